@@ -1,0 +1,168 @@
+"""The two-link arm: Páez-García et al. 2023, eq. (1), (2), Tables 1 and 2.
+
+======  ==================================  ==========  ===============
+symbol  name                                shape       unit
+======  ==================================  ==========  ===============
+theta   joint angles θ1, θ2                 (2, ...)    rad
+omega   joint velocities θ̇1, θ̇2             (2, ...)    rad/s
+alpha   joint accelerations θ̈1, θ̈2          (2, ...)    rad/s^2
+tau     joint torques τ1, τ2                (2, ...)    N m
+k       constants k1 … k7 (Table 1)         (7,)        `CONSTANT_UNITS`
+z       payload constants z1 … z5 (Table 2) (5,)        `PAYLOAD_UNITS`
+m_p     tip payload                         scalar      kg
+======  ==================================  ==========  ===============
+
+θ1 is measured from the horizontal, θ2 from link 1; gravity pulls along −y. An arm with a payload obeys the
+same equations with the constants of `with_payload`, so everything below serves both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+CONSTANT_NAMES = ("k1", "k2", "k3", "k4", "k5", "k6", "k7")
+CONSTANT_UNITS = {
+    "k1": "kg m^2",
+    "k2": "N m",
+    "k3": "kg m^2",
+    "k4": "N m",
+    "k5": "kg m^2",
+    "k6": "N m s/rad",
+    "k7": "N m s/rad",
+}
+PAYLOAD_NAMES = ("z1", "z2", "z3", "z4", "z5")
+PAYLOAD_UNITS = {"z1": "kg m^2", "z2": "kg m^2", "z3": "kg m^2", "z4": "N m", "z5": "N m"}
+
+
+@dataclass(frozen=True)
+class Arm:
+    """Physical parameters of a 2-DOF arm without payload (Table 3), in SI units.
+
+    Parameters
+    ----------
+    m1, m2 : float, kg
+    lc1, lc2 : float, m, from each joint to its link's centre of gravity
+    l1, l2 : float, m
+    I1, I2 : float, kg m^2, about each link's centre of gravity
+    b1, b2 : float, N m s/rad
+    g : float, m/s^2, 0 for an arm that moves in a horizontal plane
+    """
+
+    m1: float
+    m2: float
+    lc1: float
+    lc2: float
+    l1: float
+    l2: float
+    I1: float
+    I2: float
+    b1: float
+    b2: float
+    g: float = 9.81
+
+    def constants(self) -> FloatArray:
+        """Constants k1 … k7 (Table 1): (7,), in `CONSTANT_UNITS`."""
+        return np.array(
+            [
+                self.m2 * self.l1 * self.lc2,
+                self.m2 * self.g * self.lc2,
+                self.I2 + self.m2 * self.lc2**2,
+                self.m1 * self.g * self.lc1 + self.m2 * self.g * self.l1,
+                self.I1 + self.m1 * self.lc1**2 + self.m2 * self.l1**2,
+                self.b1,
+                self.b2,
+            ]
+        )
+
+    def payload_constants(self, m_p: float) -> FloatArray:
+        """Constants z1 … z5 of a tip payload of `m_p` kg (Table 2): (5,), in `PAYLOAD_UNITS`."""
+        return payload_constants(m_p, self.l1, self.l2, self.g)
+
+
+def payload_constants(m_p: float, l1: float, l2: float, g: float) -> FloatArray:
+    """Constants z1 … z5 of a payload of `m_p` kg at the tip of links `l1`, `l2` m (Table 2): (5,)."""
+    return m_p * np.array([l1**2, l2**2, l1 * l2, g * l1, g * l2])
+
+
+def with_payload(k: FloatArray, z: FloatArray) -> FloatArray:
+    """Constants (7,) of the arm `k` that carries the payload `z` (5,): eq. (5) against eq. (3)."""
+    k1, k2, k3, k4, k5, k6, k7 = k
+    z1, z2, z3, z4, z5 = z
+    return np.array([k1 + z3, k2 + z5, k3 + z2, k4 + z4, k5 + z1, k6, k7])
+
+
+def mass_matrix(k: FloatArray, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """M11, M12 = M21 and M22 of eq. (2) at `theta` (2, ...), each (...) in kg m^2."""
+    k1, _, k3, _, k5, _, _ = k
+    coupling = k1 * np.cos(theta[1])
+    return k5 + k3 + 2 * coupling, k3 + coupling, np.full_like(coupling, k3)
+
+
+def passive_torque(k: FloatArray, theta: FloatArray, omega: FloatArray) -> FloatArray:
+    """V + U + W of eq. (1): the torque (2, ...) in N m that the arm needs at zero acceleration."""
+    k1, k2, _, k4, _, k6, k7 = k
+    theta1, theta2 = theta
+    omega1, omega2 = omega
+    k1_s2 = k1 * np.sin(theta2)
+    k2_c12 = k2 * np.cos(theta1 + theta2)
+    return np.stack(
+        [
+            -k1_s2 * (2 * omega1 + omega2) * omega2 + k6 * omega1 + k4 * np.cos(theta1) + k2_c12,
+            k1_s2 * omega1**2 + k7 * omega2 + k2_c12,
+        ]
+    )
+
+
+def inverse_dynamics(k: FloatArray, theta: FloatArray, omega: FloatArray, alpha: FloatArray) -> FloatArray:
+    """Torque (2, ...) in N m that moves the arm so: eq. (1)."""
+    m11, m12, m22 = mass_matrix(k, theta)
+    inertial = np.stack([m11 * alpha[0] + m12 * alpha[1], m12 * alpha[0] + m22 * alpha[1]])
+    return inertial + passive_torque(k, theta, omega)
+
+
+def forward_dynamics(k: FloatArray, theta: FloatArray, omega: FloatArray, tau: FloatArray) -> FloatArray:
+    """Acceleration (2, ...) in rad/s^2 under the torque `tau` (2, ...): eq. (1) solved for θ̈."""
+    m11, m12, m22 = mass_matrix(k, theta)
+    free1, free2 = tau - passive_torque(k, theta, omega)
+    determinant = m11 * m22 - m12 * m12
+    return np.stack([m22 * free1 - m12 * free2, m11 * free2 - m12 * free1]) / determinant
+
+
+def regressor(theta: FloatArray, omega: FloatArray, alpha: FloatArray) -> FloatArray:
+    """Y (2, 7, ...) with τ = Y k: eq. (1) is linear in the constants of Table 1."""
+    theta1, theta2 = theta
+    omega1, omega2 = omega
+    alpha1, alpha2 = alpha
+    c2, s2 = np.cos(theta2), np.sin(theta2)
+    c12 = np.cos(theta1 + theta2)
+    nought = np.zeros_like(c2)
+    return np.stack(
+        [
+            np.stack(
+                [
+                    c2 * (2 * alpha1 + alpha2) - s2 * (2 * omega1 + omega2) * omega2,
+                    c12,
+                    alpha1 + alpha2,
+                    np.cos(theta1),
+                    alpha1,
+                    omega1,
+                    nought,
+                ]
+            ),
+            np.stack([c2 * alpha1 + s2 * omega1**2, c12, alpha1 + alpha2, nought, nought, nought, omega2]),
+        ]
+    )
+
+
+def energy(k: FloatArray, theta: FloatArray, omega: FloatArray) -> FloatArray:
+    """Kinetic and potential energy (...) in J, zero for the arm at rest along the horizontal."""
+    _, k2, _, k4, _, _, _ = k
+    m11, m12, m22 = mass_matrix(k, theta)
+    kinetic = 0.5 * m11 * omega[0] ** 2 + m12 * omega[0] * omega[1] + 0.5 * m22 * omega[1] ** 2
+    potential: FloatArray = k4 * np.sin(theta[0]) + k2 * np.sin(theta[0] + theta[1])
+    return np.asarray(kinetic + potential)
