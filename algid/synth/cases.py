@@ -84,9 +84,7 @@ class _CaseFile(_Table):
 
 def case_names() -> list[str]:
     """Names of the cases that ship with algid."""
-    return sorted(
-        entry.name.removesuffix(".toml") for entry in _folder().iterdir() if entry.name.endswith(".toml")
-    )
+    return sorted(entry.name.removesuffix(".toml") for entry in _folder().iterdir() if entry.name.endswith(".toml"))
 
 
 def load_case(name: str) -> Case:
