@@ -66,10 +66,8 @@ def simulate(
     if t.size < 2 or np.any(np.diff(t) <= 0):
         raise ValueError(f"t must hold at least two increasing times, got {t.size}")
     start = np.concatenate([theta0, np.zeros(2) if omega0 is None else omega0])
-    if isinstance(torque, SampledTorque):
-        states = _piecewise(k, torque, t, start)
-    else:
-        states = _smooth(k, torque, t, start)
+    sampled = isinstance(torque, SampledTorque)
+    states = _piecewise(k, torque, t, start) if sampled else _smooth(k, torque, t, start)
     return Motion(t=t, theta=states[:2], omega=states[2:], tau=torque(t))
 
 
