@@ -69,7 +69,7 @@ class LuenbergerObserver:
         kind = "complex" if np.iscomplexobj(np.array(poles)) else "real"
         self._triangle, self._basis = scipy.linalg.schur(transition, output=kind)
         self._state: FloatArray | None = None
-        self._last_angles = np.empty(2)
+        self._last_angles: FloatArray = np.empty(2)
 
     def reset(self) -> None:
         """Forget the state: the next call starts at rest."""

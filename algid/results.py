@@ -18,7 +18,7 @@ from algid.errors import ResultError
 from algid.outfiles import whole_file
 from algid.tomlfile import first_misfit
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION: Literal[1] = 1
 
 
 class Status(StrEnum):

@@ -66,9 +66,14 @@ def simulate(
     if t.size < 2 or np.any(np.diff(t) <= 0):
         raise ValueError(f"t must hold at least two increasing times, got {t.size}")
     start = np.concatenate([theta0, np.zeros(2) if omega0 is None else omega0])
-    sampled = isinstance(torque, SampledTorque)
-    states = _piecewise(k, torque, t, start) if sampled else _smooth(k, torque, t, start)
+    states = _states(k, torque, t, start)
     return Motion(t=t, theta=states[:2], omega=states[2:], tau=torque(t))
+
+
+def _states(k: FloatArray, torque: Torque, t: FloatArray, start: FloatArray) -> FloatArray:
+    if isinstance(torque, SampledTorque):
+        return _piecewise(k, torque, t, start)
+    return _smooth(k, torque, t, start)
 
 
 def _rate(k: FloatArray, state: FloatArray, tau: FloatArray) -> FloatArray:
