@@ -151,13 +151,8 @@ def _checked(
     padded = bool(separator) and any(
         re.search(rf"[ \t]{re.escape(separator)}|[ ]$", row.rstrip("\r")) for row in rows
     )
+    table = [cells for cells in (split(row, separator) for row in rows) if len(cells) == len(columns)]
     whole = frozenset(
-        column
-        for column, *cells in zip(
-            columns,
-            *(cells for row in rows if len(cells := split(row, separator)) == len(columns)),
-            strict=False,
-        )
-        if all(map(_WHOLE.match, cells))
+        column for column, *cells in zip(columns, *table, strict=True) if all(map(_WHOLE.match, cells))
     )
     return Dialect(columns, separator, comma, skip, comment, whole, padded)
