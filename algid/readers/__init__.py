@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from algid.errors import LogError
 from algid.log import Log
 
 if TYPE_CHECKING:
     from algid.profile import Profile
-    from algid.readers.base import Reader
+    from algid.readers.assemble import TableReader
 
 
-def open_log(path: str | Path, profile: Profile | None = None) -> Reader:
+def open_log(path: str | Path, profile: Profile | None = None) -> TableReader:
     """Open a log of any format, told from its content; its samples are read by `Reader.blocks`.
 
     Parameters
@@ -58,34 +55,7 @@ def read_log(path: str | Path, profile: Profile | None = None) -> Log:
     LogError
         As `open_log`, and if a value is not finite or time runs wrong.
     """
-    return _joined(open_log(path, profile).blocks())
+    from algid.readers.gather import ROWS, whole_log
 
-
-def _joined(blocks: Iterator[Log]) -> Log:
-    """One log out of blocks, one channel at a time: two copies of the whole never stand side by side."""
-    first = next(blocks)
-    stamps, thetas, taus, notices = [first.stamp_ns], [first.theta], [first.tau], [first.notices]
-    omegas = [first.omega] if first.omega is not None else []
-    origin = first.origin
-    del first
-    for block in blocks:
-        stamps.append(block.stamp_ns)
-        thetas.append(block.theta)
-        taus.append(block.tau)
-        notices.append(block.notices)
-        omegas += [block.omega] if block.omega is not None else []
-        del block
-    return Log(
-        _one(stamps),
-        _one(thetas),
-        _one(taus),
-        origin,
-        _one(omegas) if omegas else None,
-        tuple(notice for some in notices for notice in some),
-    )
-
-
-def _one(parts: list[Any]) -> Any:
-    whole = parts[0] if len(parts) == 1 else np.concatenate(parts, axis=-1)
-    parts.clear()
-    return whole
+    reader = open_log(path, profile)
+    return whole_log(reader.blocks(ROWS), reader.rows)

@@ -29,6 +29,8 @@ class TableReader:
     conversion: Conversion
     unwrap: tuple[bool, bool] = (False, False)
     notices: tuple[Notice, ...] = ()
+    rows: int = 0
+    """Samples to expect, 0 where the file does not tell."""
 
     def blocks(self, rows: int = BLOCK_ROWS) -> Iterator[Log]:
         """Blocks of at most `rows` samples: see `algid.readers.base.Reader`.

@@ -52,7 +52,8 @@ def to_nanoseconds(times: NDArray[Any], unit: str) -> IntArray:
     if np.issubdtype(times.dtype, np.integer):
         if times.size and max(abs(int(times.min())), abs(int(times.max()))) * factor > _LARGEST:
             raise ValueError("a time beyond 292 years")
-        return times.astype(np.int64) * factor
+        whole_ns = times.astype(np.int64, copy=False)
+        return whole_ns * factor if factor != 1 else whole_ns
     if not np.all(np.isfinite(times)):
         raise ValueError("a time that is not finite")
     if times.size and float(np.abs(times).max()) * factor > _LARGEST:

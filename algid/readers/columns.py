@@ -27,11 +27,16 @@ class Columns:
     notices: tuple[Notice, ...] = ()
 
     def reader(
-        self, origin: Origin, tables: Callable[[int], Iterator[Table]], profile: Profile | None
+        self,
+        origin: Origin,
+        tables: Callable[[int], Iterator[Table]],
+        profile: Profile | None,
+        rows: int,
     ) -> TableReader:
-        """A reader of these columns out of `tables`."""
+        """A reader of these columns out of `tables`; `rows` samples are to be expected."""
         unwrap = (profile.theta1.unwrap, profile.theta2.unwrap) if profile else (False, False)
-        return TableReader(origin, tables, conversion(origin.path, profile, self.units), unwrap, self.notices)
+        units = conversion(origin.path, profile, self.units)
+        return TableReader(origin, tables, units, unwrap, self.notices, rows)
 
 
 def assign(path: str, available: Sequence[str], profile: Profile | None) -> Columns:

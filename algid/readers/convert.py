@@ -47,7 +47,10 @@ class Conversion:
     def _joint_pair(self, table: Table, first: str, second: str) -> FloatArray:
         both = np.empty((2, len(table)))
         for row, name in zip(both, (first, second), strict=True):
-            np.multiply(table.columns[name], self.factors[name], out=row)
+            if self.factors[name] == 1:
+                row[:] = table.columns[name]
+            else:
+                np.multiply(table.columns[name], self.factors[name], out=row)
             if self.offsets[name]:
                 row += self.offsets[name]
         return both

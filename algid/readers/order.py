@@ -54,9 +54,9 @@ class Sorter:
             yield pending.noting(*self._report())
 
     def _sorted(self, table: Table) -> Table:
-        steps = np.diff(table.stamp_ns)
-        if steps.size == 0 or steps.min() > 0:
+        if np.all(table.stamp_ns[1:] > table.stamp_ns[:-1]):
             return table
+        steps = np.diff(table.stamp_ns)
         backward = int(np.count_nonzero(steps < 0))
         if backward:
             table = self._reordered(table, backward)

@@ -39,6 +39,7 @@ def open_parquet(path: Path, profile: Profile | None = None) -> TableReader:
         schema = dict(pl.read_parquet_schema(path))
         metadata = pl.read_parquet_metadata(path)
         available = _flat_names(path, schema)
+        rows = pl.scan_parquet(path, glob=False).select(pl.len()).collect().item()
     except (pl.exceptions.PolarsError, OSError, pl.exceptions.PanicException) as error:
         raise _damaged(path, error) from error
     companion = _companion(path, metadata)
@@ -46,7 +47,7 @@ def open_parquet(path: Path, profile: Profile | None = None) -> TableReader:
     _check_types(path, columns, available, schema)
     origin = Origin(str(path), "parquet", dict(columns.sources), companion.truth if companion else None)
     source = _Groups(path, columns, available, schema, companion.sums if companion else {})
-    return columns.reader(origin, source.tables, profile)
+    return columns.reader(origin, source.tables, profile, rows)
 
 
 def _check_footer(path: Path) -> None:

@@ -33,6 +33,7 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
     with opened(paths[0]) as (file, found):
         wanted = plan(file, found, profile)
         truth = _truth(paths[0], found)
+        rows = wanted.topics[0].count(found)
     name = str(paths[0] if len(paths) == 1 else paths[0].parent)
     origin = Origin(name, "mcap", wanted.mapping, truth)
 
@@ -43,7 +44,7 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
                 yield from topic.tables(str(path), file, found, rows)
 
     unwrap = (profile.theta1.unwrap, profile.theta2.unwrap) if profile else (False, False)
-    return TableReader(origin, tables, conversion(name, profile, {}), unwrap)
+    return TableReader(origin, tables, conversion(name, profile, {}), unwrap, (), rows)
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from algid.log import IntArray
 from algid.readers.mcap.messages import Messages
 from algid.readers.mcap.shape import Numbers, Shape
 
@@ -89,9 +90,9 @@ class Decoder:
         """
         held = np.zeros(len(messages), np.bool_)
         parts: list[tuple[NDArray[np.intp], Fields]] = []
-        sizes = np.unique(messages.sizes) if len(messages) else messages.sizes
-        for size in sizes.tolist():
-            rows = np.arange(len(messages)) if sizes.size == 1 else np.flatnonzero(messages.sizes == size)
+        sizes = _distinct(messages.sizes)
+        for size in sizes:
+            rows = np.arange(len(messages)) if len(sizes) == 1 else np.flatnonzero(messages.sizes == size)
             for chosen, fields in self._of_one_size(messages, size, rows):
                 held[chosen] = True
                 parts.append((chosen, fields))
@@ -124,6 +125,13 @@ class Decoder:
         start = int(messages.starts[row])
         payload = messages.content[start : start + int(messages.sizes[row])].tobytes()
         return layout(payload, self.walk(payload), self.wanted, self.needed)
+
+
+def _distinct(sizes: IntArray) -> list[int]:
+    """The sizes that there are; mostly one."""
+    if sizes.size and np.all(sizes == sizes[0]):
+        return [int(sizes[0])]
+    return np.unique(sizes).tolist()
 
 
 def _lead(size: int) -> int:

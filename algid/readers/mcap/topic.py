@@ -74,6 +74,12 @@ class Topic:
         counted = sum(found.counts.get(channel, 0) for channel in channels) if found.counts else None
         yield last.noting(*found.notices, *account.notices(counted), *self._skipped(decoder))
 
+    def count(self, found: Catalogue) -> int:
+        """Messages that the file's statistics promise, 0 without them."""
+        return sum(
+            (found.counts or {}).get(channel, 0) for channel in channels_of(found, self.name, self.type)
+        )
+
     def _decoder(self, path: str, found: Catalogue, channels: frozenset[int]) -> Decoder:
         channel: Any = found.channels[min(channels)]
         wanted = dict(self.fields.paths)
