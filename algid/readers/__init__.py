@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,6 +37,8 @@ def open_log(path: str | Path, profile: Profile | None = None) -> TableReader:
         from algid.readers.mcap import open_mcap
 
         return open_mcap([path], profile)
+    if kind == "rosbag2":
+        return _open_bag(path, profile)
     if kind == "parquet":
         from algid.readers.parquet import open_parquet
 
@@ -45,6 +48,16 @@ def open_log(path: str | Path, profile: Profile | None = None) -> TableReader:
 
         return open_csv(path, profile, kind)
     raise LogError(f"{path}: {kind} logs cannot be read; convert it to MCAP, Parquet or CSV")
+
+
+def _open_bag(path: Path, profile: Profile | None) -> TableReader:
+    from algid.readers.mcap import open_mcap
+    from algid.readers.rosbag2 import bag_files
+
+    bag = bag_files(path)
+    if bag.kind != "mcap":
+        raise LogError(f"{path}: a bag of {bag.kind} files; expected MCAP")
+    return replace(open_mcap(bag.paths, profile), notices=bag.notices)
 
 
 def read_log(path: str | Path, profile: Profile | None = None) -> Log:

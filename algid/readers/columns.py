@@ -62,6 +62,8 @@ def assign(path: str, available: Sequence[str], profile: Profile | None) -> Colu
         )
     units = {name: unit for name, unit in choice.units.items() if sources.get(name) == choice.columns[name]}
     units |= _currents(sources)
+    if all(sources[name] == name for name in ("t", *JOINT_CHANNELS)):
+        units.setdefault("t", "s")  # algid's own names mean algid's own units
     time_unit = profile.time_unit if profile and profile.time_unit else units.get("t")
     return Columns(sources, units, time_unit, _notices(sources))
 

@@ -57,10 +57,7 @@ def test_any_finite_log_survives(
         path = Path(folder) / f"log.{kind}"
         write_log(path, log)
         found = read_log(path)
-    if kind == "csv":  # steps of years look like another unit: only the values are compared
-        assert found.theta.tobytes() == log.theta.tobytes()
-    else:
-        assert same(found, log)
+    assert same(found, log)
 
 
 @pytest.mark.parametrize("kind", FORMATS)

@@ -62,9 +62,9 @@ class Shape:
         if array is None or array[1] not in self.numbers:
             return None
         found, index = self.numbers[array[1]], int(array[2])
-        if index >= found.count:
+        if index >= found.count or found.kind[0] not in "<>|":
             return None
-        width = 0 if found.kind == "varint" else int(found.kind[-1])
+        width = int(found.kind[-1])
         return Numbers(found.offset + index * width, found.kind, 1, found.width, found.zigzag)
 
     def _numbered(self, path: str) -> str | None:

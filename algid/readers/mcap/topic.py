@@ -13,9 +13,8 @@ from algid.errors import LogError
 from algid.log import IntArray, Notice
 from algid.readers.mcap.catalogue import Catalogue, channels_of
 from algid.readers.mcap.choose import Fields
-from algid.readers.mcap.codec import walk_for
+from algid.readers.mcap.codec import Decodes, decoder_for
 from algid.readers.mcap.framing import File
-from algid.readers.mcap.layout import Decoder
 from algid.readers.mcap.load import Account, batches
 from algid.readers.mcap.messages import Messages
 from algid.readers.mcap.shape import MisfitError
@@ -80,16 +79,14 @@ class Topic:
             (found.counts or {}).get(channel, 0) for channel in channels_of(found, self.name, self.type)
         )
 
-    def _decoder(self, path: str, found: Catalogue, channels: frozenset[int]) -> Decoder:
+    def _decoder(self, path: str, found: Catalogue, channels: frozenset[int]) -> Decodes:
         channel: Any = found.channels[min(channels)]
         wanted = dict(self.fields.paths)
         if self.fields.stamp is not None and self.clock != "log":
             wanted |= dict(zip(_STAMP, self.fields.stamp, strict=True))
-        return Decoder(
-            walk_for(path, channel, found.schemas.get(channel.schema_id)), wanted, frozenset(wanted)
-        )
+        return decoder_for(path, channel, found.schemas.get(channel.schema_id), wanted)
 
-    def _table(self, path: str, decoder: Decoder, messages: Messages) -> Table:
+    def _table(self, path: str, decoder: Decodes, messages: Messages) -> Table:
         try:
             held, columns = decoder.columns(messages)
         except MisfitError as error:
@@ -121,7 +118,7 @@ class Topic:
         text = f"header stamps of {self.name!r} stand still at {header[0]} ns: the recorder's times are taken"
         return "log", (Notice("LOG_TIME", text),)
 
-    def _skipped(self, decoder: Decoder) -> list[Notice]:
+    def _skipped(self, decoder: Decodes) -> list[Notice]:
         if not decoder.skipped:
             return []
         lacking = "velocities too" if any(name in decoder.wanted for name in VELOCITIES) else "both joints"
