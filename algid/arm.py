@@ -19,11 +19,12 @@ same equations with the constants of `with_payload`, so everything below serves 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+FloatArray = NDArray[np.floating[Any]]  # float64 throughout; numpy types its arithmetic no tighter
 
 CONSTANT_NAMES = ("k1", "k2", "k3", "k4", "k5", "k6", "k7")
 CONSTANT_UNITS = {

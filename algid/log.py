@@ -51,7 +51,7 @@ class Notice:
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a log came from: its file, format, each channel's source, and the truth behind a synthetic log."""
+    """Where a log came from: its file, format, each channel's source, and a synthetic log's truth."""
 
     path: str
     format: str

@@ -25,18 +25,14 @@ def whole_file(path: Path) -> Iterator[Path]:
         handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
         os.close(handle)
     except OSError as error:
-        raise OutputError(
-            f"{path}: cannot write there ({error.strerror}); choose another folder with -o"
-        ) from error
+        raise OutputError(f"{path}: cannot write there ({error.strerror}); choose another folder with -o") from error
     temporary = Path(name)
     try:
         yield temporary
         temporary.chmod(0o666 & ~_umask())
         temporary.replace(path)
     except OSError as error:
-        raise OutputError(
-            f"{path}: cannot write ({error.strerror}); choose another folder with -o"
-        ) from error
+        raise OutputError(f"{path}: cannot write ({error.strerror}); choose another folder with -o") from error
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -1,16 +1,24 @@
 """Uniform stretches of a log: what every estimator works on.
 
-A log is cut where samples are missing and, where its stamps jitter, put on a uniform time base by a cubic
-spline through the recorded samples.
+A log is cut where samples are missing for long and put on a uniform time base where its stamps jitter, by the
+cubic through the four recorded samples around each instant. What comes out does not depend on the blocks in
+which the log was read.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.log import IntArray, Log, join
+
+PERIOD_SAMPLES = 4096  # the first samples, from which the period is taken
+LONGEST_GAP = 5.0  # periods: a longer gap cuts the log
+EVEN = 1e-3  # periods: stamps this close to the time base are taken as lying on it
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,3 +51,160 @@ class Segment:
     def t(self) -> FloatArray:
         """Time (N,) in s since the log's first sample."""
         return self.start + self.dt * np.arange(len(self), dtype=np.float64)
+
+    def part(self, first: int, last: int) -> Segment:
+        """Samples `first` to `last` - 1 as views; it continues the part before it."""
+        return replace(
+            self,
+            start=self.start + first * self.dt,
+            theta=self.theta[:, first:last],
+            tau=self.tau[:, first:last],
+            omega=None if self.omega is None else self.omega[:, first:last],
+            continues=self.continues or first > 0,
+        )
+
+
+def segments(blocks: Iterable[Log]) -> Iterator[Segment]:
+    """Uniform segments of the log that comes in `blocks`, in time order.
+
+    The period is the mean over the log's first samples, gaps left out. A gap of more than `LONGEST_GAP` periods
+    starts a new stretch; shorter ones are filled by interpolation.
+    """
+    source = iter(blocks)
+    head = _first_samples(source)
+    if head is None:
+        return
+    dt = _mean_period(head.stamp_ns)
+    sampler = _Sampler(int(head.stamp_ns[0]), dt)
+    for block in _chain(head, source):
+        yield from sampler.push(block)
+    yield from sampler.finish()
+
+
+def _first_samples(source: Iterator[Log]) -> Log | None:
+    """The first blocks joined, so that the period does not depend on how they were cut."""
+    head: list[Log] = []
+    while sum(map(len, head)) < PERIOD_SAMPLES:
+        block = next(source, None)
+        if block is None:
+            break
+        if len(block):
+            head.append(block)
+    return join(head) if head else None
+
+
+def _chain(head: Log, rest: Iterator[Log]) -> Iterator[Log]:
+    yield head
+    yield from rest
+
+
+def _mean_period(stamp_ns: IntArray) -> float:
+    """Mean time between neighbouring samples in s, over the first samples and without gaps."""
+    steps = np.diff(stamp_ns[:PERIOD_SAMPLES]).astype(np.float64)
+    near = steps[np.abs(steps - np.median(steps)) <= 0.5 * np.median(steps)]
+    return float(near.mean()) * 1e-9
+
+
+class _Sampler:
+    """Puts blocks on the time base, holding back the last samples until their successors are known."""
+
+    def __init__(self, origin_ns: int, dt: float) -> None:
+        self._origin_ns = origin_ns
+        self._dt = dt
+        self._pending: Log | None = None
+        self._anchor = 0.0  # time of the stretch's first sample
+        self._emitted = 0  # grid points of the stretch that have been given out
+
+    def push(self, block: Log) -> Iterator[Segment]:
+        held = block if self._pending is None else join([self._pending, block])
+        gaps = np.flatnonzero(np.diff(held.stamp_ns) * 1e-9 > LONGEST_GAP * self._dt) + 1
+        edges = [0, *gaps.tolist(), len(held)]
+        for first, last in pairwise(edges[:-1]):
+            yield from self._stretch(held.part(first, last), ends=True)
+            self._anchor, self._emitted = self._time(held)[last], 0
+        self._pending = held.part(edges[-2], edges[-1])
+        yield from self._stretch(self._pending, ends=False)
+        self._pending = self._pending.part(max(0, len(self._pending) - 4), len(self._pending))
+
+    def finish(self) -> Iterator[Segment]:
+        if self._pending is not None:
+            yield from self._stretch(self._pending, ends=True)
+
+    def _time(self, log: Log) -> FloatArray:
+        return (log.stamp_ns - self._origin_ns) * 1e-9
+
+    def _stretch(self, log: Log, *, ends: bool) -> Iterator[Segment]:
+        """The grid points that `log` settles: up to its last sample but one, or all where the stretch ends."""
+        t = self._time(log)
+        reach = t[-1] + EVEN * self._dt if ends else t[max(0, t.size - 2)] - EVEN * self._dt
+        count = int(np.floor((reach - self._anchor) / self._dt)) + 1 - self._emitted
+        if count <= 0 or t.size < 4:
+            return
+        grid = self._anchor + self._dt * np.arange(self._emitted, self._emitted + count)
+        first = int(np.searchsorted(t, grid[0] - 0.5 * self._dt))
+        take = _take_even if _is_even(t[first : first + count], grid, self._dt) else _interpolate
+        yield Segment(
+            start=float(grid[0]),
+            dt=self._dt,
+            theta=take(t, log.theta, grid, first),
+            tau=take(t, log.tau, grid, first),
+            omega=None if log.omega is None else take(t, log.omega, grid, first),
+            continues=self._emitted > 0,
+        )
+        self._emitted += count
+
+
+def _is_even(t: FloatArray, grid: FloatArray, dt: float) -> bool:
+    return t.size == grid.size and bool(np.all(np.abs(t - grid) <= EVEN * dt))
+
+
+def _take_even(_t: FloatArray, signal: FloatArray, grid: FloatArray, first: int) -> FloatArray:
+    return signal[:, first : first + grid.size]
+
+
+def _interpolate(t: FloatArray, signal: FloatArray, grid: FloatArray, _first: int) -> FloatArray:
+    """Values (2, M) at `grid` of the cubic through the four samples around each instant (Lagrange)."""
+    corner = np.clip(np.searchsorted(t, grid, side="right") - 2, 0, t.size - 4)
+    nodes = t[corner[:, None] + np.arange(4)]
+    values = np.zeros((signal.shape[0], grid.size))
+    for node in range(4):
+        others = [other for other in range(4) if other != node]
+        weight = np.prod([(grid - nodes[:, other]) / (nodes[:, node] - nodes[:, other]) for other in others], axis=0)
+        values += weight * signal[:, corner + node]
+    return values
+
+
+def pieces(source: Iterable[Segment], rows: int) -> Iterator[Segment]:
+    """Cut each stretch into pieces of `rows` samples; a rest shorter than half a piece joins the last one.
+
+    The pieces do not depend on how the stretches came in. Their length is below 1.5 `rows`; a stretch shorter
+    than half a piece is a piece of its own.
+    """
+    held: Segment | None = None
+    for segment in source:
+        if held is not None and not segment.continues:
+            yield from _cut(held, rows)
+            held = None
+        held = segment if held is None else _append(held, segment)
+        while len(held) >= 2 * rows:
+            yield held.part(0, rows)
+            held = held.part(rows, len(held))
+    if held is not None:
+        yield from _cut(held, rows)
+
+
+def _cut(rest: Segment, rows: int) -> Iterator[Segment]:
+    if len(rest) >= rows + (rows + 1) // 2:
+        yield rest.part(0, rows)
+        rest = rest.part(rows, len(rest))
+    yield rest
+
+
+def _append(first: Segment, second: Segment) -> Segment:
+    both_have_omega = first.omega is not None and second.omega is not None
+    return replace(
+        first,
+        theta=np.concatenate([first.theta, second.theta], axis=1),
+        tau=np.concatenate([first.tau, second.tau], axis=1),
+        omega=np.concatenate([first.omega, second.omega], axis=1) if both_have_omega else None,
+    )

@@ -1,0 +1,134 @@
+"""Arms to simulate: the cases of the paper (Tables 3 and 4) and TOML files of the same form.
+
+A case holds the arm, the payload, the torque that drives it and, for the paper's own, the errors of Table 4.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from algid.arm import Arm
+from algid.errors import SettingError
+from algid.synth.excitation import MultiSine
+from algid.tomlfile import read_toml
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Harmonics = Annotated[list[Finite], Field(min_length=1)]
+
+
+@dataclass(frozen=True)
+class Case:
+    """An arm, its payload in kg, the torque that drives it, and the paper's errors in percent where known."""
+
+    name: str
+    arm: Arm
+    payload: float
+    torque: MultiSine | None
+    paper_error_percent: dict[str, float]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class _ArmTable(_Table):
+    m1: Positive
+    m2: Positive
+    lc1: Finite
+    lc2: Finite
+    l1: Positive
+    l2: Positive
+    I1: NonNegative
+    I2: NonNegative
+    b1: NonNegative
+    b2: NonNegative
+    g: NonNegative = 9.81
+
+
+class _PayloadTable(_Table):
+    m_p: NonNegative
+
+
+class _JointTorque(_Table):
+    amplitude: Harmonics
+    frequency: Harmonics
+    phase: Harmonics
+
+    @model_validator(mode="after")
+    def _same_lengths(self) -> _JointTorque:
+        if not len(self.amplitude) == len(self.frequency) == len(self.phase):
+            raise ValueError("amplitude, frequency and phase need the same number of harmonics")
+        return self
+
+
+class _TorqueTable(_Table):
+    joint1: _JointTorque
+    joint2: _JointTorque
+
+
+class _CaseFile(_Table):
+    arm: _ArmTable
+    payload: _PayloadTable = _PayloadTable(m_p=0.0)
+    torque: _TorqueTable | None = None
+    paper_error_percent: dict[str, Positive] = {}
+
+
+def case_names() -> list[str]:
+    """Names of the cases that ship with algid."""
+    return sorted(entry.name.removesuffix(".toml") for entry in _folder().iterdir() if entry.name.endswith(".toml"))
+
+
+def load_case(name: str) -> Case:
+    """The shipped case of that name, or the case that the TOML file `name` describes.
+
+    Raises
+    ------
+    SettingError
+        If there is neither such a case nor such a file, or the file does not describe an arm.
+    """
+    if name in case_names():
+        with resources.as_file(_folder() / f"{name}.toml") as path:
+            return _read_case(path)
+    if name.endswith(".toml"):
+        return _read_case(Path(name))
+    raise SettingError(
+        f"{name}: no such case; expected {', '.join(case_names())} or a .toml file that describes an arm"
+    )
+
+
+def _folder() -> Any:
+    return resources.files("algid") / "cases"
+
+
+def _read_case(path: Path) -> Case:
+    content = read_toml(path, _CaseFile)
+    return Case(
+        name=path.stem,
+        arm=Arm(**content.arm.model_dump()),
+        payload=content.payload.m_p,
+        torque=None if content.torque is None else _multi_sine(content.torque),
+        paper_error_percent=dict(content.paper_error_percent),
+    )
+
+
+def _multi_sine(table: _TorqueTable) -> MultiSine:
+    joints = (table.joint1, table.joint2)
+    return MultiSine(
+        amplitude=tuple(tuple(joint.amplitude) for joint in joints),
+        frequency=tuple(tuple(joint.frequency) for joint in joints),
+        phase=tuple(tuple(joint.phase) for joint in joints),
+    )
+
+
+def arm_table(arm: Arm) -> dict[str, float]:
+    """The arm as the ``[arm]`` table of a case file."""
+    return {name: float(np.float64(value)) for name, value in dataclasses.asdict(arm).items()}
