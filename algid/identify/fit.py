@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from scipy.special import stdtrit
 
 from algid.arm import FloatArray
 from algid.identify.identifiability import Identifiability, examine
@@ -129,8 +130,6 @@ def _robust(
     known: Identifiability,
     prior: Prior | None,
 ) -> tuple[FloatArray, float]:
-    from scipy.special import stdtrit
-
     meat, freedom = sandwich(shared, logs, beta, prior)
     covariance = known.covariance @ meat @ known.covariance
     return covariance, float(stdtrit(max(2, freedom), 0.975))

@@ -49,9 +49,7 @@ def examine(names: Sequence[str], values: FloatArray, S: FloatArray, moved: Floa
     determined = tuple(bool(share < _SHARE) for share in part)
     kept = vectors[:, ~lost]
     inverse = (kept / np.maximum(eigenvalues[~lost], 1e-300)) @ kept.T
-    return Identifiability(
-        tuple(_sentences(names, null, size, moved)), determined, inverse * np.outer(size, size)
-    )
+    return Identifiability(tuple(_sentences(names, null, size, moved)), determined, inverse * np.outer(size, size))
 
 
 def sizes(names: Sequence[str], values: FloatArray) -> FloatArray:
@@ -118,4 +116,3 @@ def _reason(moved: FloatArray) -> str:
     if len(still) == 2:
         return ": neither joint moved"
     return f": joint {still[0]} never moved" if still else ""
-

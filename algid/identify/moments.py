@@ -76,7 +76,12 @@ class Windows:
         s = np.clip((np.arange(length) + offset) / length, 0, 1)
         span = length * self.dt
         window = _WINDOW / _WINDOW_INTEGRAL
-        return np.stack([window.deriv(order)(s) / span ** (order + 1) if order else window(s) / span for order in range(3)]) * self.dt
+        return (
+            np.stack(
+                [window.deriv(order)(s) / span ** (order + 1) if order else window(s) / span for order in range(3)]
+            )
+            * self.dt
+        )
 
     @cached_property
     def _plain(self) -> FloatArray:

@@ -30,7 +30,6 @@ _DIFFERENCE = 6  # order of the difference that leaves only noise of a smooth si
 _PROBES = 8
 _LARGEST_STEP = 2.0  # in log σ²
 _SMALLEST = 1e-12  # relative to the signal: below it floating point is the noise
-_STIFFEST = 1e-7  # least σ_τ relative to the torque that σ_θ stands for at the sampling frequency
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,10 +92,15 @@ def variance_score(linear: Linearised, length: int, seed: int) -> VarianceScore:
     residual = _by_joint(multipliers[-1])
     back = adjoint(H, residual, first, length)
     power = np.concatenate([np.sum(back**2, axis=1), np.sum(residual**2, axis=1)])
-    directions = np.stack([forward(H, _only(back, 0), first), forward(H, _only(back, 1), first), _only(residual, 0), _only(residual, 1)])
+    directions = np.stack(
+        [forward(H, _only(back, 0), first), forward(H, _only(back, 1), first), _only(residual, 0), _only(residual, 1)]
+    )
     whitened = linear.solve(_by_row(directions))
     return VarianceScore(
-        power, _traces(linear, length, rows, seed), 0.5 * whitened @ whitened.T, _absorbed(multipliers[:-1], H, first, length)
+        power,
+        _traces(linear, length, rows, seed),
+        0.5 * whitened @ whitened.T,
+        _absorbed(multipliers[:-1], H, first, length),
     )
 
 
@@ -135,23 +139,23 @@ def _only(signal: FloatArray, joint: int) -> FloatArray:
     return kept
 
 
-def newton_step(noise: NoiseLevels, score: VarianceScore, S: FloatArray) -> tuple[NoiseLevels, float]:
-    """Better noise levels, and the largest change of a log σ² that the data can tell from none."""
+def newton_step(noise: NoiseLevels, score: VarianceScore, S: FloatArray) -> NoiseLevels:
+    """Better noise levels; S (q, q) is the information on the coefficients, whose freedom is not the noise's."""
     inverse = scaled_pinv(S)
     freedom = score.trace - np.einsum("xy,ixy->i", inverse, score.absorbed)
     gradient = 0.5 * (score.power - freedom)
     curvature = score.average + np.diag(0.05 * np.maximum(np.diag(score.average), 1.0))
     step = np.clip(np.linalg.solve(curvature, gradient), -_LARGEST_STEP, _LARGEST_STEP)
-    told = np.abs(step) * np.sqrt(np.diag(score.average))
     factor = np.exp(0.5 * step)
-    return NoiseLevels(noise.theta * factor[:2], noise.tau * factor[2:]), float(told.max())
+    return NoiseLevels(noise.theta * factor[:2], noise.tau * factor[2:])
+
+
+def change_told(before: NoiseLevels, after: NoiseLevels, score: VarianceScore) -> float:
+    """Largest change of a log variance, in its own standard deviations."""
+    ratio = np.concatenate([after.theta / before.theta, after.tau / before.tau])
+    return float(np.max(np.abs(2 * np.log(ratio)) * np.sqrt(np.diag(score.average))))
 
 
 def floored(noise: NoiseLevels, floor: NoiseLevels) -> NoiseLevels:
     """Levels no smaller than `floor`."""
     return NoiseLevels(np.maximum(noise.theta, floor.theta), np.maximum(noise.tau, floor.tau))
-
-
-def stiffness_floor(noise: NoiseLevels, G: FloatArray) -> FloatArray:
-    """Least torque noise (2,) at which the factorisation keeps enough digits, G as in `whitening.linearise`."""
-    return _STIFFEST * np.sqrt(np.mean(np.einsum("abpn,b->an", G**2, noise.theta**2), axis=1))

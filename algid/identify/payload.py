@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.identify.information import LogInformation, combine, scaled_pinv
+from algid.identify.information import LogInformation, Prior, combine, scaled_pinv
 from algid.identify.shared import Shared
 
 _FIRST_MASSES = (0.02, 0.1, 0.5, 2.0, 10.0)  # kg
@@ -17,15 +17,20 @@ def first_payload(shared: Shared, bare: FloatArray, loaded: LogInformation) -> F
 
     `loaded` is the sum over the loaded logs, linearised at the loaded arm's own coefficients.
     """
-    best, best_value = np.empty(0), -np.inf
-    start = best
+    best: FloatArray | None = None
+    best_value = -np.inf
+    start = bare
     for mass in _FIRST_MASSES:
-        guess = {"m_p": mass, "l1": _length(shared, loaded, bare, mass, "k4"), "l2": _length(shared, loaded, bare, mass, "k2")}
+        guess = {
+            "m_p": mass,
+            "l1": _length(shared, loaded, bare, mass, "k4"),
+            "l2": _length(shared, loaded, bare, mass, "k2"),
+        }
         start = np.concatenate([bare, [guess[name] for name in shared.names[len(bare) :]]])
         beta, value = _fitted(shared, start, loaded)
         if value > best_value and np.all(beta[len(bare) :] > 0):
             best, best_value = beta, value
-    return best if best.size else start
+    return start if best is None else best
 
 
 def _length(shared: Shared, loaded: LogInformation, bare: FloatArray, mass: float, name: str) -> float:
@@ -38,8 +43,6 @@ def _length(shared: Shared, loaded: LogInformation, bare: FloatArray, mass: floa
 
 
 def _fitted(shared: Shared, start: FloatArray, loaded: LogInformation) -> tuple[FloatArray, float]:
-    from algid.identify.information import Prior
-
     count = len(shared.log_names)
     S, _ = loaded.total
     # The bare arm is held by a prior far tighter than the loaded log.

@@ -8,7 +8,7 @@ efficient (Le Cam's one-step estimator): the start is already within its own err
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -22,6 +22,7 @@ from algid.identify.information import LogInformation, Prior, combine
 from algid.identify.model import Model
 from algid.identify.noise import (
     VarianceScore,
+    change_told,
     first_guess,
     floored,
     newton_step,
@@ -41,7 +42,9 @@ _TRAINED = 8  # pieces of a log in the training set
 _SHORTEST = 8 * POINTS  # samples: shorter pieces tell nothing
 _STRETCH = 64  # samples over which scores are summed
 _SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
+_FINEST = 1e-10  # relative noise that no sensor undercuts, and floating point can still weigh
 _STEPS = 20
+_NOISE_STEPS = 12  # then the noise levels stay, so that the rest can settle
 _SETTLED = 0.02  # change of every parameter in its standard deviations
 _NOISE_SETTLED = 0.2  # change of every log variance in its standard deviations
 _FAR = 3.0  # standard deviations of the training set beyond which the last step is repeated
@@ -70,14 +73,14 @@ class RefinedSettings:
         Window and bandwidth of the weak estimate that it starts from.
     """
 
-    model: Model = Model()
+    model: Model = field(default_factory=Model)
     hold: Literal["foh", "zoh"] = "foh"
     delay: float = 0.0
     estimate_delay: bool = False
     noise: NoiseLevels | None = None
     lengths: dict[str, float] = field(default_factory=dict)
     prior: Prior | None = None
-    weak: WeakSettings = WeakSettings()
+    weak: WeakSettings = field(default_factory=WeakSettings)
 
     def shift(self, dt: float) -> float:
         """Time in s by which the hold delays a torque."""
@@ -97,20 +100,22 @@ class _Outcome:
 class _Log:
     """One log: its source, the pieces it trains on, and their trajectories and noise levels so far."""
 
-    def __init__(self, source: Source, loaded: bool, settings: RefinedSettings) -> None:
+    def __init__(
+        self, source: Source, loaded: bool, settings: RefinedSettings, kept: list[Segment], whole: bool
+    ) -> None:
         self.source = source
         self.loaded = loaded
         self.settings = settings
-        self.kept, self.whole = _training_set(source())
+        self.kept = kept
+        self.whole = whole
         self.trajectories = [_first_trajectory(piece) for piece in self.kept]
-        guess = _guessed_noise(self.kept) if self.kept else None
-        self.noise = settings.noise or guess
-        self.floor = _floor(self.kept) if self.kept else None
+        self.floor = _floor(self.kept)
+        self.noise = settings.noise or _guessed_noise(self.kept, self.floor)
 
     def train(self, shared: Shared, c: FloatArray) -> _Outcome:
         """Linearise the training set at the coefficients `c`; keeps the trajectories found."""
-        assert self.noise is not None
-        stretches, scores, innovations = _sums(), [], []
+        stretches, scores = (BlockSums(), BlockSums()), []
+        innovations: list[Correlations] = []
         for seed, (piece, theta) in enumerate(zip(self.kept, self.trajectories, strict=True)):
             linear = _linearise(self.settings, shared, c, theta, piece, self.noise)
             _collect(linear, stretches, innovations)
@@ -123,8 +128,8 @@ class _Log:
 
     def run(self, shared: Shared, c: FloatArray) -> _Outcome:
         """Pass over the whole log at the coefficients `c`, settling each piece's trajectory by itself."""
-        assert self.noise is not None
-        stretches, innovations = _sums(), []
+        stretches = (BlockSums(), BlockSums())
+        innovations: list[Correlations] = []
         for piece in pieces(self.source(), PIECE_SAMPLES):
             if len(piece) < _SHORTEST:
                 continue
@@ -135,9 +140,7 @@ class _Log:
         return _Outcome(_information(self.loaded, c, stretches), None, _added(innovations), [])
 
 
-def fit(
-    unloaded: Sequence[Source], loaded: Sequence[Source] = (), settings: RefinedSettings | None = None
-) -> Fit:
+def fit(unloaded: Sequence[Source], loaded: Sequence[Source] = (), settings: RefinedSettings | None = None) -> Fit:
     """Most likely parameters of the arm, and of its payload where there are loaded logs.
 
     Parameters
@@ -159,9 +162,7 @@ def fit(
     settings = settings or RefinedSettings()
     start = weak_fit(unloaded, loaded, _weak_settings(settings), settings.lengths, settings.prior)
     shared = start.shared
-    logs = [_Log(source, False, settings) for source in unloaded]
-    logs += [_Log(source, True, settings) for source in loaded]
-    logs = [log for log in logs if log.kept]
+    logs = [*_opened(unloaded, False, settings), *_opened(loaded, True, settings)]
     try:
         beta, outcomes, iterations, settled = _train(shared, logs, start.values, settings)
         if not all(log.whole for log in logs):
@@ -174,8 +175,15 @@ def fit(
     informations = [outcome.information for outcome in outcomes]
     coloured = not whiteness.white
     fitted = conclude("refined", shared, informations, beta, start.moved, settings.prior, coloured=coloured)
-    noise = tuple(log.noise for log in logs if log.noise is not None)
+    noise = tuple(log.noise for log in logs)
     return replace(fitted, noise=noise, whiteness=whiteness, iterations=iterations)
+
+
+def _opened(sources: Sequence[Source], loaded: bool, settings: RefinedSettings) -> Iterator[_Log]:
+    for source in sources:
+        kept, whole = _training_set(source())
+        if kept:
+            yield _Log(source, loaded, settings, kept, whole)
 
 
 def _not_converged(start: Fit, iterations: int) -> Fit:
@@ -185,7 +193,11 @@ def _not_converged(start: Fit, iterations: int) -> Fit:
 
 def _weak_settings(settings: RefinedSettings) -> WeakSettings:
     return replace(
-        settings.weak, model=settings.model, hold=settings.hold, delay=settings.delay, estimate_delay=settings.estimate_delay
+        settings.weak,
+        model=settings.model,
+        hold=settings.hold,
+        delay=settings.delay,
+        estimate_delay=settings.estimate_delay,
     )
 
 
@@ -195,8 +207,9 @@ def _train(
     for iteration in range(1, _STEPS + 1):
         outcomes = [log.train(shared, shared.coefficients(beta, log.loaded)) for log in logs]
         better, S, _ = combine(shared, [outcome.information for outcome in outcomes], beta, settings.prior)
-        told = _better_noise(logs, outcomes) if settings.noise is None else 0.0
-        moved = float(np.sqrt(max(0.0, (better - beta) @ S @ (better - beta))))
+        free = settings.noise is None and iteration <= _NOISE_STEPS
+        told = _better_noise(logs, outcomes) if free else 0.0
+        moved = _distance(better - beta, S)
         beta = better
         if iteration > 1 and moved < _SETTLED and told < _NOISE_SETTLED:
             return beta, outcomes, iteration, True
@@ -206,12 +219,10 @@ def _train(
 def _better_noise(logs: Sequence[_Log], outcomes: Sequence[_Outcome]) -> float:
     told = 0.0
     for log, outcome in zip(logs, outcomes, strict=True):
-        assert outcome.noise_score is not None and log.noise is not None and log.floor is not None
-        better, change = newton_step(log.noise, outcome.noise_score, outcome.information.total[0])
-        bounded = floored(better, log.floor)
-        at_floor = np.all(bounded.theta > better.theta) and np.all(bounded.tau > better.tau)
-        log.noise = bounded
-        told = max(told, 0.0 if at_floor else change)
+        assert outcome.noise_score is not None
+        better = floored(newton_step(log.noise, outcome.noise_score, outcome.information.total[0]), log.floor)
+        told = max(told, change_told(log.noise, better, outcome.noise_score))
+        log.noise = better
     return told
 
 
@@ -223,12 +234,16 @@ def _finish(
         outcomes = [log.run(shared, shared.coefficients(beta, log.loaded)) for log in logs]
         better, S, _ = combine(shared, [outcome.information for outcome in outcomes], beta, settings.prior)
         share = sum(len(piece) for log in logs for piece in log.kept)
-        step = better - beta
-        far = float(np.sqrt(max(0.0, step @ S @ step))) * np.sqrt(share / max(share, _count(outcomes)))
+        far = _distance(better - beta, S) * np.sqrt(share / max(share, _count(outcomes)))
         beta = better
         if far < _FAR * np.sqrt(beta.size):
             break
     return beta, outcomes
+
+
+def _distance(step: FloatArray, S: FloatArray) -> float:
+    """Length of a step in standard deviations."""
+    return float(np.sqrt(np.maximum(step @ S @ step, 0.0)))
 
 
 def _count(outcomes: Sequence[_Outcome]) -> float:
@@ -259,21 +274,20 @@ def _first_trajectory(piece: Segment) -> FloatArray:
     return smoothed(piece.theta, piece.dt, min(_SMOOTHING, 0.1 / piece.dt))
 
 
-def _guessed_noise(kept: Sequence[Segment]) -> NoiseLevels:
+def _guessed_noise(kept: Sequence[Segment], floor: NoiseLevels) -> NoiseLevels:
     guesses = [first_guess(piece.theta, piece.tau) for piece in kept]
     guess = NoiseLevels(
         np.median([level.theta for level in guesses], axis=0), np.median([level.tau for level in guesses], axis=0)
     )
-    return floored(guess, _floor(kept))
+    return floored(guess, floor)
 
 
 def _floor(kept: Sequence[Segment]) -> NoiseLevels:
     """What the digitisation of angles and torques alone contributes: step / √12, and floating point's own."""
     theta = np.concatenate([piece.theta for piece in kept[:2]], axis=1)
     tau = np.concatenate([piece.tau for piece in kept[:2]], axis=1)
-    least_theta = np.maximum(quantum(theta) / np.sqrt(12), 1e-13 * np.abs(theta).max() + 1e-300)
-    # A torque known far better than the angles' noise moves it would leave the factorisation no digits.
-    least_tau = np.maximum(quantum(tau) / np.sqrt(12), 1e-9 * np.abs(tau).max() + 1e-300)
+    least_theta = np.maximum(quantum(theta) / np.sqrt(12), _FINEST * np.abs(theta).max() + 1e-300)
+    least_tau = np.maximum(quantum(tau) / np.sqrt(12), 10 * _FINEST * np.abs(tau).max() + 1e-300)
     return NoiseLevels(least_theta, least_tau)
 
 
@@ -284,10 +298,6 @@ def _linearise(
     delay = float(c[columns]) if shared.delay else settings.delay
     stencil = Stencil(piece.dt, settings.shift(piece.dt) + delay)
     return linearise(shared.model, c[:columns], theta, piece, stencil, noise, shared.delay)
-
-
-def _sums() -> tuple[BlockSums, BlockSums]:
-    return BlockSums(), BlockSums()
 
 
 def _collect(linear: Linearised, stretches: tuple[BlockSums, BlockSums], innovations: list[Correlations]) -> None:

@@ -7,7 +7,7 @@ error bars follow from them without a second pass. See `algid.identify.moments`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -47,7 +47,7 @@ class WeakSettings:
     estimate_delay : bool
     """
 
-    model: Model = Model()
+    model: Model = field(default_factory=Model)
     window: float = 0.4
     bandwidth: float | None = 60.0
     hold: Literal["foh", "zoh"] = "foh"
@@ -105,7 +105,7 @@ def _overlapping(segments: Iterable[Segment], settings: WeakSettings) -> Iterato
     before: Segment | None = None
     windows: Windows | None = None
     length = 0
-    for piece in _pieces(segments, settings):
+    for piece in pieces(segments, PIECE_SAMPLES):
         if windows is None:
             windows = windows_of(piece, settings)
         fresh = len(piece)
@@ -116,19 +116,17 @@ def _overlapping(segments: Iterable[Segment], settings: WeakSettings) -> Iterato
         yield piece, fresh
 
 
-def _pieces(segments: Iterable[Segment], settings: WeakSettings) -> Iterator[Segment]:
-    return pieces(segments, PIECE_SAMPLES)
-
-
 def _prefixed(before: Segment, piece: Segment, overlap: int) -> Segment:
     overlap = min(overlap, len(before))
-    both = before.omega is not None and piece.omega is not None
+    omega = None
+    if before.omega is not None and piece.omega is not None:
+        omega = np.concatenate([before.omega[:, len(before) - overlap :], piece.omega], axis=1)
     return replace(
         piece,
         start=piece.start - overlap * piece.dt,
         theta=np.concatenate([before.theta[:, len(before) - overlap :], piece.theta], axis=1),
         tau=np.concatenate([before.tau[:, len(before) - overlap :], piece.tau], axis=1),
-        omega=np.concatenate([before.omega[:, len(before) - overlap :], piece.omega], axis=1) if both else None,
+        omega=omega,
     )
 
 
@@ -147,10 +145,12 @@ def solve(normals: Sequence[Normal], loaded: bool = False) -> tuple[FloatArray, 
 
     The rows of a joint weigh by its own residual, log by log.
     """
-    weights = [np.ones(2) for _ in normals]
-    c = np.zeros(normals[0].gram.shape[-1] - 1)
+    weights: list[FloatArray] = [np.ones(2) for _ in normals]
+    c: FloatArray = np.zeros(normals[0].gram.shape[-1] - 1)
     for _ in range(_REWEIGHTINGS):
-        total = sum(np.einsum("a,axy->xy", w, n.gram.sum(axis=0)) for w, n in zip(weights, normals, strict=True))
+        total = np.sum(
+            [np.einsum("a,axy->xy", w, n.gram.sum(axis=0)) for w, n in zip(weights, normals, strict=True)], axis=0
+        )
         c = scaled_pinv(total[:-1, :-1]) @ total[:-1, -1]
         weights = [_weights(normal, c) for normal in normals]
     return c, [_information(n, c, w, loaded) for n, w in zip(normals, weights, strict=True)]
@@ -227,7 +227,7 @@ def _start(
     if not bare and (prior is None or not burdened):
         raise ValueError("no unloaded log is long enough: expected at least a second of samples without a gap")
     logs: list[LogInformation] = []
-    arm = np.zeros(len(shared.log_names))
+    arm: FloatArray = np.zeros(len(shared.log_names))
     if bare:
         arm, logs = solve(bare)
     elif prior is not None:

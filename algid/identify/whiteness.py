@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import chdtrc
 
 from algid.arm import FloatArray
 
@@ -29,9 +30,7 @@ class Correlations:
     fourth: FloatArray
 
     def __add__(self, other: Correlations) -> Correlations:
-        return Correlations(
-            self.count + other.count, self.products + other.products, self.fourth + other.fourth
-        )
+        return Correlations(self.count + other.count, self.products + other.products, self.fourth + other.fourth)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,15 +65,13 @@ def _lag_products(x: FloatArray) -> FloatArray:
 
 def judge(sums: Correlations) -> Whiteness:
     """Test the innovations whose sums are given."""
-    from scipy.stats import chi2
-
     power = np.maximum(sums.products[:, :, :1], 1e-300)
     rho = sums.products[:, :, 1:] / power
     n = sums.count[:, None, None]
     lags = np.arange(1, _LAGS + 1)
     tested = lags < n / 4
     statistic = np.sum(np.where(tested, n * (n + 2) * rho**2 / np.maximum(n - lags, 1), 0.0), axis=2)
-    p = chi2.sf(statistic, np.maximum(tested.sum(axis=2), 1))
+    p = chdtrc(np.maximum(tested.sum(axis=2), 1), statistic)
     p_value = np.minimum(1.0, len(SCALES) * p.min(axis=0))
     variance = power[0, :, 0] / sums.count[0]
     kurtosis = sums.fourth / sums.count[0] / variance**2 - 3

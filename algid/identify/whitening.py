@@ -72,7 +72,12 @@ def _triangular(factor: FloatArray, columns: FloatArray, transposed: str) -> Flo
 
 
 def linearise(
-    model: Model, c: FloatArray, theta0: FloatArray, piece: Segment, stencil: Stencil, noise: NoiseLevels,
+    model: Model,
+    c: FloatArray,
+    theta0: FloatArray,
+    piece: Segment,
+    stencil: Stencil,
+    noise: NoiseLevels,
     delay: bool = False,
 ) -> Linearised:
     """Linearise a piece at the trajectory `theta0` (2, N) and the coefficients `c` (q,), and whiten it.
