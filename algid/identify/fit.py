@@ -43,6 +43,7 @@ class Fit:
     noise : each log's noise levels; None for the weak estimator
     whiteness : outcome of the test on the innovations; None for the weak estimator
     iterations, converged : of the refined estimator
+    note : why the refined estimator handed back the weak estimate although nothing failed
     moved : (2,), rad, how far each joint travelled
     """
 
@@ -60,6 +61,7 @@ class Fit:
     iterations: int = 0
     converged: bool = True
     prior: Prior | None = None
+    note: str | None = None
     moved: FloatArray = field(default_factory=lambda: np.full(2, np.inf))
 
     @property

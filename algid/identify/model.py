@@ -16,7 +16,7 @@ tanh(ω / ω_s) instead of sign(ω), so that a velocity error near standstill do
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -59,7 +59,7 @@ class Model:
     offset: bool = False
     rotor: bool = False
     gravity: float = 9.81
-    coulomb_speed: float = field(default=0.05)
+    coulomb_speed: float = 0.2
 
     @cached_property
     def names(self) -> tuple[str, ...]:

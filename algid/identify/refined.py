@@ -45,6 +45,12 @@ _SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
 _FINEST = 1e-10  # relative noise that no sensor undercuts, and floating point can still weigh
 _STEPS = 20
 _NOISE_STEPS = 12  # then the noise levels stay, so that the rest can settle
+_EXCESS = 10.0  # torque error beyond the sensor's noise that tells unmodelled dynamics
+_NEGLIGIBLE = 1e-3  # torque error relative to the torque that no one need worry about
+_REFUTED = (
+    "the torque's error is far larger and slower than its sensor's noise (unmodelled dynamics): the likelihood of "
+    "white noise does not hold, and the weak estimate with robust intervals stands in its place"
+)
 _SETTLED = 0.02  # change of every parameter in its standard deviations
 _NOISE_SETTLED = 0.2  # change of every log variance in its standard deviations
 _FAR = 3.0  # standard deviations of the training set beyond which the last step is repeated
@@ -97,6 +103,17 @@ class _Outcome:
     trajectories: list[FloatArray]
 
 
+@dataclass(frozen=True, eq=False)
+class _Training:
+    """How the alternation ended: whether it settled, or the data refuted white torque noise."""
+
+    beta: FloatArray
+    outcomes: list[_Outcome]
+    iterations: int
+    settled: bool = False
+    refuted: bool = False
+
+
 class _Log:
     """One log: its source, the pieces it trains on, and their trajectories and noise levels so far."""
 
@@ -110,7 +127,15 @@ class _Log:
         self.whole = whole
         self.trajectories = [_first_trajectory(piece) for piece in self.kept]
         self.floor = _floor(self.kept)
-        self.noise = settings.noise or _guessed_noise(self.kept, self.floor)
+        guess = _guessed_noise(kept, self.floor)
+        self.noise = settings.noise or guess
+        self._sensor = guess.tau
+        self._least = _NEGLIGIBLE * np.max([np.sqrt(np.mean(piece.tau**2, axis=1)) for piece in kept], axis=0)
+
+    @property
+    def refuted(self) -> bool:
+        """Whether the torque's error is no white noise: far above what neighbouring samples differ by."""
+        return bool(np.any(self.noise.tau > np.maximum(_EXCESS * self._sensor, self._least)))
 
     def train(self, shared: Shared, c: FloatArray) -> _Outcome:
         """Linearise the training set at the coefficients `c`; keeps the trajectories found."""
@@ -164,19 +189,22 @@ def fit(unloaded: Sequence[Source], loaded: Sequence[Source] = (), settings: Ref
     shared = start.shared
     logs = [*_opened(unloaded, False, settings), *_opened(loaded, True, settings)]
     try:
-        beta, outcomes, iterations, settled = _train(shared, logs, start.values, settings)
+        training = _train(shared, logs, start.values, settings)
+        if training.refuted:
+            return replace(start, note=_REFUTED, iterations=training.iterations)
+        if not training.settled or not np.all(np.isfinite(training.beta)):
+            return _not_converged(start, training.iterations)
+        beta, outcomes = training.beta, training.outcomes
         if not all(log.whole for log in logs):
             beta, outcomes = _finish(shared, logs, beta, settings)
     except np.linalg.LinAlgError:
         return _not_converged(start, 0)
-    if not settled or not np.all(np.isfinite(beta)):
-        return _not_converged(start, iterations)
     whiteness = judge(_added([outcome.innovations for outcome in outcomes]))
     informations = [outcome.information for outcome in outcomes]
     coloured = not whiteness.white
     fitted = conclude("refined", shared, informations, beta, start.moved, settings.prior, coloured=coloured)
     noise = tuple(log.noise for log in logs)
-    return replace(fitted, noise=noise, whiteness=whiteness, iterations=iterations)
+    return replace(fitted, noise=noise, whiteness=whiteness, iterations=training.iterations)
 
 
 def _opened(sources: Sequence[Source], loaded: bool, settings: RefinedSettings) -> Iterator[_Log]:
@@ -201,9 +229,7 @@ def _weak_settings(settings: RefinedSettings) -> WeakSettings:
     )
 
 
-def _train(
-    shared: Shared, logs: Sequence[_Log], beta: FloatArray, settings: RefinedSettings
-) -> tuple[FloatArray, list[_Outcome], int, bool]:
+def _train(shared: Shared, logs: Sequence[_Log], beta: FloatArray, settings: RefinedSettings) -> _Training:
     for iteration in range(1, _STEPS + 1):
         outcomes = [log.train(shared, shared.coefficients(beta, log.loaded)) for log in logs]
         better, S, _ = combine(shared, [outcome.information for outcome in outcomes], beta, settings.prior)
@@ -211,9 +237,11 @@ def _train(
         told = _better_noise(logs, outcomes) if free else 0.0
         moved = _distance(better - beta, S)
         beta = better
+        if settings.noise is None and any(log.refuted for log in logs):
+            return _Training(beta, outcomes, iteration, refuted=True)
         if iteration > 1 and moved < _SETTLED and told < _NOISE_SETTLED:
-            return beta, outcomes, iteration, True
-    return beta, outcomes, _STEPS, False
+            return _Training(beta, outcomes, iteration, settled=True)
+    return _Training(beta, outcomes, _STEPS)
 
 
 def _better_noise(logs: Sequence[_Log], outcomes: Sequence[_Outcome]) -> float:
