@@ -42,6 +42,7 @@ class Fit:
     logs : each log's quadratic likelihood, unloaded ones first
     noise : each log's noise levels; None for the weak estimator
     whiteness : outcome of the test on the innovations; None for the weak estimator
+    freedom : independent stretches of log behind a sandwich, else samples of torque
     iterations, converged : of the refined estimator
     note : why the refined estimator handed back the weak estimate although nothing failed
     moved : (2,), rad, how far each joint travelled
@@ -58,6 +59,7 @@ class Fit:
     logs: tuple[LogInformation, ...]
     noise: tuple[NoiseLevels, ...] | None = None
     whiteness: Whiteness | None = None
+    freedom: int = 1
     iterations: int = 0
     converged: bool = True
     prior: Prior | None = None
@@ -104,13 +106,15 @@ def conclude(
     prior: Prior | None = None,
     *,
     coloured: bool,
+    samples: int = 1,
 ) -> Fit:
     """Solve for the shared parameters from `beta` and attach error bars and statuses."""
     beta, S, _ = combine(shared, logs, beta, prior)
     known = examine(shared.names, beta, S, moved)
     covariance, quantile = known.covariance, 1.959963984540054
+    freedom = samples
     if coloured:
-        covariance, quantile = _robust(shared, logs, beta, known, prior)
+        covariance, quantile, freedom = _robust(shared, logs, beta, known, prior)
     return Fit(
         estimator=estimator,
         shared=shared,
@@ -118,6 +122,7 @@ def conclude(
         covariance=covariance,
         intervals="sandwich" if coloured else "likelihood",
         quantile=quantile,
+        freedom=freedom,
         status=tuple("OK" if yes else "NOT_IDENTIFIABLE" for yes in known.determined),
         unidentifiable=known.sentences,
         logs=tuple(logs),
@@ -131,7 +136,7 @@ def _robust(
     beta: FloatArray,
     known: Identifiability,
     prior: Prior | None,
-) -> tuple[FloatArray, float]:
+) -> tuple[FloatArray, float, int]:
     meat, freedom = sandwich(shared, logs, beta, prior)
     covariance = known.covariance @ meat @ known.covariance
-    return covariance, float(stdtrit(max(2, freedom), 0.975))
+    return covariance, float(stdtrit(max(2, freedom), 0.975)), freedom

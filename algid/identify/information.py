@@ -70,10 +70,10 @@ def combine(
     beta (Q,), its information (Q, Q), and the log-likelihood there less that of each log's own coefficients c0
     """
     damping = 0.0
-    value, gradient, S = _likelihood(shared, logs, beta, prior)
+    value, gradient, S = likelihood(shared, logs, beta, prior)
     for _ in range(_STEPS):
         step = scaled_pinv(S + damping * np.diag(np.diag(S))) @ gradient
-        trial = _likelihood(shared, logs, beta + step, prior)
+        trial = likelihood(shared, logs, beta + step, prior)
         if not np.isfinite(trial[0]) or trial[0] < value - 1e-9 * (1 + abs(value)):
             damping = max(10 * damping, 1e-3)
             if damping > 1e12:
@@ -87,9 +87,10 @@ def combine(
     return beta, S, value
 
 
-def _likelihood(
+def likelihood(
     shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None
 ) -> tuple[float, FloatArray, FloatArray]:
+    """Log-likelihood at `beta` less that at the logs' own coefficients, its gradient (Q,), information (Q, Q)."""
     size = len(shared.names)
     value, gradient, S = 0.0, np.zeros(size), np.zeros((size, size))
     for log in logs:

@@ -202,7 +202,16 @@ def fit(unloaded: Sequence[Source], loaded: Sequence[Source] = (), settings: Ref
     whiteness = judge(_added([outcome.innovations for outcome in outcomes]))
     informations = [outcome.information for outcome in outcomes]
     coloured = not whiteness.white
-    fitted = conclude("refined", shared, informations, beta, start.moved, settings.prior, coloured=coloured)
+    fitted = conclude(
+        "refined",
+        shared,
+        informations,
+        beta,
+        start.moved,
+        settings.prior,
+        coloured=coloured,
+        samples=int(_count(outcomes)),
+    )
     noise = tuple(log.noise for log in logs)
     return replace(fitted, noise=noise, whiteness=whiteness, iterations=training.iterations)
 
