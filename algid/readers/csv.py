@@ -42,7 +42,7 @@ def open_csv(path: Path, profile: Profile | None = None, kind: str = "csv") -> T
     LogError
         If the text is no table, or columns are missing.
     """
-    head = _head(path, kind)
+    head = head_bytes(path, kind)
     dialect = detect(path, head)
     columns = assign(str(path), dialect.columns, profile)
     companion = _companion(path)
@@ -51,7 +51,8 @@ def open_csv(path: Path, profile: Profile | None = None, kind: str = "csv") -> T
     return columns.reader(origin, source.tables, profile, _rows(path, kind, head))
 
 
-def _head(path: Path, kind: str) -> bytes:
+def head_bytes(path: Path, kind: str) -> bytes:
+    """The first bytes of the text, unpacked, 64 KiB at most."""
     if kind != "csv":
         return head_of(path, kind)
     with path.open("rb") as stream:

@@ -34,9 +34,8 @@ def open_parquet(path: Path, profile: Profile | None = None) -> TableReader:
     """
     import polars as pl
 
-    _check_footer(path)
+    schema = schema_of(path)
     try:
-        schema = dict(pl.read_parquet_schema(path))
         metadata = pl.read_parquet_metadata(path)
         available = _flat_names(path, schema)
         rows = pl.scan_parquet(path, glob=False).select(pl.len()).collect().item()
@@ -48,6 +47,23 @@ def open_parquet(path: Path, profile: Profile | None = None) -> TableReader:
     origin = Origin(str(path), "parquet", dict(columns.sources), companion.truth if companion else None)
     source = _Groups(path, columns, available, schema, companion.sums if companion else {})
     return columns.reader(origin, source.tables, profile, rows)
+
+
+def schema_of(path: Path) -> dict[str, pl.DataType]:
+    """Columns and their types.
+
+    Raises
+    ------
+    LogError
+        If the file is damaged.
+    """
+    import polars as pl
+
+    _check_footer(path)
+    try:
+        return dict(pl.read_parquet_schema(path))
+    except (pl.exceptions.PolarsError, OSError, pl.exceptions.PanicException) as error:
+        raise _damaged(path, error) from error
 
 
 def _check_footer(path: Path) -> None:
