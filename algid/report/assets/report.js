@@ -1,0 +1,107 @@
+"use strict";
+(() => {
+  const root = document.documentElement;
+  const page = JSON.parse(document.getElementById("figures").textContent);
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  const touch = matchMedia("(pointer: coarse)").matches;
+  const PRINTED = { one: 690, two: 335 }; // CSS pixels of A4 less its margins
+  const config = {
+    responsive: true, displaylogo: false, scrollZoom: false,
+    displayModeBar: "hover",
+    modeBarButtons: [["zoom2d", "pan2d", "autoScale2d", "resetScale2d", "toImage"]],
+  };
+  const drawn = new Map();
+  const hidden = new Set();
+  let syncing = false;
+
+  // A token @name/opacity under a key that names a colour becomes the theme's colour.
+  const colour = (token, style) => {
+    const [name, opacity] = token.slice(1).split("/");
+    const value = style.getPropertyValue("--" + name).trim();
+    if (!opacity) return value;
+    const parts = [1, 3, 5].map((at) => parseInt(value.slice(at, at + 2), 16));
+    return `rgba(${parts.join(",")},${opacity})`;
+  };
+  const paint = (value, key, style) => {
+    if (typeof value === "string") return /color/i.test(key) && value[0] === "@" ? colour(value, style) : value;
+    if (Array.isArray(value)) return value.map((item) => paint(item, key, style));
+    if (value === null || typeof value !== "object" || "bdata" in value) return value;
+    return Object.fromEntries(Object.entries(value).map(([name, item]) => [name, paint(item, name, style)]));
+  };
+  const painted = (panel, width) => {
+    const style = getComputedStyle(root);
+    const layout = paint({ template: page.template, ...panel.layout }, "", style);
+    layout.height = panel.height;
+    layout.uirevision = "kept";
+    if (touch) layout.dragmode = false; // a finger scrolls the page
+    if (width) Object.assign(layout, { width, autosize: false });
+    const traces = paint(panel.traces, "", style);
+    for (const trace of traces) {
+      if (hidden.has(panel.figure + " " + trace.legendgroup)) trace.visible = false;
+    }
+    return [traces, layout];
+  };
+  const draw = (panel, width) => Plotly.react(document.getElementById(panel.id), ...painted(panel, width), config);
+
+  const range = (plot) => [...plot._fullLayout.xaxis.range];
+  const follow = (panel, change) => {
+    if (syncing || !panel.sync) return;
+    const moved = Object.keys(change).filter((key) => key.startsWith("xaxis."));
+    if (!moved.length) return;
+    const update = Object.fromEntries(moved.map((key) => [key, change[key]]));
+    syncing = true;
+    const others = page.panels.filter((other) => other.sync === panel.sync && other.id !== panel.id && drawn.has(other.id));
+    Promise.all(others.map((other) => Plotly.relayout(other.id, update))).finally(() => { syncing = false; });
+  };
+  const keys = (panel) => (event) => {
+    const plot = event.currentTarget;
+    const [low, high] = range(plot);
+    const span = high - low;
+    const moves = {
+      ArrowLeft: [low - span / 5, high - span / 5], ArrowRight: [low + span / 5, high + span / 5],
+      "+": [low + span / 6, high - span / 6], "-": [low - span / 4, high + span / 4], 0: drawn.get(panel.id),
+    };
+    const next = moves[event.key];
+    if (!next || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    Plotly.relayout(plot, { "xaxis.range[0]": next[0], "xaxis.range[1]": next[1] });
+  };
+  const start = async (panel) => {
+    const plot = document.getElementById(panel.id);
+    await draw(panel);
+    drawn.set(panel.id, range(plot));
+    plot.on("plotly_relayout", (change) => follow(panel, change));
+    plot.addEventListener("keydown", keys(panel));
+  };
+  const redraw = (size) => {
+    for (const panel of page.panels) if (drawn.has(panel.id)) draw(panel, size && size[panel.columns]);
+  };
+
+  for (const button of document.querySelectorAll(".legend button")) {
+    button.addEventListener("click", () => {
+      const { figure, group } = button.dataset;
+      const show = button.getAttribute("aria-pressed") === "false";
+      button.setAttribute("aria-pressed", String(show));
+      hidden[show ? "delete" : "add"](figure + " " + group);
+      for (const panel of page.panels) if (panel.figure === figure && drawn.has(panel.id)) draw(panel);
+    });
+  }
+  dark.addEventListener("change", () => redraw());
+  addEventListener("beforeprint", () => { root.dataset.theme = "light"; redraw(PRINTED); });
+  addEventListener("afterprint", () => { delete root.dataset.theme; redraw(); });
+
+  (async () => {
+    let failed = 0;
+    for (const panel of page.panels) {
+      try {
+        await start(panel);
+      } catch (error) {
+        failed += 1;
+        document.getElementById(panel.id).textContent = "This panel could not be drawn: " + error.message;
+      }
+      await new Promise((next) => setTimeout(next)); // let the page answer between panels
+    }
+    root.dataset.failed = failed;
+    root.dataset.drawn = drawn.size;
+  })();
+})();

@@ -1,0 +1,124 @@
+"""Results side by side: how far apart in σ, and which settings differ."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from algid.report.numbers import ABSENT, resolved, significant
+from algid.report.tables import Column, Table, flat_settings
+from algid.report.text import file_name, unit_text, visible
+from algid.results import Estimate, Result
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Results side by side: the estimates, how far each lies from the first one's, and what was set otherwise.
+
+    `sigma` holds, by parameter, the distance of each result from the first in combined standard deviations;
+    None where either has no estimate or no standard deviation.
+    """
+
+    labels: tuple[str, ...]
+    sigma: dict[str, tuple[float | None, ...]]
+    estimates: Table
+    settings: Table
+
+    @property
+    def largest_sigma(self) -> float | None:
+        """The largest distance, None where there is none."""
+        distances = [abs(distance) for row in self.sigma.values() for distance in row if distance is not None]
+        return max(distances, default=None)
+
+
+def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> Comparison:
+    """Lay `results` side by side; the first one is what the others are measured against.
+
+    Parameters
+    ----------
+    results : at least two results
+    labels : what to call them, by default the names of their first logs
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two results or not a label each.
+    """
+    if len(results) < 2:
+        raise ValueError(f"a comparison needs at least two results, got {len(results)}")
+    if labels is not None and len(labels) != len(results):
+        raise ValueError(f"labels must name {len(results)} results, got {len(labels)}")
+    shown = _distinct([visible(label) for label in labels] if labels else [file_name(r.log.path) for r in results])
+    sigma = {name: _distances(name, results) for name in _names(results)}
+    return Comparison(tuple(shown), sigma, _estimates(results, shown, sigma), _settings(results, shown))
+
+
+def distance_sigma(first: Estimate | None, other: Estimate | None) -> float | None:
+    """Signed distance of `other` from `first` over their combined standard deviation."""
+    if first is None or other is None or first.estimate is None or other.estimate is None:
+        return None
+    if first.std is None or other.std is None:
+        return None
+    combined = math.hypot(first.std, other.std)
+    return (other.estimate - first.estimate) / combined if combined > 0 else None
+
+
+def _names(results: Sequence[Result]) -> list[str]:
+    """Every parameter that any result has, in the order met."""
+    return list(dict.fromkeys(name for result in results for name in result.estimates))
+
+
+def _distances(name: str, results: Sequence[Result]) -> tuple[float | None, ...]:
+    first = results[0].estimates.get(name)
+    return tuple(distance_sigma(first, result.estimates.get(name)) for result in results[1:])
+
+
+def _distinct(labels: list[str]) -> list[str]:
+    """The labels, numbered where two are equal."""
+    if len(set(labels)) == len(labels):
+        return labels
+    return [f"{number} {label}" for number, label in enumerate(labels, start=1)]
+
+
+def _estimates(results: Sequence[Result], labels: list[str], sigma: dict[str, tuple[float | None, ...]]) -> Table:
+    columns = [Column("Parameter", "name"), Column("Unit", "text"), Column(labels[0], "number")]
+    for label in labels[1:]:
+        columns += [Column(label, "number"), Column("Δ %", "number"), Column("Δ/σ", "number")]
+    rows = tuple(_row(name, results, sigma[name]) for name in sigma)
+    note = f"Differences are against {labels[0]}; σ combines both standard deviations."
+    return Table("Estimates side by side", tuple(columns), rows, note).without_empty()
+
+
+def _row(name: str, results: Sequence[Result], distances: tuple[float | None, ...]) -> tuple[str, ...]:
+    found = [result.estimates.get(name) for result in results]
+    unit = next(unit_text(estimate.unit) for estimate in found if estimate is not None)
+    cells = [visible(name), unit, with_std(found[0])]
+    for other, distance in zip(found[1:], distances, strict=True):
+        cells += [with_std(other), _change(found[0], other), ABSENT if distance is None else f"{distance:+.1f}"]
+    return tuple(cells)
+
+
+def with_std(found: Estimate | None) -> str:
+    """``estimate ± std``, and the status where it is not OK."""
+    if found is None:
+        return ABSENT
+    spread = "" if found.std is None else f" ± {significant(found.std, 2)}"
+    status = "" if found.status == "OK" else f" ({found.status.value})"
+    return f"{resolved(found.estimate, found.std)}{spread}{status}"
+
+
+def _change(first: Estimate | None, other: Estimate | None) -> str:
+    if first is None or other is None or not first.estimate or other.estimate is None:
+        return ABSENT
+    return f"{100 * (other.estimate - first.estimate) / abs(first.estimate):+.3g}"
+
+
+def _settings(results: Sequence[Result], labels: list[str]) -> Table:
+    every = [{"estimator": r.estimator, "algid": r.version, **flat_settings(r.settings)} for r in results]
+    names = dict.fromkeys(name for settings in every for name in settings)
+    differing = [name for name in names if len({settings.get(name) for settings in every}) > 1]
+    rows = tuple((visible(n), *(visible(settings.get(n, ABSENT)) for settings in every)) for n in differing)
+    columns = (Column("Setting", "name"), *(Column(label, "text") for label in labels))
+    note = "" if rows else "Every setting is the same."
+    return Table("Settings that differ", columns, rows, note)

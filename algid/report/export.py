@@ -1,0 +1,125 @@
+"""A result as a ROS 2 log, which Foxglove and PlotJuggler open beside the original.
+
+==========================  ==========================  ==================================================
+topic                       message                     holds
+==========================  ==========================  ==================================================
+/algid/predicted            sensor_msgs/msg/JointState  effort: torque that the model predicts, N m
+/algid/residual             sensor_msgs/msg/JointState  effort: measured less predicted torque, N m
+/algid/estimates            algid_msgs/msg/Estimates    the paper's series, a field each, and condition
+/algid/loaded               algid_msgs/msg/Estimates    the same of the loaded log
+==========================  ==========================  ==================================================
+
+Several logs keep a topic each: the second one's are `/algid/log2/predicted` and so on.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.outfiles import whole_file
+from algid.report.blocks import blocks, by_log, columns_of
+from algid.report.ros2 import (
+    ESTIMATES,
+    JOINT_STATE,
+    JOINT_STATE_SCHEMA,
+    JointTorque,
+    estimates_schema,
+    field_names,
+    numbers_message,
+)
+from algid.results import Result, read_result
+
+if TYPE_CHECKING:
+    from mcap.writer import Writer
+
+START_KEY = b"algid.start_ns"
+TORQUES = ("log", "t", "tau1", "tau2", "tau1_predicted", "tau2_predicted")
+ROWS = 1 << 14
+
+
+def export_mcap(folder: Path) -> Path:
+    """Write `estimates.mcap` into the result folder `folder`.
+
+    The messages bear the log's own stamps where `torque.parquet` tells each log's first one, in ns, as a
+    JSON list in its metadata ``algid.start_ns``; otherwise time counts from zero.
+
+    Raises
+    ------
+    ResultError
+        If the folder's files are missing or unreadable.
+    OutputError
+        If the log cannot be written.
+    """
+    from mcap.writer import CompressionType, Writer
+
+    result = read_result(folder)
+    starts = start_stamps(folder / "torque.parquet", len(result.logs))
+    path = folder / "estimates.mcap"
+    with whole_file(path) as temporary, temporary.open("wb") as stream:
+        writer = Writer(stream, compression=CompressionType.ZSTD)
+        writer.start(profile="ros2", library=f"algid {result.version}")
+        _write_torques(writer, folder / "torque.parquet", starts)
+        for name, log in _series(folder, result):
+            _write_series(writer, folder / f"{name}.parquet", f"/algid/{name}", starts[log])
+        writer.finish()  # type: ignore[no-untyped-call]
+    return path
+
+
+def start_stamps(path: Path, logs: int) -> list[int]:
+    """First stamp of each log in ns; zero where the file does not tell."""
+    import pyarrow.parquet
+
+    found = [0] * logs
+    if path.exists():
+        told = (pyarrow.parquet.read_schema(path).metadata or {}).get(START_KEY)
+        known = [int(stamp) for stamp in json.loads(told)] if told else []
+        found[: len(known)] = known[:logs]
+    return found
+
+
+def _series(folder: Path, result: Result) -> Iterator[tuple[str, int]]:
+    """Each series' file name and the log it belongs to: the first unloaded one, the first loaded one."""
+    for name, role in (("estimates", "unloaded"), ("loaded", "loaded")):
+        if (folder / f"{name}.parquet").exists():
+            yield name, next((i for i, log in enumerate(result.logs) if log.role == role), 0)
+
+
+def _write_torques(writer: Writer, path: Path, starts: list[int]) -> None:
+    if not path.exists():
+        return
+    schema = writer.register_schema(JOINT_STATE, "ros2msg", JOINT_STATE_SCHEMA.encode())
+    message = JointTorque(("joint1", "joint2")).message
+    channels: dict[str, int] = {}
+    for log, block in by_log(blocks(path, TORQUES, ROWS)):
+        stamps = _stamps(block["t"], starts[log] if log < len(starts) else 0)
+        place = "/algid" if log == 0 else f"/algid/log{log + 1}"
+        predicted = np.stack([block["tau1_predicted"], block["tau2_predicted"]])
+        measured = np.stack([block["tau1"], block["tau2"]])
+        for name, values in (("predicted", predicted), ("residual", measured - predicted)):
+            topic = f"{place}/{name}"
+            if topic not in channels:
+                channels[topic] = writer.register_channel(topic, "cdr", schema)
+            for stamp, tau1, tau2 in zip(stamps, *values.tolist(), strict=True):
+                writer.add_message(channels[topic], stamp, message(stamp, tau1, tau2), stamp)
+
+
+def _write_series(writer: Writer, path: Path, topic: str, start: int) -> None:
+    names = [name for name in columns_of(path) if name != "t"]
+    schema = writer.register_schema(ESTIMATES, "ros2msg", estimates_schema(field_names(names)).encode())
+    channel = writer.register_channel(topic, "cdr", schema)
+    for block in blocks(path, ["t", *names], ROWS):
+        rows = np.stack([block[name] for name in names], axis=1).tolist()
+        for stamp, row in zip(_stamps(block["t"], start), rows, strict=True):
+            writer.add_message(channel, stamp, numbers_message(stamp, row), stamp)
+
+
+def _stamps(t: FloatArray, start: int) -> list[int]:
+    """Stamps in ns; they are whole nanoseconds, which float64 seconds resolve for a hundred days."""
+    stamps: list[int] = (start + np.rint(t * 1e9).astype(np.int64)).tolist()
+    return stamps

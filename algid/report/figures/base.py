@@ -1,0 +1,147 @@
+"""What every figure is made of, and how its numbers travel to plotly.
+
+Colours are written as tokens, ``@name`` or ``@name/opacity``; the page replaces them by the colours of the
+light or dark theme whenever it draws. Foreign text passes through `label`.
+"""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.report.text import visible
+
+Trace = dict[str, Any]
+Layout = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Legend:
+    """An entry of a figure's legend, which shows and hides the traces of its `group`."""
+
+    group: str
+    words: str
+    colour: str
+    mark: str = "line"
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One drawing area. `says` is what a screen reader is told; `sync` names panels that zoom together."""
+
+    traces: list[Trace]
+    layout: Layout
+    says: str
+    title: str = ""
+    height: int = 260
+    sync: str = ""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure: its title, panels and legend, one line that tells how to read it, one about what it holds."""
+
+    key: str
+    title: str
+    panels: tuple[Panel, ...]
+    reading: str
+    legend: tuple[Legend, ...] = ()
+    note: str = ""
+    columns: int = 1
+
+
+@dataclass(frozen=True)
+class Missing:
+    """A figure that cannot be drawn, and why."""
+
+    key: str
+    title: str
+    why: str
+
+
+def packed(values: FloatArray, precise: bool = False) -> dict[str, str]:
+    """`values` as plotly's typed array: single precision, or double where `precise`."""
+    kind = "f8" if precise else "f4"
+    data = np.ascontiguousarray(values, dtype=f"<{kind}")
+    return {"dtype": kind, "bdata": base64.b64encode(data.tobytes()).decode("ascii")}
+
+
+def times(x: FloatArray) -> dict[str, str]:
+    """Increasing `x` in single precision where that tells neighbours apart to a hundredth of their distance."""
+    steps = np.diff(x)
+    steps = steps[steps > 0]
+    coarse = 1e2 * np.finfo(np.float32).eps * np.abs(x).max() if x.size else 0.0
+    return packed(x, precise=bool(steps.size and coarse > np.median(steps)))
+
+
+def line(
+    x: FloatArray, y: FloatArray, colour: str, name: str, group: str, *, width: float = 1.4, hover: str = ""
+) -> Trace:
+    """A line without markers."""
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "x": times(x),
+        "y": packed(y),
+        "name": name,
+        "legendgroup": group,
+        "line": {"color": colour, "width": width},
+        "hovertemplate": hover or f"{name} %{{y:.5g}}<extra></extra>",
+    }
+
+
+def axis(title: str = "", **more: Any) -> Layout:
+    """An axis with that title; the rest of its looks comes from the page's template."""
+    return {"title": {"text": title}, **more} if title else dict(more)
+
+
+def label(text: str, longest: int = 40) -> str:
+    """Foreign text for plotly, which reads a little HTML: shown as it is, never as markup."""
+    shown = visible(text)
+    shown = shown if len(shown) <= longest else shown[: longest - 1] + "…"
+    return shown.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+
+
+def upright(x: float, colour: str, dash: str = "dot", yref: str = "paper") -> Layout:
+    """A vertical line over the whole panel."""
+    return {
+        "type": "line",
+        "x0": x,
+        "x1": x,
+        "y0": 0,
+        "y1": 1,
+        "yref": yref,
+        "line": {"color": colour, "width": 1, "dash": dash},
+    }
+
+
+def level(y: float, colour: str, dash: str = "dash", width: float = 1.5) -> Layout:
+    """A horizontal line over the whole panel."""
+    return {
+        "type": "line",
+        "xref": "paper",
+        "x0": 0,
+        "x1": 1,
+        "y0": y,
+        "y1": y,
+        "line": {"color": colour, "width": width, "dash": dash},
+    }
+
+
+def band(low: float, high: float, colour: str) -> Layout:
+    """A horizontal band over the whole panel, below the traces."""
+    return {
+        "type": "rect",
+        "xref": "paper",
+        "x0": 0,
+        "x1": 1,
+        "y0": low,
+        "y1": high,
+        "fillcolor": colour,
+        "line": {"width": 0},
+        "layer": "below",
+    }

@@ -1,0 +1,185 @@
+"""The paper's Figure 2: how each estimate converges, with the final value, its band and the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.report.figures.base import (
+    Figure,
+    Layout,
+    Legend,
+    Missing,
+    Panel,
+    Trace,
+    axis,
+    band,
+    label,
+    level,
+    line,
+    packed,
+    times,
+    upright,
+)
+from algid.report.numbers import resolved, significant
+from algid.report.serieslog import Series, SeriesLog, read_series
+from algid.report.text import unit_text
+from algid.results import Estimate, Result
+
+HEIGHT = 230
+MOST_WINDOWS = 6  # beyond, a line at every window's ε hides the series
+LARGEST_CONDITION = 1e10  # beyond, the paper's stages call a system singular
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a series converges to, as far as it is known, and its unit."""
+
+    found: Estimate | None
+    truth: float | None
+    unit: str
+
+
+def convergence(path: Path, result: Result, loaded: bool = False) -> Figure | Missing:
+    """The series of `path` (estimates.parquet, or loaded.parquet where `loaded`), a panel each."""
+    key, title = ("loaded", "Convergence, loaded log") if loaded else ("convergence", "Convergence of the estimates")
+    read = read_series(path, result.settings)
+    if not read.lines:
+        return Missing(key, title, f"{path.name} holds no series")
+    targets = {name: _target(name, result, loaded) for name in read.lines}
+    panels = [_panel(read, name, target, key) for name, target in targets.items()]
+    if read.condition is not None:
+        panels.append(_condition(read, read.condition, key))
+    return Figure(key, title, tuple(panels), _reading_aid(read), _legend(read, targets), columns=2)
+
+
+def _target(name: str, result: Result, loaded: bool) -> Target:
+    groups = [result.loaded, result.paper_payload, result.payload] if loaded else [result.parameters]
+    found = next((group[name] for group in groups if name in group), None)
+    row = next((row for row in result.table4 if row.parameter == name), None)
+    unit = found.unit if found is not None else row.unit if row is not None else ""
+    return Target(found, None if row is None else row.truth, unit_text(unit))
+
+
+def _panel(read: SeriesLog, name: str, target: Target, sync: str) -> Panel:
+    layout = {
+        "xaxis": axis("time, s", range=[read.start, read.end]),
+        "yaxis": axis(label(target.unit), range=_view(read.samples[name], target)),
+        "yaxis2": {"overlaying": "y", "range": [0, 1], "visible": False, "fixedrange": True},
+        "shapes": [*_marks(target), *_epsilons(read)],
+        "hovermode": "closest",
+    }
+    return Panel(_traces(read, name, target), layout, _says(name, target), name, HEIGHT, sync)
+
+
+def _traces(read: SeriesLog, name: str, target: Target) -> list[Trace]:
+    where, share = read.singular[name]
+    traces = [_shading(where, share)] if share.any() else []
+    hover = f"{label(name)} %{{y:.5g}} {label(target.unit)}<br>at %{{x:.4g}} s<extra></extra>"
+    colour = "@blue/0.3" if read.coarse else "@blue"
+    traces.append(line(*read.lines[name], colour, label(name), "series", width=1.2, hover=hover))
+    if read.coarse:
+        traces.append(line(*read.middles[name], "@blue", label(name), "middle", width=1.6, hover=hover))
+    return traces
+
+
+def _shading(where: FloatArray, share: FloatArray) -> Trace:
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "x": times(where),
+        "y": packed(share),
+        "yaxis": "y2",
+        "line": {"width": 0, "shape": "hv"},
+        "fill": "tozeroy",
+        "fillcolor": "@amber/0.35",
+        "hoverinfo": "skip",
+        "legendgroup": "singular",
+        "name": "singular",
+    }
+
+
+def _condition(read: SeriesLog, condition: Series, sync: str) -> Panel:
+    hover = "condition %{y:.3g} at %{x:.4g} s<extra></extra>"
+    layout = {
+        "xaxis": axis("time, s", range=[read.start, read.end]),
+        "yaxis": axis(type="log", dtick=3),
+        "shapes": [level(LARGEST_CONDITION, "@amber"), *_epsilons(read)],
+        "hovermode": "closest",
+    }
+    trace = line(*condition, "@muted", "condition number", "", width=1.2, hover=hover)
+    return Panel([trace], layout, "Condition number of the linear system over time", "condition number", HEIGHT, sync)
+
+
+def _view(samples: FloatArray, target: Target) -> list[float] | None:
+    """The range that shows where the series settles: spikes near singular instants stay outside at first."""
+    finite = samples[np.isfinite(samples)]
+    settled = finite[finite.size // 4 :]
+    if not settled.size:
+        return None
+    ends = [*np.percentile(settled, [4, 96]).tolist(), *_known(target)]
+    low, high = min(ends), max(ends)
+    space = 0.25 * (high - low) or 0.05 * abs(high) or 1.0
+    return [low - space, high + space]
+
+
+def _known(target: Target) -> list[float]:
+    found = target.found
+    values = [target.truth] if found is None else [target.truth, found.estimate, *(found.ci95 or ())]
+    return [value for value in values if value is not None]
+
+
+def _marks(target: Target) -> list[Layout]:
+    marks: list[Layout] = []
+    found = target.found
+    if found is not None and found.ci95 is not None:
+        low, high = found.ci95
+        if low is not None and high is not None:
+            marks.append(band(low, high, "@green/0.28"))
+    if found is not None and found.estimate is not None:
+        marks.append(level(found.estimate, "@green", "solid"))
+    if target.truth is not None:
+        marks.append(level(target.truth, "@ink", "dash", 1.2))
+    return marks
+
+
+def _epsilons(read: SeriesLog) -> list[Layout]:
+    ends = [begin + read.epsilon for begin in read.windows if begin + read.epsilon < read.end]
+    return [upright(end, "@muted") for end in ends] if len(ends) <= MOST_WINDOWS else []
+
+
+def _says(name: str, target: Target) -> str:
+    found = target.found
+    final = "" if found is None else f"; final estimate {resolved(found.estimate, found.std)} {target.unit}"
+    truth = "" if target.truth is None else f"; truth {significant(target.truth)} {target.unit}"
+    return f"{name} over time{final}{truth}"
+
+
+def _legend(read: SeriesLog, targets: Mapping[str, Target]) -> tuple[Legend, ...]:
+    entries = [Legend("series", "the paper's estimate over time", "@blue")]
+    if read.coarse:
+        entries = [
+            Legend("middle", "the paper's estimate, running median", "@blue"),
+            Legend("series", "its extremes", "@blue/0.3"),
+        ]
+    if any(target.found is not None for target in targets.values()):
+        entries.append(Legend("", "result and its 95 % interval", "@green"))
+    if any(target.truth is not None for target in targets.values()):
+        entries.append(Legend("", "truth", "@ink", "dash"))
+    if _epsilons(read):
+        entries.append(Legend("", "ε, before which estimates are arbitrary", "@muted", "dot"))
+    if read.any_singular:
+        entries.append(Legend("singular", "singular: condition number past 1e10", "@amber/0.35", "area"))
+    return tuple(entries)
+
+
+def _reading_aid(read: SeriesLog) -> str:
+    windows = "" if np.isinf(read.window) else f" in each window of {read.window:g} s"
+    return (
+        f"Read: from ε = {read.epsilon:g} s on{windows}, blue should settle on green; "
+        "double-click shows the spikes that the frame cuts off."
+    )

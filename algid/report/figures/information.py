@@ -1,0 +1,92 @@
+"""Which seconds of the logs taught each parameter."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.report.blocks import Block, blocks, by_log, columns_of
+from algid.report.figures.base import Figure, Missing, Panel, axis, label, packed, times
+from algid.report.figures.timeline import offsets, separators
+from algid.report.numbers import significant
+from algid.report.torquelog import LogRange
+from algid.results import Result
+
+TITLE = "Information per second of log"
+MOST_CELLS = 600
+SCALE = [[0, "@page"], [0.5, "@blue/0.55"], [1, "@blue"]]
+
+
+def information(path: Path, result: Result) -> Figure | Missing:
+    """Each parameter's information, in shares of what all logs gave it."""
+    names = [name for name in columns_of(path) if name not in ("log", "t")]
+    found = [(log, block) for log, block in by_log(blocks(path, ["log", "t", *names]))]
+    if not names or not found:
+        return Missing("information", TITLE, f"{path.name} holds no second")
+    x, gained, ranges = _summed(names, found)
+    shares = _shares(gained)
+    reading = "Read: dark seconds taught most; a row dark in one place only rests on that moment of the log."
+    panel = _panel(names, x, shares, result, ranges)
+    return Figure("information", TITLE, (panel,), reading, note=_note(names, x, shares))
+
+
+def _summed(names: list[str], found: list[tuple[int, Block]]) -> tuple[FloatArray, FloatArray, dict[int, LogRange]]:
+    """Middles of the stretches on the running time, information (names, m) in them, each log's range.
+
+    Information adds up, so that the seconds of a long log are summed, not thinned.
+    """
+    ranges: dict[int, LogRange] = {}
+    for log, block in found:
+        span = ranges.setdefault(log, LogRange(float(block["t"][0]), 0.0))
+        span.last = float(block["t"][-1]) + 1.0
+    moved = offsets(ranges)
+    x = np.concatenate([block["t"] + 0.5 + moved[log] for log, block in found])
+    gained = np.concatenate([np.stack([block[name] for name in names]) for _, block in found], axis=1)
+    step = int(np.ceil(x.size / MOST_CELLS))
+    starts = np.arange(0, x.size, step)
+    counts = np.diff(starts, append=x.size)
+    return np.add.reduceat(x, starts) / counts, np.add.reduceat(np.nan_to_num(gained), starts, axis=1), ranges
+
+
+def _shares(gained: FloatArray) -> FloatArray:
+    """Percent of each parameter's information."""
+    total = gained.sum(axis=1, keepdims=True)
+    return 100 * np.divide(gained, total, out=np.zeros_like(gained), where=total > 0)
+
+
+def _panel(names: list[str], x: FloatArray, shares: FloatArray, result: Result, ranges: dict[int, LogRange]) -> Panel:
+    trace = {
+        "type": "heatmap",
+        "x": times(x),
+        "y": [label(name) for name in names],
+        "z": {**packed(shares), "shape": f"{shares.shape[0]}, {shares.shape[1]}"},
+        "zmin": 0,
+        "zmax": float(shares.max()) or 1.0,
+        "colorscale": SCALE,
+        "ygap": 3,
+        "hovertemplate": "%{y}: %{z:.3g} % of its information<br>about %{x:.1f} s<extra></extra>",
+        "colorbar": {"thickness": 10, "outlinewidth": 0, "ticksuffix": " %", "nticks": 4},
+    }
+    layout = {
+        "xaxis": axis("time, s", showgrid=False),
+        "yaxis": axis(type="category", autorange="reversed", showgrid=False),
+        **separators(ranges, offsets(ranges), result.logs),
+    }
+    return Panel([trace], layout, "Share of each parameter's information by time", height=120 + 28 * len(names))
+
+
+def _note(names: list[str], x: FloatArray, shares: FloatArray) -> str:
+    """How much of the log is needed for half of each parameter's information, at the extremes."""
+    half = {name: _least_share(row) for name, row in zip(names, shares, strict=True) if row.any()}
+    if len(half) < 2 or x.size < 4:
+        return ""
+    poorest = min(half, key=lambda name: half[name])
+    return f"Half of what is known of {poorest} comes from {significant(100 * half[poorest], 2)} % of the time."
+
+
+def _least_share(row: FloatArray) -> float:
+    """The least share of the stretches that holds half of the information."""
+    most = np.cumsum(np.sort(row)[::-1])
+    return float(np.searchsorted(most, 0.5 * most[-1]) + 1) / row.size

@@ -1,0 +1,65 @@
+"""Several logs one after another on one time axis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.report.figures.base import Layout, label, upright
+from algid.report.text import file_name
+from algid.report.torquelog import LogRange
+from algid.results import LogSummary
+
+SPACE = 0.01  # of the whole time, between two logs
+MOST_NAMES = 6
+
+
+def offsets(ranges: Mapping[int, LogRange]) -> dict[int, float]:
+    """What to add to each log's times so that the logs follow one another, the first one unmoved."""
+    space = SPACE * sum(span.duration for span in ranges.values())
+    moved: dict[int, float] = {}
+    end = None
+    for log, span in sorted(ranges.items()):
+        moved[log] = 0.0 if end is None else end + space - span.first
+        end = moved[log] + span.last
+    return moved
+
+
+def chained(
+    series: Mapping[int, tuple[FloatArray, FloatArray]], moved: Mapping[int, float]
+) -> tuple[FloatArray, FloatArray]:
+    """The logs' series as one line that breaks between logs."""
+    x, y = [], []
+    for log, (own_x, own_y) in sorted(series.items()):
+        x += [own_x + moved[log], own_x[-1:] + moved[log]]
+        y += [own_y, np.full(own_x[-1:].size, np.nan)]
+    return (np.concatenate(x), np.concatenate(y)) if x else (np.empty(0), np.empty(0))
+
+
+def separators(ranges: Mapping[int, LogRange], moved: Mapping[int, float], logs: list[LogSummary]) -> Layout:
+    """Shapes and annotations that tell the logs apart; none for a single one."""
+    if len(ranges) < 2:
+        return {}
+    starts = {log: moved[log] + span.first for log, span in sorted(ranges.items())}
+    shapes = [upright(start, "@muted/0.6") for start in list(starts.values())[1:]]
+    named = starts if len(starts) <= MOST_NAMES else {}
+    return {"shapes": shapes, "annotations": [_name(start, _words(log, logs)) for log, start in named.items()]}
+
+
+def _words(log: int, logs: list[LogSummary]) -> str:
+    return label(file_name(logs[log].path), 22) if 0 <= log < len(logs) else f"log {log + 1}"
+
+
+def _name(x: float, words: str) -> Layout:
+    return {
+        "x": x,
+        "y": 1,
+        "yref": "paper",
+        "xanchor": "left",
+        "yanchor": "bottom",
+        "text": words,
+        "showarrow": False,
+        "font": {"size": 11, "color": "@muted"},
+    }

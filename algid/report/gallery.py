@@ -1,0 +1,69 @@
+"""Every figure of a result folder, in the page's order, or why it is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from algid.errors import ResultError
+from algid.report.figures.base import Figure, Missing
+from algid.report.figures.closeup import TITLE as CLOSEUP
+from algid.report.figures.closeup import closeup
+from algid.report.figures.convergence import convergence
+from algid.report.figures.correlation import correlation
+from algid.report.figures.coverage import coverage
+from algid.report.figures.inertia import inertia
+from algid.report.figures.information import TITLE as INFORMATION
+from algid.report.figures.information import information
+from algid.report.figures.residual import residual
+from algid.report.figures.torque import TITLE as TORQUE
+from algid.report.figures.torque import torque
+from algid.report.torquelog import TorqueLog, read_torque
+from algid.results import Result
+
+
+def gallery(folder: Path, result: Result) -> tuple[TorqueLog | None, list[Figure | Missing]]:
+    """What the figures need of `torque.parquet`, where it can be read, and the figures."""
+    series, loaded, seconds = (folder / f"{name}.parquet" for name in ("estimates", "loaded", "information"))
+    figures = [_try("convergence", "Convergence of the estimates", series, lambda: convergence(series, result))]
+    if loaded.exists():
+        figures.append(
+            _try("loaded", "Convergence, loaded log", loaded, lambda: convergence(loaded, result, loaded=True))
+        )
+    measured = folder / "torque.parquet"
+    found = _torque_log(measured)
+    if isinstance(found, Missing):
+        figures.append(found)
+    else:
+        figures.append(torque(found, result.logs))
+        if found.reduced:
+            figures.append(_try("closeup", CLOSEUP, measured, lambda: closeup(measured, found)))
+        figures += [residual(found, result), coverage(found)]
+    read = None if isinstance(found, Missing) else found
+    figures.append(correlation(result))
+    figures.append(_try("information", INFORMATION, seconds, lambda: information(seconds, result)))
+    figures.append(inertia(result, read))
+    return read, figures
+
+
+def _torque_log(path: Path) -> TorqueLog | Missing:
+    title = f"{TORQUE}, residual, coverage"
+    if not path.exists():
+        return Missing("torque", title, _absent(path))
+    try:
+        return read_torque(path)
+    except ResultError as error:
+        return Missing("torque", title, str(error))
+
+
+def _try(key: str, title: str, file: Path, make: Callable[[], Figure | Missing]) -> Figure | Missing:
+    if not file.exists():
+        return Missing(key, title, _absent(file))
+    try:
+        return make()
+    except ResultError as error:
+        return Missing(key, title, str(error))
+
+
+def _absent(path: Path) -> str:
+    return f"{path.name} is not in this folder"

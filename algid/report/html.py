@@ -1,0 +1,102 @@
+"""Pieces of HTML: foreign text escaped, tables, figures, and data inside a script."""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Iterable
+
+from algid.report.figures.base import Figure, Legend, Missing
+from algid.report.tables import Column, Table
+from algid.report.text import visible
+from algid.results import Status
+
+LONGEST_TEXT = 4_000
+KEYS = "Arrow keys move, plus and minus zoom, 0 resets."
+
+
+def escaped(text: str) -> str:
+    """`text` as the content of an element or of a quoted attribute, every control character shown."""
+    return html.escape(visible(text, LONGEST_TEXT), quote=True)
+
+
+def script_json(value: object) -> str:
+    """`value` as JSON that cannot end the script element it stands in."""
+    text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
+
+
+def table_html(table: Table) -> str:
+    """A table that scrolls sideways by itself where the page is narrow."""
+    head = "".join(f'<th scope="col"{_class(column)}>{escaped(column.heading)}</th>' for column in table.columns)
+    body = "".join(f"<tr>{_cells(table.columns, row)}</tr>\n" for row in table.rows)
+    note = f'<p class="note">{escaped(table.note)}</p>' if table.note else ""
+    return (
+        f'<div class="scroll" role="region" tabindex="0" aria-label="{escaped(table.title)}"><table>'
+        f"<caption>{escaped(table.title)}</caption>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody>"
+        f"</table></div>{note}\n"
+    )
+
+
+def _cells(columns: Iterable[Column], row: tuple[str, ...]) -> str:
+    return "".join(_cell(column, text) for column, text in zip(columns, row, strict=True))
+
+
+def _cell(column: Column, text: str) -> str:
+    if column.kind == "name":
+        return f'<th scope="row">{escaped(text)}</th>'
+    if column.kind == "status":
+        return f'<td class="status{" ok" if text == Status.OK.value else ""}">{escaped(text)}</td>'
+    main = " estimate" if column.heading == "Estimate" else ""
+    return f'<td class="{column.kind}{main}">{escaped(text)}</td>'
+
+
+def _class(column: Column) -> str:
+    return ' class="number"' if column.kind == "number" else ""
+
+
+def figure_html(figure: Figure | Missing) -> str:
+    """A figure's place on the page, which the script fills; or why there is none."""
+    head = f'<h2 id="{figure.key}">{escaped(figure.title)}</h2>\n'
+    if isinstance(figure, Missing):
+        return f'{head}<p class="missing">Not shown: {escaped(figure.why)}.</p>\n'
+    panels = "".join(_panel(figure, place) for place in range(len(figure.panels)))
+    note = f'<p class="note">{escaped(figure.note)}</p>' if figure.note else ""
+    columns = " two" if figure.columns == 2 else ""
+    return (
+        f'<figure aria-labelledby="{figure.key}">{head}{_legend(figure)}<div class="panels{columns}">{panels}</div>\n'
+        f'<figcaption><p class="reading">{escaped(figure.reading)}</p>{note}</figcaption></figure>\n'
+    )
+
+
+def panel_id(figure: Figure, place: int) -> str:
+    """Where the panel of that place is drawn."""
+    return f"{figure.key}-{place}"
+
+
+def _panel(figure: Figure, place: int) -> str:
+    panel = figure.panels[place]
+    title = f"<h3>{escaped(panel.title)}</h3>" if panel.title else ""
+    return (
+        f'<div class="panel">{title}<div class="plot" id="{panel_id(figure, place)}" role="img" tabindex="0" '
+        f'style="min-height:{panel.height}px" aria-label="{escaped(panel.says)}. {KEYS}"></div></div>'
+    )
+
+
+def _legend(figure: Figure) -> str:
+    if not figure.legend:
+        return ""
+    entries = "".join(f"<li>{_entry(figure.key, entry)}</li>" for entry in figure.legend)
+    return f'<ul class="legend" aria-label="Legend">{entries}</ul>'
+
+
+def _entry(key: str, entry: Legend) -> str:
+    name, _, opacity = entry.colour.removeprefix("@").partition("/")
+    style = f"--tint:var(--{name});opacity:{opacity or 1}"
+    words = (
+        f'<span class="swatch {entry.mark}" style="{style}"></span><span class="words">{escaped(entry.words)}</span>'
+    )
+    if not entry.group:
+        return f'<span class="entry">{words}</span>'
+    data = f'data-figure="{key}" data-group="{escaped(entry.group)}"'
+    return f'<button type="button" aria-pressed="true" {data}>{words}</button>'

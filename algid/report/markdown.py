@@ -1,0 +1,48 @@
+"""A result as Markdown, for pull requests and CI summaries."""
+
+from __future__ import annotations
+
+import re
+
+from algid.report.tables import Table, estimate_tables, fit_tables, log_tables, provenance_table
+from algid.report.text import file_name
+from algid.report.verdict import LEVEL_WORDS, Level, verdict
+from algid.results import Result
+
+LEVEL_SIGNS: dict[Level, str] = {"good": "✅", "reservations": "⚠️", "failed": "❌"}
+_SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|~@&])")
+
+
+def markdown(result: Result) -> str:
+    """Verdict, estimates, fit, logs and provenance of `result` as GitHub's Markdown."""
+    judged = verdict(result)
+    word = LEVEL_WORDS[judged.level]
+    lines = [
+        f"### Identification of {escaped(file_name(result.log.path))}",
+        "",
+        f"{LEVEL_SIGNS[judged.level]} **{word}**{escaped(judged.sentence.removeprefix(word))}",
+        "",
+        *(f"- {escaped(reason)}" for reason in judged.reasons),
+    ]
+    tables = [*estimate_tables(result), *fit_tables(result)]
+    details = [log_tables(result)[0], provenance_table(result)]
+    folded = ["<details><summary>Logs and provenance</summary>", "", *map(markdown_table, details), "</details>"]
+    return "\n".join([*lines, "", *map(markdown_table, tables), *folded]) + "\n"
+
+
+def markdown_table(table: Table) -> str:
+    """One table with its title and note."""
+    rule = ["--:" if column.kind == "number" else ":--" for column in table.columns]
+    rows = [[column.heading for column in table.columns], *table.rows]
+    body = [_line([escaped(cell) for cell in row]) for row in rows]
+    note = ["", escaped(table.note)] if table.note else []
+    return "\n".join([f"**{escaped(table.title)}**", "", body[0], _line(rule), *body[1:], *note, ""])
+
+
+def escaped(text: str) -> str:
+    """`text` so that Markdown shows it as it is: no markup, no HTML, no mention of anybody."""
+    return _SPECIAL.sub(r"\\\1", text)
+
+
+def _line(cells: list[str]) -> str:
+    return f"| {' | '.join(cells)} |"

@@ -1,0 +1,57 @@
+"""How a number is written: the one place, so that every format shows the same digits."""
+
+from __future__ import annotations
+
+import math
+
+ABSENT = "–"
+SMALLEST_FIXED = 1e-3
+LARGEST_FIXED = 1e6
+MOST_DIGITS = 8
+
+
+def significant(value: float | None, digits: int = 5) -> str:
+    """`value` with that many significant digits; a dash where there is none, ∞ where it is unbounded."""
+    if value is None or math.isnan(value):
+        return ABSENT
+    if math.isinf(value):
+        return "∞" if value > 0 else "−∞"
+    if value == 0:
+        return "0"
+    exponent = _exponent(value, digits)
+    if SMALLEST_FIXED <= abs(value) < LARGEST_FIXED:
+        return f"{value:.{max(digits - 1 - exponent, 0)}f}"
+    mantissa = f"{value / 10.0**exponent:.{digits - 1}f}" if abs(exponent) < 300 else f"{value:.{digits - 1}e}"
+    return f"{mantissa}e{exponent}" if "e" not in mantissa else mantissa
+
+
+def resolved(value: float | None, std: float | None) -> str:
+    """`value` down to the second significant digit of its standard deviation; five digits where there is none."""
+    return significant(value, digits_of(value, std))
+
+
+def digits_of(value: float | None, std: float | None) -> int:
+    """Significant digits of `value` that its standard deviation leaves worth writing: two to eight."""
+    if value is None or std is None or not (math.isfinite(value) and math.isfinite(std)) or value == 0 or std <= 0:
+        return 5
+    leading = math.floor(math.log10(abs(value))) - math.floor(math.log10(std))
+    return min(max(leading + 2, 2), MOST_DIGITS)
+
+
+def percent(part: float | None, whole: float | None, digits: int = 2) -> str:
+    """`part` in percent of the size of `whole`."""
+    if part is None or not whole:
+        return ABSENT
+    return significant(100 * part / abs(whole), digits)
+
+
+def interval(low: float | None, high: float | None, digits: int) -> str:
+    """An interval; a missing end is unbounded."""
+    left = "−∞" if low is None else significant(low, digits)
+    right = "∞" if high is None else significant(high, digits)
+    return f"[{left}, {right}]"
+
+
+def _exponent(value: float, digits: int) -> int:
+    """Decimal exponent of `value` once rounded to `digits` digits."""
+    return int(f"{value:.{digits - 1}e}".partition("e")[2])

@@ -1,0 +1,222 @@
+"""`report.html`: one file that opens offline, without a request to any host.
+
+Nothing but this package's own script runs: the page's Content-Security-Policy names the scripts by their
+hashes, or by a nonce for the library beside the page, so that a name out of a log could not run even if it
+slipped past the escaping.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+
+from algid.outfiles import whole_file
+from algid.report.figures.base import Figure, Missing
+from algid.report.gallery import gallery
+from algid.report.html import escaped, figure_html, panel_id, script_json, table_html
+from algid.report.numbers import significant
+from algid.report.tables import (
+    Column,
+    Table,
+    estimate_tables,
+    fit_tables,
+    log_tables,
+    provenance_table,
+    settings_table,
+)
+from algid.report.template import TEMPLATE
+from algid.report.text import file_name
+from algid.report.torquelog import TorqueLog
+from algid.report.verdict import LEVEL_WORDS, Verdict, verdict
+from algid.results import Result, read_result
+
+LIBRARY = "plotly.min.js"
+SIGNS = {"good": "✓", "reservations": "!", "failed": "✕"}
+
+
+def write_report(folder: Path, shared_library: bool = False) -> Path:
+    """Write `report.html` into the result folder `folder`, from what it holds.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds `result.json` and, as far as they are known, `estimates.parquet`, `loaded.parquet`,
+        `torque.parquet` and `information.parquet`; the page says what is absent.
+    shared_library : bool
+        Whether the plotting library stands once beside the folder, for a folder of many results, instead
+        of inside the page.
+
+    Raises
+    ------
+    ResultError
+        If `result.json` is missing or not a result of this version.
+    OutputError
+        If the page cannot be written.
+    """
+    from plotly.offline import get_plotlyjs
+
+    result = read_result(folder)
+    library = get_plotlyjs()
+    page = folder / "report.html"
+    if shared_library:
+        _write_once(folder.parent / LIBRARY, library)
+    text = page_html(folder, result, None if shared_library else library)
+    with whole_file(page) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return page
+
+
+def _write_once(path: Path, text: str) -> None:
+    content = text.encode()
+    if not path.is_file() or path.stat().st_size != len(content):
+        with whole_file(path) as temporary:
+            temporary.write_bytes(content)
+
+
+def page_html(folder: Path, result: Result, library: str | None) -> str:
+    """The page's text; without `library` it asks for the one beside the folder."""
+    torque, figures = gallery(folder, result)
+    judged = verdict(result)
+    body = [
+        _head(result, judged),
+        _contents(figures),
+        '<main id="numbers">',
+        *map(table_html, estimate_tables(result)),
+        *map(figure_html, figures),
+        *_section("fit", "What the estimator knows of the logs", fit_tables(result)),
+        *_section("data", "Data quality", [*_quality(torque, result), *log_tables(result)], _warnings(result)),
+        *_section("settings", "Settings and provenance", [settings_table(result.settings), provenance_table(result)]),
+        "</main>",
+        f"<footer>Made by algid {escaped(result.version)} from {escaped(str(folder.name))}/result.json.</footer>",
+        '<noscript><p class="missing">The figures need JavaScript; all numbers stand without it.</p></noscript>',
+    ]
+    return _document(file_name(result.log.path), "\n".join(body), script_json(_drawing(figures)), library)
+
+
+def _document(title: str, body: str, data: str, library: str | None) -> str:
+    script, style = _asset("report.js"), _asset("report.css")
+    if library is None:
+        nonce = hashlib.sha256((body + data).encode()).hexdigest()  # nobody who writes the body can foretell it
+        source, tag = f"'nonce-{nonce}'", f'<script nonce="{nonce}" src="../{LIBRARY}"></script>'
+    else:
+        source, tag = _hash(library), f"<script>{library}</script>"
+    policy = (
+        f"default-src 'none'; script-src {source} {_hash(script)}; style-src 'unsafe-inline'; "
+        "img-src data: blob:; base-uri 'none'; form-action 'none'"
+    )
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        '<meta name="color-scheme" content="light dark">\n<link rel="icon" href="data:,">\n'
+        f"<title>{escaped(title)} · algid</title>\n<style>{style}</style>\n</head>\n<body>\n"
+        f'<a class="skip" href="#numbers">Skip to the numbers</a>\n{body}\n'
+        f'<script type="application/json" id="figures">{data}</script>\n{tag}\n<script>{script}</script>\n'
+        "</body>\n</html>\n"
+    )
+
+
+def _asset(name: str) -> str:
+    return (resources.files("algid.report") / "assets" / name).read_text(encoding="utf-8")
+
+
+def _hash(script: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
+
+
+def _drawing(figures: Sequence[Figure | Missing]) -> dict[str, object]:
+    panels = [
+        {
+            "id": panel_id(figure, place),
+            "figure": figure.key,
+            "columns": "two" if figure.columns == 2 else "one",
+            "sync": panel.sync,
+            "height": panel.height,
+            "traces": panel.traces,
+            "layout": panel.layout,
+        }
+        for figure in figures
+        if isinstance(figure, Figure)
+        for place, panel in enumerate(figure.panels)
+    ]
+    return {"template": TEMPLATE, "panels": panels}
+
+
+def _head(result: Result, judged: Verdict) -> str:
+    more = "" if not result.more_logs else f" and {len(result.more_logs)} more"
+    seconds = significant(sum(log.duration for log in result.logs), 4)
+    samples, rate = sum(log.rows for log in result.logs), significant(result.log.rate, 4)
+    facts = f"{result.estimator} estimator · {seconds} s of log at {rate} Hz · {samples:,} samples"
+    return (
+        f'<header><p class="kicker">algid · identification of a two-link arm</p>'
+        f"<h1>{escaped(file_name(result.log.path))}{more}</h1>\n"
+        f'<p class="facts">{escaped(facts)}</p>\n{_banner(judged)}</header>'
+    )
+
+
+def _banner(judged: Verdict) -> str:
+    word = LEVEL_WORDS[judged.level]
+    told = judged.level == "reservations" and len(judged.reasons) == 1
+    reasons = "" if told else "".join(f"<li>{escaped(reason)}</li>" for reason in judged.reasons)
+    return (
+        f'<div class="verdict {judged.level}"><span class="sign" aria-hidden="true">{SIGNS[judged.level]}</span>'
+        f"<div><p><strong>{word}</strong>{escaped(judged.sentence.removeprefix(word))}</p>"
+        f"{reasons and f'<ul>{reasons}</ul>'}</div></div>"
+    )
+
+
+def _contents(figures: Sequence[Figure | Missing]) -> str:
+    targets = [("numbers", "Numbers"), *((figure.key, figure.title) for figure in figures)]
+    targets += [("data", "Data quality"), ("settings", "Settings and provenance")]
+    links = "".join(f'<li><a href="#{key}">{escaped(title)}</a></li>' for key, title in targets)
+    return f'<nav aria-label="Contents"><ul>{links}</ul></nav>'
+
+
+def _section(key: str, title: str, tables: Sequence[Table], extra: str = "") -> list[str]:
+    if not tables and not extra:
+        return []
+    return [
+        f'<section aria-labelledby="{key}" class="tables-facts"><h2 id="{key}">{escaped(title)}</h2>',
+        extra,
+        *map(table_html, tables),
+        "</section>",
+    ]
+
+
+def _warnings(result: Result) -> str:
+    if not result.warnings:
+        return '<p class="note">The readers and the estimator gave no warning.</p>'
+    return f"<ul>{''.join(f'<li>{escaped(warning)}</li>' for warning in result.warnings)}</ul>"
+
+
+def _quality(torque: TorqueLog | None, result: Result) -> list[Table]:
+    """What the stamps and the samples of each log look like."""
+    if torque is None:
+        return []
+    columns = (
+        Column("Log", "name"),
+        Column("Samples used", "number"),
+        Column("From, s", "number"),
+        Column("To, s", "number"),
+        Column("Period, ms", "number"),
+        Column("Gaps", "number"),
+        Column("Largest step, ms", "number"),
+    )
+    names = dict(enumerate(file_name(log.path) for log in result.logs))
+    rows = tuple(
+        (
+            names.get(log, f"log {log + 1}"),
+            f"{span.samples:,}",
+            significant(span.first, 6) if span.first else "0",
+            significant(span.last, 6),
+            significant(1e3 * span.period, 4),
+            str(span.gaps),
+            significant(1e3 * span.largest_gap, 4),
+        )
+        for log, span in sorted(torque.ranges.items())
+    )
+    note = f"{torque.unpredicted:,} samples have no predicted torque." if torque.unpredicted else ""
+    return [Table("Samples that were used", columns, rows, note)]

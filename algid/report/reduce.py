@@ -1,0 +1,132 @@
+"""Long series made short for drawing, block by block, so that no spike is lost.
+
+=======  ==================================  ======
+symbol   name                                shape
+=======  ==================================  ======
+x        where each sample lies, increasing  (N,)
+y        the samples                         (N,)
+=======  ==================================  ======
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from algid.arm import FloatArray
+
+GOLDEN = 0.6180339887498949
+
+
+class MinMax:
+    """Keeps the smallest and the largest sample of every `size` ones, each where it lies.
+
+    Blocks are fed in order; the outcome does not depend on how the series is cut into blocks. A stretch
+    without any finite sample keeps one NaN, so that the line breaks there.
+    """
+
+    def __init__(self, size: int) -> None:
+        if size < 1:
+            raise ValueError(f"size must be at least 1, got {size}")
+        self._size = size
+        self._rest: tuple[FloatArray, FloatArray] = (np.empty(0), np.empty(0))
+        self._kept: list[tuple[FloatArray, FloatArray]] = []
+
+    def feed(self, x: FloatArray, y: FloatArray) -> None:
+        """Take the next block: `x` and `y` (n,)."""
+        if self._size <= 2:
+            self._kept.append((x.copy(), y.copy()))
+            return
+        if self._rest[0].size:
+            x, y = np.concatenate([self._rest[0], x]), np.concatenate([self._rest[1], y])
+        whole = x.size - x.size % self._size
+        self._rest = x[whole:].copy(), y[whole:].copy()
+        if whole:
+            self._kept.append(_extremes(x[:whole].reshape(-1, self._size), y[:whole].reshape(-1, self._size)))
+
+    def result(self) -> tuple[FloatArray, FloatArray]:
+        """The reduced `x` and `y`, at most two samples for every `size`."""
+        kept = list(self._kept)
+        if self._rest[0].size:
+            kept.append(_extremes(self._rest[0][None], self._rest[1][None]))
+        if not kept:
+            return np.empty(0), np.empty(0)
+        return np.concatenate([x for x, _ in kept]), np.concatenate([y for _, y in kept])
+
+
+def _extremes(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Smallest and largest of each row of `y` (rows, size), in the order they lie in."""
+    rows = np.arange(y.shape[0])
+    if np.isnan(y.sum()):
+        lowest = np.where(np.isnan(y), np.inf, y).argmin(axis=1)
+        highest = np.where(np.isnan(y), -np.inf, y).argmax(axis=1)
+    else:
+        lowest, highest = y.argmin(axis=1), y.argmax(axis=1)
+    first, last = np.minimum(lowest, highest), np.maximum(lowest, highest)
+    index = np.stack([first, last], axis=1)
+    twice = (first == last)[:, None] & np.array([False, True])
+    keep = ~twice
+    return x[rows[:, None], index][keep], y[rows[:, None], index][keep]
+
+
+class Share:
+    """Share of the samples in every `size` ones for which something holds, 0 to 1, from each one's start."""
+
+    def __init__(self, size: int) -> None:
+        self._size = size
+        self._x: list[FloatArray] = []
+        self._held: list[FloatArray] = []
+        self._rest: tuple[FloatArray, FloatArray] = (np.empty(0), np.empty(0))
+
+    def feed(self, x: FloatArray, holds: NDArray[np.bool_]) -> None:
+        """Take the next block: `x` and `holds` (n,)."""
+        x, held = np.concatenate([self._rest[0], x]), np.concatenate([self._rest[1], holds])
+        whole = x.size - x.size % self._size
+        self._rest = x[whole:], held[whole:]
+        self._x.append(x[: whole : self._size])
+        self._held.append(held[:whole].reshape(-1, self._size).mean(axis=1))
+
+    def result(self) -> tuple[FloatArray, FloatArray]:
+        """The start of each stretch and the share in it."""
+        x, held = list(self._x), list(self._held)
+        if self._rest[0].size:
+            x.append(self._rest[0][:1])
+            held.append(self._rest[1].mean(keepdims=True))
+        return (np.concatenate(x), np.concatenate(held)) if x else (np.empty(0), np.empty(0))
+
+
+class Thinned:
+    """One sample of every `step` ones of several series (rows, n), counted across blocks.
+
+    Which one moves by the golden ratio from stretch to stretch: spread evenly, and never in step with a
+    periodic motion.
+    """
+
+    def __init__(self, step: int) -> None:
+        self._step = max(step, 1)
+        self._seen = 0
+        self._kept: list[FloatArray] = []
+
+    def feed(self, block: FloatArray) -> None:
+        """Take the next block (rows, n)."""
+        last = self._seen + block.shape[-1]
+        stretch = np.arange(self._seen // self._step, -(-last // self._step))
+        place = stretch * self._step + np.floor(np.mod(stretch * GOLDEN, 1.0) * self._step).astype(np.int64)
+        inside = place[(place >= self._seen) & (place < last)]
+        self._kept.append(block[:, inside - self._seen])
+        self._seen = last
+
+    def result(self, rows: int) -> FloatArray:
+        """The samples kept (rows, m)."""
+        return np.concatenate(self._kept, axis=1) if self._kept else np.empty((rows, 0))
+
+
+def bucket_size(samples: int, points: int) -> int:
+    """Samples a bucket so that `MinMax` leaves at most about `points`."""
+    return 1 if samples <= points else int(np.ceil(2 * samples / points))
+
+
+def broken_at_gaps(x: FloatArray, y: FloatArray, gap: float) -> tuple[FloatArray, FloatArray]:
+    """The series with a NaN wherever two samples lie more than `gap` apart, so that the line breaks."""
+    after = np.flatnonzero(np.diff(x) > gap) + 1
+    return np.insert(x, after, x[after]), np.insert(y, after, np.nan)

@@ -1,0 +1,62 @@
+"""A result on the terminal. Foreign text never passes as markup; colours follow the console (`NO_COLOR`)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from algid.report.tables import Table, estimate_tables
+from algid.report.verdict import LEVEL_WORDS, Level, verdict
+from algid.results import Result, Status
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table as RichTable
+
+LEVEL_STYLES: dict[Level, str] = {"good": "bold green", "reservations": "bold yellow", "failed": "bold red"}
+NARROW = 110  # columns below which the wide ones are left out
+
+
+def print_table(result: Result, console: Console) -> None:
+    """Print the verdict, the estimates and what is known against them to `console`."""
+    from rich.text import Text
+
+    judged = verdict(result)
+    word = LEVEL_WORDS[judged.level]
+    console.print(Text(word, LEVEL_STYLES[judged.level]) + Text(judged.sentence.removeprefix(word), "not bold"))
+    for reason in judged.reasons:
+        console.print(Text(f"  • {reason}"))
+    for table in estimate_tables(result):
+        console.print()
+        print_one(table, console)
+
+
+def print_one(table: Table, console: Console) -> None:
+    """Print one table, without its wide columns where the console is narrow."""
+    console.print(rich_table(table.narrow() if console.width < NARROW else table))
+
+
+def rich_table(table: Table) -> RichTable:
+    """`table` as rich sets it."""
+    from rich import box
+    from rich.table import Table as RichTable
+    from rich.text import Text
+
+    title, caption = Text(table.title, "bold"), Text(table.note, "dim") if table.note else None
+    made = RichTable(
+        title=title, caption=caption, title_justify="left", caption_justify="left", box=box.SIMPLE_HEAD, pad_edge=False
+    )
+    for column in table.columns:
+        right = column.kind == "number"
+        made.add_column(
+            Text(column.heading), justify="right" if right else "left", overflow="fold", no_wrap=column.kind != "text"
+        )
+    for row in table.rows:
+        cells = zip(table.columns, row, strict=True)
+        made.add_row(*(Text(cell, _style(column.kind, cell)) for column, cell in cells))
+    return made
+
+
+def _style(kind: str, cell: str) -> str:
+    if kind == "status":
+        return "green" if cell == Status.OK.value else "bold yellow"
+    return "bold" if kind == "name" else ""

@@ -1,0 +1,153 @@
+"""Whether to trust a result: one sentence, and the reasons behind it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from algid.report.numbers import significant
+from algid.report.text import joined, visible
+from algid.results import Estimate, Fit, Result, Status, TorquePrediction
+
+Level = Literal["good", "reservations", "failed"]
+
+LEAST_R2 = 0.9  # below, a tenth of the torque's power is not the model's
+LARGEST_SPREAD = 0.1  # a standard deviation beyond a tenth of the estimate says little more than its size
+FAR_FROM_TRUTH = 4.0  # σ; by chance one estimate in 16,000
+
+LEVEL_WORDS: dict[Level, str] = {"good": "Good", "reservations": "With reservations", "failed": "Failed"}
+STATUS_WORDS = {
+    Status.WEAK_EXCITATION: "too weakly excited",
+    Status.SINGULAR: "singular",
+    Status.NOT_IDENTIFIABLE: "not identifiable",
+    Status.NOT_CONVERGED: "not converged",
+}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How far to trust a result, in one sentence; `reasons` are the reservations, each a clause."""
+
+    level: Level
+    sentence: str
+    reasons: tuple[str, ...] = ()
+
+
+def verdict(result: Result) -> Verdict:
+    """Judge `result` by its statuses, its intervals, its residual and its warnings."""
+    failure = _failure(result)
+    reasons = tuple(_reasons(result))
+    if failure is not None:
+        return Verdict("failed", f"Failed: {failure}; do not use these numbers.", reasons)
+    if reasons:
+        return Verdict("reservations", _reserved(result, reasons), reasons)
+    return Verdict("good", f"Good: {'; '.join(_praise(result))}.")
+
+
+def _failure(result: Result) -> str | None:
+    if result.fit is not None and not result.fit.converged:
+        return f"the estimator did not converge in {result.fit.iterations} iterations"
+    if any(found.status is Status.NOT_CONVERGED for found in result.estimates.values()):
+        return "the estimator did not converge"
+    if not any(_usable(found) for found in result.estimates.values()):
+        words = sorted({STATUS_WORDS.get(found.status, "absent") for found in result.estimates.values()})
+        return f"no parameter could be identified ({joined(words)})"
+    return None
+
+
+def _usable(found: Estimate) -> bool:
+    return found.status is Status.OK and found.estimate is not None
+
+
+def _reserved(result: Result, reasons: tuple[str, ...]) -> str:
+    usable = sum(_usable(found) for found in result.estimates.values())
+    count = len(result.estimates)
+    have = f"all {count} parameters are" if usable == count else f"{usable} of {count} parameters are"
+    more = len(reasons) - 1
+    rest = (
+        "" if more == 0 else ", and there is one more reason below" if more == 1 else f", and {more} more reasons below"
+    )
+    return f"With reservations: {have} identified, but {reasons[0]}{rest}."
+
+
+def _praise(result: Result) -> list[str]:
+    count = len(result.estimates)
+    praise = [f"all {count} parameters are identified"]
+    spreads = {name: _spread(found) for name, found in result.estimates.items() if found.std is not None}
+    if spreads:
+        worst = max(spreads, key=lambda name: spreads[name])
+        praise[0] += f", the least certain, {visible(worst)}, to ±{significant(196 * spreads[worst], 2)} % (95 %)"
+    else:
+        praise[0] += f", without error bars, which the {visible(result.estimator)} estimator does not give"
+    prediction = _prediction(result.fit)
+    if prediction is not None:
+        one, two = (_share(r2) for r2 in prediction.r2)
+        where = "of the torque of both joints" if one == two else f"of joint 1's torque and {two} of joint 2's"
+        praise.append(f"the model explains {one} {where}")
+    errors = {row.parameter: abs(row.error_percent) for row in result.table4 if row.error_percent is not None}
+    if errors:
+        worst = max(errors, key=lambda name: errors[name])
+        praise.append(f"the largest error against the truth is {significant(errors[worst], 2)} % ({visible(worst)})")
+    return praise
+
+
+def _share(r2: float) -> str:
+    """R² in percent, never rounded up to all."""
+    return f"{100 * r2:.2f} %" if r2 <= 0.9999 else "over 99.99 %"
+
+
+def _spread(found: Estimate) -> float:
+    """Standard deviation relative to the estimate's size."""
+    if found.std is None or found.estimate is None:
+        return 0.0
+    return found.std / abs(found.estimate) if found.estimate else math.inf
+
+
+def _prediction(fit: Fit | None) -> TorquePrediction | None:
+    return None if fit is None else fit.cross_validation or fit.residual
+
+
+def _reasons(result: Result) -> Iterator[str]:
+    yield from _bad_statuses(result)
+    yield from _wide_intervals(result)
+    if result.fit is not None:
+        yield from _fit_reasons(result.fit)
+    yield from _far_from_truth(result)
+    yield from (f"algid warns: {visible(warning)}" for warning in result.warnings)
+
+
+def _bad_statuses(result: Result) -> Iterator[str]:
+    for status, words in STATUS_WORDS.items():
+        names = [visible(name) for name, found in result.estimates.items() if found.status is status]
+        if names:
+            yield f"{joined(names)} {'is' if len(names) == 1 else 'are'} {words}"
+
+
+def _wide_intervals(result: Result) -> Iterator[str]:
+    wide = {n: _spread(e) for n, e in result.estimates.items() if _usable(e) and _spread(e) > LARGEST_SPREAD}
+    if wide:
+        shown = [f"{visible(name)} (±{significant(100 * spread, 2)} %)" for name, spread in wide.items()]
+        yield f"the standard deviation of {joined(shown)} is large"
+
+
+def _fit_reasons(fit: Fit) -> Iterator[str]:
+    yield from (visible(direction) for direction in fit.unidentifiable)
+    yield from (f"the estimates break the bound {visible(bound.bound)}" for bound in fit.broken_bounds)
+    coloured = [visible(name) for name, test in fit.whiteness.items() if not test.white]
+    if coloured and fit.intervals == "likelihood":
+        yield f"the residual of {joined(coloured)} is not white, though the intervals take it to be"
+    prediction = _prediction(fit)
+    for joint, r2 in enumerate(prediction.r2 if prediction else (), start=1):
+        if r2 < LEAST_R2:
+            yield f"the model explains only {max(100 * r2, 0):.0f} % of the torque of joint {joint}"
+
+
+def _far_from_truth(result: Result) -> Iterator[str]:
+    for row in result.table4:
+        if row.truth is None or row.estimate is None or not row.std:
+            continue
+        distance = abs(row.estimate - row.truth) / row.std
+        if distance > FAR_FROM_TRUTH:
+            yield f"{visible(row.parameter)} lies {significant(distance, 2)} σ from the truth"
