@@ -50,10 +50,14 @@ def blocks(path: Path, names: Sequence[str], rows: int = ROWS) -> Iterator[Block
 
 
 def row_count(path: Path) -> int:
-    """Rows of `path`, from its footer."""
+    """Rows of `path`, from its footer; raises `ResultError` where it cannot be read."""
+    import pyarrow.lib
     import pyarrow.parquet
 
-    return int(pyarrow.parquet.read_metadata(path).num_rows)
+    try:
+        return int(pyarrow.parquet.read_metadata(path).num_rows)
+    except (OSError, pyarrow.lib.ArrowException) as error:
+        raise _unreadable(path, error) from error
 
 
 def by_log(found: Iterator[Block]) -> Iterator[tuple[int, Block]]:

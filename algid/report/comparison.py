@@ -115,7 +115,7 @@ def _change(first: Estimate | None, other: Estimate | None) -> str:
 
 
 def _settings(results: Sequence[Result], labels: list[str]) -> Table:
-    every = [{"estimator": r.estimator, "algid": r.version, **flat_settings(r.settings)} for r in results]
+    every = [{**flat_settings(r.settings), "estimator": r.estimator, "algid": r.version} for r in results]
     names = dict.fromkeys(name for settings in every for name in settings)
     differing = [name for name in names if len({settings.get(name) for settings in every}) > 1]
     rows = tuple((visible(n), *(visible(settings.get(n, ABSENT)) for settings in every)) for n in differing)

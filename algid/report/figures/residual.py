@@ -37,7 +37,7 @@ def _spectrum(found: TorqueLog, joint: int) -> Panel:
     ]
     layout = {
         "xaxis": axis("frequency, Hz", type="log", **_decades()),
-        "yaxis": axis("(N m)²/Hz", type="log", exponentformat="power", dtick=2, minor={"dtick": 1}),
+        "yaxis": axis("(N m)²/Hz", type="log", dtick=2, tickfont={"size": 10}),
         "hovermode": "closest",
     }
     return Panel(
