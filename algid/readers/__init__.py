@@ -1,0 +1,74 @@
+"""Readers of logs: one file a format, behind the `Reader` of `algid.readers.base`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from algid.errors import LogError
+from algid.log import Log
+
+if TYPE_CHECKING:
+    from algid.profile import Profile
+    from algid.readers.assemble import TableReader
+
+
+def open_log(path: str | Path, profile: Profile | None = None) -> TableReader:
+    """Open a log of any format, told from its content; its samples are read by `Reader.blocks`.
+
+    Parameters
+    ----------
+    path : str or Path
+        A CSV (also compressed), Parquet or MCAP file, or a rosbag2 folder.
+    profile : Profile, optional
+        What the log's names, units and signs mean, where the log does not tell.
+
+    Raises
+    ------
+    LogError
+        If there is no such log, its format is unknown, it is damaged, or it lacks a channel.
+    """
+    from algid.readers.sniff import sniff
+
+    path = Path(path)
+    kind = sniff(path)
+    if kind == "mcap":
+        from algid.readers.mcap import open_mcap
+
+        return open_mcap([path], profile)
+    if kind == "rosbag2":
+        return _open_bag(path, profile)
+    if kind == "parquet":
+        from algid.readers.parquet import open_parquet
+
+        return open_parquet(path, profile)
+    if kind.startswith("csv"):
+        from algid.readers.csv import open_csv
+
+        return open_csv(path, profile, kind)
+    raise LogError(f"{path}: {kind} logs cannot be read; convert it to MCAP, Parquet or CSV")
+
+
+def _open_bag(path: Path, profile: Profile | None) -> TableReader:
+    from algid.readers.mcap import open_mcap
+    from algid.readers.rosbag2 import bag_files
+
+    bag = bag_files(path)
+    if bag.kind != "mcap":
+        raise LogError(f"{path}: a bag of {bag.kind} files; expected MCAP")
+    return replace(open_mcap(bag.paths, profile), notices=bag.notices)
+
+
+def read_log(path: str | Path, profile: Profile | None = None) -> Log:
+    """Read a whole log: see `open_log`.
+
+    Raises
+    ------
+    LogError
+        As `open_log`, and if a value is not finite or time runs wrong.
+    """
+    from algid.readers.gather import ROWS, whole_log
+
+    reader = open_log(path, profile)
+    return whole_log(reader.blocks(ROWS), reader.rows)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,7 +23,7 @@ class Recording:
     rate: float = 1000.0
     duration: float = 1.0
     initial: tuple[float, float, float, float] = (*HANGING.tolist(), 0.0, 0.0)
-    sensors: Sensors = Sensors()
+    sensors: Sensors = field(default_factory=Sensors)
 
 
 def excitation(case: Case, name: str) -> Torque:

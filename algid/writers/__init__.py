@@ -1,0 +1,39 @@
+"""Writers of logs: one file a format, each `write(path, log, truth=…)`, whole files only."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from algid.log import Log, Truth
+
+FORMATS = ("mcap", "parquet", "csv")
+
+
+def write_log(
+    path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None, kind: str | None = None
+) -> None:
+    """Write a log, or the blocks of one, in the format of `path`'s suffix or as `kind`.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written there.
+    ValueError
+        If the format is unknown.
+    """
+    name = kind or path.suffix.lstrip(".").lower()
+    if name == "mcap":
+        from algid.writers import mcap
+
+        mcap.write(path, log, truth=truth)
+    elif name == "parquet":
+        from algid.writers import parquet
+
+        parquet.write(path, log, truth=truth)
+    elif name == "csv":
+        from algid.writers import csv
+
+        csv.write(path, log, truth=truth)
+    else:
+        raise ValueError(f"format must be one of {', '.join(FORMATS)}, got {name!r}")

@@ -1,0 +1,102 @@
+"""Profiles: what a log's names, units and signs mean, in a file `algid.toml` beside the logs.
+
+Everything is optional; what a profile leaves out is told from the log. A key that is not known is refused.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from algid.errors import SettingError
+
+AngleUnit = Literal["rad", "deg", "rev", "counts"]
+VelocityUnit = Literal["rad", "deg", "rev", "counts", "rpm"]
+TorqueUnit = Literal["N m", "mN m", "A", "mA"]
+TimeUnit = Literal["s", "ms", "us", "ns"]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Channel(_Strict):
+    """Where one channel comes from: a column, or a topic and the path of a field in its messages."""
+
+    topic: str | None = None
+    source: str | None = None
+    sign: Literal[1, -1] = 1
+    offset: float = 0.0
+
+
+class Angle(Channel):
+    """An angle: `offset` in rad is added after unit and sign; `counts` are encoder counts in one turn."""
+
+    unit: AngleUnit | None = None
+    counts: float | None = Field(default=None, gt=0)
+    unwrap: bool = False
+
+
+class Velocity(Channel):
+    """A velocity: its unit a second (rpm: turns a minute)."""
+
+    unit: VelocityUnit | None = None
+    counts: float | None = Field(default=None, gt=0)
+
+
+class Torque(Channel):
+    """A torque at the joint: `offset` in N m. Amperes need `torque_constant` in N m/A at the motor."""
+
+    unit: TorqueUnit | None = None
+    torque_constant: float | None = Field(default=None, gt=0)
+    gear_ratio: float = Field(default=1.0, gt=0)
+
+
+class Profile(_Strict):
+    """What a log's names, units and signs mean. Angles become θ1 from the horizontal, θ2 from link 1."""
+
+    topic: str | None = None
+    joints: tuple[str, str] | None = None
+    clock: Literal["header", "log"] | None = None
+    time: str | None = None
+    time_unit: TimeUnit | None = None
+    zero: Literal["horizontal", "hanging"] = "horizontal"
+    second_angle: Literal["relative", "absolute"] = "relative"
+    gravity: float = Field(default=9.81, ge=0)
+    velocity: bool = True
+    signs: tuple[Literal[1, -1], Literal[1, -1]] = (1, 1)
+    offsets: tuple[float, float] = (0.0, 0.0)
+    theta1: Angle = Angle()
+    theta2: Angle = Angle()
+    tau1: Torque = Torque()
+    tau2: Torque = Torque()
+    omega1: Velocity = Velocity()
+    omega2: Velocity = Velocity()
+
+    def channel(self, name: str) -> Angle | Velocity | Torque:
+        """The profile of the canonical channel `name`."""
+        found: Angle | Velocity | Torque = getattr(self, name)
+        return found
+
+
+def load_profile(path: Path) -> Profile:
+    """Read `algid.toml`.
+
+    Raises
+    ------
+    SettingError
+        If the file is missing, is not TOML, or holds a key or a value that is not known.
+    """
+    try:
+        return Profile.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    except (OSError, UnicodeDecodeError) as error:
+        raise SettingError(f"{path}: the profile cannot be read ({error}); check the name") from error
+    except tomllib.TOMLDecodeError as error:
+        raise SettingError(f"{path}: the profile is not TOML: {error}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise SettingError(f"{path}: {place}: {first['msg']}; found {first['input']!r}") from error

@@ -1,0 +1,98 @@
+"""From a file's units, signs and zero to algid's: rad, N m, θ1 from the horizontal, θ2 from link 1."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.errors import LogError
+from algid.readers.table import VELOCITIES, Table
+
+if TYPE_CHECKING:
+    from algid.profile import Profile
+
+_TURN = 2 * math.pi
+_ANGLE = {"rad": 1.0, "deg": math.pi / 180, "rev": _TURN, "rpm": _TURN / 60}
+_TORQUE = {"N m": 1.0, "mN m": 1e-3}
+_CURRENT = {"A": 1.0, "mA": 1e-3}
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """Value · factor + offset for each channel of a table, then the zero and the reference of the angles."""
+
+    factors: Mapping[str, float]
+    offsets: Mapping[str, float]
+    hanging: bool = False
+    absolute: bool = False
+
+    def apply(self, table: Table) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+        """Angles, torques and, where recorded, velocities of a table: each (2, N), rad, N m, rad/s."""
+        theta = self._joint_pair(table, "theta1", "theta2")
+        tau = self._joint_pair(table, "tau1", "tau2")
+        omega = self._joint_pair(table, *VELOCITIES) if VELOCITIES[0] in table.columns else None
+        if self.absolute:
+            theta[1] -= theta[0]
+            if omega is not None:
+                omega[1] -= omega[0]
+        if self.hanging:
+            theta[0] -= math.pi / 2
+        return theta, tau, omega
+
+    def _joint_pair(self, table: Table, first: str, second: str) -> FloatArray:
+        both = np.empty((2, len(table)))
+        for row, name in zip(both, (first, second), strict=True):
+            if self.factors[name] == 1:
+                row[:] = table.columns[name]
+            else:
+                np.multiply(table.columns[name], self.factors[name], out=row)
+            if self.offsets[name]:
+                row += self.offsets[name]
+        return both
+
+
+def conversion(path: str, profile: Profile | None, told: Mapping[str, str]) -> Conversion:
+    """The conversion that a profile asks for; `told` are units that the file's own names state.
+
+    Raises
+    ------
+    LogError
+        If a torque is in amperes without a torque constant, or counts without counts a turn.
+    """
+    names = ("theta1", "theta2", "tau1", "tau2", *VELOCITIES)
+    factors = {name: _factor(path, name, profile, told.get(name)) for name in names}
+    if profile is None:
+        return Conversion(factors, dict.fromkeys(names, 0.0))
+    offsets = {name: profile.channel(name).offset for name in names}
+    for joint in (0, 1):
+        offsets[names[joint]] += profile.offsets[joint]
+    return Conversion(
+        factors, offsets, hanging=profile.zero == "hanging", absolute=profile.second_angle == "absolute"
+    )
+
+
+def _factor(path: str, name: str, profile: Profile | None, told: str | None) -> float:
+    channel = profile.channel(name) if profile else None
+    unit = (channel.unit if channel else None) or told or ("N m" if name.startswith("tau") else "rad")
+    sign = channel.sign * profile.signs[int(name[-1]) - 1] if channel and profile else 1
+    if unit in _CURRENT:
+        constant = getattr(channel, "torque_constant", None)
+        if constant is None:
+            raise LogError(
+                f"{path}: {name} is a current; torque in N m needs the motor's torque constant: set "
+                f'unit = "A", torque_constant (N m/A) and gear_ratio of [{name}] in a profile'
+            )
+        return sign * _CURRENT[unit] * constant * float(getattr(channel, "gear_ratio", 1.0))
+    if unit == "counts":
+        counts = getattr(channel, "counts", None)
+        if counts is None:
+            raise LogError(f"{path}: {name} in encoder counts needs counts a turn: set counts of [{name}]")
+        return sign * _TURN / float(counts)
+    if name.startswith("tau"):
+        return sign * _TORQUE[unit]
+    return sign * _ANGLE[unit]

@@ -1,0 +1,188 @@
+"""CSV logs, plain or compressed, through polars: only the columns that are needed, a block at a time."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from algid.errors import LogError
+from algid.log import Origin
+from algid.readers import frames
+from algid.readers.assemble import TableReader
+from algid.readers.columns import Columns, assign
+from algid.readers.dialect import Dialect, detect
+from algid.readers.inflate import head_of, pieces
+from algid.readers.table import Table
+from algid.truth import Companion, loads
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from algid.profile import Profile
+
+_HEAD = 1 << 16
+_LONGEST_LINE = 1 << 16
+_EXCESS = "excess"
+
+
+def sidecar(path: Path) -> Path:
+    """Where the truth of a CSV log stands: ``LOG.csv.truth.json``."""
+    return path.with_name(path.name + ".truth.json")
+
+
+def open_csv(path: Path, profile: Profile | None = None, kind: str = "csv") -> TableReader:
+    """Open a CSV log; `kind` is "csv", "csv.zst" or "csv.gz".
+
+    Raises
+    ------
+    LogError
+        If the text is no table, or columns are missing.
+    """
+    head = _head(path, kind)
+    dialect = detect(path, head)
+    columns = assign(str(path), dialect.columns, profile)
+    companion = _companion(path)
+    origin = Origin(str(path), "csv", dict(columns.sources), companion.truth if companion else None)
+    source = _Text(path, kind, dialect, columns, companion.sums if companion else {})
+    return columns.reader(origin, source.tables, profile, _rows(path, kind, head))
+
+
+def _head(path: Path, kind: str) -> bytes:
+    if kind != "csv":
+        return head_of(path, kind)
+    with path.open("rb") as stream:
+        return stream.read(_HEAD)
+
+
+def _rows(path: Path, kind: str, head: bytes) -> int:
+    """Rows to expect of plain text, from the length of its first lines and a tenth more."""
+    return 0 if kind != "csv" else int(1.1 * path.stat().st_size * head.count(b"\n") / len(head)) + 16
+
+
+def _companion(path: Path) -> Companion | None:
+    beside = sidecar(path)
+    try:
+        return loads(beside.read_bytes()) if beside.is_file() else None
+    except (OSError, ValueError) as error:
+        raise LogError(f"{beside}: the truth beside the log cannot be read ({error}); remove it") from error
+
+
+@dataclass(frozen=True)
+class _Text:
+    """A text table and the columns to take from it."""
+
+    path: Path
+    kind: str
+    dialect: Dialect
+    columns: Columns
+    sums: Mapping[str, int]
+
+    def tables(self, rows: int) -> Iterator[Table]:
+        """Tables of about `rows` rows."""
+        return frames.tables(str(self.path), self._frames(rows), self.columns, self.sums)
+
+    def _frames(self, rows: int) -> Iterator[pl.DataFrame]:
+        import polars as pl
+
+        done = 0
+        try:
+            for frame in self._parsed(rows):
+                yield self._whole(frame, done)
+                done += frame.height
+        except pl.exceptions.PolarsError as error:
+            raise LogError(self._reason(done, error)) from error
+
+    def _parsed(self, rows: int) -> Iterator[pl.DataFrame]:
+        if self.kind == "csv" and self.dialect.separator:
+            yield from self._scan(self.path, self.dialect.skip).collect_batches(chunk_size=rows)
+            return
+        skip = self.dialect.skip
+        for text in self._slices():
+            yield self._scan(io.BytesIO(text), skip).collect()
+            skip = 0
+
+    def _slices(self) -> Iterator[bytes]:
+        """The text in pieces that end with a line; runs of blanks become one tab where they separate."""
+        rest = b""
+        for piece in pieces(self.path, self.kind):
+            text = rest + piece
+            end = text.rfind(b"\n") + 1
+            if not end and len(text) > _LONGEST_LINE:
+                raise LogError(
+                    f"{self.path}: a line of more than 65,000 characters; expected rows of numbers"
+                )
+            rest = text[end:]
+            if end:
+                yield self._plain(text[:end])
+        if rest:
+            yield self._plain(rest)
+
+    def _plain(self, text: bytes) -> bytes:
+        if self.dialect.separator:
+            return text
+        return re.sub(rb"[ \t]+", b"\t", re.sub(rb"(?m)^[ \t]+|[ \t]+$|[ \t]+(?=\r$)", b"", text))
+
+    def _scan(self, source: Path | io.BytesIO, skip: int) -> pl.LazyFrame:
+        import polars as pl
+
+        dialect = self.dialect
+        schema = {str(place): self._type(place) for place in range(len(dialect.columns))}
+        # polars drops cells past the last column without a word: one more column catches them
+        schema[_EXCESS] = pl.String
+        wanted = {name: str(dialect.columns.index(column)) for name, column in self.columns.sources.items()}
+        frame = pl.scan_csv(
+            source,
+            has_header=False,
+            separator=dialect.separator or "\t",
+            decimal_comma=dialect.decimal_comma,
+            comment_prefix=dialect.comment,
+            skip_lines=skip,
+            schema=schema,
+            missing_columns="insert",
+            glob=False,
+        )
+        numbers = [self._number(pl.col(place)).alias(name) for name, place in wanted.items()]
+        return frame.select(*numbers, pl.col(_EXCESS).is_not_null())
+
+    def _type(self, place: int) -> type[pl.DataType]:
+        import polars as pl
+
+        column = self.dialect.columns[place]
+        if column not in self.columns.sources.values() or self.dialect.padded:
+            return pl.String
+        whole = column == self.columns.sources["t"] and column in self.dialect.whole
+        return pl.Int64 if whole else pl.Float64
+
+    def _number(self, cell: pl.Expr) -> pl.Expr:
+        import polars as pl
+
+        if not self.dialect.padded:
+            return cell
+        text = cell.str.strip_chars()
+        return (text.str.replace(",", ".", literal=True) if self.dialect.decimal_comma else text).cast(
+            pl.Float64
+        )
+
+    def _whole(self, frame: pl.DataFrame, done: int) -> pl.DataFrame:
+        if frame[_EXCESS].any():
+            row = done + (frame[_EXCESS].arg_max() or 0) + 1
+            raise LogError(
+                f"{self.path}: row {row} has more cells than the header's {len(self.dialect.columns)}; "
+                "mend that row"
+            )
+        return frame.drop(_EXCESS)
+
+    def _reason(self, done: int, error: Exception) -> str:
+        told = str(error).split("\n", maxsplit=1)[0]
+        found = re.search(r"could not parse `(.*?)` as dtype `\w+` at column '(\d+)'", told, re.DOTALL)
+        if found:
+            column = self.dialect.columns[int(found[2])]
+            return (
+                f"{self.path}: column {column!r}, past row {done}: expected a number, found "
+                f"{found[1][:40]!r}; mend the file or name another column"
+            )
+        return f"{self.path}: the table cannot be read past row {done}: {told[:200]}"

@@ -1,0 +1,46 @@
+"""Compressed text, piece by piece, in bounded memory."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+
+from algid.errors import LogError
+
+_PIECE = 1 << 24
+_HEAD = 1 << 16
+
+
+def pieces(path: Path, name: str, size: int = _PIECE) -> Iterator[bytes]:
+    """Unpacked bytes of a "csv.zst" or "csv.gz" file, at most `size` at a time.
+
+    Raises
+    ------
+    LogError
+        If the compressed data are damaged or cut off.
+    """
+    import zstandard
+
+    try:
+        with path.open("rb") as raw:
+            stream: io.BufferedIOBase | zstandard.ZstdDecompressionReader = (
+                zstandard.ZstdDecompressor(max_window_size=1 << 27).stream_reader(
+                    raw, read_across_frames=True
+                )
+                if name == "csv.zst"
+                else gzip.GzipFile(fileobj=raw)
+            )
+            while piece := stream.read(size):
+                yield piece
+    except (OSError, EOFError, zlib.error, zstandard.ZstdError) as error:
+        raise LogError(
+            f"{path}: the compressed data are damaged or cut off ({error}); copy it again"
+        ) from error
+
+
+def head_of(path: Path, name: str) -> bytes:
+    """The first unpacked bytes, 64 KiB at most."""
+    return next(pieces(path, name, _HEAD), b"")

@@ -1,0 +1,74 @@
+"""MCAP logs, read by columns: only the chunks that hold the joints, no Python object for a message."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from algid.errors import LogError
+from algid.log import Origin, Truth
+from algid.readers.assemble import TableReader
+from algid.readers.convert import conversion
+from algid.readers.mcap.catalogue import Catalogue, catalogue, truth_text
+from algid.readers.mcap.framing import DamagedError, File
+from algid.readers.table import Table
+from algid.truth import loads
+
+if TYPE_CHECKING:
+    from algid.profile import Profile
+
+
+def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableReader:
+    """Open an MCAP log, or the splits of one in their order.
+
+    Raises
+    ------
+    LogError
+        If no topic holds the joints, a message is encoded in an unknown way, or the file cannot be read.
+    """
+    from algid.readers.mcap.plan import plan
+
+    with opened(paths[0]) as (file, found):
+        wanted = plan(file, found, profile)
+        truth = _truth(paths[0], found)
+        rows = wanted.topics[0].count(found)
+    name = str(paths[0] if len(paths) == 1 else paths[0].parent)
+    origin = Origin(name, "mcap", wanted.mapping, truth)
+
+    def tables(rows: int) -> Iterator[Table]:
+        topic = wanted.topics[0]
+        for path in paths:
+            with opened(path) as (file, found):
+                yield from topic.tables(str(path), file, found, rows)
+
+    unwrap = (profile.theta1.unwrap, profile.theta2.unwrap) if profile else (False, False)
+    return TableReader(origin, tables, conversion(name, profile, {}), unwrap, (), rows)
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[tuple[File, Catalogue]]:
+    """The opened file and its catalogue.
+
+    Raises
+    ------
+    LogError
+        If not even the start of the file is MCAP.
+    """
+    with File(path) as file:
+        try:
+            found = catalogue(file)
+        except DamagedError as error:
+            raise LogError(f"{path}: the MCAP file cannot be read: {error}") from error
+        yield file, found
+
+
+def _truth(path: Path, found: Catalogue) -> Truth | None:
+    text = truth_text(found)
+    if text is None:
+        return None
+    try:
+        return loads(text).truth
+    except ValueError as error:
+        raise LogError(f"{path}: the truth in the file's metadata cannot be read ({error})") from error

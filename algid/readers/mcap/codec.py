@@ -1,0 +1,70 @@
+"""From a channel's message encoding and schema to what reads its messages."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from algid.errors import LogError
+from algid.readers.mcap import cdr, jsontext, protobuf, ros2msg
+from algid.readers.mcap.layout import Decoder, Fields, Walk
+from algid.readers.mcap.messages import Messages
+from algid.readers.mcap.shape import MisfitError
+
+
+class Decodes(Protocol):
+    """Reads wanted numbers out of batches of messages; counts those that lack a needed one."""
+
+    @property
+    def wanted(self) -> Mapping[str, str]: ...
+
+    @property
+    def skipped(self) -> int: ...
+
+    def columns(self, messages: Messages) -> tuple[NDArray[np.bool_], Fields]:
+        """Which messages hold what is needed (N,), and the numbers of those, by name."""
+        ...
+
+
+def walk_for(path: str, channel: Any, schema: Any) -> Walk:
+    """The walk over single messages of a channel.
+
+    Raises
+    ------
+    LogError
+        If the encoding of the messages or of the schema is not known, or the schema cannot be read.
+    """
+    place = f"{path}: topic {channel.topic!r}"
+    encoding = (channel.message_encoding, schema.encoding if schema else "")
+    try:
+        if encoding == ("cdr", "ros2msg"):
+            types = ros2msg.parse(schema.name, schema.data.decode("utf-8", errors="replace"))
+            return lambda payload: cdr.walk(payload, schema.name, types)
+        if encoding == ("protobuf", "protobuf"):
+            messages = protobuf.parse(schema.data)
+            return lambda payload: protobuf.walk(payload, schema.name, messages)
+    except (ros2msg.DefinitionError, MisfitError) as error:
+        raise LogError(f"{place}: the message definition cannot be read: {error}") from error
+    if encoding[0] == "json":
+        return jsontext.walk
+    raise LogError(
+        f"{place}: message encoding {encoding[0]!r} with schema encoding {encoding[1]!r}; "
+        "expected cdr with ros2msg, protobuf, or json"
+    )
+
+
+def decoder_for(path: str, channel: Any, schema: Any, wanted: Mapping[str, str]) -> Decodes:
+    """What reads the numbers `wanted`, by name a path each, out of a channel's messages.
+
+    Raises
+    ------
+    LogError
+        As `walk_for`.
+    """
+    walk = walk_for(path, channel, schema)
+    if channel.message_encoding == "json":
+        return jsontext.JsonDecoder(wanted, frozenset(wanted))
+    return Decoder(walk, wanted, frozenset(wanted))

@@ -1,0 +1,186 @@
+"""Which topics and fields to read: told by a profile, else found by looking at the first messages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from algid.errors import LogError
+from algid.readers.mcap.catalogue import Catalogue, channels_of, schema_name
+from algid.readers.mcap.choose import (
+    DYNAMIC_JOINT_STATE,
+    JOINT_STATE,
+    Fields,
+    in_order,
+    joint_fields,
+    joint_names,
+    stamp_paths,
+)
+from algid.readers.mcap.codec import walk_for
+from algid.readers.mcap.framing import File
+from algid.readers.mcap.load import batches
+from algid.readers.mcap.shape import MisfitError, Shape
+from algid.readers.mcap.topic import Topic
+from algid.readers.table import JOINT_CHANNELS, VELOCITIES
+
+if TYPE_CHECKING:
+    from algid.profile import Profile
+
+_SAMPLES = 64
+_USUAL = "/joint_states"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The topics to read, the main one first, and what to tell of where each channel comes from."""
+
+    topics: tuple[Topic, ...]
+    mapping: dict[str, str]
+
+
+def plan(file: File, found: Catalogue, profile: Profile | None) -> Plan:
+    """What to read out of a file.
+
+    Raises
+    ------
+    LogError
+        If no topic holds the joints, several do, or a message cannot be read.
+    """
+    named = _named(profile)
+    usual = _usual_topic(file, found, profile) if len(named) < len(JOINT_CHANNELS) else None
+    sources: dict[str, tuple[str, str]] = {}
+    if usual is not None:
+        name, paths = usual
+        sources = {channel: (name, path) for channel, path in paths.items()}
+    for channel, (topic, path) in named.items():
+        home = topic or (usual[0] if usual else None) or (profile.topic if profile else None)
+        if home is None:
+            raise LogError(
+                f"{file.path}: the profile takes {channel} from {path!r} without a topic; name one"
+            )
+        sources[channel] = (home, path)
+    if (profile and not profile.velocity) or not all(name in sources for name in VELOCITIES):
+        sources = {name: source for name, source in sources.items() if name not in VELOCITIES}
+    mapping = {channel: f"{topic}: {path}" for channel, (topic, path) in sources.items()}
+    homes = list(dict.fromkeys(sources[name][0] for name in sources))
+    topics = tuple(_topic(file, found, home, sources, profile) for home in homes)
+    clock = topics[0].fields.stamp if topics[0].clock != "log" else None
+    mapping["t"] = f"{homes[0]}: {clock[0].rpartition('.')[0]}" if clock else "log time"
+    return Plan(topics, mapping)
+
+
+def _named(profile: Profile | None) -> dict[str, tuple[str | None, str]]:
+    if profile is None:
+        return {}
+    channels = {name: profile.channel(name) for name in (*JOINT_CHANNELS, *VELOCITIES)}
+    return {name: (one.topic or profile.topic, one.source) for name, one in channels.items() if one.source}
+
+
+def _topic(
+    file: File, found: Catalogue, name: str, sources: dict[str, tuple[str, str]], profile: Profile | None
+) -> Topic:
+    paths = {channel: path for channel, (topic, path) in sources.items() if topic == name}
+    shapes = list(_shapes(file, found, name))
+    if not shapes:
+        raise LogError(f"{file.path}: there is no message on topic {name!r}; found {listed(found)}")
+    for channel, path in paths.items():
+        if not any(shape.find(path) for shape in shapes):
+            known = [*shapes[0].numbers][:12]
+            raise LogError(f"{file.path}: messages on {name!r} have no {path!r} for {channel}; found {known}")
+    clock = profile.clock if profile else None
+    stamp = next((pair for shape in shapes if (pair := stamp_paths(shape))), None)
+    if clock == "header" and stamp is None:
+        raise LogError(f'{file.path}: messages on {name!r} carry no stamp; set clock = "log" in the profile')
+    return Topic(name, _topic_type(found, name), Fields(paths, stamp), clock)
+
+
+def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> tuple[str, dict[str, str]] | None:
+    """The one topic with joint states, and its fields."""
+    names = [profile.topic] if profile and profile.topic else _candidates(found)
+    fitting: dict[str, dict[str, str]] = {}
+    many: dict[str, list[str]] = {}
+    for name in names:
+        for shape in _shapes(file, found, name):
+            joints = joint_names(shape)
+            chosen = _joints(joints, profile)
+            if chosen:
+                fitting[name] = joint_fields(shape, chosen)
+                break
+            if len(joints) > 2:
+                many[name] = joints
+    if _USUAL in fitting:
+        return _USUAL, fitting[_USUAL]
+    if len(fitting) == 1:
+        return next(iter(fitting.items()))
+    if fitting:
+        raise LogError(
+            f"{file.path}: joint states on {', '.join(fitting)}; choose with topic = … in a profile"
+        )
+    if many:
+        name, joints = next(iter(many.items()))
+        told = ", ".join(joints[:12])
+        raise LogError(
+            f"{file.path}: {name!r} has {len(joints)} joints ({told}); choose two with joints = […]"
+        )
+    if profile is not None and all(profile.channel(name).source for name in JOINT_CHANNELS):
+        return None
+    wanted = (
+        f"the joints {profile.joints}"
+        if profile and profile.joints
+        else "positions and efforts of two joints"
+    )
+    raise LogError(
+        f"{file.path}: no topic holds {wanted}; found {listed(found)}; name topics and fields in a profile"
+    )
+
+
+def _joints(names: list[str], profile: Profile | None) -> tuple[str, str] | None:
+    if profile is not None and profile.joints is not None:
+        return profile.joints if set(profile.joints) <= set(names) else None
+    return in_order(names) if len(names) == 2 else None
+
+
+def _candidates(found: Catalogue) -> list[str]:
+    names = []
+    for channel in found.channels.values():
+        schema = found.schemas.get(channel.schema_id)
+        known = schema is not None and (
+            schema.name in JOINT_STATE + DYNAMIC_JOINT_STATE or b"effort" in schema.data
+        )
+        if known or channel.message_encoding == "json":
+            names.append(channel.topic)
+    return list(dict.fromkeys(names))
+
+
+def _shapes(file: File, found: Catalogue, topic: str) -> Iterator[Shape]:
+    """Shapes of the topic's first messages."""
+    channels = channels_of(found, topic, _topic_type(found, topic))
+    if not channels:
+        return
+    channel: Any = found.channels[min(channels)]
+    walk = walk_for(str(file.path), channel, found.schemas.get(channel.schema_id))
+    for batch in batches(file, found, channels):
+        messages = batch.messages
+        if messages is None or not len(messages):
+            continue
+        for start, size in zip(messages.starts[:_SAMPLES], messages.sizes[:_SAMPLES], strict=True):
+            try:
+                yield walk(messages.content[start : start + size].tobytes())
+            except MisfitError as error:
+                raise LogError(f"{file.path}: topic {topic!r}: {error}; it cannot be read") from error
+        return
+
+
+def _topic_type(found: Catalogue, topic: str) -> str:
+    return next((schema_name(found, one) for one in found.channels.values() if one.topic == topic), "")
+
+
+def listed(found: Catalogue) -> str:
+    """The topics of a file, with their types, for a message."""
+    topics = [
+        f"{channel.topic!r} ({schema_name(found, channel) or 'no schema'}, {channel.message_encoding!r})"
+        for channel in found.channels.values()
+    ]
+    more = f" and {len(topics) - 12} more" if len(topics) > 12 else ""
+    return (", ".join(topics[:12]) or "no topic") + more

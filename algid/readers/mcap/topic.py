@@ -1,0 +1,130 @@
+"""One topic's numbers as tables: the channels that carry it, its fields, its clock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from algid.errors import LogError
+from algid.log import IntArray, Notice
+from algid.readers.mcap.catalogue import Catalogue, channels_of
+from algid.readers.mcap.choose import Fields
+from algid.readers.mcap.codec import Decodes, decoder_for
+from algid.readers.mcap.framing import File
+from algid.readers.mcap.load import Account, batches
+from algid.readers.mcap.messages import Messages
+from algid.readers.mcap.shape import MisfitError
+from algid.readers.table import VELOCITIES, Table, stack
+
+_STAMP = ("sec", "nanosec")
+
+
+@dataclass
+class Topic:
+    """A topic of one file.
+
+    Parameters
+    ----------
+    name : str
+    type : str
+        The type of its messages; channels of another type on the same topic are not read.
+    fields : Fields
+    clock : "header", "log" or None
+        None: the header's stamps, unless they stand still.
+    """
+
+    name: str
+    type: str
+    fields: Fields
+    clock: str | None
+    _chosen: str | None = field(default=None)
+
+    def tables(self, path: str, file: File, found: Catalogue, rows: int) -> Iterator[Table]:
+        """The topic's samples in tables of about `rows` rows.
+
+        Raises
+        ------
+        LogError
+            If a message does not fit its schema.
+        """
+        channels = channels_of(found, self.name, self.type)
+        if not channels:
+            told = f"{path}: topic {self.name!r} is not in this file"
+            yield Table(np.empty(0, np.int64), {}, (Notice("NO_TOPIC", told, lossy=True),))
+            return
+        decoder, account = self._decoder(path, found, channels), Account()
+        parts: list[Table] = []
+        size = 0
+        for batch in batches(file, found, channels):
+            account.add(batch)
+            if batch.messages is None or not len(batch.messages):
+                continue
+            table = self._table(path, decoder, batch.messages)
+            parts.append(table)
+            size += len(table)
+            if size >= rows:
+                yield self._clocked(parts)
+                parts, size = [], 0
+        last = self._clocked(parts) if parts else Table(np.empty(0, np.int64), {})
+        counted = sum(found.counts.get(channel, 0) for channel in channels) if found.counts else None
+        yield last.noting(*found.notices, *account.notices(counted), *self._skipped(decoder))
+
+    def count(self, found: Catalogue) -> int:
+        """Messages that the file's statistics promise, 0 without them."""
+        return sum(
+            (found.counts or {}).get(channel, 0) for channel in channels_of(found, self.name, self.type)
+        )
+
+    def _decoder(self, path: str, found: Catalogue, channels: frozenset[int]) -> Decodes:
+        channel: Any = found.channels[min(channels)]
+        wanted = dict(self.fields.paths)
+        if self.fields.stamp is not None and self.clock != "log":
+            wanted |= dict(zip(_STAMP, self.fields.stamp, strict=True))
+        return decoder_for(path, channel, found.schemas.get(channel.schema_id), wanted)
+
+    def _table(self, path: str, decoder: Decodes, messages: Messages) -> Table:
+        try:
+            held, columns = decoder.columns(messages)
+        except MisfitError as error:
+            raise LogError(
+                f"{path}: topic {self.name!r}: {error}; it cannot be read without guessing"
+            ) from error
+        log_ns = messages.log_ns if held.all() else messages.log_ns[held]
+        if not columns:
+            columns = {name: np.empty(0) for name in decoder.wanted}
+        return Table(log_ns, columns)  # type: ignore[arg-type]
+
+    def _clocked(self, parts: list[Table]) -> Table:
+        """The tables as one, with the stamps of the chosen clock and float64 columns."""
+        table = stack(parts)
+        columns = dict(table.columns)
+        notices: tuple[Notice, ...] = ()
+        stamps = table.stamp_ns
+        if _STAMP[0] in columns:
+            header = _nanoseconds(columns.pop(_STAMP[0]), columns.pop(_STAMP[1]))
+            if self._chosen is None and len(table):
+                self._chosen, notices = self._choice(header)
+            stamps = header if self._chosen == "header" else stamps
+        floats = {name: np.asarray(values, np.float64) for name, values in columns.items()}
+        return Table(stamps, floats, table.notices + notices)
+
+    def _choice(self, header: IntArray) -> tuple[str, tuple[Notice, ...]]:
+        if self.clock == "header" or header.size < 2 or np.any(header != header[0]):
+            return "header", ()
+        text = f"header stamps of {self.name!r} stand still at {header[0]} ns: the recorder's times are taken"
+        return "log", (Notice("LOG_TIME", text),)
+
+    def _skipped(self, decoder: Decodes) -> list[Notice]:
+        if not decoder.skipped:
+            return []
+        lacking = "velocities too" if any(name in decoder.wanted for name in VELOCITIES) else "both joints"
+        text = f"{decoder.skipped} messages on {self.name!r} do not hold {lacking} and were left out"
+        return [Notice("OTHER_MESSAGES", text)]
+
+
+def _nanoseconds(seconds: NDArray[Any], nanoseconds: NDArray[Any]) -> IntArray:
+    return seconds.astype(np.int64) * 1_000_000_000 + nanoseconds.astype(np.int64)

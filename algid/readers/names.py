@@ -1,0 +1,192 @@
+"""Which column is which: the names that labs, drivers and plotting tools give to angles and torques.
+
+A name is taken apart into a stem, a joint and a unit, ``pos_meas1 [deg]`` → ``pos_meas``, 1, ``deg``. The
+stems of each quantity are ranked: measured before unspecified before filtered, commanded torque last and
+commanded angles never.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+STEMS: dict[str, tuple[str, ...]] = {
+    "theta": (
+        *("theta", "theta_meas", "pos_meas", "q_meas", "position_measured", "measured_position", "actual_q"),
+        *("position", "pos", "q", "angle", "joint_position", "joint_pos", "joint_angle", "jointposition"),
+        *("positions", "angles", "ang", "phi", "pos_filt", "q_filt", "position_filtered", "theta_filt"),
+    ),
+    "omega": (
+        *("omega", "vel_meas", "dq_meas", "velocity_measured", "measured_velocity", "actual_qd"),
+        *("velocity", "vel", "dq", "qd", "qdot", "q_dot", "dtheta", "thetadot", "theta_dot"),
+        *("joint_velocity", "joint_vel", "velocities", "speed", "vel_filt", "dq_filt", "velocity_filtered"),
+    ),
+    "tau": (
+        *("tau", "tau_meas", "tau_j", "torque_measured", "measured_torque", "actual_tau", "actual_torque"),
+        *("torque", "trq", "effort", "joint_torque", "joint_effort", "torques", "efforts", "tau_filt"),
+        *(
+            "torque_filtered",
+            "tau_con",
+            "tau_cmd",
+            "tau_des",
+            "tau_d",
+            "tau_j_d",
+            "torque_cmd",
+            "target_torque",
+        ),
+        *("actual_current", "current", "currents", "motor_current", "joint_current", "i_q", "iq"),
+    ),
+}
+COMMANDED = frozenset({"tau_con", "tau_cmd", "tau_des", "tau_d", "tau_j_d", "torque_cmd", "target_torque"})
+CURRENTS = frozenset({"actual_current", "current", "currents", "motor_current", "joint_current", "i_q", "iq"})
+TIMES = (
+    *(
+        "stamp_ns",
+        "t",
+        "time",
+        "timestamp",
+        "stamp",
+        "__time",
+        "_time",
+        "time_s",
+        "time_ms",
+        "time_us",
+        "time_ns",
+    ),
+    *(
+        "timestamp_s",
+        "timestamp_ms",
+        "timestamp_us",
+        "timestamp_ns",
+        "t_s",
+        "t_ms",
+        "t_us",
+        "t_ns",
+        "time_sec",
+    ),
+    *("seconds", "secs", "sec", "elapsed", "elapsed_time", "log_time", "header.stamp", "header/stamp"),
+)
+UNITS = {
+    "deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "rad": "rad", "radian": "rad",
+    "radians": "rad", "rev": "rev", "turns": "rev", "deg/s": "deg", "rad/s": "rad", "rads": "rad",
+    "rpm": "rpm",
+    "nm": "N m", "n.m": "N m", "n*m": "N m", "n m": "N m", "n·m": "N m", "mnm": "mN m", "a": "A", "amp": "A",
+    "s": "s", "sec": "s", "ms": "ms", "us": "us", "µs": "us", "μs": "us", "ns": "ns",
+}  # fmt: skip
+_BRACKET_UNIT = re.compile(r"^(.*\S)\s*[\[(]\s*([^\[\]()]*[^\[\]()\d\s][^\[\]()]*)\s*[\])]$")
+_SUFFIX_UNIT = re.compile(r"^(.*[^_\W])_(deg|rad|rev|nm|mnm|s|sec|ms|us|ns|rpm)$")
+_JOINT_FIRST = re.compile(r"^(?:joint|axis|motor|link|j)[_ ]?(\d{1,3})[_./ ]+(.+)$")
+_JOINT_LAST = re.compile(r"^(.*?[^\W\d])[_./ ]*\[?(\d{1,3})\]?$")
+
+
+@dataclass(frozen=True)
+class Name:
+    """A column's name taken apart; `joint` is a number as text, or the joint's own name."""
+
+    stem: str
+    joint: str | None
+    unit: str | None
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Columns chosen for a log: by canonical channel its column and, where the name tells, its unit."""
+
+    columns: dict[str, str]
+    units: dict[str, str]
+    joints: tuple[str, str] | None = None
+
+
+def take_apart(column: str) -> Name:
+    """Stem, joint and unit of a column's name; case and blanks do not matter."""
+    text = column.strip().strip('"').strip().lower()
+    unit = None
+    for pattern in (_BRACKET_UNIT, _SUFFIX_UNIT):
+        found = pattern.match(text)
+        if found and found[2].strip() in UNITS:
+            text, unit = found[1].strip(), UNITS[found[2].strip()]
+            break
+    if found := re.match(r"^(.*)/([^/]+)/(position|velocity|effort)$", text):
+        return Name(found[3], f"{found[1]}/{found[2]}", unit)
+    if found := re.match(r"^.*/(position|velocity|effort)[.\[/](\d+)\]?$", text):
+        return Name(found[1], found[2], unit)
+    for pattern, stem, joint in ((_JOINT_FIRST, 2, 1), (_JOINT_LAST, 1, 2)):
+        if found := pattern.match(text):
+            return Name(
+                found[stem].replace(" ", "_").replace(".", "_"), found[joint].lstrip("0") or "0", unit
+            )
+    return Name(text, None, unit)
+
+
+def choose(columns: Iterable[str], joints: tuple[str, str] | None = None) -> Choice:
+    """Canonical channels found among `columns`; those not found are left out.
+
+    Parameters
+    ----------
+    columns : iterable of str
+        Every column of the file.
+    joints : pair of str, optional
+        The two joints to take where a log has more: numbers, or names as in ``/joint_states/elbow/position``.
+
+    Raises
+    ------
+    LookupError
+        If a quantity stands there for more than two joints and `joints` does not choose.
+    """
+    parts = {column: take_apart(column) for column in columns}
+    chosen: dict[str, str] = {}
+    for quantity in ("theta", "tau", "omega"):
+        pair = _pair(parts, STEMS[quantity], joints)
+        if pair:
+            chosen |= {f"{quantity}1": pair[0], f"{quantity}2": pair[1]}
+    time = _time(parts)
+    if time:
+        chosen["t"] = time
+    units = {channel: unit for channel, column in chosen.items() if (unit := parts[column].unit)}
+    return Choice(chosen, units)
+
+
+def _pair(
+    parts: dict[str, Name], stems: tuple[str, ...], joints: tuple[str, str] | None
+) -> tuple[str, str] | None:
+    for stem in stems:
+        by_joint = {name.joint: column for column, name in parts.items() if name.stem == stem and name.joint}
+        if joints and (wanted := _wanted(by_joint, joints)):
+            return wanted
+        if len(by_joint) == 2 and not joints:
+            first, second = sorted(by_joint, key=_joint_order) if _numbered(by_joint) else list(by_joint)
+            return by_joint[first], by_joint[second]
+        if len(by_joint) > 2 and not joints:
+            raise LookupError(
+                f"{stem!r} stands there for {len(by_joint)} joints: {', '.join(list(by_joint)[:8])}"
+            )
+    return None
+
+
+def _wanted(by_joint: dict[str, str], joints: tuple[str, str]) -> tuple[str, str] | None:
+    found = []
+    for joint in joints:
+        text = joint.lower()
+        matches = [key for key in by_joint if key == text or key.rsplit("/", 1)[-1] == text]
+        if len(matches) != 1:
+            return None
+        found.append(by_joint[matches[0]])
+    return found[0], found[1]
+
+
+def _numbered(by_joint: dict[str, str]) -> bool:
+    return all(joint.isdigit() for joint in by_joint)
+
+
+def _joint_order(joint: str) -> int:
+    return int(joint)
+
+
+def _time(parts: dict[str, Name]) -> str | None:
+    plain = {column.strip().strip('"').strip().lower(): column for column in reversed(list(parts))}
+    for name in TIMES:
+        if name in plain:
+            return plain[name]
+    bare = {part.stem: column for column, part in reversed(list(parts.items())) if part.joint is None}
+    return next((bare[name] for name in TIMES if name in bare), None)

@@ -1,0 +1,166 @@
+"""Parquet logs, a row group at a time: flat columns, or list columns as robots' drivers write them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from algid.errors import LogError
+from algid.log import Origin
+from algid.readers import frames
+from algid.readers.assemble import TableReader
+from algid.readers.columns import Columns, assign
+from algid.readers.table import Table
+from algid.truth import KEY, Companion, loads
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from algid.profile import Profile
+
+_MOST_COLUMNS = 4096
+_LARGEST_FOOTER = 1 << 26
+
+
+def open_parquet(path: Path, profile: Profile | None = None) -> TableReader:
+    """Open a Parquet log.
+
+    Raises
+    ------
+    LogError
+        If the file is damaged, or columns are missing or hold no numbers.
+    """
+    import polars as pl
+
+    _check_footer(path)
+    try:
+        schema = dict(pl.read_parquet_schema(path))
+        metadata = pl.read_parquet_metadata(path)
+        available = _flat_names(path, schema)
+        rows = pl.scan_parquet(path, glob=False).select(pl.len()).collect().item()
+    except (pl.exceptions.PolarsError, OSError, pl.exceptions.PanicException) as error:
+        raise _damaged(path, error) from error
+    companion = _companion(path, metadata)
+    columns = assign(str(path), list(available), profile)
+    _check_types(path, columns, available, schema)
+    origin = Origin(str(path), "parquet", dict(columns.sources), companion.truth if companion else None)
+    source = _Groups(path, columns, available, schema, companion.sums if companion else {})
+    return columns.reader(origin, source.tables, profile, rows)
+
+
+def _check_footer(path: Path) -> None:
+    with path.open("rb") as stream:
+        size = stream.seek(0, 2)
+        stream.seek(max(0, size - 8))
+        tail = stream.read(8)
+    length = int.from_bytes(tail[:4], "little")
+    if tail[4:] != b"PAR1":
+        raise LogError(
+            f"{path}: the Parquet file is cut off: its footer is missing, so nothing can be read of it"
+        )
+    if length + 12 > size or length > _LARGEST_FOOTER:
+        raise LogError(
+            f"{path}: the Parquet footer claims {length} bytes of a file of {size}; copy the file again"
+        )
+
+
+def _flat_names(path: Path, schema: Mapping[str, pl.DataType]) -> dict[str, tuple[str, int | None]]:
+    """By the name to choose from, the column and, in a list column, the place in the list."""
+    import polars as pl
+
+    if len(schema) > _MOST_COLUMNS:
+        raise LogError(f"{path}: {len(schema)} columns; expected {_MOST_COLUMNS} at most")
+    names: dict[str, tuple[str, int | None]] = {}
+    for column, kind in schema.items():
+        if isinstance(kind, (pl.List, pl.Array)):
+            first = pl.scan_parquet(path, glob=False).select(pl.col(column)).head(1).collect()
+            width = len(first.item()) if first.height and first.item() is not None else 0
+            names |= {f"{column}[{place}]": (column, place) for place in range(min(width, 64))}
+        else:
+            names[column] = (column, None)
+    return names
+
+
+def _companion(path: Path, metadata: Mapping[str, str]) -> Companion | None:
+    try:
+        return loads(metadata[KEY]) if KEY in metadata else None
+    except ValueError as error:
+        raise LogError(f"{path}: the truth in the file's metadata cannot be read ({error})") from error
+
+
+def _check_types(
+    path: Path,
+    columns: Columns,
+    available: Mapping[str, tuple[str, int | None]],
+    schema: Mapping[str, pl.DataType],
+) -> None:
+    import polars as pl
+
+    for name, source in columns.sources.items():
+        column, place = available[source]
+        kind = schema[column]
+        inner = getattr(kind, "inner", kind) if place is not None else kind
+        stamp = name == "t" and isinstance(inner, (pl.Datetime, pl.Duration))
+        if not (inner.is_numeric() or stamp):
+            raise LogError(f"{path}: column {source!r} for {name} holds {inner}; expected numbers")
+
+
+@dataclass(frozen=True)
+class _Groups:
+    """A Parquet file's row groups and the columns to take from them."""
+
+    path: Path
+    columns: Columns
+    available: Mapping[str, tuple[str, int | None]]
+    schema: Mapping[str, pl.DataType]
+    sums: Mapping[str, int]
+
+    def tables(self, rows: int) -> Iterator[Table]:
+        """Tables of about `rows` rows."""
+        return frames.tables(str(self.path), self._frames(rows), self._columns(), self.sums)
+
+    def _frames(self, rows: int) -> Iterator[pl.DataFrame]:
+        import polars as pl
+
+        frame = pl.scan_parquet(self.path, glob=False).select(
+            self._number(name, source) for name, source in self.columns.sources.items()
+        )
+        try:
+            yield from frame.collect_batches(chunk_size=rows)
+        except (pl.exceptions.PolarsError, OSError, pl.exceptions.PanicException) as error:
+            raise _damaged(self.path, error) from error
+
+    def _number(self, name: str, source: str) -> pl.Expr:
+        import polars as pl
+
+        column, place = self.available[source]
+        cell = pl.col(column)
+        kind = self.schema[column]
+        if place is not None:
+            cell = (
+                cell.list.get(place, null_on_oob=True) if isinstance(kind, pl.List) else cell.arr.get(place)
+            )
+        if name != "t":
+            return cell.cast(pl.Float64).alias(name)
+        if isinstance(kind, pl.Datetime):
+            return cell.dt.timestamp("ns").alias("t")
+        if isinstance(kind, pl.Duration):
+            return cell.dt.total_nanoseconds().alias("t")
+        return (cell.cast(pl.Int64) if kind.is_integer() else cell.cast(pl.Float64)).alias("t")
+
+    def _columns(self) -> Columns:
+        import polars as pl
+
+        column, _ = self.available[self.columns.sources["t"]]
+        if isinstance(self.schema[column], (pl.Datetime, pl.Duration)):
+            return Columns(self.columns.sources, self.columns.units, "ns")
+        return self.columns
+
+
+def _damaged(path: Path, error: BaseException) -> LogError:
+    told = str(error).split("\n", maxsplit=1)[0][:200]
+    return LogError(
+        f"{path}: the Parquet file is damaged or not one that can be read ({told}); copy it again"
+    )

@@ -1,0 +1,60 @@
+"""Samples as a file holds them: named channels in the file's own units, before anything is converted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.log import IntArray, Notice
+
+JOINT_CHANNELS = ("theta1", "theta2", "tau1", "tau2")
+VELOCITIES = ("omega1", "omega2")
+CHANNELS = JOINT_CHANNELS + VELOCITIES
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A stretch of samples: stamps (N,) in ns and, by canonical name, channels (N,) in the file's units."""
+
+    stamp_ns: IntArray
+    columns: Mapping[str, FloatArray]
+    notices: tuple[Notice, ...] = ()
+
+    def __len__(self) -> int:
+        return int(self.stamp_ns.size)
+
+    def part(self, first: int, last: int) -> Table:
+        """Rows `first` to `last` - 1 as views; the notices stay with the first part."""
+        columns = {name: values[first:last] for name, values in self.columns.items()}
+        return Table(self.stamp_ns[first:last], columns, self.notices if first == 0 else ())
+
+    def take(self, rows: IntArray | np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Table:
+        """The rows of an index or mask, with all notices."""
+        columns = {name: values[rows] for name, values in self.columns.items()}
+        return Table(self.stamp_ns[rows], columns, self.notices)
+
+    def noting(self, *notices: Notice) -> Table:
+        """This table with more notices."""
+        return Table(self.stamp_ns, self.columns, (*self.notices, *notices)) if notices else self
+
+
+def stack(tables: Sequence[Table]) -> Table:
+    """One table out of several with the same channels, in their order."""
+    if len(tables) == 1:
+        return tables[0]
+    columns = {name: np.concatenate([table.columns[name] for table in tables]) for name in tables[0].columns}
+    notices = tuple(notice for table in tables for notice in table.notices)
+    return Table(np.concatenate([table.stamp_ns for table in tables]), columns, notices)
+
+
+def cut(tables: Iterator[Table], rows: int) -> Iterator[Table]:
+    """The same samples in tables of at most `rows` rows."""
+    for table in tables:
+        if len(table) <= rows:
+            yield table
+        else:
+            for first in range(0, len(table), rows):
+                yield table.part(first, min(first + rows, len(table)))

@@ -1,0 +1,48 @@
+"""CSV logs: canonical columns, every float to its last bit, the truth in ``LOG.csv.truth.json`` beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from algid.log import Log, Truth
+from algid.outfiles import whole_file
+from algid.truth import Companion
+from algid.writers.blocks import as_blocks, columns, exact_in_seconds, summed
+
+
+def write(path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None) -> None:
+    """Write a log, or the blocks of one: t in s, angles, torques, velocities where recorded.
+
+    Stamps too far from zero for float64 seconds get a column ``stamp_ns`` as well. The sidecar is written
+    only with a truth.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written there.
+    """
+    import polars as pl
+
+    sums: dict[str, int] = {}
+    with whole_file(path) as temporary:
+        stamped = None
+        with temporary.open("wb") as stream:
+            for block in as_blocks(log):
+                first = stamped is None
+                stamped = not exact_in_seconds(block.stamp_ns) if stamped is None else stamped
+                found = columns(block)
+                if not stamped:
+                    del found["stamp_ns"]
+                summed(sums, found)
+                pl.DataFrame(found).write_csv(stream, include_header=first)
+    _beside(path, Companion(truth, sums) if truth is not None else None)
+
+
+def _beside(path: Path, companion: Companion | None) -> None:
+    beside = path.with_name(path.name + ".truth.json")
+    if companion is None:
+        beside.unlink(missing_ok=True)  # what an older file of this name left there is not this log's truth
+        return
+    with whole_file(beside) as temporary:
+        temporary.write_text(companion.dumps() + "\n", encoding="utf-8")

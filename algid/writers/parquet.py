@@ -1,0 +1,48 @@
+"""Parquet logs: flat canonical columns, stamps in ns, the truth in the file's metadata."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from algid.errors import OutputError
+from algid.log import Log, Truth
+from algid.outfiles import whole_file
+from algid.truth import KEY, Companion
+from algid.writers.blocks import as_blocks, columns, summed
+
+
+def write(path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None) -> None:
+    """Write a log, or the blocks of one, a row group a block: t in s … stamp_ns last.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written there, or there is no block.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    sums: dict[str, int] = {}
+    writer = None
+    with whole_file(path) as temporary:
+        try:
+            for block in as_blocks(log):
+                found = columns(block)
+                summed(sums, found)
+                table = pa.table(found)
+                # floats of a measured signal hardly ever repeat: a dictionary would only cost time
+                writer = writer or pq.ParquetWriter(
+                    temporary,
+                    table.schema,
+                    compression="zstd",
+                    use_dictionary=False,
+                    write_page_checksum=True,
+                )
+                writer.write_table(table)
+            if writer is None:
+                raise OutputError(f"{path}: there is no sample to write")
+            writer.add_key_value_metadata({KEY: Companion(truth, sums).dumps()})
+        finally:
+            if writer is not None:
+                writer.close()

@@ -1,0 +1,90 @@
+"""MCAP files for the tests: written by the `mcap` package, message by message."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mcap.writer import CompressionType, IndexType, Writer
+
+from algid.writers.mcap import DEFINITION, TYPE
+
+HEADER = DEFINITION[DEFINITION.index("====") :]
+
+
+@dataclass
+class Cdr:
+    """A CDR message under construction, little endian or big."""
+
+    order: str = "<"
+    data: bytes = b""
+
+    def put(self, kind: str, *values: Any) -> Cdr:
+        """Append numbers of a struct type, each aligned to its size."""
+        for value in values:
+            width = struct.calcsize(kind)
+            self.data += bytes(-len(self.data) % width) + struct.pack(self.order + kind, value)
+        return self
+
+    def text(self, value: str) -> Cdr:
+        """Append a string."""
+        self.put("I", len(value) + 1)
+        self.data += value.encode() + b"\0"
+        return self
+
+    def list(self, kind: str, values: Sequence[float]) -> Cdr:
+        """Append a sequence of numbers."""
+        return self.put("I", len(values)).put(kind, *values)
+
+    def done(self, representation: int | None = None) -> bytes:
+        """The message with its encapsulation."""
+        number = (1 if self.order == "<" else 0) if representation is None else representation
+        return bytes([0, number, 0, 0]) + self.data
+
+
+def joint_state(
+    stamp_ns: int,
+    names: Sequence[str] = ("joint1", "joint2"),
+    position: Sequence[float] = (),
+    velocity: Sequence[float] = (),
+    effort: Sequence[float] = (),
+    *,
+    frame: str = "",
+    order: str = "<",
+) -> Cdr:
+    """A sensor_msgs/msg/JointState."""
+    message = Cdr(order).put("i", stamp_ns // 10**9).put("I", stamp_ns % 10**9).text(frame)
+    message.put("I", len(names))
+    for name in names:
+        message.text(name)
+    return message.list("d", position).list("d", velocity).list("d", effort)
+
+
+def write_mcap(
+    path: Path,
+    messages: Iterable[tuple[str, int, bytes]],
+    schemas: dict[str, tuple[str, str, bytes]] | None = None,
+    *,
+    encoding: str = "cdr",
+    compression: CompressionType = CompressionType.ZSTD,
+    chunk_size: int = 4096,
+    **options: Any,
+) -> None:
+    """Write messages (topic, log time, bytes); `schemas` gives name, encoding and data by topic."""
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=chunk_size, compression=compression, **options)
+        writer.start()
+        channels: dict[str, int] = {}
+        for topic, stamp, data in messages:
+            if topic not in channels:
+                name, kind, text = (schemas or {}).get(topic, (TYPE, "ros2msg", DEFINITION.encode()))
+                schema = writer.register_schema(name, kind, text)
+                channels[topic] = writer.register_channel(topic, encoding, schema)
+            writer.add_message(channels[topic], stamp, data, stamp)
+        writer.finish()  # type: ignore[no-untyped-call]
+
+
+NO_INDEX = {"index_types": IndexType.NONE, "use_statistics": False, "use_summary_offsets": False}

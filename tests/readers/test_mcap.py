@@ -1,0 +1,318 @@
+"""MCAP as the field writes it: encodings, layouts, broken indexes, cut files, damaged chunks."""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import zstandard
+from mcap.reader import make_reader
+from mcap.writer import CompressionType
+
+from algid.errors import LogError
+from algid.log import Log
+from algid.profile import Profile
+from algid.readers import open_log, read_log
+from algid.writers import write_log
+from tests.readers.logs import EPOCH_NS, noise_log, same
+from tests.readers.mcaps import HEADER, NO_INDEX, Cdr, joint_state, write_mcap
+
+TOPIC = "/joint_states"
+
+
+def messages_of(log: Log, **options: Any) -> list[tuple[str, int, bytes]]:
+    """The log's samples as JointState messages."""
+    omega = log.omega if log.omega is not None else np.empty((0, len(log)))
+    return [
+        (
+            TOPIC,
+            stamp,
+            joint_state(
+                stamp,
+                position=log.theta[:, row].tolist(),
+                velocity=omega[:, row].tolist(),
+                effort=log.tau[:, row].tolist(),
+                **options,
+            ).done(),
+        )
+        for row, stamp in enumerate(log.stamp_ns.tolist())
+    ]
+
+
+@pytest.mark.parametrize("compression", list(CompressionType))
+@pytest.mark.parametrize("options", [{}, NO_INDEX, {"use_chunking": False}, {"enable_crcs": False}])
+def test_every_way_of_writing_reads_the_same(
+    compression: CompressionType, options: dict[str, Any], tmp_path: Path
+) -> None:
+    log = noise_log(300, start_ns=EPOCH_NS)
+    write_mcap(tmp_path / "log.mcap", messages_of(log), compression=compression, **options)
+    assert same(read_log(tmp_path / "log.mcap"), log)
+
+
+@pytest.mark.parametrize("order", "<>")
+def test_either_byte_order_and_any_frame_name(order: str, tmp_path: Path) -> None:
+    log = noise_log(100, start_ns=EPOCH_NS)
+    messages = [
+        message
+        for frame in ("", "base_link", "x")
+        for message in messages_of(log, order=order, frame=frame)[len(frame) :: 12]
+    ]
+    messages.sort(key=lambda message: message[1])
+    write_mcap(tmp_path / "log.mcap", messages)
+    found = read_log(tmp_path / "log.mcap")
+    assert np.isin(found.theta, log.theta).all()
+    assert len(found) == len({stamp for _, stamp, _ in messages})
+
+
+def test_names_that_change_place_are_followed(tmp_path: Path) -> None:
+    log = noise_log(60, start_ns=EPOCH_NS, velocity=False)
+    messages = []
+    for row, stamp in enumerate(log.stamp_ns.tolist()):
+        names, order = (["a1", "x", "a2"], [0, 2, 1]) if row % 3 else (["a2", "a1", "x"], [1, 0, 2])
+        values = [*log.theta[:, row], 7.0]
+        efforts = [*log.tau[:, row], 9.0]
+        data = joint_state(
+            stamp, names, [values[place] for place in order], (), [efforts[place] for place in order]
+        )
+        messages.append((TOPIC, stamp, data.done()))
+        messages.append((TOPIC, stamp + 5, joint_state(stamp + 5, ["gripper"], [1.0], (), [2.0]).done()))
+    write_mcap(tmp_path / "log.mcap", messages)
+    found = read_log(tmp_path / "log.mcap", Profile(joints=("a1", "a2")))
+    assert same(found, log)
+    assert [notice.code for notice in found.notices] == ["OTHER_MESSAGES"]
+
+
+def test_more_layouts_than_are_remembered(tmp_path: Path) -> None:
+    log = noise_log(400, start_ns=EPOCH_NS, velocity=False)
+    messages = []
+    for row, stamp in enumerate(log.stamp_ns.tolist()):
+        names = ["joint1", "joint2", f"other{row:03d}"]
+        position, effort = [*log.theta[:, row], 0.0], [*log.tau[:, row], 0.0]
+        messages.append((TOPIC, stamp, joint_state(stamp, names, position, (), effort).done()))
+    write_mcap(tmp_path / "log.mcap", messages, chunk_size=1 << 20)
+    assert same(read_log(tmp_path / "log.mcap", Profile(joints=("joint1", "joint2"))), log)
+
+
+def test_dynamic_joint_states(tmp_path: Path) -> None:
+    definition = (
+        "std_msgs/Header header\nstring[] joint_names\ncontrol_msgs/InterfaceValue[] interface_values\n"
+        + "=" * 80
+        + "\nMSG: control_msgs/InterfaceValue\nstring[] interface_names\nfloat64[] values\n"
+        + HEADER
+    )
+    log = noise_log(50, start_ns=EPOCH_NS)
+    assert log.omega is not None
+    messages = []
+    for row, stamp in enumerate(log.stamp_ns.tolist()):
+        data = Cdr().put("i", stamp // 10**9).put("I", stamp % 10**9).text("").put("I", 2)
+        data.text("elbow").text("shoulder").put("I", 2)
+        for joint in (1, 0):
+            data.put("I", 3).text("effort").text("velocity").text("position")
+            data.list("d", [log.tau[joint, row], log.omega[joint, row], log.theta[joint, row]])
+        messages.append(("/dynamic", stamp, data.done()))
+    schema = {"/dynamic": ("control_msgs/msg/DynamicJointState", "ros2msg", definition.encode())}
+    write_mcap(tmp_path / "log.mcap", messages, schema)
+    assert same(read_log(tmp_path / "log.mcap", Profile(joints=("shoulder", "elbow"))), log)
+
+
+def test_an_array_without_names_or_stamps_through_a_profile(tmp_path: Path) -> None:
+    definition = (
+        "std_msgs/MultiArrayLayout layout\nfloat64[] data\n"
+        + "=" * 80
+        + "\nMSG: std_msgs/MultiArrayLayout\nMultiArrayDimension[] dim\nuint32 data_offset\n"
+        + "=" * 80
+        + "\nMSG: std_msgs/MultiArrayDimension\nstring label\nuint32 size\nuint32 stride\n"
+    )
+    log = noise_log(50, start_ns=EPOCH_NS, velocity=False)
+    messages = []
+    for row, stamp in enumerate(log.stamp_ns.tolist()):
+        data = Cdr().put("I", 0, 0).list("d", [*log.theta[:, row], *log.tau[:, row]])
+        messages.append(("/state", stamp, data.done()))
+    schema = {"/state": ("std_msgs/msg/Float64MultiArray", "ros2msg", definition.encode())}
+    write_mcap(tmp_path / "log.mcap", messages, schema)
+    paths = {
+        name: {"source": f"data[{place}]"} for place, name in enumerate(("theta1", "theta2", "tau1", "tau2"))
+    }
+    profile = Profile.model_validate({"topic": "/state", **paths})
+    assert same(read_log(tmp_path / "log.mcap", profile), log)
+
+
+def test_json_joint_states(tmp_path: Path) -> None:
+    log = noise_log(40, start_ns=EPOCH_NS, velocity=False)
+    messages = []
+    for row, stamp in enumerate(log.stamp_ns.tolist()):
+        text = {
+            "header": {"stamp": {"sec": stamp // 10**9, "nanosec": stamp % 10**9}},
+            "name": ["b", "a"],
+            "position": log.theta[::-1, row].tolist(),
+            "effort": log.tau[::-1, row].tolist(),
+        }
+        messages.append(("/arm", stamp, json.dumps(text).encode()))
+    write_mcap(tmp_path / "log.mcap", messages, {"/arm": ("arm", "jsonschema", b"{}")}, encoding="json")
+    assert same(read_log(tmp_path / "log.mcap", Profile(joints=("a", "b"))), log)
+
+
+def protobuf_schema() -> tuple[bytes, Any]:
+    """A file descriptor set of a joint state, and the message class."""
+    from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
+
+    file = descriptor_pb2.FileDescriptorProto(name="arm.proto", package="arm", syntax="proto3")
+    file.dependency.append("google/protobuf/timestamp.proto")
+    message = file.message_type.add(name="State")
+    kinds = {"name": (9, 3), "position": (1, 3), "velocity": (1, 3), "effort": (1, 3), "mode": (17, 1)}
+    message.field.add(name="timestamp", number=1, type=11, label=1, type_name=".google.protobuf.Timestamp")
+    for number, (name, (kind, label)) in enumerate(kinds.items(), start=2):
+        message.field.add(name=name, number=number, type=kind, label=label)
+    stamp = descriptor_pb2.FileDescriptorProto()
+    timestamp_pb2.DESCRIPTOR.CopyToProto(stamp)
+    pool = descriptor_pool.DescriptorPool()
+    pool.Add(stamp)
+    pool.Add(file)
+    state = message_factory.GetMessageClass(pool.FindMessageTypeByName("arm.State"))
+    return descriptor_pb2.FileDescriptorSet(file=[stamp, file]).SerializeToString(), state
+
+
+def test_protobuf_joint_states(tmp_path: Path) -> None:
+    data, state = protobuf_schema()
+    log = noise_log(300, start_ns=EPOCH_NS - EPOCH_NS % 10**9 - 10**8)
+    assert log.omega is not None
+    messages = []
+    for row, stamp in enumerate(log.stamp_ns.tolist()):
+        one = state(name=["j1", "j2"], mode=row % 300 - 150)
+        one.timestamp.seconds, one.timestamp.nanos = divmod(stamp, 10**9)
+        one.position.extend(log.theta[:, row])
+        one.velocity.extend(log.omega[:, row])
+        one.effort.extend(log.tau[:, row])
+        messages.append(("/arm", stamp + 3, one.SerializeToString()))
+    schema = {"/arm": ("arm.State", "protobuf", data)}
+    write_mcap(tmp_path / "log.mcap", messages, schema, encoding="protobuf")
+    assert same(read_log(tmp_path / "log.mcap"), log)
+
+
+def test_xcdr2_is_refused(tmp_path: Path) -> None:
+    log = noise_log(5, start_ns=EPOCH_NS)
+    messages = [(topic, stamp, b"\0\7" + data[2:]) for topic, stamp, data in messages_of(log)]
+    write_mcap(tmp_path / "log.mcap", messages)
+    with pytest.raises(LogError, match="XCDR2"):
+        read_log(tmp_path / "log.mcap")
+
+
+def test_stamps_that_stand_still_give_way_to_log_times(tmp_path: Path) -> None:
+    log = noise_log(50, start_ns=EPOCH_NS)
+    messages = [(topic, stamp, data[:4] + bytes(8) + data[12:]) for topic, stamp, data in messages_of(log)]
+    write_mcap(tmp_path / "log.mcap", messages)
+    found = read_log(tmp_path / "log.mcap")
+    assert same(found, log)
+    assert [notice.code for notice in found.notices] == ["LOG_TIME"]
+
+
+@pytest.mark.parametrize("share", [0.3, 0.7, 0.95])
+def test_a_cut_file_yields_what_is_there(share: float, tmp_path: Path) -> None:
+    log = noise_log(2000, start_ns=EPOCH_NS)
+    write_mcap(tmp_path / "whole.mcap", messages_of(log))
+    content = (tmp_path / "whole.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(content[: int(share * len(content))])
+    found = read_log(tmp_path / "cut.mcap")
+    assert share - 0.15 < len(found) / len(log) <= 1
+    assert same(found, log.part(0, len(found)))
+    assert any(notice.lossy for notice in found.notices)
+
+
+def test_a_flipped_bit_costs_its_chunk_and_is_told(tmp_path: Path) -> None:
+    log = noise_log(2000, start_ns=EPOCH_NS)
+    write_mcap(tmp_path / "log.mcap", messages_of(log), compression=CompressionType.NONE)
+    content = bytearray((tmp_path / "log.mcap").read_bytes())
+    place = content.index(struct.pack("<d", log.theta[0, 1000]))
+    content[place] ^= 1
+    (tmp_path / "log.mcap").write_bytes(content)
+    found = read_log(tmp_path / "log.mcap")
+    assert len(found) > 1900
+    assert log.theta[0, 1000] not in found.theta
+    (notice,) = found.notices
+    assert notice.code == "DAMAGED_CHUNK"
+    assert notice.lossy
+    assert f"{len(log) - len(found)} messages are missing" in notice.text
+
+
+def test_a_message_index_that_lies_is_not_believed(tmp_path: Path) -> None:
+    log = noise_log(300, start_ns=EPOCH_NS)
+    write_mcap(tmp_path / "log.mcap", messages_of(log), compression=CompressionType.NONE)
+    content = bytearray((tmp_path / "log.mcap").read_bytes())
+    with (tmp_path / "log.mcap").open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    (index,) = summary.chunk_indexes[0].message_index_offsets.values()
+    struct.pack_into("<Q", content, index + 15 + 8, 31)  # the first message's offset
+    (tmp_path / "log.mcap").write_bytes(content)
+    assert same(read_log(tmp_path / "log.mcap"), log)
+
+
+def test_a_chunk_that_claims_too_much_is_left_out_unread(tmp_path: Path) -> None:
+    log = noise_log(500, start_ns=EPOCH_NS)
+    write_mcap(tmp_path / "log.mcap", messages_of(log))
+    content = bytearray((tmp_path / "log.mcap").read_bytes())
+    place = content.index(b"\x04\0\0\0zstd")
+    struct.pack_into("<Q", content, place - 12, 1 << 60)
+    (tmp_path / "log.mcap").write_bytes(content)
+    found = read_log(tmp_path / "log.mcap")
+    assert 0 < len(found) < len(log)
+    assert any(notice.code == "DAMAGED_CHUNK" and notice.lossy for notice in found.notices)
+
+
+def test_a_file_compressed_as_a_whole_is_refused(tmp_path: Path) -> None:
+    write_log(tmp_path / "log.mcap", noise_log(10))
+    packed = zstandard.compress((tmp_path / "log.mcap").read_bytes())
+    (tmp_path / "log.mcap.zstd").write_bytes(packed)
+    with pytest.raises(LogError, match=r"compressed as a whole.*zstd -d"):
+        read_log(tmp_path / "log.mcap.zstd")
+
+
+def test_splits_of_a_rosbag2_folder_are_one_log(tmp_path: Path) -> None:
+    log = noise_log(1000, start_ns=EPOCH_NS)
+    bag = tmp_path / "bag"
+    bag.mkdir()
+    for number in range(11):
+        write_log(bag / f"bag_{number}.mcap", log.part(number * 90, min(1000, number * 90 + 90)))
+    names = "".join(f"    - bag_{number}.mcap\n" for number in range(11))
+    (bag / "metadata.yaml").write_text(
+        f"rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths:\n{names}  compression_mode: ''\n"
+    )
+    assert same(read_log(bag), log.part(0, 990))
+    (bag / "bag_3.mcap").unlink()
+    found = read_log(bag)
+    assert len(found) == 900
+    assert any(notice.lossy and "bag_3.mcap" in notice.text for notice in found.notices)
+
+
+def test_paths_in_a_bag_that_lead_elsewhere_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "bag").mkdir()
+    write_log(tmp_path / "secret.mcap", noise_log(10))
+    (tmp_path / "bag" / "metadata.yaml").write_text("  relative_file_paths:\n    - ../secret.mcap\n")
+    with pytest.raises(LogError, match="outside"):
+        open_log(tmp_path / "bag")
+
+
+def test_bags_compressed_by_message_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "bag").mkdir()
+    write_log(tmp_path / "bag" / "bag_0.mcap", noise_log(10))
+    (tmp_path / "bag" / "metadata.yaml").write_text(
+        "  relative_file_paths:\n    - bag_0.mcap\n  compression_format: zstd\n  compression_mode: MESSAGE\n"
+    )
+    with pytest.raises(LogError, match=r"compressed.*MESSAGE.*ros2 bag convert"):
+        open_log(tmp_path / "bag")
+
+
+def test_nan_in_a_message_is_refused(tmp_path: Path) -> None:
+    stamp = EPOCH_NS
+    messages = [
+        (TOPIC, stamp + row, joint_state(stamp + row, position=[0, 1], effort=[1, math.nan]).done())
+        for row in range(3)
+    ]
+    write_mcap(tmp_path / "log.mcap", messages)
+    with pytest.raises(LogError, match=r"tau2 .*effort\[joint2\].* sample 1"):
+        read_log(tmp_path / "log.mcap")

@@ -1,0 +1,182 @@
+"""Round trips through every format, other libraries as oracles, recorded logs, and what must be refused."""
+
+from __future__ import annotations
+
+import gzip
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zstandard
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from algid.errors import LogError
+from algid.log import Log, Origin
+from algid.readers import open_log, read_log
+from algid.writers import FORMATS, write_log
+from tests.readers.logs import EPOCH_NS, TRUTH, noise_log, same
+
+CSV = "t,theta1,theta2,tau1,tau2\n"
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+@pytest.mark.parametrize("start_ns", [0, EPOCH_NS])
+@pytest.mark.parametrize("velocity", [True, False])
+def test_round_trip_keeps_every_bit_and_the_truth(
+    kind: str, start_ns: int, velocity: bool, tmp_path: Path
+) -> None:
+    log = noise_log(start_ns=start_ns, velocity=velocity)
+    write_log(tmp_path / f"log.{kind}", log, truth=TRUTH)
+    found = read_log(tmp_path / f"log.{kind}")
+    assert same(found, log)
+    assert found.origin.truth == TRUTH
+    assert found.origin.format == kind
+    assert found.notices == ()
+
+
+FINITE = st.floats(-1e99, 1e99, allow_subnormal=True)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    values=arrays(np.float64, (2, 2, 5), elements=FINITE),
+    steps=arrays(np.int64, 5, elements=st.integers(1, 10**15)),
+    kind=st.sampled_from(FORMATS),
+)
+def test_any_finite_log_survives(
+    values: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
+    steps: np.ndarray[tuple[int, ...], np.dtype[np.int64]],
+    kind: str,
+) -> None:
+    log = Log(np.cumsum(steps), values[0], values[1], Origin("", "", {}))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"log.{kind}"
+        write_log(path, log)
+        found = read_log(path)
+    assert same(found, log)
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_blocks_add_up_to_the_whole(kind: str, tmp_path: Path) -> None:
+    log = noise_log(5000)
+    parts = [log.part(first, first + 1000) for first in range(0, 5000, 1000)]
+    write_log(tmp_path / f"log.{kind}", iter(parts))
+    blocks = list(open_log(tmp_path / f"log.{kind}").blocks(700))
+    assert max(map(len, blocks)) <= 700
+    assert np.array_equal(np.concatenate([block.stamp_ns for block in blocks]), log.stamp_ns)
+    assert np.array_equal(np.concatenate([block.tau for block in blocks], axis=1), log.tau)
+
+
+def test_mcap_reads_the_same_in_mcap_ros2_and_rosbags(tmp_path: Path) -> None:
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
+    from rosbags.highlevel import AnyReader
+
+    log = noise_log(300, start_ns=EPOCH_NS)
+    path = tmp_path / "log.mcap"
+    write_log(path, log)
+    with path.open("rb") as stream:
+        reading = make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages()
+        decoded = [message.decoded_message for message in reading]
+    assert np.array_equal(np.array([one.position for one in decoded]).T, log.theta)
+    assert np.array_equal(np.array([one.effort for one in decoded]).T, log.tau)
+    stamps = [one.header.stamp.sec * 10**9 + one.header.stamp.nanosec for one in decoded]
+    assert stamps == log.stamp_ns.tolist()
+    assert all(one.name == ["joint1", "joint2"] for one in decoded)
+    with AnyReader([path]) as reader:
+        messages = [reader.deserialize(data, connection.msgtype) for connection, _, data in reader.messages()]
+    velocities = np.array([one.velocity for one in messages]).T  # type: ignore[attr-defined]
+    assert log.omega is not None
+    assert np.array_equal(velocities, log.omega)
+
+
+def test_recorded_mcap_and_csv_of_one_run_agree(shared_data: Path) -> None:
+    mcap = read_log(shared_data / "mcap" / "dfki_C1_143601_jointstate.mcap")
+    csv = read_log(shared_data / "dfki" / "C1_sysid" / "20230629-143601.csv")
+    assert csv.origin.mapping["tau1"] == "tau_meas1"
+    assert np.array_equal(mcap.theta, csv.theta)
+    assert np.array_equal(mcap.tau, csv.tau)
+    assert np.abs(mcap.t - csv.t).max() < 2e-9  # the bag rounds its stamps to nanoseconds
+
+
+def test_a_repeated_first_stamp_is_dropped_and_told(shared_data: Path) -> None:
+    log = read_log(shared_data / "dfki" / "A0_noise" / "down_dt0.002.csv")
+    assert [notice.code for notice in log.notices] == ["DUPLICATE_STAMPS"]
+    assert np.all(np.diff(log.stamp_ns) > 0)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["rosbag2_cdr_test_0.mcap", "rosbag2_wrong_rmw_test_0.mcap", "lichtblick_example_logs_json.mcap"],
+)
+def test_logs_without_joints_are_refused(name: str, shared_data: Path) -> None:
+    with pytest.raises(LogError, match="topic"):
+        read_log(shared_data / "mcap" / name)
+
+
+@pytest.mark.parametrize("packed", ["gz", "zst"])
+def test_format_is_told_by_content(packed: str, tmp_path: Path) -> None:
+    log = noise_log()
+    write_log(tmp_path / "log.csv", log)
+    text = (tmp_path / "log.csv").read_bytes()
+    content = gzip.compress(text) if packed == "gz" else zstandard.compress(text)
+    (tmp_path / "misnamed.mcap").write_bytes(content)
+    assert same(read_log(tmp_path / "misnamed.mcap"), log)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "empty"),
+        ("t,theta1,theta2,tau1\n0,1,2,3\n1,1,2,3\n", "no column for tau1, tau2"),
+        (CSV + "0,1,2,3,4\n0.1,nan,2,3,4\n", "theta1.*sample 2.*nan"),
+        (CSV + "0,1,2,3,4\n0.1,1,2,3,inf\n", "tau2.*sample 2.*inf"),
+        (CSV + "0,1,2,3,4\n0.1,1,x,3,4\n0.2,1,2,3,4\n", "'theta2'.*expected a number, found 'x'"),
+        (CSV + "0,1,2,3,4\n0.1,1,,3,4\n0.2,1,2,3,4\n", "theta2 has no value in row 2"),
+        (CSV + "0,1,2,3,4\n0.1,1,2,3,4,5\n0.2,1,2,3,4\n", "row 2 has more cells"),
+        (CSV + "0,1,2,3,4\n", "1 samples"),
+        (CSV, "no rows"),
+        (CSV + "".join(f"{9 - row},1,2,3,4\n" for row in range(9)), "time goes backwards"),
+        (CSV + "5,1,2,3,4\n" * 9, "time stands still"),
+        ("0,1,2,3,4\n1,1,2,3,4\n", "no header"),
+        ("\x00\x01\x02", "unknown format"),
+        ("t,theta1,theta1,tau1,tau2\n0,1,2,3,4\n", "twice"),
+    ],
+)
+def test_bad_csv_is_refused_in_one_clear_line(text: str, told: str, tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(text)
+    with pytest.raises(LogError, match=told) as caught:
+        read_log(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_files_and_plain_folders_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="no such file"):
+        read_log(tmp_path / "nothing.csv")
+    with pytest.raises(LogError, match="folder"):
+        read_log(tmp_path)
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_values_changed_after_writing_are_refused(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / f"log.{kind}"
+    log = noise_log(50)
+    write_log(path, log, truth=TRUTH)
+    other = replace(log, tau=log.tau * 2)
+    if kind == "csv":
+        beside = (tmp_path / "log.csv.truth.json").read_text()
+        write_log(path, other)
+        (tmp_path / "log.csv.truth.json").write_text(beside)
+    else:
+        import polars as pl
+
+        frame = pl.read_parquet(path).with_columns(tau1=pl.lit(1.0))
+        frame.write_parquet(path, metadata=dict(pl.read_parquet_metadata(path)))
+    with pytest.raises(LogError, match="not those that were written"):
+        read_log(path)
