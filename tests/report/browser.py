@@ -74,7 +74,7 @@ class Browser:
         self._log("performance")
         self._log("browser")
         self.driver.get(page.resolve().as_uri())
-        self._wait()
+        self.until("return document.documentElement.dataset.drawn !== undefined")
         if picture is not None:
             self._take(picture, width, dark)
         run = self.driver.execute_script
@@ -102,13 +102,14 @@ class Browser:
         screen = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
 
-    def _wait(self) -> None:
+    def until(self, script: str, *arguments: object) -> None:
+        """Wait until `script` returns true."""
         end = time.monotonic() + PATIENCE
         while time.monotonic() < end:
-            if self.driver.execute_script("return document.documentElement.dataset.drawn") is not None:
+            if self.driver.execute_script(script, *arguments):
                 return
             time.sleep(0.05)
-        raise TimeoutError(f"the figures were not drawn within {PATIENCE} s")
+        raise TimeoutError(f"not true within {PATIENCE} s: {script}")
 
     def _requests(self) -> list[str]:
         events = [json.loads(entry["message"])["message"] for entry in self._log("performance")]

@@ -100,7 +100,8 @@ def test_figures_follow_legend_theme_keys_and_paper(browser: Browser, folder: Pa
     ranges = "return ['torque-0', 'torque-1'].map((id) => [...document.getElementById(id)._fullLayout.xaxis.range])"
     whole = run(ranges)[0]
     run(press, "+")
-    one, two = browser.driver.execute_async_script(f"setTimeout(() => arguments[0]((() => {{ {ranges} }})()), 500)")
+    browser.until("return document.getElementById('torque-1')._fullLayout.xaxis.range[0] > arguments[0]", whole[0])
+    one, two = run(ranges)
     assert one == two
     assert whole[0] < one[0] < one[1] < whole[1]
     run(press, "0")
@@ -109,7 +110,7 @@ def test_figures_follow_legend_theme_keys_and_paper(browser: Browser, folder: Pa
     assert run(ink) == "#1a2230"
     dark = {"features": [{"name": "prefers-color-scheme", "value": "dark"}]}
     browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", dark)
-    assert run(ink) == "#e7ecf3"
+    browser.until(f"{ink} === '#e7ecf3'")
     assert run(shown) == [False, True, True]
 
     run("dispatchEvent(new Event('beforeprint'))")
