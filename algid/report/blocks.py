@@ -42,7 +42,8 @@ def blocks(path: Path, names: Sequence[str], rows: int = ROWS) -> Iterator[Block
     if absent:
         raise ResultError(f"{path}: expected a column {absent[0]!r}, found none; identify again with this version")
     try:
-        with pyarrow.parquet.ParquetFile(path) as file:
+        # without pre_buffer=False the file is kept in memory as it is read
+        with pyarrow.parquet.ParquetFile(path, pre_buffer=False) as file:
             for batch in file.iter_batches(batch_size=rows, columns=list(names)):
                 yield {name: _array(batch.column(name)) for name in names}
     except (OSError, pyarrow.lib.ArrowException) as error:
