@@ -89,7 +89,7 @@ class Browser:
             console=[entry["message"] for entry in self._log("browser")],
             title=self.driver.title,
             poor_contrast=run(CONTRAST),
-            overflow=run("return document.documentElement.scrollWidth - innerWidth"),
+            overflow=run("return document.documentElement.scrollWidth") - width,
             background=run("return getComputedStyle(document.body).backgroundColor"),
         )
 

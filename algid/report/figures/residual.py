@@ -69,7 +69,7 @@ def _correlation(found: TorqueLog, joint: int) -> Panel:
     }
     layout = {
         "xaxis": axis("lag, samples", range=[0, LAGS + 0.7]),
-        "yaxis": axis("correlation", range=[-reach, reach]),
+        "yaxis": axis("correlation", range=[min(-2 * limit, 1.15 * float(correlation.min()), -0.1 * reach), reach]),
         "shapes": [band(-limit, limit, "@blue/0.25")],
         "bargap": 0.35,
     }
