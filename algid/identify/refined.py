@@ -38,7 +38,7 @@ from algid.identify.whitening import Linearised, NoiseLevels, linearise, traject
 from algid.sampling import Segment, pieces
 
 PIECE_SAMPLES = 16384
-_TRAINED = 8  # pieces of a log in the training set
+_TRAINED = 4  # pieces of a log in the training set
 _SHORTEST = 8 * POINTS  # samples: shorter pieces tell nothing
 _STRETCH = 64  # samples over which scores are summed
 _SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
