@@ -112,9 +112,7 @@ class _Text:
             text = rest + piece
             end = text.rfind(b"\n") + 1
             if not end and len(text) > _LONGEST_LINE:
-                raise LogError(
-                    f"{self.path}: a line of more than 65,000 characters; expected rows of numbers"
-                )
+                raise LogError(f"{self.path}: a line of more than 65,000 characters; expected rows of numbers")
             rest = text[end:]
             if end:
                 yield self._plain(text[:end])
@@ -163,16 +161,13 @@ class _Text:
         if not self.dialect.padded:
             return cell
         text = cell.str.strip_chars()
-        return (text.str.replace(",", ".", literal=True) if self.dialect.decimal_comma else text).cast(
-            pl.Float64
-        )
+        return (text.str.replace(",", ".", literal=True) if self.dialect.decimal_comma else text).cast(pl.Float64)
 
     def _whole(self, frame: pl.DataFrame, done: int) -> pl.DataFrame:
         if frame[_EXCESS].any():
             row = done + (frame[_EXCESS].arg_max() or 0) + 1
             raise LogError(
-                f"{self.path}: row {row} has more cells than the header's {len(self.dialect.columns)}; "
-                "mend that row"
+                f"{self.path}: row {row} has more cells than the header's {len(self.dialect.columns)}; mend that row"
             )
         return frame.drop(_EXCESS)
 

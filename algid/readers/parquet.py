@@ -57,13 +57,9 @@ def _check_footer(path: Path) -> None:
         tail = stream.read(8)
     length = int.from_bytes(tail[:4], "little")
     if tail[4:] != b"PAR1":
-        raise LogError(
-            f"{path}: the Parquet file is cut off: its footer is missing, so nothing can be read of it"
-        )
+        raise LogError(f"{path}: the Parquet file is cut off: its footer is missing, so nothing can be read of it")
     if length + 12 > size or length > _LARGEST_FOOTER:
-        raise LogError(
-            f"{path}: the Parquet footer claims {length} bytes of a file of {size}; copy the file again"
-        )
+        raise LogError(f"{path}: the Parquet footer claims {length} bytes of a file of {size}; copy the file again")
 
 
 def _flat_names(path: Path, schema: Mapping[str, pl.DataType]) -> dict[str, tuple[str, int | None]]:
@@ -139,9 +135,7 @@ class _Groups:
         cell = pl.col(column)
         kind = self.schema[column]
         if place is not None:
-            cell = (
-                cell.list.get(place, null_on_oob=True) if isinstance(kind, pl.List) else cell.arr.get(place)
-            )
+            cell = cell.list.get(place, null_on_oob=True) if isinstance(kind, pl.List) else cell.arr.get(place)
         if name != "t":
             return cell.cast(pl.Float64).alias(name)
         if isinstance(kind, pl.Datetime):
@@ -161,6 +155,4 @@ class _Groups:
 
 def _damaged(path: Path, error: BaseException) -> LogError:
     told = str(error).split("\n", maxsplit=1)[0][:200]
-    return LogError(
-        f"{path}: the Parquet file is damaged or not one that can be read ({told}); copy it again"
-    )
+    return LogError(f"{path}: the Parquet file is damaged or not one that can be read ({told}); copy it again")

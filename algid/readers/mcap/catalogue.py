@@ -101,9 +101,7 @@ def _from_summary(file: File) -> Catalogue | None:
     if statistics is None or not chunks or not found.channels:
         return None
     found.counts = dict(statistics.channel_message_counts)
-    found.spans = [
-        _chunk_span(file, chunk) for chunk in sorted(chunks, key=lambda one: one.chunk_start_offset)
-    ]
+    found.spans = [_chunk_span(file, chunk) for chunk in sorted(chunks, key=lambda one: one.chunk_start_offset)]
     _check_counts(file, chunks, statistics)
     for place in metadata:
         _keep_metadata(file, framing.Record(framing.METADATA, place.offset + 9, place.length - 9), found)

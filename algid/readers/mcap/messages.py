@@ -79,9 +79,7 @@ def find(content: bytes, index: bytes, wanted: Collection[int]) -> Messages:
 def gather(octets: NDArray[np.uint8], places: IntArray, kind: str) -> NDArray[np.generic]:
     """The numbers of type `kind` at byte `places` (N,), aligned or not."""
     width = np.dtype(kind).itemsize
-    window: NDArray[np.generic] = np.ndarray(
-        max(0, octets.size - width + 1), np.dtype(kind), octets.data, strides=(1,)
-    )
+    window: NDArray[np.generic] = np.ndarray(max(0, octets.size - width + 1), np.dtype(kind), octets.data, strides=(1,))
     return window[places]
 
 
