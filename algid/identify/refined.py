@@ -182,9 +182,10 @@ def fit(unloaded: Sequence[Source], loaded: Sequence[Source] = (), settings: Ref
     Raises
     ------
     ValueError
-        If there is no log, or no log long enough.
+        If there is no log, or no log long enough, or a known noise level is not positive.
     """
     settings = settings or RefinedSettings()
+    _check_noise(settings.noise)
     start = weak_fit(unloaded, loaded, _weak_settings(settings), settings.lengths, settings.prior)
     shared = start.shared
     logs = [*_opened(unloaded, False, settings), *_opened(loaded, True, settings)]

@@ -41,6 +41,11 @@ def test_known_noise_levels_are_kept(bench: Bench) -> None:
     assert fit.noise == (known,)
 
 
+def test_noise_levels_of_zero_are_refused(bench: Bench) -> None:
+    with pytest.raises(ValueError, match="positive"):
+        refined.fit([lambda: [bench.log()]], settings=RefinedSettings(noise=NoiseLevels(np.zeros(2), np.ones(2))))
+
+
 def test_known_lengths_sharpen_the_payload(bench: Bench) -> None:
     sources = [lambda: [bench.log(sigma=1e-3)]], [lambda: [bench.log(True, 1e-3)]]
     free = refined.fit(*sources)
