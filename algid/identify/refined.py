@@ -217,6 +217,11 @@ def fit(unloaded: Sequence[Source], loaded: Sequence[Source] = (), settings: Ref
     return replace(fitted, noise=noise, whiteness=whiteness, iterations=training.iterations)
 
 
+def _check_noise(noise: NoiseLevels | None) -> None:
+    if noise is not None and not (np.all(noise.theta > 0) and np.all(noise.tau > 0)):
+        raise ValueError(f"known noise levels must be positive, got {noise.theta} rad and {noise.tau} N m")
+
+
 def _opened(sources: Sequence[Source], loaded: bool, settings: RefinedSettings) -> Iterator[_Log]:
     for source in sources:
         kept, whole = _training_set(source())

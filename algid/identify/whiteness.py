@@ -1,9 +1,8 @@
 """Are the innovations white and Gaussian, as the error bars of the likelihood suppose?
 
 Ljung & Box's test on the innovations of each joint, as they are and summed over 16 and 64 samples, so that slow
-colour is seen as well as fast; the smallest p-value counts three times over (Bonferroni), and a correlation too faint to
-matter counts as none. The excess kurtosis
-tells heavy tails.
+colour is seen as well as fast. The smallest p-value counts three times over (Bonferroni), and a correlation too
+faint to matter counts as none. The excess kurtosis tells heavy tails.
 """
 
 from __future__ import annotations
