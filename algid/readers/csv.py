@@ -13,7 +13,7 @@ from algid.errors import LogError
 from algid.log import Origin
 from algid.readers import frames
 from algid.readers.assemble import TableReader
-from algid.readers.columns import Columns, assign
+from algid.readers.columns import Columns, assign, check_written
 from algid.readers.dialect import Dialect, detect
 from algid.readers.inflate import head_of, pieces
 from algid.readers.table import Table
@@ -42,16 +42,18 @@ def open_csv(path: Path, profile: Profile | None = None, kind: str = "csv") -> T
     LogError
         If the text is no table, or columns are missing.
     """
-    head = _head(path, kind)
+    head = head_bytes(path, kind)
     dialect = detect(path, head)
-    columns = assign(str(path), dialect.columns, profile)
     companion = _companion(path)
+    check_written(str(path), dialect.columns, companion.sums if companion else {})
+    columns = assign(str(path), dialect.columns, profile)
     origin = Origin(str(path), "csv", dict(columns.sources), companion.truth if companion else None)
     source = _Text(path, kind, dialect, columns, companion.sums if companion else {})
     return columns.reader(origin, source.tables, profile, _rows(path, kind, head))
 
 
-def _head(path: Path, kind: str) -> bytes:
+def head_bytes(path: Path, kind: str) -> bytes:
+    """The first bytes of the text, unpacked, 64 KiB at most."""
     if kind != "csv":
         return head_of(path, kind)
     with path.open("rb") as stream:

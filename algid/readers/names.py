@@ -141,6 +141,7 @@ def choose(columns: Iterable[str], joints: tuple[str, str] | None = None) -> Cho
     time = _time(parts)
     if time:
         chosen["t"] = time
+    chosen = _of_one_pair(chosen, parts)
     units = {channel: unit for channel, column in chosen.items() if (unit := parts[column].unit)}
     return Choice(chosen, units)
 
@@ -156,6 +157,18 @@ def _pair(parts: dict[str, Name], stems: tuple[str, ...], joints: tuple[str, str
         if len(by_joint) > 2 and not joints:
             raise LookupError(f"{stem!r} stands there for {len(by_joint)} joints: {', '.join(list(by_joint)[:8])}")
     return None
+
+
+def _of_one_pair(chosen: dict[str, str], parts: dict[str, Name]) -> dict[str, str]:
+    """Only quantities of the joints that the angles have: torques of other joints are not theirs."""
+    pair = [parts[chosen[f"theta{joint}"]].joint for joint in (1, 2)] if "theta1" in chosen else None
+    kept = {}
+    for channel, column in chosen.items():
+        own = channel == "t" or pair is None or parts[column].joint == pair[int(channel[-1]) - 1]
+        # drivers mix counting from nought and from one between quantities: the order is what counts then
+        if own or {parts[column].joint, pair[int(channel[-1]) - 1] if pair else None} <= {"0", "1", "2"}:
+            kept[channel] = column
+    return kept
 
 
 def _wanted(by_joint: dict[str, str], joints: tuple[str, str]) -> tuple[str, str] | None:

@@ -42,7 +42,8 @@ def blocks(path: Path, names: Sequence[str], rows: int = ROWS) -> Iterator[Block
     if absent:
         raise ResultError(f"{path}: expected a column {absent[0]!r}, found none; identify again with this version")
     try:
-        with pyarrow.parquet.ParquetFile(path) as file:
+        # without pre_buffer=False the file is kept in memory as it is read
+        with pyarrow.parquet.ParquetFile(path, pre_buffer=False) as file:
             for batch in file.iter_batches(batch_size=rows, columns=list(names)):
                 yield {name: _array(batch.column(name)) for name in names}
     except (OSError, pyarrow.lib.ArrowException) as error:
@@ -50,10 +51,14 @@ def blocks(path: Path, names: Sequence[str], rows: int = ROWS) -> Iterator[Block
 
 
 def row_count(path: Path) -> int:
-    """Rows of `path`, from its footer."""
+    """Rows of `path`, from its footer; raises `ResultError` where it cannot be read."""
+    import pyarrow.lib
     import pyarrow.parquet
 
-    return int(pyarrow.parquet.read_metadata(path).num_rows)
+    try:
+        return int(pyarrow.parquet.read_metadata(path).num_rows)
+    except (OSError, pyarrow.lib.ArrowException) as error:
+        raise _unreadable(path, error) from error
 
 
 def by_log(found: Iterator[Block]) -> Iterator[tuple[int, Block]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -52,6 +53,27 @@ def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> C
     shown = _distinct([visible(label) for label in labels] if labels else [file_name(r.log.path) for r in results])
     sigma = {name: _distances(name, results) for name in _names(results)}
     return Comparison(tuple(shown), sigma, _estimates(results, shown, sigma), _settings(results, shown))
+
+
+def comparison_json(found: Comparison, results: Sequence[Result]) -> str:
+    """The comparison as JSON: by parameter the estimates, their standard deviations and the distances in σ."""
+    parameters = {
+        name: {
+            "estimate": [_number(result, name, "estimate") for result in results],
+            "std": [_number(result, name, "std") for result in results],
+            "sigma": [None, *distances],
+        }
+        for name, distances in found.sigma.items()
+    }
+    settings = {name: list(values) for name, *values in found.settings.rows}
+    content = {"labels": list(found.labels), "parameters": parameters, "settings": settings}
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _number(result: Result, name: str, which: str) -> float | None:
+    found = result.estimates.get(name)
+    number: float | None = None if found is None else getattr(found, which)
+    return number
 
 
 def distance_sigma(first: Estimate | None, other: Estimate | None) -> float | None:
@@ -115,7 +137,7 @@ def _change(first: Estimate | None, other: Estimate | None) -> str:
 
 
 def _settings(results: Sequence[Result], labels: list[str]) -> Table:
-    every = [{"estimator": r.estimator, "algid": r.version, **flat_settings(r.settings)} for r in results]
+    every = [{**flat_settings(r.settings), "estimator": r.estimator, "algid": r.version} for r in results]
     names = dict.fromkeys(name for settings in every for name in settings)
     differing = [name for name in names if len({settings.get(name) for settings in every}) > 1]
     rows = tuple((visible(n), *(visible(settings.get(n, ABSENT)) for settings in every)) for n in differing)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
+from algid.outfiles import whole_file
 from algid.report.tables import Table, estimate_tables, fit_tables, log_tables, provenance_table
 from algid.report.text import file_name
 from algid.report.verdict import LEVEL_WORDS, Level, verdict
-from algid.results import Result
+from algid.results import Result, read_result
 
 LEVEL_SIGNS: dict[Level, str] = {"good": "✅", "reservations": "⚠️", "failed": "❌"}
 _SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|~@&])")
@@ -28,6 +30,15 @@ def markdown(result: Result) -> str:
     details = [log_tables(result)[0], provenance_table(result)]
     folded = ["<details><summary>Logs and provenance</summary>", "", *map(markdown_table, details), "</details>"]
     return "\n".join([*lines, "", *map(markdown_table, tables), *folded]) + "\n"
+
+
+def write_markdown(folder: Path) -> Path:
+    """Write `report.md` into the result folder `folder`. Raises `ResultError`, `OutputError`."""
+    page = folder / "report.md"
+    text = markdown(read_result(folder))
+    with whole_file(page) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return page
 
 
 def markdown_table(table: Table) -> str:

@@ -83,7 +83,7 @@ class Share:
         x, held = np.concatenate([self._rest[0], x]), np.concatenate([self._rest[1], holds])
         whole = x.size - x.size % self._size
         self._rest = x[whole:], held[whole:]
-        self._x.append(x[: whole : self._size])
+        self._x.append(x[: whole : self._size].copy())  # a view would keep the whole block
         self._held.append(held[:whole].reshape(-1, self._size).mean(axis=1))
 
     def result(self) -> tuple[FloatArray, FloatArray]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 import pyarrow.parquet as pq
+from scipy.signal import butter, filtfilt
 
 from algid.arm import CONSTANT_NAMES, CONSTANT_UNITS, FloatArray, forward_dynamics, regressor, with_payload
 from algid.identify.paper.stages import STAGE2_NAMES, stage1, stage2
@@ -196,6 +197,40 @@ def _write_series(folder: Path, unloaded: Recording, loaded: Recording, k: Float
         flat = {key: values.reshape(-1) for key, values in found.items()}
         t = np.arange(flat["condition"].size) / RATE
         pl.DataFrame({"t": t, **flat}).write_parquet(folder / f"{name}.parquet")
+
+
+def build_recorded(folder: Path, csv: Path) -> Result:
+    """A folder on a recorded run of a real arm: filtered least squares, whose residual is far from white."""
+    run = pl.read_csv(csv)
+    t = run["time"].to_numpy() - run["time"][0]
+    dt = float(np.median(np.diff(t)))
+    grid = np.arange(int(t[-1] / dt)) * dt
+
+    def smooth(name: str) -> FloatArray:
+        values = np.stack([np.interp(grid, t, run[f"{name}{joint}"].to_numpy()) for joint in (1, 2)])
+        low: FloatArray = filtfilt(*butter(3, 5.0 * 2 * dt), values)
+        return low
+
+    theta = smooth("pos_meas") - np.array([[np.pi / 2], [0.0]])
+    omega = np.gradient(theta, dt, axis=1)
+    alpha = np.gradient(omega, dt, axis=1)
+    raw = np.stack([np.interp(grid, t, run[f"tau_meas{joint}"].to_numpy()) for joint in (1, 2)])
+    recording = Recording(Motion(grid, theta, omega, raw), alpha, raw)
+    y = regressor(theta, omega, alpha)
+    k, covariance = _least_squares(y, smooth("tau_meas"))
+    result = _result(load_case("case1"), k, 400 * covariance, recording).model_copy(
+        update={
+            "log": _log(csv.name, "unloaded", recording),
+            "more_logs": [],
+            "payload": {},
+            "paper_payload": {},
+            "table4": [],
+            "warnings": ["stamps jitter by up to 0.9 ms; resampled at 2 ms"],
+        }
+    )
+    write_result(result, folder / "result.json")
+    _write_torque(folder / "torque.parquet", [recording], k)
+    return result
 
 
 HOSTILE = '<script>document.title="owned"</script>"><img src=x onerror=document.title="owned">.csv'

@@ -89,7 +89,7 @@ def _indexed(octets: NDArray[np.uint8], content: bytes, index: bytes) -> IntArra
     if not listed:
         return None
     records = np.concatenate([offsets for _, offsets in listed])
-    if len(listed) > 1:
+    if len(listed) > 1 or np.any(records[1:] <= records[:-1]):
         records.sort(kind="stable")
     if records.size == 0 or records[0] < 0 or records[-1] > octets.size - HEAD:
         return None

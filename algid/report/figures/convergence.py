@@ -107,7 +107,7 @@ def _condition(read: SeriesLog, condition: Series, sync: str) -> Panel:
     hover = "condition %{y:.3g} at %{x:.4g} s<extra></extra>"
     layout = {
         "xaxis": axis("time, s", range=[read.start, read.end]),
-        "yaxis": axis(type="log", dtick=3),
+        "yaxis": axis(type="log", dtick=3, tickfont={"size": 10}),
         "shapes": [level(LARGEST_CONDITION, "@amber"), *_epsilons(read)],
         "hovermode": "closest",
     }

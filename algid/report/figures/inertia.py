@@ -28,12 +28,10 @@ def inertia(result: Result, found: TorqueLog | None) -> Figure | Missing:
     theta2 = np.linspace(-np.pi, np.pi, 181)
     parts, stds = _parts(known, theta2), _stds(result, theta2)
     smallest = _smallest_eigenvalue(parts)
-    reading = "Read: M11 and M22 must stay above zero and M must stay positive definite; outside the grey stretch the curves extrapolate."
-    definite = (
-        "M is positive definite for every θ2"
-        if smallest > 0
-        else "M is not positive definite for every θ2: the estimates are not physical"
-    )
+    reading = "Read: M11 and M22 must stay above zero; outside the grey stretch the curves extrapolate."
+    definite = "M is positive definite for every θ2"
+    if smallest <= 0:
+        definite = "M is not positive definite for every θ2, which no arm is"
     panel = Panel(_traces(theta2, parts, stds), _layout(found), f"{TITLE} over θ2. {definite}", height=300)
     return Figure(
         "inertia", TITLE, (panel,), reading, LEGEND, f"{definite}; its smallest eigenvalue is {smallest:.3g} kg m²."

@@ -37,7 +37,7 @@ def _spectrum(found: TorqueLog, joint: int) -> Panel:
     ]
     layout = {
         "xaxis": axis("frequency, Hz", type="log", **_decades()),
-        "yaxis": axis("(N m)²/Hz", type="log", exponentformat="power", dtick=2, minor={"dtick": 1}),
+        "yaxis": axis("(N m)²/Hz", type="log", dtick=2, tickfont={"size": 10}),
         "hovermode": "closest",
     }
     return Panel(
@@ -69,7 +69,7 @@ def _correlation(found: TorqueLog, joint: int) -> Panel:
     }
     layout = {
         "xaxis": axis("lag, samples", range=[0, LAGS + 0.7]),
-        "yaxis": axis("correlation", range=[-reach, reach]),
+        "yaxis": axis("correlation", range=[min(-2 * limit, 1.15 * float(correlation.min()), -0.1 * reach), reach]),
         "shapes": [band(-limit, limit, "@blue/0.25")],
         "bargap": 0.35,
     }

@@ -1,0 +1,47 @@
+"""The commands of `algid`, gathered."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from algid import __version__
+from algid.cli.check import check
+from algid.cli.compare import compare
+from algid.cli.convert import convert
+from algid.cli.identify import identify
+from algid.cli.inspect import inspect
+from algid.cli.profile import new
+from algid.cli.report import report
+from algid.cli.synth import synth
+
+app = typer.Typer(
+    help="Parameters and payload of a two-link arm, with honest error bars, straight from its torque and angle logs.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"algid {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    _version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+profiles = typer.Typer(help="Profiles tell what a log's names, units and signs mean.", no_args_is_help=True)
+profiles.command("new")(new)
+
+for command in (inspect, identify, check, report, compare, synth, convert):
+    app.command()(command)
+app.add_typer(profiles, name="profile")

@@ -1,0 +1,57 @@
+"""`algid compare`: results side by side."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from algid.cli.report import ResultFormat
+from algid.errors import SettingError
+
+if TYPE_CHECKING:
+    from algid.report.tables import Table
+
+
+def compare(
+    results: Annotated[list[Path], typer.Argument(metavar="RESULT RESULT...", help="Two results or more.")],
+    form: Annotated[ResultFormat, typer.Option("--format", help="How to print the comparison.")] = ResultFormat.TABLE,
+) -> None:
+    """Lay results side by side: differences in σ from the first one, and which settings differ.
+
+    Example: algid compare monday.algid friday.algid
+    """
+    from algid.report import compare as compared
+    from algid.report.comparison import comparison_json
+    from algid.report.markdown import markdown_table
+    from algid.results import read_result
+
+    if len(results) < 2:
+        raise SettingError(f"compare: expected two results or more, found {len(results)}; name another one")
+    read = [read_result(path) for path in results]
+    found = compared(read, labels(results))
+    if form is ResultFormat.TABLE:
+        _print((found.estimates, found.settings))
+    elif form is ResultFormat.MARKDOWN:
+        typer.echo("\n".join(markdown_table(table) for table in (found.estimates, found.settings)), nl=False)
+    else:
+        typer.echo(comparison_json(found, read), nl=False)
+
+
+def labels(paths: list[Path]) -> list[str]:
+    """The folders' names without the suffix, or the whole paths where two names are equal."""
+    folders = [path.parent if path.name == "result.json" else path for path in paths]
+    names = [folder.resolve().name.removesuffix(".algid") for folder in folders]
+    return names if len(set(names)) == len(names) else [str(folder) for folder in folders]
+
+
+def _print(tables: tuple[Table, ...]) -> None:
+    from rich.console import Console
+
+    from algid.report.terminal import print_one
+
+    console = Console()
+    for table in tables:
+        print_one(table, console)
+        console.print()

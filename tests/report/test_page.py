@@ -1,0 +1,192 @@
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import plotly.graph_objects as go
+import polars as pl
+import pytest
+
+from algid.errors import ResultError
+from algid.report import write_report
+from algid.report.figures.base import Figure, Missing
+from algid.report.gallery import gallery
+from algid.report.html import escaped, script_json
+from algid.report.torquelog import read_torque
+from algid.results import Result, read_result, write_result
+from tests.report.folders import HOSTILE, hostile
+
+
+@pytest.fixture
+def folder(case_folder: Path, tmp_path: Path) -> Path:
+    """A copy of the complete folder, to be changed."""
+    return Path(shutil.copytree(case_folder, tmp_path / "case1.algid"))
+
+
+class Tags(HTMLParser):
+    """Elements with their attributes, and the text of scripts left out."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, dict(attrs)))
+
+
+def test_every_figure_is_one_that_plotly_knows(case_folder: Path, result: Result) -> None:
+    _, figures = gallery(case_folder, result)
+    assert [figure.title for figure in figures if isinstance(figure, Missing)] == []
+    assert len(figures) == 9
+    for figure in figures:
+        assert isinstance(figure, Figure)
+        assert figure.reading.startswith("Read: ")
+        for panel in figure.panels:
+            go.Figure({"data": _without_tokens(panel.traces), "layout": _without_tokens(panel.layout)})
+
+
+def _without_tokens(value: object) -> object:
+    """Colour tokens replaced by a colour, as the page's script does."""
+    if isinstance(value, str):
+        return "#123456" if value.startswith("@") else value
+    if isinstance(value, dict):
+        return {name: _without_tokens(item) for name, item in value.items()}
+    return [_without_tokens(item) for item in value] if isinstance(value, list) else value
+
+
+def test_the_page_asks_nothing_of_any_host(folder: Path) -> None:
+    text = write_report(folder).read_text(encoding="utf-8")
+    tags = Tags(re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)).found
+    assert not [tag for tag, attrs in tags if "src" in attrs]
+    links = [attrs.get("href") or "" for _, attrs in tags if "href" in attrs]
+    assert all(link.startswith(("#", "data:,")) for link in links)
+    policy = next(attrs["content"] for tag, attrs in tags if tag == "meta" and "http-equiv" in attrs)
+    assert policy is not None
+    assert policy.startswith("default-src 'none'; script-src 'sha256-")
+    assert "unsafe-eval" not in policy
+    assert "http" not in policy
+
+
+def test_one_library_serves_a_folder_of_reports(folder: Path) -> None:
+    page = write_report(folder, shared_library=True)
+    assert (folder.parent / "plotly.min.js").stat().st_size > 1_000_000
+    assert page.stat().st_size <= 1_000_000
+    assert '<script nonce="' in page.read_text(encoding="utf-8")
+
+
+def test_a_page_alone_is_within_eight_megabytes(folder: Path) -> None:
+    assert write_report(folder).stat().st_size <= 8_000_000
+
+
+def test_the_same_folder_gives_the_same_bytes(folder: Path) -> None:
+    assert write_report(folder).read_bytes() == write_report(folder).read_bytes()
+
+
+def test_foreign_text_stays_text(folder: Path, result: Result) -> None:
+    write_result(hostile(result), folder / "result.json")
+    text = write_report(folder).read_text(encoding="utf-8")
+    own = re.sub(r"<(script|style)[^>]*>.*?</\1>", "", text, flags=re.DOTALL)
+    tags = Tags(own).found
+    assert {"img", "svg", "b", "script"}.isdisjoint(tag for tag, _ in tags)
+    assert not [attrs for _, attrs in tags if any(name.startswith("on") for name in attrs)]
+    assert escaped(HOSTILE) in own
+    assert text.count("<script") == 3  # the data, the library, the page's own
+    for character in "\x1b\x07\u202e":
+        assert character not in text
+
+
+def test_data_cannot_end_its_script() -> None:
+    text = script_json({"a": "</script><!--&\u2028"})
+    assert not set("<>&\u2028") & set(text)
+    assert json.loads(text) == {"a": "</script><!--&\u2028"}
+
+
+@pytest.mark.parametrize("name", ["estimates", "torque", "information"])
+def test_the_page_says_which_file_is_absent(folder: Path, name: str) -> None:
+    (folder / f"{name}.parquet").unlink()
+    assert f"Not shown: {name}.parquet is not in this folder." in write_report(folder).read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", ["estimates", "loaded", "torque", "information"])
+def test_the_page_says_which_file_is_broken(folder: Path, name: str) -> None:
+    (folder / f"{name}.parquet").write_bytes(b"PAR1 no parquet")
+    assert "cannot read it as Parquet" in write_report(folder).read_text(encoding="utf-8")
+
+
+def test_a_missing_column_is_named(folder: Path) -> None:
+    path = folder / "torque.parquet"
+    pl.read_parquet(path).drop("omega2").write_parquet(path)
+    assert "expected a column &#x27;omega2&#x27;" in write_report(folder).read_text(encoding="utf-8")
+
+
+def test_a_bare_result_still_makes_a_page(tmp_path: Path, result: Result) -> None:
+    bare = tmp_path / "bare.algid"
+    write_result(result.model_copy(update={"fit": None, "more_logs": []}), bare / "result.json")
+    text = write_report(bare).read_text(encoding="utf-8")
+    assert text.count("Not shown: ") == 4
+    assert "the estimator refined gives no covariance" in text
+
+
+def test_a_folder_without_a_result_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ResultError, match="cannot read it"):
+        write_report(tmp_path)
+
+
+def test_nothing_is_lost_of_a_torque_log_in_blocks(case_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = read_torque(case_folder / "torque.parquet")
+    rows = pl.read_parquet(case_folder / "torque.parquet")
+    residual = (rows["tau1"] - rows["tau1_predicted"]).to_numpy()
+    assert whole.residual_rms[0] == pytest.approx(float(np.sqrt(np.mean(residual**2))), rel=1e-12)
+    log, moment = whole.worst[1]
+    largest = rows.filter((pl.col("log") == log) & (pl.col("t") == moment))
+    assert abs(largest["tau1"][0] - largest["tau1_predicted"][0]) == np.abs(residual).max()
+    monkeypatch.setattr("algid.report.blocks.blocks.__defaults__", (317,))
+    cut = read_torque(case_folder / "torque.parquet")
+    for log, span in whole.ranges.items():
+        assert cut.ranges[log] == replace(span, period=cut.ranges[log].period)
+        assert cut.ranges[log].period == pytest.approx(span.period, rel=1e-9)  # a median of other stamps
+    assert cut.extremes == whole.extremes
+    np.testing.assert_array_equal(cut.motion, whole.motion)
+    for name, series in whole.series[1].items():
+        np.testing.assert_array_equal(cut.series[1][name], series)
+    np.testing.assert_allclose(cut.density, whole.density, rtol=1e-9)
+
+
+def test_gaps_are_counted(folder: Path) -> None:
+    path = folder / "torque.parquet"
+    pl.read_parquet(path).filter(~pl.col("t").is_between(1.0, 1.5)).write_parquet(path)
+    found = read_torque(path)
+    assert [span.gaps for span in found.ranges.values()] == [1, 1]
+    assert found.ranges[0].largest_gap == pytest.approx(0.502, abs=1e-9)
+    assert np.isnan(found.series[0]["tau1"][1]).any()
+
+
+def test_a_log_without_prediction_has_its_torque_alone(folder: Path) -> None:
+    path = folder / "torque.parquet"
+    lost = [pl.lit(None, pl.Float64).alias(f"tau{joint}_predicted") for joint in (1, 2)]
+    pl.read_parquet(path).with_columns(lost).write_parquet(path)
+    text = write_report(folder).read_text(encoding="utf-8")
+    assert "8,000 samples have no predicted torque" in text
+    assert "Not shown: no torque is predicted" in text
+
+
+def _ids(text: str) -> Iterator[str]:
+    yield from re.findall(r'\sid="([^"]+)"', re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL))
+
+
+def test_every_link_within_the_page_leads_somewhere(folder: Path) -> None:
+    text = write_report(folder).read_text(encoding="utf-8")
+    ids = list(_ids(text))
+    assert len(ids) == len(set(ids))
+    assert set(re.findall(r'href="#([^"]+)"', text)) <= set(ids)
+
+
+def test_the_result_is_read_from_the_folder(folder: Path) -> None:
+    assert read_result(folder).log.path.endswith("case1-unloaded.mcap")

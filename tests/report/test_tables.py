@@ -1,0 +1,142 @@
+from __future__ import annotations
+
+import html
+import io
+import json
+import re
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from algid.report import markdown, print_table, write_report
+from algid.report.markdown import escaped
+from algid.report.numbers import digits_of, resolved, significant
+from algid.report.tables import Table, estimate_tables, flat_settings, log_tables, settings_table
+from algid.results import Estimate, Result, Status, result_json
+from tests.report.folders import estimate, hostile
+
+
+def terminal(result: Result, width: int = 200, **options: object) -> str:
+    stream = io.StringIO()
+    print_table(result, Console(file=stream, width=width, **options))  # type: ignore[arg-type]
+    return stream.getvalue()
+
+
+def from_markdown(text: str) -> list[list[str]]:
+    cells = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    return [[re.sub(r"\\(.)", r"\1", cell) for cell in row] for row in cells if not row[0].startswith(":--")]
+
+
+def from_html(text: str) -> list[list[str]]:
+    rows = re.findall(r"<tr>(.*?)</tr>", text, re.DOTALL)
+    return [[html.unescape(cell) for cell in re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row, re.DOTALL)] for row in rows]
+
+
+def from_terminal(text: str, heading: str) -> list[list[str]]:
+    """Rows of the table under `heading`, split where two blanks part the cells."""
+    lines = text.splitlines()
+    start = next(i for i, line in enumerate(lines) if line.strip() == heading) + 4
+    rows = []
+    for line in lines[start:]:
+        if not line.strip():
+            break
+        rows.append(re.split(r"\s{2,}", line.strip()))
+    return rows
+
+
+def test_every_format_shows_the_same_digits_and_json_holds_them(result: Result, case_folder: Path) -> None:
+    parameters = next(table for table in estimate_tables(result) if table.title == "Parameters")
+    expected = [list(row) for row in parameters.rows]
+    page = from_html(write_report(case_folder, shared_library=True).read_text(encoding="utf-8"))
+    assert [row for row in page if row in expected][: len(expected)] == expected
+    assert from_markdown(markdown(result))[1 : 1 + len(expected)] == expected
+    assert from_terminal(terminal(result), "Parameters") == expected
+    stored = json.loads(result_json(result))["parameters"]
+    for name, shown, std, *_ in expected:
+        number, spread = stored[name]["estimate"], stored[name]["std"]
+        assert float(shown) == pytest.approx(number, rel=0.501 * 10 ** (1 - digits_of(number, spread)))
+        assert shown == resolved(number, spread)
+        assert std == significant(spread, 2)
+
+
+def test_every_table_reaches_html_and_markdown_alike(result: Result, case_folder: Path) -> None:
+    page = from_html(write_report(case_folder).read_text(encoding="utf-8"))
+    text = from_markdown(markdown(result))
+    for table in estimate_tables(result):
+        for row in (tuple(column.heading for column in table.columns), *table.rows):
+            assert list(row) in page
+            assert list(row) in text
+
+
+def test_truth_and_the_papers_error_stand_beside_the_estimate(result: Result) -> None:
+    parameters, *_ = estimate_tables(result)
+    headings = [column.heading for column in parameters.columns]
+    row = dict(zip(headings, parameters.rows[0], strict=True))
+    assert row["Parameter"] == "k1"
+    assert row["Truth"] == "8.1532e-4"  # m2 l1 lc2 of Table 3
+    assert row["Paper's error %"] == "0.2449"
+
+
+def test_a_column_that_nobody_fills_is_dropped(result: Result) -> None:
+    bare = {"k1": Estimate(estimate=1.0, unit="kg m^2")}
+    tables = estimate_tables(result.model_copy(update={"parameters": bare, "table4": [], "payload": {}}))
+    assert [column.heading for column in tables[0].columns] == ["Parameter", "Estimate", "Unit", "Status"]
+    assert tables[0].rows == (("k1", "1.0000", "kg m²", "OK"),)
+
+
+def test_an_unbounded_interval_is_shown_as_one(result: Result) -> None:
+    lost = Estimate(estimate=None, ci95=(None, None), unit="N m", status=Status.NOT_IDENTIFIABLE)
+    table = estimate_tables(result.model_copy(update={"parameters": {"k2": lost}}))[0]
+    assert "[−∞, ∞]" in table.rows[0]
+    assert "NOT_IDENTIFIABLE" in table.rows[0]
+
+
+def test_settings_are_flat_and_plain() -> None:
+    nested = {"a": {"b": True, "c": None}, "d": [1.0, 2], "e": {}, "f": 1e-3}
+    assert flat_settings(nested) == {"a.b": "yes", "a.c": "–", "d": "1, 2", "e": "{}", "f": "0.001"}
+
+
+def test_channels_name_a_log_only_where_they_differ(result: Result) -> None:
+    channels = log_tables(result)[1]
+    assert {row[2] for row in channels.rows} == {"all logs"}
+    other = result.more_logs[0].model_copy(update={"mapping": {"theta1": "q1"}})
+    differing = log_tables(result.model_copy(update={"more_logs": [other]}))[1]
+    assert differing.rows[-1] == ("theta1", "q1", "case1-loaded.mcap")
+
+
+def test_the_terminal_has_no_colour_without_a_colour_system(result: Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert "\x1b[3" not in terminal(result, force_terminal=True)
+
+
+def test_a_narrow_terminal_does_without_the_interval(result: Result) -> None:
+    assert "95 % interval" in terminal(result, 140)
+    narrow = terminal(result, 100)
+    assert "95 % interval" not in narrow
+    assert "Parameter " in narrow
+
+
+def test_foreign_text_is_neither_markup_nor_escape_sequence(result: Result) -> None:
+    text = terminal(hostile(result)) + markdown(hostile(result))
+    assert "\x1b" not in text
+    assert "\u202e" not in text
+    shown = markdown(hostile(result))
+    assert not re.search(r"(?<!\\)<(?!/?(details|summary)>)", shown)
+    assert "\n```" not in shown
+    assert "\\@everyone" in shown
+
+
+def test_markdown_escapes_what_it_would_read() -> None:
+    assert escaped("a|b_c*`<x>") == "a\\|b\\_c\\*\\`\\<x\\>"
+
+
+def test_settings_table_keeps_a_table_whole() -> None:
+    table = settings_table({"a\nb": "x|y"})
+    assert isinstance(table, Table)
+    assert table.rows == (("a\\x0ab", "x|y"),)
+
+
+def test_estimates_that_are_not_ok_stand_out(result: Result) -> None:
+    weak = {"k1": estimate(1.0, 0.5, "kg m^2", Status.WEAK_EXCITATION)}
+    assert "WEAK_EXCITATION" in terminal(result.model_copy(update={"parameters": weak}))

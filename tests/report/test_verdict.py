@@ -1,0 +1,95 @@
+from __future__ import annotations
+
+import pytest
+
+from algid.report.verdict import verdict
+from algid.results import Bound, Estimate, Result, Status, TorquePrediction, Whiteness
+from tests.report.folders import estimate
+
+
+def with_fit(result: Result, **changes: object) -> Result:
+    assert result.fit is not None
+    return result.model_copy(update={"fit": result.fit.model_copy(update=changes)})
+
+
+def with_parameter(result: Result, name: str, found: Estimate) -> Result:
+    return result.model_copy(update={"parameters": {**result.parameters, name: found}, "table4": []})
+
+
+def test_a_result_without_a_flaw_is_good_and_says_how_good(result: Result) -> None:
+    found = verdict(result)
+    assert found.level == "good"
+    assert found.sentence.startswith("Good: all 9 parameters are identified, the least certain, ")
+    assert "over 99.99 % of the torque of both joints" in found.sentence
+    assert found.reasons == ()
+
+
+def test_the_papers_estimator_is_good_without_error_bars(result: Result) -> None:
+    bare = {name: Estimate(estimate=e.estimate, unit=e.unit) for name, e in result.parameters.items()}
+    plain = result.model_copy(
+        update={"parameters": bare, "payload": {}, "fit": None, "estimator": "paper", "table4": []}
+    )
+    found = verdict(plain)
+    assert found.level == "good"
+    assert "without error bars, which the paper estimator does not give" in found.sentence
+
+
+def test_one_reservation_is_told_in_the_sentence(result: Result) -> None:
+    lost = Estimate(estimate=None, unit="kg m^2", status=Status.NOT_IDENTIFIABLE)
+    found = verdict(with_parameter(result, "k5", lost))
+    assert found.level == "reservations"
+    assert found.sentence == "With reservations: 8 of 9 parameters are identified, but k5 is not identifiable."
+
+
+def test_more_reservations_are_counted(result: Result) -> None:
+    found = verdict(result.model_copy(update={"warnings": ["3 samples are missing", "stamps jitter"]}))
+    assert found.sentence.endswith("but algid warns: 3 samples are missing, and there is one more reason below.")
+    assert len(found.reasons) == 2
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"unidentifiable": ["k3 and k5 only as a sum"]}, "k3 and k5 only as a sum"),
+        ({"broken_bounds": [Bound(bound="k6 ≥ 0", value=-1.0, distance_sigma=4.0)]}, "k6 ≥ 0"),
+        (
+            {"whiteness": {"tau1": Whiteness(white=False, p_value=0.0, lag1_correlation=0.9)}},
+            "the residual of tau1 is not white",
+        ),
+        (
+            {"cross_validation": TorquePrediction(rmse=(1, 1), nrmse=(1, 1), r2=(0.62, 0.99), filter="none")},
+            "the model explains only 62 % of the torque of joint 1",
+        ),
+    ],
+)
+def test_what_the_fit_holds_against_itself_is_a_reservation(
+    result: Result, changes: dict[str, object], reason: str
+) -> None:
+    found = verdict(with_fit(result, **changes))
+    assert found.level == "reservations"
+    assert reason in found.sentence
+
+
+def test_intervals_that_allow_for_colour_make_it_no_reservation(result: Result) -> None:
+    coloured = {"tau1": Whiteness(white=False, p_value=0.0, lag1_correlation=0.9)}
+    assert verdict(with_fit(result, whiteness=coloured, intervals="sandwich")).level == "good"
+
+
+def test_wide_intervals_and_distance_from_the_truth_are_reservations(result: Result) -> None:
+    wide = verdict(with_parameter(result, "k2", estimate(0.05, 0.01, "N m")))
+    assert "k2 (±20 %)" in wide.sentence
+    row = result.table4[0].model_copy(update={"estimate": 2.0, "truth": 1.0, "std": 0.1})
+    assert "k1 lies 10 σ from the truth" in verdict(result.model_copy(update={"table4": [row]})).sentence
+
+
+def test_an_estimator_that_did_not_converge_failed(result: Result) -> None:
+    found = verdict(with_fit(result, converged=False))
+    assert found.sentence == "Failed: the estimator did not converge in 4 iterations; do not use these numbers."
+    one = result.parameters["k1"].model_copy(update={"status": Status.NOT_CONVERGED})
+    assert verdict(with_parameter(result, "k1", one)).level == "failed"
+
+
+def test_nothing_identified_is_a_failure(result: Result) -> None:
+    weak = {"k1": Estimate(estimate=None, unit="kg m^2", status=Status.WEAK_EXCITATION)}
+    found = verdict(result.model_copy(update={"parameters": weak, "payload": {}, "table4": []}))
+    assert found.sentence.startswith("Failed: no parameter could be identified (too weakly excited)")
