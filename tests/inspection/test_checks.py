@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from algid.arm import Arm, FloatArray, inverse_dynamics
 from algid.errors import LogError
@@ -46,7 +45,7 @@ def test_a_clean_log_raises_nothing() -> None:
     assert admit(log).notices == ()
 
 
-def with_row(values: FloatArray, row: int, new: NDArray[Any] | float) -> NDArray[np.float64]:
+def with_row(values: FloatArray, row: int, new: FloatArray | float) -> FloatArray:
     changed = values.copy()
     changed[row] = new
     return changed
