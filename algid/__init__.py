@@ -1,3 +1,65 @@
-"""algid: parameters and payload of a two-link arm from its torque and angle logs."""
+"""algid: parameters and payload of a two-link arm from its torque and angle logs.
+
+    import algid
+
+    unloaded, loaded = algid.synthesise("case1", duration=10.0, excitation="wide")
+    result = algid.identify(unloaded, loaded)
+    print(result.parameters["k1"].estimate, result.payload["m_p"].ci95)
+
+The names below load what they need when they are first used.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from algid.api import synthesise
+    from algid.arm import Arm
+    from algid.errors import AlgidError
+    from algid.log import Log
+    from algid.pipeline.identify import identify
+    from algid.pipeline.settings import Settings
+    from algid.readers import read_log
+    from algid.results import Result, read_result
+    from algid.synth.simulator import simulate
+    from algid.writers import write_log
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "AlgidError",
+    "Arm",
+    "Log",
+    "Result",
+    "Settings",
+    "__version__",
+    "identify",
+    "read_log",
+    "read_result",
+    "simulate",
+    "synthesise",
+    "write_log",
+]
+
+_HOMES = {
+    "AlgidError": "algid.errors",
+    "Arm": "algid.arm",
+    "Log": "algid.log",
+    "Result": "algid.results",
+    "Settings": "algid.pipeline.settings",
+    "identify": "algid.pipeline.identify",
+    "read_log": "algid.readers",
+    "read_result": "algid.results",
+    "simulate": "algid.synth.simulator",
+    "synthesise": "algid.api",
+    "write_log": "algid.writers",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'algid' has no attribute {name!r}")
+    from importlib import import_module
+
+    return getattr(import_module(_HOMES[name]), name)

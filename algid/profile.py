@@ -6,8 +6,9 @@ Everything is optional; what a profile leaves out is told from the log. A key th
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -82,6 +83,23 @@ class Profile(_Strict):
         return found
 
 
+def with_settings(profile: Profile, settings: Mapping[str, Any]) -> Profile:
+    """The profile with settings over it, channel by channel.
+
+    Raises
+    ------
+    SettingError
+        If a setting or its value is not known.
+    """
+    merged = profile.model_dump(exclude_unset=True)
+    for name, value in settings.items():
+        merged[name] = {**merged.get(name, {}), **value} if isinstance(value, Mapping) else value
+    try:
+        return Profile.model_validate(merged)
+    except ValidationError as error:
+        raise SettingError(f"setting {_told(error)}") from error
+
+
 def load_profile(path: Path) -> Profile:
     """Read `algid.toml`.
 
@@ -97,6 +115,10 @@ def load_profile(path: Path) -> Profile:
     except tomllib.TOMLDecodeError as error:
         raise SettingError(f"{path}: the profile is not TOML: {error}") from error
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise SettingError(f"{path}: {place}: {first['msg']}; found {first['input']!r}") from error
+        raise SettingError(f"{path}: {_told(error)}") from error
+
+
+def _told(error: ValidationError) -> str:
+    first = error.errors()[0]
+    place = ".".join(str(part) for part in first["loc"])
+    return f"{place}: {first['msg']}; found {str(first['input'])[:60]!r}"

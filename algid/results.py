@@ -140,6 +140,7 @@ class Result(_Model):
     settings: dict[str, Any]
     log: LogSummary
     more_logs: list[LogSummary] = []
+    data_lost: bool = False
     warnings: list[str] = []
 
     @property

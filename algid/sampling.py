@@ -185,7 +185,7 @@ def pieces(source: Iterable[Segment], rows: int) -> Iterator[Segment]:
         if held is not None and not segment.continues:
             yield from _cut(held, rows)
             held = None
-        held = segment if held is None else _append(held, segment)
+        held = segment if held is None else append(held, segment)
         while len(held) >= 2 * rows:
             yield held.part(0, rows)
             held = held.part(rows, len(held))
@@ -200,7 +200,8 @@ def _cut(rest: Segment, rows: int) -> Iterator[Segment]:
     yield rest
 
 
-def _append(first: Segment, second: Segment) -> Segment:
+def append(first: Segment, second: Segment) -> Segment:
+    """One segment out of two, the second of which continues the first."""
     both_have_omega = first.omega is not None and second.omega is not None
     return replace(
         first,

@@ -7,6 +7,7 @@ beside a CSV log.
 from __future__ import annotations
 
 import json
+import zlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -36,7 +37,7 @@ class Companion:
                 "payload": self.truth.payload,
                 "case": self.truth.case,
             }
-        return json.dumps(content)
+        return json.dumps({**content, "crc32": _checksum(content)})
 
 
 def loads(text: str | bytes) -> Companion:
@@ -49,6 +50,8 @@ def loads(text: str | bytes) -> Companion:
     """
     try:
         content = json.loads(text)
+        if content.pop("crc32") != _checksum(content):
+            raise ValueError("its checksum is wrong")
         sums = {str(name): int(value) for name, value in content["sums"].items()}
         if "arm" not in content:
             return Companion(None, sums)
@@ -57,6 +60,10 @@ def loads(text: str | bytes) -> Companion:
         return Companion(Truth(arm, float(content["payload"]), case), sums)
     except (KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ValueError(f"not the truth of a synthetic log: {error!r}") from error
+
+
+def _checksum(content: dict[str, Any]) -> int:
+    return zlib.crc32(json.dumps(content, sort_keys=True).encode())
 
 
 def word_sum(values: NDArray[Any]) -> int:

@@ -12,7 +12,7 @@ from mcap.writer import CompressionType, Writer
 from algid.log import Log, Origin
 from algid.outfiles import whole_file
 from algid.writers import write_log
-from algid.writers.mcap import DEFINITION, TYPE, _payloads
+from algid.writers.mcap import DEFINITION, TYPE, payloads
 
 ROWS = 1_000_000
 START_NS = 1_700_000_000_000_000_000
@@ -61,7 +61,7 @@ def joint_and_imu(path: Path) -> None:
         joints = _channel(writer, "/joint_states", TYPE, DEFINITION)
         imu = _channel(writer, "/imu/data", _IMU, _IMU_DEFINITION)
         other = imu_payloads(ROWS // 5)
-        for row, (stamp, payload) in enumerate(zip(log.stamp_ns.tolist(), _payloads(log), strict=True)):
+        for row, (stamp, payload) in enumerate(zip(log.stamp_ns.tolist(), payloads(log), strict=True)):
             writer.add_message(joints, stamp, payload, stamp, row)
             if row % 5 == 0:
                 writer.add_message(imu, stamp + 1000, next(other), stamp + 1000, row // 5)
@@ -89,7 +89,7 @@ def with_cameras(path: Path, gigabytes: float = 2.0) -> None:
         joints = _channel(writer, "/joint_states", TYPE, DEFINITION)
         camera = _channel(writer, "/camera/image", "sensor_msgs/msg/CompressedImage", "uint8[] data\n")
         head = struct.pack("<BBBBI", 0, 1, 0, 0, len(image))
-        for row, (stamp, payload) in enumerate(zip(log.stamp_ns.tolist(), _payloads(log), strict=True)):
+        for row, (stamp, payload) in enumerate(zip(log.stamp_ns.tolist(), payloads(log), strict=True)):
             writer.add_message(joints, stamp, payload, stamp, row)
             if row % 16 == 0:
                 writer.add_message(camera, stamp, head + image, stamp, row // 16)
@@ -106,3 +106,37 @@ def flat_files(folder: Path) -> None:
 def _channel(writer: Writer, topic: str, name: str, definition: str) -> int:
     schema = writer.register_schema(name=name, encoding="ros2msg", data=definition.encode())
     return writer.register_channel(topic=topic, message_encoding="cdr", schema_id=schema)
+
+
+def protobuf_states(path: Path, rows: int = PROTOBUF_ROWS) -> None:
+    """Joint states as protobuf messages with a Timestamp."""
+    from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
+
+    file = descriptor_pb2.FileDescriptorProto(name="arm.proto", package="arm", syntax="proto3")
+    file.dependency.append("google/protobuf/timestamp.proto")
+    message = file.message_type.add(name="State")
+    message.field.add(name="timestamp", number=1, type=11, label=1, type_name=".google.protobuf.Timestamp")
+    for number, (name, kind) in enumerate((("name", 9), ("position", 1), ("velocity", 1), ("effort", 1)), 2):
+        message.field.add(name=name, number=number, type=kind, label=3)
+    stamp = descriptor_pb2.FileDescriptorProto()
+    timestamp_pb2.DESCRIPTOR.CopyToProto(stamp)
+    pool = descriptor_pool.DescriptorPool()
+    pool.Add(stamp)
+    pool.Add(file)
+    state = message_factory.GetMessageClass(pool.FindMessageTypeByName("arm.State"))
+    data = descriptor_pb2.FileDescriptorSet(file=[stamp, file]).SerializeToString()
+    log = arm_log(rows)
+    assert log.omega is not None
+    with whole_file(path) as temporary, temporary.open("wb") as stream:
+        writer = Writer(stream, chunk_size=768 * 1024, compression=CompressionType.ZSTD)
+        writer.start(library="algid bench")
+        schema = writer.register_schema(name="arm.State", encoding="protobuf", data=data)
+        channel = writer.register_channel(topic="/arm", message_encoding="protobuf", schema_id=schema)
+        for row, stamp_ns in enumerate(log.stamp_ns.tolist()):
+            one = state(name=["j1", "j2"])
+            one.timestamp.seconds, one.timestamp.nanos = divmod(stamp_ns, 10**9)
+            one.position.extend(log.theta[:, row])
+            one.velocity.extend(log.omega[:, row])
+            one.effort.extend(log.tau[:, row])
+            writer.add_message(channel, stamp_ns, one.SerializeToString(), stamp_ns, row)
+        writer.finish()  # type: ignore[no-untyped-call]

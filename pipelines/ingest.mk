@@ -3,7 +3,7 @@
 BENCH_DIR ?= build/bench-ingest
 
 bench-ingest: setup ## time the readers against decompression, polars and other readers
-	$(BIN)/python pipelines/bench_ingest.py $(BENCH_DIR)
+	$(BIN)/python -m pipelines.bench_ingest $(BENCH_DIR)
 
 fuzz: setup ## read 20,000 damaged logs
-	$(BIN)/python pipelines/fuzz.py
+	$(BIN)/python -m pipelines.fuzz

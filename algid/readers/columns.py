@@ -68,6 +68,22 @@ def assign(path: str, available: Sequence[str], profile: Profile | None) -> Colu
     return Columns(sources, units, time_unit, _notices(sources))
 
 
+def check_written(path: str, available: Sequence[str], sums: Mapping[str, int]) -> None:
+    """Refuse a file that lacks a column which algid wrote into it.
+
+    Raises
+    ------
+    LogError
+        If the header was changed after writing.
+    """
+    missing = [name for name in sums if name not in available]
+    if missing:
+        raise LogError(
+            f"{path}: the columns {', '.join(missing)} that were written are not there: the file was changed "
+            "or damaged; write it again, or remove its truth if it was changed on purpose"
+        )
+
+
 def _named(path: str, available: Sequence[str], profile: Profile | None) -> dict[str, str]:
     if profile is None:
         return {}

@@ -71,9 +71,7 @@ def conversion(path: str, profile: Profile | None, told: Mapping[str, str]) -> C
     offsets = {name: profile.channel(name).offset for name in names}
     for joint in (0, 1):
         offsets[names[joint]] += profile.offsets[joint]
-    return Conversion(
-        factors, offsets, hanging=profile.zero == "hanging", absolute=profile.second_angle == "absolute"
-    )
+    return Conversion(factors, offsets, hanging=profile.zero == "hanging", absolute=profile.second_angle == "absolute")
 
 
 def _factor(path: str, name: str, profile: Profile | None, told: str | None) -> float:

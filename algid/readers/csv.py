@@ -13,7 +13,7 @@ from algid.errors import LogError
 from algid.log import Origin
 from algid.readers import frames
 from algid.readers.assemble import TableReader
-from algid.readers.columns import Columns, assign
+from algid.readers.columns import Columns, assign, check_written
 from algid.readers.dialect import Dialect, detect
 from algid.readers.inflate import head_of, pieces
 from algid.readers.table import Table
@@ -42,16 +42,18 @@ def open_csv(path: Path, profile: Profile | None = None, kind: str = "csv") -> T
     LogError
         If the text is no table, or columns are missing.
     """
-    head = _head(path, kind)
+    head = head_bytes(path, kind)
     dialect = detect(path, head)
-    columns = assign(str(path), dialect.columns, profile)
     companion = _companion(path)
+    check_written(str(path), dialect.columns, companion.sums if companion else {})
+    columns = assign(str(path), dialect.columns, profile)
     origin = Origin(str(path), "csv", dict(columns.sources), companion.truth if companion else None)
     source = _Text(path, kind, dialect, columns, companion.sums if companion else {})
     return columns.reader(origin, source.tables, profile, _rows(path, kind, head))
 
 
-def _head(path: Path, kind: str) -> bytes:
+def head_bytes(path: Path, kind: str) -> bytes:
+    """The first bytes of the text, unpacked, 64 KiB at most."""
     if kind != "csv":
         return head_of(path, kind)
     with path.open("rb") as stream:
@@ -112,9 +114,7 @@ class _Text:
             text = rest + piece
             end = text.rfind(b"\n") + 1
             if not end and len(text) > _LONGEST_LINE:
-                raise LogError(
-                    f"{self.path}: a line of more than 65,000 characters; expected rows of numbers"
-                )
+                raise LogError(f"{self.path}: a line of more than 65,000 characters; expected rows of numbers")
             rest = text[end:]
             if end:
                 yield self._plain(text[:end])
@@ -163,16 +163,13 @@ class _Text:
         if not self.dialect.padded:
             return cell
         text = cell.str.strip_chars()
-        return (text.str.replace(",", ".", literal=True) if self.dialect.decimal_comma else text).cast(
-            pl.Float64
-        )
+        return (text.str.replace(",", ".", literal=True) if self.dialect.decimal_comma else text).cast(pl.Float64)
 
     def _whole(self, frame: pl.DataFrame, done: int) -> pl.DataFrame:
         if frame[_EXCESS].any():
             row = done + (frame[_EXCESS].arg_max() or 0) + 1
             raise LogError(
-                f"{self.path}: row {row} has more cells than the header's {len(self.dialect.columns)}; "
-                "mend that row"
+                f"{self.path}: row {row} has more cells than the header's {len(self.dialect.columns)}; mend that row"
             )
         return frame.drop(_EXCESS)
 

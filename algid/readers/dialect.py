@@ -56,9 +56,7 @@ def detect(path: Path, head: bytes) -> Dialect:
     """
     lines = _lines(path, head)
     comment = next((sign for sign in COMMENTS if any(line.startswith(sign) for line in lines)), None)
-    data = [
-        (number, line) for number, line in enumerate(lines) if line.strip() and not _comment(line, comment)
-    ]
+    data = [(number, line) for number, line in enumerate(lines) if line.strip() and not _comment(line, comment)]
     if not data:
         raise LogError(f"{path}: no table in the text; expected a header and rows of numbers")
     number, header = data[0]
@@ -87,9 +85,7 @@ def _lines(path: Path, head: bytes) -> list[str]:
         raise LogError(f"{path}: the text is UTF-16; save it as UTF-8")
     text = head.decode("utf-8-sig", errors="replace")
     lines = re.split("\r\n|\n", text)
-    if max(map(len, lines[:-1] or lines)) >= _LONGEST_LINE - 4 or (
-        len(lines) == 1 and len(head) >= _LONGEST_LINE
-    ):
+    if max(map(len, lines[:-1] or lines)) >= _LONGEST_LINE - 4 or (len(lines) == 1 and len(head) >= _LONGEST_LINE):
         raise LogError(f"{path}: a line of more than 65,000 characters; expected a table of a few columns")
     if len(lines) == 1 and "\r" in text:
         raise LogError(f"{path}: lines end in carriage returns alone; save it with line feeds")
@@ -111,9 +107,7 @@ def _separator(path: Path, header: str, rows: list[str]) -> str:
     raise LogError(f"{path}: {header[:60]!r} has one column; expected columns split by , ; | tab or blanks")
 
 
-def _commented_header(
-    path: Path, before: list[str], comment: str | None, cells: list[str], separator: str
-) -> str:
+def _commented_header(path: Path, before: list[str], comment: str | None, cells: list[str], separator: str) -> str:
     for line in reversed(before):
         text = line.removeprefix(comment or "").strip()
         names = split(text, separator)
@@ -139,8 +133,7 @@ def _checked(
     cells = split(first, separator)
     if len(cells) != len(columns):
         raise LogError(
-            f"{path}: line {skip + 1} has {len(cells)} cells under a header of {len(columns)}; "
-            "mend the header"
+            f"{path}: line {skip + 1} has {len(cells)} cells under a header of {len(columns)}; mend the header"
         )
     repeated = sorted({name for name in columns if name and columns.count(name) > 1})
     if repeated:
@@ -148,11 +141,7 @@ def _checked(
     comma = separator != "," and any(
         "," in cell and _NUMBER.match(cell) for row in rows for cell in split(row, separator)
     )
-    padded = bool(separator) and any(
-        re.search(rf"[ \t]{re.escape(separator)}|[ ]$", row.rstrip("\r")) for row in rows
-    )
+    padded = bool(separator) and any(re.search(rf"[ \t]{re.escape(separator)}|[ ]$", row.rstrip("\r")) for row in rows)
     table = [cells for cells in (split(row, separator) for row in rows) if len(cells) == len(columns)]
-    whole = frozenset(
-        column for column, *cells in zip(columns, *table, strict=True) if all(map(_WHOLE.match, cells))
-    )
+    whole = frozenset(column for column, *cells in zip(columns, *table, strict=True) if all(map(_WHOLE.match, cells)))
     return Dialect(columns, separator, comma, skip, comment, whole, padded)

@@ -19,9 +19,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 
-def tables(
-    path: str, frames: Iterator[pl.DataFrame], columns: Columns, sums: Mapping[str, int]
-) -> Iterator[Table]:
+def tables(path: str, frames: Iterator[pl.DataFrame], columns: Columns, sums: Mapping[str, int]) -> Iterator[Table]:
     """Tables out of frames that hold one column a channel, and "t".
 
     Raises

@@ -26,9 +26,7 @@ class _Growing:
     def append(self, values: NDArray[Any]) -> None:
         end = self._used + values.shape[-1]
         if end > self._array.shape[-1]:
-            grown = np.empty(
-                (*self._array.shape[:-1], max(end, 2 * self._array.shape[-1])), self._array.dtype
-            )
+            grown = np.empty((*self._array.shape[:-1], max(end, 2 * self._array.shape[-1])), self._array.dtype)
             grown[..., : self._used] = self._array[..., : self._used]
             self._array = grown
         self._array[..., self._used : end] = values

@@ -27,18 +27,14 @@ def pieces(path: Path, name: str, size: int = _PIECE) -> Iterator[bytes]:
     try:
         with path.open("rb") as raw:
             stream: io.BufferedIOBase | zstandard.ZstdDecompressionReader = (
-                zstandard.ZstdDecompressor(max_window_size=1 << 27).stream_reader(
-                    raw, read_across_frames=True
-                )
+                zstandard.ZstdDecompressor(max_window_size=1 << 27).stream_reader(raw, read_across_frames=True)
                 if name == "csv.zst"
                 else gzip.GzipFile(fileobj=raw)
             )
             while piece := stream.read(size):
                 yield piece
     except (OSError, EOFError, zlib.error, zstandard.ZstdError) as error:
-        raise LogError(
-            f"{path}: the compressed data are damaged or cut off ({error}); copy it again"
-        ) from error
+        raise LogError(f"{path}: the compressed data are damaged or cut off ({error}); copy it again") from error
 
 
 def head_of(path: Path, name: str) -> bytes:

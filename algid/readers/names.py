@@ -113,9 +113,7 @@ def take_apart(column: str) -> Name:
         return Name(found[1], found[2], unit)
     for pattern, stem, joint in ((_JOINT_FIRST, 2, 1), (_JOINT_LAST, 1, 2)):
         if found := pattern.match(text):
-            return Name(
-                found[stem].replace(" ", "_").replace(".", "_"), found[joint].lstrip("0") or "0", unit
-            )
+            return Name(found[stem].replace(" ", "_").replace(".", "_"), found[joint].lstrip("0") or "0", unit)
     return Name(text, None, unit)
 
 
@@ -143,13 +141,12 @@ def choose(columns: Iterable[str], joints: tuple[str, str] | None = None) -> Cho
     time = _time(parts)
     if time:
         chosen["t"] = time
+    chosen = _of_one_pair(chosen, parts)
     units = {channel: unit for channel, column in chosen.items() if (unit := parts[column].unit)}
     return Choice(chosen, units)
 
 
-def _pair(
-    parts: dict[str, Name], stems: tuple[str, ...], joints: tuple[str, str] | None
-) -> tuple[str, str] | None:
+def _pair(parts: dict[str, Name], stems: tuple[str, ...], joints: tuple[str, str] | None) -> tuple[str, str] | None:
     for stem in stems:
         by_joint = {name.joint: column for column, name in parts.items() if name.stem == stem and name.joint}
         if joints and (wanted := _wanted(by_joint, joints)):
@@ -158,10 +155,20 @@ def _pair(
             first, second = sorted(by_joint, key=_joint_order) if _numbered(by_joint) else list(by_joint)
             return by_joint[first], by_joint[second]
         if len(by_joint) > 2 and not joints:
-            raise LookupError(
-                f"{stem!r} stands there for {len(by_joint)} joints: {', '.join(list(by_joint)[:8])}"
-            )
+            raise LookupError(f"{stem!r} stands there for {len(by_joint)} joints: {', '.join(list(by_joint)[:8])}")
     return None
+
+
+def _of_one_pair(chosen: dict[str, str], parts: dict[str, Name]) -> dict[str, str]:
+    """Only quantities of the joints that the angles have: torques of other joints are not theirs."""
+    pair = [parts[chosen[f"theta{joint}"]].joint for joint in (1, 2)] if "theta1" in chosen else None
+    kept = {}
+    for channel, column in chosen.items():
+        own = channel == "t" or pair is None or parts[column].joint == pair[int(channel[-1]) - 1]
+        # drivers mix counting from nought and from one between quantities: the order is what counts then
+        if own or {parts[column].joint, pair[int(channel[-1]) - 1] if pair else None} <= {"0", "1", "2"}:
+            kept[channel] = column
+    return kept
 
 
 def _wanted(by_joint: dict[str, str], joints: tuple[str, str]) -> tuple[str, str] | None:

@@ -87,13 +87,9 @@ class Sorter:
     def _report(self) -> list[Notice]:
         found = []
         if self.late:
-            found.append(
-                Notice("UNSORTED_STAMPS", f"{self.late} samples came late and were put in their place")
-            )
+            found.append(Notice("UNSORTED_STAMPS", f"{self.late} samples came late and were put in their place"))
         if self.repeated:
             found.append(
-                Notice(
-                    "DUPLICATE_STAMPS", f"{self.repeated} samples repeat a stamp; the first of each was kept"
-                )
+                Notice("DUPLICATE_STAMPS", f"{self.repeated} samples repeat a stamp; the first of each was kept")
             )
         return found

@@ -11,7 +11,7 @@ from algid.errors import LogError
 from algid.log import Origin
 from algid.readers import frames
 from algid.readers.assemble import TableReader
-from algid.readers.columns import Columns, assign
+from algid.readers.columns import Columns, assign, check_written
 from algid.readers.table import Table
 from algid.truth import KEY, Companion, loads
 
@@ -34,20 +34,37 @@ def open_parquet(path: Path, profile: Profile | None = None) -> TableReader:
     """
     import polars as pl
 
-    _check_footer(path)
+    schema = schema_of(path)
     try:
-        schema = dict(pl.read_parquet_schema(path))
         metadata = pl.read_parquet_metadata(path)
         available = _flat_names(path, schema)
-        rows = pl.scan_parquet(path, glob=False).select(pl.len()).collect().item()
+        rows = _counted_rows(path)
     except (pl.exceptions.PolarsError, OSError, pl.exceptions.PanicException) as error:
         raise _damaged(path, error) from error
     companion = _companion(path, metadata)
+    check_written(str(path), list(available), companion.sums if companion else {})
     columns = assign(str(path), list(available), profile)
     _check_types(path, columns, available, schema)
     origin = Origin(str(path), "parquet", dict(columns.sources), companion.truth if companion else None)
     source = _Groups(path, columns, available, schema, companion.sums if companion else {})
     return columns.reader(origin, source.tables, profile, rows)
+
+
+def schema_of(path: Path) -> dict[str, pl.DataType]:
+    """Columns and their types.
+
+    Raises
+    ------
+    LogError
+        If the file is damaged.
+    """
+    import polars as pl
+
+    _check_footer(path)
+    try:
+        return dict(pl.read_parquet_schema(path))
+    except (pl.exceptions.PolarsError, OSError, pl.exceptions.PanicException) as error:
+        raise _damaged(path, error) from error
 
 
 def _check_footer(path: Path) -> None:
@@ -57,13 +74,45 @@ def _check_footer(path: Path) -> None:
         tail = stream.read(8)
     length = int.from_bytes(tail[:4], "little")
     if tail[4:] != b"PAR1":
-        raise LogError(
-            f"{path}: the Parquet file is cut off: its footer is missing, so nothing can be read of it"
-        )
+        raise LogError(f"{path}: the Parquet file is cut off: its footer is missing, so nothing can be read of it")
     if length + 12 > size or length > _LARGEST_FOOTER:
+        raise LogError(f"{path}: the Parquet footer claims {length} bytes of a file of {size}; copy the file again")
+
+
+def _counted_rows(path: Path) -> int:
+    """Rows of the file, once its footer, its row groups and their columns agree on them.
+
+    Raises
+    ------
+    LogError
+        If they do not: polars would believe one of them without a word.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        metadata = pq.read_metadata(path)
+        groups = [metadata.row_group(place) for place in range(metadata.num_row_groups)]
+        told = [group.num_rows for group in groups]
+        fewest = [
+            min((group.column(place).num_values for place in range(group.num_columns)), default=0)
+            for group in groups
+        ]
+    except (pa.ArrowException, OSError, ValueError) as error:
+        raise _damaged(path, error) from error
+    if sum(told) != metadata.num_rows or any(
+        rows > values for rows, values in zip(told, fewest, strict=True)
+    ):
         raise LogError(
-            f"{path}: the Parquet footer claims {length} bytes of a file of {size}; copy the file again"
+            f"{path}: the Parquet footer contradicts itself about how many rows there are; copy it again"
         )
+    if fewest != told and not any(
+        "." in str(metadata.schema.column(place).path) for place in range(metadata.num_columns)
+    ):
+        raise LogError(
+            f"{path}: the Parquet footer contradicts itself about how many values there are; copy it again"
+        )
+    return int(metadata.num_rows)
 
 
 def _flat_names(path: Path, schema: Mapping[str, pl.DataType]) -> dict[str, tuple[str, int | None]]:
@@ -139,9 +188,7 @@ class _Groups:
         cell = pl.col(column)
         kind = self.schema[column]
         if place is not None:
-            cell = (
-                cell.list.get(place, null_on_oob=True) if isinstance(kind, pl.List) else cell.arr.get(place)
-            )
+            cell = cell.list.get(place, null_on_oob=True) if isinstance(kind, pl.List) else cell.arr.get(place)
         if name != "t":
             return cell.cast(pl.Float64).alias(name)
         if isinstance(kind, pl.Datetime):
@@ -161,6 +208,4 @@ class _Groups:
 
 def _damaged(path: Path, error: BaseException) -> LogError:
     told = str(error).split("\n", maxsplit=1)[0][:200]
-    return LogError(
-        f"{path}: the Parquet file is damaged or not one that can be read ({told}); copy it again"
-    )
+    return LogError(f"{path}: the Parquet file is damaged or not one that can be read ({told}); copy it again")

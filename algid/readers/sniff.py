@@ -32,18 +32,14 @@ def sniff(path: Path) -> str:
         with path.open("rb") as stream:
             head = stream.read(_HEAD)
     except (OSError, ValueError) as error:
-        raise LogError(
-            f"{str(path)!r}: the log cannot be read ({error}); check the name and rights"
-        ) from error
+        raise LogError(f"{str(path)!r}: the log cannot be read ({error}); check the name and rights") from error
     return _by_content(path, head)
 
 
 def _folder(path: Path) -> str:
     if (path / "metadata.yaml").is_file() or any(path.glob("*.mcap")) or any(path.glob("*.db3")):
         return "rosbag2"
-    raise LogError(
-        f"{path}: a folder without metadata.yaml or *.mcap; expected a log file or a rosbag2 folder"
-    )
+    raise LogError(f"{path}: a folder without metadata.yaml or *.mcap; expected a log file or a rosbag2 folder")
 
 
 def _by_content(path: Path, head: bytes) -> str:
@@ -56,9 +52,7 @@ def _by_content(path: Path, head: bytes) -> str:
         raise LogError(f"{path}: the file is empty; expected a log in MCAP, Parquet or CSV")
     if looks_like_text(head):
         return "csv"
-    raise LogError(
-        f"{path}: unknown format, it begins with {head[:8]!r}; expected a log in MCAP, Parquet or CSV"
-    )
+    raise LogError(f"{path}: unknown format, it begins with {head[:8]!r}; expected a log in MCAP, Parquet or CSV")
 
 
 def _compressed(path: Path, name: str) -> str:

@@ -10,9 +10,7 @@ from algid.log import Log, Truth
 FORMATS = ("mcap", "parquet", "csv")
 
 
-def write_log(
-    path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None, kind: str | None = None
-) -> None:
+def write_log(path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None, kind: str | None = None) -> None:
     """Write a log, or the blocks of one, in the format of `path`'s suffix or as `kind`.
 
     Raises

@@ -50,8 +50,12 @@ _QOS = """\
 """
 
 
-def write(path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None) -> None:
+def write(
+    path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None, chunk_size: int = _CHUNK
+) -> None:
     """Write a log, or the blocks of one; the truth goes into the metadata record "algid".
+
+    A chunk closes at `chunk_size` bytes.
 
     Raises
     ------
@@ -63,7 +67,7 @@ def write(path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None) -
     from mcap.writer import Writer
 
     with whole_file(path) as temporary, temporary.open("wb") as stream:
-        writer = Writer(stream, chunk_size=_CHUNK)
+        writer = Writer(stream, chunk_size=chunk_size)
         writer.start(profile="ros2", library="algid")
         schema = writer.register_schema(name=TYPE, encoding="ros2msg", data=DEFINITION.encode())
         channel = writer.register_channel(
@@ -74,7 +78,7 @@ def write(path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None) -
         )
         sequence = 0
         for block in as_blocks(log):
-            for stamp, payload in zip(block.stamp_ns.tolist(), _payloads(block), strict=True):
+            for stamp, payload in zip(block.stamp_ns.tolist(), payloads(block), strict=True):
                 writer.add_message(channel, stamp, payload, stamp, sequence)
                 sequence += 1
         if truth is not None:
@@ -82,7 +86,14 @@ def write(path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None) -
         writer.finish()  # type: ignore[no-untyped-call]
 
 
-def _payloads(block: Log) -> Iterator[bytes]:
+def payloads(block: Log) -> Iterator[bytes]:
+    """The samples of a block as JointState messages in CDR, one at a time.
+
+    Raises
+    ------
+    ValueError
+        If a stamp is negative or beyond 2^31 s.
+    """
     if block.stamp_ns.size and (block.stamp_ns[0] < 0 or block.stamp_ns[-1] >= 2**31 * 10**9):
         raise ValueError(f"stamps must lie within 0 and 2^31 s, got {block.stamp_ns[0]} ns")
     rows = np.zeros(len(block), _layout(block.omega is not None))

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from algid.arm import Arm
+from algid.arm import Arm, FloatArray
 from algid.log import Log, Origin, Truth
 
 TRUTH = Truth(Arm(6, 3, 0.15, 0.1, 0.3, 0.2, 0.1, 0.02, 1.5, 0.3), 0.5, "case1")
@@ -31,5 +30,5 @@ def same(one: Log, other: Log) -> bool:
     )
 
 
-def _bits(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+def _bits(one: FloatArray, other: FloatArray) -> bool:
     return one.shape == other.shape and one.tobytes() == other.tobytes()

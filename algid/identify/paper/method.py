@@ -7,15 +7,14 @@ the median of the windows' medians. An estimate that wanders by more than its ow
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.identify.paper.stages import EPSILON, STAGE2_NAMES, stage1, stage2
-from algid.observers import PAPER_POLES, LuenbergerObserver
 from algid.sampling import Segment, pieces
 
 SETTLED = 0.2  # s at the end of each window
@@ -28,15 +27,6 @@ STAGE2_SERIES = (*STAGE2_NAMES, "l1", "m_p", "condition")
 Stage = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
 
 
-@dataclass(frozen=True)
-class PaperSettings:
-    """`velocity` from the observer with `poles` (rad/s), or as measured; windows of `window` s."""
-
-    velocity: Literal["observer", "measured"] = "observer"
-    poles: tuple[complex, ...] = PAPER_POLES
-    window: float = 2.0
-
-
 @dataclass(frozen=True, eq=False)
 class Series:
     """Estimates (s, n) of one window, its times `t` (n,) in s, and how many samples at its end are settled."""
@@ -46,68 +36,40 @@ class Series:
     settled: int
 
 
-def stage1_series(source: Iterable[Segment], settings: PaperSettings) -> Iterator[Series]:
-    """`STAGE1_SERIES` of a log of the arm without payload, window by window."""
+def stage1_series(source: Iterable[Segment], window: float) -> Iterator[Series]:
+    """`STAGE1_SERIES` of a log of the arm without payload, by windows of `window` s; segments need velocities."""
 
     def stage(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> FloatArray:
         found = stage1(theta, omega, tau, dt)
         total = found.k[4] + found.k[2]
         return np.concatenate([found.k, [total, found.condition, found.k7_condition]])
 
-    return _windows(source, settings, stage)
+    return _windows(source, window, stage)
 
 
-def stage2_series(
-    source: Iterable[Segment], settings: PaperSettings, k: FloatArray, gravity: float
-) -> Iterator[Series]:
+def stage2_series(source: Iterable[Segment], window: float, k: FloatArray, gravity: float) -> Iterator[Series]:
     """`STAGE2_SERIES` of a log of the arm with payload, given its constants k1 … k7 (7,) without."""
 
     def stage(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> FloatArray:
         found = stage2(theta, omega, tau, dt, k, gravity)
         return np.concatenate([found.x, [found.l1, found.m_p, found.condition]])
 
-    return _windows(source, settings, stage)
+    return _windows(source, window, stage)
 
 
-def with_velocities(source: Iterable[Segment], settings: PaperSettings) -> Iterator[Segment]:
-    """The segments with the velocities that the settings ask for.
-
-    Raises
-    ------
-    ValueError
-        If measured velocities are asked for and a segment has none.
-    """
-    observer: LuenbergerObserver | None = None
-    for segment in source:
-        if settings.velocity == "measured":
-            if segment.omega is None:
-                raise ValueError("measured velocities were asked for, but the log has none")
-            yield segment
-            continue
-        observer = observer or LuenbergerObserver(segment.dt, settings.poles)
-        if not segment.continues:
-            observer.reset()
-        yield replace(segment, omega=observer.velocities(segment.theta))
-
-
-def _windows(source: Iterable[Segment], settings: PaperSettings, stage: Stage) -> Iterator[Series]:
-    moving = with_velocities(source, settings)
+def _windows(source: Iterable[Segment], window: float, stage: Stage) -> Iterator[Series]:
+    moving = iter(source)
     first = next(moving, None)
     if first is None:
         return
-    rows = max(round(settings.window / first.dt), 8)
-    for batch in _batches(pieces(_chain(first, moving), rows)):
+    rows = max(round(window / first.dt), 8)
+    for batch in _batches(pieces(chain([first], moving), rows)):
         dt = batch[0].dt
         theta, tau = (np.stack([getattr(window, name) for window in batch], axis=1) for name in ("theta", "tau"))
         omega = np.stack([window.omega for window in batch if window.omega is not None], axis=1)
         values = stage(theta, omega, tau, dt)
-        for index, window in enumerate(batch):
-            yield Series(t=window.t, values=values[:, index], settled=round(SETTLED / dt))
-
-
-def _chain(first: Segment, rest: Iterator[Segment]) -> Iterator[Segment]:
-    yield first
-    yield from rest
+        for index, piece in enumerate(batch):
+            yield Series(t=piece.t, values=values[:, index], settled=round(SETTLED / dt))
 
 
 def _batches(windows: Iterable[Segment]) -> Iterator[list[Segment]]:

@@ -9,11 +9,15 @@ from typing import TYPE_CHECKING
 
 from algid.errors import LogError
 from algid.log import Origin, Truth
+from algid.readers.align import Series, aligned
 from algid.readers.assemble import TableReader
+from algid.readers.base import BLOCK_ROWS
 from algid.readers.convert import conversion
 from algid.readers.mcap.catalogue import Catalogue, catalogue, truth_text
 from algid.readers.mcap.framing import DamagedError, File
-from algid.readers.table import Table
+from algid.readers.mcap.topic import Topic
+from algid.readers.order import Sorter
+from algid.readers.table import Table, stack
 from algid.truth import loads
 
 if TYPE_CHECKING:
@@ -38,13 +42,27 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
     origin = Origin(name, "mcap", wanted.mapping, truth)
 
     def tables(rows: int) -> Iterator[Table]:
-        topic = wanted.topics[0]
-        for path in paths:
-            with opened(path) as (file, found):
-                yield from topic.tables(str(path), file, found, rows)
+        main, *others = wanted.topics
+        if not others:
+            return _read(paths, main, rows)
+        return aligned(_read(paths, main, rows), [_series(name, paths, other) for other in others])
 
     unwrap = (profile.theta1.unwrap, profile.theta2.unwrap) if profile else (False, False)
     return TableReader(origin, tables, conversion(name, profile, {}), unwrap, (), rows)
+
+
+def _read(paths: Sequence[Path], topic: Topic, rows: int) -> Iterator[Table]:
+    for path in paths:
+        with opened(path) as (file, found):
+            yield from topic.tables(str(path), file, found, rows)
+
+
+def _series(name: str, paths: Sequence[Path], topic: Topic) -> Series:
+    """A topic as a whole, in time order."""
+    tables = [table for table in Sorter(name).run(_read(paths, topic, BLOCK_ROWS)) if len(table)]
+    if not tables:
+        raise LogError(f"{name}: topic {topic.name!r} holds no sample; name another source in the profile")
+    return Series(topic.name, stack(tables))
 
 
 @contextmanager

@@ -101,12 +101,13 @@ def _from_summary(file: File) -> Catalogue | None:
     if statistics is None or not chunks or not found.channels:
         return None
     found.counts = dict(statistics.channel_message_counts)
-    found.spans = [
-        _chunk_span(file, chunk) for chunk in sorted(chunks, key=lambda one: one.chunk_start_offset)
-    ]
+    found.spans = [_chunk_span(file, chunk) for chunk in sorted(chunks, key=lambda one: one.chunk_start_offset)]
     _check_counts(file, chunks, statistics)
     for place in metadata:
         _keep_metadata(file, framing.Record(framing.METADATA, place.offset + 9, place.length - 9), found)
+        if place.name not in found.metadata:
+            text = f"the metadata record {place.name!r} is damaged and was left out"
+            found.notices.append(Notice("DAMAGED_RECORD", text))
     return found
 
 
@@ -227,10 +228,10 @@ def _keep_metadata(file: File, record: framing.Record, found: Catalogue) -> None
 
 
 def truth_text(found: Catalogue) -> str | None:
-    """The JSON text of the metadata record "algid", or None."""
+    """The JSON text of the metadata record "algid", None without one, empty where the record is damaged."""
     from algid.truth import KEY
 
-    return found.metadata.get(KEY, {}).get(KEY)
+    return found.metadata[KEY].get(KEY, "") if KEY in found.metadata else None
 
 
 def channels_of(found: Catalogue, topic: str, type_name: str) -> frozenset[int]:

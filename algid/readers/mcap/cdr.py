@@ -55,9 +55,7 @@ class _Walk:
         width = int(code[1])
         if count:
             self.align(width)
-        self.shape.numbers[path] = Numbers(
-            self.place, f"{self.order}{code}" if width > 1 else f"|{code}", count
-        )
+        self.shape.numbers[path] = Numbers(self.place, f"{self.order}{code}" if width > 1 else f"|{code}", count)
         self.advance(count * width)
 
     def length(self) -> int:
@@ -83,9 +81,7 @@ class _Walk:
     def advance(self, size: int) -> None:
         self.place += size
         if self.place > len(self.payload):
-            raise MisfitError(
-                f"a message of {len(self.payload)} bytes where its schema needs {self.place} at least"
-            )
+            raise MisfitError(f"a message of {len(self.payload)} bytes where its schema needs {self.place} at least")
 
     def possible(self, count: int, least: int) -> int:
         if count * least > len(self.payload) - self.place:

@@ -57,11 +57,7 @@ def in_order(names: list[str]) -> tuple[str, str]:
     """Two joints in their order along the arm: by the number at their names' ends, else as they stand."""
     first, second = names
     digits = [name[len(name.rstrip("0123456789")) :] for name in names]
-    if (
-        all(digits)
-        and first.rstrip("0123456789") == second.rstrip("0123456789")
-        and int(digits[0]) > int(digits[1])
-    ):
+    if all(digits) and first.rstrip("0123456789") == second.rstrip("0123456789") and int(digits[0]) > int(digits[1]):
         return second, first
     return first, second
 

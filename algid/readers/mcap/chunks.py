@@ -51,9 +51,7 @@ def _unpacked(name: bytes, packed: memoryview, size: int) -> bytes:
         return _zstd(packed, size)
     if name == b"lz4":
         return _lz4(packed, size)
-    raise DamagedError(
-        f"a chunk is packed with {name.decode(errors='replace')!r}; expected zstd, lz4 or nothing"
-    )
+    raise DamagedError(f"a chunk is packed with {name.decode(errors='replace')!r}; expected zstd, lz4 or nothing")
 
 
 def _zstd(packed: memoryview, size: int) -> bytes:

@@ -76,8 +76,7 @@ class JsonDecoder:
             found = _object(messages.content[start : start + size].tobytes())
             values = [_value(found, path) for path in self.wanted.values()]
             held[row] = all(
-                value is not None or name not in self.needed
-                for name, value in zip(self.wanted, values, strict=True)
+                value is not None or name not in self.needed for name, value in zip(self.wanted, values, strict=True)
             )
             if held[row]:
                 rows.append(values)

@@ -79,9 +79,7 @@ def find(content: bytes, index: bytes, wanted: Collection[int]) -> Messages:
 def gather(octets: NDArray[np.uint8], places: IntArray, kind: str) -> NDArray[np.generic]:
     """The numbers of type `kind` at byte `places` (N,), aligned or not."""
     width = np.dtype(kind).itemsize
-    window: NDArray[np.generic] = np.ndarray(
-        max(0, octets.size - width + 1), np.dtype(kind), octets.data, strides=(1,)
-    )
+    window: NDArray[np.generic] = np.ndarray(max(0, octets.size - width + 1), np.dtype(kind), octets.data, strides=(1,))
     return window[places]
 
 
@@ -91,7 +89,7 @@ def _indexed(octets: NDArray[np.uint8], content: bytes, index: bytes) -> IntArra
     if not listed:
         return None
     records = np.concatenate([offsets for _, offsets in listed])
-    if len(listed) > 1:
+    if len(listed) > 1 or np.any(records[1:] <= records[:-1]):
         records.sort(kind="stable")
     if records.size == 0 or records[0] < 0 or records[-1] > octets.size - HEAD:
         return None

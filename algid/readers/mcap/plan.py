@@ -56,9 +56,7 @@ def plan(file: File, found: Catalogue, profile: Profile | None) -> Plan:
     for channel, (topic, path) in named.items():
         home = topic or (usual[0] if usual else None) or (profile.topic if profile else None)
         if home is None:
-            raise LogError(
-                f"{file.path}: the profile takes {channel} from {path!r} without a topic; name one"
-            )
+            raise LogError(f"{file.path}: the profile takes {channel} from {path!r} without a topic; name one")
         sources[channel] = (home, path)
     if (profile and not profile.velocity) or not all(name in sources for name in VELOCITIES):
         sources = {name: source for name, source in sources.items() if name not in VELOCITIES}
@@ -114,25 +112,15 @@ def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> tuple
     if len(fitting) == 1:
         return next(iter(fitting.items()))
     if fitting:
-        raise LogError(
-            f"{file.path}: joint states on {', '.join(fitting)}; choose with topic = … in a profile"
-        )
+        raise LogError(f"{file.path}: joint states on {', '.join(fitting)}; choose with topic = … in a profile")
     if many:
         name, joints = next(iter(many.items()))
         told = ", ".join(joints[:12])
-        raise LogError(
-            f"{file.path}: {name!r} has {len(joints)} joints ({told}); choose two with joints = […]"
-        )
+        raise LogError(f"{file.path}: {name!r} has {len(joints)} joints ({told}); choose two with joints = […]")
     if profile is not None and all(profile.channel(name).source for name in JOINT_CHANNELS):
         return None
-    wanted = (
-        f"the joints {profile.joints}"
-        if profile and profile.joints
-        else "positions and efforts of two joints"
-    )
-    raise LogError(
-        f"{file.path}: no topic holds {wanted}; found {listed(found)}; name topics and fields in a profile"
-    )
+    wanted = f"the joints {profile.joints}" if profile and profile.joints else "positions and efforts of two joints"
+    raise LogError(f"{file.path}: no topic holds {wanted}; found {listed(found)}; name topics and fields in a profile")
 
 
 def _joints(names: list[str], profile: Profile | None) -> tuple[str, str] | None:
@@ -145,9 +133,7 @@ def _candidates(found: Catalogue) -> list[str]:
     names = []
     for channel in found.channels.values():
         schema = found.schemas.get(channel.schema_id)
-        known = schema is not None and (
-            schema.name in JOINT_STATE + DYNAMIC_JOINT_STATE or b"effort" in schema.data
-        )
+        known = schema is not None and (schema.name in JOINT_STATE + DYNAMIC_JOINT_STATE or b"effort" in schema.data)
         if known or channel.message_encoding == "json":
             names.append(channel.topic)
     return list(dict.fromkeys(names))

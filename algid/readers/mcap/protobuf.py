@@ -71,9 +71,7 @@ def _field(data: bytes) -> tuple[int, Field]:
             values[number] = value
         elif wire == 2:
             texts[number] = _name(data[start:end]) if number in (1, 6) else ""
-    field = Field(
-        texts.get(1, ""), values.get(5, 0), texts.get(6, "").lstrip("."), values.get(4) == _REPEATED
-    )
+    field = Field(texts.get(1, ""), values.get(5, 0), texts.get(6, "").lstrip("."), values.get(4) == _REPEATED)
     return values.get(3, 0), field
 
 
@@ -134,9 +132,7 @@ def walk(payload: bytes, root: str, types: Types) -> Shape:
     return shape
 
 
-def _walk(
-    data: bytes, start: int, end: int, types: Types, kind: str, prefix: str, shape: Shape, depth: int
-) -> None:
+def _walk(data: bytes, start: int, end: int, types: Types, kind: str, prefix: str, shape: Shape, depth: int) -> None:
     if depth > _DEEPEST:
         raise MisfitError("messages nested too deep")
     seen: dict[str, int] = {}

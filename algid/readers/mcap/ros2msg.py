@@ -48,9 +48,7 @@ def parse(root: str, text: str) -> Types:
         if found is None:
             raise DefinitionError(f"{root}: expected 'MSG: package/Type', found {head[:60]!r}")
         types[found[1]] = _fields(found[1], body)
-    resolved = {
-        name: tuple(_resolved(field, name, types) for field in fields) for name, fields in types.items()
-    }
+    resolved = {name: tuple(_resolved(field, name, types) for field in fields) for name, fields in types.items()}
     _check_depth(root, resolved, 0)
     return resolved
 

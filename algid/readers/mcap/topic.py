@@ -75,9 +75,7 @@ class Topic:
 
     def count(self, found: Catalogue) -> int:
         """Messages that the file's statistics promise, 0 without them."""
-        return sum(
-            (found.counts or {}).get(channel, 0) for channel in channels_of(found, self.name, self.type)
-        )
+        return sum((found.counts or {}).get(channel, 0) for channel in channels_of(found, self.name, self.type))
 
     def _decoder(self, path: str, found: Catalogue, channels: frozenset[int]) -> Decodes:
         channel: Any = found.channels[min(channels)]
@@ -90,9 +88,7 @@ class Topic:
         try:
             held, columns = decoder.columns(messages)
         except MisfitError as error:
-            raise LogError(
-                f"{path}: topic {self.name!r}: {error}; it cannot be read without guessing"
-            ) from error
+            raise LogError(f"{path}: topic {self.name!r}: {error}; it cannot be read without guessing") from error
         log_ns = messages.log_ns if held.all() else messages.log_ns[held]
         if not columns:
             columns = {name: np.empty(0) for name in decoder.wanted}

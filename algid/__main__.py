@@ -1,0 +1,5 @@
+"""`python -m algid`."""
+
+from algid.cli import main
+
+main()

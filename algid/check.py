@@ -1,0 +1,94 @@
+"""Whether a result's errors stay within their limits: the paper's, one for all, or a file's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from algid.errors import ResultError, SettingError
+from algid.results import Result, Table4Row
+from algid.tomlfile import read_toml
+
+
+@dataclass(frozen=True)
+class Row:
+    """One parameter's error in percent beside its limit; None where there was no estimate."""
+
+    parameter: str
+    error: float | None
+    limit: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether there is an estimate and its error is within the limit."""
+        return self.error is not None and self.error <= self.limit
+
+    @property
+    def text(self) -> str:
+        """One line for the terminal."""
+        found = "no estimate" if self.error is None else f"{self.error:.4g} %"
+        return f"{'ok  ' if self.passed else 'OVER'}  {self.parameter:12}  {found:>12}  limit {self.limit:.4g} %"
+
+
+class _Tolerances(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+    max_error_percent: dict[str, Annotated[float, Field(ge=0)]] = Field(min_length=1)
+
+
+def judge(
+    result: Result, against: Literal["paper", "truth"], max_error: float | None, tolerance_file: Path | None
+) -> list[Row]:
+    """Rows of Table 4 beside their limits.
+
+    Raises
+    ------
+    SettingError
+        If the limit is missing, doubled, or names a parameter that is no row of Table 4.
+    ResultError
+        If the result holds no truth to compare with, or no case of the paper.
+    """
+    if not any(row.truth is not None for row in result.table4):
+        raise ResultError(f"{result.log.path}: the log holds no true parameters; only synthetic logs can be checked")
+    limits = _limits(result, against, max_error, tolerance_file)
+    return [
+        Row(row.parameter, row.error_percent, limits[row.parameter]) for row in result.table4 if row.parameter in limits
+    ]
+
+
+def failed(rows: Sequence[Row]) -> bool:
+    """Whether any row is over its limit."""
+    return not all(row.passed for row in rows)
+
+
+def _limits(result: Result, against: str, max_error: float | None, tolerance_file: Path | None) -> dict[str, float]:
+    known = [row for row in result.table4 if row.truth is not None]
+    if tolerance_file is not None:
+        if max_error is not None:
+            raise SettingError("--max-error and --tolerance-file: give one of them")
+        return _of_file(tolerance_file, known)
+    if against == "paper":
+        return _of_paper(result, known)
+    if max_error is None:
+        raise SettingError("--against truth: give the largest error with --max-error or --tolerance-file")
+    return {row.parameter: max_error for row in known}
+
+
+def _of_file(path: Path, known: Sequence[Table4Row]) -> dict[str, float]:
+    limits = read_toml(path, _Tolerances).max_error_percent
+    names = [row.parameter for row in known]
+    stranger = next((name for name in limits if name not in names), None)
+    if stranger is not None:
+        raise SettingError(f"{path}: max_error_percent.{stranger}: expected one of {', '.join(names)}")
+    return limits
+
+
+def _of_paper(result: Result, known: Sequence[Table4Row]) -> dict[str, float]:
+    limits = {row.parameter: row.paper_error_percent for row in known if row.paper_error_percent is not None}
+    if not limits:
+        raise ResultError(f"{result.log.path}: not a case of the paper; check --against truth")
+    return limits

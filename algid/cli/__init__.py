@@ -1,0 +1,32 @@
+"""The command line: one file a command; errors become one line and an exit code in one place."""
+
+from __future__ import annotations
+
+import sys
+
+EXIT_FAILED = 1
+EXIT_USAGE = 2
+EXIT_INCOMPLETE = 3
+
+
+def main() -> None:
+    """Run algid; the entry point of the console script."""
+    from algid.cli.app import app
+    from algid.errors import AlgidError
+
+    try:
+        app()
+    except AlgidError as error:
+        print(f"algid: {_one_line(error)}", file=sys.stderr)
+        sys.exit(EXIT_USAGE)
+    except BrokenPipeError:  # the reader of our output has seen enough
+        sys.stderr.close()
+        sys.exit(EXIT_FAILED)
+    except KeyboardInterrupt:
+        print("algid: stopped; nothing half-written is left", file=sys.stderr)
+        sys.exit(130)
+
+
+def _one_line(error: Exception) -> str:
+    """The message on one line, with control characters from foreign names made visible."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in str(error))

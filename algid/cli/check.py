@@ -1,0 +1,42 @@
+"""`algid check`: fail when a reported error has grown."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from algid.cli import EXIT_FAILED
+
+
+class Against(StrEnum):
+    """What the errors are compared with."""
+
+    PAPER = "paper"
+    TRUTH = "truth"
+
+
+def check(
+    result: Annotated[Path, typer.Argument(help="A result folder or its result.json.")],
+    against: Annotated[
+        Against, typer.Option(help="paper: each error at most Table 4's; truth: each at most --max-error.")
+    ] = Against.TRUTH,
+    max_error: Annotated[float | None, typer.Option(help="Largest error allowed, percent.", min=0)] = None,
+    tolerance_file: Annotated[
+        Path | None, typer.Option(help="TOML with a table [max_error_percent]: parameter = percent.")
+    ] = None,
+) -> None:
+    """Compare a result's errors with their limits, row by row; exit code 1 when one is over.
+
+    Example: algid check case1-unloaded.algid --against truth --max-error 0.5
+    """
+    from algid.check import failed, judge
+    from algid.results import read_result
+
+    rows = judge(read_result(result), against.value, max_error, tolerance_file)
+    for row in rows:
+        print(row.text)
+    if failed(rows):
+        raise typer.Exit(EXIT_FAILED)

@@ -1,0 +1,65 @@
+"""`algid convert`: a log in another format, under algid's own names and units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from algid.cli import profiles
+
+if TYPE_CHECKING:
+    from algid.log import Log, Notice
+
+
+def convert(
+    source: Annotated[Path, typer.Argument(metavar="IN", help="The log to read.")],
+    target: Annotated[Path, typer.Argument(metavar="OUT", help="The log to write: .mcap, .parquet or .csv.")],
+    profile: profiles.ProfileFile = None,
+    topic: profiles.Topic = None,
+    joints: profiles.Joints = None,
+    angle_unit: profiles.AngleUnit = None,
+    torque_unit: profiles.TorqueUnit = None,
+    zero: profiles.Zero = None,
+    second_angle: profiles.SecondAngle = None,
+    clock: profiles.Clock = None,
+    force: Annotated[bool, typer.Option(help="Overwrite OUT.")] = False,
+) -> None:
+    """Write a log in another format, in SI units, with canonical names; a synthetic log keeps its truth.
+
+    Exit code 3 where samples of IN are missing.
+
+    Example: algid convert rosbag2_2026/ arm.parquet --joints shoulder,elbow --zero hanging
+    """
+    from algid.errors import OutputError
+    from algid.readers import open_log
+    from algid.writers import FORMATS, write_log
+
+    if target.suffix.lstrip(".").lower() not in FORMATS:
+        raise OutputError(f"{target}: expected a name that ends in .mcap, .parquet or .csv")
+    if target.exists() and not force:
+        raise OutputError(f"{target}: exists already; overwrite it with --force")
+    chosen = profiles.profile_from(
+        profile,
+        topic=topic,
+        joints=joints,
+        angle_unit=angle_unit,
+        torque_unit=torque_unit,
+        zero=zero,
+        second_angle=second_angle,
+        clock=clock,
+    )
+    reader = open_log(source, chosen)
+    notices: list[Notice] = []
+    write_log(target, _noted(reader.blocks(), notices), truth=reader.origin.truth)
+    for notice in notices:
+        typer.echo(f"{notice.code}: {notice.text}", err=True)
+    raise typer.Exit(3 if any(notice.lossy for notice in notices) else 0)
+
+
+def _noted(blocks: Iterable[Log], notices: list[Notice]) -> Iterator[Log]:
+    for block in blocks:
+        notices += block.notices
+        yield block

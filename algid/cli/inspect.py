@@ -1,0 +1,123 @@
+"""`algid inspect`: what a log holds and is worth, before anyone identifies anything."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from algid.cli import profiles
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from algid.inspection.report import Inspection
+
+
+def inspect(
+    log: Annotated[Path, typer.Argument(help="CSV, Parquet or MCAP log, or a rosbag2 folder.")],
+    profile: profiles.ProfileFile = None,
+    topic: profiles.Topic = None,
+    joints: profiles.Joints = None,
+    angle_unit: profiles.AngleUnit = None,
+    torque_unit: profiles.TorqueUnit = None,
+    zero: profiles.Zero = None,
+    second_angle: profiles.SecondAngle = None,
+    clock: profiles.Clock = None,
+    output: Annotated[str, typer.Option("--format", help="table or json.")] = "table",
+) -> None:
+    """Show what a log holds, which channels would be used, and what is wrong with it.
+
+    Exit code 2 for a log that would be refused, 3 where samples are missing.
+
+    Example: algid inspect arm.mcap --joints shoulder,elbow --zero hanging
+    """
+    from rich.console import Console
+
+    from algid.errors import SettingError
+    from algid.inspection.report import inspect_log
+
+    if output not in ("table", "json"):
+        raise SettingError(f"--format: expected table or json, found {output!r}")
+    chosen = profiles.profile_from(
+        profile,
+        topic=topic,
+        joints=joints,
+        angle_unit=angle_unit,
+        torque_unit=torque_unit,
+        zero=zero,
+        second_angle=second_angle,
+        clock=clock,
+    )
+    found = inspect_log(log, chosen)
+    if output == "json":
+        typer.echo(json.dumps(found.as_dict(), indent=2))
+    else:
+        _print(found, Console(highlight=False))
+    raise typer.Exit(2 if found.refused else 3 if found.lossy else 0)
+
+
+def _print(found: Inspection, console: Console) -> None:
+    from rich.markup import escape
+
+    console.print(f"{escape(plain(found.path))}: {found.format}{', synthetic' if found.synthetic else ''}")
+    _table(console, "channels", ("name", "type", "samples"), _entries(found))
+    mapping = [(name, plain(source)) for name, source in sorted((found.mapping or {}).items())]
+    _table(console, "taken as", ("algid", "log"), mapping)
+    if found.clock is not None:
+        clock = found.clock
+        console.print(
+            f"{clock.rows} samples, {clock.duration:.6g} s at {clock.rate:.6g} Hz, "
+            f"jitter {clock.jitter * 1e3:.3g} ms, {clock.gaps} gaps, the longest {clock.longest_gap:.3g} s"
+        )
+    _table(console, "signals", ("channel", "low", "high", "noise", "step", "saturated %"), _signals(found))
+    if found.dynamics is not None:
+        rough = found.dynamics
+        console.print(
+            f"excitation: condition number {rough.condition:.4g}; rough fit explains "
+            f"{100 * rough.explained:.3g} % of the torques, "
+            f"gravity {100 * rough.gravity_share:.3g} %: k4 {rough.weight1:.3g} N m, "
+            f"k2 {rough.weight2:.3g} N m, turned by {rough.turn:.0f} degrees"
+        )
+    for notice in found.notices:
+        console.print(f"{notice.code}: {escape(plain(notice.text))}")
+    for finding in found.findings:
+        console.print(f"{finding.code}: {escape(plain(finding.text))}")
+    if found.refused:
+        console.print(f"refused: {escape(plain(found.refused))}")
+
+
+def plain(text: str) -> str:
+    """The text without control characters: names in a log are another's words."""
+    return "".join(letter if letter.isprintable() else "\ufffd" for letter in text)
+
+
+def _entries(found: Inspection) -> list[tuple[str, ...]]:
+    shown = [
+        (plain(one.name[:80]), plain(one.type[:60]), "" if one.count is None else str(one.count))
+        for one in found.entries[:100]
+    ]
+    more = len(found.entries) - len(shown)
+    return [*shown, (f"and {more} more", "", "")] if more else list(shown)
+
+
+def _signals(found: Inspection) -> list[tuple[str, ...]]:
+    return [
+        (name, *(f"{value:.4g}" for value in (one.low, one.high, one.noise, one.step, 100 * one.saturated)))
+        for name, one in (found.signals or {}).items()
+    ]
+
+
+def _table(console: Console, title: str, header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
+    from rich.markup import escape
+    from rich.table import Table
+
+    if not rows:
+        return
+    table = Table(*header, title=title, title_justify="left")
+    for row in rows:
+        table.add_row(*map(escape, row))
+    console.print(table)

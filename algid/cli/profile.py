@@ -1,0 +1,31 @@
+"""`algid profile new`: a profile for a log, to edit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from algid.cli.inspect import plain
+
+
+def new(
+    log: Annotated[Path, typer.Argument(help="The log to write a profile for.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Where to write it.")] = Path("algid.toml"),
+    force: Annotated[bool, typer.Option(help="Overwrite the profile.")] = False,
+) -> None:
+    """Write a profile with everything that can be set, filled in with what a log tells.
+
+    Example: algid profile new arm.mcap -o algid.toml
+    """
+    from algid.errors import OutputError
+    from algid.inspection.draft import draft_profile
+    from algid.outfiles import whole_file
+
+    if output.exists() and not force:
+        raise OutputError(f"{output}: exists already; overwrite it with --force")
+    text = draft_profile(log)
+    with whole_file(output) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    typer.echo(plain(f"{output}: written; edit it, then try: algid inspect {log} --profile {output}"))

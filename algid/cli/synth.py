@@ -1,0 +1,109 @@
+"""`algid synth`: synthetic logs of an arm, with the truth inside."""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from algid.synth.cases import Case
+    from algid.synth.excitation import Torque
+    from algid.synth.run import Recording
+
+
+class Format(StrEnum):
+    """Formats that logs are written in."""
+
+    MCAP = "mcap"
+    PARQUET = "parquet"
+    CSV = "csv"
+
+
+class Hold(StrEnum):
+    """What the drive does between two torque samples."""
+
+    EXACT = "exact"
+    ZOH = "zoh"
+    FOH = "foh"
+
+
+def synth(
+    case: Annotated[str, typer.Argument(help="case1, case2, or a TOML file that describes an arm.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write into.")] = Path(),
+    kind: Annotated[Format, typer.Option("--format", help="Format of the logs.")] = Format.MCAP,
+    rate: Annotated[float, typer.Option(help="Samples a second, Hz.", min=1e-3)] = 1000.0,
+    duration: Annotated[float, typer.Option(help="Length of each log, s.", min=1e-3)] = 1.0,
+    torque: Annotated[
+        str, typer.Option(help="case (the case's own), wide (0.3 to 8 Hz), none, or a log whose torque is replayed.")
+    ] = "case",
+    torque_hold: Annotated[
+        Hold, typer.Option(help="Whether the drive holds (zoh) or ramps (foh) the torque between samples.")
+    ] = Hold.EXACT,
+    initial: Annotated[
+        str | None, typer.Option(help="Initial state θ1,θ2,ω1,ω2 in rad and rad/s; hanging at rest by default.")
+    ] = None,
+    position_noise: Annotated[float, typer.Option(help="Noise of the angles, rad (standard deviation).", min=0)] = 0.0,
+    torque_noise: Annotated[float, typer.Option(help="Noise of the torques, N m (standard deviation).", min=0)] = 0.0,
+    encoder_bits: Annotated[
+        int | None, typer.Option(help="Round angles to 2π / 2^bits, as an encoder does.", min=4, max=32)
+    ] = None,
+    jitter: Annotated[float, typer.Option(help="Jitter of the stamps, s (standard deviation).", min=0)] = 0.0,
+    drop: Annotated[float, typer.Option(help="Share of samples lost at random.", min=0, max=0.9)] = 0.0,
+    seed: Annotated[int, typer.Option(help="Seed of noise, jitter and losses.", min=0)] = 0,
+) -> None:
+    """Write CASE-unloaded and CASE-loaded logs of a simulated arm; the truth travels with them.
+
+    Velocities are in the logs only where angles are exact: with noise or an encoder the arm measures none.
+
+    Example: algid synth case1 -o logs --position-noise 1e-3 --torque-noise 1e-2 --duration 10 --torque wide
+    """
+    from algid.synth.cases import load_case
+    from algid.synth.run import EXCITATIONS, Recording, held, synthesise
+    from algid.synth.sensors import Sensors
+    from algid.writers import write_log
+
+    described = load_case(case)
+    sensors = Sensors(position_noise, torque_noise, encoder_bits, jitter, drop, seed)
+    recording = _recording(Recording(rate=rate, duration=duration, sensors=sensors), initial)
+    drive = _torque(described, torque, torque_hold)
+    if torque_hold is not Hold.EXACT and torque in EXCITATIONS:
+        drive = held(drive, rate, duration, "zoh" if torque_hold is Hold.ZOH else "foh")
+    for log in synthesise(described, drive, recording):
+        path = out / f"{log.origin.path}.{kind.value}"
+        write_log(path, log, truth=log.origin.truth, kind=kind.value)
+        print(path)
+
+
+def _recording(recording: Recording, initial: str | None) -> Recording:
+    from dataclasses import replace
+
+    from algid.errors import SettingError
+
+    if initial is None:
+        return recording
+    try:
+        state = tuple(float(part) for part in initial.split(","))
+    except ValueError:
+        state = ()
+    if len(state) != 4 or not all(map(math.isfinite, state)):
+        raise SettingError(f"--initial: expected four numbers like -1.57,0,0,0, found {initial!r}")
+    return replace(recording, initial=state)
+
+
+def _torque(case: Case, name: str, hold: Hold) -> Torque:
+    """The excitation of that name, or the torque of the log at that path."""
+    from algid.errors import SettingError
+    from algid.readers import read_log
+    from algid.synth.excitation import SampledTorque
+    from algid.synth.run import EXCITATIONS, excitation
+
+    if name in EXCITATIONS:
+        return excitation(case, name)
+    if not Path(name).exists():
+        raise SettingError(f"--torque {name}: expected {', '.join(EXCITATIONS)} or a log, found neither")
+    log = read_log(name)
+    return SampledTorque(log.t, log.tau, "foh" if hold is Hold.FOH else "zoh")

@@ -1,0 +1,67 @@
+"""Zero-phase finite filters, applied by matrix products: no loop over samples, no state.
+
+The differentiator is the ideal one below its bandwidth, cut by a Kaiser window (Oppenheim & Schafer, Discrete-
+Time Signal Processing, sec. 7.5), scaled so that a constant speed comes out exactly.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from algid.arm import FloatArray
+
+_KAISER_BETA = 7.0  # stop band at -70 dB
+_PERIODS = 2.5  # half length of a kernel in periods of its bandwidth
+_ROWS = 64  # outputs a matrix product makes at once
+
+
+def half_length(dt: float, bandwidth: float) -> int:
+    """Samples that a kernel of `bandwidth` Hz reaches to either side."""
+    return max(2, round(_PERIODS / (bandwidth * dt)))
+
+
+def differentiator(dt: float, bandwidth: float) -> FloatArray:
+    """Kernel (2 M + 1,) in s^-1 whose correlation with an angle is its velocity below `bandwidth` Hz."""
+    n, taper = _support(dt, bandwidth)
+    x = 2 * bandwidth * dt * n
+    safe = np.where(n == 0, 1, n)
+    slope = np.where(n == 0, 0.0, (np.sinc(x) - np.cos(np.pi * x)) / safe)
+    kernel = slope * taper
+    return kernel / (kernel @ n * dt)
+
+
+def smoother(dt: float, bandwidth: float) -> FloatArray:
+    """Kernel (2 M + 1,) whose correlation with a signal passes what lies below `bandwidth` Hz."""
+    n, taper = _support(dt, bandwidth)
+    kernel = np.sinc(2 * bandwidth * dt * n) * taper
+    return kernel / kernel.sum()
+
+
+def _support(dt: float, bandwidth: float) -> tuple[FloatArray, FloatArray]:
+    reach = half_length(dt, bandwidth)
+    n = np.arange(-reach, reach + 1, dtype=np.float64)
+    return n, np.kaiser(n.size, _KAISER_BETA)
+
+
+def correlate(x: FloatArray, kernel: FloatArray) -> FloatArray:
+    """Correlation (m, N - K + 1) of each row of x (m, N) with a kernel (K,), where they overlap entirely."""
+    taps = kernel.size
+    wanted = x.shape[1] - taps + 1
+    blocks = -(-wanted // _ROWS)
+    padded = np.zeros((x.shape[0], blocks * _ROWS + taps - 1))
+    padded[:, : x.shape[1]] = x
+    windows = np.lib.stride_tricks.sliding_window_view(padded, _ROWS + taps - 1, axis=1)[:, ::_ROWS]
+    toeplitz = np.zeros((_ROWS + taps - 1, _ROWS))
+    for column in range(_ROWS):
+        toeplitz[column : column + taps, column] = kernel
+    return (np.ascontiguousarray(windows) @ toeplitz).reshape(x.shape[0], -1)[:, :wanted]
+
+
+def smoothed(x: FloatArray, dt: float, bandwidth: float) -> FloatArray:
+    """Signals (m, N) without what lies above `bandwidth` Hz; both ends continue by point reflection."""
+    kernel = smoother(dt, bandwidth)
+    reach = min(kernel.size // 2, x.shape[1] - 1)
+    kernel = kernel[kernel.size // 2 - reach : kernel.size // 2 + reach + 1]
+    before = 2 * x[:, :1] - x[:, reach:0:-1]
+    after = 2 * x[:, -1:] - x[:, -2 : -reach - 2 : -1]
+    return correlate(np.concatenate([before, x, after], axis=1), kernel / kernel.sum())

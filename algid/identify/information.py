@@ -1,0 +1,132 @@
+"""What logs tell about the shared parameters: quadratic likelihoods that add up.
+
+======  ===================================================  =========  =================
+symbol  name                                                 shape      unit
+======  ===================================================  =========  =================
+S       information on a log's coefficients, by stretch      (B, q, q)  1 / (unit unit)
+g       score at the coefficients `c0`, by stretch           (B, q)     1 / unit
+======  ===================================================  =========  =================
+
+Near c0 the log-likelihood is g·(c − c0) − ½ (c − c0)ᵀ S (c − c0).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.identify.blocks import long_run_variance
+from algid.identify.shared import Shared
+
+RANK_TOLERANCE = 1e-13  # relative eigenvalue of the scaled information that counts as nothing
+_STEPS = 60
+_DONE = 1e-10  # change of the log-likelihood at which the quadratic problem counts as solved
+
+
+@dataclass(frozen=True, eq=False)
+class LogInformation:
+    """One log's quadratic likelihood: see the module's table."""
+
+    loaded: bool
+    c0: FloatArray
+    S: FloatArray
+    g: FloatArray
+
+    @cached_property
+    def total(self) -> tuple[FloatArray, FloatArray]:
+        """S (q, q) and g (q,) over the whole log."""
+        return self.S.sum(axis=0), self.g.sum(axis=0)
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """Gaussian knowledge of the first parameters from an earlier result: mean (p,) and covariance (p, p)."""
+
+    names: tuple[str, ...]
+    mean: FloatArray
+    covariance: FloatArray
+
+
+def scaled_pinv(S: FloatArray, tolerance: float = RANK_TOLERANCE) -> FloatArray:
+    """Pseudo-inverse of an information matrix after scaling to unit diagonal."""
+    size = np.sqrt(np.maximum(np.diag(S), 0.0))
+    inverse = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
+    return np.linalg.pinv(S * np.outer(inverse, inverse), rcond=tolerance, hermitian=True) * np.outer(inverse, inverse)
+
+
+def combine(
+    shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None = None
+) -> tuple[FloatArray, FloatArray, float]:
+    """Most likely shared parameters by damped Gauss-Newton on the sum of quadratic likelihoods.
+
+    Directions without information keep the values they have in `beta`.
+
+    Returns
+    -------
+    beta (Q,), its information (Q, Q), and the log-likelihood there less that of each log's own coefficients c0
+    """
+    damping = 0.0
+    value, gradient, S = likelihood(shared, logs, beta, prior)
+    for _ in range(_STEPS):
+        step = scaled_pinv(S + damping * np.diag(np.diag(S))) @ gradient
+        trial = likelihood(shared, logs, beta + step, prior)
+        if not np.isfinite(trial[0]) or trial[0] < value - 1e-9 * (1 + abs(value)):
+            damping = max(10 * damping, 1e-3)
+            if damping > 1e12:
+                break
+            continue
+        gain = float(gradient @ step)
+        beta, damping = beta + step, damping / 10 if damping > 1e-6 else 0.0
+        value, gradient, S = trial
+        if gain < _DONE and damping == 0.0:
+            break
+    return beta, S, value
+
+
+def likelihood(
+    shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None
+) -> tuple[float, FloatArray, FloatArray]:
+    """Log-likelihood at `beta` less that at the logs' own coefficients, its gradient (Q,), information (Q, Q)."""
+    size = len(shared.names)
+    value, gradient, S = 0.0, np.zeros(size), np.zeros((size, size))
+    for log in logs:
+        T = shared.jacobian(beta, log.loaded)
+        change = shared.coefficients(beta, log.loaded) - log.c0
+        log_S, log_g = log.total
+        value += float(log_g @ change - 0.5 * change @ log_S @ change)
+        gradient += T.T @ (log_g - log_S @ change)
+        S += T.T @ log_S @ T
+    if prior is not None:
+        places = [shared.names.index(name) for name in prior.names]
+        weight = scaled_pinv(prior.covariance)
+        change = beta[places] - prior.mean
+        value -= 0.5 * float(change @ weight @ change)
+        gradient[places] -= weight @ change
+        S[np.ix_(places, places)] += weight
+    return value, gradient, S
+
+
+def sandwich(
+    shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None = None
+) -> tuple[FloatArray, int]:
+    """Covariance (Q, Q) of the score at `beta`, allowing for coloured residuals, and its degrees of freedom.
+
+    Between the inverses of the information it makes the sandwich of White 1982 and Newey & West 1987.
+    """
+    meat = np.zeros((len(shared.names), len(shared.names)))
+    stretches = 0
+    for log in logs:
+        T = shared.jacobian(beta, log.loaded)
+        scores = log.g - log.S @ (shared.coefficients(beta, log.loaded) - log.c0)
+        variance, lags = long_run_variance(scores)
+        meat += T.T @ variance @ T
+        stretches += scores.shape[0] // (lags + 1)
+    if prior is not None:
+        places = [shared.names.index(name) for name in prior.names]
+        meat[np.ix_(places, places)] += scaled_pinv(prior.covariance)
+    freedom = max(2, stretches - len(shared.names))
+    return meat * (max(stretches, freedom + 1) / freedom), freedom

@@ -1,0 +1,252 @@
+"""The weak estimator: weighted least squares on the momentum form, in one pass over the log.
+
+Its normal equations are kept by stretch and by joint, so that the joints' weights, the residual's size and the
+error bars follow from them without a second pass. See `algid.identify.moments`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.identify.blocks import BlockSums
+from algid.identify.fit import Fit, conclude
+from algid.identify.information import LogInformation, Prior, scaled_pinv
+from algid.identify.model import Model
+from algid.identify.moments import OVERLAP, Windows
+from algid.identify.payload import first_payload
+from algid.identify.shared import Shared
+from algid.sampling import Segment, pieces
+
+Source = Callable[[], Iterable[Segment]]
+PIECE_SAMPLES = 16384
+_REWEIGHTINGS = 4
+_DELAY_PASSES = 4
+_DELAY_SETTLED = 0.02  # samples
+
+
+@dataclass(frozen=True)
+class WeakSettings:
+    """Settings of the weak estimator.
+
+    Parameters
+    ----------
+    model : Model
+    window : float, s
+        Length of a window; a record shorter than four windows gets shorter ones.
+    bandwidth : float, Hz, or None for the log's own velocities
+        Of the zero-phase differentiator behind k1's column.
+    hold : "foh" or "zoh"
+        Whether the torque moved evenly from sample to sample, or was held from each sample to the next.
+    delay : float, s
+        After how long a logged torque acts; where the estimate of it starts with `estimate_delay`.
+    estimate_delay : bool
+    """
+
+    model: Model = field(default_factory=Model)
+    window: float = 0.4
+    bandwidth: float | None = 60.0
+    hold: Literal["foh", "zoh"] = "foh"
+    delay: float = 0.0
+    estimate_delay: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Normal:
+    """Normal equations of one log: Gram matrices (B, 2, q + 1, q + 1) by stretch and joint, the torque last.
+
+    `samples` counts the log's samples, `rows` the windows, `dt` is in s, and `moved` (2,) is the spread of each
+    joint's angle in rad.
+    """
+
+    gram: FloatArray
+    dt: float
+    samples: int
+    rows: int
+    moved: FloatArray
+
+
+def normal_equations(segments: Iterable[Segment], settings: WeakSettings) -> Normal | None:
+    """Normal equations of one log; None where it is too short for a window."""
+    sums = BlockSums()
+    windows: Windows | None = None
+    samples = rows = 0
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    for piece, fresh in _overlapping(segments, settings):
+        windows = windows_of(piece, settings) if windows is None else windows
+        samples += fresh
+        low = np.minimum(low, piece.theta.min(axis=1))
+        high = np.maximum(high, piece.theta.max(axis=1))
+        X = windows.equations(settings.model, piece, settings.estimate_delay)
+        rows += X.shape[2]
+        if X.shape[2]:
+            sums.add(_grams(X))
+    if windows is None or rows == 0:
+        return None
+    return Normal(sums.values(), windows.dt, samples, rows, high - low)
+
+
+def windows_of(piece: Segment, settings: WeakSettings) -> Windows:
+    """Windows that fit the first piece of a log: at least four of them, and a bandwidth it can hold."""
+    duration = len(piece) * piece.dt
+    bandwidth = settings.bandwidth
+    if bandwidth is not None:
+        bandwidth = max(min(bandwidth, 0.2 / piece.dt), 20.0 / duration)
+    shift = settings.delay + (0.5 * piece.dt if settings.hold == "zoh" else 0.0)
+    return Windows(piece.dt, min(settings.window, duration / 4), shift, bandwidth)
+
+
+def _overlapping(segments: Iterable[Segment], settings: WeakSettings) -> Iterator[tuple[Segment, int]]:
+    """Pieces that share the samples a window needs with the piece before, and their fresh samples."""
+    before: Segment | None = None
+    windows: Windows | None = None
+    length = 0
+    for piece in pieces(segments, PIECE_SAMPLES):
+        if windows is None:
+            windows = windows_of(piece, settings)
+        fresh = len(piece)
+        if piece.continues and before is not None:
+            piece = _prefixed(before, piece, windows.overlap + length % windows.step)
+        length = (len(piece) - 2 * windows.margin) % windows.step
+        before = piece
+        yield piece, fresh
+
+
+def _prefixed(before: Segment, piece: Segment, overlap: int) -> Segment:
+    overlap = min(overlap, len(before))
+    omega = None
+    if before.omega is not None and piece.omega is not None:
+        omega = np.concatenate([before.omega[:, len(before) - overlap :], piece.omega], axis=1)
+    return replace(
+        piece,
+        start=piece.start - overlap * piece.dt,
+        theta=np.concatenate([before.theta[:, len(before) - overlap :], piece.theta], axis=1),
+        tau=np.concatenate([before.tau[:, len(before) - overlap :], piece.tau], axis=1),
+        omega=omega,
+    )
+
+
+def _grams(X: FloatArray) -> FloatArray:
+    """Gram matrices (B, 2, q + 1, q + 1) of X (2, q + 1, R), by stretches of `OVERLAP` rows."""
+    size, rows = X.shape[1:]
+    stretches = -(-rows // OVERLAP)
+    padded = np.zeros((2, size, stretches * OVERLAP))
+    padded[:, :, :rows] = X
+    parts = padded.reshape(2, size, stretches, OVERLAP).transpose(2, 0, 1, 3)
+    return parts @ parts.swapaxes(-1, -2)
+
+
+def solve(normals: Sequence[Normal], loaded: bool = False) -> tuple[FloatArray, list[LogInformation]]:
+    """Coefficients (q,) of logs that share them, and each log's likelihood there.
+
+    The rows of a joint weigh by its own residual, log by log.
+    """
+    weights: list[FloatArray] = [np.ones(2) for _ in normals]
+    c: FloatArray = np.zeros(normals[0].gram.shape[-1] - 1)
+    for _ in range(_REWEIGHTINGS):
+        total = np.sum(
+            [np.einsum("a,axy->xy", w, n.gram.sum(axis=0)) for w, n in zip(weights, normals, strict=True)], axis=0
+        )
+        c = scaled_pinv(total[:-1, :-1]) @ total[:-1, -1]
+        weights = [_weights(normal, c) for normal in normals]
+    return c, [_information(n, c, w, loaded) for n, w in zip(normals, weights, strict=True)]
+
+
+def _weights(normal: Normal, c: FloatArray) -> FloatArray:
+    """Inverse residual variance (2,) of a row of each joint."""
+    v = np.append(-c, 1.0)
+    gram = normal.gram.sum(axis=0)
+    squares = np.einsum("x,axy,y->a", v, gram, v)
+    floor = 1e-24 * gram[:, -1, -1] + 1e-300
+    return normal.rows / np.maximum(squares, floor)
+
+
+def _information(normal: Normal, c: FloatArray, weights: FloatArray, loaded: bool) -> LogInformation:
+    # Overlapping rows repeat each other: a window's worth of rows counts as two.
+    gram = np.einsum("a,baxy->bxy", weights * (2.0 / OVERLAP), normal.gram)
+    return LogInformation(loaded, c, gram[:, :-1, :-1], gram[:, :-1, -1] - gram[:, :-1, :-1] @ c)
+
+
+def fit(
+    unloaded: Sequence[Source],
+    loaded: Sequence[Source] = (),
+    settings: WeakSettings | None = None,
+    lengths: dict[str, float] | None = None,
+    prior: Prior | None = None,
+) -> Fit:
+    """Least-squares parameters of the arm, and of its payload where there are loaded logs.
+
+    Parameters
+    ----------
+    unloaded, loaded : sequences of callables
+        Each gives a fresh iterable of `Segment`, the stretches of one log in time. It is called once, and a few
+        times more where a delay is estimated.
+    settings : WeakSettings
+    lengths : dict
+        Known link lengths "l1", "l2" in m.
+    prior : Prior
+        What an earlier result knows of the arm; unloaded logs are not needed then.
+
+    Raises
+    ------
+    ValueError
+        If no log is long enough for a window, or there is neither an unloaded log nor a prior.
+    """
+    settings = settings or WeakSettings()
+    shared = Shared(settings.model, settings.estimate_delay, bool(loaded), dict(lengths or {}))
+    for _ in range(_DELAY_PASSES):
+        bare = _normals(unloaded, settings)
+        burdened = _normals(loaded, settings)
+        beta, logs = _start(shared, bare, burdened, prior)
+        if not shared.delay:
+            break
+        place = len(settings.model.names)
+        change = float(beta[place])
+        settings = replace(settings, delay=settings.delay + change)
+        beta[place] = settings.delay
+        logs = [_with_delay(log, place, settings.delay - change) for log in logs]
+        if abs(change) < _DELAY_SETTLED * max(normal.dt for normal in bare + burdened):
+            break
+    moved = np.max([normal.moved for normal in bare + burdened], axis=0)
+    return replace(conclude("weak", shared, logs, beta, moved, prior, coloured=True), moved=moved)
+
+
+def _normals(sources: Sequence[Source], settings: WeakSettings) -> list[Normal]:
+    found = [normal_equations(source(), settings) for source in sources]
+    return [normal for normal in found if normal is not None]
+
+
+def _start(
+    shared: Shared, bare: list[Normal], burdened: list[Normal], prior: Prior | None
+) -> tuple[FloatArray, list[LogInformation]]:
+    """Shared parameters from which `conclude` starts, and each log's likelihood."""
+    if not bare and (prior is None or not burdened):
+        raise ValueError("no unloaded log is long enough: expected at least a second of samples without a gap")
+    logs: list[LogInformation] = []
+    arm: FloatArray = np.zeros(len(shared.log_names))
+    if bare:
+        arm, logs = solve(bare)
+    elif prior is not None:
+        arm[[shared.log_names.index(name) for name in prior.names]] = prior.mean
+    if not shared.payload:
+        return arm, logs
+    if not burdened:
+        raise ValueError("no loaded log is long enough: expected at least a second of samples without a gap")
+    _, under_load = solve(burdened, loaded=True)
+    together = LogInformation(True, under_load[0].c0, *_stacked(under_load))
+    return first_payload(shared, arm, together), logs + under_load
+
+
+def _stacked(logs: Sequence[LogInformation]) -> tuple[FloatArray, FloatArray]:
+    return np.concatenate([log.S for log in logs]), np.concatenate([log.g for log in logs])
+
+
+def _with_delay(log: LogInformation, place: int, base: float) -> LogInformation:
+    """The log's likelihood in the whole delay, where it was linearised in the change from `base`."""
+    c0 = log.c0.copy()
+    c0[place] += base
+    return replace(log, c0=c0)

@@ -1,0 +1,1 @@
+"""What a log is worth, before anyone identifies anything from it."""

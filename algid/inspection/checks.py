@@ -1,0 +1,209 @@
+"""Named checks of a log: what is wrong with it, and whether that forbids its use.
+
+====================  =======  ==========================================================
+code                  refused  seen
+====================  =======  ==========================================================
+EFFORT_ZERO           yes      a torque is nought throughout
+EFFORT_DENORMAL       yes      a torque below 1e-6 N m throughout, as from unset memory
+EFFORT_CONSTANT       yes      a torque that never changes
+WRAPPED_ANGLE         yes      an angle jumps by 2π between two samples
+DEGREES               yes      angles or velocities are 57.3 times what the others say
+ANGLE_CONSTANT        no       an angle that never changes
+STUCK_SENSOR          no       an angle freezes in motion and jumps when it comes back
+SPIKES                no       single samples far off their neighbours
+SATURATED_EFFORT      no       a torque clipped at its limit
+GAPS                  no       samples are missing
+JITTER                no       uneven stamps
+GRAVITY_COMPENSATED   no       torques do not carry the arm's weight
+FLIPPED_SIGN          no       gravity pulls upwards: a sign is wrong
+WRONG_ZERO            no       gravity pulls sideways: θ1 is not from the horizontal
+====================  =======  ==========================================================
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.errors import LogError
+from algid.inspection.dynamics import DynamicFigures, dynamic_figures
+from algid.inspection.signals import clock_figures, robust_deviation, saturated_share
+from algid.log import Log, Notice
+
+_DENORMAL = 1e-6
+_SPIKE = 30.0
+_TURN = 2 * math.pi
+_LEAST_PULL = 1.3
+"""Weight in N m to inertia in kg m^2: a fifth of g/l for links of 1.5 m."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing seen: its code, what it means, and whether the log is refused for it."""
+
+    code: str
+    text: str
+    refuse: bool = False
+
+
+def examine(log: Log, *, gravity: float = 9.81) -> tuple[Finding, ...]:
+    """Everything that the checks above find in a log; `gravity` 0 for an arm in a horizontal plane."""
+    if len(log) < 4:
+        return ()
+    found = [*_efforts(log), *_angles(log), *_degrees(log), *_spikes(log), *_clock(log)]
+    if gravity > 0 and not any(finding.refuse for finding in found):
+        figures = dynamic_figures(log)
+        found += _gravity(figures) if figures is not None else []
+    return tuple(found)
+
+
+def admit(log: Log, *, gravity: float = 9.81) -> Log:
+    """The log with what was found as notices.
+
+    Raises
+    ------
+    LogError
+        If a check forbids the log's use.
+    """
+    found = examine(log, gravity=gravity)
+    for finding in found:
+        if finding.refuse:
+            raise LogError(f"{log.origin.path}: {finding.code}: {finding.text}")
+    return replace(log, notices=log.notices + tuple(Notice(one.code, one.text) for one in found))
+
+
+def _source(log: Log, name: str) -> str:
+    source = log.origin.mapping.get(name, name)
+    return name if source == name else f"{name} ({source})"
+
+
+def _efforts(log: Log) -> Iterator[Finding]:
+    for name, tau in zip(("tau1", "tau2"), log.tau, strict=True):
+        largest, what = float(np.abs(tau).max()), _source(log, name)
+        if largest == 0:
+            yield Finding("EFFORT_ZERO", f"{what} is nought in every sample; name the measured torque", True)
+        elif largest < _DENORMAL:
+            text = f"{what} never exceeds {largest:.3g} N m: no torque; name the measured one"
+            yield Finding("EFFORT_DENORMAL", text, True)
+        elif tau.min() == tau.max():
+            text = f"{what} is {tau[0]:.6g} N m in every sample; name the measured torque"
+            yield Finding("EFFORT_CONSTANT", text, True)
+        elif (share := saturated_share(tau)) > 0.01:
+            text = f"{what} stands at its limit in {100 * share:.3g} % of the samples"
+            yield Finding("SATURATED_EFFORT", text)
+
+
+def _angles(log: Log) -> Iterator[Finding]:
+    for name, theta in zip(("theta1", "theta2"), log.theta, strict=True):
+        steps, what = np.diff(theta), _source(log, name)
+        if not steps.any():
+            yield Finding("ANGLE_CONSTANT", f"{what} is {theta[0]:.6g} rad in every sample")
+            continue
+        wraps = int(np.count_nonzero(np.abs(np.abs(steps) - _TURN) < 0.1 * _TURN))
+        if wraps and _quiet(steps):
+            text = f"{what} jumps by a turn {wraps} times; set unwrap = true of [{name}] in a profile"
+            yield Finding("WRAPPED_ANGLE", text, True)
+        frozen = _frozen(steps, log.period)
+        if frozen:
+            text = f"{what} freezes for {frozen[1]:.3g} s from t = {frozen[0]:.6g} s, then jumps"
+            yield Finding("STUCK_SENSOR", text)
+
+
+def _quiet(steps: FloatArray) -> bool:
+    """Whether an arm at this rate moves by far less than a turn between two samples."""
+    return float(np.median(np.abs(steps))) < 0.5
+
+
+def _frozen(steps: FloatArray, period: float) -> tuple[float, float] | None:
+    """Start and length in s of a run without change that a jump ends, or None."""
+    moving = np.flatnonzero(steps)
+    lengths = np.diff(moving)
+    usual = float(np.quantile(np.abs(steps[moving]), 0.99))
+    long_enough = max(10, round(0.02 / period))
+    for place in np.flatnonzero(lengths > long_enough).tolist():
+        if abs(steps[moving[place + 1]]) > 5 * usual:
+            return float(moving[place] + 1) * period, float(lengths[place]) * period
+    return None
+
+
+def _degrees(log: Log) -> Iterator[Finding]:
+    hint = 'set unit = "deg" in a profile, or unit = "rad" of what is right'
+    if log.omega is not None and len(log) > 20:
+        for joint in (0, 1):
+            ratio = _ratio(log, joint)
+            for factor, what in ((180 / math.pi, "angles"), (math.pi / 180, "velocities")):
+                if 0.8 < ratio / factor < 1.25:
+                    text = f"{what} of joint {joint + 1} are in degrees by the other signal; {hint}"
+                    yield Finding("DEGREES", text, True)
+    widest = float(np.abs(log.theta).max())
+    if widest > 12 * math.pi and not any(_ratio(log, joint) for joint in (0, 1)):
+        yield Finding("DEGREES", f"angles reach {widest:.4g}: no arm turns that far in rad; {hint}", True)
+
+
+def _ratio(log: Log, joint: int) -> float:
+    """Angle travelled over velocity summed, robustly; 0 where there is no velocity or no motion."""
+    if log.omega is None:
+        return 0.0
+    width = max(1, len(log) // 200)
+    t = log.t[::width]
+    travelled = np.abs(np.diff(log.theta[joint, ::width]))
+    summed = np.add.reduceat(np.abs(log.omega[joint]), np.arange(0, len(log), width))[: travelled.size]
+    summed = summed / width * np.diff(t)
+    moving = travelled > 0.2 * travelled.max()
+    total = float(np.sum(summed[moving]))
+    return float(np.sum(travelled[moving])) / total if total > 0 else 0.0
+
+
+def _spikes(log: Log) -> Iterator[Finding]:
+    for names, pair in ((("theta1", "theta2"), log.theta), (("tau1", "tau2"), log.tau)):
+        for name, values in zip(names, pair, strict=True):
+            if values.size < 20:
+                continue
+            off = values[1:-1] - (values[:-2] + values[2:]) / 2
+            aside = np.abs(values[2:] - values[:-2])
+            limit = _SPIKE * max(robust_deviation(off), float(np.quantile(np.abs(off), 0.9)))
+            spikes = np.flatnonzero((np.abs(off) > limit) & (aside < 0.2 * np.abs(off)) & (limit > 0))
+            if spikes.size:
+                place = float(log.t[1:-1][spikes][0])
+                text = f"{_source(log, name)} has {len(spikes)} spikes, the first at t = {place:.6g} s"
+                yield Finding("SPIKES", text)
+
+
+def _clock(log: Log) -> Iterator[Finding]:
+    clock = clock_figures(log.stamp_ns)
+    if clock.gaps:
+        text = f"{clock.gaps} gaps, the longest {clock.longest_gap:.4g} s; no window spans one"
+        yield Finding("GAPS", text)
+    if clock.jitter * clock.rate > 0.01:
+        told = f"stamps jitter by {clock.jitter * 1e3:.3g} ms about a period of {1e3 / clock.rate:.4g} ms"
+        bend = max(float(np.sqrt(np.mean(np.diff(row, 2) ** 2))) for row in log.theta) / 8
+        yield Finding("JITTER", f"{told}; resampling moves angles by {bend:.2g} rad at most, linearly")
+
+
+def _gravity(figures: DynamicFigures) -> Iterator[Finding]:
+    if figures.condition > 1e6 or figures.explained < 0.3:
+        return
+    weightless = math.hypot(figures.weight1, figures.weight2) < _LEAST_PULL * abs(figures.inertia)
+    if figures.seen > 0.15 and figures.gravity_share < 0.01 and weightless:
+        text = (
+            f"torques carry no weight (gravity explains {100 * figures.gravity_share:.2g} % of them): "
+            "they are gravity-compensated, or the arm moves in a horizontal plane (gravity = 0 in a profile)"
+        )
+        yield Finding("GRAVITY_COMPENSATED", text)
+    elif figures.seen < 0.015 or figures.gravity_share < 0.02:
+        return  # the motion does not tell where gravity pulls
+    elif abs(figures.turn) > 135:
+        text = (
+            f"gravity pulls upwards (k4 = {figures.weight1:.3g} N m): the sign of torques or angles is wrong"
+        )
+        yield Finding("FLIPPED_SIGN", text)
+    elif abs(figures.turn) > 45:
+        text = (
+            f"gravity is turned by {figures.turn:.0f} degrees: θ1 is not from the horizontal; "
+            'set zero = "hanging" or an offset in a profile'
+        )
+        yield Finding("WRONG_ZERO", text)

@@ -1,0 +1,135 @@
+"""A rough look at a log's dynamics: does it move the arm enough, and does its torque carry the arm's weight?
+
+The model of eq. (1) is fitted by least squares to smoothed signals, once with gravity as it is and once with
+gravity turned by a right angle. That is no identification; it tells a wrong sign or zero from a right one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from algid.arm import FloatArray, regressor
+from algid.log import Log
+
+_RATE = 100.0
+_MOST_ROWS = 20_000
+_EDGE = 10
+_K2, _K3, _K4, _K5 = 1, 2, 3, 4
+
+
+@dataclass(frozen=True)
+class DynamicFigures:
+    """What the rough fit tells.
+
+    Parameters
+    ----------
+    condition : float
+        Condition number of the scaled regressor of k1 … k7; infinite where the arm stands still.
+    explained : float
+        Share of the torques' variance that the model explains.
+    weight1, weight2 : float, N m
+        Gravity constants k4 and k2 of the fit.
+    turn : float, deg
+        Direction that gravity has in the fit against the one that algid expects: 0 for a right zero, ±90 for
+        angles from the vertical, 180 for a flipped sign.
+    gravity_share : float
+        Share of the torques' variance that is lost without gravity.
+    seen : float
+        How far gravity's columns stand out of all others, 0 to 1: below 0.1 its direction is not told.
+    inertia : float, kg m^2
+        k3 + k5 of the fit.
+    """
+
+    condition: float
+    explained: float
+    weight1: float
+    weight2: float
+    turn: float
+    gravity_share: float
+    seen: float
+    inertia: float
+
+
+def dynamic_figures(log: Log) -> DynamicFigures | None:
+    """Figures of a log, or None where it is too short to smooth (40 samples at 100 Hz)."""
+    smooth = _smoothed(log)
+    if smooth is None:
+        return None
+    theta, tau, dt = smooth
+    omega, alpha = np.gradient(theta, dt, axis=1), np.gradient(np.gradient(theta, dt, axis=1), dt, axis=1)
+    inner = slice(_EDGE, -_EDGE)
+    theta, omega, alpha, tau = theta[:, inner], omega[:, inner], alpha[:, inner], tau[:, inner]
+    rows = _rows(regressor(theta, omega, alpha))
+    turned = _rows(regressor(theta - np.array([[np.pi / 2], [0.0]]), omega, alpha))[:, [_K2, _K4]]
+    friction = _rows(_signs(omega))
+    target = tau.ravel()
+    wide = np.hstack([rows, turned, friction])
+    found = _fit(wide, target)
+    total = float(np.sum((target - target.mean()) ** 2)) or 1.0
+    without = np.hstack([np.delete(rows, [_K2, _K4], axis=1), friction])
+    left = _left(wide, found, target)
+    lost = _left(without, _fit(without, target), target) - left
+    turn = np.degrees(np.arctan2(found[7] + found[8], found[_K2] + found[_K4]))
+    return DynamicFigures(
+        condition=_condition(rows),
+        explained=1 - left / total,
+        weight1=float(found[_K4]),
+        weight2=float(found[_K2]),
+        turn=float(turn),
+        gravity_share=lost / total,
+        seen=_standing_out(np.hstack([rows[:, [_K2, _K4]], turned]), without),
+        inertia=float(found[_K3] + found[_K5]),
+    )
+
+
+def _smoothed(log: Log) -> tuple[FloatArray, FloatArray, float] | None:
+    """Angles and torques averaged to 100 Hz at most, over what a gap does not break."""
+    width = max(1, round(1 / (_RATE * log.period)))
+    count = min(len(log) // width, _MOST_ROWS)
+    if count < 40:
+        return None
+    used = count * width
+    theta = log.theta[:, :used].reshape(2, count, width).mean(axis=2)
+    tau = log.tau[:, :used].reshape(2, count, width).mean(axis=2)
+    kernel = np.hanning(9)[1:-1] / np.hanning(9).sum()
+    smooth = np.stack([np.convolve(row, kernel, "same") for row in (*theta, *tau)])
+    return smooth[:2], smooth[2:], log.period * width
+
+
+def _signs(omega: FloatArray) -> FloatArray:
+    """Columns of Coulomb friction and torque offset (2, 4, N)."""
+    nought, one = np.zeros_like(omega[0]), np.ones_like(omega[0])
+    first = np.stack([np.tanh(omega[0] / 0.05), nought, one, nought])
+    return np.stack([first, np.stack([nought, np.tanh(omega[1] / 0.05), nought, one])])
+
+
+def _rows(columns: FloatArray) -> FloatArray:
+    """Columns (2, p, N) as a matrix (2 N, p)."""
+    return columns.transpose(0, 2, 1).reshape(-1, columns.shape[1])
+
+
+def _fit(matrix: FloatArray, target: FloatArray) -> FloatArray:
+    scale = np.linalg.norm(matrix, axis=0)
+    scale[scale == 0] = 1
+    found = np.linalg.lstsq(matrix / scale, target, rcond=1e-8)[0]
+    return np.asarray(found / scale)
+
+
+def _left(matrix: FloatArray, found: FloatArray, target: FloatArray) -> float:
+    return float(np.sum((target - matrix @ found) ** 2))
+
+
+def _standing_out(columns: FloatArray, others: FloatArray) -> float:
+    """Smallest singular value of scaled `columns` after `others` have explained what they can of them."""
+    scale = np.linalg.norm(columns, axis=0)
+    if not np.all(scale > 0):
+        return 0.0
+    left = columns / scale - others @ np.linalg.lstsq(others, columns / scale, rcond=1e-8)[0]
+    return float(np.linalg.svd(left, compute_uv=False)[-1])
+
+
+def _condition(matrix: FloatArray) -> float:
+    scale = np.linalg.norm(matrix, axis=0)
+    return float(np.linalg.cond(matrix / scale)) if np.all(scale > 0) else float("inf")

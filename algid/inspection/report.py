@@ -1,0 +1,95 @@
+"""The whole look at a log that `algid inspect` prints."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from algid.errors import LogError
+from algid.inspection.checks import Finding, examine
+from algid.inspection.contents import Entry, contents
+from algid.inspection.dynamics import DynamicFigures, dynamic_figures
+from algid.inspection.signals import ClockFigures, SignalFigures, clock_figures, signal_figures
+from algid.log import Log, Notice
+from algid.readers import read_log
+
+if TYPE_CHECKING:
+    from algid.profile import Profile
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What a log is and is worth; everything below `refused` is empty for a log that cannot be read."""
+
+    path: str
+    format: str
+    entries: tuple[Entry, ...]
+    refused: str | None = None
+    mapping: dict[str, str] | None = None
+    synthetic: bool = False
+    clock: ClockFigures | None = None
+    signals: dict[str, SignalFigures] | None = None
+    dynamics: DynamicFigures | None = None
+    notices: tuple[Notice, ...] = ()
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def lossy(self) -> bool:
+        """Whether samples are missing."""
+        return any(notice.lossy for notice in self.notices)
+
+    def as_dict(self) -> dict[str, Any]:
+        """As plain data for JSON; what is not finite becomes None."""
+        plain: dict[str, Any] = _finite(asdict(self))
+        return plain
+
+
+def inspect_log(path: Path, profile: Profile | None = None) -> Inspection:
+    """Look at a log without using it; a log that cannot be read gives what it holds, and the reason.
+
+    Raises
+    ------
+    LogError
+        If there is no such log, or its format is unknown.
+    """
+    kind, entries = contents(path)
+    try:
+        log = read_log(path, profile)
+    except LogError as error:
+        return Inspection(str(path), kind, entries, refused=str(error))
+    gravity = profile.gravity if profile is not None else 9.81
+    findings = examine(log, gravity=gravity)
+    reasons = [f"{one.code}: {one.text}" for one in findings if one.refuse]
+    return Inspection(
+        path=str(path),
+        format=kind,
+        entries=entries,
+        refused="; ".join(reasons) or None,
+        mapping=log.origin.mapping,
+        synthetic=log.origin.truth is not None,
+        clock=clock_figures(log.stamp_ns),
+        signals=_signals(log),
+        dynamics=dynamic_figures(log),
+        notices=log.notices,
+        findings=findings,
+    )
+
+
+def _signals(log: Log) -> dict[str, SignalFigures]:
+    found = {}
+    pairs = [("theta", log.theta), ("tau", log.tau)]
+    pairs += [("omega", log.omega)] if log.omega is not None else []
+    for name, pair in pairs:
+        for joint, values in enumerate(pair, start=1):
+            found[f"{name}{joint}"] = signal_figures(values)
+    return found
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

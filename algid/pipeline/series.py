@@ -1,0 +1,126 @@
+"""Time series of a result folder, written block by block."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.identify.fit import Fit
+from algid.identify.model import Model, Motion, regressor
+from algid.identify.paper.method import Series
+from algid.pipeline.settings import Settings
+from algid.pipeline.sources import LogSource
+from algid.sampling import Segment, pieces
+
+START_KEY = b"start_ns"
+ROWS = 1 << 17
+PREDICTION_BANDWIDTH = 40.0  # Hz: of the angles behind the predicted torque
+
+
+def write_columns(path: Path, blocks: Iterable[Mapping[str, FloatArray]], start_ns: Sequence[int]) -> None:
+    """Write blocks of flat columns as one Parquet file, with each log's first stamp in its metadata."""
+    import pyarrow
+    import pyarrow.parquet
+
+    writer: pyarrow.parquet.ParquetWriter | None = None
+    try:
+        for block in blocks:
+            table = pyarrow.table(dict(block))
+            if writer is None:
+                schema = table.schema.with_metadata({START_KEY: json.dumps(list(start_ns))})
+                writer = pyarrow.parquet.ParquetWriter(path, schema, compression="zstd")
+            writer.write_table(table.cast(writer.schema))
+    finally:
+        if writer is not None:
+            writer.close()
+
+
+def series_blocks(series: Iterable[Series], names: Sequence[str]) -> Iterator[dict[str, FloatArray]]:
+    """Windows of estimates gathered into blocks of columns, `t` first; a window's values are (s, n)."""
+    gathered: list[Series] = []
+    for window in series:
+        gathered.append(window)
+        if sum(part.t.size for part in gathered) >= ROWS:
+            yield _columns(gathered, names)
+            gathered = []
+    if gathered:
+        yield _columns(gathered, names)
+
+
+def _columns(windows: Sequence[Series], names: Sequence[str]) -> dict[str, FloatArray]:
+    values = np.concatenate([window.values for window in windows], axis=1)
+    return {"t": np.concatenate([window.t for window in windows]), **dict(zip(names, values, strict=True))}
+
+
+def torque_blocks(
+    logs: Sequence[LogSource], model: Model, coefficients: Mapping[str, FloatArray], shift: float
+) -> Iterator[dict[str, FloatArray]]:
+    """Motion, measured and predicted torque of every log; `coefficients` by role, `shift` the torque's delay in s.
+
+    Angles are smoothed without phase below `PREDICTION_BANDWIDTH`, so that two derivatives mean something.
+    """
+    for number, log in enumerate(logs):
+        for piece in pieces(log.segments(), ROWS):
+            yield {
+                "log": np.full(len(piece), number, dtype=np.int32),
+                **_torques(piece, model, coefficients[log.role], shift),
+            }
+
+
+def _torques(piece: Segment, model: Model, c: FloatArray, shift: float) -> dict[str, FloatArray]:
+    from algid.identify.filters import smoothed
+
+    theta = (
+        smoothed(piece.theta, piece.dt, min(PREDICTION_BANDWIDTH, 0.1 / piece.dt)) if len(piece) > 2 else piece.theta
+    )
+    omega = np.gradient(theta, piece.dt, axis=1)
+    motion = Motion(theta, omega, np.gradient(omega, piece.dt, axis=1))
+    predicted = np.einsum("aqn,q->an", regressor(model, motion), c)
+    predicted = np.stack([np.interp(piece.t + shift, piece.t, row) for row in predicted])
+    columns = {"theta": piece.theta, "omega": omega, "tau": piece.tau}
+    flat = {f"{name}{joint + 1}": value[joint] for name, value in columns.items() for joint in range(2)}
+    return {"t": piece.t, **flat, "tau1_predicted": predicted[0], "tau2_predicted": predicted[1]}
+
+
+def information_blocks(fit: Fit, durations: Sequence[float]) -> Iterator[dict[str, FloatArray]]:
+    """Information on each shared parameter by second of each log, in 1 / unit²."""
+    for number, (log, duration) in enumerate(zip(fit.logs, durations, strict=True)):
+        jacobian = fit.shared.jacobian(fit.values, log.loaded)
+        gains = np.einsum("ap,bac,cp->pb", jacobian, log.S, jacobian, optimize=True)
+        t = np.arange(gains.shape[1]) * duration / gains.shape[1]
+        second = np.floor(t)
+        starts = np.flatnonzero(np.diff(second, prepend=-1.0))
+        summed = np.add.reduceat(gains, starts, axis=1)
+        yield {
+            "log": np.full(starts.size, number, dtype=np.int32),
+            "t": second[starts],
+            **dict(zip(fit.names, summed, strict=True)),
+        }
+
+
+def write_fit_series(folder: Path, fit: Fit, logs: Sequence[LogSource], settings: Settings) -> None:
+    """Write `torque.parquet` and `information.parquet` of a fit."""
+    summaries, starts = [log.summary() for log in logs], [log.start_ns for log in logs]
+    coefficients: dict[str, FloatArray] = {role: torque_coefficients(fit, role) for role in {log.role for log in logs}}
+    shift = torque_shift(settings, fit, 1 / summaries[0].rate)
+    torques = torque_blocks(logs, fit.shared.model, coefficients, shift)
+    write_columns(folder / "torque.parquet", torques, starts)
+    durations = [summary.duration for summary in summaries]
+    write_columns(folder / "information.parquet", information_blocks(fit, durations), starts)
+
+
+def torque_coefficients(fit: Fit, role: str) -> FloatArray:
+    """Coefficients of the model's columns for a log of that role."""
+    return fit.shared.coefficients(fit.values, role == "loaded")[: len(fit.shared.model.names)]
+
+
+def torque_shift(settings: Settings, fit: Fit, dt: float) -> float:
+    """Time in s after which a logged torque acts: half a sample of hold, and the delay."""
+    hold = 0.5 * dt if settings.torque_hold == "zoh" else 0.0
+    if "delay" in fit.names:
+        return hold + float(fit.values[fit.names.index("delay")])
+    return hold + (0.0 if settings.delay == "estimate" else settings.delay)

@@ -1,0 +1,137 @@
+"""Logs to identify from, each read as often as an estimator asks."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from algid.errors import LogError
+from algid.log import Log, Notice, Origin
+from algid.results import LogSummary
+from algid.sampling import Segment, segments
+
+if TYPE_CHECKING:
+    from algid.profile import Profile
+
+Role = Literal["unloaded", "loaded"]
+LogLike = str | Path | Log
+
+
+@dataclass
+class _Seen:
+    """What a full pass over a log has shown."""
+
+    rows: int = 0
+    first_ns: int = 0
+    last_ns: int = 0
+    notices: list[Notice] = field(default_factory=list)
+
+
+class LogSource:
+    """One log, from a file or from memory; `segments` gives a fresh pass over it."""
+
+    def __init__(self, log: LogLike, role: Role, profile: Profile | None = None) -> None:
+        self.role = role
+        self.name = log.origin.path if isinstance(log, Log) else str(log)
+        self._log = log
+        self._profile = profile
+        self.origin, self._blocks = self._open()
+        self._seen: _Seen | None = None
+        self._refuse_the_other_role()
+
+    def _open(self) -> tuple[Origin, Callable[[], Iterator[Log]]]:
+        if isinstance(self._log, Log):
+            log = self._log
+            return log.origin, lambda: iter([log])
+        from algid.readers import open_log
+
+        reader = open_log(self._log, self._profile)
+        return reader.origin, reader.blocks
+
+    def _refuse_the_other_role(self) -> None:
+        truth = self.origin.truth
+        if truth is None or (truth.payload > 0) == (self.role == "loaded"):
+            return
+        found = f"a payload of {truth.payload:g} kg" if truth.payload > 0 else "no payload"
+        raise LogError(f"{self.name}: expected a log of the {self.role} arm, its metadata say {found}; swap the logs")
+
+    def segments(self) -> Iterator[Segment]:
+        """Uniform stretches of the log, from its start."""
+        return segments(self._counted())
+
+    def _counted(self) -> Iterator[Log]:
+        seen = _Seen()
+        for block in self._blocks():
+            if len(block) and not seen.rows:
+                seen.first_ns = int(block.stamp_ns[0])
+            if len(block):
+                seen.last_ns = int(block.stamp_ns[-1])
+            seen.rows += len(block)
+            seen.notices += block.notices
+            yield block
+        self._seen = seen
+
+    @property
+    def seen(self) -> _Seen:
+        """What the log holds; reads it where no estimator has done so to its end."""
+        if self._seen is None:
+            for _ in self._counted():
+                pass
+        assert self._seen is not None
+        return self._seen
+
+    @property
+    def notices(self) -> list[Notice]:
+        """What the reader noticed."""
+        return self.seen.notices
+
+    @property
+    def start_ns(self) -> int:
+        """First stamp in ns."""
+        return self.seen.first_ns
+
+    @cached_property
+    def sha256(self) -> str:
+        """Of the file, of a folder's files in the order of their names, or of a log in memory."""
+        if isinstance(self._log, Log):
+            arrays = (self._log.stamp_ns, self._log.theta, self._log.tau)
+            return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
+        return sha256_of(Path(self._log))
+
+    def summary(self) -> LogSummary:
+        """For the result."""
+        seen = self.seen
+        duration = (seen.last_ns - seen.first_ns) * 1e-9
+        return LogSummary(
+            path=self.name,
+            sha256=self.sha256,
+            role=self.role,
+            format=self.origin.format,
+            rows=seen.rows,
+            duration=duration,
+            rate=(seen.rows - 1) / duration if duration > 0 else 0.0,
+            mapping=dict(self.origin.mapping),
+        )
+
+
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file, or of a folder's files in the order of their names."""
+    digest = hashlib.sha256()
+    for file in sorted(path.iterdir()) if path.is_dir() else [path]:
+        if file.is_file():
+            with file.open("rb") as opened:
+                while chunk := opened.read(1 << 20):
+                    digest.update(chunk)
+    return digest.hexdigest()
+
+
+def sources_of(logs: LogLike | Iterable[LogLike] | None, role: Role, profile: Profile | None) -> list[LogSource]:
+    """Sources of one log, several, or none."""
+    if logs is None:
+        return []
+    several = [logs] if isinstance(logs, str | Path | Log) else list(logs)
+    return [LogSource(log, role, profile) for log in several]

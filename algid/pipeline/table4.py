@@ -1,0 +1,92 @@
+"""The paper's Table 4 from any estimator's numbers, beside the truth and the paper's errors where known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from algid.arm import FloatArray, with_payload
+from algid.log import Truth
+from algid.results import Table4Row
+
+UNITS = {
+    "k5+k3": "kg m^2",
+    "k1": "kg m^2",
+    "k3": "kg m^2",
+    "k6": "N m s/rad",
+    "k4": "N m",
+    "k2": "N m",
+    "k5+k3+z1+z2": "kg m^2",
+    "k1+z3": "kg m^2",
+    "k3+z2": "kg m^2",
+    "k4+z4": "N m",
+    "k2+z5": "N m",
+    "m_p": "kg",
+}
+UNLOADED_ROWS = ("k5+k3", "k1", "k3", "k6", "k4", "k2")
+LOADED_ROWS = ("k5+k3+z1+z2", "k1+z3", "k3+z2", "k4+z4", "k2+z5")
+
+
+def unloaded_rows(k: FloatArray) -> dict[str, float]:
+    """The first six rows from k1 … k7 (7,)."""
+    k1, k2, k3, k4, k5, k6, _ = (float(value) for value in k)
+    return dict(zip(UNLOADED_ROWS, (k5 + k3, k1, k3, k6, k4, k2), strict=True))
+
+
+def loaded_rows(k: FloatArray) -> dict[str, float]:
+    """The next five rows from the loaded arm's constants (7,)."""
+    k1, k2, k3, k4, k5, _, _ = (float(value) for value in k)
+    return dict(zip(LOADED_ROWS, (k5 + k3, k1, k3, k4, k2), strict=True))
+
+
+def true_rows(truth: Truth | None, payload: float | None) -> dict[str, float]:
+    """All rows of the arm behind a synthetic log, with the loaded log's `payload` in kg."""
+    if truth is None:
+        return {}
+    k = truth.arm.constants()
+    rows = unloaded_rows(k)
+    if payload:
+        rows |= loaded_rows(with_payload(k, truth.arm.payload_constants(payload)))
+        rows["m_p"] = payload
+    return rows
+
+
+def paper_errors(truth: Truth | None) -> dict[str, float]:
+    """The paper's errors in percent, where the log comes from one of its cases unchanged."""
+    from algid.synth.cases import case_names, load_case
+
+    if truth is None or truth.case not in case_names():
+        return {}
+    case = load_case(truth.case)
+    return case.paper_error_percent if case.arm == truth.arm else {}
+
+
+def table4(
+    found: Mapping[str, float], std: Mapping[str, float], true: Mapping[str, float], paper: Mapping[str, float]
+) -> list[Table4Row]:
+    """The twelve rows; what was not estimated, or is not known, is null."""
+    return [
+        _row(name, unit, found.get(name), std.get(name), true.get(name), paper.get(name))
+        for name, unit in UNITS.items()
+    ]
+
+
+def _row(
+    name: str, unit: str, found: float | None, std: float | None, true: float | None, paper: float | None
+) -> Table4Row:
+    estimate = finite(found)
+    return Table4Row(
+        parameter=name,
+        unit=unit,
+        estimate=estimate,
+        std=finite(std),
+        truth=true,
+        error_percent=None if estimate is None or not true else 100 * abs(estimate / true - 1),
+        paper_error_percent=paper,
+    )
+
+
+def finite(value: float | None) -> float | None:
+    """The value as JSON can hold it: None where it is not a finite number."""
+    return None if value is None or not np.isfinite(value) else float(value)

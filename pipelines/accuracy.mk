@@ -1,0 +1,9 @@
+.PHONY: accuracy accuracy-quick
+
+ACCURACY_DRAWS ?= 100
+
+accuracy: setup ## errors against the Cramér-Rao bound, peers, real arm; into build/accuracy
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python pipelines/accuracy.py --draws $(ACCURACY_DRAWS) -o build/accuracy
+
+accuracy-quick: setup
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python pipelines/accuracy.py --quick -o build/accuracy

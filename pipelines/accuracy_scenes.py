@@ -1,0 +1,139 @@
+"""Arms, motions and noise of the accuracy benchmark, and the peers that run on the same logs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from cramer_rao import Truth
+
+from algid.arm import Arm, FloatArray, regressor, with_payload
+from algid.identify.paper.stages import stage1, stage2
+from algid.observers import LuenbergerObserver
+from algid.sampling import Segment
+from algid.synth.cases import load_case
+from algid.synth.excitation import Torque, wide_multi_sine
+from algid.synth.simulator import simulate
+
+RATE = 1000.0
+DURATION = 10.0
+ENCODER_STEP = 2 * np.pi / 4096
+CUTOFFS = (3.0, 5.0, 8.0, 12.0, 18.0, 27.0, 40.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """An arm with its payload, and its true motion without and with it."""
+
+    name: str
+    arm: Arm
+    payload: float
+    bare: Truth
+    burdened: Truth
+
+    @property
+    def truth(self) -> FloatArray:
+        """k1 … k7, m_p, l1, l2: (10,)."""
+        return np.concatenate([self.arm.constants(), [self.payload, self.arm.l1, self.arm.l2]])
+
+    @property
+    def turns(self) -> FloatArray:
+        """Turns that each joint ranges over without payload (2,)."""
+        return np.ptp(self.bare.theta, axis=1) / (2 * np.pi)
+
+
+def random_arm(seed: int) -> tuple[Arm, float]:
+    """An arm of plausible make and a payload of a quarter to one of its second link's mass."""
+    rng = np.random.default_rng(seed)
+    m1, m2 = rng.uniform(0.4, 3.0), rng.uniform(0.2, 1.5)
+    l1, l2 = rng.uniform(0.15, 0.5, 2)
+    lc1, lc2 = l1 * rng.uniform(0.35, 0.65), l2 * rng.uniform(0.35, 0.65)
+    inertia1, inertia2 = m1 * l1**2 / 12 * rng.uniform(0.7, 1.5), m2 * l2**2 / 12 * rng.uniform(0.7, 1.5)
+    b1, b2 = rng.uniform(0.05, 0.3, 2)
+    return Arm(m1, m2, lc1, lc2, l1, l2, inertia1, inertia2, b1, b2), float(m2 * rng.uniform(0.25, 1.0))
+
+
+def scene(name: str) -> Scene:
+    """The scene `case1`, `case2`, or `arm<seed>`; arms of odd seed get a torque that turns joint 1 round."""
+    if name.startswith("case"):
+        case = load_case(name)
+        arm, payload, bias = case.arm, case.payload, 0.0
+    else:
+        arm, payload = random_arm(int(name.removeprefix("arm")))
+        k = arm.constants()
+        bias = float(k[3] + k[1] + 2 * k[5]) if int(name.removeprefix("arm")) % 2 else 0.0
+    k = arm.constants()
+    loaded = with_payload(k, arm.payload_constants(payload))
+    seed = sum(name.encode())
+    return Scene(name, arm, payload, _moved(k, _torque(arm, seed, bias)), _moved(loaded, _torque(arm, seed + 1, bias)))
+
+
+def _torque(arm: Arm, seed: int, bias: float) -> Torque:
+    wide = wide_multi_sine(arm, seed)
+    return lambda t: wide(t) + np.array([[bias], [0.0]])
+
+
+def _moved(k: FloatArray, torque: Torque) -> Truth:
+    t = np.arange(round(DURATION * RATE) + 1) / RATE
+    motion = simulate(k, torque, t)
+    return Truth(t, motion.theta, motion.omega, motion.tau)
+
+
+def noisy(truth: Truth, sigma_theta: float, sigma_tau: float, encoder: bool, rng: np.random.Generator) -> Segment:
+    """One draw of a log: Gaussian noise on the angles, or an encoder of twelve bits at a random phase."""
+    theta = truth.theta + sigma_theta * rng.standard_normal(truth.theta.shape)
+    if encoder:
+        phase = rng.uniform(0, ENCODER_STEP, (2, 1))
+        theta = np.round((truth.theta + phase) / ENCODER_STEP) * ENCODER_STEP - phase
+    return Segment(0.0, 1 / RATE, theta, truth.tau + sigma_tau * rng.standard_normal(truth.tau.shape))
+
+
+def filtered_least_squares(bare: Segment, burdened: Segment, gravity: float) -> FloatArray:
+    """Inverse-dynamics least squares behind zero-phase filters of each cutoff: k1 … k7 and m_p (C, 8)."""
+    rows = []
+    for cutoff in CUTOFFS:
+        k, loaded = _inverse_dynamics(bare, cutoff), _inverse_dynamics(burdened, cutoff)
+        rows.append(np.append(k, _payload_mass(k, loaded, gravity)))
+    return np.array(rows)
+
+
+def _inverse_dynamics(log: Segment, cutoff: float) -> FloatArray:
+    from scipy.signal import butter, sosfiltfilt
+
+    sections = butter(4, cutoff, fs=1 / log.dt, output="sos")
+    theta, tau = sosfiltfilt(sections, np.stack([log.theta, log.tau]), axis=-1)
+    omega = np.gradient(theta, log.dt, axis=1)
+    Y = regressor(theta, omega, np.gradient(omega, log.dt, axis=1))
+    # Filtered alike, as Gautier's practice is: the regressor's products pass the same filter as the torque.
+    Y = sosfiltfilt(sections, Y, axis=-1)
+    tau = sosfiltfilt(sections, tau, axis=-1)
+    inner = slice(300, -300)
+    A = np.concatenate([Y[joint][:, inner].T for joint in range(2)])
+    b = np.concatenate([tau[joint][inner] for joint in range(2)])
+    k: FloatArray = np.linalg.lstsq(A, b, rcond=None)[0]
+    return k
+
+
+def paper(bare: Segment, burdened: Segment, gravity: float) -> FloatArray:
+    """The paper's method with its observer on windows of one second, median over windows: k1 … k7, m_p (8,)."""
+    theta, omega, tau = _windows(bare)
+    k = np.nanmedian(stage1(theta, omega, tau, bare.dt).k[..., -200:], axis=(1, 2))
+    theta, omega, tau = _windows(burdened)
+    second = stage2(theta, omega, tau, bare.dt, k, gravity)
+    return np.append(k, np.nanmedian(second.m_p[..., -200:]))
+
+
+def _windows(log: Segment) -> tuple[FloatArray, FloatArray, FloatArray]:
+    length = round(1 / log.dt) + 1
+    omega = LuenbergerObserver(log.dt).velocities(log.theta)
+    starts = range(0, len(log) - length + 1, length - 1)
+    return tuple(  # type: ignore[return-value]
+        np.stack([signal[:, start : start + length] for start in starts], axis=1)
+        for signal in (log.theta, omega, log.tau)
+    )
+
+
+def _payload_mass(k: FloatArray, loaded: FloatArray, gravity: float) -> float:
+    """The paper's route from the constants to m_p."""
+    z1, z4 = loaded[4] - k[4], loaded[3] - k[3]
+    return float(z4**2 / (z1 * gravity**2))

@@ -1,0 +1,173 @@
+"""Time the readers against decompression, polars and other readers, in one run on the same files.
+
+Usage: python -m pipelines.bench_ingest [FOLDER]
+
+Prints a Markdown table. Times are the best of several repetitions, page cache warm, imports excluded.
+"""
+
+from __future__ import annotations
+
+import gc
+import struct
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+import zstandard
+
+from algid.log import Log, Origin
+from algid.readers import open_log, read_log
+from algid.readers.mcap import opened
+from pipelines import bench_files
+
+COLUMNS = ["stamp_ns", "theta1", "theta2", "tau1", "tau2", "omega1", "omega2"]
+
+
+def best(work: Callable[[], object], repetitions: int) -> float:
+    """Shortest time in s of several repetitions."""
+    times = []
+    for _ in range(repetitions):
+        gc.collect()
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def decompress(path: Path) -> int:
+    """Unpack every chunk of a file and do nothing else."""
+    size = 0
+    with opened(path) as (file, found):
+        for span in found.spans:
+            chunk = file.read(span.start, span.length)
+            (claimed,) = struct.unpack_from("<Q", chunk, 16)
+            (name,) = struct.unpack_from("<I", chunk, 28)
+            packed = memoryview(chunk)[40 + name :]
+            size += len(zstandard.ZstdDecompressor().decompress(packed, max_output_size=claimed))
+    return size
+
+
+def peer(path: Path, factory: Any, topic: str) -> Log | None:
+    """The log through the `mcap` package and a decoder factory, message by message."""
+    from mcap.reader import make_reader
+
+    stamps, positions, velocities, efforts = [], [], [], []
+    with path.open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[factory])
+        for _, _, message, decoded in reader.iter_decoded_messages(topics=[topic]):
+            stamps.append(message.log_time)
+            positions.append(list(decoded.position))
+            velocities.append(list(decoded.velocity))
+            efforts.append(list(decoded.effort))
+    theta, omega, tau = (np.array(rows).T for rows in (positions, velocities, efforts))
+    return Log(np.array(stamps), theta, tau, Origin("", "", {}), omega)
+
+
+def same(one: Log, other: Log) -> bool:
+    """Whether two logs agree in every bit."""
+    names = ("stamp_ns", "theta", "tau", "omega")
+    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in names)
+
+
+def peak_above_arrays(path: Path) -> float:
+    """MB of memory that reading a file takes beyond its arrays and what the imports take."""
+    code = (
+        "import resource, sys; from algid.readers import open_log, read_log; import polars, pyarrow.parquet\n"
+        "from pathlib import Path; import algid.readers.mcap.plan, algid.readers.parquet, algid.readers.csv\n"
+        "peak = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024\n"
+        "before = peak(); log = read_log(sys.argv[1])\n"
+        "arrays = sum(a.nbytes for a in (log.stamp_ns, log.theta, log.tau, log.omega))\n"
+        "print((peak() - before - arrays) / 1e6)"
+    )
+    done = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True)
+    return float(done.stdout)
+
+
+def row(name: str, aim: str, figure: str, told: str) -> None:
+    """Print one row of the table."""
+    print(f"| {name} | {aim} | {figure} | {told} |", flush=True)
+
+
+def joints(folder: Path) -> None:
+    """A million joint states among Imu messages."""
+    from mcap_ros2.decoder import DecoderFactory
+
+    path = folder / "joints.mcap"
+    if not path.exists():
+        bench_files.joint_and_imu(path)
+    limit, ours = best(lambda: decompress(path), 7), best(lambda: read_log(path), 7)
+    told = f"{ours:.3f} s, decompression {limit:.3f} s"
+    row("1,000,000 JointState + 200,000 Imu, zstd, to decompression", "≤ 3", f"{ours / limit:.2f}", told)
+    start = time.perf_counter()
+    theirs = peer(path, DecoderFactory(), "/joint_states")
+    slow = time.perf_counter() - start
+    equal = "bit-exact" if theirs is not None and same(read_log(path), theirs) else "DIFFERENT"
+    row("the same, mcap-ros2-support to algid", "≥ 40", f"{slow / ours:.0f}", f"{slow:.1f} s, {equal}")
+    row("the same, memory beyond the arrays, MB", "≤ 64", f"{peak_above_arrays(path):.0f}", "peak resident")
+
+
+def protobuf(folder: Path) -> None:
+    """A hundred thousand protobuf messages."""
+    from mcap_protobuf.decoder import DecoderFactory
+
+    path = folder / "protobuf.mcap"
+    if not path.exists():
+        bench_files.protobuf_states(path)
+    ours = best(lambda: read_log(path), 7)
+    start = time.perf_counter()
+    theirs = peer(path, DecoderFactory(), "/arm")
+    slow = time.perf_counter() - start
+    equal = "bit-exact" if theirs is not None and same(read_log(path), theirs) else "DIFFERENT"
+    told = f"{ours:.3f} s against {slow:.2f} s, {equal}"
+    row("100,000 protobuf, mcap-protobuf-support to algid", "≥ 15", f"{slow / ours:.0f}", told)
+
+
+def cameras(folder: Path) -> None:
+    """Bytes read of a large log with cameras."""
+    path = folder / "cameras.mcap"
+    if not path.exists():
+        bench_files.with_cameras(path)
+    with opened(path) as (file, found):
+        needed = sum(span.length for span in found.spans if span.channels and 1 in span.channels)
+        from algid.readers.mcap.plan import plan
+
+        (topic,) = plan(file, found, None).topics
+        for _ in topic.tables(str(path), file, found, 1 << 18):
+            pass
+        told = f"{file.read_bytes / 1e6:.0f} MB of {file.size / 1e6:.0f} MB"
+        row(
+            "2 GB with cameras, bytes read to the channel's chunks",
+            "≤ 2",
+            f"{file.read_bytes / needed:.2f}",
+            told,
+        )
+
+
+def flat(folder: Path) -> None:
+    """Parquet and CSV against polars reading the same columns."""
+    bench_files.flat_files(folder)
+    for kind, reader in (("parquet", pl.read_parquet), ("csv", pl.read_csv)):
+        path = folder / f"arm.{kind}"
+        theirs = best(lambda path=path, reader=reader: reader(path, columns=COLUMNS), 11)  # type: ignore[misc]
+        ours = best(lambda path=path: read_log(path), 11)  # type: ignore[misc]
+        blocks = best(lambda path=path: [len(block) for block in open_log(path).blocks()], 11)  # type: ignore[misc]
+        told = f"{ours:.3f} s against {theirs:.3f} s; in blocks {blocks:.3f} s"
+        row(f"1,000,000 rows of {kind}, to polars", "≤ 1.3", f"{ours / theirs:.2f}", told)
+
+
+def main() -> None:
+    """All of them."""
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "build/bench-ingest")
+    folder.mkdir(parents=True, exist_ok=True)
+    print("| what | aim | measured | told |\n|---|---|---|---|")
+    for part in (joints, protobuf, cameras, flat):
+        part(folder)
+
+
+if __name__ == "__main__":
+    main()

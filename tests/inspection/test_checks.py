@@ -1,0 +1,142 @@
+"""Every named check on a log made for it, and none of them on a clean one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from algid.arm import Arm, inverse_dynamics
+from algid.errors import LogError
+from algid.inspection.checks import admit, examine
+from algid.inspection.dynamics import dynamic_figures
+from algid.inspection.signals import signal_figures
+from algid.log import Log, Origin
+from algid.profile import Profile
+from algid.readers import read_log
+
+K = Arm(6, 3, 0.15, 0.1, 0.3, 0.2, 0.1, 0.02, 1.5, 0.3).constants()
+
+
+def moving_log(rows: int = 6000) -> Log:
+    """Closed-form motion and the torque that eq. (1) gives for it, 1 kHz, with measurement noise."""
+    draw = np.random.default_rng(4)
+    t = np.arange(rows) * 1e-3
+    theta, omega, alpha = np.zeros((3, 2, rows))
+    for joint, terms in enumerate((((0.9, 2.1), (0.4, 5.3)), ((1.1, 1.3), (0.5, 6.1)))):
+        for size, rate in terms:
+            theta[joint] += size * np.sin(rate * t)
+            omega[joint] += size * rate * np.cos(rate * t)
+            alpha[joint] -= size * rate**2 * np.sin(rate * t)
+    tau = inverse_dynamics(K, theta, omega, alpha) + draw.normal(0, 0.02, (2, rows))
+    noisy = theta + draw.normal(0, 1e-4, theta.shape)
+    return Log(np.arange(rows) * 1_000_000, noisy, tau, Origin("arm.csv", "csv", {}), omega)
+
+
+def codes(log: Log) -> list[str]:
+    return [finding.code for finding in examine(log)]
+
+
+def test_a_clean_log_raises_nothing() -> None:
+    log = moving_log()
+    assert codes(log) == []
+    assert admit(log).notices == ()
+
+
+def with_row(values: NDArray[np.float64], row: int, new: NDArray[np.float64] | float) -> NDArray[np.float64]:
+    changed = values.copy()
+    changed[row] = new
+    return changed
+
+
+def spoiled(name: str) -> Log:
+    log = moving_log()
+    theta, tau, omega = log.theta, log.tau, log.omega
+    assert omega is not None
+    match name:
+        case "EFFORT_ZERO":
+            return replace(log, tau=with_row(tau, 1, 0.0))
+        case "EFFORT_DENORMAL":
+            return replace(log, tau=tau * 1e-310)
+        case "EFFORT_CONSTANT":
+            return replace(log, tau=with_row(tau, 0, 2.5))
+        case "SATURATED_EFFORT":
+            return replace(log, tau=np.clip(tau, -4, 4))
+        case "ANGLE_CONSTANT":
+            return replace(log, theta=with_row(theta, 1, 0.5), omega=None)
+        case "WRAPPED_ANGLE":
+            return replace(log, theta=np.angle(np.exp(1j * (theta + 2.5))))
+        case "STUCK_SENSOR":
+            frozen = theta[0].copy()
+            frozen[3000:3400] = frozen[3000]
+            return replace(log, theta=with_row(theta, 0, frozen))
+        case "DEGREES":
+            return replace(log, theta=np.degrees(theta))
+        case "SPIKES":
+            spiked = tau[0].copy()
+            spiked[[700, 2000]] += 50
+            return replace(log, tau=with_row(tau, 0, spiked))
+        case "GAPS":
+            keep = np.r_[0:2000, 2500:6000]
+            return Log(log.stamp_ns[keep], theta[:, keep], tau[:, keep], log.origin, omega[:, keep])
+        case "JITTER":
+            late = np.random.default_rng(5).integers(0, 300_000, len(log))
+            return replace(log, stamp_ns=log.stamp_ns + late)
+        case "FLIPPED_SIGN":
+            return replace(log, tau=-tau)
+        case "WRONG_ZERO":
+            return replace(log, theta=with_row(theta, 0, theta[0] + np.pi / 2))
+        case _:
+            k = K.copy()
+            k[[1, 3]] = 0
+            alpha = np.gradient(omega, 1e-3, axis=1)
+            noise = np.random.default_rng(6).normal(0, 0.02, tau.shape)
+            return replace(log, tau=inverse_dynamics(k, theta, omega, alpha) + noise)
+
+
+REFUSED = ("EFFORT_ZERO", "EFFORT_DENORMAL", "EFFORT_CONSTANT", "WRAPPED_ANGLE", "DEGREES")
+TOLD = ("SATURATED_EFFORT", "ANGLE_CONSTANT", "STUCK_SENSOR", "SPIKES", "GAPS", "JITTER")
+TOLD_OF_GRAVITY = ("FLIPPED_SIGN", "WRONG_ZERO", "GRAVITY_COMPENSATED")
+
+
+@pytest.mark.parametrize("code", REFUSED + TOLD + TOLD_OF_GRAVITY)
+def test_each_check_sees_what_it_is_for(code: str) -> None:
+    log = spoiled(code)
+    assert code in codes(log)
+    if code in REFUSED:
+        with pytest.raises(LogError, match=f"arm.csv: {code}"):
+            admit(log)
+    else:
+        assert code in [notice.code for notice in admit(log).notices]
+
+
+def test_an_arm_in_a_horizontal_plane_is_not_asked_for_weight() -> None:
+    found = examine(spoiled("GRAVITY_COMPENSATED"), gravity=0)
+    assert [finding.code for finding in found] == []
+
+
+def test_encoder_step_and_noise_floor() -> None:
+    draw = np.random.default_rng(7)
+    smooth = np.sin(np.arange(5000) * 1e-3)
+    # the robust deviation of 5000 draws is good to a few percent
+    assert signal_figures(smooth + draw.normal(0, 1e-3, 5000)).noise == pytest.approx(1e-3, rel=0.1)
+    stepped = np.rint(smooth / 3.8e-4) * 3.8e-4
+    assert signal_figures(stepped).step == pytest.approx(3.8e-4, rel=1e-6)
+    assert signal_figures(smooth).step == 0
+
+
+def test_the_recorded_runs_tell_their_zero(shared_data: Path) -> None:
+    runs = sorted((shared_data / "dfki" / "C1_sysid").glob("*.csv"))
+    turned = {"WRONG_ZERO", "FLIPPED_SIGN", "GRAVITY_COMPENSATED"}
+    blamed = [turned & set(codes(read_log(run))) for run in runs]
+    assert set.union(*blamed) == {"WRONG_ZERO"}
+    assert sum(map(bool, blamed)) >= 5
+    for run in runs:
+        log = read_log(run, Profile(zero="hanging"))
+        assert not turned & set(codes(log))
+        figures = dynamic_figures(log)
+        assert figures is not None
+        assert figures.explained > 0.8
