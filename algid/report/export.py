@@ -38,7 +38,7 @@ from algid.results import Result, read_result
 if TYPE_CHECKING:
     from mcap.writer import Writer
 
-START_KEY = b"algid.start_ns"
+START_KEY = b"start_ns"
 TORQUES = ("log", "t", "tau1", "tau2", "tau1_predicted", "tau2_predicted")
 ROWS = 1 << 14
 
@@ -47,7 +47,7 @@ def export_mcap(folder: Path) -> Path:
     """Write `estimates.mcap` into the result folder `folder`.
 
     The messages bear the log's own stamps where `torque.parquet` tells each log's first one, in ns, as a
-    JSON list in its metadata ``algid.start_ns``; otherwise time counts from zero.
+    JSON list in its metadata ``start_ns``; otherwise time counts from zero.
 
     Raises
     ------

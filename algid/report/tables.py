@@ -104,7 +104,7 @@ def _estimate_row(name: str, found: Estimate, known: Table4Row | None) -> tuple[
         unit_text(found.unit),
         found.status.value,
         ABSENT if found.ci95 is None else interval(*found.ci95, digits),
-        *_against(known, digits),
+        *_against(_of_this(known, found), digits),
     )
 
 
@@ -117,6 +117,16 @@ def _table4_row(row: Table4Row) -> tuple[str, ...]:
         unit_text(row.unit),
         *_against(row, digits_of(row.estimate, row.std)),
     )
+
+
+def _of_this(known: Table4Row | None, found: Estimate) -> Table4Row | None:
+    """What is known of `found`: where Table 4 holds another estimate of the same name, the error is its own."""
+    if known is None or known.estimate == found.estimate:
+        return known
+    if known.truth is None or found.estimate is None:
+        return known.model_copy(update={"error_percent": None})
+    error = 100 * abs(found.estimate - known.truth) / abs(known.truth) if known.truth else None
+    return known.model_copy(update={"error_percent": error})
 
 
 def _against(known: Table4Row | None, digits: int) -> tuple[str, str, str]:

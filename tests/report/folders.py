@@ -166,7 +166,7 @@ def _write_torque(path: Path, recordings: list[Recording], k: FloatArray) -> Non
         frames.append(pl.DataFrame(columns))
     table = pl.concat(frames).to_arrow()
     starts = json.dumps([START_NS, START_NS + 60_000_000_000])
-    pq.write_table(table.replace_schema_metadata({"algid.start_ns": starts}), path)
+    pq.write_table(table.replace_schema_metadata({"start_ns": starts}), path)
 
 
 def _write_information(path: Path, y: FloatArray) -> None:

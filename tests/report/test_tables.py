@@ -78,6 +78,14 @@ def test_truth_and_the_papers_error_stand_beside_the_estimate(result: Result) ->
     assert row["Paper %"] == "0.2449"
 
 
+def test_the_error_belongs_to_the_estimate_beside_it(result: Result) -> None:
+    row = result.table4[0].model_copy(update={"parameter": "m_p", "estimate": 0.5, "truth": 0.5, "error_percent": 0.0})
+    other = {"m_p": Estimate(estimate=0.51, unit="kg")}
+    changed = result.model_copy(update={"table4": [row], "paper_payload": other, "payload": {}})
+    table = next(table for table in estimate_tables(changed) if "route" in table.title)
+    assert table.rows == (("m_p", "0.51000", "kg", "OK", "0.50000", "2.000", "0.2449"),)
+
+
 def test_a_column_that_nobody_fills_is_dropped(result: Result) -> None:
     bare = {"k1": Estimate(estimate=1.0, unit="kg m^2")}
     tables = estimate_tables(result.model_copy(update={"parameters": bare, "table4": [], "payload": {}}))
