@@ -32,6 +32,7 @@ from algid.synth.simulator import Motion, simulate
 NOISE = 1e-2  # N m
 RATE = 1000.0
 START_NS = 1_700_000_000_123_456_789
+LOADED_START_NS = START_NS + 60_000_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +166,7 @@ def _write_torque(path: Path, recordings: list[Recording], k: FloatArray) -> Non
         columns |= {f"tau{joint + 1}_predicted": predicted[joint] for joint in range(2)}
         frames.append(pl.DataFrame(columns))
     table = pl.concat(frames).to_arrow()
-    starts = json.dumps([START_NS, START_NS + 60_000_000_000])
+    starts = json.dumps([START_NS, LOADED_START_NS])
     pq.write_table(table.replace_schema_metadata({"start_ns": starts}), path)
 
 
@@ -196,7 +197,9 @@ def _write_series(folder: Path, unloaded: Recording, loaded: Recording, k: Float
     for name, found in (("estimates", series), ("loaded", other)):
         flat = {key: values.reshape(-1) for key, values in found.items()}
         t = np.arange(flat["condition"].size) / RATE
-        pl.DataFrame({"t": t, **flat}).write_parquet(folder / f"{name}.parquet")
+        table = pl.DataFrame({"t": t, **flat}).to_arrow()
+        start = START_NS if name == "estimates" else LOADED_START_NS
+        pq.write_table(table.replace_schema_metadata({"start_ns": json.dumps([start])}), folder / f"{name}.parquet")
 
 
 def build_recorded(folder: Path, csv: Path) -> Result:
