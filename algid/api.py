@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from algid.log import Log
-from algid.synth.cases import load_case
 from algid.synth import run
+from algid.synth.cases import load_case
 from algid.synth.sensors import Sensors
 
 

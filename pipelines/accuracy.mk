@@ -3,7 +3,7 @@
 ACCURACY_DRAWS ?= 100
 
 accuracy: setup ## errors against the Cramér-Rao bound, peers, real arm; into build/accuracy
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python pipelines/accuracy.py --draws $(ACCURACY_DRAWS) -o build/accuracy
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.accuracy --draws $(ACCURACY_DRAWS) -o build/accuracy
 
 accuracy-quick: setup
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python pipelines/accuracy.py --quick -o build/accuracy
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.accuracy --quick -o build/accuracy

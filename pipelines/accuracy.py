@@ -16,9 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import accuracy_scenes as scenes
 import numpy as np
-from cramer_rao import joint_bound
 
 from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.identify import refined, weak
@@ -27,6 +25,8 @@ from algid.sampling import Segment
 from algid.synth.cases import load_case
 from algid.synth.excitation import SampledTorque
 from algid.synth.simulator import simulate
+from pipelines import accuracy_scenes as scenes
+from pipelines.cramer_rao import joint_bound
 
 SCENES = ("case1", "case2", "arm1", "arm2", "arm3", "arm4", "arm5")
 NOISES = (1e-4, 1e-3, 3e-3)
@@ -204,7 +204,7 @@ def _first(logs: list[Segment], count: int) -> list[Segment]:
 
 def dfki_rows(folder: Path) -> list[Row]:
     """The real arm, each run predicted from the others, by the README beside the data."""
-    from accuracy_dfki import evaluate
+    from pipelines.accuracy_dfki import evaluate
 
     return evaluate(folder)
 
@@ -231,7 +231,7 @@ def main() -> None:
         "dfki": dfki_rows(given.dfki) if given.dfki.is_dir() else [],
     }
     (given.output / "accuracy.json").write_text(json.dumps(found, indent=1))
-    from accuracy_report import markdown, plot
+    from pipelines.accuracy_report import markdown, plot
 
     text = markdown(found)
     (given.output / "accuracy.md").write_text(text)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from cramer_rao import Truth
 
 from algid.arm import Arm, FloatArray, regressor, with_payload
 from algid.identify.paper.stages import stage1, stage2
@@ -14,6 +13,7 @@ from algid.sampling import Segment
 from algid.synth.cases import load_case
 from algid.synth.excitation import Torque, wide_multi_sine
 from algid.synth.simulator import simulate
+from pipelines.cramer_rao import Truth
 
 RATE = 1000.0
 DURATION = 10.0

@@ -8,7 +8,12 @@ import typer
 
 from algid import __version__
 from algid.cli.check import check
+from algid.cli.compare import compare
+from algid.cli.convert import convert
 from algid.cli.identify import identify
+from algid.cli.inspect import inspect
+from algid.cli.profile import new
+from algid.cli.report import report
 from algid.cli.synth import synth
 
 app = typer.Typer(
@@ -34,6 +39,9 @@ def _root(
     pass
 
 
-app.command()(synth)
-app.command()(identify)
-app.command()(check)
+profiles = typer.Typer(help="Profiles tell what a log's names, units and signs mean.", no_args_is_help=True)
+profiles.command("new")(new)
+
+for command in (inspect, identify, check, report, compare, synth, convert):
+    app.command()(command)
+app.add_typer(profiles, name="profile")

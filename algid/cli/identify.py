@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
-from algid.cli import EXIT_INCOMPLETE
-
-if TYPE_CHECKING:
-    from algid.profile import Profile
-    from algid.results import Result
+from algid.cli import EXIT_INCOMPLETE, profiles
+from algid.cli.report import ResultFormat, print_result
 
 
 class Estimator(StrEnum):
@@ -51,13 +48,6 @@ class Hold(StrEnum):
     ZOH = "zoh"
 
 
-class Output(StrEnum):
-    """What goes to standard output."""
-
-    TABLE = "table"
-    JSON = "json"
-
-
 def identify(
     logs: Annotated[list[Path], typer.Argument(help="Logs of the arm without payload; loaded ones with --parameters.")],
     loaded: Annotated[
@@ -68,7 +58,14 @@ def identify(
     parameters: Annotated[
         Path | None, typer.Option(help="Result of the arm identified before: then LOGS are of the loaded arm.")
     ] = None,
-    profile: Annotated[Path | None, typer.Option(help="algid.toml that tells names, units and signs.")] = None,
+    profile: profiles.ProfileFile = None,
+    topic: profiles.Topic = None,
+    joints: profiles.Joints = None,
+    angle_unit: profiles.AngleUnit = None,
+    torque_unit: profiles.TorqueUnit = None,
+    zero: profiles.Zero = None,
+    second_angle: profiles.SecondAngle = None,
+    clock: profiles.Clock = None,
     velocity: Annotated[Velocity, typer.Option(help="Observe velocities, or use the log's own.")] = Velocity.OBSERVER,
     observer: Annotated[
         Observer | None, typer.Option(help="The paper's observer, or the zero-phase differentiator.")
@@ -95,7 +92,7 @@ def identify(
     ] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace a result that is there.")] = False,
     report: Annotated[bool, typer.Option(help="Write pages and time series beside result.json.")] = True,
-    output: Annotated[Output, typer.Option("--format", help="What to print.")] = Output.TABLE,
+    output: Annotated[ResultFormat, typer.Option("--format", help="What to print.")] = ResultFormat.TABLE,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
     """Identify an arm's constants k1 … k7 and, with loaded logs, its payload; write LOG.algid.
@@ -128,27 +125,21 @@ def identify(
     )
     known = None if parameters is None else read_result(parameters)
     bare, burdened = (logs, loaded or []) if known is None else ([], [*logs, *(loaded or [])])
-    result = run(
-        bare, burdened, settings, parameters=known, profile=_profile(profile), out=out, force=force, report=report
+    meaning = profiles.profile_from(
+        profile,
+        topic=topic,
+        joints=joints,
+        angle_unit=angle_unit,
+        torque_unit=torque_unit,
+        zero=zero,
+        second_angle=second_angle,
+        clock=clock,
     )
+    result = run(bare, burdened, settings, parameters=known, profile=meaning, out=out, force=force, report=report)
     if not quiet:
-        show(result, output)
+        print_result(result, output)
     if not result.complete or result.data_lost:
         raise typer.Exit(EXIT_INCOMPLETE)
-
-
-def show(result: Result, output: Output) -> None:
-    """Print a result as asked; warnings go to standard error with the table."""
-    from algid.results import result_json
-
-    if output is Output.JSON:
-        print(result_json(result), end="")
-        return
-    from rich.console import Console
-
-    from algid.report import print_table
-
-    print_table(result, Console())
 
 
 def _delay(text: str) -> float | Literal["estimate"]:
@@ -173,11 +164,3 @@ def _poles(text: str) -> tuple[complex, ...]:
     except ValueError as error:
         raise SettingError(f"--poles {text}: {error}; give six like -80,-390,-391,-392,-393,-394") from None
     return tuple(pole.real if pole.imag == 0 else pole for pole in poles)
-
-
-def _profile(path: Path | None) -> Profile | None:
-    if path is None:
-        return None
-    from algid.profile import load_profile
-
-    return load_profile(path)

@@ -197,9 +197,7 @@ def _gravity(figures: DynamicFigures) -> Iterator[Finding]:
     elif figures.seen < 0.015 or figures.gravity_share < 0.02:
         return  # the motion does not tell where gravity pulls
     elif abs(figures.turn) > 135:
-        text = (
-            f"gravity pulls upwards (k4 = {figures.weight1:.3g} N m): the sign of torques or angles is wrong"
-        )
+        text = f"gravity pulls upwards (k4 = {figures.weight1:.3g} N m): the sign of torques or angles is wrong"
         yield Finding("FLIPPED_SIGN", text)
     elif abs(figures.turn) > 45:
         text = (

@@ -63,7 +63,8 @@ def identify(
         If there is neither an unloaded log nor `parameters`.
     """
     settings = settings or Settings()
-    bare, burdened = sources_of(unloaded, "unloaded", profile), sources_of(loaded, "loaded", profile)
+    bare = sources_of(unloaded, "unloaded", profile, settings.gravity)
+    burdened = sources_of(loaded, "loaded", profile, settings.gravity)
     if not bare and (parameters is None or not burdened):
         raise ValueError("an unloaded log is needed, or parameters and a loaded log")
     if out is None:

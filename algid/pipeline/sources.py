@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -34,11 +35,13 @@ class _Seen:
 class LogSource:
     """One log, from a file or from memory; `segments` gives a fresh pass over it."""
 
-    def __init__(self, log: LogLike, role: Role, profile: Profile | None = None) -> None:
+    def __init__(self, log: LogLike, role: Role, profile: Profile | None = None, gravity: float = 9.81) -> None:
         self.role = role
         self.name = log.origin.path if isinstance(log, Log) else str(log)
         self._log = log
         self._profile = profile
+        self._gravity = gravity
+        self._found: list[Notice] | None = None
         self.origin, self._blocks = self._open()
         self._seen: _Seen | None = None
         self._refuse_the_other_role()
@@ -65,15 +68,29 @@ class LogSource:
 
     def _counted(self) -> Iterator[Log]:
         seen = _Seen()
-        for block in self._blocks():
+        for block, alone in _with_end(self._blocks()):
             if len(block) and not seen.rows:
                 seen.first_ns = int(block.stamp_ns[0])
+                seen.notices += self._examined(block, alone)
             if len(block):
                 seen.last_ns = int(block.stamp_ns[-1])
             seen.rows += len(block)
             seen.notices += block.notices
             yield block
         self._seen = seen
+
+    def _examined(self, block: Log, alone: bool) -> list[Notice]:
+        """What the named checks find in the first block; they refuse a log only where that is all of it."""
+        if self._found is None:
+            from algid.inspection.checks import examine
+
+            findings = examine(block, gravity=self._gravity)
+            refused = next((finding for finding in findings if finding.refuse), None)
+            if refused is not None and alone:
+                raise LogError(f"{self.name}: {refused.code}: {refused.text}")
+            place = "" if alone else f" (in its first {block.duration:.0f} s)"
+            self._found = [Notice(finding.code, f"{finding.code}: {finding.text}{place}") for finding in findings]
+        return self._found
 
     @property
     def seen(self) -> _Seen:
@@ -118,6 +135,17 @@ class LogSource:
         )
 
 
+def _with_end(blocks: Iterator[Log]) -> Iterator[tuple[Log, bool]]:
+    """Each block, and whether it is the only one."""
+    first = next(blocks, None)
+    if first is None:
+        return
+    second = next(blocks, None)
+    yield first, second is None
+    for block in chain([] if second is None else [second], blocks):
+        yield block, False
+
+
 def sha256_of(path: Path) -> str:
     """SHA-256 of a file, or of a folder's files in the order of their names."""
     digest = hashlib.sha256()
@@ -129,9 +157,11 @@ def sha256_of(path: Path) -> str:
     return digest.hexdigest()
 
 
-def sources_of(logs: LogLike | Iterable[LogLike] | None, role: Role, profile: Profile | None) -> list[LogSource]:
+def sources_of(
+    logs: LogLike | Iterable[LogLike] | None, role: Role, profile: Profile | None, gravity: float
+) -> list[LogSource]:
     """Sources of one log, several, or none."""
     if logs is None:
         return []
     several = [logs] if isinstance(logs, str | Path | Log) else list(logs)
-    return [LogSource(log, role, profile) for log in several]
+    return [LogSource(log, role, profile, gravity) for log in several]

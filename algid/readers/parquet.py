@@ -95,23 +95,16 @@ def _counted_rows(path: Path) -> int:
         groups = [metadata.row_group(place) for place in range(metadata.num_row_groups)]
         told = [group.num_rows for group in groups]
         fewest = [
-            min((group.column(place).num_values for place in range(group.num_columns)), default=0)
-            for group in groups
+            min((group.column(place).num_values for place in range(group.num_columns)), default=0) for group in groups
         ]
     except (pa.ArrowException, OSError, ValueError) as error:
         raise _damaged(path, error) from error
-    if sum(told) != metadata.num_rows or any(
-        rows > values for rows, values in zip(told, fewest, strict=True)
-    ):
-        raise LogError(
-            f"{path}: the Parquet footer contradicts itself about how many rows there are; copy it again"
-        )
+    if sum(told) != metadata.num_rows or any(rows > values for rows, values in zip(told, fewest, strict=True)):
+        raise LogError(f"{path}: the Parquet footer contradicts itself about how many rows there are; copy it again")
     if fewest != told and not any(
         "." in str(metadata.schema.column(place).path) for place in range(metadata.num_columns)
     ):
-        raise LogError(
-            f"{path}: the Parquet footer contradicts itself about how many values there are; copy it again"
-        )
+        raise LogError(f"{path}: the Parquet footer contradicts itself about how many values there are; copy it again")
     return int(metadata.num_rows)
 
 

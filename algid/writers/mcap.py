@@ -50,9 +50,7 @@ _QOS = """\
 """
 
 
-def write(
-    path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None, chunk_size: int = _CHUNK
-) -> None:
+def write(path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None, chunk_size: int = _CHUNK) -> None:
     """Write a log, or the blocks of one; the truth goes into the metadata record "algid".
 
     A chunk closes at `chunk_size` bytes.

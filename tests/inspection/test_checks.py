@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from algid.arm import Arm, inverse_dynamics
+from algid.arm import Arm, FloatArray, inverse_dynamics
 from algid.errors import LogError
 from algid.inspection.checks import admit, examine
 from algid.inspection.dynamics import dynamic_figures
@@ -46,7 +45,7 @@ def test_a_clean_log_raises_nothing() -> None:
     assert admit(log).notices == ()
 
 
-def with_row(values: NDArray[np.float64], row: int, new: NDArray[np.float64] | float) -> NDArray[np.float64]:
+def with_row(values: FloatArray, row: int, new: FloatArray | float) -> FloatArray:
     changed = values.copy()
     changed[row] = new
     return changed

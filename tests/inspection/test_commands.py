@@ -40,9 +40,7 @@ def test_inspect_tells_what_a_log_is(kind: str, tmp_path: Path) -> None:
     assert found["refused"] is None
     assert found["clock"]["rows"] == 6000
     assert found["clock"]["rate"] == pytest.approx(1000)
-    assert set(found["signals"]) == {
-        f"{name}{joint}" for name in ("theta", "tau", "omega") for joint in (1, 2)
-    }
+    assert set(found["signals"]) == {f"{name}{joint}" for name in ("theta", "tau", "omega") for joint in (1, 2)}
 
 
 def test_inspect_works_on_what_it_refuses(tmp_path: Path) -> None:

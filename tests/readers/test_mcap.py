@@ -76,9 +76,7 @@ def test_names_that_change_place_are_followed(tmp_path: Path) -> None:
         names, order = (["a1", "x", "a2"], [0, 2, 1]) if row % 3 else (["a2", "a1", "x"], [1, 0, 2])
         values = [*log.theta[:, row], 7.0]
         efforts = [*log.tau[:, row], 9.0]
-        data = joint_state(
-            stamp, names, [values[place] for place in order], (), [efforts[place] for place in order]
-        )
+        data = joint_state(stamp, names, [values[place] for place in order], (), [efforts[place] for place in order])
         messages.append((TOPIC, stamp, data.done()))
         messages.append((TOPIC, stamp + 5, joint_state(stamp + 5, ["gripper"], [1.0], (), [2.0]).done()))
     write_mcap(tmp_path / "log.mcap", messages)
@@ -135,9 +133,7 @@ def test_an_array_without_names_or_stamps_through_a_profile(tmp_path: Path) -> N
         messages.append(("/state", stamp, data.done()))
     schema = {"/state": ("std_msgs/msg/Float64MultiArray", "ros2msg", definition.encode())}
     write_mcap(tmp_path / "log.mcap", messages, schema)
-    paths = {
-        name: {"source": f"data[{place}]"} for place, name in enumerate(("theta1", "theta2", "tau1", "tau2"))
-    }
+    paths = {name: {"source": f"data[{place}]"} for place, name in enumerate(("theta1", "theta2", "tau1", "tau2"))}
     profile = Profile.model_validate({"topic": "/state", **paths})
     assert same(read_log(tmp_path / "log.mcap", profile), log)
 
@@ -310,8 +306,7 @@ def test_bags_compressed_by_message_are_refused(tmp_path: Path) -> None:
 def test_nan_in_a_message_is_refused(tmp_path: Path) -> None:
     stamp = EPOCH_NS
     messages = [
-        (TOPIC, stamp + row, joint_state(stamp + row, position=[0, 1], effort=[1, math.nan]).done())
-        for row in range(3)
+        (TOPIC, stamp + row, joint_state(stamp + row, position=[0, 1], effort=[1, math.nan]).done()) for row in range(3)
     ]
     write_mcap(tmp_path / "log.mcap", messages)
     with pytest.raises(LogError, match=r"tau2 .*effort\[joint2\].* sample 1"):

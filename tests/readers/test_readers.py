@@ -26,9 +26,7 @@ CSV = "t,theta1,theta2,tau1,tau2\n"
 @pytest.mark.parametrize("kind", FORMATS)
 @pytest.mark.parametrize("start_ns", [0, EPOCH_NS])
 @pytest.mark.parametrize("velocity", [True, False])
-def test_round_trip_keeps_every_bit_and_the_truth(
-    kind: str, start_ns: int, velocity: bool, tmp_path: Path
-) -> None:
+def test_round_trip_keeps_every_bit_and_the_truth(kind: str, start_ns: int, velocity: bool, tmp_path: Path) -> None:
     log = noise_log(start_ns=start_ns, velocity=velocity)
     write_log(tmp_path / f"log.{kind}", log, truth=TRUTH)
     found = read_log(tmp_path / f"log.{kind}")

@@ -1,0 +1,71 @@
+"""The simulator against closed forms, energy, and another integrator."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from algid.arm import energy, forward_dynamics
+from algid.integrals import integral
+from algid.synth.cases import load_case
+from algid.synth.excitation import SampledTorque, no_torque, wide_multi_sine
+from algid.synth.simulator import simulate
+
+CASE = load_case("case1")
+K = CASE.arm.constants()
+
+
+def test_energy_balance_holds() -> None:
+    t = 5e-5 * np.arange(20001)
+    motion = simulate(K, wide_multi_sine(CASE.arm), t)
+    power = motion.tau * motion.omega - K[5:, None] * motion.omega**2
+    stored = energy(K, motion.theta, motion.omega)
+    work = integral(power.sum(axis=0), t[1])
+    turned_over = integral(np.abs(power).sum(axis=0), t[1])[-1]
+    # the work is integrated at 20 kHz, to within 2e-10 of what is turned over
+    assert np.abs(stored - stored[0] - work).max() <= 1e-9 * turned_over
+
+
+def test_small_swing_is_that_of_the_linear_arm() -> None:
+    from scipy.linalg import expm
+
+    small = 1e-6
+    t = np.linspace(0, 0.5, 51)
+    motion = simulate(K, no_torque, t, np.array([-np.pi / 2 + small, 0.0]))
+    k1, k2, k3, k4, k5, k6, k7 = K
+    mass = np.array([[k5 + k3 + 2 * k1, k3 + k1], [k3 + k1, k3]])
+    stiffness, damping = np.array([[k4 + k2, k2], [k2, k2]]), np.diag([k6, k7])
+    rate = np.block(
+        [[np.zeros((2, 2)), np.eye(2)], [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)]]
+    )
+    linear = np.stack([expm(rate * now) @ [small, 0, 0, 0] for now in t], axis=1)
+    # terms of third order in the swing, 1e-18, and the integrator's tolerance
+    np.testing.assert_allclose(motion.theta + np.array([[np.pi / 2], [0.0]]), linear[:2], atol=1e-12)
+
+
+def test_angles_agree_with_an_implicit_integrator() -> None:
+    torque = wide_multi_sine(CASE.arm)
+    t = np.linspace(0, 0.5, 6)
+    motion = simulate(K, torque, t)
+
+    def rate(now: float, y: np.ndarray) -> np.ndarray:
+        return np.concatenate([y[2:], forward_dynamics(K, y[:2], y[2:], torque(np.array([now]))[:, 0])])
+
+    other = solve_ivp(rate, (0, 0.5), [-np.pi / 2, 0, 0, 0], method="Radau", t_eval=t, rtol=1e-11, atol=1e-12).y
+    np.testing.assert_allclose(motion.theta, other[:2], atol=1e-9)
+
+
+@pytest.mark.parametrize("hold", ["zoh", "foh"])
+def test_sampled_torque_is_integrated_from_corner_to_corner(hold: str) -> None:
+    knots = np.linspace(0, 0.2, 21)
+    tau = np.random.default_rng(3).normal(0, 0.5, (2, knots.size))
+    torque = SampledTorque(knots, tau, hold)  # type: ignore[arg-type]
+    coarse, fine = np.linspace(0, 0.2, 3), np.linspace(0, 0.2, 401)
+    first, second = simulate(K, torque, coarse), simulate(K, torque, fine)
+    np.testing.assert_allclose(first.theta, second.theta[:, ::200], atol=1e-11)
+
+
+def test_times_must_increase() -> None:
+    with pytest.raises(ValueError, match="increasing times"):
+        simulate(K, no_torque, np.array([0.0, 0.0]))

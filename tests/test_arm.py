@@ -1,0 +1,102 @@
+"""Eq. (1) against a Lagrangian derived by SymPy, and the tables against their own definitions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from algid.arm import Arm, energy, forward_dynamics, inverse_dynamics, mass_matrix, regressor, with_payload
+from algid.synth.cases import load_case
+
+PAYLOAD = 0.35
+
+
+@pytest.fixture(scope="module")
+def lagrangian_torque() -> Callable[..., list[float]]:
+    """τ(θ, ω, α, arm, m_p) by the Euler-Lagrange equations of two rigid links and a point mass."""
+    time = sp.symbols("t")
+    angle = [sp.Function(f"q{i}")(time) for i in (1, 2)]
+    m1, m2, lc1, lc2, l1, l2, i1, i2, b1, b2, g, m_p = symbols = sp.symbols("m1 m2 lc1 lc2 l1 l2 I1 I2 b1 b2 g m_p")
+    absolute = angle[0] + angle[1]
+    elbow = sp.Matrix([l1 * sp.cos(angle[0]), l1 * sp.sin(angle[0])])
+    direction = sp.Matrix([sp.cos(absolute), sp.sin(absolute)])
+    points = [(m1, elbow * lc1 / l1), (m2, elbow + lc2 * direction), (m_p, elbow + l2 * direction)]
+    kinetic = i1 * angle[0].diff(time) ** 2 / 2 + i2 * absolute.diff(time) ** 2 / 2
+    kinetic += sum(m * place.diff(time).dot(place.diff(time)) / 2 for m, place in points)
+    potential = sum(m * g * place[1] for m, place in points)
+    lagrangian = kinetic - potential
+    torque = [
+        lagrangian.diff(q.diff(time)).diff(time) - lagrangian.diff(q) + b * q.diff(time)
+        for q, b in zip(angle, (b1, b2), strict=True)
+    ]
+    plain = sp.symbols("a1 a2 v1 v2 x1 x2")
+    order = [q.diff(time, 2) for q in angle] + [q.diff(time) for q in angle] + angle
+    flat = [expression.subs(list(zip(order, plain, strict=True))) for expression in torque]
+    return sp.lambdify((*plain, *symbols), flat, "numpy")  # type: ignore[no-any-return]
+
+
+def states(count: int = 200) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    draw = np.random.default_rng(7)
+    return draw.uniform(-6, 6, (2, count)), draw.normal(0, 5, (2, count)), draw.normal(0, 50, (2, count))
+
+
+def physical(arm: Arm) -> tuple[float, ...]:
+    return (arm.m1, arm.m2, arm.lc1, arm.lc2, arm.l1, arm.l2, arm.I1, arm.I2, arm.b1, arm.b2, arm.g)
+
+
+@pytest.mark.parametrize("case", ["case1", "case2"])
+@pytest.mark.parametrize("payload", [0.0, PAYLOAD])
+def test_inverse_dynamics_is_the_lagrangian_s(
+    case: str, payload: float, lagrangian_torque: Callable[..., list[float]]
+) -> None:
+    arm = load_case(case).arm
+    theta, omega, alpha = states()
+    k = with_payload(arm.constants(), arm.payload_constants(payload))
+    expected = np.array(lagrangian_torque(*alpha, *omega, *theta, *physical(arm), payload))
+    # rounding of sums of terms up to 1 N m
+    np.testing.assert_allclose(inverse_dynamics(k, theta, omega, alpha), expected, atol=1e-12)
+
+
+def test_forward_dynamics_inverts_inverse_dynamics() -> None:
+    k = load_case("case1").arm.constants()
+    theta, omega, alpha = states()
+    tau = inverse_dynamics(k, theta, omega, alpha)
+    # the mass matrix has a condition number of about 10
+    np.testing.assert_allclose(forward_dynamics(k, theta, omega, tau), alpha, rtol=1e-10, atol=1e-10)
+
+
+def test_regressor_times_constants_is_the_torque() -> None:
+    k = load_case("case2").arm.constants()
+    theta, omega, alpha = states()
+    torque = np.einsum("jkn,k->jn", regressor(theta, omega, alpha), k)
+    np.testing.assert_allclose(torque, inverse_dynamics(k, theta, omega, alpha), atol=1e-12)
+
+
+def test_constants_of_case_1_follow_table_1() -> None:
+    k = load_case("case1").arm.constants()
+    by_hand = [
+        0.0814 * 0.1626 * 0.0616,
+        0.0814 * 9.81 * 0.0616,
+        0.0018 + 0.0814 * 0.0616**2,
+        0.3674 * 9.81 * 0.0813 + 0.0814 * 9.81 * 0.1626,
+        0.0009 + 0.3674 * 0.0813**2 + 0.0814 * 0.1626**2,
+        0.1360,
+        0.3072,
+    ]
+    np.testing.assert_allclose(k, by_hand, rtol=1e-14)
+
+
+def test_mass_matrix_of_a_real_arm_is_positive_definite() -> None:
+    k = load_case("case1").arm.constants()
+    m11, m12, m22 = mass_matrix(k, np.stack([np.zeros(361), np.linspace(-np.pi, np.pi, 361)]))
+    assert np.all(m11 > 0)
+    assert np.all(m11 * m22 > m12**2)
+
+
+def test_energy_of_an_arm_at_rest_is_its_height_times_its_weight() -> None:
+    arm = load_case("case1").arm
+    upright = energy(arm.constants(), np.array([np.pi / 2, 0.0]), np.zeros(2))
+    assert upright == pytest.approx(arm.g * (arm.m1 * arm.lc1 + arm.m2 * (arm.l1 + arm.lc2)), rel=1e-14)

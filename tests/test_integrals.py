@@ -1,0 +1,40 @@
+"""Cumulative integrals against closed forms, and the order at which they converge."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from algid.integrals import integral, nested_integral
+
+
+def largest_error(dt: float, order: int) -> float:
+    """Error of the integrals of cos(3 t) over two seconds, at any sample."""
+    t = dt * np.arange(round(2.0 / dt) + 1)
+    exact = {1: np.sin(3 * t) / 3, 2: (1 - np.cos(3 * t)) / 9, 3: t / 9 - np.sin(3 * t) / 27}[order]
+    return float(np.abs(nested_integral(np.cos(3 * t), dt, order) - exact).max())
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_error_falls_with_the_fourth_power_of_the_sample_time(order: int) -> None:
+    steps = 0.01 / 2.0 ** np.arange(4)
+    errors = [largest_error(dt, order) for dt in steps]
+    slope = np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert slope == pytest.approx(4.0, abs=0.1)
+
+
+def test_cubics_are_integrated_exactly() -> None:
+    t = 0.1 * np.arange(12)
+    np.testing.assert_allclose(integral(4 * t**3 - 2 * t, 0.1), t**4 - t**2, atol=1e-14)
+
+
+def test_leading_axes_are_kept() -> None:
+    signal = np.random.default_rng(0).normal(size=(3, 2, 50))
+    np.testing.assert_array_equal(integral(signal, 0.1)[1, 0], integral(signal[1, 0], 0.1))
+
+
+def test_wrong_calls_say_what_was_wrong() -> None:
+    with pytest.raises(ValueError, match="order must be at least 1, got 0"):
+        nested_integral(np.zeros(8), 0.1, 0)
+    with pytest.raises(ValueError, match="at least 4 samples, got 3"):
+        integral(np.zeros(3), 0.1)

@@ -1,0 +1,65 @@
+"""The derivative observer against the transfer function of eq. (6) and a brute-force integration."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from algid.observers import C_OBS, PAPER_POLES, A, C, LuenbergerObserver, observer_gain
+
+DT = 1e-3
+
+
+def test_gain_places_the_poles_of_the_paper() -> None:
+    found = np.sort(np.linalg.eigvals(A - observer_gain(PAPER_POLES) @ C).real)
+    np.testing.assert_allclose(found, np.sort(PAPER_POLES), rtol=1e-4)  # close poles: eigenvalues lose digits
+
+
+@pytest.mark.parametrize("poles", [PAPER_POLES, (-50 + 20j, -50 - 20j, -60, -80, -90, -100)])
+def test_velocities_are_those_of_the_differential_equation(poles: tuple[complex, ...]) -> None:
+    t = DT * np.arange(301)
+    theta = np.stack([np.sin(8 * t), np.cos(5 * t)])
+    gain = observer_gain(poles)
+
+    def rate(now: float, x: np.ndarray) -> np.ndarray:
+        y = np.array([np.interp(now, t, angle) for angle in theta])  # linear between samples, as assumed
+        return (A - gain @ C) @ x + gain @ y
+
+    start = np.array([theta[0, 0], 0, 0, theta[1, 0], 0, 0])
+    exact = solve_ivp(rate, (0, t[-1]), start, t_eval=t, rtol=1e-9, atol=1e-9, max_step=DT).y
+    found = LuenbergerObserver(DT, poles).velocities(theta)
+    # solve_ivp's own tolerance, on velocities up to 8 rad/s, across the corners of y
+    np.testing.assert_allclose(found, C_OBS @ exact, atol=2e-5)
+
+
+def test_steady_sine_meets_the_transfer_function() -> None:
+    frequency = 2 * np.pi * 1.0
+    t = DT * np.arange(4000)
+    found = LuenbergerObserver(DT).velocities(np.stack([np.sin(frequency * t), np.zeros_like(t)]))[0, 2000:]
+    s = 1j * frequency
+    _, l1, l2, l3 = np.poly(PAPER_POLES[:3])
+    gain = (l2 * s + l3) * s / (s**3 + l1 * s**2 + l2 * s + l3)
+    expected = np.imag(gain * np.exp(s * t[2000:]))
+    # a sine is not linear between samples: (ω dt)²/12 of it is lost
+    np.testing.assert_allclose(found, expected, atol=frequency**3 * DT**2)
+
+
+def test_pieces_give_the_same_bits_as_the_whole() -> None:
+    theta = np.random.default_rng(1).normal(size=(2, 1000)).cumsum(axis=1)
+    whole = LuenbergerObserver(DT).velocities(theta)
+    observer = LuenbergerObserver(DT)
+    parts = [observer.velocities(part) for part in np.split(theta, [1, 17, 600], axis=1)]
+    # the state is carried exactly; BLAS may sum in another order for another length
+    np.testing.assert_allclose(np.concatenate(parts, axis=1), whole, rtol=1e-12, atol=1e-9)
+
+
+def test_an_arm_at_rest_has_no_velocity() -> None:
+    found = LuenbergerObserver(DT).velocities(np.full((2, 100), 1.3))
+    np.testing.assert_allclose(found, 0, atol=1e-8)  # rounding of gains up to 6e7
+
+
+@pytest.mark.parametrize("poles", [(-1.0,) * 5, (1.0, -1, -2, -3, -4, -5), (-1 + 1j, -2, -3, -1 - 1j, -4, -5)])
+def test_poles_that_cannot_be_are_refused(poles: tuple[complex, ...]) -> None:
+    with pytest.raises(ValueError, match="poles"):
+        observer_gain(poles)
