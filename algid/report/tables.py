@@ -103,7 +103,7 @@ def _estimate_row(name: str, found: Estimate, known: Table4Row | None) -> tuple[
         percent(found.std, found.estimate),
         unit_text(found.unit),
         found.status.value,
-        ABSENT if found.ci95 is None else interval(*found.ci95, digits),
+        ABSENT if found.ci95 is None else interval(*found.ci95, found.std),
         *_against(_of_this(known, found), digits),
     )
 

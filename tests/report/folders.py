@@ -113,7 +113,7 @@ def _result(case: Case, k: FloatArray, covariance: FloatArray, unloaded: Recordi
             },
             residual=prediction,
         ),
-        settings={"estimator": "refined", "velocity": "zero-phase", "epsilon": 0.2, "window": 2.0, "gravity": 9.81},
+        settings={"estimator": "refined", "velocity": "observer", "window": None, "gravity": 9.81},
         log=_log(f"{case.name}-unloaded.mcap", "unloaded", unloaded),
         more_logs=[_log(f"{case.name}-loaded.mcap", "loaded", unloaded)],
     )

@@ -21,9 +21,7 @@ def correlation(result: Result) -> Figure | Missing:
         return Missing("correlation", TITLE, f"the estimator {result.estimator} gives no covariance")
     names = result.fit.covariance_names
     matrix = correlation_matrix(result.fit.covariance)
-    reading = (
-        "Read: a dark cell off the diagonal means two estimates err together; trust their combination before either."
-    )
+    reading = "Read: a strong colour off the diagonal means two estimates err together: trust their combination first."
     pairs = _strong_pairs(names, matrix)
     note = f"Correlated beyond {STRONG:g}: {joined(pairs)}." if pairs else f"No pair is correlated beyond {STRONG:g}."
     return Figure("correlation", TITLE, (_panel(names, matrix, note),), reading, note=note)
