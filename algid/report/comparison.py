@@ -106,7 +106,7 @@ def _distinct(labels: list[str]) -> list[str]:
 def _estimates(results: Sequence[Result], labels: list[str], sigma: dict[str, tuple[float | None, ...]]) -> Table:
     columns = [Column("Parameter", "name"), Column("Unit", "text"), Column(labels[0], "number")]
     for label in labels[1:]:
-        columns += [Column(label, "number"), Column("Δ %", "number"), Column("Δ/σ", "number")]
+        columns += [Column(label, "number"), Column("Δ %", "number", rank=1), Column("Δ/σ", "number")]
     rows = tuple(_row(name, results, sigma[name]) for name in sigma)
     note = f"Differences are against {labels[0]}; σ combines both standard deviations."
     return Table("Estimates side by side", tuple(columns), rows, note).without_empty()

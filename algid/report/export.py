@@ -15,7 +15,6 @@ Several logs keep a topic each: the second one's are `/algid/log2/predicted` and
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,12 +32,12 @@ from algid.report.ros2 import (
     field_names,
     numbers_message,
 )
-from algid.results import Result, read_result
+from algid.results import read_result
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
 
-START_KEY = b"algid.start_ns"
+START_KEY = b"start_ns"
 TORQUES = ("log", "t", "tau1", "tau2", "tau1_predicted", "tau2_predicted")
 ROWS = 1 << 14
 
@@ -46,8 +45,8 @@ ROWS = 1 << 14
 def export_mcap(folder: Path) -> Path:
     """Write `estimates.mcap` into the result folder `folder`.
 
-    The messages bear the log's own stamps where `torque.parquet` tells each log's first one, in ns, as a
-    JSON list in its metadata ``algid.start_ns``; otherwise time counts from zero.
+    The messages bear the log's own stamps where each Parquet file tells its logs' first ones, in ns, as a
+    JSON list in its metadata ``start_ns``; otherwise time counts from zero.
 
     Raises
     ------
@@ -59,40 +58,30 @@ def export_mcap(folder: Path) -> Path:
     from mcap.writer import CompressionType, Writer
 
     result = read_result(folder)
-    starts = start_stamps(folder / "torque.parquet", len(result.logs))
     path = folder / "estimates.mcap"
     with whole_file(path) as temporary, temporary.open("wb") as stream:
         writer = Writer(stream, compression=CompressionType.ZSTD)
         writer.start(profile="ros2", library=f"algid {result.version}")
-        _write_torques(writer, folder / "torque.parquet", starts)
-        for name, log in _series(folder, result):
-            _write_series(writer, folder / f"{name}.parquet", f"/algid/{name}", starts[log])
+        _write_torques(writer, folder / "torque.parquet", len(result.logs))
+        for name in ("estimates", "loaded"):
+            _write_series(writer, folder / f"{name}.parquet", f"/algid/{name}")
         writer.finish()  # type: ignore[no-untyped-call]
     return path
 
 
 def start_stamps(path: Path, logs: int) -> list[int]:
-    """First stamp of each log in ns; zero where the file does not tell."""
+    """First stamp in ns of each of the file's logs; zero where it does not tell."""
     import pyarrow.parquet
 
-    found = [0] * logs
-    if path.exists():
-        told = (pyarrow.parquet.read_schema(path).metadata or {}).get(START_KEY)
-        known = [int(stamp) for stamp in json.loads(told)] if told else []
-        found[: len(known)] = known[:logs]
-    return found
+    told = (pyarrow.parquet.read_schema(path).metadata or {}).get(START_KEY)
+    known = [int(stamp) for stamp in json.loads(told)] if told else []
+    return (known + [0] * logs)[:logs]
 
 
-def _series(folder: Path, result: Result) -> Iterator[tuple[str, int]]:
-    """Each series' file name and the log it belongs to: the first unloaded one, the first loaded one."""
-    for name, role in (("estimates", "unloaded"), ("loaded", "loaded")):
-        if (folder / f"{name}.parquet").exists():
-            yield name, next((i for i, log in enumerate(result.logs) if log.role == role), 0)
-
-
-def _write_torques(writer: Writer, path: Path, starts: list[int]) -> None:
+def _write_torques(writer: Writer, path: Path, logs: int) -> None:
     if not path.exists():
         return
+    starts = start_stamps(path, logs)
     schema = writer.register_schema(JOINT_STATE, "ros2msg", JOINT_STATE_SCHEMA.encode())
     message = JointTorque(("joint1", "joint2")).message
     channels: dict[str, int] = {}
@@ -109,7 +98,10 @@ def _write_torques(writer: Writer, path: Path, starts: list[int]) -> None:
                 writer.add_message(channels[topic], stamp, message(stamp, tau1, tau2), stamp)
 
 
-def _write_series(writer: Writer, path: Path, topic: str, start: int) -> None:
+def _write_series(writer: Writer, path: Path, topic: str) -> None:
+    if not path.exists():
+        return
+    [start] = start_stamps(path, 1)
     names = [name for name in columns_of(path) if name != "t"]
     schema = writer.register_schema(ESTIMATES, "ros2msg", estimates_schema(field_names(names)).encode())
     channel = writer.register_channel(topic, "cdr", schema)

@@ -8,12 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.report.blocks import Block, blocks, columns_of, row_count
 from algid.report.reduce import MinMax, Share, Thinned, bucket_size
 
-EPSILON = 0.2  # s: the paper's ε, where the settings do not tell
+EPSILON = 0.2  # s: the paper's ε
+WINDOW = 2.0  # s: after which the paper's integrals restart, unless its own settings say otherwise
+LARGEST_CONDITION = 1e10  # beyond, the paper's stages call a system singular
 POINTS = 2_000
 STRETCHES = 400
 SAMPLES = 20_000
@@ -27,13 +30,12 @@ Series = tuple[FloatArray, FloatArray]
 class SeriesLog:
     """Series by name: `lines` by their extremes, `samples` for their size, `middles` their running medians.
 
-    `singular` is the share of samples without an estimate though ε has passed; `condition` is the condition
-    number, infinite ones left out. `epsilon` and `window` are in s, the latter infinite without windows.
+    `singular` is the share of samples that have no estimate, after ε, because the system was singular;
+    `condition` is the condition number, infinite ones left out. `start`, `end` and `window` are in s.
     """
 
     start: float
     end: float
-    epsilon: float
     window: float
     coarse: bool
     lines: dict[str, Series]
@@ -45,8 +47,6 @@ class SeriesLog:
     @property
     def windows(self) -> list[float]:
         """When each window starts, in s."""
-        if np.isinf(self.window):
-            return [self.start]
         return [float(begin) for begin in np.arange(self.start, self.end, self.window)]
 
     @property
@@ -59,7 +59,7 @@ def read_series(path: Path, settings: Mapping[str, Any]) -> SeriesLog:
     """Read `path`: a column ``t``, a column a series, perhaps ``condition``. Raises `ResultError`."""
     columns = columns_of(path)
     gathering = _Gathering([name for name in columns if name not in NOT_SERIES], row_count(path), settings)
-    wanted = ["t", *gathering.names, *(["condition"] if "condition" in columns else [])]
+    wanted = ["t", *gathering.names, *(name for name in ("condition", "k7_condition") if name in columns)]
     for block in blocks(path, wanted):
         gathering.take(block)
     return gathering.result("condition" in columns)
@@ -69,8 +69,7 @@ class _Gathering:
     def __init__(self, names: list[str], total: int, settings: Mapping[str, Any]) -> None:
         self.names = names
         self._total = total
-        self._epsilon = _positive(settings.get("epsilon"), EPSILON)
-        self._window = _positive(settings.get("window"), np.inf)
+        self._window = _positive(settings.get("window"), WINDOW) if settings.get("estimator") == "paper" else WINDOW
         self._start: float | None = None
         self._end = 0.0
         self._size = bucket_size(total, POINTS)
@@ -86,10 +85,10 @@ class _Gathering:
         self._end = float(t[-1])
         since = t - self._start
         # stamps are multiples of the period but for rounding, which must not move a window's first sample
-        late = (since if np.isinf(self._window) else np.mod(since + 1e-9, self._window)) >= self._epsilon
+        late = np.mod(since + 1e-9, self._window) >= EPSILON
         for name in self.names:
             self._lines[name].feed(t, block[name])
-            self._singular[name].feed(t, late & np.isnan(block[name]))
+            self._singular[name].feed(t, late & np.isnan(block[name]) & _ill(block, name))
         if "condition" in block:
             self._condition.feed(t, np.where(np.isfinite(block["condition"]), block["condition"], np.nan))
         self._samples.feed(np.stack([t, *(block[name] for name in self.names)]))
@@ -103,15 +102,21 @@ class _Gathering:
         return SeriesLog(
             start=start,
             end=self._end,
-            epsilon=self._epsilon,
             window=self._window,
-            coarse=self._size * period >= self._epsilon,
+            coarse=self._size * period >= EPSILON,
             lines={name: line.result() for name, line in self._lines.items()},
             samples=named,
             middles={name: _medians(samples[0], values) for name, values in named.items()},
             singular={name: share.result() for name, share in self._singular.items()},
             condition=self._condition.result() if with_condition else None,
         )
+
+
+def _ill(block: Block, name: str) -> NDArray[np.bool_]:
+    """Where the system of that series is singular; everywhere where the file does not tell."""
+    conditions = ["condition", *(["k7_condition"] if name == "k7" else [])]
+    known = [~(block[condition] <= LARGEST_CONDITION) for condition in conditions if condition in block]
+    return np.logical_or.reduce(known) if known else np.ones(block["t"].size, dtype=bool)
 
 
 def _medians(x: FloatArray, y: FloatArray) -> Series:

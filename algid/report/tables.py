@@ -18,11 +18,11 @@ Kind = Literal["name", "number", "text", "status"]
 
 @dataclass(frozen=True)
 class Column:
-    """Heading of a column, what it holds, and whether a narrow terminal does without it."""
+    """Heading of a column and what it holds; a narrow terminal does without it, the highest `rank` first."""
 
     heading: str
     kind: Kind
-    wide: bool = False
+    rank: int = 0
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,12 @@ class Table:
         kept = [i for i, _ in enumerate(self.columns) if any(row[i] not in (ABSENT, "") for row in self.rows)]
         return self.only(kept)
 
-    def narrow(self) -> Table:
-        """This table less the columns that a narrow terminal does without."""
-        return self.only([i for i, column in enumerate(self.columns) if not column.wide])
+    def narrower(self) -> Table | None:
+        """This table less the column that is missed least; None where all are needed."""
+        least = max(range(len(self.columns)), key=lambda i: self.columns[i].rank, default=None)
+        if least is None or self.columns[least].rank == 0:
+            return None
+        return self.only([i for i in range(len(self.columns)) if i != least])
 
     def only(self, kept: list[int]) -> Table:
         """This table with the columns `kept`."""
@@ -56,15 +59,17 @@ ESTIMATE_COLUMNS = (
     Column("Parameter", "name"),
     Column("Estimate", "number"),
     Column("± std", "number"),
-    Column("± std, %", "number"),
+    Column("± std, %", "number", rank=2),
     Column("Unit", "text"),
     Column("Status", "status"),
-    Column("95 % interval", "number", wide=True),
-    Column("Truth", "number"),
+    Column("95 % interval", "number", rank=3),
+    Column("Truth", "number", rank=1),
     Column("Error %", "number"),
-    Column("Paper's error %", "number"),
+    Column("Paper %", "number"),
 )
-TABLE4_COLUMNS = tuple(column for column in ESTIMATE_COLUMNS if column.kind != "status" and not column.wide)
+TABLE4_COLUMNS = tuple(
+    column for column in ESTIMATE_COLUMNS if column.kind != "status" and "interval" not in column.heading
+)
 
 
 def estimate_tables(result: Result) -> list[Table]:
@@ -78,7 +83,7 @@ def estimate_tables(result: Result) -> list[Table]:
     tables = [_estimates(title, group, result.table4) for title, group in groups if group]
     if any(row.truth is not None for row in result.table4):
         rows = tuple(_table4_row(row) for row in result.table4)
-        note = "The paper's Table 4: its names and order, its errors beside those found here."
+        note = "Names and order of the paper's Table 4; Paper % is the error it reports."
         tables.append(Table("Table 4", TABLE4_COLUMNS, rows, note).without_empty())
     return tables
 
@@ -98,8 +103,8 @@ def _estimate_row(name: str, found: Estimate, known: Table4Row | None) -> tuple[
         percent(found.std, found.estimate),
         unit_text(found.unit),
         found.status.value,
-        ABSENT if found.ci95 is None else interval(*found.ci95, digits),
-        *_against(known, digits),
+        ABSENT if found.ci95 is None else interval(*found.ci95, found.std),
+        *_against(_of_this(known, found), digits),
     )
 
 
@@ -112,6 +117,16 @@ def _table4_row(row: Table4Row) -> tuple[str, ...]:
         unit_text(row.unit),
         *_against(row, digits_of(row.estimate, row.std)),
     )
+
+
+def _of_this(known: Table4Row | None, found: Estimate) -> Table4Row | None:
+    """What is known of `found`: where Table 4 holds another estimate of the same name, the error is its own."""
+    if known is None or known.estimate == found.estimate:
+        return known
+    if known.truth is None or found.estimate is None:
+        return known.model_copy(update={"error_percent": None})
+    error = 100 * abs(found.estimate - known.truth) / abs(known.truth) if known.truth else None
+    return known.model_copy(update={"error_percent": error})
 
 
 def _against(known: Table4Row | None, digits: int) -> tuple[str, str, str]:
@@ -170,7 +185,7 @@ def _prediction(result: Result) -> Table:
         Column("RMSE, N m", "number"),
         Column("RMSE / RMS, %", "number"),
         Column("R²", "number"),
-        Column("Filter", "text", wide=True),
+        Column("Filter", "text", rank=1),
     )
     return Table("Torque prediction", columns, rows).without_empty()
 

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
 LEVEL_STYLES: dict[Level, str] = {"good": "bold green", "reservations": "bold yellow", "failed": "bold red"}
-NARROW = 110  # columns below which the wide ones are left out
 
 
 def print_table(result: Result, console: Console) -> None:
@@ -22,7 +21,7 @@ def print_table(result: Result, console: Console) -> None:
 
     judged = verdict(result)
     word = LEVEL_WORDS[judged.level]
-    console.print(Text(word, LEVEL_STYLES[judged.level]) + Text(judged.sentence.removeprefix(word), "not bold"))
+    console.print(Text.assemble((word, LEVEL_STYLES[judged.level]), judged.sentence.removeprefix(word)))
     for reason in judged.reasons:
         console.print(Text(f"  • {reason}"))
     for table in estimate_tables(result):
@@ -31,8 +30,16 @@ def print_table(result: Result, console: Console) -> None:
 
 
 def print_one(table: Table, console: Console) -> None:
-    """Print one table, without its wide columns where the console is narrow."""
-    console.print(rich_table(table.narrow() if console.width < NARROW else table))
+    """Print one table, less the columns that the console has no room for; no digit is ever cut off."""
+    from rich.measure import Measurement
+
+    made = rich_table(table)
+    while Measurement.get(console, console.options.update(width=10_000), made).maximum > console.width:
+        fewer = table.narrower()
+        if fewer is None:
+            break
+        table, made = fewer, rich_table(fewer)
+    console.print(made)
 
 
 def rich_table(table: Table) -> RichTable:
@@ -42,14 +49,11 @@ def rich_table(table: Table) -> RichTable:
     from rich.text import Text
 
     title, caption = Text(table.title, "bold"), Text(table.note, "dim") if table.note else None
-    made = RichTable(
-        title=title, caption=caption, title_justify="left", caption_justify="left", box=box.SIMPLE_HEAD, pad_edge=False
-    )
+    made = RichTable(title=title, caption=caption, box=box.SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
+    made.title_justify = made.caption_justify = "left"
     for column in table.columns:
         right = column.kind == "number"
-        made.add_column(
-            Text(column.heading), justify="right" if right else "left", overflow="fold", no_wrap=column.kind != "text"
-        )
+        made.add_column(Text(column.heading), justify="right" if right else "left", overflow="fold")
     for row in table.rows:
         cells = zip(table.columns, row, strict=True)
         made.add_row(*(Text(cell, _style(column.kind, cell)) for column, cell in cells))

@@ -14,7 +14,7 @@ from algid.report.spectrum import Spectrum, stretch_length
 
 COLUMNS = ("log", "t", "theta1", "theta2", "omega1", "omega2", "tau1", "tau2", "tau1_predicted", "tau2_predicted")
 SERIES = ("tau1", "tau2", "tau1_predicted", "tau2_predicted", "residual1", "residual2")
-POINTS = 4_000  # a series; twice what a wide screen can show
+POINTS = 3_600  # a series; twice what a wide screen can show
 DOTS = 3_000
 LONGEST_GAP = 5  # sampling periods; longer breaks the line
 

@@ -14,6 +14,8 @@ from algid.results import Estimate, Fit, Result, Status, TorquePrediction
 Level = Literal["good", "reservations", "failed"]
 
 LEAST_R2 = 0.9  # below, a tenth of the torque's power is not the model's
+WORST_R2 = 0.5  # below, most of it is not: wrong angles, signs or units, or not this arm
+LEAST_USABLE = 0.5  # share of the parameters that must have an estimate
 LARGEST_SPREAD = 0.1  # a standard deviation beyond a tenth of the estimate says little more than its size
 FAR_FROM_TRUTH = 4.0  # σ; by chance one estimate in 16,000
 
@@ -54,7 +56,10 @@ def _failure(result: Result) -> str | None:
     if not any(_usable(found) for found in result.estimates.values()):
         words = sorted({STATUS_WORDS.get(found.status, "absent") for found in result.estimates.values()})
         return f"no parameter could be identified ({joined(words)})"
-    return None
+    usable, count = sum(_usable(found) for found in result.estimates.values()), len(result.estimates)
+    if usable < LEAST_USABLE * count:
+        return f"only {usable} of {count} parameters could be identified"
+    return next(_unexplained(_prediction(result.fit), WORST_R2), None)
 
 
 def _usable(found: Estimate) -> bool:
@@ -113,7 +118,7 @@ def _reasons(result: Result) -> Iterator[str]:
     yield from _bad_statuses(result)
     yield from _wide_intervals(result)
     if result.fit is not None:
-        yield from _fit_reasons(result.fit)
+        yield from _fit_reasons(result.fit, " ".join(result.warnings))
     yield from _far_from_truth(result)
     yield from (f"algid warns: {visible(warning)}" for warning in result.warnings)
 
@@ -132,15 +137,20 @@ def _wide_intervals(result: Result) -> Iterator[str]:
         yield f"the standard deviation of {joined(shown)} is large"
 
 
-def _fit_reasons(fit: Fit) -> Iterator[str]:
-    yield from (visible(direction) for direction in fit.unidentifiable)
-    yield from (f"the estimates break the bound {visible(bound.bound)}" for bound in fit.broken_bounds)
+def _fit_reasons(fit: Fit, told: str) -> Iterator[str]:
+    """What the fit holds against itself, less what the warnings have told."""
+    yield from (visible(direction) for direction in fit.unidentifiable if direction not in told)
+    bounds = [bound.bound for bound in fit.broken_bounds if bound.bound not in told]
+    yield from (f"the estimates break the bound {visible(bound)}" for bound in bounds)
     coloured = [visible(name) for name, test in fit.whiteness.items() if not test.white]
     if coloured and fit.intervals == "likelihood":
         yield f"the residual of {joined(coloured)} is not white, though the intervals take it to be"
-    prediction = _prediction(fit)
+    yield from _unexplained(_prediction(fit), LEAST_R2)
+
+
+def _unexplained(prediction: TorquePrediction | None, least: float) -> Iterator[str]:
     for joint, r2 in enumerate(prediction.r2 if prediction else (), start=1):
-        if r2 < LEAST_R2:
+        if r2 < least:
             yield f"the model explains only {max(100 * r2, 0):.0f} % of the torque of joint {joint}"
 
 

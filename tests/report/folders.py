@@ -32,6 +32,7 @@ from algid.synth.simulator import Motion, simulate
 NOISE = 1e-2  # N m
 RATE = 1000.0
 START_NS = 1_700_000_000_123_456_789
+LOADED_START_NS = START_NS + 60_000_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +113,7 @@ def _result(case: Case, k: FloatArray, covariance: FloatArray, unloaded: Recordi
             },
             residual=prediction,
         ),
-        settings={"estimator": "refined", "velocity": "zero-phase", "epsilon": 0.2, "window": 2.0, "gravity": 9.81},
+        settings={"estimator": "refined", "velocity": "observer", "window": None, "gravity": 9.81},
         log=_log(f"{case.name}-unloaded.mcap", "unloaded", unloaded),
         more_logs=[_log(f"{case.name}-loaded.mcap", "loaded", unloaded)],
     )
@@ -165,8 +166,8 @@ def _write_torque(path: Path, recordings: list[Recording], k: FloatArray) -> Non
         columns |= {f"tau{joint + 1}_predicted": predicted[joint] for joint in range(2)}
         frames.append(pl.DataFrame(columns))
     table = pl.concat(frames).to_arrow()
-    starts = json.dumps([START_NS, START_NS + 60_000_000_000])
-    pq.write_table(table.replace_schema_metadata({"algid.start_ns": starts}), path)
+    starts = json.dumps([START_NS, LOADED_START_NS])
+    pq.write_table(table.replace_schema_metadata({"start_ns": starts}), path)
 
 
 def _write_information(path: Path, y: FloatArray) -> None:
@@ -196,7 +197,9 @@ def _write_series(folder: Path, unloaded: Recording, loaded: Recording, k: Float
     for name, found in (("estimates", series), ("loaded", other)):
         flat = {key: values.reshape(-1) for key, values in found.items()}
         t = np.arange(flat["condition"].size) / RATE
-        pl.DataFrame({"t": t, **flat}).write_parquet(folder / f"{name}.parquet")
+        table = pl.DataFrame({"t": t, **flat}).to_arrow()
+        start = START_NS if name == "estimates" else LOADED_START_NS
+        pq.write_table(table.replace_schema_metadata({"start_ns": json.dumps([start])}), folder / f"{name}.parquet")
 
 
 def build_recorded(folder: Path, csv: Path) -> Result:

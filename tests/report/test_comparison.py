@@ -19,7 +19,7 @@ def test_the_difference_is_over_both_standard_deviations(result: Result) -> None
 def test_only_settings_that_differ_are_shown(result: Result) -> None:
     other = result.model_copy(update={"settings": {**result.settings, "window": 4.0}, "estimator": "weak"})
     rows = compare([result, other], ["a", "b"]).settings.rows
-    assert rows == (("estimator", "refined", "weak"), ("window", "2", "4"))
+    assert rows == (("estimator", "refined", "weak"), ("window", "–", "4"))
     assert compare([result, result], ["a", "b"]).settings.note == "Every setting is the same."
 
 

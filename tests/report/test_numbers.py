@@ -48,8 +48,9 @@ def test_the_standard_deviation_decides_how_many_digits_are_worth_writing() -> N
 
 
 def test_an_unbounded_interval_says_so() -> None:
-    assert interval(None, None, 5) == "[−∞, ∞]"
-    assert interval(0.1, None, 2) == "[0.10, ∞]"
+    assert interval(None, None, None) == "[−∞, ∞]"
+    assert interval(0.1, None, 0.01) == "[0.100, ∞]"
+    assert interval(-0.0055, 0.019, 0.006) == "[-0.0055, 0.0190]"
 
 
 def test_a_share_of_nothing_is_absent() -> None:

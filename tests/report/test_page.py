@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from html.parser import HTMLParser
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ import plotly.graph_objects as go
 import polars as pl
 import pytest
 
+from algid.arm import FloatArray
 from algid.errors import ResultError
 from algid.report import write_report
 from algid.report.figures.base import Figure, Missing
@@ -186,6 +188,26 @@ def test_every_link_within_the_page_leads_somewhere(folder: Path) -> None:
     ids = list(_ids(text))
     assert len(ids) == len(set(ids))
     assert set(re.findall(r'href="#([^"]+)"', text)) <= set(ids)
+
+
+def test_numbers_are_legible_on_the_strongest_colours_of_a_matrix() -> None:
+    style = (resources.files("algid.report") / "assets/report.css").read_text(encoding="utf-8")
+    light, dark = style.split("@media (prefers-color-scheme: dark)")[:2]
+    for theme in (light, dark):
+        colours = {name: _channels(value) for name, value in re.findall(r"--(\w+): (#\w{6});", theme)}
+        for strong in ("blue", "orange"):
+            ground = 0.5 * colours[strong] + 0.5 * colours["page"]
+            high, low = sorted((_luminance(ground), _luminance(colours["ink"])), reverse=True)
+            assert (high + 0.05) / (low + 0.05) >= 4.5  # WCAG AA
+
+
+def _channels(colour: str) -> FloatArray:
+    return np.array([int(colour[at : at + 2], 16) for at in (1, 3, 5)]) / 255
+
+
+def _luminance(colour: FloatArray) -> float:
+    linear = np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])
 
 
 def test_the_result_is_read_from_the_folder(folder: Path) -> None:

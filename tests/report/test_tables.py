@@ -75,7 +75,15 @@ def test_truth_and_the_papers_error_stand_beside_the_estimate(result: Result) ->
     row = dict(zip(headings, parameters.rows[0], strict=True))
     assert row["Parameter"] == "k1"
     assert row["Truth"] == "8.1532e-4"  # m2 l1 lc2 of Table 3
-    assert row["Paper's error %"] == "0.2449"
+    assert row["Paper %"] == "0.2449"
+
+
+def test_the_error_belongs_to_the_estimate_beside_it(result: Result) -> None:
+    row = result.table4[0].model_copy(update={"parameter": "m_p", "estimate": 0.5, "truth": 0.5, "error_percent": 0.0})
+    other = {"m_p": Estimate(estimate=0.51, unit="kg")}
+    changed = result.model_copy(update={"table4": [row], "paper_payload": other, "payload": {}})
+    table = next(table for table in estimate_tables(changed) if "route" in table.title)
+    assert table.rows == (("m_p", "0.51000", "kg", "OK", "0.50000", "2.000", "0.2449"),)
 
 
 def test_a_column_that_nobody_fills_is_dropped(result: Result) -> None:
@@ -110,11 +118,23 @@ def test_the_terminal_has_no_colour_without_a_colour_system(result: Result, monk
     assert "\x1b[3" not in terminal(result, force_terminal=True)
 
 
-def test_a_narrow_terminal_does_without_the_interval(result: Result) -> None:
-    assert "95 % interval" in terminal(result, 140)
-    narrow = terminal(result, 100)
-    assert "95 % interval" not in narrow
-    assert "Parameter " in narrow
+@pytest.mark.parametrize("width", [80, 100, 112, 140])
+def test_a_narrow_terminal_drops_columns_and_never_digits(result: Result, width: int) -> None:
+    table = estimate_tables(result)[0]
+    shown = from_terminal(terminal(result, width), "Parameters")
+    for row, full in zip(shown, table.rows, strict=True):
+        assert set(row) <= set(full)
+        assert row[:3] == list(full[:3])
+        assert row[-2:] == list(full[-2:])
+    assert (len(shown[0]) == len(table.columns)) == (width == 140)
+
+
+def test_where_nothing_can_be_dropped_cells_fold(result: Result) -> None:
+    narrow = terminal(result, 40)
+    k7 = result.parameters["k7"]
+    parts = [line.split()[1] for line in narrow.splitlines() if line.startswith(("k7", " k7"))]
+    assert resolved(k7.estimate, k7.std).startswith(parts[0])
+    assert "…" not in narrow
 
 
 def test_foreign_text_is_neither_markup_nor_escape_sequence(result: Result) -> None:

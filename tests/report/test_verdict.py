@@ -89,6 +89,28 @@ def test_an_estimator_that_did_not_converge_failed(result: Result) -> None:
     assert verdict(with_parameter(result, "k1", one)).level == "failed"
 
 
+def test_a_model_that_explains_little_of_the_torque_failed(result: Result) -> None:
+    poor = TorquePrediction(rmse=(1, 1), nrmse=(1, 1), r2=(0.14, 0.48), filter="none")
+    found = verdict(with_fit(result, residual=poor))
+    assert found.sentence == (
+        "Failed: the model explains only 14 % of the torque of joint 1; do not use these numbers."
+    )
+
+
+def test_fewer_than_half_of_the_parameters_is_a_failure(result: Result) -> None:
+    lost = Estimate(estimate=None, unit="kg m^2", status=Status.NOT_IDENTIFIABLE)
+    few = {name: found if name in ("k1", "k2") else lost for name, found in result.parameters.items()}
+    found = verdict(result.model_copy(update={"parameters": few, "payload": {}, "table4": []}))
+    assert found.sentence.startswith("Failed: only 2 of 7 parameters could be identified")
+
+
+def test_what_a_warning_tells_is_not_told_twice(result: Result) -> None:
+    told = with_fit(result, unidentifiable=["k3 and k5 only as a sum"]).model_copy(
+        update={"warnings": ["k3 and k5 only as a sum"]}
+    )
+    assert verdict(told).reasons == ("algid warns: k3 and k5 only as a sum",)
+
+
 def test_nothing_identified_is_a_failure(result: Result) -> None:
     weak = {"k1": Estimate(estimate=None, unit="kg m^2", status=Status.WEAK_EXCITATION)}
     found = verdict(result.model_copy(update={"parameters": weak, "payload": {}, "table4": []}))

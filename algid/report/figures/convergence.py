@@ -26,13 +26,12 @@ from algid.report.figures.base import (
     upright,
 )
 from algid.report.numbers import resolved, significant
-from algid.report.serieslog import Series, SeriesLog, read_series
+from algid.report.serieslog import EPSILON, LARGEST_CONDITION, Series, SeriesLog, read_series
 from algid.report.text import unit_text
 from algid.results import Estimate, Result
 
 HEIGHT = 230
 MOST_WINDOWS = 6  # beyond, a line at every window's ε hides the series
-LARGEST_CONDITION = 1e10  # beyond, the paper's stages call a system singular
 
 
 @dataclass(frozen=True)
@@ -148,7 +147,7 @@ def _marks(target: Target) -> list[Layout]:
 
 
 def _epsilons(read: SeriesLog) -> list[Layout]:
-    ends = [begin + read.epsilon for begin in read.windows if begin + read.epsilon < read.end]
+    ends = [begin + EPSILON for begin in read.windows if begin + EPSILON < read.end]
     return [upright(end, "@muted") for end in ends] if len(ends) <= MOST_WINDOWS else []
 
 
@@ -178,8 +177,8 @@ def _legend(read: SeriesLog, targets: Mapping[str, Target]) -> tuple[Legend, ...
 
 
 def _reading_aid(read: SeriesLog) -> str:
-    windows = "" if np.isinf(read.window) else f" in each window of {read.window:g} s"
+    windows = f" in each window of {read.window:g} s" if len(read.windows) > 1 else ""
     return (
-        f"Read: from ε = {read.epsilon:g} s on{windows}, blue should settle on green; "
+        f"Read: from ε = {EPSILON:g} s on{windows}, blue should settle on green; "
         "double-click shows the spikes that the frame cuts off."
     )

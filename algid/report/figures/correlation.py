@@ -12,7 +12,7 @@ from algid.results import Result
 TITLE = "Correlation of the estimates"
 STRONG = 0.95
 MOST_WRITTEN = 14
-SCALE = [[0, "@orange"], [0.5, "@page"], [1, "@blue"]]
+SCALE = [[0, "@orange/0.5"], [0.5, "@page/0"], [1, "@blue/0.5"]]  # pale enough to write on
 
 
 def correlation(result: Result) -> Figure | Missing:
@@ -21,9 +21,7 @@ def correlation(result: Result) -> Figure | Missing:
         return Missing("correlation", TITLE, f"the estimator {result.estimator} gives no covariance")
     names = result.fit.covariance_names
     matrix = correlation_matrix(result.fit.covariance)
-    reading = (
-        "Read: a dark cell off the diagonal means two estimates err together; trust their combination before either."
-    )
+    reading = "Read: a strong colour off the diagonal means two estimates err together: trust their combination first."
     pairs = _strong_pairs(names, matrix)
     note = f"Correlated beyond {STRONG:g}: {joined(pairs)}." if pairs else f"No pair is correlated beyond {STRONG:g}."
     return Figure("correlation", TITLE, (_panel(names, matrix, note),), reading, note=note)
@@ -54,7 +52,7 @@ def _panel(names: list[str], matrix: FloatArray, says: str) -> Panel:
         "colorbar": {"thickness": 10, "outlinewidth": 0, "tickvals": [-1, 0, 1], "len": 0.9},
     }
     if len(names) <= MOST_WRITTEN:
-        trace |= {"texttemplate": "%{z:.2f}", "textfont": {"size": 11}}
+        trace |= {"texttemplate": "%{z:.2f}", "textfont": {"size": 11, "color": "@ink"}}
     layout = {
         "xaxis": axis(type="category", showgrid=False, side="bottom", tickangle=0 if len(names) < 9 else -45),
         "yaxis": axis(type="category", showgrid=False, autorange="reversed"),

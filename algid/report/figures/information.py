@@ -27,7 +27,7 @@ def information(path: Path, result: Result) -> Figure | Missing:
         return Missing("information", TITLE, f"{path.name} holds no second")
     x, gained, ranges = _summed(names, found)
     shares = _shares(gained)
-    reading = "Read: dark seconds taught most; a row dark in one place only rests on that moment of the log."
+    reading = "Read: strongly coloured seconds taught most; a row with colour in one place only rests on that moment."
     panel = _panel(names, x, shares, result, ranges)
     return Figure("information", TITLE, (panel,), reading, note=_note(names, x, shares))
 

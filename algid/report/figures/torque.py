@@ -62,4 +62,6 @@ def _note(found: TorqueLog) -> str:
         f"{significant(residual, 3)} of {significant(rms, 3)} N m RMS"
         for residual, rms in zip(found.residual_rms, found.rms, strict=True)
     ]
-    return f"Residual: joint 1 {shares[0]}, joint 2 {shares[1]}."
+    noisy = any(2 * residual > rms for residual, rms in zip(found.residual_rms, found.rms, strict=True))
+    why = " The prediction differentiates angles twice, and with them their noise: see Torque prediction below."
+    return f"Residual: joint 1 {shares[0]}, joint 2 {shares[1]}.{why if noisy else ''}"
