@@ -35,9 +35,7 @@ def pieces(path: Path, name: str, size: int = _PIECE) -> Iterator[bytes]:
             while piece := stream.read(size):
                 yield piece
     except (OSError, EOFError, zlib.error, zstandard.ZstdError) as error:
-        raise LogError(
-            f"{path}: the compressed data are damaged or cut off ({error}); copy it again"
-        ) from error
+        raise LogError(f"{path}: the compressed data are damaged or cut off ({error}); copy it again") from error
 
 
 def head_of(path: Path, name: str) -> bytes:

@@ -22,9 +22,7 @@ if TYPE_CHECKING:
 
 _MOST_COLUMNS = 4096
 _LARGEST_FOOTER = 1 << 26
-_NO_SUMS = Notice(
-    "NO_CHECKSUM", "the file has no sums of its values, as algid's have: changes would go unseen"
-)
+_NO_SUMS = Notice("NO_CHECKSUM", "the file has no sums of its values, as algid's have: changes would go unseen")
 
 
 def open_parquet(path: Path, profile: Profile | None = None) -> TableReader:
@@ -79,13 +77,9 @@ def _check_footer(path: Path) -> None:
         tail = stream.read(8)
     length = int.from_bytes(tail[:4], "little")
     if tail[4:] != b"PAR1":
-        raise LogError(
-            f"{path}: the Parquet file is cut off: its footer is missing, so nothing can be read of it"
-        )
+        raise LogError(f"{path}: the Parquet file is cut off: its footer is missing, so nothing can be read of it")
     if length + 12 > size or length > _LARGEST_FOOTER:
-        raise LogError(
-            f"{path}: the Parquet footer claims {length} bytes of a file of {size}; copy the file again"
-        )
+        raise LogError(f"{path}: the Parquet footer claims {length} bytes of a file of {size}; copy the file again")
 
 
 def _counted_rows(path: Path) -> int:
@@ -189,9 +183,7 @@ class _Groups:
         cell = pl.col(column)
         kind = self.schema[column]
         if place is not None:
-            cell = (
-                cell.list.get(place, null_on_oob=True) if isinstance(kind, pl.List) else cell.arr.get(place)
-            )
+            cell = cell.list.get(place, null_on_oob=True) if isinstance(kind, pl.List) else cell.arr.get(place)
         if name != "t":
             return cell.cast(pl.Float64).alias(name)
         if isinstance(kind, pl.Datetime):
@@ -211,6 +203,4 @@ class _Groups:
 
 def _damaged(path: Path, error: BaseException) -> LogError:
     told = str(error).split("\n", maxsplit=1)[0][:200]
-    return LogError(
-        f"{path}: the Parquet file is damaged or not one that can be read ({told}); copy it again"
-    )
+    return LogError(f"{path}: the Parquet file is damaged or not one that can be read ({told}); copy it again")
