@@ -1,0 +1,178 @@
+"""The commands as their users call them: outputs, exit codes, one clear line for what is wrong."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+from algid.cli.app import app
+
+
+class Outcome:
+    """What a command printed and returned."""
+
+    def __init__(self, *arguments: str | Path, cwd: Path | None = None) -> None:
+        command = [sys.executable, "-m", "algid", *map(str, arguments)]
+        done = subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False)
+        self.code, self.out, self.err = done.returncode, done.stdout, done.stderr
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("logs")
+    made = Outcome("synth", "case1", "-o", folder, "--torque", "wide", "--duration", "2", "--format", "csv")
+    assert made.code == 0, made.err
+    assert made.out.split() == [str(folder / f"case1-{role}.csv") for role in ("unloaded", "loaded")]
+    return folder
+
+
+def test_synth_identify_check(logs: Path, tmp_path: Path) -> None:
+    found = Outcome(
+        "identify",
+        logs / "case1-unloaded.csv",
+        "--loaded",
+        logs / "case1-loaded.csv",
+        "-o",
+        tmp_path,
+        "--format",
+        "json",
+    )
+    assert found.code == 0, found.err
+    content = json.loads(found.out)
+    folder = tmp_path / "case1-unloaded.algid"
+    assert content == json.loads((folder / "result.json").read_text())
+    good = Outcome("check", folder, "--against", "truth", "--max-error", "0.5")
+    assert good.code == 0, good.out
+    assert good.out.count("ok") == 12
+    tight = tmp_path / "tight.toml"
+    tight.write_text("[max_error_percent]\nk1 = 1e-12\nk2 = 5\n")
+    bad = Outcome("check", folder, "--tolerance-file", tight)
+    assert bad.code == 1
+    assert bad.out.splitlines()[0].startswith("OVER  k1")
+    assert bad.out.splitlines()[1].startswith("ok    k2")
+
+
+def test_help_has_an_example_for_every_command() -> None:
+    for command in app.registered_commands:
+        assert command.callback is not None
+        assert "Example: algid " in (command.callback.__doc__ or ""), command.callback.__name__
+    assert Outcome("--version").out.startswith("algid ")
+    assert "--install-completion" in Outcome("--help").out
+
+
+def test_help_of_synth_names_its_options() -> None:
+    shown = Outcome("synth", "--help").out
+    for option in ("--format", "--rate", "--duration", "--torque", "--initial", "--encoder-bits", "--jitter", "--drop"):
+        assert option in shown
+
+
+def broken(folder: Path, logs: Path, name: str, change: str) -> Path:
+    """A copy of the unloaded log with one thing wrong."""
+    table = pl.read_csv(logs / "case1-unloaded.csv")
+    path = folder / f"{name}.csv"
+    if change == "missing column":
+        table = table.drop("tau2")
+    elif change == "not a number":
+        table = table.with_columns(
+            pl.when(pl.int_range(pl.len()) == 7).then(None).otherwise(pl.col("theta1")).alias("theta1")
+        )
+    elif change == "text":
+        table = table.with_columns(pl.lit("abc").alias("theta2"))
+    elif change == "infinite":
+        table = table.with_columns(
+            pl.when(pl.int_range(pl.len()) == 7).then(float("inf")).otherwise(pl.col("tau1")).alias("tau1")
+        )
+    elif change == "time stands still":
+        table = table.with_columns(pl.lit(0.5).alias("t"))
+    elif change == "time runs backwards":
+        table = table.with_columns(-pl.col("t"))
+    elif change == "too short":
+        table = table.head(40)
+    elif change == "zero torque":
+        table = table.with_columns(pl.lit(0.0).alias("tau1"))
+    table.write_csv(path)
+    return path
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "missing column",
+        "not a number",
+        "text",
+        "infinite",
+        "time stands still",
+        "time runs backwards",
+        "too short",
+        "zero torque",
+    ],
+)
+def test_bad_logs_get_one_line_and_nothing_is_written(change: str, logs: Path, tmp_path: Path) -> None:
+    path = broken(tmp_path, logs, "bad", change)
+    out = tmp_path / "out"
+    found = Outcome("identify", path, "-o", out, "--estimator", "paper")
+    assert found.code == 2, found.err + found.out
+    assert found.out == ""
+    assert len(found.err.strip().splitlines()) == 1
+    assert found.err.startswith(f"algid: {path}")
+    assert not list(out.iterdir()) if out.exists() else True
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("identify", "nowhere.mcap"), "nowhere.mcap"),
+        (("synth", "case9"), "case9: no such case"),
+        (("synth", "case1", "--initial", "1,2"), "--initial"),
+        (("synth", "case1", "--torque", "nothing-like-it"), "--torque nothing-like-it"),
+        (("identify", "x.csv", "--delay", "soon"), "--delay"),
+        (("identify", "x.csv", "--poles", "1,2,3"), "--poles"),
+        (("identify", "x.csv", "--estimator", "paper", "--friction", "coulomb"), "--friction"),
+        (("check", "nothing.algid"), "nothing.algid"),
+    ],
+)
+def test_wrong_calls_get_one_line(arguments: tuple[str, ...], said: str, tmp_path: Path) -> None:
+    found = Outcome(*arguments, cwd=tmp_path)
+    assert found.code == 2
+    assert said in found.err
+    assert "Traceback" not in found.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_unwritable_folder_is_told(logs: Path, tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_text("")
+    found = Outcome("identify", logs / "case1-unloaded.csv", "-o", file / "below")
+    assert found.code == 2
+    assert "cannot write" in found.err
+
+
+def test_swapped_logs_are_told(logs: Path, tmp_path: Path) -> None:
+    found = Outcome("identify", logs / "case1-loaded.csv", "-o", tmp_path)
+    assert found.code == 2
+    assert "swap the logs" in found.err
+
+
+def test_weak_excitation_ends_with_three(tmp_path: Path) -> None:
+    still = ("--torque", "none", "--position-noise", "1e-4", "--torque-noise", "1e-3")
+    Outcome("synth", "case1", "-o", tmp_path, "--duration", "2", *still)
+    found = Outcome("identify", tmp_path / "case1-unloaded.mcap", "-o", tmp_path, "--estimator", "paper")
+    assert found.code == 3
+    assert "WEAK_EXCITATION" in found.out
+
+
+def test_replayed_torque_gives_the_same_motion(logs: Path, tmp_path: Path) -> None:
+    replayed = Outcome(
+        "synth", "case1", "--torque", logs / "case1-unloaded.csv", "--torque-hold", "foh", "--format", "csv",
+        "--duration", "0.5", "-o", tmp_path,
+    )  # fmt: skip
+    assert replayed.code == 0, replayed.err
+    first = pl.read_csv(logs / "case1-unloaded.csv").head(501)
+    second = pl.read_csv(tmp_path / "case1-unloaded.csv")
+    # straight lines through an 8 Hz torque at 1 kHz: (ω dt)²/8 of it
+    assert abs(first["theta1"] - second["theta1"]).max() < 1e-4  # type: ignore[operator]
