@@ -77,12 +77,14 @@ def same(one: Log, other: Log) -> bool:
 def peak_above_arrays(path: Path) -> float:
     """MB of memory that reading a file takes beyond its arrays and what the imports take."""
     code = (
-        "import resource, sys; from algid.readers import open_log, read_log; import polars, pyarrow.parquet\n"
-        "from pathlib import Path; import algid.readers.mcap.plan, algid.readers.parquet, algid.readers.csv\n"
-        "peak = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024\n"
-        "before = peak(); log = read_log(sys.argv[1])\n"
+        "import re, sys; from pathlib import Path; from algid.readers import read_log\n"
+        "import algid.readers.mcap.plan, zstandard, mcap.records, mcap.data_stream\n"
+        "told = lambda: Path('/proc/self/status').read_text()\n"
+        "status = lambda key: int(re.search(key + r':\\s*(\\d+)', told())[1]) * 1024\n"
+        "Path('/proc/self/clear_refs').write_text('5')\n"  # forget the peak of the imports
+        "before = status('VmRSS'); log = read_log(sys.argv[1])\n"
         "arrays = sum(a.nbytes for a in (log.stamp_ns, log.theta, log.tau, log.omega))\n"
-        "print((peak() - before - arrays) / 1e6)"
+        "print((status('VmHWM') - before - arrays) / 1e6)"
     )
     done = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True)
     return float(done.stdout)

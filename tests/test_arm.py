@@ -35,7 +35,7 @@ def lagrangian_torque() -> Callable[..., list[float]]:
     plain = sp.symbols("a1 a2 v1 v2 x1 x2")
     order = [q.diff(time, 2) for q in angle] + [q.diff(time) for q in angle] + angle
     flat = [expression.subs(list(zip(order, plain, strict=True))) for expression in torque]
-    return sp.lambdify((*plain, *symbols), flat, "numpy")  # type: ignore[no-any-return]
+    return sp.lambdify((*plain, *symbols), flat, "numpy")
 
 
 def states(count: int = 200) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

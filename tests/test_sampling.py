@@ -32,8 +32,8 @@ def test_segments_do_not_depend_on_the_blocks(stamps: np.ndarray, rows: int) -> 
     log = log_at(stamps)
     whole, cut = list(segments([log])), list(segments(blocks(log, rows)))
     for name in ("theta", "tau"):
-        joined = [np.concatenate([getattr(part, name) for part in parts], axis=1) for parts in (whole, cut)]
-        np.testing.assert_array_equal(*joined)
+        one, other = (np.concatenate([getattr(part, name) for part in parts], axis=1) for parts in (whole, cut))
+        np.testing.assert_array_equal(one, other)
     assert [part.start for part in cut if not part.continues] == [part.start for part in whole if not part.continues]
 
 

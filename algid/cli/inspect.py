@@ -80,7 +80,7 @@ def _print(found: Inspection, console: Console) -> None:
             f"excitation: condition number {rough.condition:.4g}; rough fit explains "
             f"{100 * rough.explained:.3g} % of the torques, "
             f"gravity {100 * rough.gravity_share:.3g} %: k4 {rough.weight1:.3g} N m, "
-            f"k2 {rough.weight2:.3g} N m, turned by {rough.turn:.0f} degrees"
+            f"k2 {rough.weight2:.3g} N m, turned by {round(rough.turn)} degrees"
         )
     for notice in found.notices:
         console.print(f"{notice.code}: {escape(plain(notice.text))}")

@@ -1,7 +1,7 @@
 """Zero-phase finite filters, applied by matrix products: no loop over samples, no state.
 
 The differentiator is the ideal one below its bandwidth, cut by a Kaiser window (Oppenheim & Schafer, Discrete-
-Time Signal Processing, sec. 7.5), scaled so that a constant speed comes out exactly.
+Time Signal Processing, sec. 7.5), and exact for angles that are polynomials of sixth degree in time.
 """
 
 from __future__ import annotations
@@ -27,7 +27,12 @@ def differentiator(dt: float, bandwidth: float) -> FloatArray:
     safe = np.where(n == 0, 1, n)
     slope = np.where(n == 0, 0.0, (np.sinc(x) - np.cos(np.pi * x)) / safe)
     kernel = slope * taper
-    return kernel / (kernel @ n * dt)
+    kernel /= kernel @ n * dt
+    # The window leaves a ripple of some tenths of a percent; the odd moments take it out where motion lives.
+    s = n / n[-1]
+    odd = np.stack([s, s**3, s**5])
+    wanted = np.array([1 / (n[-1] * dt), 0.0, 0.0])
+    return kernel + np.linalg.solve((odd * taper) @ odd.T, wanted - odd @ kernel) @ (odd * taper)
 
 
 def smoother(dt: float, bandwidth: float) -> FloatArray:

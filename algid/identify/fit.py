@@ -114,7 +114,9 @@ def conclude(
     covariance, quantile = known.covariance, 1.959963984540054
     freedom = samples
     if coloured:
-        covariance, quantile, freedom = _robust(shared, logs, beta, known, prior)
+        robust, quantile, freedom = _robust(shared, logs, beta, known, prior)
+        # The long-run variance of a short log errs low; white noise alone is the least there can be.
+        covariance = robust if estimator == "weak" else _widened(robust, covariance)
     return Fit(
         estimator=estimator,
         shared=shared,
@@ -140,3 +142,10 @@ def _robust(
     meat, freedom = sandwich(shared, logs, beta, prior)
     covariance = known.covariance @ meat @ known.covariance
     return covariance, float(stdtrit(max(2, freedom), 0.975)), freedom
+
+
+def _widened(robust: FloatArray, least: FloatArray) -> FloatArray:
+    """The robust covariance with no standard deviation below that of `least`, correlations kept."""
+    size, floor = np.sqrt(np.maximum(np.diag(robust), 0.0)), np.sqrt(np.maximum(np.diag(least), 0.0))
+    factor = np.divide(np.maximum(size, floor), size, out=np.ones_like(size), where=size > 0)
+    return robust * np.outer(factor, factor)

@@ -47,7 +47,7 @@ class Windows:
     dt: float
     length: float
     shift: float = 0.0
-    bandwidth: float | None = 60.0
+    bandwidth: float | None = 40.0
 
     @cached_property
     def step(self) -> int:

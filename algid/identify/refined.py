@@ -38,7 +38,7 @@ from algid.identify.whitening import Linearised, NoiseLevels, linearise, traject
 from algid.sampling import Segment, pieces
 
 PIECE_SAMPLES = 16384
-_TRAINED = 8  # pieces of a log in the training set
+_TRAINED = 4  # pieces of a log in the training set
 _SHORTEST = 8 * POINTS  # samples: shorter pieces tell nothing
 _STRETCH = 64  # samples over which scores are summed
 _SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
@@ -182,9 +182,10 @@ def fit(unloaded: Sequence[Source], loaded: Sequence[Source] = (), settings: Ref
     Raises
     ------
     ValueError
-        If there is no log, or no log long enough.
+        If there is no log, or no log long enough, or a known noise level is not positive.
     """
     settings = settings or RefinedSettings()
+    _check_noise(settings.noise)
     start = weak_fit(unloaded, loaded, _weak_settings(settings), settings.lengths, settings.prior)
     shared = start.shared
     logs = [*_opened(unloaded, False, settings), *_opened(loaded, True, settings)]
@@ -214,6 +215,11 @@ def fit(unloaded: Sequence[Source], loaded: Sequence[Source] = (), settings: Ref
     )
     noise = tuple(log.noise for log in logs)
     return replace(fitted, noise=noise, whiteness=whiteness, iterations=training.iterations)
+
+
+def _check_noise(noise: NoiseLevels | None) -> None:
+    if noise is not None and not (np.all(noise.theta > 0) and np.all(noise.tau > 0)):
+        raise ValueError(f"known noise levels must be positive, got {noise.theta} rad and {noise.tau} N m")
 
 
 def _opened(sources: Sequence[Source], loaded: bool, settings: RefinedSettings) -> Iterator[_Log]:

@@ -24,6 +24,7 @@ from algid.sampling import Segment, pieces
 
 Source = Callable[[], Iterable[Segment]]
 PIECE_SAMPLES = 16384
+_SHORTEST = 64  # samples: shorter pieces hold no window
 _REWEIGHTINGS = 4
 _DELAY_PASSES = 4
 _DELAY_SETTLED = 0.02  # samples
@@ -49,7 +50,7 @@ class WeakSettings:
 
     model: Model = field(default_factory=Model)
     window: float = 0.4
-    bandwidth: float | None = 60.0
+    bandwidth: float | None = 40.0
     hold: Literal["foh", "zoh"] = "foh"
     delay: float = 0.0
     estimate_delay: bool = False
@@ -70,14 +71,26 @@ class Normal:
     moved: FloatArray
 
 
-def normal_equations(segments: Iterable[Segment], settings: WeakSettings) -> Normal | None:
-    """Normal equations of one log; None where it is too short for a window."""
+def normal_equations(source: Source, settings: WeakSettings) -> Normal | None:
+    """Normal equations of one log; None where it is too short for a window.
+
+    A log without a stretch of four windows gets windows of a quarter of its longest stretch.
+    """
+    found, longest = _pass(source(), settings, settings.window)
+    if longest < 4 * settings.window and longest > 0:
+        found, _ = _pass(source(), settings, longest / 4)
+    return found
+
+
+def _pass(segments: Iterable[Segment], settings: WeakSettings, window: float) -> tuple[Normal | None, float]:
+    """Normal equations with windows of a given length, and the longest piece of the log in s."""
     sums = BlockSums()
-    windows: Windows | None = None
     samples = rows = 0
+    longest = dt = 0.0
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
-    for piece, fresh in _overlapping(segments, settings):
-        windows = windows_of(piece, settings) if windows is None else windows
+    for piece, windows, fresh in _overlapping(segments, settings, window):
+        dt = piece.dt
+        longest = max(longest, len(piece) * dt if len(piece) >= _SHORTEST else 0.0)
         samples += fresh
         low = np.minimum(low, piece.theta.min(axis=1))
         high = np.maximum(high, piece.theta.max(axis=1))
@@ -85,35 +98,34 @@ def normal_equations(segments: Iterable[Segment], settings: WeakSettings) -> Nor
         rows += X.shape[2]
         if X.shape[2]:
             sums.add(_grams(X))
-    if windows is None or rows == 0:
-        return None
-    return Normal(sums.values(), windows.dt, samples, rows, high - low)
+    return (Normal(sums.values(), dt, samples, rows, high - low) if rows else None), longest
 
 
-def windows_of(piece: Segment, settings: WeakSettings) -> Windows:
-    """Windows that fit the first piece of a log: at least four of them, and a bandwidth it can hold."""
-    duration = len(piece) * piece.dt
-    bandwidth = settings.bandwidth
-    if bandwidth is not None:
-        bandwidth = max(min(bandwidth, 0.2 / piece.dt), 20.0 / duration)
-    shift = settings.delay + (0.5 * piece.dt if settings.hold == "zoh" else 0.0)
-    return Windows(piece.dt, min(settings.window, duration / 4), shift, bandwidth)
-
-
-def _overlapping(segments: Iterable[Segment], settings: WeakSettings) -> Iterator[tuple[Segment, int]]:
-    """Pieces that share the samples a window needs with the piece before, and their fresh samples."""
+def _overlapping(
+    segments: Iterable[Segment], settings: WeakSettings, window: float
+) -> Iterator[tuple[Segment, Windows, int]]:
+    """Pieces that share the samples a window needs with the piece before, their windows and fresh samples."""
     before: Segment | None = None
     windows: Windows | None = None
-    length = 0
+    left_over = 0
     for piece in pieces(segments, PIECE_SAMPLES):
         if windows is None:
-            windows = windows_of(piece, settings)
+            windows = _windows(piece.dt, settings, window)
         fresh = len(piece)
         if piece.continues and before is not None:
-            piece = _prefixed(before, piece, windows.overlap + length % windows.step)
-        length = (len(piece) - 2 * windows.margin) % windows.step
+            piece = _prefixed(before, piece, windows.overlap + left_over)
+        left_over = (len(piece) - 2 * windows.margin) % windows.step
         before = piece
-        yield piece, fresh
+        yield piece, windows, fresh
+
+
+def _windows(dt: float, settings: WeakSettings, window: float) -> Windows:
+    """Windows for samples `dt` s apart, with a bandwidth that the rate and the window's length leave room for."""
+    bandwidth = settings.bandwidth
+    if bandwidth is not None:
+        bandwidth = max(min(bandwidth, 0.2 / dt), 6.0 / window)
+    shift = settings.delay + (0.5 * dt if settings.hold == "zoh" else 0.0)
+    return Windows(dt, window, shift, bandwidth)
 
 
 def _prefixed(before: Segment, piece: Segment, overlap: int) -> Segment:
@@ -216,7 +228,7 @@ def fit(
 
 
 def _normals(sources: Sequence[Source], settings: WeakSettings) -> list[Normal]:
-    found = [normal_equations(source(), settings) for source in sources]
+    found = [normal_equations(source, settings) for source in sources]
     return [normal for normal in found if normal is not None]
 
 

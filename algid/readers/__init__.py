@@ -47,7 +47,11 @@ def open_log(path: str | Path, profile: Profile | None = None) -> TableReader:
         from algid.readers.csv import open_csv
 
         return open_csv(path, profile, kind)
-    raise LogError(f"{path}: {kind} logs cannot be read; convert it to MCAP, Parquet or CSV")
+    if kind == "bag":
+        from algid.readers.bag import open_bag
+
+        return open_bag(path, profile)
+    raise LogError(f"{path}: a single {kind} file; open the folder that holds it and its metadata.yaml")
 
 
 def _open_bag(path: Path, profile: Profile | None) -> TableReader:
@@ -56,7 +60,9 @@ def _open_bag(path: Path, profile: Profile | None) -> TableReader:
 
     bag = bag_files(path)
     if bag.kind != "mcap":
-        raise LogError(f"{path}: a bag of {bag.kind} files; expected MCAP")
+        from algid.readers.bag import open_bag
+
+        return open_bag(path, profile, bag.notices)
     return replace(open_mcap(bag.paths, profile), notices=bag.notices)
 
 

@@ -43,13 +43,17 @@ class TableReader:
         tables = self._finite(self.tables(rows))
         notices, total, turns = self.notices, 0, np.array([[math.nan, 0.0]] * 2)
         for table in cut(Sorter(self.origin.path).run(tables), rows):
+            notices += table.notices
+            if not len(table):
+                continue
             theta, tau, omega = self.conversion.apply(table)
             turns = self._unwrapped(theta, turns)
             total += len(table)
-            yield Log(table.stamp_ns, theta, tau, self.origin, omega, notices + table.notices)
+            yield Log(table.stamp_ns, theta, tau, self.origin, omega, notices)
             notices = ()
         if total < 2:
-            raise LogError(f"{self.origin.path}: {total} samples; a log needs two at least")
+            why = "".join(f" ({notice.text})" for notice in notices[:1])
+            raise LogError(f"{self.origin.path}: {total} samples; a log needs two at least{why}")
 
     def _finite(self, tables: Iterator[Table]) -> Iterator[Table]:
         first = 0

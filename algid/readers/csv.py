@@ -166,12 +166,17 @@ class _Text:
         return (text.str.replace(",", ".", literal=True) if self.dialect.decimal_comma else text).cast(pl.Float64)
 
     def _whole(self, frame: pl.DataFrame, done: int) -> pl.DataFrame:
+        import polars as pl
+
         if frame[_EXCESS].any():
             row = done + (frame[_EXCESS].arg_max() or 0) + 1
             raise LogError(
                 f"{self.path}: row {row} has more cells than the header's {len(self.dialect.columns)}; mend that row"
             )
-        return frame.drop(_EXCESS)
+        frame = frame.drop(_EXCESS)
+        if any(frame.null_count().row(0)):  # an empty line is no row
+            frame = frame.filter(~pl.all_horizontal(pl.all().is_null()))
+        return frame
 
     def _reason(self, done: int, error: Exception) -> str:
         told = str(error).split("\n", maxsplit=1)[0]

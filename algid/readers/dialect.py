@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,7 +77,10 @@ def detect(path: Path, head: bytes) -> Dialect:
 
 def split(line: str, separator: str) -> list[str]:
     """Cells of a line, blanks and quotes stripped."""
-    cells = line.split(separator) if separator else line.split()
+    if separator and '"' in line:
+        cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
+    else:
+        cells = line.split(separator) if separator else line.split()
     return [cell.strip().strip('"').strip() for cell in cells]
 
 

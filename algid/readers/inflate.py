@@ -15,7 +15,7 @@ _HEAD = 1 << 16
 
 
 def pieces(path: Path, name: str, size: int = _PIECE) -> Iterator[bytes]:
-    """Unpacked bytes of a "csv.zst" or "csv.gz" file, at most `size` at a time.
+    """Bytes of a "csv" file, unpacked ones of a "csv.zst" or "csv.gz" file, at most `size` at a time.
 
     Raises
     ------
@@ -26,11 +26,12 @@ def pieces(path: Path, name: str, size: int = _PIECE) -> Iterator[bytes]:
 
     try:
         with path.open("rb") as raw:
-            stream: io.BufferedIOBase | zstandard.ZstdDecompressionReader = (
-                zstandard.ZstdDecompressor(max_window_size=1 << 27).stream_reader(raw, read_across_frames=True)
-                if name == "csv.zst"
-                else gzip.GzipFile(fileobj=raw)
-            )
+            stream: io.BufferedIOBase | zstandard.ZstdDecompressionReader = raw
+            if name == "csv.zst":
+                window = zstandard.ZstdDecompressor(max_window_size=1 << 27)
+                stream = window.stream_reader(raw, read_across_frames=True)
+            elif name == "csv.gz":
+                stream = gzip.GzipFile(fileobj=raw)
             while piece := stream.read(size):
                 yield piece
     except (OSError, EOFError, zlib.error, zstandard.ZstdError) as error:

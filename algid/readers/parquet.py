@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from algid.errors import LogError
-from algid.log import Origin
+from algid.log import CANONICAL_COLUMNS, Notice, Origin
 from algid.readers import frames
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign, check_written
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 _MOST_COLUMNS = 4096
 _LARGEST_FOOTER = 1 << 26
+_NO_SUMS = Notice("NO_CHECKSUM", "the file has no sums of its values, as algid's have: changes would go unseen")
 
 
 def open_parquet(path: Path, profile: Profile | None = None) -> TableReader:
@@ -44,6 +45,8 @@ def open_parquet(path: Path, profile: Profile | None = None) -> TableReader:
     companion = _companion(path, metadata)
     check_written(str(path), list(available), companion.sums if companion else {})
     columns = assign(str(path), list(available), profile)
+    if companion is None and "stamp_ns" in schema and set(CANONICAL_COLUMNS) <= schema.keys():
+        columns = replace(columns, notices=(*columns.notices, _NO_SUMS))
     _check_types(path, columns, available, schema)
     origin = Origin(str(path), "parquet", dict(columns.sources), companion.truth if companion else None)
     source = _Groups(path, columns, available, schema, companion.sums if companion else {})
@@ -93,18 +96,17 @@ def _counted_rows(path: Path) -> int:
     try:
         metadata = pq.read_metadata(path)
         groups = [metadata.row_group(place) for place in range(metadata.num_row_groups)]
-        told = [group.num_rows for group in groups]
-        fewest = [
-            min((group.column(place).num_values for place in range(group.num_columns)), default=0) for group in groups
-        ]
+        # a list column has more values than rows, a flat one just as many
+        flat = not any("." in metadata.schema.column(place).path for place in range(metadata.num_columns))
+        agree = sum(group.num_rows for group in groups) == metadata.num_rows and all(
+            values == group.num_rows if flat else values >= group.num_rows
+            for group in groups
+            for values in (group.column(place).num_values for place in range(group.num_columns))
+        )
     except (pa.ArrowException, OSError, ValueError) as error:
         raise _damaged(path, error) from error
-    if sum(told) != metadata.num_rows or any(rows > values for rows, values in zip(told, fewest, strict=True)):
-        raise LogError(f"{path}: the Parquet footer contradicts itself about how many rows there are; copy it again")
-    if fewest != told and not any(
-        "." in str(metadata.schema.column(place).path) for place in range(metadata.num_columns)
-    ):
-        raise LogError(f"{path}: the Parquet footer contradicts itself about how many values there are; copy it again")
+    if not agree:
+        raise LogError(f"{path}: the Parquet footer contradicts itself about its rows; copy the file again")
     return int(metadata.num_rows)
 
 

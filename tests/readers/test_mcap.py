@@ -85,6 +85,16 @@ def test_names_that_change_place_are_followed(tmp_path: Path) -> None:
     assert [notice.code for notice in found.notices] == ["OTHER_MESSAGES"]
 
 
+def test_joints_named_by_numbers_are_not_places(tmp_path: Path) -> None:
+    log = noise_log(20, start_ns=EPOCH_NS, velocity=False)
+    messages = []
+    for row, stamp in enumerate(log.stamp_ns.tolist()):
+        position, effort = log.theta[::-1, row].tolist(), log.tau[::-1, row].tolist()
+        messages.append((TOPIC, stamp, joint_state(stamp, ["1", "0"], position, (), effort).done()))
+    write_mcap(tmp_path / "log.mcap", messages)
+    assert same(read_log(tmp_path / "log.mcap"), log)
+
+
 def test_more_layouts_than_are_remembered(tmp_path: Path) -> None:
     log = noise_log(400, start_ns=EPOCH_NS, velocity=False)
     messages = []

@@ -98,7 +98,9 @@ def _value(found: Any, path: str) -> Any:
         if not part.startswith("["):
             parent, found = found, found.get(part) if isinstance(found, dict) else None
             continue
-        index = int(part[1:-1]) if part[1:-1].isdigit() else _place(parent, part[1:-1])
+        index = _place(parent, part[1:-1])
+        if index is None and part[1:-1].isdigit():
+            index = int(part[1:-1])
         found = found[index] if isinstance(found, list) and index is not None and index < len(found) else None
     return found if isinstance(found, (int, float)) and not isinstance(found, bool) else None
 

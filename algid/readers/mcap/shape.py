@@ -70,13 +70,13 @@ class Shape:
     def _numbered(self, path: str) -> str | None:
         done = ""
         for part in re.split(r"(\[[^\]]*\])", path):
-            if not part.startswith("[") or part[1:-1].isdigit():
+            if not part.startswith("["):
                 done += part
                 continue
-            index = self._index(done, part[1:-1])
-            if index is None:
+            index = self._index(done, part[1:-1])  # a name first: joints may be called "1" and "2"
+            if index is None and not part[1:-1].isdigit():
                 return None
-            done += f"[{index}]"
+            done += part if index is None else f"[{index}]"
         return done
 
     def _index(self, array: str, name: str) -> int | None:

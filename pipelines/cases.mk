@@ -1,0 +1,38 @@
+# Both cases through every format: synth -> identify -> check. A reported error that grows fails the run.
+.PHONY: demo pipelines
+
+DEMO := build/demo
+PIPELINES := build/pipelines
+CASES := case1 case2
+FORMATS := mcap parquet csv
+ALGID := $(BIN)/algid
+
+demo: setup
+	@rm -rf $(DEMO)
+	@for case in $(CASES); do \
+	  $(ALGID) synth $$case -o $(DEMO) >/dev/null && \
+	  for estimator in paper refined; do \
+	    $(ALGID) identify $(DEMO)/$$case-unloaded.mcap --loaded $(DEMO)/$$case-loaded.mcap \
+	      --estimator $$estimator -o $(DEMO)/$$estimator --quiet || exit; \
+	  done || exit; \
+	done
+	@$(BIN)/python -m pipelines.table4 $(DEMO)
+	@echo "Reports: $(DEMO)/refined/case1-unloaded.algid/report.html and its neighbours"
+
+pipelines: setup $(foreach case,$(CASES),$(foreach format,$(FORMATS),pipeline-$(case)-$(format)))
+
+define PIPELINE
+.PHONY: pipeline-$(1)-$(2)
+pipeline-$(1)-$(2): setup
+	@echo "== $(1) $(2)"
+	@rm -rf $(PIPELINES)/$(1)-$(2)
+	@$(ALGID) synth $(1) --format $(2) -o $(PIPELINES)/$(1)-$(2) >/dev/null
+	@for estimator in paper refined; do \
+	  $(ALGID) identify $(PIPELINES)/$(1)-$(2)/$(1)-unloaded.$(2) \
+	    --loaded $(PIPELINES)/$(1)-$(2)/$(1)-loaded.$(2) --estimator $$$$estimator \
+	    -o $(PIPELINES)/$(1)-$(2)/$$$$estimator --quiet --no-report && \
+	  $(ALGID) check $(PIPELINES)/$(1)-$(2)/$$$$estimator/$(1)-unloaded.algid \
+	    --tolerance-file pipelines/tolerances/$(1)-$$$$estimator.toml || exit 1; \
+	done
+endef
+$(foreach case,$(CASES),$(foreach format,$(FORMATS),$(eval $(call PIPELINE,$(case),$(format)))))

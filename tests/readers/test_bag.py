@@ -1,0 +1,60 @@
+"""ROS 1 bags and SQLite rosbag2 folders, written by rosbags."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Writer2
+from rosbags.typesys import Stores, get_typestore
+
+from algid.errors import LogError
+from algid.log import Log
+from algid.readers import read_log
+from tests.readers.logs import EPOCH_NS, noise_log, same
+
+TYPE = "sensor_msgs/msg/JointState"
+
+
+def message(store: Any, log: Log, row: int, *, first: bool) -> Any:
+    time, header, state = (store.types[name] for name in ("builtin_interfaces/msg/Time", "std_msgs/msg/Header", TYPE))
+    sec, nanosec = divmod(int(log.stamp_ns[row]), 10**9)
+    stamp = time(sec=sec, nanosec=nanosec)
+    head = header(seq=row, stamp=stamp, frame_id="") if first else header(stamp=stamp, frame_id="")
+    assert log.omega is not None
+    return state(
+        header=head,
+        name=["j1", "j2"],
+        position=log.theta[:, row].copy(),
+        velocity=log.omega[:, row].copy(),
+        effort=log.tau[:, row].copy(),
+    )
+
+
+def test_bags_of_both_generations_read_the_same(tmp_path: Path) -> None:
+    log = noise_log(200, start_ns=EPOCH_NS)
+    store = get_typestore(Stores.ROS1_NOETIC)
+    with Writer1(tmp_path / "one.bag") as writer:
+        channel = writer.add_connection("/joint_states", TYPE, typestore=store)
+        for row, stamp in enumerate(log.stamp_ns.tolist()):
+            writer.write(channel, stamp, store.serialize_ros1(message(store, log, row, first=True), TYPE))
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    with Writer2(tmp_path / "two", version=9, storage_plugin=StoragePlugin.SQLITE3) as writer2:
+        channel2 = writer2.add_connection("/joint_states", TYPE, typestore=store)
+        for row, stamp in enumerate(log.stamp_ns.tolist()):
+            data = store.serialize_cdr(message(store, log, row, first=False), TYPE)
+            writer2.write(channel2, stamp, data)
+    for name in ("one.bag", "two"):
+        found = read_log(tmp_path / name)
+        assert same(found, log)
+        assert found.origin.mapping["tau2"] == "/joint_states: effort[j2]"
+
+
+def test_a_damaged_bag_is_refused_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "log.bag").write_bytes(b"#ROSBAG V2.0\n" + np.arange(100).tobytes())
+    with pytest.raises(LogError, match="bag cannot be read"):
+        read_log(tmp_path / "log.bag")

@@ -1,0 +1,136 @@
+"""Names, clocks, dialects and order: the small parts, on what is seen in the field."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from algid.errors import LogError
+from algid.log import Notice
+from algid.readers import read_log
+from algid.readers.clock import time_unit, to_nanoseconds
+from algid.readers.names import choose, take_apart
+from algid.readers.order import Sorter
+from algid.readers.table import Table
+
+FIELD = {
+    "t,q1,q2,tau1,tau2": "t q1 q2 tau1 tau2",
+    "time,pos1,pos2,vel1,vel2,tau1,tau2": "time pos1 pos2 tau1 tau2",
+    "time,pos_meas1,pos_meas2,pos_filt1,pos_filt2,tau_con1,tau_con2,tau_meas1,tau_meas2": (
+        "time pos_meas1 pos_meas2 tau_meas1 tau_meas2"
+    ),
+    "timestamp,actual_q_0,actual_q_1,actual_current_0,actual_current_1": (
+        "timestamp actual_q_0 actual_q_1 actual_current_0 actual_current_1"
+    ),
+    "__time,/js/a/position,/js/a/effort,/js/b/position,/js/b/effort": (
+        "__time /js/a/position /js/b/position /js/a/effort /js/b/effort"
+    ),
+    "time,q[0],q[1],tau_J[0],tau_J[1]": "time q[0] q[1] tau_J[0] tau_J[1]",
+    "T,THETA1,Theta2,Tau1,TAU2": "T THETA1 Theta2 Tau1 TAU2",
+    "Time [ms],Joint 1 Position [deg],Joint 2 Position [deg],Joint 1 Torque [Nm],Joint 2 Torque [Nm]": (
+        "Time [ms],Joint 1 Position [deg],Joint 2 Position [deg],Joint 1 Torque [Nm],Joint 2 Torque [Nm]"
+    ),
+}
+
+
+@pytest.mark.parametrize("header", FIELD)
+def test_names_of_the_field_are_recognised(header: str) -> None:
+    chosen = choose(header.split(",")).columns
+    wanted = FIELD[header].split("," if "," in FIELD[header] else " ")
+    assert [chosen[name] for name in ("t", "theta1", "theta2", "tau1", "tau2")] == wanted
+
+
+def test_units_in_names() -> None:
+    assert take_apart("Joint 1 Position [deg]").unit == "deg"
+    assert take_apart("tau_1 (mNm)").unit == "mN m"
+    assert take_apart("q1_deg").unit == "deg"
+    assert take_apart("q[0]").unit is None
+    assert take_apart("velocity_rpm").unit == "rpm"
+
+
+def test_more_joints_than_two_need_a_choice() -> None:
+    columns = ["t", *(f"{name}{joint}" for name in ("q", "tau") for joint in range(7))]
+    with pytest.raises(LookupError, match="7 joints"):
+        choose(columns)
+    chosen = choose(columns, ("3", "5")).columns
+    assert [chosen[name] for name in ("theta1", "theta2", "tau1", "tau2")] == ["q3", "q5", "tau3", "tau5"]
+
+
+def test_torques_of_other_joints_are_not_taken() -> None:
+    chosen = choose(["t", "q1", "q2", "tau2", "tau9"]).columns
+    assert "tau2" not in chosen
+
+
+@pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
+@pytest.mark.parametrize("start", [0, 1_700_000_000])
+def test_units_of_time_are_told_by_size_and_step(unit: str, start: int) -> None:
+    factor = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}[unit]
+    times = start * factor + np.arange(100) * (factor * 2e-3)
+    assert time_unit(times) == unit
+    # float64 seconds since 1970 resolve 0.24 µs; half of that is the rounding
+    assert np.abs(to_nanoseconds(times, unit) - (start * 10**9 + np.arange(100) * 2_000_000)).max() <= 240
+
+
+def test_whole_nanoseconds_stay_exact() -> None:
+    stamps = np.array([1_700_000_000_123_456_789, 1_700_000_000_123_456_790])
+    assert to_nanoseconds(stamps, "ns").tolist() == stamps.tolist()
+    with pytest.raises(ValueError, match="292 years"):
+        to_nanoseconds(np.array([2**62]), "s")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "# made by hand\n\n t ; q1 ; q2 ; tau1 ; tau2 \n0,0 ; 1,5 ;2,0;3,0;4,0\n0,5;1,5 ;2,0;3,0;4,0\n",
+        "t\tq1\tq2\ttau1\ttau2\n0.0\t1.5\t2.0\t3.0\t4.0\n0.5\t1.5\t2.0\t3.0\t4.0\n",
+        "# t q1 q2 tau1 tau2\n 0.0  1.5  2.0  3.0 4.0\n 0.5  1.5  2.0  3.0 4.0\n\n",
+        'note,"t","q1","q2","tau1","tau2"\r\n"x, y",0.0,1.5,2.0,3.0,4.0\r\nz,0.5,1.5,2.0,3.0,4.0\r\n',
+        "\ufefft, q1, q2, tau1, tau2\n0.0, 1.5, 2.0, 3.0, 4.0\n0.5, 1.5, 2.0, 3.0, 4.0\n0.6, 1.5, 2",
+    ],
+)
+def test_dialects(text: str, tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text(text, newline="")
+    found = read_log(tmp_path / "log.csv")
+    assert found.theta.tolist() == [[1.5, 1.5], [2, 2]]
+    assert found.tau.tolist() == [[3, 3], [4, 4]]
+    cut = [Notice("CUT_OFF", "the last row breaks off and was dropped", lossy=True)]
+    assert [one for one in found.notices if one.lossy] == (cut if text.endswith("2") else [])
+
+
+def test_list_columns_of_parquet(tmp_path: Path) -> None:
+    lists = {"position": [[0.1, 0.2], [0.3, 0.4]], "effort": [[1.0, 2.0], [3.0, 4.0]]}
+    stamps = pl.Series("timestamp", [1_700_000_000_000_000_000, 1_700_000_000_001_000_000])
+    frame = pl.DataFrame({**lists, "timestamp": stamps.cast(pl.Datetime("ns"))})
+    frame.write_parquet(tmp_path / "log.parquet")
+    found = read_log(tmp_path / "log.parquet")
+    assert found.theta.tolist() == [[0.1, 0.3], [0.2, 0.4]]
+    assert found.tau.tolist() == [[1, 3], [2, 4]]
+    assert found.stamp_ns.tolist() == stamps.to_list()
+
+
+def sorted_stamps(*tables: list[int]) -> tuple[list[int], list[str]]:
+    made = [Table(np.array(stamps), {"theta1": np.array(stamps, float)}) for stamps in tables]
+    found = list(Sorter("log").run(iter(made)))
+    for table in found:
+        assert table.columns["theta1"].tolist() == table.stamp_ns.tolist()
+    stamps = [stamp for table in found for stamp in table.stamp_ns.tolist()]
+    return stamps, [notice.code for table in found for notice in table.notices]
+
+
+def test_late_samples_are_put_in_place_also_across_tables() -> None:
+    first, second = list(range(0, 100, 2)), [99, *range(100, 200, 2)]
+    first[40], first[41] = first[41], first[40]
+    second[0] = 95
+    stamps, codes = sorted_stamps(first, second)
+    assert stamps == sorted({*first, *second})
+    assert codes == ["UNSORTED_STAMPS"]
+
+
+def test_two_recordings_in_one_file_are_not_mixed() -> None:
+    with pytest.raises(LogError, match="time goes backwards"):
+        sorted_stamps([*range(0, 6000, 2), *range(1, 6000, 2)])
+    with pytest.raises(LogError, match="time goes backwards"):
+        sorted_stamps(list(range(0, 6000, 2)), list(range(1, 6000, 2)))
