@@ -11,7 +11,7 @@ from algid.cli.report import ResultFormat
 from algid.errors import SettingError
 
 if TYPE_CHECKING:
-    from algid.report.tables import Table
+    from algid.report.table import Table
 
 
 def compare(

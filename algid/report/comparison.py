@@ -7,8 +7,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from algid.report.facts import flat_settings
 from algid.report.numbers import ABSENT, resolved, significant
-from algid.report.tables import Column, Table, flat_settings
+from algid.report.table import Column, Table
 from algid.report.text import file_name, unit_text, visible
 from algid.results import Estimate, Result
 

@@ -7,11 +7,12 @@ import json
 from collections.abc import Iterable
 
 from algid.report.figures.base import Figure, Legend, Missing
-from algid.report.tables import Column, Table
+from algid.report.table import Column, Table
 from algid.report.text import visible
 from algid.results import Status
 
 LONGEST_TEXT = 4_000
+LONG_CELL = 40  # beyond, a cell breaks into lines
 KEYS = "Arrow keys move, plus and minus zoom, 0 resets."
 
 
@@ -48,7 +49,8 @@ def _cell(column: Column, text: str) -> str:
     if column.kind == "status":
         return f'<td class="status{" ok" if text == Status.OK.value else ""}">{escaped(text)}</td>'
     main = " estimate" if column.heading == "Estimate" else ""
-    return f'<td class="{column.kind}{main}">{escaped(text)}</td>'
+    long = " long" if column.kind == "text" and len(text) > LONG_CELL else ""
+    return f'<td class="{column.kind}{main}{long}">{escaped(text)}</td>'
 
 
 def _class(column: Column) -> str:

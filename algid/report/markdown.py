@@ -6,7 +6,9 @@ import re
 from pathlib import Path
 
 from algid.outfiles import whole_file
-from algid.report.tables import Table, estimate_tables, fit_tables, log_tables, provenance_table
+from algid.report.facts import fit_tables, log_tables, provenance_table
+from algid.report.table import Table
+from algid.report.tables import estimate_tables
 from algid.report.text import file_name
 from algid.report.verdict import LEVEL_WORDS, Level, verdict
 from algid.results import Result, read_result

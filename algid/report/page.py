@@ -14,22 +14,15 @@ from importlib import resources
 from pathlib import Path
 
 from algid.outfiles import whole_file
+from algid.report.facts import fit_tables, log_tables, provenance_table, quality_tables, settings_table
 from algid.report.figures.base import Figure, Missing
 from algid.report.gallery import gallery
 from algid.report.html import escaped, figure_html, panel_id, script_json, table_html
 from algid.report.numbers import significant
-from algid.report.tables import (
-    Column,
-    Table,
-    estimate_tables,
-    fit_tables,
-    log_tables,
-    provenance_table,
-    settings_table,
-)
+from algid.report.table import Table
+from algid.report.tables import estimate_tables
 from algid.report.template import TEMPLATE
 from algid.report.text import file_name
-from algid.report.torquelog import TorqueLog
 from algid.report.verdict import LEVEL_WORDS, Verdict, verdict
 from algid.results import Result, read_result
 
@@ -87,7 +80,7 @@ def page_html(folder: Path, result: Result, library: str | None) -> str:
         *map(table_html, estimate_tables(result)),
         *map(figure_html, figures),
         *_section("fit", "What the estimator knows of the logs", fit_tables(result)),
-        *_section("data", "Data quality", [*_quality(torque, result), *log_tables(result)], _warnings(result)),
+        *_section("data", "Data quality", [*quality_tables(torque, result), *log_tables(result)], _warnings(result)),
         *_section("settings", "Settings and provenance", [settings_table(result.settings), provenance_table(result)]),
         "</main>",
         f"<footer>Made by algid {escaped(result.version)} from {escaped(str(folder.name))}/result.json.</footer>",
@@ -179,7 +172,7 @@ def _section(key: str, title: str, tables: Sequence[Table], extra: str = "") -> 
     if not tables and not extra:
         return []
     return [
-        f'<section aria-labelledby="{key}" class="tables-facts"><h2 id="{key}">{escaped(title)}</h2>',
+        f'<section aria-labelledby="{key}"><h2 id="{key}">{escaped(title)}</h2>',
         extra,
         *map(table_html, tables),
         "</section>",
@@ -190,33 +183,3 @@ def _warnings(result: Result) -> str:
     if not result.warnings:
         return '<p class="note">The readers and the estimator gave no warning.</p>'
     return f"<ul>{''.join(f'<li>{escaped(warning)}</li>' for warning in result.warnings)}</ul>"
-
-
-def _quality(torque: TorqueLog | None, result: Result) -> list[Table]:
-    """What the stamps and the samples of each log look like."""
-    if torque is None:
-        return []
-    columns = (
-        Column("Log", "name"),
-        Column("Samples used", "number"),
-        Column("From, s", "number"),
-        Column("To, s", "number"),
-        Column("Period, ms", "number"),
-        Column("Gaps", "number"),
-        Column("Largest step, ms", "number"),
-    )
-    names = dict(enumerate(file_name(log.path) for log in result.logs))
-    rows = tuple(
-        (
-            names.get(log, f"log {log + 1}"),
-            f"{span.samples:,}",
-            significant(span.first, 6) if span.first else "0",
-            significant(span.last, 6),
-            significant(1e3 * span.period, 4),
-            str(span.gaps),
-            significant(1e3 * span.largest_gap, 4),
-        )
-        for log, span in sorted(torque.ranges.items())
-    )
-    note = f"{torque.unpredicted:,} samples have no predicted torque." if torque.unpredicted else ""
-    return [Table("Samples that were used", columns, rows, note)]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from algid.report.tables import Table, estimate_tables
+from algid.report.table import Table
+from algid.report.tables import estimate_tables
 from algid.report.verdict import LEVEL_WORDS, Level, verdict
 from algid.results import Result, Status
 

@@ -1,0 +1,49 @@
+"""A table of finished text: what every format sets, and none changes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from algid.report.numbers import ABSENT
+
+Kind = Literal["name", "number", "text", "status"]
+
+
+@dataclass(frozen=True)
+class Column:
+    """Heading of a column and what it holds; a narrow terminal does without it, the highest `rank` first."""
+
+    heading: str
+    kind: Kind
+    rank: int = 0
+
+
+@dataclass(frozen=True)
+class Table:
+    """A titled table of finished text, foreign text made visible; `note` is one line below it."""
+
+    title: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+    def without_empty(self) -> Table:
+        """This table less the columns that hold nothing."""
+        kept = [i for i, _ in enumerate(self.columns) if any(row[i] not in (ABSENT, "") for row in self.rows)]
+        return self.only(kept)
+
+    def narrower(self) -> Table | None:
+        """This table less the column that is missed least; None where all are needed."""
+        least = max(range(len(self.columns)), key=lambda i: self.columns[i].rank, default=None)
+        if least is None or self.columns[least].rank == 0:
+            return None
+        return self.only([i for i in range(len(self.columns)) if i != least])
+
+    def only(self, kept: list[int]) -> Table:
+        """This table with the columns `kept`."""
+        return replace(
+            self,
+            columns=tuple(self.columns[i] for i in kept),
+            rows=tuple(tuple(row[i] for i in kept) for row in self.rows),
+        )
