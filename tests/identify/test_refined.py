@@ -1,10 +1,11 @@
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from algid.identify import refined
+from algid.identify import evidence, refined
 from algid.identify.information import Prior
 from algid.identify.model import Model
 from algid.identify.refined import RefinedSettings
@@ -135,8 +136,15 @@ def test_a_horizontal_arm_has_five_constants(bench: Bench) -> None:
 
 def test_long_logs_take_one_more_pass_and_agree(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     log = bench.log(sigma=1e-3)
-    monkeypatch.setattr(refined, "PIECE_SAMPLES", 500)
+    monkeypatch.setattr(evidence, "PIECE_SAMPLES", 500)
     whole = refined.fit([lambda: [log]])
-    monkeypatch.setattr(refined, "_TRAINED", 2)
+    monkeypatch.setattr(evidence, "_TRAINED", 2)
     parts = refined.fit([lambda: [log]])
     assert np.allclose(whole.values, parts.values, atol=0.2 * whole.std.min() + 0.2 * whole.std)
+
+
+def test_blocks_of_any_size_give_the_same_estimate(bench: Bench) -> None:
+    log = bench.log(sigma=1e-3)
+    cut = [log.part(first, last) for first, last in pairwise([0, 17, 1200, 1201, 3500, len(log)])]
+    whole = refined.fit([lambda: [log]])
+    assert np.array_equal(refined.fit([lambda: cut]).values, whole.values)

@@ -4,7 +4,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from algid.identify import weak
+from algid.identify import normal, weak
 from algid.identify.model import Model
 from algid.identify.weak import WeakSettings
 from algid.sampling import Segment
@@ -33,15 +33,15 @@ def test_recorded_velocities_serve_as_well(bench: Bench) -> None:
 
 
 def test_blocks_of_any_size_give_the_same_normal_equations(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(weak, "PIECE_SAMPLES", 1111)
+    monkeypatch.setattr(normal, "PIECE_SAMPLES", 1111)
     log = bench.log(sigma=1e-3)
-    whole = weak.normal_equations(lambda: [log], WeakSettings(window=0.2))
-    cut = weak.normal_equations(lambda: _cut(log, 17, 1200, 1201, 3500), WeakSettings(window=0.2))
+    whole = normal.normal_equations(lambda: [log], WeakSettings(window=0.2))
+    cut = normal.normal_equations(lambda: _cut(log, 17, 1200, 1201, 3500), WeakSettings(window=0.2))
     assert whole is not None
     assert cut is not None
     assert np.array_equal(whole.gram, cut.gram)
-    monkeypatch.setattr(weak, "PIECE_SAMPLES", 16384)
-    single = weak.normal_equations(lambda: [log], WeakSettings(window=0.2))
+    monkeypatch.setattr(normal, "PIECE_SAMPLES", 16384)
+    single = normal.normal_equations(lambda: [log], WeakSettings(window=0.2))
     assert single is not None
     assert single.rows == whole.rows  # no window is lost between pieces
     assert np.allclose(single.gram.sum(axis=0), whole.gram.sum(axis=0), rtol=1e-11)
