@@ -3,10 +3,12 @@
 The paper does not state the torque behind Table 4. Its observer lags more the faster the arm moves, so the
 torque decides the errors. This script seeks, for one case, four harmonics a joint (0.1 to 1.5 Hz, at most
 4 N m) that drive the unloaded and the loaded arm alike from rest, so that the largest of the twelve errors, each
-as a share of the paper's, is as small as possible: differential evolution from the best of many Sobol points,
-seeded, hence repeatable. (The errors have poles wherever P_r is singular, so that a local solver gets nowhere.)
+as a share of the paper's, is as small as possible: CMA-ES from the best of many Sobol points, seeded, hence
+repeatable. (The errors have poles wherever P_r is singular, so that least squares gets nowhere, and differential
+evolution stalls at three times the paper's.) It needs the package cma:
 
-    python pipelines/search_torque.py case1
+    pip install cma
+    python -m pipelines.search_torque case1
 
 prints the [torque] table of data/cases/case1.toml. The search simulates by its own fixed-step Runge-Kutta method
 over all candidates at once; what it finds is judged by `algid identify` on logs from `algid synth`.
@@ -18,7 +20,6 @@ import argparse
 import sys
 
 import numpy as np
-from scipy.optimize import differential_evolution
 from scipy.stats import qmc
 
 from algid.arm import FloatArray, forward_dynamics, with_payload
@@ -34,6 +35,7 @@ SAMPLES = 1001
 SUBSTEPS = 2
 JUDGED = slice(-200, None, 10)  # the last 0.2 s of the second, thinned out
 HARMONICS = 4
+ENOUGH = 0.9  # of the paper's errors: the search may stop
 BOUNDS = [(0.0, 4.0)] * (2 * HARMONICS) + [(0.1, 1.5)] * (2 * HARMONICS) + [(0.0, 2 * np.pi)] * (2 * HARMONICS)
 
 
@@ -111,36 +113,41 @@ def worst_share(case: Case, genes: FloatArray) -> FloatArray:
     return worst
 
 
-def first_population(case: Case, points: int, size: int, seed: int) -> FloatArray:
-    """The best `size` of `points` Sobol points (size, 24)."""
+def first_points(case: Case, points: int, count: int, seed: int) -> FloatArray:
+    """The best `count` of `points` Sobol points (count, 24)."""
     low, high = np.array(BOUNDS).T
     drawn = low + (high - low) * qmc.Sobol(len(BOUNDS), rng=seed).random(points)
     score = np.concatenate([worst_share(case, batch.T) for batch in np.split(drawn, range(256, points, 256))])
-    best: FloatArray = drawn[np.argsort(score)[:size]]
+    best: FloatArray = drawn[np.argsort(score)[:count]]
     return best
 
 
-def search(case: Case, points: int, size: int, generations: int, seed: int) -> FloatArray:
-    """The best candidate (24,), rounded as it will be written."""
+def evolve(case: Case, start: FloatArray, generations: int, seed: int) -> tuple[FloatArray, float]:
+    """The candidate (24,) that CMA-ES reaches from `start` (24,), rounded as it will be written, and its share."""
+    import cma
 
-    def report(intermediate_result: object) -> None:
-        print(f"worst error / paper's: {getattr(intermediate_result, 'fun', np.nan):.4g}", file=sys.stderr, flush=True)
+    low, high = np.array(BOUNDS).T
+    options = {"bounds": [0, 1], "popsize": 64, "seed": seed + 1, "verbose": -9, "maxiter": generations}
+    strategy = cma.CMAEvolutionStrategy((start - low) / (high - low), 0.1, options)
+    while not strategy.stop() and strategy.best.f > ENOUGH:
+        candidates = np.array(strategy.ask())
+        strategy.tell(candidates, worst_share(case, (low + (high - low) * candidates).T).tolist())
+        if strategy.countiter % 50 == 0:
+            print(f"generation {strategy.countiter}: worst error / paper's {strategy.best.f:.3g}", file=sys.stderr)
+    best = np.round(low + (high - low) * np.array(strategy.best.x), 4)
+    return best, float(worst_share(case, best[:, None])[0])
 
-    found = differential_evolution(
-        lambda genes: worst_share(case, genes),
-        BOUNDS,
-        init=first_population(case, points, size, seed),
-        maxiter=generations,
-        mutation=(0.3, 0.8),
-        recombination=0.9,
-        rng=seed,
-        polish=False,
-        vectorized=True,
-        updating="deferred",
-        tol=0,
-        callback=report,
-    )
-    best: FloatArray = np.round(found.x, 4)
+
+def search(case: Case, points: int, starts: int, generations: int, seed: int) -> FloatArray:
+    """The best candidate (24,) of several evolutions; the first that is good enough ends the search."""
+    best: FloatArray = np.empty(0)
+    best_share = np.inf
+    for start in first_points(case, points, starts, seed):
+        found, share = evolve(case, start, generations, seed)
+        if share < best_share:
+            best, best_share = found, share
+        if best_share <= ENOUGH:
+            break
     return best
 
 
@@ -158,13 +165,13 @@ def main() -> None:
     """Search for one case and print its torque."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("case", choices=["case1", "case2"])
-    parser.add_argument("--points", type=int, default=4096, help="Sobol points to sift")
-    parser.add_argument("--size", type=int, default=128, help="population")
-    parser.add_argument("--generations", type=int, default=800)
+    parser.add_argument("--points", type=int, default=2048, help="Sobol points to sift")
+    parser.add_argument("--starts", type=int, default=4, help="best points to evolve, one after the other")
+    parser.add_argument("--generations", type=int, default=400, help="from each")
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     case = load_case(arguments.case)
-    best = search(case, arguments.points, arguments.size, arguments.generations, arguments.seed)
+    best = search(case, arguments.points, arguments.starts, arguments.generations, arguments.seed)
     print(torque_table(best))
     for name, error in zip(case.paper_error_percent, errors(case, best[:, None])[:, 0], strict=True):
         print(f"# {name:12} {error:+.5f} %  paper {case.paper_error_percent[name]} %")

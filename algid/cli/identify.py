@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Literal
@@ -135,7 +137,18 @@ def identify(
         second_angle=second_angle,
         clock=clock,
     )
-    result = run(bare, burdened, settings, parameters=known, profile=meaning, out=out, force=force, report=report)
+    command = shlex.join(["algid", *sys.argv[1:]])
+    result = run(
+        bare,
+        burdened,
+        settings,
+        parameters=known,
+        profile=meaning,
+        out=out,
+        force=force,
+        report=report,
+        command=command,
+    )
     if not quiet:
         print_result(result, output)
     if not result.complete or result.data_lost:

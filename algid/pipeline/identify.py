@@ -37,6 +37,7 @@ def identify(
     out: Path | None = None,
     force: bool = False,
     report: bool = True,
+    command: str | None = None,
 ) -> Result:
     """Identify the constants k1 … k7 of an arm and, from loaded logs, its tip payload.
 
@@ -55,6 +56,8 @@ def identify(
         Replace a result that is there.
     report : bool
         Write time series and pages beside ``result.json``.
+    command : str
+        The command line behind the call, for the result.
 
     Raises
     ------
@@ -73,6 +76,8 @@ def identify(
     folder = result_folder((bare + burdened)[0].name, out)
     with whole_folder(folder, force) as temporary:
         result = _identify(bare, burdened, settings, parameters, temporary, report)
+        if command is not None:
+            result = result.model_copy(update={"settings": result.settings | {"command": command}})
         write_result(result, temporary / "result.json")
         if report:
             _write_pages(temporary, result)

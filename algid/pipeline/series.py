@@ -10,15 +10,13 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.identify.fit import Fit
-from algid.identify.model import Model, Motion, regressor
 from algid.identify.paper.method import Series
+from algid.pipeline.predicted import torque_blocks
 from algid.pipeline.settings import Settings
 from algid.pipeline.sources import LogSource
-from algid.sampling import Segment, pieces
 
 START_KEY = b"start_ns"
 ROWS = 1 << 17
-PREDICTION_BANDWIDTH = 40.0  # Hz: of the angles behind the predicted torque
 
 
 def write_columns(path: Path, blocks: Iterable[Mapping[str, FloatArray]], start_ns: Sequence[int]) -> None:
@@ -55,36 +53,6 @@ def series_blocks(series: Iterable[Series], names: Sequence[str]) -> Iterator[di
 def _columns(windows: Sequence[Series], names: Sequence[str]) -> dict[str, FloatArray]:
     values = np.concatenate([window.values for window in windows], axis=1)
     return {"t": np.concatenate([window.t for window in windows]), **dict(zip(names, values, strict=True))}
-
-
-def torque_blocks(
-    logs: Sequence[LogSource], model: Model, coefficients: Mapping[str, FloatArray], shift: float
-) -> Iterator[dict[str, FloatArray]]:
-    """Motion, measured and predicted torque of every log; `coefficients` by role, `shift` the torque's delay in s.
-
-    Angles are smoothed without phase below `PREDICTION_BANDWIDTH`, so that two derivatives mean something.
-    """
-    for number, log in enumerate(logs):
-        for piece in pieces(log.segments(), ROWS):
-            yield {
-                "log": np.full(len(piece), number, dtype=np.int32),
-                **_torques(piece, model, coefficients[log.role], shift),
-            }
-
-
-def _torques(piece: Segment, model: Model, c: FloatArray, shift: float) -> dict[str, FloatArray]:
-    from algid.identify.filters import smoothed
-
-    theta = (
-        smoothed(piece.theta, piece.dt, min(PREDICTION_BANDWIDTH, 0.1 / piece.dt)) if len(piece) > 2 else piece.theta
-    )
-    omega = np.gradient(theta, piece.dt, axis=1)
-    motion = Motion(theta, omega, np.gradient(omega, piece.dt, axis=1))
-    predicted = np.einsum("aqn,q->an", regressor(model, motion), c)
-    predicted = np.stack([np.interp(piece.t + shift, piece.t, row) for row in predicted])
-    columns = {"theta": piece.theta, "omega": omega, "tau": piece.tau}
-    flat = {f"{name}{joint + 1}": value[joint] for name, value in columns.items() for joint in range(2)}
-    return {"t": piece.t, **flat, "tau1_predicted": predicted[0], "tau2_predicted": predicted[1]}
 
 
 def information_blocks(fit: Fit, durations: Sequence[float]) -> Iterator[dict[str, FloatArray]]:
