@@ -10,6 +10,7 @@ import os
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import islice
 from typing import Generic, TypeVar
 
 _VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
@@ -30,6 +31,17 @@ def one_blas_thread() -> Iterator[None]:
 
     with threadpool_limits(limits=1, user_api="blas"):
         yield
+
+
+def ahead(source: Iterator[T]) -> Iterator[T]:
+    """The same items, the next one being made in a thread of its own while the last one is used."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    with ThreadPoolExecutor(1) as pool:
+        coming = pool.submit(list, islice(source, 1))
+        while item := coming.result():
+            coming = pool.submit(list, islice(source, 1))
+            yield item[0]
 
 
 class Beside(Generic[T]):
