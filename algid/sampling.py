@@ -18,6 +18,7 @@ from algid.log import IntArray, Log, join
 
 PERIOD_SAMPLES = 4096  # the first samples, from which the period is taken
 LONGEST_GAP = 5.0  # periods: a longer gap cuts the log
+_BRIDGE = 8  # samples of a block that are joined to those held back from the one before
 EVEN = 1e-3  # periods: stamps this close to the time base are taken as lying on it
 
 
@@ -116,7 +117,14 @@ class _Sampler:
         self._emitted = 0  # grid points of the stretch that have been given out
 
     def push(self, block: Log) -> Iterator[Segment]:
-        held = block if self._pending is None else join([self._pending, block])
+        if self._pending is None:
+            yield from self._settle(block)
+            return
+        yield from self._settle(join([self._pending, block.part(0, _BRIDGE)]))
+        if len(block) > _BRIDGE:  # what is held back now is the block's own: no copy
+            yield from self._settle(block.part(_BRIDGE - len(self._pending), len(block)))
+
+    def _settle(self, held: Log) -> Iterator[Segment]:
         gaps = np.flatnonzero(np.diff(held.stamp_ns) * 1e-9 > LONGEST_GAP * self._dt) + 1
         edges = [0, *gaps.tolist(), len(held)]
         for first, last in pairwise(edges[:-1]):
@@ -175,29 +183,56 @@ def _interpolate(t: FloatArray, signal: FloatArray, grid: FloatArray, _first: in
 
 
 def pieces(source: Iterable[Segment], rows: int) -> Iterator[Segment]:
-    """Cut each stretch into pieces of `rows` samples; a rest shorter than half a piece joins the last one.
+    """Cut each stretch into pieces of `rows` samples: see `Cutter`."""
+    cutter = Cutter(rows)
+    for segment in source:
+        yield from cutter.push(segment)
+    yield from cutter.finish()
+
+
+class Cutter:
+    """Cuts each stretch into pieces of `rows` samples; a rest shorter than half a piece joins the last one.
 
     The pieces do not depend on how the stretches came in. Their length is below 1.5 `rows`; a stretch shorter
-    than half a piece is a piece of its own.
+    than half a piece is a piece of its own. Pieces are views wherever they lie within one segment.
     """
-    held: Segment | None = None
-    for segment in source:
-        if held is not None and not segment.continues:
-            yield from _cut(held, rows)
-            held = None
-        held = segment if held is None else append(held, segment)
-        while len(held) >= 2 * rows:
-            yield held.part(0, rows)
-            held = held.part(rows, len(held))
-    if held is not None:
-        yield from _cut(held, rows)
 
+    def __init__(self, rows: int) -> None:
+        self._rows = rows
+        self._held: Segment | None = None  # fewer than two pieces
 
-def _cut(rest: Segment, rows: int) -> Iterator[Segment]:
-    if len(rest) >= rows + (rows + 1) // 2:
-        yield rest.part(0, rows)
-        rest = rest.part(rows, len(rest))
-    yield rest
+    def push(self, segment: Segment) -> Iterator[Segment]:
+        """Take in a segment; give out the pieces that are settled."""
+        if self._held is not None and not segment.continues:
+            yield from self.finish()
+        rest = segment
+        while len(rest) + (0 if self._held is None else len(self._held)) >= 2 * self._rows:
+            piece, rest = self._first(rest)
+            yield piece
+        if len(rest):
+            self._held = rest if self._held is None else append(self._held, rest)
+
+    def _first(self, rest: Segment) -> tuple[Segment, Segment]:
+        """The next piece out of what is held and of `rest`, and what remains of `rest`."""
+        held, self._held = self._held, None
+        if held is None:
+            return rest.part(0, self._rows), rest.part(self._rows, len(rest))
+        missing = self._rows - len(held)
+        if missing > 0:
+            return append(held, rest.part(0, missing)), rest.part(missing, len(rest))
+        if missing < 0:
+            self._held = held.part(self._rows, len(held))
+        return held.part(0, self._rows), rest
+
+    def finish(self) -> Iterator[Segment]:
+        """Give out what is left of a stretch at its end."""
+        rest, self._held = self._held, None
+        if rest is None:
+            return
+        if len(rest) >= self._rows + (self._rows + 1) // 2:
+            yield rest.part(0, self._rows)
+            rest = rest.part(self._rows, len(rest))
+        yield rest
 
 
 def append(first: Segment, second: Segment) -> Segment:

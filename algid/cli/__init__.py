@@ -11,6 +11,9 @@ EXIT_INCOMPLETE = 3
 
 def main() -> None:
     """Run algid; the entry point of the console script."""
+    from algid.threads import bound_by_environment
+
+    bound_by_environment()  # before anything loads numpy
     from algid.cli.app import app
     from algid.errors import AlgidError
 

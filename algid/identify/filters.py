@@ -6,6 +6,8 @@ Time Signal Processing, sec. 7.5), and exact for angles that are polynomials of 
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from algid.arm import FloatArray
@@ -20,6 +22,7 @@ def half_length(dt: float, bandwidth: float) -> int:
     return max(2, round(_PERIODS / (bandwidth * dt)))
 
 
+@lru_cache(maxsize=16)
 def differentiator(dt: float, bandwidth: float) -> FloatArray:
     """Kernel (2 M + 1,) in s^-1 whose correlation with an angle is its velocity below `bandwidth` Hz."""
     n, taper = _support(dt, bandwidth)
@@ -32,14 +35,21 @@ def differentiator(dt: float, bandwidth: float) -> FloatArray:
     s = n / n[-1]
     odd = np.stack([s, s**3, s**5])
     wanted = np.array([1 / (n[-1] * dt), 0.0, 0.0])
-    return kernel + np.linalg.solve((odd * taper) @ odd.T, wanted - odd @ kernel) @ (odd * taper)
+    return _shared(kernel + np.linalg.solve((odd * taper) @ odd.T, wanted - odd @ kernel) @ (odd * taper))
 
 
+@lru_cache(maxsize=16)
 def smoother(dt: float, bandwidth: float) -> FloatArray:
     """Kernel (2 M + 1,) whose correlation with a signal passes what lies below `bandwidth` Hz."""
     n, taper = _support(dt, bandwidth)
     kernel = np.sinc(2 * bandwidth * dt * n) * taper
-    return kernel / kernel.sum()
+    return _shared(kernel / kernel.sum())
+
+
+def _shared(kernel: FloatArray) -> FloatArray:
+    """The kernel, now read-only: it is kept for the next piece of log."""
+    kernel.flags.writeable = False
+    return kernel
 
 
 def _support(dt: float, bandwidth: float) -> tuple[FloatArray, FloatArray]:
@@ -48,17 +58,25 @@ def _support(dt: float, bandwidth: float) -> tuple[FloatArray, FloatArray]:
     return n, np.kaiser(n.size, _KAISER_BETA)
 
 
-def correlate(x: FloatArray, kernel: FloatArray) -> FloatArray:
-    """Correlation (m, N - K + 1) of each row of x (m, N) with a kernel (K,), where they overlap entirely."""
+def correlate(x: FloatArray, kernel: FloatArray, step: int = 1) -> FloatArray:
+    """Correlation of each row of x (m, N) with a kernel (K,), where they overlap entirely.
+
+    Returns
+    -------
+    (m, (N - K) // step + 1): every `step`-th value of it
+    """
     taps = kernel.size
-    wanted = x.shape[1] - taps + 1
-    blocks = -(-wanted // _ROWS)
-    padded = np.zeros((x.shape[0], blocks * _ROWS + taps - 1))
-    padded[:, : x.shape[1]] = x
-    windows = np.lib.stride_tricks.sliding_window_view(padded, _ROWS + taps - 1, axis=1)[:, ::_ROWS]
-    toeplitz = np.zeros((_ROWS + taps - 1, _ROWS))
-    for column in range(_ROWS):
-        toeplitz[column : column + taps, column] = kernel
+    wanted = (x.shape[1] - taps) // step + 1
+    rows = max(4, _ROWS // step)
+    blocks = -(-wanted // rows)
+    width = (rows - 1) * step + taps
+    padded = np.zeros((x.shape[0], (blocks - 1) * rows * step + width))
+    used = min(x.shape[1], padded.shape[1])
+    padded[:, :used] = x[:, :used]
+    windows = np.lib.stride_tricks.sliding_window_view(padded, width, axis=1)[:, :: rows * step]
+    toeplitz = np.zeros((width, rows))
+    for column in range(rows):
+        toeplitz[column * step : column * step + taps, column] = kernel
     return (np.ascontiguousarray(windows) @ toeplitz).reshape(x.shape[0], -1)[:, :wanted]
 
 

@@ -1,24 +1,38 @@
 """Torque predicted on logs, and how good the prediction is.
 
-Angles and torques pass the same zero-phase Butterworth filter; velocities and accelerations are central
-differences of the filtered angles; both ends of every stretch, where a zero-phase filter rings, are dropped.
+Angles and torques pass the same zero-phase Butterworth filter, at `_PER_CUTOFF` samples a period of its cutoff,
+to which a sharper filter without phase takes the log first. Velocities and accelerations are those of the
+filtered angles; both ends of every stretch, where a zero-phase filter rings, are dropped.
+
+======  ==============================================================  ===============  ======
+symbol  name                                                            shape            unit
+======  ==============================================================  ===============  ======
+X       filtered regressor of each joint, its torque last               (2, q + 1, n)    mixed
+gram    X Xᵀ by joint: the residual of any c is (−c, 1) gram (−c, 1)ᵀ   (2, q+1, q+1)    mixed
+======  ==============================================================  ===============  ======
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.identify.filters import correlate, smoother
 from algid.identify.fit import Fit
 from algid.identify.information import combine
 from algid.identify.model import Model, Motion, regressor
 from algid.identify.weak import Source
-from algid.sampling import Segment, pieces
+from algid.sampling import Cutter, Segment
 
 _PIECE_SECONDS = 60.0
+_PER_CUTOFF = 50.0
+_SHARPER = 6.0  # cutoffs: bandwidth of the first filter
+
+Shift = float | Callable[[float], float]
 
 
 @dataclass(frozen=True)
@@ -67,51 +81,97 @@ class PredictionScore:
         return 1 - self.residual / np.maximum(spread, 1e-300)
 
 
-def predicted(
-    model: Model, c: FloatArray, segments: Iterable[Segment], shift: float = 0.0, by: PredictionFilter | None = None
-) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
-    """Time (n,) in s, predicted and measured torque (2, n) in N m, both filtered, stretch by stretch.
+class PredictionSums:
+    """What scores any coefficients on a log, gathered segment by segment.
 
     Parameters
     ----------
-    model, c : Model and its coefficients (q,)
-    segments : iterable of Segment
-    shift : float, s
+    model : Model
+    shift : float, s, or a callable that gives it for the time between samples
         After how long a logged torque acts: hold and delay together.
     by : PredictionFilter
     """
-    from scipy.signal import butter, sosfiltfilt
 
-    by = by or PredictionFilter()
-    for segment in segments:
-        for piece in pieces([segment], max(1, round(_PIECE_SECONDS / segment.dt))):
-            edge = round(by.dropped / piece.dt)
-            if len(piece) <= max(2 * edge + 2, 6 * (by.order + 1)):
-                continue
-            sections = butter(by.order, min(by.cutoff, 0.45 / piece.dt), fs=1 / piece.dt, output="sos")
-            theta, tau = sosfiltfilt(sections, np.stack([piece.theta, piece.tau]), axis=-1)
-            omega = np.gradient(theta, piece.dt, axis=1)
-            motion = Motion(theta, omega, np.gradient(omega, piece.dt, axis=1))
-            torque = np.einsum("aqn,q->an", regressor(model, motion), c)
-            acts = piece.t + shift
-            torque = np.stack([np.interp(acts, piece.t, row) for row in torque])
-            inner = slice(edge, len(piece) - edge)
-            yield piece.t[inner], torque[:, inner], tau[:, inner]
+    def __init__(self, model: Model, shift: Shift = 0.0, by: PredictionFilter | None = None) -> None:
+        self._model = model
+        self._shift = shift
+        self._by = by or PredictionFilter()
+        self._cutter: Cutter | None = None
+        size = len(model.names) + 1
+        self._count, self._torque, self._gram = 0, np.zeros(2), np.zeros((2, size, size))
+
+    def push(self, segment: Segment) -> None:
+        """Take in the next segment of the log."""
+        self._cutter = self._cutter or Cutter(max(1, round(_PIECE_SECONDS / segment.dt)))
+        for piece in self._cutter.push(segment):
+            self._add(piece)
+
+    def finish(self) -> None:
+        """Take in what is left at the end of the log."""
+        for piece in self._cutter.finish() if self._cutter else ():
+            self._add(piece)
+
+    def score(self, c: FloatArray) -> PredictionScore:
+        """How well the coefficients `c` (q,) predict the torque."""
+        v = np.append(-c, 1.0)
+        residual = np.maximum(np.einsum("x,axy,y->a", v, self._gram, v), 0.0)
+        return PredictionScore(float(self._count), residual, self._torque, self._gram[:, -1, -1])
+
+    def _add(self, piece: Segment) -> None:
+        shift = self._shift(piece.dt) if callable(self._shift) else self._shift
+        X = _filtered(self._model, piece, shift, self._by)
+        self._count += X.shape[2]
+        self._torque = self._torque + X[:, -1].sum(axis=1)
+        self._gram += X @ X.swapaxes(1, 2)
+
+
+def _filtered(model: Model, piece: Segment, shift: float, by: PredictionFilter) -> FloatArray:
+    """X (2, q + 1, n) of a piece: see the module's table."""
+    from scipy.signal import sosfiltfilt
+
+    signals, dt = _decimated(piece, by)
+    edge = round(by.dropped / dt)
+    if signals.shape[1] <= max(2 * edge + 2, 6 * (by.order + 1)):
+        return np.zeros((2, len(model.names) + 1, 0))
+    signals = sosfiltfilt(_sections(by, dt), signals, axis=-1)
+    Y = regressor(model, _motion(signals[:2], dt))
+    place = np.arange(edge, signals.shape[1] - edge) + shift / dt
+    whole = np.clip(np.floor(place).astype(np.int64), 0, signals.shape[1] - 2)
+    Y = Y[:, :, whole] + (place - whole) * (Y[:, :, whole + 1] - Y[:, :, whole])
+    return np.concatenate([Y, signals[2:, None, edge : signals.shape[1] - edge]], axis=1)
+
+
+def _decimated(piece: Segment, by: PredictionFilter) -> tuple[FloatArray, float]:
+    """Angles and torques (4, n) at the rate that the filter asks for, and the time between them in s."""
+    step = int(1 / (_PER_CUTOFF * by.cutoff * piece.dt))
+    signals = np.concatenate([piece.theta, piece.tau])
+    kernel = smoother(piece.dt, _SHARPER * by.cutoff)
+    if step < 2 or signals.shape[1] < kernel.size:
+        return signals, piece.dt
+    return correlate(signals, kernel, step), step * piece.dt
+
+
+@lru_cache(maxsize=4)
+def _sections(by: PredictionFilter, dt: float) -> FloatArray:
+    from scipy.signal import butter
+
+    return butter(by.order, min(by.cutoff, 0.45 / dt), fs=1 / dt, output="sos")
+
+
+def _motion(theta: FloatArray, dt: float) -> Motion:
+    omega = np.gradient(theta, dt, axis=1)
+    return Motion(theta, omega, np.gradient(omega, dt, axis=1))
 
 
 def score(
-    model: Model, c: FloatArray, segments: Iterable[Segment], shift: float = 0.0, by: PredictionFilter | None = None
+    model: Model, c: FloatArray, segments: Iterable[Segment], shift: Shift = 0.0, by: PredictionFilter | None = None
 ) -> PredictionScore:
-    """How well the coefficients `c` (q,) predict a log's torque; see `predicted`."""
-    total = PredictionScore()
-    for _, torque, tau in predicted(model, c, segments, shift, by):
-        total += PredictionScore(
-            float(tau.shape[1]),
-            np.sum((tau - torque) ** 2, axis=1),
-            np.sum(tau, axis=1),
-            np.sum(tau**2, axis=1),
-        )
-    return total
+    """How well the coefficients `c` (q,) predict a log's torque; see `PredictionSums`."""
+    sums = PredictionSums(model, shift, by)
+    for segment in segments:
+        sums.push(segment)
+    sums.finish()
+    return sums.score(c)
 
 
 def cross_validate(

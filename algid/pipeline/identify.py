@@ -19,6 +19,7 @@ from algid.pipeline.series import write_fit_series
 from algid.pipeline.settings import Settings
 from algid.pipeline.sources import LogLike, LogSource, sources_of
 from algid.results import Result, write_result
+from algid.threads import one_blas_thread
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -91,9 +92,10 @@ def _identify(
     folder: Path | None,
     report: bool,
 ) -> Result:
-    if settings.estimator == "paper":
-        return _by_the_paper(bare, burdened, settings, parameters, folder)
-    return _by_likelihood(bare, burdened, settings, parameters, folder if report else None)
+    with one_blas_thread():
+        if settings.estimator == "paper":
+            return _by_the_paper(bare, burdened, settings, parameters, folder)
+        return _by_likelihood(bare, burdened, settings, parameters, folder if report else None)
 
 
 def _by_the_paper(

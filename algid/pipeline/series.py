@@ -30,7 +30,8 @@ def write_columns(path: Path, blocks: Iterable[Mapping[str, FloatArray]], start_
             table = pyarrow.table(dict(block))
             if writer is None:
                 schema = table.schema.with_metadata({START_KEY: json.dumps(list(start_ns))})
-                writer = pyarrow.parquet.ParquetWriter(path, schema, compression="zstd")
+                # floats of an estimate hardly ever repeat: a dictionary would only cost time
+                writer = pyarrow.parquet.ParquetWriter(path, schema, compression="zstd", use_dictionary=False)
             writer.write_table(table.cast(writer.schema))
     finally:
         if writer is not None:

@@ -14,12 +14,16 @@ from algid.errors import LogError
 from algid.log import Log, Notice, Origin
 from algid.results import LogSummary
 from algid.sampling import Segment, segments
+from algid.threads import Beside, ahead
 
 if TYPE_CHECKING:
+    from algid.identify.prediction import PredictionSums
     from algid.profile import Profile
 
 Role = Literal["unloaded", "loaded"]
 LogLike = str | Path | Log
+EXAMINED = 1 << 16
+"""Samples at the start of a long log that the named checks look at."""
 
 
 @dataclass
@@ -42,6 +46,9 @@ class LogSource:
         self._profile = profile
         self._gravity = gravity
         self._found: list[Notice] | None = None
+        self._digest: Beside[str] | None = None
+        self.prediction: PredictionSums | None = None
+        """What scores a prediction of this log, where an estimator's pass has gathered it."""
         self.origin, self._blocks = self._open()
         self._seen: _Seen | None = None
         self._refuse_the_other_role()
@@ -53,7 +60,7 @@ class LogSource:
         from algid.readers import open_log
 
         reader = open_log(self._log, self._profile)
-        return reader.origin, reader.blocks
+        return reader.origin, lambda: ahead(reader.blocks())
 
     def _refuse_the_other_role(self) -> None:
         truth = self.origin.truth
@@ -68,6 +75,7 @@ class LogSource:
 
     def _counted(self) -> Iterator[Log]:
         seen = _Seen()
+        self._start_hashing()
         for block, alone in _with_end(self._blocks()):
             if len(block) and not seen.rows:
                 seen.first_ns = int(block.stamp_ns[0])
@@ -84,6 +92,7 @@ class LogSource:
         if self._found is None:
             from algid.inspection.checks import examine
 
+            block = block if alone else block.part(0, EXAMINED)
             findings = examine(block, gravity=self._gravity)
             refused = next((finding for finding in findings if finding.refuse), None)
             if refused is not None and alone:
@@ -114,9 +123,20 @@ class LogSource:
     @cached_property
     def sha256(self) -> str:
         """Of the file, of a folder's files in the order of their names, or of a log in memory."""
+        return self._start_hashing().result()
+
+    def _start_hashing(self) -> Beside[str]:
+        """Hash the log beside the first pass over it."""
+        if self._digest is None:
+            self._digest = Beside(self._hash)
+        return self._digest
+
+    def _hash(self) -> str:
         if isinstance(self._log, Log):
-            arrays = (self._log.stamp_ns, self._log.theta, self._log.tau)
-            return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
+            digest = hashlib.sha256()
+            for array in (self._log.stamp_ns, *self._log.theta, *self._log.tau):
+                digest.update(array.tobytes())
+            return digest.hexdigest()
         return sha256_of(Path(self._log))
 
     def summary(self) -> LogSummary:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from algid.identify.consistency import broken_bounds, constrained
 from algid.identify.fit import Fit
 from algid.identify.information import Prior
 from algid.identify.model import UNITS, Model
-from algid.identify.prediction import PredictionFilter, PredictionScore, cross_validate, score
+from algid.identify.prediction import PredictionFilter, PredictionScore, PredictionSums, cross_validate, score
 from algid.identify.selection import payload_distance, term_worths
 from algid.identify.shared import PAYLOAD_PARAMETERS
 from algid.pipeline.outcome import Outcome
@@ -41,6 +42,8 @@ def run_fit(unloaded: Sequence[LogSource], loaded: Sequence[LogSource], settings
     LogError
         If no log is long enough.
     """
+    for log in (*unloaded, *loaded):
+        log.prediction = None  # of another fit's settings
     weak_settings, sources = _weak_settings(settings), (_passes(unloaded, settings), _passes(loaded, settings))
     try:
         if settings.estimator == "weak":
@@ -91,9 +94,27 @@ def _refined_settings(
 
 def _passes(logs: Sequence[LogSource], settings: Settings) -> list[Pass]:
     """A callable a log that gives a fresh pass, with velocities only where they are not observed on the way."""
-    if settings.velocity == "measured" or settings.luenberger:
-        return [lambda log=log: with_velocities(log, settings, luenberger=settings.luenberger) for log in logs]  # type: ignore[misc]
-    return [log.segments for log in logs]
+    own = settings.velocity == "measured" or settings.luenberger
+    passes: list[Pass] = [
+        partial(with_velocities, log, settings, luenberger=settings.luenberger) if own else log.segments for log in logs
+    ]
+    if settings.delay == "estimate":  # what the prediction is scored by depends on it
+        return passes
+    return [partial(_watched, log, moving, settings, settings.delay) for log, moving in zip(logs, passes, strict=True)]
+
+
+def _watched(log: LogSource, moving: Pass, settings: Settings, delay: float) -> Iterator[Segment]:
+    """A pass that also gathers, once, what the prediction will be scored by."""
+    if log.prediction is not None:
+        yield from moving()
+        return
+    hold = 0.5 if settings.torque_hold == "zoh" else 0.0
+    sums = PredictionSums(model_of(settings), lambda dt: delay + hold * dt)
+    for segment in moving():
+        sums.push(segment)
+        yield segment
+    sums.finish()
+    log.prediction = sums
 
 
 def prior_of(result: Result, settings: Settings) -> Prior:
@@ -215,7 +236,9 @@ def fit_summary(
     logs = [*unloaded, *loaded]
     shift = torque_shift(settings, fit, 1 / logs[0].summary().rate)
     worths = term_worths(fit)
-    crossed = cross_validate(fit, [log.segments for log in unloaded], [log.segments for log in loaded], shift)
+    crossed = None
+    if settings.cross_validate:
+        crossed = cross_validate(fit, [log.segments for log in unloaded], [log.segments for log in loaded], shift)
     return results.Fit(
         noise=_noise(fit),
         covariance_names=list(fit.names),
@@ -230,7 +253,7 @@ def fit_summary(
             results.Bound(bound=b.bound, value=b.value, distance_sigma=b.distance) for b in broken_bounds(fit)
         ],
         residual=prediction(_residual(fit, logs, shift)),
-        cross_validation=prediction(crossed) if settings.cross_validate and crossed is not None else None,
+        cross_validation=None if crossed is None else prediction(crossed),
     )
 
 
@@ -268,7 +291,9 @@ def _whiteness(fit: Fit) -> dict[str, results.Whiteness]:
 def _residual(fit: Fit, logs: Sequence[LogSource], shift: float) -> PredictionScore:
     total = PredictionScore()
     for log in logs:
-        total += score(fit.shared.model, torque_coefficients(fit, log.role), log.segments(), shift)
+        c = torque_coefficients(fit, log.role)
+        gathered = log.prediction
+        total += gathered.score(c) if gathered else score(fit.shared.model, c, log.segments(), shift)
     return total
 
 

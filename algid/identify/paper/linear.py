@@ -44,9 +44,10 @@ def solve_scaled(matrix: FloatArray, rhs: FloatArray) -> Solutions:
     column = _scale(np.abs(p).max(axis=-2, keepdims=True))
     p = p * column
     inverse, regular = _inverse(p)
-    scaled = inverse @ (q * row)
-    scaled += inverse @ (q * row - p @ scaled)
-    condition = np.where(regular, _norm1(p) * _norm1(inverse), np.inf)
+    with np.errstate(over="ignore", invalid="ignore"):  # next to singular: caught by the condition number
+        scaled = inverse @ (q * row)
+        scaled += inverse @ (q * row - p @ scaled)
+        condition = np.where(regular, _norm1(p) * _norm1(inverse), np.inf)
     x = np.where((condition <= LARGEST_CONDITION)[..., None, None], scaled * column.mT, np.nan)
     return Solutions(x=np.moveaxis(x[..., 0], -1, 0), condition=condition)
 
@@ -62,8 +63,13 @@ def _norm1(matrix: FloatArray) -> FloatArray:
 
 def _inverse(p: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Inverses (..., u, u) and where they exist; LAPACK refuses a whole batch for one singular matrix."""
+    regular = np.asarray((p != 0).any(axis=-1).all(axis=-1))  # windows start with rows of zeros
     try:
-        return np.linalg.inv(p), np.ones(p.shape[:-2], dtype=bool)
+        return _inverse_where(p, regular), regular
     except np.linalg.LinAlgError:
-        regular = np.asarray(np.linalg.cond(p) < 1 / np.finfo(np.float64).eps)
-        return np.linalg.inv(np.where(regular[..., None, None], p, np.eye(p.shape[-1]))), regular
+        regular = np.asarray(np.linalg.slogdet(p).sign != 0)  # the same factors, the same zero pivots
+        return _inverse_where(p, regular), regular
+
+
+def _inverse_where(p: FloatArray, regular: NDArray[np.bool_]) -> FloatArray:
+    return np.linalg.inv(p if regular.all() else np.where(regular[..., None, None], p, np.eye(p.shape[-1])))

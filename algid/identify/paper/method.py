@@ -100,7 +100,9 @@ class Summary:
         quartiles = np.full((3, self._size), np.nan)
         some = np.isfinite(settled).any(axis=1)
         if some.any():
-            quartiles[:, some] = np.nanquantile(settled[some], [0.25, 0.5, 0.75], axis=1)
+            usable = settled[some]
+            quantile = np.nanquantile if np.isnan(usable).any() else np.quantile  # the former goes row by row
+            quartiles[:, some] = quantile(usable, [0.25, 0.5, 0.75], axis=1)
         self._quartiles.append(quartiles)
 
     def estimates(self) -> tuple[FloatArray, FloatArray]:
