@@ -248,11 +248,11 @@ def fit_summary(
         converged=fit.converged,
         whiteness=_whiteness(fit),
         unidentifiable=list(fit.unidentifiable),
-        terms=[results.TermCriterion(term=w.term, delta_bic=w.delta_bic, kept=True) for w in worths],
+        terms=[results.TermCriterion(term=w.term, delta_bic=w.delta_bic, kept=w.earned) for w in worths],
         broken_bounds=[
             results.Bound(bound=b.bound, value=b.value, distance_sigma=b.distance) for b in broken_bounds(fit)
         ],
-        residual=prediction(_residual(fit, logs, shift)),
+        residual=prediction(_residual(fit, logs, settings)),
         cross_validation=None if crossed is None else prediction(crossed),
     )
 
@@ -288,11 +288,11 @@ def _whiteness(fit: Fit) -> dict[str, results.Whiteness]:
     }
 
 
-def _residual(fit: Fit, logs: Sequence[LogSource], shift: float) -> PredictionScore:
+def _residual(fit: Fit, logs: Sequence[LogSource], settings: Settings) -> PredictionScore:
     total = PredictionScore()
     for log in logs:
         c = torque_coefficients(fit, log.role)
-        gathered = log.prediction
+        gathered, shift = log.prediction, torque_shift(settings, fit, 1 / log.summary().rate)
         total += gathered.score(c) if gathered else score(fit.shared.model, c, log.segments(), shift)
     return total
 
