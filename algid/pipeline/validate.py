@@ -11,9 +11,10 @@ from algid.arm import FloatArray, payload_constants, with_payload
 from algid.errors import ResultError
 from algid.identify.model import Model
 from algid.identify.prediction import PredictionScore, score
+from algid.pipeline.fitted import prediction
 from algid.pipeline.settings import Settings
 from algid.pipeline.sources import LogSource, Role
-from algid.pipeline.statistical import model_of, prediction
+from algid.pipeline.statistical import model_of
 from algid.results import Result, TorquePrediction
 
 
