@@ -136,3 +136,18 @@ def _record(code: int, content: bytes) -> bytes:
 def _text(text: str) -> bytes:
     encoded = text.encode()
     return struct.pack("<I", len(encoded)) + encoded
+
+
+def bag(path: Path, rows: int) -> Path:
+    """The log as a rosbag2 folder, once."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    if not path.exists():
+        store = get_typestore(Stores.ROS2_HUMBLE)
+        with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+            connection = writer.add_connection(TOPIC, TYPE, typestore=store)
+            for block in blocks(rows):
+                for stamp, payload in zip(block.stamp_ns.tolist(), payloads(block), strict=True):
+                    writer.write(connection, stamp, payload)
+    return path
