@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -46,7 +47,7 @@ def test_a_clean_log_raises_nothing() -> None:
     assert admit(log).notices == ()
 
 
-def with_row(values: FloatArray, row: int, new: NDArray[Any] | float) -> NDArray[np.float64]:
+def with_row(values: FloatArray, row: int, new: NDArray[Any] | float) -> FloatArray:
     changed = values.copy()
     changed[row] = new
     return changed
