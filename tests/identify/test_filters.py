@@ -33,3 +33,12 @@ def test_smoothing_keeps_a_slow_motion_and_the_length() -> None:
     left = smoothed(slow + fast, 1e-3, 40.0) - slow
     assert left.shape == slow.shape
     assert np.abs(left[:, 200:-200]).max() < 1e-3  # stop band at -70 dB, pass band within it
+
+
+@pytest.mark.parametrize("rate", [1.0, 5.0, 33.0, 80.0])
+def test_slow_sampling_keeps_what_the_kernel_promises(rate: float) -> None:
+    kernel = differentiator(1 / rate, 60.0)
+    n = np.arange(kernel.size) - kernel.size // 2
+    moments = [float(kernel @ (n / rate) ** power) for power in range(7)]
+    scale = (kernel.size / rate) ** np.arange(7) * rate
+    assert np.allclose(np.array(moments) / scale, np.eye(7)[1] / scale[1], atol=1e-12)  # rounding
