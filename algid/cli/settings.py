@@ -160,9 +160,13 @@ def _poles(text: str) -> tuple[complex, ...]:
     from algid.errors import SettingError
     from algid.observers import observer_gain
 
+    like = "give six like -80,-390,-391,-392,-393,-394"
     try:
         poles = tuple(complex(part.strip()) for part in text.split(","))
+    except ValueError:
+        raise SettingError(f"--poles {text}: expected numbers between commas; {like}") from None
+    try:
         observer_gain(poles)
     except ValueError as error:
-        raise SettingError(f"--poles {text}: {error}; give six like -80,-390,-391,-392,-393,-394") from None
+        raise SettingError(f"--poles {text}: {error}; {like}") from None
     return tuple(pole.real if pole.imag == 0 else pole for pole in poles)
