@@ -3,10 +3,10 @@
     import algid
 
     unloaded, loaded = algid.synthesise("case1", duration=10.0, excitation="wide")
-    result = algid.identify(unloaded, loaded)
+    result = algid.identify_logs(unloaded, loaded)
     print(result.parameters["k1"].estimate, result.payload["m_p"].ci95)
 
-The names below load what they need when they are first used.
+The names below load what they need when they are first used. (`algid.identify` is the package of estimators.)
 """
 
 from __future__ import annotations
@@ -14,11 +14,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from algid.api import synthesise
+    from algid.api import identify_logs, synthesise
     from algid.arm import Arm
     from algid.errors import AlgidError
     from algid.log import Log
-    from algid.pipeline.identify import identify
     from algid.pipeline.settings import Settings
     from algid.readers import read_log
     from algid.results import Result, read_result
@@ -34,7 +33,7 @@ __all__ = [
     "Result",
     "Settings",
     "__version__",
-    "identify",
+    "identify_logs",
     "read_log",
     "read_result",
     "simulate",
@@ -48,7 +47,7 @@ _HOMES = {
     "Log": "algid.log",
     "Result": "algid.results",
     "Settings": "algid.pipeline.settings",
-    "identify": "algid.pipeline.identify",
+    "identify_logs": "algid.api",
     "read_log": "algid.readers",
     "read_result": "algid.results",
     "simulate": "algid.synth.simulator",

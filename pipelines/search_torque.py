@@ -9,8 +9,9 @@ evolution stalls at three times the paper's.) It needs the package cma:
 
     pip install cma
     python -m pipelines.search_torque case1
+    python -m pipelines.search_torque case2 --seed 1 --starts 1
 
-prints the [torque] table of data/cases/case1.toml. The search simulates by its own fixed-step Runge-Kutta method
+print the [torque] tables of data/cases/. The search simulates by its own fixed-step Runge-Kutta method
 over all candidates at once; what it finds is judged by `algid identify` on logs from `algid synth`.
 """
 

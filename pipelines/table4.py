@@ -8,6 +8,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from rich import box
 from rich.console import Console
 from rich.table import Table
 
@@ -23,8 +24,13 @@ def rows(folder: Path, estimator: str, case: str) -> list[Table4Row]:
 
 def table4(folder: Path) -> Table:
     """Errors in percent: by case the paper's print, its method here, the refined estimator."""
-    table = Table(title="Table 4: estimation error (%)", title_justify="left")
-    table.add_column("Parameter")
+    table = Table(
+        title="Table 4, estimation error (%): the paper's print, its method here, and algid's refined estimator",
+        title_justify="left",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+    )
+    table.add_column("Parameter", no_wrap=True)
     columns = [
         [
             row.paper_error_percent if estimator is None else row.error_percent
@@ -34,8 +40,8 @@ def table4(folder: Path) -> Table:
         for estimator in (None, "paper", "refined")
     ]
     for number, _ in enumerate(CASES, 1):
-        for heading in ("paper", "its method here", "refined"):
-            table.add_column(f"Case {number}\n{heading}", justify="right")
+        for heading in ("paper", "here", "refined"):
+            table.add_column(f"Case {number}\n{heading}", justify="right", no_wrap=True)
     for place, row in enumerate(rows(folder, "paper", CASES[0])):
         found = [column[place] for column in columns]
         table.add_row(row.parameter, *("–" if value is None else f"{value:.3g}" for value in found))

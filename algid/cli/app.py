@@ -15,6 +15,7 @@ from algid.cli.inspect import inspect
 from algid.cli.profile import new
 from algid.cli.report import report
 from algid.cli.synth import synth
+from algid.cli.validate import validate
 
 app = typer.Typer(
     help="Parameters and payload of a two-link arm, with honest error bars, straight from its torque and angle logs.",
@@ -42,6 +43,6 @@ def _root(
 profiles = typer.Typer(help="Profiles tell what a log's names, units and signs mean.", no_args_is_help=True)
 profiles.command("new")(new)
 
-for command in (inspect, identify, check, report, compare, synth, convert):
+for command in (inspect, identify, validate, check, report, compare, synth, convert):
     app.command()(command)
 app.add_typer(profiles, name="profile")

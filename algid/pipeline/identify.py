@@ -122,7 +122,8 @@ def _by_likelihood(
     parameters: Result | None,
     folder: Path | None,
 ) -> Result:
-    from algid.pipeline.statistical import outcome_of, prior_of, run_fit
+    from algid.pipeline.fitted import outcome_of
+    from algid.pipeline.statistical import prior_of, run_fit
 
     prior = None if parameters is None else prior_of(parameters, settings)
     fit = run_fit(bare, burdened, settings, prior)

@@ -19,13 +19,13 @@ LOWEST, HIGHEST = 4.0, 40.0  # Hz
 
 
 def torque_blocks(
-    logs: Sequence[LogSource], model: Model, coefficients: Mapping[str, FloatArray], shift: float
+    logs: Sequence[LogSource], model: Model, coefficients: Mapping[str, FloatArray], shifts: Sequence[float]
 ) -> Iterator[dict[str, FloatArray]]:
-    """Motion, measured and predicted torque of every log; `coefficients` by role, `shift` the torque's delay in s.
+    """Motion, measured and predicted torque of every log; by role its coefficients, by log the torque's delay in s.
 
     Angles are smoothed without phase; the prediction is NaN where the smoother reaches past a stretch's end.
     """
-    for number, log in enumerate(logs):
+    for number, (log, shift) in enumerate(zip(logs, shifts, strict=True)):
         for piece in pieces(log.segments(), ROWS):
             yield {
                 "log": np.full(len(piece), number, dtype=np.int32),

@@ -74,9 +74,9 @@ def information_blocks(fit: Fit, durations: Sequence[float]) -> Iterator[dict[st
 def write_fit_series(folder: Path, fit: Fit, logs: Sequence[LogSource], settings: Settings) -> None:
     """Write `torque.parquet` and `information.parquet` of a fit."""
     summaries, starts = [log.summary() for log in logs], [log.start_ns for log in logs]
+    shifts = [torque_shift(settings, fit, 1 / summary.rate) for summary in summaries]
     coefficients: dict[str, FloatArray] = {role: torque_coefficients(fit, role) for role in {log.role for log in logs}}
-    shift = torque_shift(settings, fit, 1 / summaries[0].rate)
-    torques = torque_blocks(logs, fit.shared.model, coefficients, shift)
+    torques = torque_blocks(logs, fit.shared.model, coefficients, shifts)
     write_columns(folder / "torque.parquet", torques, starts)
     durations = [summary.duration for summary in summaries]
     write_columns(folder / "information.parquet", information_blocks(fit, durations), starts)

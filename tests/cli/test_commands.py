@@ -176,3 +176,19 @@ def test_replayed_torque_gives_the_same_motion(logs: Path, tmp_path: Path) -> No
     second = pl.read_csv(tmp_path / "case1-unloaded.csv")
     # straight lines through an 8 Hz torque at 1 kHz: (ω dt)²/8 of it
     assert abs(first["theta1"] - second["theta1"]).max() < 1e-4  # type: ignore[operator]
+
+
+def test_validate_predicts_another_log(tmp_path: Path) -> None:
+    for seed, name in enumerate(("one", "two")):
+        Outcome(
+            "synth", "case1", "-o", tmp_path / name, "--torque", "wide", "--duration", "4", "--seed", str(seed),
+            "--position-noise", "1e-4", "--torque-noise", "1e-2",
+        )  # fmt: skip
+    logs = [[tmp_path / name / f"case1-{role}.mcap" for role in ("unloaded", "loaded")] for name in ("one", "two")]
+    Outcome("identify", logs[0][0], "--loaded", logs[0][1], "-o", tmp_path, "--no-report")
+    folder = tmp_path / "case1-unloaded.algid"
+    good = Outcome("validate", folder, logs[1][0], "--loaded", logs[1][1], "--max-nrmse", "0.3")
+    assert good.code == 0, good.err + good.out
+    assert "all logs: joint 1: RMSE" in good.out
+    assert "filter: zero-phase Butterworth" in good.out
+    assert Outcome("validate", folder, logs[1][0], "--max-nrmse", "1e-9").code == 1

@@ -17,11 +17,11 @@ def test_polynomials_come_out_exactly(shift: float) -> None:
     assert np.allclose(bend[1], polynomial.deriv(2)(at), atol=1e-4)
 
 
-def test_acceleration_converges_with_sixth_order() -> None:
+def test_acceleration_converges_with_eighth_order() -> None:
     errors = []
-    for dt in (0.02, 0.01):
+    for dt in (0.04, 0.02):  # finer steps drown in rounding
         t = np.arange(0, 2, dt)
         stencil = Stencil(dt)
         _, _, bend = stencil.differences(np.stack([np.sin(8 * t), np.cos(8 * t)]))
         errors.append(np.abs(bend[0] + 64 * np.sin(8 * t[stencil.torques(t.size)])).max())
-    assert np.log2(errors[0] / errors[1]) == pytest.approx(6, abs=0.1)  # the order claimed
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(8, abs=0.1)  # the order claimed

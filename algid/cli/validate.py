@@ -1,0 +1,71 @@
+"""`algid validate`: predict the torque of logs that the result was not made from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from algid.cli import EXIT_FAILED, profiles
+
+if TYPE_CHECKING:
+    from algid.results import TorquePrediction
+
+
+def validate(
+    result: Annotated[Path, typer.Argument(help="A result folder or its result.json.")],
+    logs: Annotated[list[Path], typer.Argument(help="Logs of the arm without payload.")],
+    loaded: Annotated[list[Path] | None, typer.Option(help="A log of the loaded arm; may be repeated.")] = None,
+    max_nrmse: Annotated[
+        float | None, typer.Option(help="Largest RMSE over the torque's RMS allowed, for either joint.", min=0)
+    ] = None,
+    profile: profiles.ProfileFile = None,
+    topic: profiles.Topic = None,
+    joints: profiles.Joints = None,
+    angle_unit: profiles.AngleUnit = None,
+    torque_unit: profiles.TorqueUnit = None,
+    zero: profiles.Zero = None,
+    second_angle: profiles.SecondAngle = None,
+    clock: profiles.Clock = None,
+) -> None:
+    """Print RMSE, normalised RMSE and R² of the predicted torque; exit code 1 past --max-nrmse.
+
+    Example: algid validate run1-unloaded.algid run2-unloaded.mcap --max-nrmse 0.3
+    """
+    from algid.pipeline.sources import LogSource
+    from algid.pipeline.validate import validate as judge
+    from algid.results import read_result
+
+    meaning = profiles.profile_from(
+        profile,
+        topic=topic,
+        joints=joints,
+        angle_unit=angle_unit,
+        torque_unit=torque_unit,
+        zero=zero,
+        second_angle=second_angle,
+        clock=clock,
+    )
+    known = read_result(result)
+    gravity = float(known.settings.get("gravity", 9.81))
+    sources = [LogSource(log, "unloaded", meaning, gravity) for log in logs]
+    sources += [LogSource(log, "loaded", meaning, gravity) for log in loaded or []]
+    found = judge(known, sources)
+    for name, one in {**found.logs, "all logs": found.total}.items():
+        print(_line(name, one))
+    if found.total is not None:
+        print(f"filter: {found.total.filter}")
+    if max_nrmse is not None and (found.total is None or max(found.total.nrmse) > max_nrmse):
+        print(f"OVER: normalised RMSE past {max_nrmse:g}")
+        raise typer.Exit(EXIT_FAILED)
+
+
+def _line(name: str, found: TorquePrediction | None) -> str:
+    if found is None:
+        return f"{name}: too short to judge"
+    joints = (
+        f"joint {joint}: RMSE {rmse:.4g} N m, normalised {nrmse:.4g}, R² {r2:.4f}"
+        for joint, rmse, nrmse, r2 in zip((1, 2), found.rmse, found.nrmse, found.r2, strict=True)
+    )
+    return f"{name}: {'; '.join(joints)}"
