@@ -10,11 +10,12 @@ import pytest
 import algid
 from algid.arm import FloatArray
 from algid.log import Log, Origin
+from algid.pipeline.fitted import outcome_of
 from algid.pipeline.outcome import result_of
 from algid.pipeline.paper import run_paper
 from algid.pipeline.settings import Settings
 from algid.pipeline.sources import LogSource
-from algid.pipeline.statistical import outcome_of, run_fit
+from algid.pipeline.statistical import run_fit
 from algid.results import Result
 from algid.synth.sensors import Sensors
 
