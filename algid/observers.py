@@ -93,8 +93,6 @@ class LuenbergerObserver:
 
     def _cascade(self, drive: FloatArray) -> FloatArray:
         """States (6, N) of z[n] = T z[n-1] + drive[n], T upper triangular: from the last state to the first."""
-        from scipy.signal import lfilter
-
         assert self._state is not None
         triangle = self._triangle
         states = np.empty_like(drive)
@@ -104,8 +102,20 @@ class LuenbergerObserver:
             total[0] += later @ self._state[row + 1 :]
             total[1:] += later @ states[row + 1 :, :-1]
             pole = triangle[row, row]
-            states[row], _ = lfilter([1.0], [1.0, -pole], total, zi=[pole * self._state[row]])
+            total[0] += pole * self._state[row]
+            states[row] = _recursion(pole, total)
         return states
+
+
+def _recursion(pole: complex, drive: FloatArray) -> FloatArray:
+    """z (N,) of z[n] = pole z[n-1] + drive[n] from rest: a triangular system of two bands."""
+    from scipy.linalg import get_lapack_funcs
+
+    band = np.empty((2, drive.size), drive.dtype)
+    band[0], band[1] = 1.0, -pole
+    (substitute,) = get_lapack_funcs(("tbtrs",), (band, drive))
+    found, _ = substitute(band, drive[:, None], uplo="L")
+    return found[:, 0]
 
 
 def _first_order_hold(a: FloatArray, b: FloatArray, dt: float) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median
+
+# A process inherits the peak memory of the one that starts it: a small one stands in between.
+_LAUNCH = """
+import json, resource, subprocess, sys, time
+start = time.perf_counter()
+code = subprocess.run(sys.argv[1:], stderr=subprocess.STDOUT).returncode
+wall = time.perf_counter() - start
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print()
+print(json.dumps([code, wall, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024]))
+"""
 
 
 @dataclass(frozen=True)
@@ -30,17 +41,13 @@ def run(command: Sequence[str]) -> Cost:
         If it fails.
     """
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    start = time.perf_counter()
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment)
-    assert process.stdout is not None
-    output = process.stdout.read()
-    _, status, usage = os.wait4(process.pid, 0)
-    wall = time.perf_counter() - start
-    process.returncode = os.waitstatus_to_exitcode(status)
-    process.stdout.close()
-    if process.returncode not in (0, 3):  # 3: algid tells that a constant could not be identified
-        raise RuntimeError(f"{' '.join(command)}: exit code {process.returncode}\n{output}")
-    return Cost(wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024, output)
+    launcher = [sys.executable, "-I", "-S", "-c", _LAUNCH, *command]
+    told = subprocess.run(launcher, capture_output=True, text=True, env=environment, check=True).stdout
+    output, _, figures = told.rstrip().rpartition("\n")
+    code, wall, cpu, peak = json.loads(figures)
+    if code not in (0, 3):  # 3: algid tells that a constant could not be identified
+        raise RuntimeError(f"{' '.join(command)}: exit code {code}\n{output}")
+    return Cost(wall, cpu, peak, output)
 
 
 def python(*arguments: str) -> list[str]:

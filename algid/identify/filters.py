@@ -16,7 +16,7 @@ from algid.arm import FloatArray
 _KAISER_BETA = 7.0  # stop band at -70 dB
 _PERIODS = 2.5  # half length of a kernel in periods of its bandwidth
 _LEAST = 3  # half length that three odd moments ask for, however slowly a log was sampled
-_ROWS = 64  # outputs a matrix product makes at once
+_ROWS = 32  # outputs a matrix product makes at once
 
 
 def half_length(dt: float, bandwidth: float) -> int:

@@ -28,8 +28,10 @@ from algid.identify.weak import Source
 from algid.sampling import Cutter, Segment
 
 _PIECE_SECONDS = 60.0
-_PER_CUTOFF = 50.0
-_SHARPER = 6.0  # cutoffs: bandwidth of the first filter
+_PER_CUTOFF = 12.5
+_SHARPER = 5.0  # cutoffs: bandwidth of the first filter, whose stop band begins before its images matter
+_SLOPE = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / 12  # of fourth order (Fornberg 1988)
+_BEND = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / 12
 
 Shift = float | Callable[[float], float]
 
@@ -149,8 +151,14 @@ def _decimated(piece: Segment, by: PredictionFilter) -> tuple[FloatArray, float]
 
 
 def _motion(theta: FloatArray, dt: float) -> Motion:
-    omega = np.gradient(theta, dt, axis=1)
-    return Motion(theta, omega, np.gradient(omega, dt, axis=1))
+    """Motion with derivatives by five points; the two samples at each end repeat their neighbour's."""
+    inner, n = theta.shape[1] - 4, theta.shape[1]
+    omega, alpha = (
+        sum(weight * theta[:, place : place + inner] for place, weight in enumerate(weights))
+        for weights in (_SLOPE / dt, _BEND / dt**2)
+    )
+    place = np.clip(np.arange(n) - 2, 0, inner - 1)
+    return Motion(theta, np.asarray(omega)[:, place], np.asarray(alpha)[:, place])
 
 
 def score(
