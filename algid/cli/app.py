@@ -17,6 +17,7 @@ from algid.cli.inspect import inspect
 from algid.cli.profile import new
 from algid.cli.report import report
 from algid.cli.synth import synth
+from algid.cli.track import track
 
 app = typer.Typer(
     help="Parameters and payload of a two-link arm, with honest error bars, straight from its torque and angle logs.",
@@ -44,6 +45,6 @@ def _root(
 profiles = typer.Typer(help="Profiles tell what a log's names, units and signs mean.", no_args_is_help=True)
 profiles.command("new")(new)
 
-for command in (inspect, identify, batch, fleet, check, report, compare, synth, convert):
+for command in (inspect, identify, batch, fleet, track, check, report, compare, synth, convert):
     app.command()(command)
 app.add_typer(profiles, name="profile")
