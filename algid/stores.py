@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from algid.errors import OutputError
+from algid.errors import LogError, OutputError
 from algid.outfiles import whole_file
 
 SCHEMES = ("s3://", "gs://", "az://")
@@ -155,3 +155,30 @@ def object_stat(url: str) -> tuple[int, int]:
     filesystem, path = connect(url)
     info = filesystem.get_file_info(path)
     return (info.size, info.mtime_ns) if info.is_file else (0, 0)
+
+
+def fetched(url: str, folder: Path) -> Path:
+    """A copy of an object in `folder`, under its own name.
+
+    Raises
+    ------
+    LogError
+        If there is no such object, or it cannot be read.
+    """
+    from pyarrow.fs import LocalFileSystem, copy_files
+
+    filesystem, path = connect(url)
+    copy = folder / path.rpartition("/")[2]
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        copy_files(path, str(copy), source_filesystem=filesystem, destination_filesystem=LocalFileSystem())
+    except OSError as error:
+        raise LogError(f"{url}: it cannot be read ({_told(error)}); check name and rights") from error
+    return copy
+
+
+def put_folder(store: Store, name: str, folder: Path) -> None:
+    """Write the files of a folder below `name`; ``result.json`` comes last, so that it vouches for the others."""
+    files = sorted((path for path in folder.rglob("*") if path.is_file()), key=lambda p: (p.name == "result.json", p))
+    for path in files:
+        store.write(f"{name}/{path.relative_to(folder).as_posix()}", path.read_bytes())

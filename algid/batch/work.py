@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import tempfile
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -15,9 +16,9 @@ from algid.batch.records import End, Input, Record, estimates_of, stat_of
 from algid.errors import AlgidError
 from algid.pipeline.identify import identify
 from algid.pipeline.settings import Settings
-from algid.pipeline.sources import sha256_of
+from algid.pipeline.sources import Staged, sha256_of
 from algid.results import Result
-from algid.stores import is_url
+from algid.stores import fetched, is_url, open_store, put_folder
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -77,19 +78,29 @@ def ended_record(task: Task, inputs: tuple[Input, ...], **ended: Any) -> Record:
 
 
 def _identified(task: Task) -> Result:
-    place = Path(task.out) / task.job.name
-    return identify(
-        task.job.logs,
-        task.job.loaded,
-        task.settings,
-        parameters=task.parameters,
-        profile=task.profile,
-        out=place.parent,
-        name=place.name,
-        force=True,
-        report=task.report,
-        shared_library=True,
-    )
+    """Identify; what lies in an object store is fetched before and put there after."""
+    with tempfile.TemporaryDirectory(prefix="algid-") as temporary:
+        stage = Path(temporary)
+        place = (stage if is_url(task.out) else Path(task.out)) / task.job.name
+        result = identify(
+            [_staged(path, stage / str(number)) for number, path in enumerate(task.job.logs)],
+            [_staged(path, stage / f"loaded{number}") for number, path in enumerate(task.job.loaded)],
+            task.settings,
+            parameters=task.parameters,
+            profile=task.profile,
+            out=place.parent,
+            name=place.name,
+            force=True,
+            report=task.report,
+            shared_library=not is_url(task.out),
+        )
+        if is_url(task.out):
+            put_folder(open_store(task.out), f"{task.job.name}.algid", place.with_name(f"{place.name}.algid"))
+        return result
+
+
+def _staged(path: str, folder: Path) -> str | Staged:
+    return Staged(fetched(path, folder), path) if is_url(path) else path
 
 
 def _of_result(result: Result) -> dict[str, Any]:

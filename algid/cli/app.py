@@ -11,11 +11,13 @@ from algid.cli.batch import batch
 from algid.cli.check import check
 from algid.cli.compare import compare
 from algid.cli.convert import convert
+from algid.cli.fleet import fleet
 from algid.cli.identify import identify
 from algid.cli.inspect import inspect
 from algid.cli.profile import new
 from algid.cli.report import report
 from algid.cli.synth import synth
+from algid.cli.track import track
 from algid.cli.validate import validate
 
 app = typer.Typer(
@@ -44,6 +46,6 @@ def _root(
 profiles = typer.Typer(help="Profiles tell what a log's names, units and signs mean.", no_args_is_help=True)
 profiles.command("new")(new)
 
-for command in (inspect, identify, validate, batch, check, report, compare, synth, convert):
+for command in (inspect, identify, validate, batch, fleet, track, check, report, compare, synth, convert):
     app.command()(command)
 app.add_typer(profiles, name="profile")

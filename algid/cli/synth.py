@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from algid.log import Log
     from algid.synth.cases import Case
     from algid.synth.excitation import Torque
     from algid.synth.run import Recording
@@ -54,6 +55,9 @@ def synth(
     jitter: Annotated[float, typer.Option(help="Jitter of the stamps, s (standard deviation).", min=0)] = 0.0,
     drop: Annotated[float, typer.Option(help="Share of samples lost at random.", min=0, max=0.9)] = 0.0,
     seed: Annotated[int, typer.Option(help="Seed of noise, jitter and losses.", min=0)] = 0,
+    payload_schedule: Annotated[
+        str | None, typer.Option(help="One log instead, its payload changing: S=KG,…, like 2=0.05,4=0; bare before.")
+    ] = None,
 ) -> None:
     """Write CASE-unloaded and CASE-loaded logs of a simulated arm; the truth travels with them.
 
@@ -72,10 +76,25 @@ def synth(
     drive = _torque(described, torque, torque_hold)
     if torque_hold is not Hold.EXACT and torque in EXCITATIONS:
         drive = held(drive, rate, duration, "zoh" if torque_hold is Hold.ZOH else "foh")
-    for log in synthesise(described, drive, recording):
+    if payload_schedule is None:
+        logs: tuple[Log, ...] = synthesise(described, drive, recording)
+    else:
+        logs = (_scheduled(described, drive, recording, payload_schedule),)
+    for log in logs:
         path = out / f"{log.origin.path}.{kind.value}"
         write_log(path, log, truth=log.origin.truth, kind=kind.value)
         print(path)
+
+
+def _scheduled(case: Case, torque: Torque, recording: Recording, text: str) -> Log:
+    from algid.errors import SettingError
+    from algid.synth.run import with_schedule
+
+    try:
+        pairs = [tuple(map(float, part.split("="))) for part in text.split(",")]
+        return with_schedule(case, torque, recording, [(time, mass) for time, mass in pairs])
+    except ValueError as error:
+        raise SettingError(f"--payload-schedule {text}: {error}; give times and payloads like 2=0.05,4=0") from error
 
 
 def _recording(recording: Recording, initial: str | None) -> Recording:

@@ -21,9 +21,19 @@ if TYPE_CHECKING:
     from algid.profile import Profile
 
 Role = Literal["unloaded", "loaded"]
-LogLike = str | Path | Log
 EXAMINED = 1 << 16
 """Samples at the start of a long log that the named checks look at."""
+
+
+@dataclass(frozen=True)
+class Staged:
+    """A log that was fetched from an object store: its copy on this machine, and its URL."""
+
+    path: Path
+    url: str
+
+
+LogLike = str | Path | Log | Staged
 
 
 @dataclass
@@ -41,8 +51,8 @@ class LogSource:
 
     def __init__(self, log: LogLike, role: Role, profile: Profile | None = None, gravity: float = 9.81) -> None:
         self.role = role
-        self.name = log.origin.path if isinstance(log, Log) else str(log)
-        self._log = log
+        self.name = log.origin.path if isinstance(log, Log) else log.url if isinstance(log, Staged) else str(log)
+        self._log = log.path if isinstance(log, Staged) else log
         self._profile = profile
         self._gravity = gravity
         self._found: list[Notice] | None = None
@@ -184,5 +194,5 @@ def sources_of(
     """Sources of one log, several, or none."""
     if logs is None:
         return []
-    several = [logs] if isinstance(logs, str | Path | Log) else list(logs)
+    several = [logs] if isinstance(logs, str | Path | Log | Staged) else list(logs)
     return [LogSource(log, role, profile, gravity) for log in several]

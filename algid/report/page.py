@@ -86,10 +86,11 @@ def page_html(folder: Path, result: Result, library: str | None) -> str:
         f"<footer>Made by algid {escaped(result.version)} from {escaped(str(folder.name))}/result.json.</footer>",
         '<noscript><p class="missing">The figures need JavaScript; all numbers stand without it.</p></noscript>',
     ]
-    return _document(file_name(result.log.path), "\n".join(body), script_json(_drawing(figures)), library)
+    return document(file_name(result.log.path), "\n".join(body), script_json(drawing(figures)), library)
 
 
-def _document(title: str, body: str, data: str, library: str | None) -> str:
+def document(title: str, body: str, data: str, library: str | None) -> str:
+    """A whole page out of its body and its figures' data; without `library` it asks for the one beside the folder."""
     script, style = _asset("report.js"), _asset("report.css")
     if library is None:
         nonce = hashlib.sha256((body + data).encode()).hexdigest()  # nobody who writes the body can foretell it
@@ -120,7 +121,8 @@ def _hash(script: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
 
 
-def _drawing(figures: Sequence[Figure | Missing]) -> dict[str, object]:
+def drawing(figures: Sequence[Figure | Missing]) -> dict[str, object]:
+    """What the page's script draws."""
     panels = [
         {
             "id": panel_id(figure, place),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -11,7 +13,7 @@ from algid.log import Log, Truth
 from algid.synth.cases import Case
 from algid.synth.excitation import Hold, SampledTorque, Torque, no_torque, wide_multi_sine
 from algid.synth.sensors import Sensors, record, sample_times
-from algid.synth.simulator import HANGING, simulate
+from algid.synth.simulator import HANGING, Motion, simulate
 
 EXCITATIONS = ("case", "wide", "none")
 
@@ -56,6 +58,40 @@ def synthesise(case: Case, torque: Torque, recording: Recording) -> tuple[Log, L
     unloaded = _one(case, torque, recording, payload=0.0)
     other = replace(recording.sensors, seed=recording.sensors.seed + 1)
     return unloaded, _one(case, torque, replace(recording, sensors=other), payload=case.payload)
+
+
+def with_schedule(case: Case, torque: Torque, recording: Recording, schedule: Sequence[tuple[float, float]]) -> Log:
+    """A log during which the payload changes: pairs of time in s, increasing, and payload in kg from then on.
+
+    Before the first time the arm is bare. An object is grasped and let go at the tip's own velocity, so that the
+    motion has no step. No single payload is true of the log: it bears no truth.
+
+    Raises
+    ------
+    ValueError
+        If the times do not increase or a payload is negative.
+    """
+    times = [time for time, _ in schedule]
+    if any(b <= a for a, b in pairwise(times)) or any(mass < 0 for _, mass in schedule):
+        raise ValueError(f"schedule must hold increasing times and payloads of 0 or more, got {list(schedule)}")
+    t = sample_times(recording.rate, recording.duration, recording.sensors)
+    state = np.array(recording.initial)
+    parts = []
+    starts = [0.0, *times]
+    for start, end, mass in zip(starts, [*times, np.inf], [0.0, *(mass for _, mass in schedule)], strict=True):
+        own = t[(t >= start) & (t < end)]
+        close = min(end, t[-1])
+        if not own.size or close <= start:
+            continue
+        k = with_payload(case.arm.constants(), case.arm.payload_constants(mass))
+        every = np.unique(np.concatenate([[start], own, [close]]))
+        motion = simulate(k, torque, every, state[:2], state[2:])
+        state = np.concatenate([motion.theta[:, -1], motion.omega[:, -1]])
+        kept = np.isin(every, own)
+        parts.append(Motion(own, motion.theta[:, kept], motion.omega[:, kept], motion.tau[:, kept]))
+    whole = Motion(*(np.concatenate([getattr(p, n) for p in parts], axis=-1) for n in ("t", "theta", "omega", "tau")))
+    log = record(whole, recording.sensors, Truth(case.arm, 0.0, case.name), f"{case.name}-schedule")
+    return replace(log, origin=replace(log.origin, truth=None))
 
 
 def _one(case: Case, torque: Torque, recording: Recording, payload: float) -> Log:

@@ -1,0 +1,1 @@
+"""The fleet's history: parameters over time, drift, payloads against their labels, outliers."""

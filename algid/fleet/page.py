@@ -1,0 +1,112 @@
+"""The fleet's page: what drifts and what stands out, in tables and figures that open offline."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from algid.fleet.windows import ALPHA, SPAN
+from algid.report.figures.base import Figure, Panel, axis, label
+from algid.report.html import escaped, figure_html, script_json, table_html
+from algid.report.numbers import significant
+from algid.report.page import document, drawing
+from algid.report.tables import Column, Table
+from algid.report.text import visible
+
+if TYPE_CHECKING:
+    from algid.fleet.history import History
+
+MOST_ROWS = 200
+MOST_PANELS = 12
+
+
+def fleet_html(history: History) -> str:
+    """The page's text."""
+    from plotly.offline import get_plotlyjs
+
+    figures = _figures(history)
+    facts = f"{history.robots:,} robots · {history.logs:,} logs"
+    body = [
+        f'<header><p class="kicker">algid · a fleet\'s history</p><h1>Fleet</h1><p class="facts">{escaped(facts)}</p>',
+        '</header>\n<main id="numbers">',
+        table_html(drift_table(history)),
+        *map(figure_html, figures),
+        table_html(finding_table(history)),
+        "</main>",
+    ]
+    return document("Fleet", "\n".join(body), script_json(drawing(figures)), get_plotlyjs())
+
+
+def drift_table(history: History) -> Table:
+    """Parameters that drift, the clearest first."""
+    columns = ("Robot", "Parameter", "Until", "Logs", "Mean", "Slope, % a month", "95 % interval", "p")
+    kinds = ("name", "text", "text", "number", "number", "number", "number", "number")
+    rows = tuple(_drift_row(row) for row in history.drifts.head(MOST_ROWS).iter_rows(named=True))
+    note = f"{history.drifts.height} found. A slope over {SPAN} months is told from none at p < {ALPHA:g}."
+    return Table("Drift", tuple(map(Column, columns, kinds)), rows, note)  # type: ignore[arg-type]
+
+
+def _drift_row(row: dict[str, Any]) -> tuple[str, ...]:
+    percent = 100 / abs(row["mean"]) if row["mean"] else np.nan
+    slope, half = percent * row["slope"], 1.96 * percent * row["slope_std"]
+    return (
+        visible(row["robot"]),
+        row["parameter"],
+        row["end"].date().isoformat(),
+        str(row["logs"]),
+        significant(row["mean"]),
+        f"{slope:+.3g}",
+        f"[{slope - half:.3g}, {slope + half:.3g}]",
+        f"{row['p']:.1e}",
+    )
+
+
+def finding_table(history: History) -> Table:
+    """Payloads unlike their labels, and outliers, the farthest first."""
+    import polars as pl
+
+    columns = ("Job", "Robot", "What", "Parameter", "Value", "Expected", "σ away")
+    kinds = ("name", "text", "text", "text", "number", "number", "number")
+    worst = history.findings.sort(pl.col("sigmas").abs(), descending=True).head(MOST_ROWS)
+    rows = tuple(
+        (
+            visible(row["job"]),
+            visible(row["robot"]),
+            {"payload": "payload unlike its label", "outlier": "outlier"}[row["kind"]],
+            row["parameter"],
+            significant(row["value"]),
+            significant(row["expected"]),
+            f"{row['sigmas']:+.1f}",
+        )
+        for row in worst.iter_rows(named=True)
+    )
+    note = f"{history.findings.height} found; the farthest {len(rows)} are shown."
+    return Table("Logs that stand out", tuple(map(Column, columns, kinds)), rows, note)  # type: ignore[arg-type]
+
+
+def _figures(history: History) -> list[Figure]:
+    pairs = history.drifts.head(MOST_PANELS).select("robot", "parameter").rows()
+    panels = tuple(_panel(history, robot, parameter) for robot, parameter in pairs)
+    if not panels:
+        return []
+    reading = f"Read: the mean of {SPAN} months that end there, with its 95 % interval."
+    return [Figure("drift", "Parameters that drift", panels, reading, columns=2)]
+
+
+def _panel(history: History, robot: str, parameter: str) -> Panel:
+    import polars as pl
+
+    own = history.windows.filter((pl.col("robot") == robot) & (pl.col("parameter") == parameter)).sort("month")
+    trace = {
+        "type": "scatter",
+        "mode": "lines+markers",
+        "x": [end.isoformat() for end in own["end"]],
+        "y": own["mean"].to_list(),
+        "error_y": {"type": "data", "array": (1.96 * own["mean_std"]).to_list(), "color": "@blue"},
+        "line": {"color": "@blue", "width": 1.4},
+        "hovertemplate": "%{y:.6g}<extra></extra>",
+    }
+    title = f"{label(robot)}: {parameter}"
+    says = f"{visible(robot)}, {parameter}, {own.height} months"
+    return Panel([trace], {"xaxis": axis(type="date"), "yaxis": axis(parameter)}, says, title=title)

@@ -1,0 +1,1 @@
+"""The payload in time: when it changed, and what each stretch weighs."""

@@ -1,0 +1,120 @@
+"""What short cells of a log tell of the payload: sums over whitened rows that are linear in it.
+
+Errors in variables are whitened as in `algid.identify.whitening`, so that the rows' noise is white whatever the
+angles' noise does to neighbouring torques. With the payload's column g = Y d, d what one kilogram at the tip adds
+to the constants (Table 2), a row reads e = g m_p + noise.
+
+======  ==========================================  =========
+symbol  name                                        shape
+======  ==========================================  =========
+A       Σ g², information on m_p                    (C,)
+B       Σ g e, so that m_p = ΣB / ΣA                (C,)
+S       Σ g Y, how constants' errors enter          (C, q)
+E       Σ e²                                        (C,)
+======  ==========================================  =========
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from algid.arm import FloatArray, payload_constants
+from algid.identify.filters import smoothed
+from algid.identify.model import Model
+from algid.identify.stencil import POINTS, Stencil
+from algid.identify.whitening import Linearised, NoiseLevels, linearise, trajectory
+from algid.sampling import Segment, pieces
+
+CELL = 0.02  # s
+_PIECE_SAMPLES = 16384
+_SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
+_PAYLOAD_OF = {"k5": 0, "k3": 1, "k1": 2, "k4": 3, "k2": 4}  # which of z1 … z5 adds to which constant
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """The arm that carries the payload: its model, coefficients k (q,), link lengths in m, and noise levels."""
+
+    model: Model
+    k: FloatArray
+    l1: float
+    l2: float
+    noise: NoiseLevels
+    shift: float = 0.0
+
+    @property
+    def unit(self) -> FloatArray:
+        """d (q,): what a payload of 1 kg adds to the coefficients."""
+        return self.added(payload_constants(1.0, self.l1, self.l2, self.model.gravity))
+
+    def added(self, z: FloatArray) -> FloatArray:
+        """Payload constants z (5,) as changes of the coefficients (q,)."""
+        return np.array([z[_PAYLOAD_OF[name]] if name in _PAYLOAD_OF else 0.0 for name in self.model.names])
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Sums by cell: see the table above; `start` and `end` (C,) are times in s, `rows` (C,) counts."""
+
+    start: FloatArray
+    end: FloatArray
+    A: FloatArray
+    B: FloatArray
+    S: FloatArray
+    E: FloatArray
+    rows: FloatArray
+
+    def __len__(self) -> int:
+        return int(self.start.size)
+
+    def part(self, first: int, last: int) -> Cells:
+        """Cells `first` to `last` - 1."""
+        return Cells(*(getattr(self, name)[first:last] for name in self.__dataclass_fields__))
+
+
+def joined(parts: Sequence[Cells]) -> Cells:
+    """Cells one after another."""
+    return Cells(*(np.concatenate([getattr(part, name) for part in parts]) for name in Cells.__dataclass_fields__))
+
+
+def cells_of(segments: Iterable[Segment], arm: Arm, mass: float, settle: int = 1) -> list[Cells]:
+    """Cells of each piece of a log, linearised at a payload of `mass` kg and, `settle` times, at its trajectory."""
+    long_enough = (piece for piece in pieces(segments, _PIECE_SAMPLES) if len(piece) >= 8 * POINTS)
+    return [_cells(piece, arm, mass, settle) for piece in long_enough]
+
+
+def _cells(piece: Segment, arm: Arm, mass: float, settle: int) -> Cells:
+    c = arm.k + mass * arm.unit
+    stencil = Stencil(piece.dt, arm.shift)
+    theta = smoothed(piece.theta, piece.dt, min(_SMOOTHING, 0.1 / piece.dt))
+    linear = linearise(arm.model, c, theta, piece, stencil, arm.noise)
+    for _ in range(settle):
+        multiplier = linear.solve_transposed(linear.columns[-1:])[0]
+        theta = trajectory(piece, linear, multiplier, arm.noise)
+        linear = linearise(arm.model, c, theta, piece, stencil, arm.noise)
+    return _sums(linear, piece, stencil, arm, mass)
+
+
+def _sums(linear: Linearised, piece: Segment, stencil: Stencil, arm: Arm, mass: float) -> Cells:
+    Y, e = linear.columns[:-1], linear.columns[-1]
+    g = arm.unit @ Y
+    e = e + mass * g
+    step = max(1, round(CELL / piece.dt))
+    count = e.size // (2 * step)
+
+    def by_cell(rows: FloatArray) -> FloatArray:
+        return rows[..., : count * 2 * step].reshape(*rows.shape[:-1], count, 2 * step).sum(axis=-1)
+
+    first = piece.start + piece.dt * (stencil.torques(len(piece)).start + step * np.arange(count))
+    return Cells(
+        first,
+        first + step * piece.dt,
+        by_cell(g * g),
+        by_cell(g * e),
+        by_cell(g * Y).T,
+        by_cell(e * e),
+        np.full(count, 2.0 * step),
+    )

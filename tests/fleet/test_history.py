@@ -1,0 +1,93 @@
+"""Drift is found, nothing else is: on simulated fleets, against closed forms and numpy."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from algid.errors import ResultError
+from algid.fleet.history import History, history_of, write_history
+
+START = datetime(2026, 1, 1, tzinfo=UTC)
+NAMES = tuple(f"k{n}" for n in range(1, 8))
+
+
+def _jobs(robots: int, days: int, seed: int, growth: float = 0.0, scatter: float = 1.0) -> pl.DataFrame:
+    """One log a day: estimates of 1 ± 0.5 %, scattering `scatter` times as much as they say; k6 grows a month."""
+    rng = np.random.default_rng(seed)
+    rows = robots * days
+    day = np.tile(np.arange(days), robots)
+    robot = np.repeat(np.arange(robots), days)
+    columns: dict[str, object] = {
+        "job": [f"j{row}" for row in range(rows)],
+        "robot": [f"r{one}" for one in robot],
+        "time": pl.Series([START + timedelta(days=int(one)) for one in day], dtype=pl.Datetime("us", "UTC")),
+        "status": ["ok"] * rows,
+    }
+    for name in NAMES:
+        trend = growth * day / 30.4375 if name == "k6" else 0.0
+        columns[name] = 1 + trend + scatter * 0.005 * rng.standard_normal(rows)
+        columns[f"{name}_std"] = np.full(rows, 0.005)
+    return pl.DataFrame(columns)
+
+
+def _history(jobs: pl.DataFrame, folder: Path) -> History:
+    jobs.write_parquet(folder / "jobs.parquet")
+    return history_of(folder / "jobs.parquet")
+
+
+def test_growth_of_a_percent_a_month_is_found_within_three_months(tmp_path: Path) -> None:
+    history = _history(_jobs(20, 92, seed=1, growth=0.01), tmp_path)
+    found = history.drifts.filter(pl.col("parameter") == "k6")
+    assert found["robot"].n_unique() == 20
+    assert found["slope"].to_numpy() == pytest.approx(0.01, abs=5 * float(found["slope_std"].to_numpy().max()))
+
+
+@pytest.mark.parametrize("scatter", [1.0, 3.0])
+def test_false_alarms_stay_below_one_a_robot_year(tmp_path: Path, scatter: float) -> None:
+    history = _history(_jobs(100, 365, seed=2, scatter=scatter), tmp_path)
+    # 100 robots a year, 0.084 expected each: Poisson(8.4) passes 25 with probability 1e-6.
+    assert history.windows["drift"].sum() <= 25
+
+
+def test_a_slope_is_that_of_weighted_least_squares(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    jobs = _jobs(1, 60, seed=3, growth=0.02).with_columns(k6_std=pl.Series(rng.uniform(0.002, 0.02, 60)))
+    last = _history(jobs, tmp_path).windows.filter(pl.col("parameter") == "k6").sort("month").row(-1, named=True)
+    t = np.arange(60) / 30.4375
+    line = np.polyfit(t, jobs["k6"].to_numpy(), 1, w=1 / jobs["k6_std"].to_numpy())
+    assert last["slope"] == pytest.approx(line[0], rel=1e-9)
+    assert last["logs"] == 60
+
+
+def test_outliers_and_wrong_labels_are_told(tmp_path: Path) -> None:
+    jobs = _jobs(2, 30, seed=4)
+    k3 = jobs["k3"].to_numpy().copy()
+    k3[7] = 1.5
+    payload = 0.5 + 0.001 * np.random.default_rng(5).standard_normal(60)
+    payload[40] = 0.55
+    jobs = jobs.with_columns(k3=pl.Series(k3), m_p=pl.Series(payload), m_p_std=pl.lit(0.001), label_payload=pl.lit(0.5))
+    findings = _history(jobs, tmp_path).findings
+    assert findings.select("kind", "job", "parameter").rows() == [("outlier", "j7", "k3"), ("payload", "j40", "m_p")]
+
+
+def test_the_page_escapes_names_and_asks_no_host(tmp_path: Path) -> None:
+    jobs = _jobs(1, 92, seed=1, growth=0.05).with_columns(robot=pl.lit("<script>alert(1)</script>"))
+    write_history(_history(jobs, tmp_path), tmp_path)
+    page = (tmp_path / "fleet.html").read_text()
+    assert "<script>alert" not in page
+    assert "default-src 'none'" in page
+    assert (
+        pl.read_parquet(tmp_path / "fleet.parquet").height == 7 * 3
+    )  # the last log is 91 days old: in the third month
+
+
+def test_a_table_without_robots_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ResultError, match="no finished job has a robot"):
+        _history(_jobs(1, 3, seed=1).with_columns(robot=pl.lit(None, dtype=pl.String)), tmp_path)
+    with pytest.raises(ResultError, match="cannot read it"):
+        history_of(tmp_path / "absent.parquet")

@@ -1,0 +1,111 @@
+"""Payloads in time: found where they change, weighed within their intervals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from typer.testing import CliRunner
+
+import algid
+from algid.arm import FloatArray
+from algid.cli.app import app
+from algid.identify.model import Model
+from algid.identify.whitening import NoiseLevels
+from algid.log import Log
+from algid.pipeline.identify import identify
+from algid.sampling import segments
+from algid.synth.cases import load_case
+from algid.synth.run import Recording, excitation, with_schedule
+from algid.synth.sensors import Sensors
+from algid.track.cells import Arm
+from algid.track.changes import cuts
+from algid.track.payload import Track, track
+from algid.writers import write_log
+
+CASE = load_case("case1")
+MASSES = (0.0, 0.05, 0.0)
+NOISE = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
+
+
+@pytest.fixture(scope="module")
+def picking() -> Log:
+    return with_schedule(CASE, excitation(CASE, "wide"), Recording(duration=4.5), [(1.5, 0.05), (3.0, 0.0)])
+
+
+def _noisy(log: Log, rng: np.random.Generator) -> Log:
+    theta = log.theta + 1e-3 * rng.standard_normal(log.theta.shape)
+    return replace(log, theta=theta, tau=log.tau + 1e-2 * rng.standard_normal(log.tau.shape), omega=None)
+
+
+def _track(log: Log, k: FloatArray | None = None, covariance: FloatArray | None = None) -> Track:
+    arm = Arm(Model(), CASE.arm.constants() if k is None else k, CASE.arm.l1, CASE.arm.l2, NOISE)
+    return track(lambda: segments([log]), arm, np.zeros((9, 9)) if covariance is None else covariance)
+
+
+def test_changes_of_50_g_are_found_and_masses_lie_within_their_intervals(picking: Log) -> None:
+    rng = np.random.default_rng(0)
+    inside = []
+    for _ in range(20):
+        found = _track(_noisy(picking, rng))
+        assert len(found.stretches) == 3
+        assert abs(found.stretches[0].end - 1.5) < 0.5
+        assert abs(found.stretches[1].end - 3.0) < 0.5
+        inside += [s.ci95[0] < m < s.ci95[1] for s, m in zip(found.stretches, MASSES, strict=True)]
+    # 60 draws at 95 %: fewer than 50 inside happens once in 2000 times.
+    assert sum(inside) >= 50
+
+
+def test_an_uncertain_arm_widens_the_intervals_as_it_should(picking: Log) -> None:
+    rng = np.random.default_rng(1)
+    k = CASE.arm.constants()
+    covariance = np.zeros((9, 9))
+    covariance[:7, :7] = np.diag((1e-2 * k) ** 2)
+    inside = []
+    for _ in range(15):
+        found = _track(_noisy(picking, rng), k * (1 + 1e-2 * rng.standard_normal(7)), covariance)
+        for stretch in found.stretches:
+            middle = (stretch.start + stretch.end) / 2
+            inside.append(stretch.ci95[0] < MASSES[int(middle // 1.5)] < stretch.ci95[1])
+    assert np.mean(inside) > 0.85
+
+
+def test_a_constant_payload_is_one_stretch(picking: Log) -> None:
+    found = _track(_noisy(picking.part(0, 1400), np.random.default_rng(2)))
+    assert len(found.stretches) == 1
+    assert np.all(np.abs(found.m_p) < 5 * found.std)
+
+
+def test_cuts_are_the_best_ones() -> None:
+    rng = np.random.default_rng(3)
+    A = rng.uniform(1, 3, 24)
+    B = A * np.repeat([0.0, 4.0, 1.0], 8) + np.sqrt(A) * rng.standard_normal(24)
+
+    def cost(edges: list[int]) -> float:
+        both = list(pairwise(edges))
+        return sum(10.0 - B[a:b].sum() ** 2 / A[a:b].sum() for a, b in both)
+
+    best = min(([0, a, b, 24] for a in range(3, 22) for b in range(a + 3, 22)), key=cost)  # by trying every pair
+    assert cuts(A, B, penalty=10.0, shortest=3) == best[1:-1] == [8, 16]
+
+
+def test_the_command_writes_both_tables(picking: Log, tmp_path: Path) -> None:
+    unloaded, _ = algid.synthesise("case1", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
+    identify(unloaded, out=tmp_path, name="arm", report=False)
+    write_log(tmp_path / "picking.parquet", _noisy(picking, np.random.default_rng(4)))
+    lengths = ["--l1", str(CASE.arm.l1), "--l2", str(CASE.arm.l2)]
+    command = ["track", str(tmp_path / "picking.parquet"), "--parameters", str(tmp_path / "arm.algid"), *lengths]
+    done = CliRunner().invoke(app, [*command, "-o", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    stretches = pl.read_parquet(tmp_path / "picking.stretches.parquet")
+    assert stretches["m_p"].to_list() == pytest.approx(MASSES, abs=0.005)
+    assert pl.read_parquet(tmp_path / "picking.track.parquet").columns == ["t", "m_p", "low", "high", "stretch"]
+
+
+def test_a_schedule_that_runs_backwards_is_refused() -> None:
+    with pytest.raises(ValueError, match="increasing times"):
+        with_schedule(CASE, excitation(CASE, "wide"), Recording(), [(2.0, 0.1), (1.0, 0.0)])
