@@ -11,7 +11,7 @@ from algid.report.figures.base import Figure, Panel, axis, label
 from algid.report.html import escaped, figure_html, script_json, table_html
 from algid.report.numbers import significant
 from algid.report.page import document, drawing
-from algid.report.tables import Column, Table
+from algid.report.table import Column, Table
 from algid.report.text import visible
 
 if TYPE_CHECKING:
