@@ -2,7 +2,7 @@
 
     import algid
 
-    unloaded, loaded = algid.synthesise("case1", duration=10.0, excitation="wide")
+    unloaded, loaded = algid.synthesise("case1", duration=3.0, excitation="wide")
     result = algid.identify_logs(unloaded, loaded)
     print(result.parameters["k1"].estimate, result.payload["m_p"].ci95)
 

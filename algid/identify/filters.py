@@ -15,12 +15,13 @@ from algid.arm import FloatArray
 
 _KAISER_BETA = 7.0  # stop band at -70 dB
 _PERIODS = 2.5  # half length of a kernel in periods of its bandwidth
+_LEAST = 3  # half length that three odd moments ask for, however slowly a log was sampled
 _ROWS = 32  # outputs a matrix product makes at once
 
 
 def half_length(dt: float, bandwidth: float) -> int:
     """Samples that a kernel of `bandwidth` Hz reaches to either side."""
-    return max(2, round(_PERIODS / (bandwidth * dt)))
+    return max(_LEAST, round(_PERIODS / (bandwidth * dt)))
 
 
 @lru_cache(maxsize=16)

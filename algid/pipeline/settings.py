@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
@@ -56,8 +57,12 @@ class Settings:
     def __post_init__(self) -> None:
         for name, low in (("window", 0.0), ("bandwidth", 0.0), ("l1", 0.0), ("l2", 0.0)):
             value = getattr(self, name)
-            if value is not None and not value > low:
+            if value is not None and not low < value < math.inf:
                 raise SettingError(f"{name}: expected a number above {low:g}, found {value:g}")
+        if not 0.0 <= self.gravity < math.inf:
+            raise SettingError(f"gravity: expected a number of 0 or more, found {self.gravity:g}")
+        if self.delay != "estimate" and not math.isfinite(self.delay):
+            raise SettingError(f"delay: expected seconds or 'estimate', found {self.delay:g}")
         if self.estimator == "paper":
             self._refuse_what_the_paper_lacks()
 

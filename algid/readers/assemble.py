@@ -70,7 +70,8 @@ class TableReader:
             source = self.origin.mapping.get(name, name)
             raise LogError(
                 f"{self.origin.path}: {name} ({source}) in sample {first + row + 1}: "
-                f"expected a finite number, found {values[row]}; cut that part out or name another source"
+                f"expected a finite number below {_LARGEST:g} in size, found {values[row]}; "
+                "cut that part out or name another source"
             )
 
     def _unwrapped(self, theta: FloatArray, before: FloatArray) -> FloatArray:

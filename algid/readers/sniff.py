@@ -23,6 +23,8 @@ def sniff(path: Path) -> str:
     LogError
         If there is no such file, it cannot be read, or its content is none of these.
     """
+    if not _is_unicode(path):
+        raise LogError(f"{str(path)!r}: the name is not valid UTF-8; rename the log")
     try:
         if path.is_dir():
             return _folder(path)
@@ -34,6 +36,11 @@ def sniff(path: Path) -> str:
     except (OSError, ValueError) as error:
         raise LogError(f"{str(path)!r}: the log cannot be read ({error}); check the name and rights") from error
     return _by_content(path, head)
+
+
+def _is_unicode(path: Path) -> bool:
+    """Whether the name can be told to polars and written into a result; surrogates stand for bytes that cannot."""
+    return not any(0xD800 <= ord(letter) <= 0xDFFF for letter in str(path))
 
 
 def _folder(path: Path) -> str:

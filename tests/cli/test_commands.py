@@ -192,3 +192,9 @@ def test_validate_predicts_another_log(tmp_path: Path) -> None:
     assert "all logs: joint 1: RMSE" in good.out
     assert "filter: zero-phase Butterworth" in good.out
     assert Outcome("validate", folder, logs[1][0], "--max-nrmse", "1e-9").code == 1
+
+
+def test_poles_that_are_no_numbers_are_told_in_words(logs: Path) -> None:
+    found = Outcome("identify", logs / "case1-unloaded.csv", "--poles=-80,x")
+    assert found.code == 2
+    assert "expected numbers between commas; give six like" in found.err

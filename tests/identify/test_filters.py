@@ -48,3 +48,12 @@ def test_butterworth_agrees_with_scipy_away_from_the_ends(order: int, cutoff: fl
 def test_every_third_correlation_is_every_third_correlation() -> None:
     x, kernel = np.random.default_rng(1).standard_normal((2, 1003)), np.arange(1.0, 12.0)
     np.testing.assert_allclose(correlate(x, kernel, 3), correlate(x, kernel)[:, ::3], rtol=1e-12)
+
+
+@pytest.mark.parametrize("rate", [1.0, 5.0, 33.0, 80.0])
+def test_slow_sampling_keeps_what_the_kernel_promises(rate: float) -> None:
+    kernel = differentiator(1 / rate, 60.0)
+    n = np.arange(kernel.size) - kernel.size // 2
+    moments = [float(kernel @ (n / rate) ** power) for power in range(7)]
+    scale = (kernel.size / rate) ** np.arange(7) * rate
+    assert np.allclose(np.array(moments) / scale, np.eye(7)[1] / scale[1], atol=1e-12)  # rounding

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -170,3 +171,20 @@ def test_real_arm_is_identified(shared_data: Path) -> None:
     assert result.fit.residual is not None
     # the parameters published with the data predict all ten runs to 0.159 and 0.114 N m
     assert np.all(np.array(result.fit.residual.rmse) < (0.159, 0.114))
+
+
+def test_a_joint_that_stands_still_is_a_status(wide: tuple[Log, Log], tmp_path: Path) -> None:
+    still = replace(wide[0], theta=np.stack([wide[0].theta[0], np.zeros(len(wide[0]))]))
+    held = replace(wide[0], theta=np.full_like(wide[0].theta, -1.5), omega=None)
+    for number, log in enumerate((still, held)):
+        for settings in (Settings(), PAPER):
+            result = identify(log, None, settings, out=tmp_path / f"{number}{settings.estimator}")
+            assert not result.complete
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("gravity", -9.81), ("gravity", np.nan), ("delay", np.inf), ("l1", np.inf), ("window", np.nan)]
+)
+def test_numbers_without_a_meaning_are_refused(name: str, value: float) -> None:
+    with pytest.raises(SettingError, match=f"{name}: expected"):
+        replace(Settings(), **{name: value})  # type: ignore[arg-type]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import os
 import random
 import struct
 import tempfile
@@ -99,3 +100,17 @@ def test_names_with_control_characters_do_not_break_a_message(tmp_path: Path) ->
     with pytest.raises(LogError, match="no column for") as caught:
         read_log(tmp_path / "log.csv")
     assert "\u202e" not in str(caught.value)
+
+
+def test_a_name_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / os.fsdecode(b"bad\xff.csv")
+    path.write_text("t,theta1,theta2,tau1,tau2\n0,0,0,0,0\n")
+    with pytest.raises(LogError, match="not valid UTF-8; rename"):
+        read_log(path)
+
+
+def test_a_finite_number_too_large_is_told_so(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("t,theta1,theta2,tau1,tau2\n0,0,0,0,0\n1,1e300,0,0,0\n")
+    with pytest.raises(LogError, match=r"sample 2: expected a finite number below 1e\+100 in size, found 1e\+300"):
+        read_log(path)

@@ -114,8 +114,9 @@ class Summary:
         some = np.isfinite(middle).any(axis=1)
         estimate[some] = np.nanmedian(middle[some], axis=1)
         within = np.nanmedian(high[some] - low[some], axis=1)
-        between = np.subtract(*np.nanquantile(middle[some], [0.75, 0.25], axis=1))
-        wander[some] = 0.5 * np.maximum(within, between)
+        if some.any():
+            between = np.subtract(*np.nanquantile(middle[some], [0.75, 0.25], axis=1))
+            wander[some] = 0.5 * np.maximum(within, between)
         return estimate, wander
 
 
