@@ -18,15 +18,13 @@ to joint 2, so that L is unique and no joint's angle disturbs the other's veloci
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg
-from scipy.signal import lfilter
 
 from algid.arm import FloatArray
 
 PAPER_POLES = (-80.0, -390.0, -391.0, -392.0, -393.0, -394.0)
 
 _CHAIN = np.diag([1.0, 1.0], 1)
-A = scipy.linalg.block_diag(_CHAIN, _CHAIN)
+A = np.kron(np.eye(2), _CHAIN)
 C = np.eye(6)[[0, 3]]
 C_OBS = np.eye(6)[[1, 4]]
 
@@ -67,6 +65,8 @@ class LuenbergerObserver:
         gain = observer_gain(poles)
         transition, self._now, self._next = _first_order_hold(A - gain @ C, gain, dt)
         kind = "complex" if np.iscomplexobj(np.array(poles)) else "real"
+        import scipy.linalg
+
         self._triangle, self._basis = scipy.linalg.schur(transition, output=kind)
         self._state: FloatArray | None = None
         self._last_angles: FloatArray = np.empty(2)
@@ -93,6 +93,8 @@ class LuenbergerObserver:
 
     def _cascade(self, drive: FloatArray) -> FloatArray:
         """States (6, N) of z[n] = T z[n-1] + drive[n], T upper triangular: from the last state to the first."""
+        from scipy.signal import lfilter
+
         assert self._state is not None
         triangle = self._triangle
         states = np.empty_like(drive)
@@ -108,6 +110,8 @@ class LuenbergerObserver:
 
 def _first_order_hold(a: FloatArray, b: FloatArray, dt: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Φ, Γ0, Γ1 with x[n+1] = Φ x[n] + Γ0 y[n] + Γ1 y[n+1] for y linear in between, by one matrix exponential."""
+    import scipy.linalg
+
     states, inputs = b.shape
     block = np.zeros((states + 2 * inputs, states + 2 * inputs))
     block[:states, :states] = a * dt

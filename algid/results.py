@@ -58,13 +58,14 @@ class Table4Row(_Model):
 
 
 class LogSummary(_Model):
-    """A log that was used: duration in s, rate in Hz, and which channel each signal was taken from."""
+    """A log that was used: first stamp in ns, duration in s, rate in Hz, each signal's channel."""
 
     path: str
     sha256: str
     role: Literal["unloaded", "loaded"]
     format: str
     rows: int
+    start_ns: int = 0
     duration: float
     rate: float
     mapping: dict[str, str]

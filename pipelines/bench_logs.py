@@ -74,7 +74,7 @@ def parquet(path: Path, rows: int) -> Path:
 
 
 def mcap(path: Path, rows: int) -> Path:
-    """The log as MCAP, once: what algid's own writer writes, laid out a chunk at a time and without an index."""
+    """The log as MCAP, once: what a ROS 2 recorder writes, laid out a chunk at a time."""
     if not path.exists():
         with whole_file(path) as temporary, temporary.open("wb") as stream:
             _write_mcap(stream, blocks(rows))
@@ -82,42 +82,72 @@ def mcap(path: Path, rows: int) -> Path:
 
 
 def _write_mcap(stream: BinaryIO, log: Iterator[Log]) -> None:
-    stream.write(_MAGIC)
-    _record(stream, 1, _text("ros2") + _text("algid bench"))
-    _record(stream, 3, struct.pack("<H", 1) + _text(TYPE) + _text("ros2msg") + _text(DEFINITION))
-    _record(stream, 4, struct.pack("<HH", 0, 1) + _text(TOPIC) + _text("cdr") + struct.pack("<I", 0))
-    packer = zstandard.ZstdCompressor(level=1)
-    sequence = 0
+    schema = struct.pack("<H", 1) + _text(TYPE) + _text("ros2msg") + _text(DEFINITION)
+    channel = struct.pack("<HH", 0, 1) + _text(TOPIC) + _text("cdr") + struct.pack("<I", 0)
+    head = _record(1, _text("ros2") + _text("algid bench")) + _record(3, schema) + _record(4, channel)
+    stream.write(_MAGIC + head)
+    packer = zstandard.ZstdCompressor(level=1, threads=0)
+    index, sequence, first_ns, last_ns = [], 0, 0, 0
     for block in log:
         for first in range(0, len(block), _CHUNK_ROWS):
             part = block.part(first, min(first + _CHUNK_ROWS, len(block)))
-            _record(stream, 6, _chunk(part, sequence, packer))
+            index.append(_write_chunk(stream, part, sequence, packer))
             sequence += len(part)
-    _record(stream, 0x0F, struct.pack("<I", 0))
-    _record(stream, 2, struct.pack("<QQI", 0, 0, 0))
-    stream.write(_MAGIC)
+            first_ns, last_ns = first_ns or int(part.stamp_ns[0]), int(part.stamp_ns[-1])
+    stream.write(_record(0x0F, struct.pack("<I", 0)))
+    summary = stream.tell()
+    counts = struct.pack("<IHQ", 10, 0, sequence)
+    figures = struct.pack("<QHIIIIQQ", sequence, 1, 1, 0, 0, len(index), first_ns, last_ns) + counts
+    stream.write(_record(3, schema) + _record(4, channel) + _record(0x0B, figures) + b"".join(index))
+    stream.write(_record(2, struct.pack("<QQI", summary, 0, 0)) + _MAGIC)
 
 
-def _chunk(part: Log, sequence: int, packer: zstandard.ZstdCompressor) -> bytes:
-    """Content of a chunk record that holds the samples of `part` as messages."""
-    messages = list(payloads(part))
-    size = len(messages[0])
+def _write_chunk(stream: BinaryIO, part: Log, sequence: int, packer: zstandard.ZstdCompressor) -> bytes:
+    """Write the samples of `part` as a chunk of messages and its message index; gives its chunk index record."""
+    plain, size = _messages(part, sequence)
+    span = struct.pack("<QQ", int(part.stamp_ns[0]), int(part.stamp_ns[-1]))
+    packed = packer.compress(plain)
+    body = span + struct.pack("<QI", len(plain), 0) + _text("zstd") + struct.pack("<Q", len(packed)) + packed
+    start, chunk = stream.tell(), _record(6, body)
+    entries = np.stack([part.stamp_ns, size * np.arange(len(part))], axis=1).astype("<u8").tobytes()
+    index = _record(7, struct.pack("<HI", 0, len(entries)) + entries)
+    stream.write(chunk + index)
+    places = struct.pack("<QQIHQQ", start, len(chunk), 10, 0, start + len(chunk), len(index))
+    return _record(8, span + places + _text("zstd") + struct.pack("<QQ", len(packed), len(plain)))
+
+
+def _messages(part: Log, sequence: int) -> tuple[bytes, int]:
+    """The samples of `part` as message records, and the bytes of one."""
+    payload = list(payloads(part))
+    size = len(payload[0])
     fields = [("code", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log", "<u8")]
     rows = np.zeros(len(part), np.dtype([*fields, ("publish", "<u8"), ("data", f"V{size}")]))
     rows["code"], rows["length"] = 5, 22 + size
     rows["sequence"] = sequence + np.arange(len(part))
     rows["log"] = rows["publish"] = part.stamp_ns
-    rows["data"] = np.frombuffer(b"".join(messages), f"V{size}")
-    plain = rows.tobytes()
-    head = struct.pack("<QQQI", int(part.stamp_ns[0]), int(part.stamp_ns[-1]), len(plain), 0)
-    packed = packer.compress(plain)
-    return head + _text("zstd") + struct.pack("<Q", len(packed)) + packed
+    rows["data"] = np.frombuffer(b"".join(payload), f"V{size}")
+    return rows.tobytes(), rows.itemsize
 
 
-def _record(stream: BinaryIO, code: int, content: bytes) -> None:
-    stream.write(struct.pack("<BQ", code, len(content)) + content)
+def _record(code: int, content: bytes) -> bytes:
+    return struct.pack("<BQ", code, len(content)) + content
 
 
 def _text(text: str) -> bytes:
     encoded = text.encode()
     return struct.pack("<I", len(encoded)) + encoded
+
+
+def bag(path: Path, rows: int) -> Path:
+    """The log as a rosbag2 folder, once."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    if not path.exists():
+        store = get_typestore(Stores.ROS2_HUMBLE)
+        with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+            connection = writer.add_connection(TOPIC, TYPE, typestore=store)
+            for block in blocks(rows):
+                for stamp, payload in zip(block.stamp_ns.tolist(), payloads(block), strict=True):
+                    writer.write(connection, stamp, payload)
+    return path

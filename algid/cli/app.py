@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from algid import __version__
+from algid.cli.batch import batch
 from algid.cli.check import check
 from algid.cli.compare import compare
 from algid.cli.convert import convert
@@ -43,6 +44,6 @@ def _root(
 profiles = typer.Typer(help="Profiles tell what a log's names, units and signs mean.", no_args_is_help=True)
 profiles.command("new")(new)
 
-for command in (inspect, identify, validate, check, report, compare, synth, convert):
+for command in (inspect, identify, validate, batch, check, report, compare, synth, convert):
     app.command()(command)
 app.add_typer(profiles, name="profile")

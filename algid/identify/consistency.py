@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import minimize
 
 from algid.arm import FloatArray
 from algid.identify.fit import Fit
@@ -83,6 +82,8 @@ def constrained(fit: Fit) -> Fit:
     """
     if not broken_bounds(fit):
         return fit
+    from scipy.optimize import minimize
+
     size = sizes(fit.names, fit.values)
     S = likelihood(fit.shared, fit.logs, fit.values, fit.prior)[2]
     scale = 1 / np.sqrt(np.maximum(np.diag(S), 1 / size**2))

@@ -7,6 +7,7 @@ Time Signal Processing, sec. 7.5), and exact for angles that are polynomials of 
 from __future__ import annotations
 
 from functools import lru_cache
+from math import comb
 
 import numpy as np
 
@@ -89,3 +90,30 @@ def smoothed(x: FloatArray, dt: float, bandwidth: float) -> FloatArray:
     before = 2 * x[:, :1] - x[:, reach:0:-1]
     after = 2 * x[:, -1:] - x[:, -2 : -reach - 2 : -1]
     return correlate(np.concatenate([before, x, after], axis=1), kernel / kernel.sum())
+
+
+def butterworth(x: FloatArray, dt: float, cutoff: float, order: int) -> FloatArray:
+    """Signals (m, N) after a digital Butterworth filter of `order` and `cutoff` Hz, forwards and backwards.
+
+    Its response |H|² = |1 + z|^2n / (|1 + z|^2n + γ |1 - z|^2n), γ = tan(π cutoff dt)^-2n, is that of the minimum
+    of |S (y - x)|² + γ |D y|² with the n-fold sum S and difference D of neighbours: one banded system, whose ends
+    are free. N must be above n.
+    """
+    from scipy.linalg import lapack
+
+    wanted = x.shape[1] - order
+    sums = np.array([comb(order, k) for k in range(order + 1)], dtype=np.float64)
+    differences = sums * (-1.0) ** np.arange(order + 1)
+    gamma = float(np.tan(np.pi * cutoff * dt)) ** (-2 * order)
+    band = np.zeros((order + 1, x.shape[1]))
+    for b in range(order + 1):
+        for a in range(b, order + 1):
+            band[a - b, b : b + wanted] += sums[a] * sums[b] + gamma * differences[a] * differences[b]
+    summed = sum(weight * x[:, k : k + wanted] for k, weight in enumerate(sums))
+    rhs = np.zeros_like(x)
+    for k, weight in enumerate(sums):
+        rhs[:, k : k + wanted] += weight * summed
+    _, y, info = lapack.dpbsv(band, rhs.T, lower=1, overwrite_ab=1)
+    if info != 0:
+        raise np.linalg.LinAlgError(f"the filter's system is not positive definite (row {info})")
+    return np.ascontiguousarray(y.T)

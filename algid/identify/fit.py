@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from algid.arm import FloatArray
-from algid.identify.identifiability import Identifiability, examine
+from algid.identify.identifiability import Identifiability, examine, open_directions
 from algid.identify.information import LogInformation, Prior, combine, sandwich
 from algid.identify.shared import Shared
 from algid.identify.whiteness import Whiteness
@@ -83,18 +83,19 @@ class Fit:
         half = self.quantile * self.std
         return np.stack([self.values - half, self.values + half], axis=1)
 
-    def loaded_constants(self) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
-        """Coefficients (q,) of the loaded arm with their names and covariance (q, q).
+    def spread(self, share: FloatArray) -> float:
+        """Standard deviation of the sum `share` (Q,) @ values; infinite where the logs leave that sum open.
 
-        Raises
-        ------
-        ValueError
-            If there was no loaded log.
+        A sum may be known where its terms are not: k3 + k5 of an arm whose second joint never moved.
         """
-        if not self.shared.payload:
-            raise ValueError("there was no loaded log")
-        T = self.shared.jacobian(self.values, loaded=True)
-        return self.shared.log_names, self.shared.coefficients(self.values, loaded=True), T @ self.covariance @ T.T
+        if not np.any((share != 0) & np.isinf(self.std)):
+            return float(np.sqrt(max(float(share @ self.covariance @ share), 0.0)))
+        _, S, _ = combine(self.shared, self.logs, self.values, self.prior)
+        null, size = open_directions(self.names, self.values, S)
+        scaled = share * size
+        if np.linalg.norm(null.T @ scaled) > 1e-3 * np.linalg.norm(scaled):
+            return float("inf")
+        return float(np.sqrt(max(float(share @ self.covariance @ share), 0.0)))
 
 
 def conclude(

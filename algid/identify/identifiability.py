@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 
@@ -41,15 +42,27 @@ class Identifiability:
 def examine(names: Sequence[str], values: FloatArray, S: FloatArray, moved: FloatArray) -> Identifiability:
     """Examine the information S (Q, Q) on parameters `values` (Q,); `moved` (2,) is each joint's travel in rad."""
     size = sizes(names, values)
-    scaled = S * np.outer(size, size)
-    eigenvalues, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
-    lost = eigenvalues < max(1 / _UNDETERMINED**2, 1e-14 * float(eigenvalues[-1]))
+    eigenvalues, vectors, lost = _spectrum(S, size)
     null = vectors[:, lost]
     part = np.sqrt(np.sum(null**2, axis=1))
     determined = tuple(bool(share < _SHARE) for share in part)
     kept = vectors[:, ~lost]
     inverse = (kept / np.maximum(eigenvalues[~lost], 1e-300)) @ kept.T
     return Identifiability(tuple(_sentences(names, null, size, moved)), determined, inverse * np.outer(size, size))
+
+
+def open_directions(names: Sequence[str], values: FloatArray, S: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Directions (Q, m) of the parameters over their sizes that S leaves open, orthonormal, and the sizes (Q,)."""
+    size = sizes(names, values)
+    _, vectors, lost = _spectrum(S, size)
+    return vectors[:, lost], size
+
+
+def _spectrum(S: FloatArray, size: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Eigenvalues and vectors of the information on the parameters over their sizes, and which count as nothing."""
+    scaled = S * np.outer(size, size)
+    eigenvalues, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
+    return eigenvalues, vectors, eigenvalues < max(1 / _UNDETERMINED**2, 1e-14 * float(eigenvalues[-1]))
 
 
 def sizes(names: Sequence[str], values: FloatArray) -> FloatArray:

@@ -44,11 +44,16 @@ class LogInformation:
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Gaussian knowledge of the first parameters from an earlier result: mean (p,) and covariance (p, p)."""
+    """Gaussian knowledge of the first parameters: mean (p,) and precision (p, p), zero along what is not known."""
 
     names: tuple[str, ...]
     mean: FloatArray
-    covariance: FloatArray
+    precision: FloatArray
+
+    @classmethod
+    def of(cls, names: tuple[str, ...], mean: FloatArray, covariance: FloatArray) -> Prior:
+        """The knowledge that an estimate `mean` (p,) with `covariance` (p, p) holds."""
+        return cls(names, mean, scaled_pinv(covariance))
 
 
 def scaled_pinv(S: FloatArray, tolerance: float = RANK_TOLERANCE) -> FloatArray:
@@ -102,7 +107,7 @@ def likelihood(
         S += T.T @ log_S @ T
     if prior is not None:
         places = [shared.names.index(name) for name in prior.names]
-        weight = scaled_pinv(prior.covariance)
+        weight = prior.precision
         change = beta[places] - prior.mean
         value -= 0.5 * float(change @ weight @ change)
         gradient[places] -= weight @ change
@@ -127,6 +132,6 @@ def sandwich(
         stretches += scores.shape[0] // (lags + 1)
     if prior is not None:
         places = [shared.names.index(name) for name in prior.names]
-        meat[np.ix_(places, places)] += scaled_pinv(prior.covariance)
+        meat[np.ix_(places, places)] += prior.precision
     freedom = max(2, stretches - len(shared.names))
     return meat * (max(stretches, freedom + 1) / freedom), freedom

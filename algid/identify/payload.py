@@ -46,6 +46,6 @@ def _fitted(shared: Shared, start: FloatArray, loaded: LogInformation) -> tuple[
     count = len(shared.log_names)
     S, _ = loaded.total
     # The bare arm is held by a prior far tighter than the loaded log.
-    hold = Prior(shared.log_names, start[:count], scaled_pinv(S) * 1e-4)
+    hold = Prior.of(shared.log_names, start[:count], scaled_pinv(S) * 1e-4)
     beta, _, value = combine(shared, [loaded], start, hold)
     return beta, value

@@ -16,12 +16,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.identify.filters import correlate, smoother
+from algid.identify.filters import butterworth, correlate, smoother
 from algid.identify.fit import Fit
 from algid.identify.information import combine
 from algid.identify.model import Model, Motion, regressor
@@ -127,13 +126,11 @@ class PredictionSums:
 
 def _filtered(model: Model, piece: Segment, shift: float, by: PredictionFilter) -> FloatArray:
     """X (2, q + 1, n) of a piece: see the module's table."""
-    from scipy.signal import sosfiltfilt
-
     signals, dt = _decimated(piece, by)
     edge = round(by.dropped / dt)
     if signals.shape[1] <= max(2 * edge + 2, 6 * (by.order + 1)):
         return np.zeros((2, len(model.names) + 1, 0))
-    signals = sosfiltfilt(_sections(by, dt), signals, axis=-1)
+    signals = butterworth(signals, dt, min(by.cutoff, 0.45 / dt), by.order)
     Y = regressor(model, _motion(signals[:2], dt))
     place = np.arange(edge, signals.shape[1] - edge) + shift / dt
     whole = np.clip(np.floor(place).astype(np.int64), 0, signals.shape[1] - 2)
@@ -149,13 +146,6 @@ def _decimated(piece: Segment, by: PredictionFilter) -> tuple[FloatArray, float]
     if step < 2 or signals.shape[1] < kernel.size:
         return signals, piece.dt
     return correlate(signals, kernel, step), step * piece.dt
-
-
-@lru_cache(maxsize=4)
-def _sections(by: PredictionFilter, dt: float) -> FloatArray:
-    from scipy.signal import butter
-
-    return butter(by.order, min(by.cutoff, 0.45 / dt), fs=1 / dt, output="sos")
 
 
 def _motion(theta: FloatArray, dt: float) -> Motion:

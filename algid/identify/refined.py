@@ -17,6 +17,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.identify.evidence import LogEvidence, Outcome, added
 from algid.identify.fit import Fit, conclude
+from algid.identify.identifiability import open_directions
 from algid.identify.information import Prior, combine
 from algid.identify.model import Model
 from algid.identify.shared import Shared
@@ -36,6 +37,7 @@ _SETTLED = 0.02  # change of every parameter in its standard deviations
 _NOISE_SETTLED = 0.2  # change of every log variance in its standard deviations
 _FAR = 3.0  # standard deviations of the training set beyond which the last step is repeated
 _PASSES = 4
+_ANCHOR = 1e-3  # of a parameter's size: how firmly a direction without information is held
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +110,7 @@ def fit(unloaded: Sequence[Source], loaded: Sequence[Source] = (), settings: Ref
     _check_noise(settings.noise)
     start = weak_fit(unloaded, loaded, _weak_settings(settings), settings.lengths, settings.prior)
     shared = start.shared
+    settings, prior = replace(settings, prior=_anchored(start)), settings.prior
     logs = [*_opened(unloaded, False, shared, settings), *_opened(loaded, True, shared, settings)]
     try:
         training = _train(shared, logs, start.values, settings)
@@ -129,12 +132,41 @@ def fit(unloaded: Sequence[Source], loaded: Sequence[Source] = (), settings: Ref
         informations,
         beta,
         start.moved,
-        settings.prior,
+        prior,
         coloured=coloured,
         samples=int(_count(outcomes)),
     )
     noise = tuple(log.noise for log in logs)
+    fitted = _no_surer(fitted, start)
     return replace(fitted, noise=noise, whiteness=whiteness, iterations=training.iterations)
+
+
+def _no_surer(fitted: Fit, start: Fit) -> Fit:
+    """The fit without what the weak estimate leaves open: a joint at rest trembles in noise, which is no motion."""
+    pairs = zip(fitted.status, start.status, strict=True)
+    status = tuple(first if second == "OK" else second for first, second in pairs)
+    return replace(
+        fitted, status=status, unidentifiable=tuple(dict.fromkeys(fitted.unidentifiable + start.unidentifiable))
+    )
+
+
+def _anchored(start: Fit) -> Prior | None:
+    """The prior, and an anchor on every direction that the weak estimate leaves open.
+
+    There the trajectories and the parameters would chase each other for ever, in nothing but noise.
+    """
+    _, S, _ = combine(start.shared, start.logs, start.values, start.prior)
+    null, size = open_directions(start.names, start.values, S)
+    if null.shape[1] == 0:
+        return start.prior
+    along = null.T @ (start.values / size)
+    mean = start.values + size * (null @ (np.clip(along, -1, 1) - along))
+    precision = (null @ null.T) / np.outer(size, size) / _ANCHOR**2
+    if start.prior is not None:
+        places = [start.names.index(name) for name in start.prior.names]
+        precision[np.ix_(places, places)] += start.prior.precision
+        mean[places] = start.prior.mean
+    return Prior(start.names, mean, precision)
 
 
 def _check_noise(noise: NoiseLevels | None) -> None:

@@ -58,7 +58,7 @@ def payload_distance(fit: Fit) -> float | None:
         return None
     bare, burdened = [side for side in sides if side is not None]
     freedom = len(fit.shared.log_names) - (len(fit.shared.names) - len(fit.shared.log_names))
-    arm = Prior(fit.shared.log_names, bare[0], bare[1])
+    arm = Prior.of(fit.shared.log_names, bare[0], bare[1])
     loaded = LogInformation(True, burdened[0], scaled_pinv(burdened[1])[None], np.zeros_like(burdened[0])[None])
     _, _, value = combine(fit.shared, [loaded], fit.values, arm)
     return max(0.0, float(-ndtri(chdtrc(freedom, max(0.0, -2 * value)))))

@@ -88,11 +88,9 @@ def table_rows(fit: Fit) -> tuple[dict[str, float], dict[str, float]]:
         weights = _row_weights(place, LOADED_ROWS if loaded else UNLOADED_ROWS)
         coefficients = fit.shared.coefficients(fit.values, loaded)
         for name, weight in weights.items():
-            share = weight @ jacobian
-            blurred = np.isinf(fit.std) & (np.abs(share) > 0)
-            if not blurred.any():
-                rows[name] = float(weight @ coefficients)
-                stds[name] = float(np.sqrt(max(float(share @ fit.covariance @ share), 0.0)))
+            spread = fit.spread(weight @ jacobian)
+            if np.isfinite(spread):
+                rows[name], stds[name] = float(weight @ coefficients), spread
     if fit.shared.payload and np.isfinite(fit.std[fit.names.index("m_p")]):
         rows["m_p"] = float(fit.values[fit.names.index("m_p")])
         stds["m_p"] = float(fit.std[fit.names.index("m_p")])
@@ -197,6 +195,8 @@ def fit_warnings(fit: Fit) -> Iterator[str]:
     if not fit.converged:
         yield "the refined estimator did not converge; the weak estimate is reported instead"
     yield from fit.unidentifiable
+    if fit.shared.model.gravity == 0:
+        yield "without gravity k2 and k4 have no effect and the payload has no weight: give --l1 or --l2 to tell it"
     for bound in broken_bounds(fit):
         distance = "" if bound.distance is None else f", {bound.distance:.1f} standard deviations beyond"
         yield f"the estimates break {bound.bound}: {bound.value:.4g}{distance}"

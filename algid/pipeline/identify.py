@@ -35,9 +35,11 @@ def identify(
     parameters: Result | None = None,
     profile: Profile | None = None,
     out: Path | None = None,
+    name: str | None = None,
     force: bool = False,
     report: bool = True,
     command: str | None = None,
+    shared_library: bool = False,
 ) -> Result:
     """Identify the constants k1 … k7 of an arm and, from loaded logs, its tip payload.
 
@@ -51,13 +53,17 @@ def identify(
     profile : Profile
         What the logs' names, units and signs mean.
     out : Path
-        Folder to write into, as ``STEM.algid`` of the first log; None writes nothing.
+        Folder to write into; None writes nothing.
+    name : str
+        Of the result folder, ``NAME.algid``; the stem of the first log by default.
     force : bool
         Replace a result that is there.
     report : bool
         Write time series and pages beside ``result.json``.
     command : str
         The command line behind the call, for the result.
+    shared_library : bool
+        Put the pages' plotting library once beside the result folders instead of into each page.
 
     Raises
     ------
@@ -73,14 +79,14 @@ def identify(
         raise ValueError("an unloaded log is needed, or parameters and a loaded log")
     if out is None:
         return _identify(bare, burdened, settings, parameters, None, report)
-    folder = result_folder((bare + burdened)[0].name, out)
+    folder = result_folder((bare + burdened)[0].name, out) if name is None else out / f"{name}.algid"
     with whole_folder(folder, force) as temporary:
         result = _identify(bare, burdened, settings, parameters, temporary, report)
         if command is not None:
             result = result.model_copy(update={"settings": result.settings | {"command": command}})
         write_result(result, temporary / "result.json")
         if report:
-            _write_pages(temporary, result)
+            _write_pages(temporary, result, shared_library)
     return result
 
 
@@ -151,11 +157,11 @@ def _firsts(bare: Sequence[LogSource], burdened: Sequence[LogSource]) -> tuple[L
     return bare[0] if bare else None, burdened[0] if burdened else None
 
 
-def _write_pages(folder: Path, result: Result) -> None:
+def _write_pages(folder: Path, result: Result, shared_library: bool) -> None:
     from algid.report import markdown, write_report
 
     (folder / "report.md").write_text(markdown(result), encoding="utf-8")
-    write_report(folder)
+    write_report(folder, shared_library)
 
 
 def known_constants(parameters: Result) -> FloatArray:

@@ -149,6 +149,7 @@ class LogSource:
             role=self.role,
             format=self.origin.format,
             rows=seen.rows,
+            start_ns=seen.first_ns,
             duration=duration,
             rate=(seen.rows - 1) / duration if duration > 0 else 0.0,
             mapping=dict(self.origin.mapping),

@@ -129,4 +129,4 @@ def prior_of(result: Result, settings: Settings) -> Prior:
     mean = np.array([result.parameters[name].estimate for name in model.names], dtype=np.float64)
     if not (np.isfinite(covariance).all() and np.isfinite(mean).all()):
         raise ResultError(f"{result.log.path}: the result leaves constants undetermined; identify from more logs first")
-    return Prior(model.names, mean, covariance)
+    return Prior.of(model.names, mean, covariance)

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfiltfilt
 
-from algid.identify.filters import correlate, differentiator, half_length, smoothed
+from algid.identify.filters import butterworth, correlate, differentiator, half_length, smoothed
 
 
 def test_a_ramp_has_its_slope() -> None:
@@ -42,3 +43,17 @@ def test_slow_sampling_keeps_what_the_kernel_promises(rate: float) -> None:
     moments = [float(kernel @ (n / rate) ** power) for power in range(7)]
     scale = (kernel.size / rate) ** np.arange(7) * rate
     assert np.allclose(np.array(moments) / scale, np.eye(7)[1] / scale[1], atol=1e-12)  # rounding
+
+
+@pytest.mark.parametrize(("order", "cutoff"), [(1, 3.0), (3, 5.0), (4, 20.0)])
+def test_butterworth_agrees_with_scipy_away_from_the_ends(order: int, cutoff: float) -> None:
+    x = np.cumsum(np.random.default_rng(0).standard_normal((2, 6000)), axis=1)
+    sections = butter(order, cutoff, fs=250.0, output="sos")
+    inner = slice(500, -500)
+    expected = sosfiltfilt(sections, x, axis=-1)[:, inner]
+    assert np.abs(butterworth(x, 1 / 250, cutoff, order)[:, inner] - expected).max() < 1e-6 * np.abs(x).max()
+
+
+def test_every_third_correlation_is_every_third_correlation() -> None:
+    x, kernel = np.random.default_rng(1).standard_normal((2, 1003)), np.arange(1.0, 12.0)
+    np.testing.assert_allclose(correlate(x, kernel, 3), correlate(x, kernel)[:, ::3], rtol=1e-12)

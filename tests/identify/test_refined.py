@@ -5,12 +5,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from algid.arm import inverse_dynamics
 from algid.identify import evidence, refined
 from algid.identify.information import Prior
 from algid.identify.model import Model
 from algid.identify.refined import RefinedSettings
 from algid.identify.whitening import NoiseLevels
 from algid.sampling import Segment
+from algid.synth.cases import load_case
 from algid.synth.excitation import SampledTorque
 from algid.synth.simulator import simulate
 
@@ -58,7 +60,7 @@ def test_known_lengths_sharpen_the_payload(bench: Bench) -> None:
 
 def test_a_loaded_log_alone_with_an_earlier_result(bench: Bench) -> None:
     before = refined.fit([lambda: [bench.log(sigma=1e-3)]])
-    prior = Prior(before.names, before.values, before.covariance)
+    prior = Prior.of(before.names, before.values, before.covariance)
     together = refined.fit([lambda: [bench.log(sigma=1e-3)]], [lambda: [bench.log(True, 1e-3)]])
     after = refined.fit([], [lambda: [bench.log(True, 1e-3)]], RefinedSettings(prior=prior))
     assert np.allclose(after.values, together.values, atol=0.3 * together.std.min() + 0.3 * together.std)
@@ -148,3 +150,20 @@ def test_blocks_of_any_size_give_the_same_estimate(bench: Bench) -> None:
     cut = [log.part(first, last) for first, last in pairwise([0, 17, 1200, 1201, 3500, len(log)])]
     whole = refined.fit([lambda: [log]])
     assert np.array_equal(refined.fit([lambda: cut]).values, whole.values)
+
+
+def test_a_joint_at_rest_leaves_its_friction_open_and_the_rest_known() -> None:
+    k = load_case("case1").arm.constants()
+    rng = np.random.default_rng(0)
+    t = 1e-3 * np.arange(5001)
+    theta = np.stack([np.sin(4 * t) + 0.5 * np.sin(9 * t), np.full_like(t, 0.3)])
+    omega = np.stack([4 * np.cos(4 * t) + 4.5 * np.cos(9 * t), np.zeros_like(t)])
+    alpha = np.stack([-16 * np.sin(4 * t) - 40.5 * np.sin(9 * t), np.zeros_like(t)])
+    tau = inverse_dynamics(k, theta, omega, alpha)
+    noise = rng.standard_normal((2, *theta.shape))
+    noisy = Segment(0.0, 1e-3, theta + 1e-4 * noise[0], tau + 1e-3 * noise[1])
+    found = refined.fit([lambda: [noisy]])
+    assert found.converged
+    assert found.status == ("OK",) * 6 + ("NOT_IDENTIFIABLE",)
+    assert found.unidentifiable == ("k7 is not determined: joint 2 never moved",)
+    assert np.all(np.abs(found.values[:6] - k[:6]) < 4.5 * found.std[:6])

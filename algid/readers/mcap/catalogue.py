@@ -11,10 +11,13 @@ import zlib
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from algid.log import Notice
 from algid.readers.mcap import framing
 from algid.readers.mcap.chunks import unpack
 from algid.readers.mcap.framing import DamagedError, File, parse
+from algid.readers.mcap.messages import alike
 
 _FOOTER_SIZE = 9 + 20 + 8
 _LARGEST_SUMMARY = 1 << 28
@@ -208,6 +211,8 @@ def _inner_channels(file: File, found: Catalogue) -> None:
             continue
         try:
             content = unpack(file.read(span.start, span.length))
+            if alike(np.frombuffer(content, np.uint8)) is not None:
+                continue
             for record in framing.walk_bytes(content, 0, len(content)):
                 if record.code in (framing.SCHEMA, framing.CHANNEL):
                     _define(record.code, bytes(content[record.start : record.end]), found)

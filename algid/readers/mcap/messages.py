@@ -55,6 +55,8 @@ def find(content: bytes, index: bytes, wanted: Collection[int]) -> Messages:
     octets = np.frombuffer(content, np.uint8)
     records = _indexed(octets, content, index)
     if records is None:
+        records = alike(octets)
+    if records is None:
         records = np.array(
             [
                 record.start - 9
@@ -74,6 +76,18 @@ def find(content: bytes, index: bytes, wanted: Collection[int]) -> Messages:
         records, lengths = records[ours], lengths[ours]
     log_ns = gather(octets, records + 15, "<i8").astype(np.int64, copy=False)
     return Messages(octets, records + HEAD, lengths - (HEAD - 9), log_ns)
+
+
+def alike(octets: NDArray[np.uint8]) -> IntArray | None:
+    """Offsets of the records where all of them are messages of one length, else None."""
+    if octets.size < HEAD:
+        return None
+    length = 9 + int(gather(octets, np.ones(1, np.int64), "<u8")[0])
+    if octets.size % length or length < HEAD:
+        return None
+    records = np.arange(0, octets.size, length, dtype=np.int64)
+    same = gather(octets, records + 1, "<u8") == length - 9
+    return records if bool(np.all(same) and np.all(octets[records] == framing.MESSAGE)) else None
 
 
 def gather(octets: NDArray[np.uint8], places: IntArray, kind: str) -> NDArray[np.generic]:

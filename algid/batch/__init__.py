@@ -1,0 +1,1 @@
+"""Batches: many logs, one job each, that survive bad logs, dying workers and a killed run."""

@@ -1,0 +1,189 @@
+"""`algid batch`: many logs, one result folder each, and a table of them all."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from algid.cli import EXIT_FAILED, EXIT_INCOMPLETE
+from algid.cli.settings import Choice, takes_settings
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from algid.batch.jobs import Job
+    from algid.batch.run import Batch, Ended, Progress
+    from algid.profile import Profile
+
+EXIT_STOPPED = 130
+
+
+@takes_settings
+def batch(
+    choice: Choice,
+    sources: Annotated[
+        list[str], typer.Argument(metavar="SOURCE...", help="Folders, logs, globs, URLs, or a manifest (CSV, TOML).")
+    ],
+    out: Annotated[str, typer.Option("-o", "--out", help="Folder, or s3://, gs://, az:// URL, for all results.")],
+    parameters: Annotated[
+        Path | None, typer.Option(help="Result of the arm identified before: then logs are of the loaded arm.")
+    ] = None,
+    workers: Annotated[int | None, typer.Option(help="Worker processes; one a core by default.", min=1)] = None,
+    scheduler: Annotated[str | None, typer.Option(help="tcp://HOST:PORT of a Dask scheduler to run on.")] = None,
+    memory_limit: Annotated[
+        str | None, typer.Option(help="Memory of each worker, like 2GB; a job that needs more fails alone.")
+    ] = None,
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Run jobs again that have failed.")] = False,
+    watch: Annotated[bool, typer.Option("--watch", help="Go on, and take logs as they arrive.")] = False,
+    report: Annotated[bool, typer.Option(help="Write pages and time series beside each result.json.")] = True,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
+) -> None:
+    """Identify many logs: a result folder a job and OUT/jobs.parquet; what is done already is not done again.
+
+    X-unloaded.* and X-loaded.* are one job X. Exit code 1 tells that jobs failed or the batch was cut short, 3
+    that a result lacks a parameter or samples. The first Ctrl-C lets running jobs end, the second one stops them.
+
+    Example: algid batch logs/ -o results --workers 2
+    """
+    from algid.batch.lock import locked
+    from algid.batch.plan import Recipe
+    from algid.batch.run import Batch, stopped_by_signals, sweep
+    from algid.results import read_result
+    from algid.stores import open_store
+
+    known = None if parameters is None else read_result(parameters)
+    recipe = Recipe(out, choice.settings(), _profiles(choice), known, report)
+    recipe.profile(None)
+    alone = "logs" if known is None else "loaded"
+    jobs = [] if watch else _jobs(sources, out, alone)
+    store = open_store(out)
+    with locked(out):
+        sweep(store)
+        with _executor(scheduler, workers, memory_limit) as (executor, slots), _progress() as told:
+            running = Batch(store, recipe, executor, slots, told)
+            with stopped_by_signals(running.stop):
+                ended = _watch(running, sources, out, alone, retry_failed) if watch else running.run(jobs, retry_failed)
+        sweep(store)
+    _conclude(ended, running.stop.is_set() and not watch, out, quiet)
+
+
+def _jobs(sources: list[str], out: str, alone: str) -> list[Job]:
+    from algid.batch.discover import jobs_of
+    from algid.errors import SettingError
+
+    jobs = jobs_of(sources, out, alone)
+    if not jobs:
+        raise SettingError(f"{' '.join(sources)}: expected logs in MCAP, Parquet or CSV, found none")
+    return jobs
+
+
+def _profiles(choice: Choice) -> Callable[[str | None], Profile | None]:
+    """Profiles by their file, each read once."""
+    from functools import lru_cache
+
+    return lru_cache(maxsize=None)(lambda file: choice.profile(None if file is None else Path(file)))
+
+
+@contextmanager
+def _executor(scheduler: str | None, workers: int | None, memory_limit: str | None) -> Iterator[tuple[Executor, int]]:
+    """The workers, and how many jobs to hand out at once; they end with the block."""
+    from algid.batch.processes import Processes
+    from algid.errors import SettingError
+
+    if scheduler is not None:
+        if workers is not None or memory_limit is not None:
+            raise SettingError("--scheduler: workers and their memory are the cluster's; set them where it is started")
+        from algid.batch.cluster import cluster
+
+        with cluster(scheduler) as found:
+            yield found
+        return
+    count = workers or len(os.sched_getaffinity(0))
+    executor = Processes(count, None if memory_limit is None else _bytes(memory_limit))
+    try:
+        yield executor, 2 * count
+    finally:
+        executor.shutdown(cancel_futures=True)
+
+
+def _bytes(text: str) -> int:
+    from algid.errors import SettingError
+
+    units = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9, "ki": 2**10, "mi": 2**20, "gi": 2**30}
+    number = text.strip().lower().removesuffix("b")
+    unit = number.lstrip("0123456789.").strip()
+    try:
+        size = int(float(number.removesuffix(unit)) * units[unit])
+    except (ValueError, KeyError, OverflowError):
+        size = 0
+    if size < 1 << 29:
+        raise SettingError(f"--memory-limit: expected at least 512MiB, like 2GB, found {text!r}")
+    return size
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[Progress], None]]:
+    """Tells of each job that ends: a line that is written over on a terminal, nothing elsewhere."""
+    if not sys.stderr.isatty():
+        yield lambda _progress: None
+        return
+
+    def told(progress: Progress) -> None:
+        text = f"{progress.done}/{progress.total} {progress.last.job.name[:50]}: {progress.last.status.value}"
+        print(f"\r\x1b[2K{text}", end="", file=sys.stderr, flush=True)
+
+    try:
+        yield told
+    finally:
+        print("\r\x1b[2K", end="", file=sys.stderr, flush=True)
+
+
+def _watch(running: Batch, sources: list[str], out: str, alone: str, retry_failed: bool) -> Ended:
+    """Look for logs until stopped; nothing but settled ones are taken."""
+    from algid.batch.discover import jobs_of
+    from algid.batch.watch import LOOK_EVERY, Settling
+    from algid.errors import SettingError
+
+    settling = Settling()
+    complaint = ""
+    ended = running.run([])
+    while not running.stop.is_set():
+        try:
+            jobs = settling.settled(jobs_of(sources, out, alone))
+        except SettingError as error:
+            jobs = []
+            if str(error) != complaint:
+                complaint = str(error)
+                typer.echo(f"algid: {complaint}", err=True)
+        if jobs:
+            ended, retry_failed = running.run(jobs, retry_failed), False
+        running.stop.wait(LOOK_EVERY)
+    return ended
+
+
+def _conclude(ended: Ended, stopped: bool, out: str, quiet: bool) -> None:
+    """Print what came of the jobs, and leave with the exit code that tells it."""
+    from algid.batch.records import FAILURES, End
+    from algid.report.text import visible
+
+    failed = [record for record in ended.records if record.status in FAILURES]
+    if not quiet:
+        for record in failed:
+            typer.echo(f"{visible(record.job.name)}: {record.status.value}: {visible(record.reason)}")
+        counts = {end: sum(record.status is end for record in ended.records) for end in End}
+        told = ", ".join(f"{count} {end.value}" for end, count in counts.items() if count)
+        typer.echo(f"{told or 'nothing done'}; {ended.ran} run now, {ended.left} left; {out}/jobs.parquet")
+    if ended.full is not None:
+        typer.echo(f"algid: {ended.full}; make room and run again: what is finished is kept", err=True)
+    if stopped and ended.full is None:
+        raise typer.Exit(EXIT_STOPPED)
+    if failed or ended.left or ended.full is not None:
+        raise typer.Exit(EXIT_FAILED)
+    if any(record.status is End.INCOMPLETE for record in ended.records):
+        raise typer.Exit(EXIT_INCOMPLETE)

@@ -1,0 +1,172 @@
+"""The options that decide an identification, shared by every command that identifies."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from algid.cli import profiles
+
+if TYPE_CHECKING:
+    from algid.pipeline.settings import Settings
+    from algid.profile import Profile
+
+
+class Estimator(StrEnum):
+    """The estimators."""
+
+    REFINED = "refined"
+    WEAK = "weak"
+    PAPER = "paper"
+
+
+class Velocity(StrEnum):
+    """Where joint velocities come from."""
+
+    OBSERVER = "observer"
+    MEASURED = "measured"
+
+
+class Observer(StrEnum):
+    """How joint velocities are observed."""
+
+    LUENBERGER = "luenberger"
+    ZERO_PHASE = "zero-phase"
+
+
+class Friction(StrEnum):
+    """Friction models."""
+
+    VISCOUS = "viscous"
+    COULOMB = "coulomb"
+
+
+class Hold(StrEnum):
+    """What the drive does between two torque samples."""
+
+    FOH = "foh"
+    ZOH = "zoh"
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What the shared options were set to."""
+
+    settings_flags: Mapping[str, Any]
+    profile_file: Path | None
+    profile_flags: Mapping[str, str | None]
+
+    def settings(self) -> Settings:
+        """As the pipeline takes them. Raises `SettingError` where an option is wrong."""
+        from algid.pipeline.settings import Settings
+
+        flags: dict[str, Any] = {
+            name: value.value if isinstance(value, StrEnum) else value for name, value in self.settings_flags.items()
+        }
+        flags["delay"] = _delay(flags["delay"])
+        poles = flags.pop("poles")
+        return Settings(**flags) if poles is None else Settings(**flags, poles=_poles(poles))
+
+    def profile(self, file: Path | None = None) -> Profile | None:
+        """The profile of `file`, or of ``--profile``, with the flags over it. Raises `SettingError`."""
+        return profiles.profile_from(file or self.profile_file, **self.profile_flags)
+
+
+def _settings(
+    estimator: Annotated[Estimator, typer.Option(help="How to estimate.")] = Estimator.REFINED,
+    velocity: Annotated[Velocity, typer.Option(help="Observe velocities, or use the log's own.")] = Velocity.OBSERVER,
+    observer: Annotated[
+        Observer | None, typer.Option(help="The paper's observer, or the zero-phase differentiator.")
+    ] = None,
+    poles: Annotated[
+        str | None, typer.Option(help="Six poles of the paper's observer, rad/s, three a joint, like -80,-390,….")
+    ] = None,
+    window: Annotated[
+        float | None,
+        typer.Option(help="Window, s: the paper's integrals restart after it (2), or the weak form's (0.4)."),
+    ] = None,
+    bandwidth: Annotated[float, typer.Option(help="Of the zero-phase differentiator, Hz.")] = 60.0,
+    gravity: Annotated[float, typer.Option(help="m/s²; 0 for an arm that moves in a horizontal plane.")] = 9.81,
+    friction: Annotated[Friction, typer.Option(help="Viscous, or viscous and Coulomb.")] = Friction.VISCOUS,
+    torque_offset: Annotated[bool, typer.Option("--torque-offset", help="Estimate an offset of each torque.")] = False,
+    rotor_inertia: Annotated[bool, typer.Option("--rotor-inertia", help="Estimate joint 2's rotor inertia.")] = False,
+    torque_hold: Annotated[Hold, typer.Option(help="Torque between samples: ramped or held.")] = Hold.FOH,
+    delay: Annotated[str, typer.Option(help="From torque to angle, s, or 'estimate'.")] = "0",
+    l1: Annotated[float | None, typer.Option("--l1", help="Length of link 1, m, where known.")] = None,
+    l2: Annotated[float | None, typer.Option("--l2", help="Length of link 2, m, where known.")] = None,
+    constrain: Annotated[bool, typer.Option("--constrain", help="Solve within the physical bounds.")] = False,
+    cross_validate: Annotated[
+        bool, typer.Option("--cross-validate", help="Predict each log from the others and report how well.")
+    ] = False,
+) -> None:
+    """The options of `Settings`, in its words."""
+
+
+def _profile(
+    profile: profiles.ProfileFile = None,
+    topic: profiles.Topic = None,
+    joints: profiles.Joints = None,
+    angle_unit: profiles.AngleUnit = None,
+    torque_unit: profiles.TorqueUnit = None,
+    zero: profiles.Zero = None,
+    second_angle: profiles.SecondAngle = None,
+    clock: profiles.Clock = None,
+) -> None:
+    """The options of a profile."""
+
+
+def takes_settings(command: Callable[..., None]) -> Callable[..., None]:
+    """Give `command`, whose first parameter is the `Choice`, the shared options after its own ones."""
+    own = _parameters(command)[1:]
+    settings, profile = _parameters(_settings), _parameters(_profile)
+
+    @wraps(command)
+    def with_options(**values: Any) -> None:
+        chosen = {parameter.name: values.pop(parameter.name) for parameter in settings}
+        meaning = {parameter.name: values.pop(parameter.name) for parameter in profile}
+        command(Choice(chosen, meaning.pop("profile"), meaning), **values)
+
+    every = [*own, *profile, *settings]
+    with_options.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]  # typer reads it
+    with_options.__annotations__ = {parameter.name: parameter.annotation for parameter in every}
+    return with_options
+
+
+def _parameters(function: Callable[..., None]) -> list[inspect.Parameter]:
+    found = inspect.signature(function, eval_str=True).parameters.values()
+    return [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in found]
+
+
+def _delay(text: str) -> float | Literal["estimate"]:
+    from algid.errors import SettingError
+
+    if text == "estimate":
+        return "estimate"
+    try:
+        return float(text)
+    except ValueError:
+        raise SettingError(f"--delay: expected seconds or 'estimate', found {text!r}") from None
+
+
+def _poles(text: str) -> tuple[complex, ...]:
+    """Six poles out of text; complex ones like -80+20j."""
+    from algid.errors import SettingError
+    from algid.observers import observer_gain
+
+    like = "give six like -80,-390,-391,-392,-393,-394"
+    try:
+        poles = tuple(complex(part.strip()) for part in text.split(","))
+    except ValueError:
+        raise SettingError(f"--poles {text}: expected numbers between commas; {like}") from None
+    try:
+        observer_gain(poles)
+    except ValueError as error:
+        raise SettingError(f"--poles {text}: {error}; {like}") from None
+    return tuple(pole.real if pole.imag == 0 else pole for pole in poles)

@@ -1,0 +1,166 @@
+"""What algid is timed against, one process a peer: `python -m pipelines.bench_peers NAME LOG`.
+
+A peer that estimates prints the seven constants; one that reads prints the seconds that reading took, imports
+excluded. Every estimating peer reads the log with polars and filters it as users of these tools do.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from algid.arm import FloatArray, regressor
+
+COLUMNS = ["stamp_ns", "theta1", "theta2", "tau1", "tau2"]
+_CUTOFF = 20.0  # Hz
+_WINDOW = 0.4  # s
+
+
+def _filtered(path: Path) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]:
+    """Angles, velocities, accelerations and torques (2, N) after a zero-phase filter, and the period in s."""
+    import polars as pl
+    from scipy.signal import butter, sosfiltfilt
+
+    frame = pl.read_parquet(path, columns=COLUMNS)
+    stamps = frame["stamp_ns"].to_numpy()
+    dt = float(stamps[-1] - stamps[0]) * 1e-9 / (stamps.size - 1)
+    signals = np.stack([frame[name].to_numpy() for name in COLUMNS[1:]])
+    signals = sosfiltfilt(butter(4, _CUTOFF, fs=1 / dt, output="sos"), signals, axis=1)
+    theta, tau = signals[:2], signals[2:]
+    omega = np.gradient(theta, dt, axis=1)
+    return theta, omega, np.gradient(omega, dt, axis=1), tau, dt
+
+
+def least_squares(path: Path) -> FloatArray:
+    """Filtered least squares by numpy and scipy."""
+    theta, omega, alpha, tau, _ = _filtered(path)
+    Y = regressor(theta, omega, alpha)
+    rows = np.concatenate([Y[0], Y[1]], axis=1).T
+    return np.asarray(np.linalg.lstsq(rows, np.concatenate([tau[0], tau[1]]), rcond=None)[0])
+
+
+def pinocchio(path: Path) -> FloatArray:
+    """FIGAROH's way: pinocchio's torque regressor sample by sample, viscous columns beside it, least squares."""
+    import pinocchio as pin
+
+    theta, omega, alpha, tau, _ = _filtered(path)
+    model, l1 = _two_links(pin)
+    data, n = model.createData(), theta.shape[1]
+    W = np.zeros((2 * n, 22))
+    for i in range(n):
+        block = pin.computeJointTorqueRegressor(model, data, theta[:, i], omega[:, i], alpha[:, i])
+        W[i, :20], W[n + i, :20] = block[0], block[1]
+    W[:n, 20], W[n:, 21] = omega
+    found = np.linalg.lstsq(W, np.concatenate([tau[0], tau[1]]), rcond=1e-8)[0]
+    x1, inertia1, m2, x2, inertia2 = found[[1, 9, 10, 11, 19]]
+    g = 9.81
+    return np.array([l1 * x2, g * x2, inertia2, g * (x1 + m2 * l1), inertia1 + m2 * l1**2, found[20], found[21]])
+
+
+def _two_links(pin: Any) -> tuple[Any, float]:
+    """The arm of case 1 in a vertical plane, and the length of its first link in m."""
+    from algid.synth.cases import load_case
+
+    l1 = load_case("case1").arm.l1
+    model = pin.Model()
+    model.gravity.linear = np.array([0.0, -9.81, 0.0])
+    first = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "joint1")
+    place = pin.SE3(np.eye(3), np.array([l1, 0.0, 0.0]))
+    model.addJoint(first, pin.JointModelRZ(), place, "joint2")
+    return model, l1
+
+
+def pysindy(path: Path) -> FloatArray:
+    """PySINDy's weak form: integrals of the columns and of the torque over windows, then least squares."""
+    from pysindy import WeakPDELibrary
+    from pysindy.feature_library import PolynomialLibrary
+
+    theta, omega, alpha, tau, dt = _filtered(path)
+    n = theta.shape[1]
+    Y = regressor(theta, omega, alpha)
+    np.random.seed(0)  # noqa: NPY002 (the library draws its windows from there)
+    library = WeakPDELibrary(
+        PolynomialLibrary(degree=1, include_bias=False),
+        spatiotemporal_grid=dt * np.arange(n),
+        K=max(20, round(n * dt / _WINDOW)),
+        H_xt=_WINDOW / 2,
+    )
+    moments = []
+    for joint in range(2):
+        signals = np.concatenate([Y[joint], tau[joint][None]]).T
+        library.fit([signals])
+        moments.append(np.asarray(library.transform([signals])[0]))
+    rows = np.concatenate(moments)
+    return np.asarray(np.linalg.lstsq(rows[:, :7], rows[:, 7], rcond=None)[0])
+
+
+def polars(path: Path) -> float:
+    """Seconds in which polars reads the five columns, once it is warm."""
+    import polars as pl
+
+    return _seconds(lambda: pl.read_parquet(path, columns=COLUMNS), 9)
+
+
+def algid_reader(path: Path) -> float:
+    """Seconds in which algid reads a log in blocks."""
+    from algid.readers import open_log
+
+    return _seconds(lambda: sum(len(block) for block in open_log(path).blocks()), 5)
+
+
+def mcap_ros2(path: Path) -> float:
+    """Seconds in which mcap-ros2-support decodes the joint states of a bag."""
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
+
+    def read() -> None:
+        rows = []
+        with next(path.glob("*.mcap")).open("rb") as stream:
+            for _, _, message, state in make_reader(
+                stream, decoder_factories=[DecoderFactory()]
+            ).iter_decoded_messages():
+                rows.append((message.log_time, *state.position, *state.effort))
+        np.array(rows)
+
+    return _seconds(read, 1)
+
+
+def rosbags(path: Path) -> float:
+    """Seconds in which rosbags decodes the joint states of a bag."""
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
+    def read() -> None:
+        rows = []
+        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+            for connection, stamp, raw in reader.messages():
+                state: Any = reader.deserialize(raw, connection.msgtype)
+                rows.append((stamp, *state.position, *state.effort))
+        np.array(rows)
+
+    return _seconds(read, 1)
+
+
+def _seconds(work: Callable[[], object], times: int) -> float:
+    found = []
+    for _ in range(times):
+        start = time.perf_counter()
+        work()
+        found.append(time.perf_counter() - start)
+    return median(found)
+
+
+PEERS: dict[str, Callable[[Path], Any]] = {
+    peer.__name__: peer for peer in (least_squares, pinocchio, pysindy, polars, algid_reader, mcap_ros2, rosbags)
+}
+
+if __name__ == "__main__":
+    told = PEERS[sys.argv[1]](Path(sys.argv[2]))
+    print(json.dumps(told.tolist() if isinstance(told, np.ndarray) else told))
