@@ -5,6 +5,7 @@ Everything is optional; what a profile leaves out is told from the log. A key th
 
 from __future__ import annotations
 
+import reprlib
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -112,13 +113,18 @@ def load_profile(path: Path) -> Profile:
         return Profile.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
     except (OSError, UnicodeDecodeError) as error:
         raise SettingError(f"{path}: the profile cannot be read ({error}); check the name") from error
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise SettingError(f"{path}: the profile is not TOML: {error}") from error
     except ValidationError as error:
         raise SettingError(f"{path}: {_told(error)}") from error
 
 
+def _shown(value: object) -> str:
+    """As text; tables, which may nest without end, only a few levels deep."""
+    return reprlib.repr(value) if isinstance(value, dict | list) else str(value)
+
+
 def _told(error: ValidationError) -> str:
     first = error.errors()[0]
     place = ".".join(str(part) for part in first["loc"])
-    return f"{place}: {first['msg']}; found {str(first['input'])[:60]!r}"
+    return f"{place}: {first['msg']}; found {_shown(first['input'])[:60]!r}"

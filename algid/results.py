@@ -12,7 +12,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from algid.errors import ResultError
 from algid.outfiles import whole_file
@@ -125,6 +125,13 @@ class Fit(_Model):
     residual: TorquePrediction | None = None
     cross_validation: TorquePrediction | None = None
 
+    @model_validator(mode="after")
+    def _covariance_is_square(self) -> Fit:
+        size = len(self.covariance_names)
+        if [len(row) for row in self.covariance] != [size] * size:
+            raise ValueError(f"covariance should have {size} rows of {size} numbers, as covariance_names")
+        return self
+
 
 class Result(_Model):
     """The outcome of one identification."""
@@ -189,7 +196,7 @@ def read_result(path: Path) -> Result:
         content = json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise ResultError(f"{file}: cannot read it ({error.strerror}); expected a result of algid identify") from error
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise ResultError(f"{file}: not JSON ({error}); expected a result of algid identify") from error
     found = content.get("schema_version") if isinstance(content, dict) else None
     if found != SCHEMA_VERSION:

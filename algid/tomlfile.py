@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -28,7 +29,7 @@ def read_toml(path: Path, model: type[ModelT]) -> ModelT:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise SettingError(f"{path}: cannot read it ({error.strerror}); check the name") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise SettingError(f"{path}: not TOML ({error}); mend that line") from error
     try:
         return model.model_validate(content)
@@ -41,4 +42,4 @@ def first_misfit(error: ValidationError) -> str:
     first, *others = error.errors(include_url=False, include_context=False)
     place = ".".join(str(part) for part in first["loc"]) or "top level"
     more = f" (and {len(others)} more)" if others else ""
-    return f"{place}: {first['msg'].lower()}, found {first['input']!r:.60}{more}"
+    return f"{place}: {first['msg'].lower()}, found {reprlib.repr(first['input']):.60}{more}"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+from types import FrameType
 
 EXIT_FAILED = 1
 EXIT_USAGE = 2
@@ -13,6 +15,7 @@ def main() -> None:
     """Run algid; the entry point of the console script."""
     from algid.threads import bound_by_environment
 
+    signal.signal(signal.SIGTERM, _stop)
     bound_by_environment()  # before anything loads numpy
     from algid.cli.app import app
     from algid.errors import AlgidError
@@ -28,6 +31,11 @@ def main() -> None:
     except KeyboardInterrupt:
         print("algid: stopped; nothing half-written is left", file=sys.stderr)
         sys.exit(130)
+
+
+def _stop(number: int, _frame: FrameType | None) -> None:
+    """Leave by an exception, so that what is half-written is taken away."""
+    sys.exit(128 + number)
 
 
 def _one_line(error: Exception) -> str:

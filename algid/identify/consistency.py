@@ -56,12 +56,13 @@ def _mass(shared: Shared, beta: FloatArray) -> tuple[float, float, float]:
 
 
 def broken_bounds(fit: Fit) -> list[BrokenBound]:
-    """Bounds that the estimates break."""
+    """Bounds that the estimates break; a parameter that the logs leave open breaks none."""
     size = sizes(fit.names, fit.values)
+    open_ones = {f"{name} >= 0" for name, std in zip(fit.names, fit.std, strict=True) if np.isinf(std)}
     broken = []
     for name, bound in bounds(fit.shared).items():
         value = bound(fit.values)
-        if value >= 0:
+        if value >= 0 or name in open_ones:
             continue
         slope = _slope(bound, fit.values, size)
         deviation = float(np.sqrt(max(0.0, float(slope @ fit.covariance @ slope))))

@@ -36,6 +36,7 @@ def outcome_of(fit: Fit, unloaded: Sequence[LogSource], loaded: Sequence[LogSour
         loaded={name: _row_estimate(rows, stds, name, fit, units[name]) for name in LOADED_ROWS} if loaded else {},
         payload=payload,
         rows=rows,
+        estimator=fit.estimator,
         stds=stds,
         fit=fit_summary(fit, unloaded, loaded, settings),
         warnings=list(fit_warnings(fit)),

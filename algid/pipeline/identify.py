@@ -172,7 +172,7 @@ def known_constants(parameters: Result) -> FloatArray:
     ResultError
         If one of them has no estimate.
     """
-    values = [parameters.parameters[name].estimate for name in CONSTANT_NAMES]
+    values = [found.estimate if (found := parameters.parameters.get(name)) else None for name in CONSTANT_NAMES]
     if any(value is None for value in values):
         raise ResultError(
             f"{parameters.log.path}: its result lacks a constant; identify the arm from a better log first"

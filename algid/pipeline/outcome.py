@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import PurePath
 
 from algid import __version__
 from algid.log import Truth
@@ -11,6 +12,8 @@ from algid.pipeline.settings import Settings
 from algid.pipeline.sources import LogSource
 from algid.pipeline.table4 import paper_errors, table4, true_rows
 from algid.results import Estimate, Fit, Result
+
+NAMED = 3  # logs that a warning names beside the first
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +24,8 @@ class Outcome:
     loaded: dict[str, Estimate]
     payload: dict[str, Estimate]
     rows: Mapping[str, float]
+    estimator: str | None = None
+    """Whose estimates these are, where not those of the estimator asked for."""
     stds: Mapping[str, float] = field(default_factory=dict)
     paper_payload: dict[str, Estimate] = field(default_factory=dict)
     fit: Fit | None = None
@@ -33,7 +38,7 @@ def result_of(outcome: Outcome, settings: Settings, logs: Sequence[LogSource]) -
     first, *others = [log.summary() for log in logs]
     return Result(
         version=__version__,
-        estimator=settings.estimator,
+        estimator=outcome.estimator or settings.estimator,
         parameters=outcome.parameters,
         loaded=outcome.loaded,
         payload=outcome.payload,
@@ -56,7 +61,25 @@ def _truth(logs: Sequence[LogSource]) -> tuple[Truth | None, float | None]:
 
 
 def _notices(logs: Sequence[LogSource]) -> list[str]:
-    return [f"{log.name}: {notice.text}" for log in logs for notice in log.notices]
+    """What was noticed in the logs: each loss, and of the rest the first of each kind."""
+    told = [f"{log.name}: {notice.text}" for log in logs for notice in log.notices if notice.lossy]
+    alike: dict[str, list[tuple[str, str]]] = {}
+    for log in logs:
+        for notice in log.notices:
+            if not notice.lossy:
+                alike.setdefault(notice.code, []).append((log.name, notice.text))
+    return [*told, *(_one_for_all(found) for found in alike.values())]
+
+
+def _one_for_all(found: Sequence[tuple[str, str]]) -> str:
+    (name, text), *others = found
+    names = list(dict.fromkeys(PurePath(other).name for other, _ in others if other != name))
+    if not names:
+        return f"{name}: {text}" + (f" (and {len(others)} more of the kind)" if others else "")
+    more = ", …" if len(names) > NAMED else ""
+    return (
+        f"{name}: {text}; likewise in {len(names)} other log{'s' * (len(names) > 1)} ({', '.join(names[:NAMED])}{more})"
+    )
 
 
 def _contradictions(logs: Sequence[LogSource]) -> list[str]:

@@ -121,7 +121,8 @@ def prior_of(result: Result, settings: Settings) -> Prior:
             f"{result.log.path}: the result of --estimator {result.estimator} has no error bars; "
             "identify with --estimator refined or weak, or use --estimator paper here too"
         )
-    missing = [name for name in model.names if name not in result.fit.covariance_names]
+    known = set(result.fit.covariance_names) & set(result.parameters)
+    missing = [name for name in model.names if name not in known]
     if missing:
         raise ResultError(f"{result.log.path}: the result has no {', '.join(missing)}; use the flags it was made with")
     places = [result.fit.covariance_names.index(name) for name in model.names]

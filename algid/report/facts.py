@@ -9,6 +9,7 @@ from algid.report.numbers import ABSENT, significant
 from algid.report.table import Column, Table
 from algid.report.text import file_name, visible
 from algid.report.torquelog import TorqueLog
+from algid.report.verdict import replaced_estimator
 from algid.results import LogSummary, Result, TorquePrediction
 
 
@@ -157,9 +158,14 @@ def setting_text(value: object) -> str:
     return str(value)
 
 
+def _estimator(result: Result) -> str:
+    asked = replaced_estimator(result)
+    return visible(result.estimator) + ("" if asked is None else f", in place of {visible(asked)}")
+
+
 def provenance_table(result: Result) -> Table:
     """What made the result, from what."""
-    rows = [("algid", visible(result.version)), ("estimator", visible(result.estimator))]
+    rows = [("algid", visible(result.version)), ("estimator", _estimator(result))]
     rows += [(f"sha256 of {file_name(log.path)}", visible(log.sha256)) for log in result.logs]
     rows += [(f"path of {file_name(log.path)}", visible(log.path)) for log in result.logs]
     return Table("Provenance", (Column("What", "name"), Column("Value", "text")), tuple(rows))

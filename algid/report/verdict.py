@@ -70,11 +70,19 @@ def _reserved(result: Result, reasons: tuple[str, ...]) -> str:
     usable = sum(_usable(found) for found in result.estimates.values())
     count = len(result.estimates)
     have = f"all {count} parameters are" if usable == count else f"{usable} of {count} parameters are"
+    asked = replaced_estimator(result)
+    by = "" if asked is None else f" by the {visible(result.estimator)} estimator in place of the {visible(asked)} one"
     more = len(reasons) - 1
     rest = (
         "" if more == 0 else ", and there is one more reason below" if more == 1 else f", and {more} more reasons below"
     )
-    return f"With reservations: {have} identified, but {reasons[0]}{rest}."
+    return f"With reservations: {have} identified{by}, but {reasons[0]}{rest}."
+
+
+def replaced_estimator(result: Result) -> str | None:
+    """The estimator that was asked for, where another one's estimates stand in the result."""
+    asked = result.settings.get("estimator")
+    return str(asked) if asked is not None and asked != result.estimator else None
 
 
 def _praise(result: Result) -> list[str]:
@@ -120,7 +128,8 @@ def _reasons(result: Result) -> Iterator[str]:
     if result.fit is not None:
         yield from _fit_reasons(result.fit, " ".join(result.warnings))
     yield from _far_from_truth(result)
-    yield from (f"algid warns: {visible(warning)}" for warning in result.warnings)
+    told = {f"{name} is not determined" for name, found in result.estimates.items() if not _usable(found)}
+    yield from (f"algid warns: {visible(warning)}" for warning in result.warnings if warning not in told)
 
 
 def _bad_statuses(result: Result) -> Iterator[str]:

@@ -198,3 +198,32 @@ def test_poles_that_are_no_numbers_are_told_in_words(logs: Path) -> None:
     found = Outcome("identify", logs / "case1-unloaded.csv", "--poles=-80,x")
     assert found.code == 2
     assert "expected numbers between commas; give six like" in found.err
+
+
+def test_a_stop_leaves_nothing_half_written(tmp_path: Path) -> None:
+    import algid.cli
+    from algid.pipeline.folder import whole_folder
+
+    def write() -> None:
+        with whole_folder(tmp_path / "a.algid", force=False) as folder:
+            (folder / "result.json").write_text("half")
+            algid.cli._stop(15, None)
+
+    with pytest.raises(SystemExit) as stopped:
+        write()
+    assert stopped.value.code == 143
+    assert not list(tmp_path.iterdir())
+
+
+def test_results_that_fit_no_arm_get_one_line(logs: Path, tmp_path: Path) -> None:
+    Outcome("identify", logs / "case1-unloaded.csv", "-o", tmp_path, "--no-report")
+    content = json.loads((tmp_path / "case1-unloaded.algid" / "result.json").read_text())
+    crooked = {**content, "fit": {**content["fit"], "covariance": [[1.0]]}}
+    empty = {**content, "parameters": {}}
+    texts = [json.dumps(crooked), json.dumps(empty), "[" * 100_000]
+    for text, said in zip(texts, ("covariance should have 7 rows", "the result has no k1", "not JSON"), strict=True):
+        path = tmp_path / "result.json"
+        path.write_text(text)
+        found = Outcome("identify", "--parameters", path, logs / "case1-loaded.csv", "-o", tmp_path / "out")
+        assert (found.code, found.err.count("\n")) == (2, 1), found.err
+        assert said in found.err

@@ -188,3 +188,20 @@ def test_a_joint_that_stands_still_is_a_status(wide: tuple[Log, Log], tmp_path: 
 def test_numbers_without_a_meaning_are_refused(name: str, value: float) -> None:
     with pytest.raises(SettingError, match=f"{name}: expected"):
         replace(Settings(), **{name: value})  # type: ignore[arg-type]
+
+
+def test_a_result_names_the_estimator_whose_numbers_it_holds(shared_data: Path) -> None:
+    from algid.profile import Profile, with_settings
+    from algid.report.verdict import verdict
+
+    logs = sorted((shared_data / "dfki" / "C1_sysid").glob("*.csv"))
+    profile = with_settings(Profile(), {"zero": "hanging"})
+    result = identify(logs[:3], None, Settings(friction="coulomb"), profile=profile)
+    weak = identify(logs[:3], None, Settings(friction="coulomb", estimator="weak"), profile=profile)
+    assert result.estimator == "weak"
+    assert result.settings["estimator"] == "refined"
+    assert result.parameters == weak.parameters
+    assert "by the weak estimator in place of the refined one" in verdict(result).sentence
+    jitter = [warning for warning in result.warnings if "JITTER" in warning]
+    assert len(jitter) == 1
+    assert f"likewise in 1 other log ({logs[1].name})" in jitter[0]

@@ -115,3 +115,9 @@ def test_nothing_identified_is_a_failure(result: Result) -> None:
     weak = {"k1": Estimate(estimate=None, unit="kg m^2", status=Status.WEAK_EXCITATION)}
     found = verdict(result.model_copy(update={"parameters": weak, "payload": {}, "table4": []}))
     assert found.sentence.startswith("Failed: no parameter could be identified (too weakly excited)")
+
+
+def test_an_undetermined_parameter_is_told_once(result: Result) -> None:
+    lost = Estimate(estimate=None, unit="kg m^2", status=Status.NOT_IDENTIFIABLE)
+    told = with_parameter(result, "k5", lost).model_copy(update={"warnings": ["k5 is not determined"]})
+    assert verdict(told).reasons == ("k5 is not identifiable",)
