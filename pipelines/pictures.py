@@ -1,6 +1,6 @@
 """Draw the README's pictures from a result folder: the terminal as SVG, the report as PNG, light and dark.
 
-    python pipelines/pictures.py case1-unloaded.algid -o pipelines/pictures
+    python -m pipelines.pictures build/pictures/case1-unloaded.algid -o data/pictures
 
 Needs Debian's package chromium for the report; without it only the terminal is drawn.
 """
