@@ -5,13 +5,16 @@ from __future__ import annotations
 import shlex
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from algid.cli import EXIT_INCOMPLETE
 from algid.cli.report import ResultFormat, print_result
 from algid.cli.settings import Choice, takes_settings
+
+if TYPE_CHECKING:
+    from algid.results import Result
 
 
 @takes_settings
@@ -29,6 +32,7 @@ def identify(
     report: Annotated[bool, typer.Option(help="Write pages and time series beside result.json.")] = True,
     output: Annotated[ResultFormat, typer.Option("--format", help="What to print.")] = ResultFormat.TABLE,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
+    verbose: Annotated[bool, typer.Option("-v", "--verbose", help="Tell logs, channels and settings too.")] = False,
 ) -> None:
     """Identify an arm's constants k1 … k7 and, with loaded logs, its payload; write LOG.algid.
 
@@ -37,23 +41,43 @@ def identify(
     Example: algid identify run-unloaded.mcap --loaded run-loaded.mcap -o results
     """
     from algid.pipeline.identify import identify as run
+    from algid.report.progress import waiting
     from algid.results import read_result
 
     settings = choice.settings()
     known = None if parameters is None else read_result(parameters)
     bare, burdened = (logs, loaded or []) if known is None else ([], [*logs, *(loaded or [])])
-    result = run(
-        bare,
-        burdened,
-        settings,
-        parameters=known,
-        profile=choice.profile(),
-        out=out,
-        force=force,
-        report=report,
-        command=shlex.join(["algid", *sys.argv[1:]]),
-    )
+    count = len(bare) + len(burdened)
+    with waiting(f"{settings.estimator} estimator on {count} log{'s' if count > 1 else ''}", quiet):
+        result = run(
+            bare,
+            burdened,
+            settings,
+            parameters=known,
+            profile=choice.profile(),
+            out=out,
+            force=force,
+            report=report,
+            command=shlex.join(["algid", *sys.argv[1:]]),
+        )
+    if verbose:
+        _tell(result, out)
     if not quiet:
         print_result(result, output)
     if not result.complete or result.data_lost:
         raise typer.Exit(EXIT_INCOMPLETE)
+
+
+def _tell(result: Result, out: Path) -> None:
+    """What was read, how, and where the result went, on standard error."""
+    from algid.pipeline.folder import result_folder
+    from algid.report.text import visible
+
+    for log in result.logs:
+        told = f"{log.role} {log.path}: {log.rows} samples, {log.duration:.6g} s at {log.rate:.6g} Hz, {log.format}"
+        print(visible(told), file=sys.stderr)
+        for signal, source in log.mapping.items():
+            print(visible(f"  {signal} from {source}"), file=sys.stderr)
+    for name, value in result.settings.items():
+        print(visible(f"{name} = {value}"), file=sys.stderr)
+    print(visible(f"written: {result_folder(result.log.path, out)}"), file=sys.stderr)

@@ -19,3 +19,16 @@ def progress(words: str, total: float, quiet: bool = False) -> Iterator[Advance]
     with Progress(*parts, console=console, transient=True, disable=quiet or not console.is_terminal) as bar:
         task = bar.add_task(words, total=total)
         yield lambda done: bar.advance(task, done)
+
+
+@contextmanager
+def waiting(words: str, quiet: bool = False) -> Iterator[None]:
+    """Show that something of unknown length is being done while the block runs."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if quiet or not console.is_terminal:
+        yield
+        return
+    with console.status(words.replace("[", "\\[")):
+        yield

@@ -57,6 +57,15 @@ def test_synth_identify_check(logs: Path, tmp_path: Path) -> None:
     assert bad.out.splitlines()[1].startswith("ok    k2")
 
 
+def test_verbose_tells_on_stderr_what_was_read_and_how(logs: Path, tmp_path: Path) -> None:
+    found = Outcome("identify", logs / "case1-unloaded.csv", "-o", tmp_path, "--no-report", "--format", "json", "-v")
+    assert found.code == 0, found.err
+    assert json.loads(found.out)["estimator"] == "refined"
+    assert "2001 samples" in found.err
+    assert "  theta1 from theta1" in found.err
+    assert f"written: {tmp_path / 'case1-unloaded.algid'}" in found.err
+
+
 def test_help_has_an_example_for_every_command() -> None:
     for command in app.registered_commands:
         assert command.callback is not None
