@@ -37,26 +37,26 @@ Row = dict[str, Any]
 _scenes: dict[str, scenes.Scene] = {}
 
 
-def _install(made: dict[str, scenes.Scene]) -> None:
+def install(made: dict[str, scenes.Scene]) -> None:
     """Hand the motions to a process, so that each is integrated once."""
     _scenes.update(made)
 
 
-def _scene(name: str) -> scenes.Scene:
+def scene_of(name: str) -> scenes.Scene:
     return _scenes[name]
 
 
-def _fit(fit: Callable[..., Fit], bare: Segment, burdened: Segment) -> Fit:
+def fit_pair(fit: Callable[..., Fit], bare: Segment, burdened: Segment) -> Fit:
     return fit([lambda: [bare]], [lambda: [burdened]])
 
 
 def _draw(job: tuple[str, float, bool, int]) -> dict[str, Any]:
     """Estimates of every method on one pair of logs; the refined and the weak one with their error bars."""
     name, sigma, encoder, seed = job
-    here = _scene(name)
+    here = scene_of(name)
     rng = np.random.default_rng([seed, sum(name.encode())])
     bare, burdened = (scenes.noisy(log, sigma, 10 * sigma, encoder, rng) for log in (here.bare, here.burdened))
-    fits = {"refined": _fit(refined.fit, bare, burdened), "weak": _fit(weak.fit, bare, burdened)}
+    fits = {"refined": fit_pair(refined.fit, bare, burdened), "weak": fit_pair(weak.fit, bare, burdened)}
     found: dict[str, Any] = {"filtered": scenes.filtered_least_squares(bare, burdened, here.arm.g)}
     found["paper"] = scenes.paper(bare, burdened, here.arm.g)
     for method, fit in fits.items():
@@ -70,7 +70,7 @@ def noise_rows(pool: ProcessPoolExecutor, draws: int) -> list[Row]:
     """Every arm and noise: RMS over the bound, bias over σ, coverage, and the methods side by side."""
     jobs = [(name, sigma, encoder) for name in SCENES for sigma, encoder in _noises()]
     drawn = list(pool.map(_draw, [(*job, seed) for job in jobs for seed in range(draws)], chunksize=4))
-    bounds = dict(zip(SCENES, pool.map(_bound, SCENES), strict=True))
+    bounds = dict(zip(SCENES, pool.map(bound, SCENES), strict=True))
     return [
         _noise_row(*job, drawn[index * draws : (index + 1) * draws], bounds[job[0]]) for index, job in enumerate(jobs)
     ]
@@ -80,14 +80,14 @@ def _noises() -> list[tuple[float, bool]]:
     return [*((sigma, False) for sigma in NOISES), (scenes.ENCODER_STEP / np.sqrt(12), True)]
 
 
-def _bound(name: str) -> FloatArray:
+def bound(name: str) -> FloatArray:
     """The bound (10,) for σ_θ = 1 rad; it grows with σ_θ while σ_τ = 10 σ_θ."""
-    here = _scene(name)
+    here = scene_of(name)
     return joint_bound(here.bare, here.burdened, here.truth, here.arm.g, 1e-3, 1e-2) / 1e-3
 
 
 def _noise_row(name: str, sigma: float, encoder: bool, drawn: list[dict[str, Any]], bound: FloatArray) -> Row:
-    here = _scene(name)
+    here = scene_of(name)
     truth, sigmas = here.truth[:8], sigma * bound[:8]
     errors = {method: np.array([draw[method] for draw in drawn]) - truth for method in METHODS}
     rms = {method: np.sqrt(np.mean(error**2, axis=0)) for method, error in errors.items()}
@@ -112,9 +112,9 @@ def table4_rows() -> list[Row]:
     """Errors without noise against the paper's Table 4: largest share of a hundredth of the paper's error."""
     rows = []
     for name in ("case1", "case2"):
-        here, case = _scene(name), load_case(name)
+        here, case = scene_of(name), load_case(name)
         rng = np.random.default_rng(0)
-        fit = _fit(refined.fit, *(scenes.noisy(log, 0.0, 0.0, False, rng) for log in (here.bare, here.burdened)))
+        fit = fit_pair(refined.fit, *(scenes.noisy(log, 0.0, 0.0, False, rng) for log in (here.bare, here.burdened)))
         estimated, true = (_table4(fit, beta) for beta in (fit.values, here.truth))
         for row, paper_error in case.paper_error_percent.items():
             error = 100 * abs(estimated[row] / true[row] - 1)
@@ -139,7 +139,7 @@ def _table4(fit: Fit, beta: FloatArray) -> dict[str, float]:
 
 def timing_rows(draws: int) -> list[Row]:
     """A delay of 5 ms, estimated and ignored; a torque that is held between its samples."""
-    here = _scene("case1")
+    here = scene_of("case1")
     errors = [_delayed(here, seed) for seed in range(draws)]
     found = np.array([error[0] for error in errors])
     k = here.arm.constants()
@@ -179,7 +179,7 @@ def _held(here: scenes.Scene) -> dict[str, float]:
 
 def cost_rows() -> list[Row]:
     """Seconds of one core for logs of 10 s to 1000 s, and the slope in a log-log fit."""
-    here = _scene("case1")
+    here = scene_of("case1")
     rng = np.random.default_rng(0)
     lengths, seconds = (1, 3, 10, 30, 100), []
     tens = [scenes.noisy(here.bare, 1e-3, 1e-2, False, rng) for _ in range(lengths[-1])]
@@ -218,8 +218,8 @@ def main() -> None:
     draws = 6 if given.quick else given.draws
     given.output.mkdir(parents=True, exist_ok=True)
     with ProcessPoolExecutor(2) as pool:
-        _install(dict(zip(SCENES, pool.map(scenes.scene, SCENES), strict=True)))
-    with ProcessPoolExecutor(2, initializer=_install, initargs=(_scenes,)) as pool:
+        install(dict(zip(SCENES, pool.map(scenes.scene, SCENES), strict=True)))
+    with ProcessPoolExecutor(2, initializer=install, initargs=(_scenes,)) as pool:
         noise = noise_rows(pool, draws)
     found = {
         "draws": draws,
