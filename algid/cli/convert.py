@@ -8,23 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from algid.cli import profiles
+from algid.cli.settings import Choice, takes_profile
 
 if TYPE_CHECKING:
     from algid.log import Log, Notice
 
 
+@takes_profile
 def convert(
+    choice: Choice,
     source: Annotated[Path, typer.Argument(metavar="IN", help="The log to read.")],
     target: Annotated[Path, typer.Argument(metavar="OUT", help="The log to write: .mcap, .parquet or .csv.")],
-    profile: profiles.ProfileFile = None,
-    topic: profiles.Topic = None,
-    joints: profiles.Joints = None,
-    angle_unit: profiles.AngleUnit = None,
-    torque_unit: profiles.TorqueUnit = None,
-    zero: profiles.Zero = None,
-    second_angle: profiles.SecondAngle = None,
-    clock: profiles.Clock = None,
     force: Annotated[bool, typer.Option(help="Overwrite OUT.")] = False,
 ) -> None:
     """Write a log in another format, in SI units, with canonical names; a synthetic log keeps its truth.
@@ -41,16 +35,7 @@ def convert(
         raise OutputError(f"{target}: expected a name that ends in .mcap, .parquet or .csv")
     if target.exists() and not force:
         raise OutputError(f"{target}: exists already; overwrite it with --force")
-    chosen = profiles.profile_from(
-        profile,
-        topic=topic,
-        joints=joints,
-        angle_unit=angle_unit,
-        torque_unit=torque_unit,
-        zero=zero,
-        second_angle=second_angle,
-        clock=clock,
-    )
+    chosen = choice.profile()
     reader = open_log(source, chosen)
     notices: list[Notice] = []
     write_log(target, _noted(reader.blocks(), notices), truth=reader.origin.truth)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from algid.cli import profiles
+from algid.cli.settings import Choice, takes_profile
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -17,16 +17,10 @@ if TYPE_CHECKING:
     from algid.inspection.report import Inspection
 
 
+@takes_profile
 def inspect(
+    choice: Choice,
     log: Annotated[Path, typer.Argument(help="CSV, Parquet or MCAP log, or a rosbag2 folder.")],
-    profile: profiles.ProfileFile = None,
-    topic: profiles.Topic = None,
-    joints: profiles.Joints = None,
-    angle_unit: profiles.AngleUnit = None,
-    torque_unit: profiles.TorqueUnit = None,
-    zero: profiles.Zero = None,
-    second_angle: profiles.SecondAngle = None,
-    clock: profiles.Clock = None,
     output: Annotated[str, typer.Option("--format", help="table or json.")] = "table",
 ) -> None:
     """Show what a log holds, which channels would be used, and what is wrong with it.
@@ -42,16 +36,7 @@ def inspect(
 
     if output not in ("table", "json"):
         raise SettingError(f"--format: expected table or json, found {output!r}")
-    chosen = profiles.profile_from(
-        profile,
-        topic=topic,
-        joints=joints,
-        angle_unit=angle_unit,
-        torque_unit=torque_unit,
-        zero=zero,
-        second_angle=second_angle,
-        clock=clock,
-    )
+    chosen = choice.profile()
     found = inspect_log(log, chosen)
     if output == "json":
         typer.echo(json.dumps(found.as_dict(), indent=2))

@@ -123,9 +123,19 @@ def _profile(
 
 
 def takes_settings(command: Callable[..., None]) -> Callable[..., None]:
-    """Give `command`, whose first parameter is the `Choice`, the shared options after its own ones."""
+    """Give `command`, whose first parameter is the `Choice`, the options of logs and of settings after its own."""
+    return _taking(command, _parameters(_profile), _parameters(_settings))
+
+
+def takes_profile(command: Callable[..., None]) -> Callable[..., None]:
+    """Give `command`, whose first parameter is the `Choice`, the options of logs after its own."""
+    return _taking(command, _parameters(_profile), [])
+
+
+def _taking(
+    command: Callable[..., None], profile: list[inspect.Parameter], settings: list[inspect.Parameter]
+) -> Callable[..., None]:
     own = _parameters(command)[1:]
-    settings, profile = _parameters(_settings), _parameters(_profile)
 
     @wraps(command)
     def with_options(**values: Any) -> None:

@@ -7,27 +7,22 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from algid.cli import EXIT_FAILED, profiles
+from algid.cli import EXIT_FAILED
+from algid.cli.settings import Choice, takes_profile
 
 if TYPE_CHECKING:
     from algid.results import TorquePrediction
 
 
+@takes_profile
 def validate(
+    choice: Choice,
     result: Annotated[Path, typer.Argument(help="A result folder or its result.json.")],
     logs: Annotated[list[Path], typer.Argument(help="Logs of the arm without payload.")],
     loaded: Annotated[list[Path] | None, typer.Option(help="A log of the loaded arm; may be repeated.")] = None,
     max_nrmse: Annotated[
         float | None, typer.Option(help="Largest RMSE over the torque's RMS allowed, for either joint.", min=0)
     ] = None,
-    profile: profiles.ProfileFile = None,
-    topic: profiles.Topic = None,
-    joints: profiles.Joints = None,
-    angle_unit: profiles.AngleUnit = None,
-    torque_unit: profiles.TorqueUnit = None,
-    zero: profiles.Zero = None,
-    second_angle: profiles.SecondAngle = None,
-    clock: profiles.Clock = None,
 ) -> None:
     """Print RMSE, normalised RMSE and R² of the predicted torque; exit code 1 past --max-nrmse.
 
@@ -37,16 +32,7 @@ def validate(
     from algid.pipeline.validate import validate as judge
     from algid.results import read_result
 
-    meaning = profiles.profile_from(
-        profile,
-        topic=topic,
-        joints=joints,
-        angle_unit=angle_unit,
-        torque_unit=torque_unit,
-        zero=zero,
-        second_angle=second_angle,
-        clock=clock,
-    )
+    meaning = choice.profile()
     known = read_result(result)
     gravity = float(known.settings.get("gravity", 9.81))
     sources = [LogSource(log, "unloaded", meaning, gravity) for log in logs]
