@@ -88,8 +88,6 @@ def torque_coefficients(fit: Fit, role: str) -> FloatArray:
 
 
 def torque_shift(settings: Settings, fit: Fit, dt: float) -> float:
-    """Time in s after which a logged torque acts: half a sample of hold, and the delay."""
-    hold = 0.5 * dt if settings.torque_hold == "zoh" else 0.0
-    if "delay" in fit.names:
-        return hold + float(fit.values[fit.names.index("delay")])
-    return hold + (0.0 if settings.delay == "estimate" else settings.delay)
+    """Time in s after which a logged torque acts, with the delay of the fit where it has one."""
+    found = float(fit.values[fit.names.index("delay")]) if "delay" in fit.names else None
+    return settings.torque_shift(dt, found)

@@ -76,6 +76,13 @@ class Settings:
         """The link lengths that are known, in m."""
         return {name: value for name, value in (("l1", self.l1), ("l2", self.l2)) if value is not None}
 
+    def torque_shift(self, dt: float, found_delay: float | None = None) -> float:
+        """Time in s after which a logged torque acts: half a sample of hold, and the delay, found or set."""
+        hold = 0.5 * dt if self.torque_hold == "zoh" else 0.0
+        if found_delay is not None:
+            return hold + found_delay
+        return hold + (0.0 if self.delay == "estimate" else self.delay)
+
     def as_json(self) -> dict[str, Any]:
         """For `result.json`; complex poles as text."""
         content = asdict(self)

@@ -37,9 +37,9 @@ def validate(result: Result, logs: Sequence[LogSource]) -> Validation:
     settings = settings_of(result)
     model = model_of(settings)
     found: dict[str, TorquePrediction | None] = {}
-    total = PredictionScore()
+    total, delay = PredictionScore(), result.parameters.get("delay")
     for log in logs:
-        shift = _shift(result, settings, log)
+        shift = settings.torque_shift(1 / log.summary().rate, None if delay is None else delay.estimate)
         one = score(model, torque_constants(result, model, log.role), log.segments(), shift)
         found[log.name] = prediction(one)
         total += one
@@ -72,12 +72,3 @@ def torque_constants(result: Result, model: Model, role: Role) -> FloatArray:
         k = with_payload(np.array([known.get(f"k{number}", 0.0) for number in range(1, 8)]), z)
         known |= {f"k{number + 1}": float(value) for number, value in enumerate(k)}
     return np.array([known[name] for name in model.names])
-
-
-def _shift(result: Result, settings: Settings, log: LogSource) -> float:
-    """Time in s after which a logged torque acts."""
-    hold = 0.5 / log.summary().rate if settings.torque_hold == "zoh" else 0.0
-    estimated = result.parameters.get("delay")
-    if estimated is not None and estimated.estimate is not None:
-        return hold + estimated.estimate
-    return hold + (0.0 if settings.delay == "estimate" else settings.delay)

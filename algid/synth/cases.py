@@ -5,13 +5,11 @@ A case holds the arm, the payload, the torque that drives it and, for the paper'
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from algid.arm import Arm
@@ -127,8 +125,3 @@ def _multi_sine(table: _TorqueTable) -> MultiSine:
         frequency=tuple(tuple(joint.frequency) for joint in joints),
         phase=tuple(tuple(joint.phase) for joint in joints),
     )
-
-
-def arm_table(arm: Arm) -> dict[str, float]:
-    """The arm as the ``[arm]`` table of a case file."""
-    return {name: float(np.float64(value)) for name, value in dataclasses.asdict(arm).items()}
