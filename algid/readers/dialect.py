@@ -77,10 +77,9 @@ def detect(path: Path, head: bytes) -> Dialect:
 
 def split(line: str, separator: str) -> list[str]:
     """Cells of a line, blanks and quotes stripped."""
-    if separator and '"' in line:
-        cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
-    else:
-        cells = line.split(separator) if separator else line.split()
+    if '"' not in line:
+        return [cell.strip() for cell in line.split(separator)] if separator else line.split()
+    cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True), []) if separator else line.split()
     return [cell.strip().strip('"').strip() for cell in cells]
 
 
