@@ -15,8 +15,8 @@ import numpy as np
 
 from algid.log import Notice
 from algid.readers.mcap import framing
-from algid.readers.mcap.chunks import unpack
-from algid.readers.mcap.framing import DamagedError, File, parse
+from algid.readers.mcap.chunks import unpack, unpack_torn
+from algid.readers.mcap.framing import BrokenOffError, DamagedError, File, parse
 from algid.readers.mcap.messages import alike
 
 _FOOTER_SIZE = 9 + 20 + 8
@@ -28,7 +28,7 @@ _SPAN = 1 << 23
 class Span:
     """Records side by side in the file: a chunk with the message indexes behind it, or loose records.
 
-    `channels` are those that the index names; None where nobody knows.
+    `channels` are those that the index names; None where nobody knows. `torn`: a chunk that breaks off.
     """
 
     start: int
@@ -36,6 +36,7 @@ class Span:
     index_length: int = 0
     channels: frozenset[int] | None = None
     loose: bool = False
+    torn: bool = False
 
 
 @dataclass
@@ -159,15 +160,18 @@ def _walked(file: File) -> Catalogue:
             else:
                 _place(file, record, found, spans)
             end = record.end
-    except DamagedError:
-        lost = file.size - end
-        text = f"the file breaks off: its last {lost} bytes are an unfinished record and were left out"
+    except DamagedError as error:
+        last = error.record if isinstance(error, BrokenOffError) else None
+        torn = [Span(last.start, file.size - last.start, torn=True)] if last and last.code == framing.CHUNK else []
+        told = "chunk, read as far as it goes" if torn else "record and were left out"
+        text = f"the file breaks off: its last {file.size - end} bytes are an unfinished {told}"
         found.notices.append(Notice("CUT_OFF", text, lossy=True))
     else:
+        torn = []
         if end != file.size:
             text = "the file breaks off behind its last whole record"
             found.notices.append(Notice("CUT_OFF", text, lossy=True))
-    found.spans = [_span(*span) for span in spans]
+    found.spans = [_span(*span) for span in spans] + torn
     _inner_channels(file, found)
     return found
 
@@ -210,7 +214,8 @@ def _inner_channels(file: File, found: Catalogue) -> None:
         if span.loose:
             continue
         try:
-            content = unpack(file.read(span.start, span.length))
+            packed = file.read(span.start, span.length)
+            content = unpack_torn(packed)[0] if span.torn else unpack(packed)
             if alike(np.frombuffer(content, np.uint8)) is not None:
                 continue
             for record in framing.walk_bytes(content, 0, len(content)):
