@@ -75,7 +75,8 @@ class TableReader:
                 yield table, notices
                 notices = ()
         if total < 2:
-            why = "".join(f" ({notice.text})" for notice in notices[:1])
+            worst = sorted(notices, key=lambda notice: not notice.lossy)[:1]
+            why = "".join(f" ({notice.text})" for notice in worst)
             raise LogError(f"{self.origin.path}: {total} samples; a log needs two at least{why}")
 
     def _convert(self, table: Table, room: Room, unwrapper: Unwrapper) -> None:

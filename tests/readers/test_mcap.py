@@ -302,6 +302,28 @@ def test_a_message_index_that_lies_is_not_believed(tmp_path: Path) -> None:
     assert same(read_log(tmp_path / "log.mcap"), log)
 
 
+def test_a_file_of_which_damage_left_nothing_says_so_and_where(tmp_path: Path) -> None:
+    log = noise_log(100, start_ns=EPOCH_NS)
+    write_mcap(tmp_path / "log.mcap", messages_of(log), compression=CompressionType.NONE, chunk_size=1 << 20)
+    whole = (tmp_path / "log.mcap").read_bytes()
+    with (tmp_path / "log.mcap").open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    (chunk,) = summary.chunk_indexes
+    content = bytearray(whole)
+    content[content.index(struct.pack("<d", log.theta[0, 50]))] ^= 1
+    (tmp_path / "log.mcap").write_bytes(content)
+    with pytest.raises(LogError, match=rf"damaged \(.*checksum.*byte {chunk.chunk_start_offset + 9}\).*no topic"):
+        read_log(tmp_path / "log.mcap")
+    content[content.rindex(b"JointState")] ^= 1  # in the summary
+    (tmp_path / "log.mcap").write_bytes(content)
+    with pytest.raises(LogError, match=r"damaged \(its summary: its checksum is wrong; .*\).*no topic"):
+        read_log(tmp_path / "log.mcap")
+    (tmp_path / "log.mcap").write_bytes(whole[: chunk.chunk_start_offset + 100])
+    with pytest.raises(LogError, match=rf"damaged \(.*breaks off at byte {chunk.chunk_start_offset}\).*no topic"):
+        read_log(tmp_path / "log.mcap")
+
+
 def test_a_chunk_that_claims_too_much_is_left_out_unread(tmp_path: Path) -> None:
     log = noise_log(500, start_ns=EPOCH_NS)
     write_mcap(tmp_path / "log.mcap", messages_of(log))

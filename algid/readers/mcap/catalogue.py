@@ -41,7 +41,10 @@ class Span:
 
 @dataclass
 class Catalogue:
-    """Schemas and channels by id, spans in file order, messages by channel where counted."""
+    """Schemas and channels by id, spans in file order, messages by channel where counted.
+
+    `damage` names the places where bytes were met that are not what the format says.
+    """
 
     schemas: dict[int, Any] = field(default_factory=dict)
     channels: dict[int, Any] = field(default_factory=dict)
@@ -50,23 +53,25 @@ class Catalogue:
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     notices: list[Notice] = field(default_factory=list)
     walked: bool = False
+    damage: list[str] = field(default_factory=list)
 
 
 def catalogue(file: File) -> Catalogue:
     """The catalogue of an opened file; `DamagedError` only where not even the start can be read."""
     if file.size < len(framing.MAGIC) or file.read(0, len(framing.MAGIC)) != framing.MAGIC:
         raise DamagedError("the file does not begin as MCAP does")
+    notice, damage = Notice("NO_INDEX", "the file has no usable index; read by scanning"), []
     try:
         found = _from_summary(file)
     except DamagedError as error:
         found = None
+        damage = [f"its summary: {error}"]
         notice = Notice("DAMAGED_SUMMARY", f"the file's summary cannot be used ({error}); read by scanning")
-    else:
-        notice = Notice("NO_INDEX", "the file has no usable index; read by scanning")
     if found is not None:
         return found
     walked = _walked(file)
     walked.notices.insert(0, notice)
+    walked.damage[:0] = damage
     return walked
 
 
@@ -166,6 +171,7 @@ def _walked(file: File) -> Catalogue:
         told = "chunk, read as far as it goes" if torn else "record and were left out"
         text = f"the file breaks off: its last {file.size - end} bytes are an unfinished {told}"
         found.notices.append(Notice("CUT_OFF", text, lossy=True))
+        found.damage.append(f"it breaks off at byte {end}")
     else:
         torn = []
         if end != file.size:
@@ -206,6 +212,7 @@ def _define(code: int, content: bytes, found: Catalogue) -> None:
             found.channels.setdefault(channel.id, channel)
     except DamagedError as error:
         found.notices.append(Notice("DAMAGED_RECORD", f"{error}; left out", lossy=True))
+        found.damage.append(str(error))
 
 
 def _inner_channels(file: File, found: Catalogue) -> None:
@@ -221,8 +228,8 @@ def _inner_channels(file: File, found: Catalogue) -> None:
             for record in framing.walk_bytes(content, 0, len(content)):
                 if record.code in (framing.SCHEMA, framing.CHANNEL):
                     _define(record.code, bytes(content[record.start : record.end]), found)
-        except DamagedError:
-            continue
+        except DamagedError as error:
+            found.damage.append(f"{error} (at byte {span.start})")
 
 
 def _keep_metadata(file: File, record: framing.Record, found: Catalogue) -> None:
