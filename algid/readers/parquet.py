@@ -39,7 +39,7 @@ def open_parquet(path: Path, profile: Profile | None = None) -> TableReader:
     try:
         metadata = pl.read_parquet_metadata(path)
         available = _flat_names(path, schema)
-        rows = _counted_rows(path)
+        rows = counted_rows(path)
     except (pl.exceptions.PolarsError, OSError, pl.exceptions.PanicException) as error:
         raise _damaged(path, error) from error
     companion = _companion(path, metadata)
@@ -82,7 +82,7 @@ def _check_footer(path: Path) -> None:
         raise LogError(f"{path}: the Parquet footer claims {length} bytes of a file of {size}; copy the file again")
 
 
-def _counted_rows(path: Path) -> int:
+def counted_rows(path: Path) -> int:
     """Rows of the file, once its footer, its row groups and their columns agree on them.
 
     Raises
@@ -201,7 +201,7 @@ class _Groups:
 
         column, _ = self.available[self.columns.sources["t"]]
         if isinstance(self.schema[column], (pl.Datetime, pl.Duration)):
-            return Columns(self.columns.sources, self.columns.units, "ns")
+            return replace(self.columns, time_unit="ns", time_told=True)
         return self.columns
 
 
