@@ -76,7 +76,7 @@ def write_mcap(
     """Write messages (topic, log time, bytes); `schemas` gives name, encoding and data by topic."""
     with path.open("wb") as stream:
         writer = Writer(stream, chunk_size=chunk_size, compression=compression, **options)
-        writer.start()
+        writer.start(profile="ros2")
         channels: dict[str, int] = {}
         for topic, stamp, data in messages:
             if topic not in channels:
