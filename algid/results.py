@@ -58,10 +58,13 @@ class Table4Row(_Model):
 
 
 class LogSummary(_Model):
-    """A log that was used: first stamp in ns, duration in s, rate in Hz, each signal's channel."""
+    """A log that was used: first stamp in ns, duration in s, rate in Hz, each signal's channel.
+
+    `sha256` is null where only what was needed of a log was fetched from an object store.
+    """
 
     path: str
-    sha256: str
+    sha256: str | None
     role: Literal["unloaded", "loaded"]
     format: str
     rows: int

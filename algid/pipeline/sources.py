@@ -27,10 +27,14 @@ EXAMINED = 1 << 16
 
 @dataclass(frozen=True)
 class Staged:
-    """A log that was fetched from an object store: its copy on this machine, and its URL."""
+    """A log that was fetched from an object store: its copy on this machine, and its URL.
+
+    A copy that is not `whole` holds what the reader needs, and zeros elsewhere: the log's hash is not known then.
+    """
 
     path: Path
     url: str
+    whole: bool = True
 
 
 LogLike = str | Path | Log | Staged
@@ -53,6 +57,7 @@ class LogSource:
         self.role = role
         self.name = log.origin.path if isinstance(log, Log) else log.url if isinstance(log, Staged) else str(log)
         self._log = log.path if isinstance(log, Staged) else log
+        self._whole = not isinstance(log, Staged) or log.whole
         self._profile = profile
         self._gravity = gravity
         self._found: list[Notice] | None = None
@@ -131,13 +136,14 @@ class LogSource:
         return self.seen.first_ns
 
     @cached_property
-    def sha256(self) -> str:
-        """Of the file, of a folder's files in the order of their names, or of a log in memory."""
-        return self._start_hashing().result()
+    def sha256(self) -> str | None:
+        """Of the file, of a folder's files in the order of their names, or of a log in memory; None of parts."""
+        digest = self._start_hashing()
+        return None if digest is None else digest.result()
 
-    def _start_hashing(self) -> Beside[str]:
+    def _start_hashing(self) -> Beside[str] | None:
         """Hash the log beside the first pass over it."""
-        if self._digest is None:
+        if self._digest is None and self._whole:
             self._digest = Beside(self._hash)
         return self._digest
 

@@ -166,7 +166,9 @@ def _estimator(result: Result) -> str:
 def provenance_table(result: Result) -> Table:
     """What made the result, from what."""
     rows = [("algid", visible(result.version)), ("estimator", _estimator(result))]
-    rows += [(f"sha256 of {file_name(log.path)}", visible(log.sha256)) for log in result.logs]
+    rows += [
+        (f"sha256 of {file_name(log.path)}", visible(log.sha256 or "unknown, fetched in part")) for log in result.logs
+    ]
     rows += [(f"path of {file_name(log.path)}", visible(log.path)) for log in result.logs]
     return Table("Provenance", (Column("What", "name"), Column("Value", "text")), tuple(rows))
 
