@@ -30,11 +30,15 @@ VELOCITY_COLUMNS = ("omega1", "omega2")
 
 @dataclass(frozen=True)
 class Truth:
-    """The arm and the payload (kg) behind a synthetic log, and the case they are taken from."""
+    """The arm and the payload (kg) behind a synthetic log, and the case they are taken from.
+
+    `schedule` holds pairs of time in s and payload from then on, where the payload changes during the log.
+    """
 
     arm: Arm
     payload: float
     case: str | None = None
+    schedule: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)

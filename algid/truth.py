@@ -37,6 +37,8 @@ class Companion:
                 "payload": self.truth.payload,
                 "case": self.truth.case,
             }
+            if self.truth.schedule:
+                content["schedule"] = [list(change) for change in self.truth.schedule]
         return json.dumps({**content, "crc32": _checksum(content)})
 
 
@@ -57,7 +59,8 @@ def loads(text: str | bytes) -> Companion:
             return Companion(None, sums)
         arm = Arm(**{name: float(value) for name, value in content["arm"].items()})
         case = None if content["case"] is None else str(content["case"])
-        return Companion(Truth(arm, float(content["payload"]), case), sums)
+        schedule = tuple((float(time), float(mass)) for time, mass in content.get("schedule", ()))
+        return Companion(Truth(arm, float(content["payload"]), case, schedule), sums)
     except (KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ValueError(f"not the truth of a synthetic log: {error!r}") from error
 

@@ -51,9 +51,14 @@ class _Seen:
 
 
 class LogSource:
-    """One log, from a file or from memory; `segments` gives a fresh pass over it."""
+    """One log, from a file or from memory; `segments` gives a fresh pass over it.
 
-    def __init__(self, log: LogLike, role: Role, profile: Profile | None = None, gravity: float = 9.81) -> None:
+    A log whose payload may be `changing` is refused for no payload that its metadata name.
+    """
+
+    def __init__(
+        self, log: LogLike, role: Role, profile: Profile | None = None, gravity: float = 9.81, *, changing: bool = False
+    ) -> None:
         self.role = role
         self.name = log.origin.path if isinstance(log, Log) else log.url if isinstance(log, Staged) else str(log)
         self._log = log.path if isinstance(log, Staged) else log
@@ -66,7 +71,8 @@ class LogSource:
         """What scores a prediction of this log, where an estimator's pass has gathered it."""
         self.origin, self._blocks = self._open()
         self._seen: _Seen | None = None
-        self._refuse_the_other_role()
+        if not changing:
+            self._refuse_the_other_role()
 
     def _open(self) -> tuple[Origin, Callable[[], Iterator[Log]]]:
         if isinstance(self._log, Log):
@@ -79,6 +85,8 @@ class LogSource:
 
     def _refuse_the_other_role(self) -> None:
         truth = self.origin.truth
+        if truth is not None and truth.schedule:
+            raise LogError(f"{self.name}: its metadata say that the payload changes; weigh it with algid track")
         if truth is None or (truth.payload > 0) == (self.role == "loaded"):
             return
         found = f"a payload of {truth.payload:g} kg" if truth.payload > 0 else "no payload"

@@ -64,7 +64,7 @@ def with_schedule(case: Case, torque: Torque, recording: Recording, schedule: Se
     """A log during which the payload changes: pairs of time in s, increasing, and payload in kg from then on.
 
     Before the first time the arm is bare. An object is grasped and let go at the tip's own velocity, so that the
-    motion has no step. No single payload is true of the log: it bears no truth.
+    motion has no step. The truth that the log bears names the schedule.
 
     Raises
     ------
@@ -72,7 +72,8 @@ def with_schedule(case: Case, torque: Torque, recording: Recording, schedule: Se
         If the times do not increase or a payload is negative.
     """
     times = [time for time, _ in schedule]
-    if any(b <= a for a, b in pairwise(times)) or any(mass < 0 for _, mass in schedule):
+    ordered = all(a < b for a, b in pairwise(times))
+    if not (ordered and all(0 <= mass < np.inf and np.isfinite(time) for time, mass in schedule)):
         raise ValueError(f"schedule must hold increasing times and payloads of 0 or more, got {list(schedule)}")
     t = sample_times(recording.rate, recording.duration, recording.sensors)
     state = np.array(recording.initial)
@@ -90,8 +91,8 @@ def with_schedule(case: Case, torque: Torque, recording: Recording, schedule: Se
         kept = np.isin(every, own)
         parts.append(Motion(own, motion.theta[:, kept], motion.omega[:, kept], motion.tau[:, kept]))
     whole = Motion(*(np.concatenate([getattr(p, n) for p in parts], axis=-1) for n in ("t", "theta", "omega", "tau")))
-    log = record(whole, recording.sensors, Truth(case.arm, 0.0, case.name), f"{case.name}-schedule")
-    return replace(log, origin=replace(log.origin, truth=None))
+    truth = Truth(case.arm, 0.0, case.name, tuple((float(time), float(mass)) for time, mass in schedule))
+    return record(whole, recording.sensors, truth, f"{case.name}-schedule")
 
 
 def _one(case: Case, torque: Torque, recording: Recording, payload: float) -> Log:

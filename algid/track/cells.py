@@ -74,6 +74,13 @@ class Cells:
         """Cells `first` to `last` - 1."""
         return Cells(*(getattr(self, name)[first:last] for name in self.__dataclass_fields__))
 
+    def sensitivity(self, arm: Arm, mass: float | FloatArray) -> FloatArray:
+        """T (C, q + 2): how the scores of a payload of `mass` kg, one or (C,), shift with constants, l1 and l2."""
+        g, l1, l2 = arm.model.gravity, arm.l1, arm.l2
+        by_l1 = self.S @ arm.added(np.array([2 * l1, 0.0, l2, g, 0.0]))
+        by_l2 = self.S @ arm.added(np.array([0.0, 2 * l2, l1, 0.0, g]))
+        return np.column_stack([self.S, mass * by_l1, mass * by_l2])
+
 
 def joined(parts: Sequence[Cells]) -> Cells:
     """Cells one after another."""

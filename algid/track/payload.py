@@ -2,28 +2,29 @@
 
 The variance of a mass is what its rows leave open and what the arm's own uncertainty adds,
 
-    var m_p = s² / A + (J / A)ᵀ Σ (J / A),    J = [S, m_p S ∂d/∂l1, m_p S ∂d/∂l2]
+    var m_p = s² / A + Jᵀ Σ J,    J = T / A
 
-with Σ the covariance of constants and link lengths and s² the rows' own variance where it exceeds one.
+with Σ the covariance of constants and link lengths, T the cells' sensitivity to them and s² the rows' variance
+where it exceeds one, slow errors (`algid.track.colour`) included.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import groupby, pairwise
+from operator import itemgetter
 
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.identify.stencil import Stencil
 from algid.sampling import Segment
 from algid.track.cells import CELL, Arm, Cells, cells_of, joined
-from algid.track.changes import cuts
+from algid.track.edges import GUARD, SHORTEST, edges
 
 QUANTILE = 1.959964  # of the normal distribution, for 95 %
-SHORTEST = 10  # cells: no object is carried for less than 0.2 s
-GUARD = 3  # cells left out on both sides of a change, which lies somewhere among them
-PENALTY = 60.0  # of a change: 7.7 standard deviations, far beyond what white rows reach
+ROUNDS = 2  # of linearising each stretch at its own mass and looking for the changes again
 HALF_BAND = 0.25  # s: m_p(t) rests on so much log on both sides of t
 
 Pass = Callable[[], Iterable[Segment]]
@@ -46,13 +47,17 @@ class Stretch:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Stretches, and m_p(t) with its standard deviation and the stretch that each instant lies in, each (C,)."""
+    """Stretches, and m_p(t) with its standard deviation and the stretch that each instant lies in, each (C,).
+
+    `colour` is the variance of the rows over that of sensor noise: above one, the arm's model lacks something.
+    """
 
     stretches: list[Stretch]
     t: FloatArray
     m_p: FloatArray
     std: FloatArray
     stretch: FloatArray
+    colour: float
 
 
 def track(source: Pass, arm: Arm, covariance: FloatArray) -> Track:
@@ -61,7 +66,7 @@ def track(source: Pass, arm: Arm, covariance: FloatArray) -> Track:
     Parameters
     ----------
     source : callable
-        Gives a fresh iterable of the log's `Segment`.
+        Gives a fresh iterable of the log's `Segment`; called three times.
     arm : Arm
     covariance : (q + 2, q + 2) float64
         Of the arm's coefficients and link lengths.
@@ -74,57 +79,50 @@ def track(source: Pass, arm: Arm, covariance: FloatArray) -> Track:
     parts = cells_of(source(), arm, mass=0.0, settle=0)
     if not parts or sum(map(len, parts)) < 2 * SHORTEST:
         raise ValueError(f"the log is too short: expected {2 * SHORTEST * CELL:g} s at least")
-    rough = joined(parts)
-    penalty = PENALTY * _roughness(rough)
-    edges = _merged([0, *cuts(rough.A, rough.B, penalty, SHORTEST), len(rough)], rough, penalty)
-    found = [_settled(source, arm, rough.part(first, last)) for first, last in pairwise(edges)]
-    inner = [_inner(cells, place > 0, place < len(found) - 1) for place, cells in enumerate(found)]
-    stretches = [_stretch(cells, kept, arm, covariance) for cells, kept in zip(found, inner, strict=True)]
-    curves = [_curve(cells, arm, covariance, s.m_p) for cells, s in zip(found, stretches, strict=True)]
-    number = np.repeat(np.arange(len(found)), [len(cells) for cells in found]).astype(np.float64)
+    cells = joined(parts)
+    found = edges(cells, arm, covariance)
+    for _ in range(ROUNDS):
+        cells = joined(_settled(source, arm, _parts(cells, found.places)))
+        found = edges(cells, arm, covariance)
+    own = _parts(cells, found.places)
+    inner = [_inner(part, place > 0, place < len(own) - 1) for place, part in enumerate(own)]
+    stretches = [_stretch(whole, kept, arm, covariance, found.scale) for whole, kept in zip(own, inner, strict=True)]
+    curves = [_curve(part, arm, covariance, s.m_p, found.scale) for part, s in zip(own, stretches, strict=True)]
+    number = np.repeat(np.arange(len(own)), [len(part) for part in own]).astype(np.float64)
     t, m_p, std = np.concatenate(curves, axis=1)
-    return Track(stretches, t, m_p, std, number)
+    return Track(stretches, t, m_p, std, number, found.scale)
 
 
-def _roughness(cells: Cells) -> float:
-    """Variance of the rows about masses that hold for a few cells, one at least."""
-    groups = len(cells) // SHORTEST
-    A, B, E, rows = (
-        x[: groups * SHORTEST].reshape(groups, -1).sum(axis=1) for x in (cells.A, cells.B, cells.E, cells.rows)
-    )
-    left = (E - B**2 / np.maximum(A, 1e-300)) / rows
-    return max(1.0, float(np.median(left)))  # groups that hold a change are few
+def _parts(cells: Cells, places: Sequence[int]) -> list[Cells]:
+    return [cells.part(first, last) for first, last in pairwise(places)]
 
 
-def _merged(edges: list[int], cells: Cells, penalty: float) -> list[int]:
-    """Edges less those that cells away from them do not need: a grasp jolts the cells it falls among."""
-    while len(edges) > 2:
-        worths = [_worth(cells, *edges[place : place + 3]) for place in range(len(edges) - 2)]
-        weakest = int(np.argmin(worths))
-        if worths[weakest] > penalty:
-            break
-        edges = edges[: weakest + 1] + edges[weakest + 2 :]
-    return edges
+def _settled(source: Pass, arm: Arm, rough: Sequence[Cells]) -> list[Cells]:
+    """Each stretch's cells, linearised again at its own mass, in one pass over the log."""
+    found = list(rough)
+    for place, own in groupby(_by_stretch(source(), arm, rough), key=itemgetter(0)):
+        mass = float(rough[place].B.sum() / max(rough[place].A.sum(), 1e-300))
+        if cells := cells_of((segment for _, segment in own), arm, mass):
+            found[place] = joined(cells)
+    return found
 
 
-def _worth(cells: Cells, first: int, cut: int, last: int) -> float:
-    """Squared difference of the masses on both sides of a cut over its variance."""
-    left, right = cells.part(first + GUARD, cut - GUARD), cells.part(cut + GUARD, last - GUARD)
-    A, B = (np.array([x.A.sum() for x in (left, right)]), np.array([x.B.sum() for x in (left, right)]))
-    return float(np.diff(B / A)[0] ** 2 / np.sum(1 / A))
+def _by_stretch(log: Iterable[Segment], arm: Arm, rough: Sequence[Cells]) -> Iterator[tuple[int, Segment]]:
+    """The log's segments cut at the stretches' ends, each with its stretch's number."""
+    for segment in log:
+        end = segment.start + len(segment) * segment.dt
+        for place, cells in enumerate(rough):
+            if cells.start[0] < end and cells.end[-1] > segment.start:
+                part = _cut(segment, float(cells.start[0]), float(cells.end[-1]), arm.shift)
+                if part is not None:
+                    yield place, part
 
 
-def _settled(source: Pass, arm: Arm, rough: Cells) -> Cells:
-    """The stretch's cells, linearised again at its own mass."""
-    start, end = rough.start[0], rough.end[-1]
-    mass = float(rough.B.sum() / max(rough.A.sum(), 1e-300))
-    own = cells_of((cut for segment in source() if (cut := _cut(segment, start, end)) is not None), arm, mass)
-    return joined(own) if own else rough
-
-
-def _cut(segment: Segment, start: float, end: float) -> Segment | None:
-    first = max(0, round((start - segment.start) / segment.dt) - 3)  # what the stencil takes away
-    last = min(len(segment), round((end - segment.start) / segment.dt) + 3)
+def _cut(segment: Segment, start: float, end: float, shift: float) -> Segment | None:
+    told = Stencil(segment.dt, shift).torques(len(segment))  # the others serve the stencil
+    first = round((start - segment.start) / segment.dt) - told.start
+    last = round((end - segment.start) / segment.dt) + len(segment) - told.stop
+    first, last = max(0, first), min(len(segment), last)
     return segment.part(first, last) if last - first > 1 else None
 
 
@@ -133,15 +131,21 @@ def _inner(cells: Cells, before: bool, after: bool) -> Cells:
     return cells.part(GUARD if before else 0, len(cells) - (GUARD if after else 0))
 
 
-def _stretch(whole: Cells, cells: Cells, arm: Arm, covariance: FloatArray) -> Stretch:
-    A, B, S = cells.A.sum(), cells.B.sum(), cells.S.sum(axis=0)
-    mass = float(B / A)
-    noise = max(1.0, float((cells.E.sum() - B * mass) / (cells.rows.sum() - 1)))
-    std = float(_std(np.array([A]), S[None], mass, noise, arm, covariance)[0])
+def _stretch(whole: Cells, cells: Cells, arm: Arm, covariance: FloatArray, colour: float) -> Stretch:
+    A, B = cells.A.sum(), cells.B.sum()
+    mass = float(B / max(A, 1e-300))
+    T = cells.sensitivity(arm, mass).sum(axis=0)
+    std = float(_std(np.array([A]), T[None], _noise(cells, mass, colour), covariance)[0])
     return Stretch(float(whole.start[0]), float(whole.end[-1]), mass, std)
 
 
-def _curve(cells: Cells, arm: Arm, covariance: FloatArray, mass: float) -> FloatArray:
+def _noise(cells: Cells, mass: float, colour: float) -> float:
+    """Variance of a stretch's rows: its own, or the log's where that is larger."""
+    left = cells.E.sum() - 2 * mass * cells.B.sum() + mass**2 * cells.A.sum()
+    return max(colour, float(left / (cells.rows.sum() - 1)))
+
+
+def _curve(cells: Cells, arm: Arm, covariance: FloatArray, mass: float, colour: float) -> FloatArray:
     """Times, masses and their standard deviations (3, C), each cell from its neighbourhood within the stretch."""
     half = round(HALF_BAND / CELL)
     low = np.clip(np.arange(len(cells)) - half, 0, None)
@@ -151,15 +155,12 @@ def _curve(cells: Cells, arm: Arm, covariance: FloatArray, mass: float) -> Float
         total = np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x, axis=0)])
         return np.asarray(total[high] - total[low])
 
-    A, B = moving(cells.A), moving(cells.B)
-    noise = max(1.0, float((cells.E.sum() - cells.B.sum() * mass) / (cells.rows.sum() - 1)))
-    std = _std(A, moving(cells.S), mass, noise, arm, covariance)
+    A, B = np.maximum(moving(cells.A), 1e-300), moving(cells.B)
+    std = _std(A, moving(cells.sensitivity(arm, mass)), _noise(cells, mass, colour), covariance)
     return np.stack([(cells.start + cells.end) / 2, B / A, std])
 
 
-def _std(A: FloatArray, S: FloatArray, mass: float, noise: float, arm: Arm, covariance: FloatArray) -> FloatArray:
-    g, l1, l2 = arm.model.gravity, arm.l1, arm.l2
-    by_l1 = arm.added(np.array([2 * l1, 0.0, l2, g, 0.0]))
-    by_l2 = arm.added(np.array([0.0, 2 * l2, l1, 0.0, g]))
-    J = np.column_stack([S, mass * (S @ by_l1), mass * (S @ by_l2)]) / A[:, None]
+def _std(A: FloatArray, T: FloatArray, noise: float, covariance: FloatArray) -> FloatArray:
+    A = np.maximum(A, 1e-300)
+    J = T / A[:, None]
     return np.sqrt(noise / A + np.einsum("cx,xy,cy->c", J, covariance, J))

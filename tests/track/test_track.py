@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 import algid
 from algid.arm import FloatArray
 from algid.cli.app import app
+from algid.errors import LogError
 from algid.identify.model import Model
 from algid.identify.whitening import NoiseLevels
 from algid.log import Log
@@ -80,6 +81,33 @@ def test_a_constant_payload_is_one_stretch(picking: Log) -> None:
     assert np.all(np.abs(found.m_p) < 5 * found.std)
 
 
+def test_slow_errors_of_the_torque_pass_for_no_payload(picking: Log) -> None:
+    """As unmodelled friction does, they alternate between the joints' turning points."""
+    log = picking.part(0, 1500)
+    slow = 0.05 * np.sin(2 * np.pi * 1.7 * log.t + np.array([[0.0], [1.0]]))
+    found = _track(replace(_noisy(log, np.random.default_rng(5)), tau=log.tau + slow))
+    assert len(found.stretches) == 1
+    assert found.colour > 5
+    low, high = found.stretches[0].ci95
+    assert low < 0 < high
+
+
+def test_stretches_follow_one_another_without_a_hole(picking: Log) -> None:
+    found = _track(_noisy(picking, np.random.default_rng(6)))
+    assert [s.end for s in found.stretches[:-1]] == pytest.approx([s.start for s in found.stretches[1:]], abs=1e-9)
+    assert np.diff(found.t) == pytest.approx(0.02, abs=1e-9)
+
+
+def test_errors_of_the_constants_are_no_colour(picking: Log) -> None:
+    rng = np.random.default_rng(7)
+    k = CASE.arm.constants()
+    covariance = np.zeros((9, 9))
+    covariance[:7, :7] = np.diag((1e-2 * k) ** 2)
+    wrong = k * (1 + 1e-2 * rng.standard_normal(7))
+    log = _noisy(picking, rng)
+    assert _track(log, wrong, covariance).colour < _track(log, wrong).colour / 3
+
+
 def test_cuts_are_the_best_ones() -> None:
     rng = np.random.default_rng(3)
     A = rng.uniform(1, 3, 24)
@@ -104,6 +132,17 @@ def test_the_command_writes_both_tables(picking: Log, tmp_path: Path) -> None:
     stretches = pl.read_parquet(tmp_path / "picking.stretches.parquet")
     assert stretches["m_p"].to_list() == pytest.approx(MASSES, abs=0.005)
     assert pl.read_parquet(tmp_path / "picking.track.parquet").columns == ["t", "m_p", "low", "high", "stretch"]
+
+
+@pytest.mark.parametrize("suffix", ["mcap", "parquet", "csv"])
+def test_a_log_carries_its_schedule(picking: Log, tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"picking.{suffix}"
+    write_log(path, picking.part(0, 50), truth=picking.origin.truth)
+    truth = algid.read_log(path).origin.truth
+    assert truth is not None
+    assert truth.schedule == ((1.5, 0.05), (3.0, 0.0))
+    with pytest.raises(LogError, match="the payload changes; weigh it with algid track"):
+        identify(path)
 
 
 def test_a_schedule_that_runs_backwards_is_refused() -> None:
