@@ -41,14 +41,13 @@ def identify(
     Example: algid identify run-unloaded.mcap --loaded run-loaded.mcap -o results
     """
     from algid.pipeline.identify import identify as run
-    from algid.report.progress import waiting
+    from algid.report.progress import progress
     from algid.results import read_result
 
     settings = choice.settings()
     known = None if parameters is None else read_result(parameters)
     bare, burdened = (logs, loaded or []) if known is None else ([], [*logs, *(loaded or [])])
-    count = len(bare) + len(burdened)
-    with waiting(f"{settings.estimator} estimator on {count} log{'s' if count > 1 else ''}", quiet):
+    with progress("samples", quiet) as told:
         result = run(
             bare,
             burdened,
@@ -59,6 +58,7 @@ def identify(
             force=force,
             report=report,
             command=shlex.join(["algid", *sys.argv[1:]]),
+            told=told,
         )
     if verbose:
         _tell(result, out)

@@ -15,9 +15,11 @@ from algid.identify.paper.method import SHORTEST
 from algid.pipeline.folder import result_folder, whole_folder
 from algid.pipeline.outcome import Outcome, result_of
 from algid.pipeline.paper import run_paper
+from algid.pipeline.passes import Passes
 from algid.pipeline.series import write_fit_series
 from algid.pipeline.settings import Settings
 from algid.pipeline.sources import LogLike, LogSource, sources_of
+from algid.progress import Told
 from algid.results import Result, write_result
 from algid.threads import one_blas_thread
 
@@ -40,6 +42,7 @@ def identify(
     report: bool = True,
     command: str | None = None,
     shared_library: bool = False,
+    told: Told | None = None,
 ) -> Result:
     """Identify the constants k1 … k7 of an arm and, from loaded logs, its tip payload.
 
@@ -64,6 +67,8 @@ def identify(
         The command line behind the call, for the result.
     shared_library : bool
         Put the pages' plotting library once beside the result folders instead of into each page.
+    told : callable
+        Called with the stage and how many samples of how many it has gone over, as the work goes on.
 
     Raises
     ------
@@ -77,16 +82,17 @@ def identify(
     burdened = sources_of(loaded, "loaded", profile, settings.gravity)
     if not bare and (parameters is None or not burdened):
         raise ValueError("an unloaded log is needed, or parameters and a loaded log")
+    passes = Passes(told, [*bare, *burdened])
     if out is None:
-        return _identify(bare, burdened, settings, parameters, None, report)
+        return _identify(bare, burdened, settings, parameters, None, report, passes)
     folder = result_folder((bare + burdened)[0].name, out) if name is None else out / f"{name}.algid"
     with whole_folder(folder, force) as temporary:
-        result = _identify(bare, burdened, settings, parameters, temporary, report)
+        result = _identify(bare, burdened, settings, parameters, temporary, report, passes)
         if command is not None:
             result = result.model_copy(update={"settings": result.settings | {"command": command}})
         write_result(result, temporary / "result.json")
         if report:
-            _write_pages(temporary, result, shared_library)
+            _write_pages(temporary, result, shared_library, told)
     return result
 
 
@@ -97,11 +103,12 @@ def _identify(
     parameters: Result | None,
     folder: Path | None,
     report: bool,
+    passes: Passes,
 ) -> Result:
     with one_blas_thread():
         if settings.estimator == "paper":
             return _by_the_paper(bare, burdened, settings, parameters, folder)
-        return _by_likelihood(bare, burdened, settings, parameters, folder if report else None)
+        return _by_likelihood(bare, burdened, settings, parameters, folder if report else None, passes)
 
 
 def _by_the_paper(
@@ -127,22 +134,31 @@ def _by_likelihood(
     settings: Settings,
     parameters: Result | None,
     folder: Path | None,
+    passes: Passes,
 ) -> Result:
     from algid.pipeline.fitted import outcome_of
     from algid.pipeline.statistical import prior_of, run_fit
 
     prior = None if parameters is None else prior_of(parameters, settings)
-    fit = run_fit(bare, burdened, settings, prior)
+    logs = [*bare, *burdened]
+    fit = run_fit(bare, burdened, settings, prior, passes.told)
+    passes.begin("prediction", logs)
     outcome = outcome_of(fit, bare, burdened, settings)
     if folder is not None:
-        write_fit_series(folder, fit, [*bare, *burdened], settings)
+        passes.begin("series", logs)
+        write_fit_series(folder, fit, logs, settings)
         if settings.estimator == "refined":
-            outcome = _with_the_papers(outcome, bare, burdened, settings, folder)
-    return result_of(outcome, settings, [*bare, *burdened])
+            outcome = _with_the_papers(outcome, bare, burdened, settings, folder, passes)
+    return result_of(outcome, settings, logs)
 
 
 def _with_the_papers(
-    outcome: Outcome, bare: Sequence[LogSource], burdened: Sequence[LogSource], settings: Settings, folder: Path
+    outcome: Outcome,
+    bare: Sequence[LogSource],
+    burdened: Sequence[LogSource],
+    settings: Settings,
+    folder: Path,
+    passes: Passes,
 ) -> Outcome:
     """The paper's convergence series of the first log of each kind, and its route to the payload."""
     first, second = _firsts(bare, burdened)
@@ -150,6 +166,7 @@ def _with_the_papers(
     durations = [log.summary().duration for log in logs]
     if first is None or settings.gravity == 0 or min(durations) < SHORTEST or max(durations) > SERIES_SECONDS:
         return outcome
+    passes.begin("series", logs)
     return replace(outcome, paper_payload=run_paper(first, second, settings, None, folder).payload)
 
 
@@ -157,11 +174,14 @@ def _firsts(bare: Sequence[LogSource], burdened: Sequence[LogSource]) -> tuple[L
     return bare[0] if bare else None, burdened[0] if burdened else None
 
 
-def _write_pages(folder: Path, result: Result, shared_library: bool) -> None:
+def _write_pages(folder: Path, result: Result, shared_library: bool, told: Told | None) -> None:
     from algid.report import markdown, write_report
 
+    if told is not None:
+        told("report", 0, 0)
+
     (folder / "report.md").write_text(markdown(result), encoding="utf-8")
-    write_report(folder, shared_library)
+    write_report(folder, shared_library, told)
 
 
 def known_constants(parameters: Result) -> FloatArray:

@@ -18,14 +18,21 @@ from algid.identify.prediction import PredictionSums
 from algid.pipeline.settings import Settings
 from algid.pipeline.sources import LogSource
 from algid.pipeline.velocities import with_velocities
+from algid.progress import Told
 from algid.results import Result
 from algid.sampling import Segment
 
 Pass = Callable[[], Iterable[Segment]]
 
 
-def run_fit(unloaded: Sequence[LogSource], loaded: Sequence[LogSource], settings: Settings, prior: Prior | None) -> Fit:
-    """Fit the settings' estimator to logs.
+def run_fit(
+    unloaded: Sequence[LogSource],
+    loaded: Sequence[LogSource],
+    settings: Settings,
+    prior: Prior | None,
+    told: Told | None = None,
+) -> Fit:
+    """Fit the settings' estimator to logs, telling the refined one's steps.
 
     Raises
     ------
@@ -39,7 +46,7 @@ def run_fit(unloaded: Sequence[LogSource], loaded: Sequence[LogSource], settings
         if settings.estimator == "weak":
             fit = weak.fit(*sources, weak_settings, settings.lengths, prior)
         else:
-            fit = refined.fit(*sources, _refined_settings(settings, weak_settings, prior))
+            fit = refined.fit(*sources, _refined_settings(settings, weak_settings, prior), told)
     except ValueError as error:
         names = ", ".join(log.name for log in (*unloaded, *loaded))
         raise LogError(f"{names}: {error}; record longer") from error

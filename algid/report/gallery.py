@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from algid.errors import ResultError
+from algid.progress import Told
 from algid.report.figures.base import Figure, Missing
 from algid.report.figures.closeup import TITLE as CLOSEUP
 from algid.report.figures.closeup import closeup
@@ -22,7 +23,7 @@ from algid.report.torquelog import TorqueLog, read_torque
 from algid.results import Result
 
 
-def gallery(folder: Path, result: Result) -> tuple[TorqueLog | None, list[Figure | Missing]]:
+def gallery(folder: Path, result: Result, told: Told | None = None) -> tuple[TorqueLog | None, list[Figure | Missing]]:
     """What the figures need of `torque.parquet`, where it can be read, and the figures."""
     series, loaded, seconds = (folder / f"{name}.parquet" for name in ("estimates", "loaded", "information"))
     figures = [_try("convergence", "Convergence of the estimates", series, lambda: convergence(series, result))]
@@ -31,7 +32,7 @@ def gallery(folder: Path, result: Result) -> tuple[TorqueLog | None, list[Figure
             _try("loaded", "Convergence, loaded log", loaded, lambda: convergence(loaded, result, loaded=True))
         )
     measured = folder / "torque.parquet"
-    found = _torque_log(measured)
+    found = _torque_log(measured, told)
     if isinstance(found, Missing):
         figures.append(found)
     else:
@@ -46,12 +47,12 @@ def gallery(folder: Path, result: Result) -> tuple[TorqueLog | None, list[Figure
     return read, figures
 
 
-def _torque_log(path: Path) -> TorqueLog | Missing:
+def _torque_log(path: Path, told: Told | None) -> TorqueLog | Missing:
     title = f"{TORQUE}, residual, coverage"
     if not path.exists():
         return Missing("torque", title, _absent(path))
     try:
-        return read_torque(path)
+        return read_torque(path, told)
     except ResultError as error:
         return Missing("torque", title, str(error))
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import polars as pl
@@ -209,19 +211,22 @@ def test_poles_that_are_no_numbers_are_told_in_words(logs: Path) -> None:
     assert "expected numbers between commas; give six like" in found.err
 
 
-def test_a_stop_leaves_nothing_half_written(tmp_path: Path) -> None:
-    import algid.cli
-    from algid.pipeline.folder import whole_folder
-
-    def write() -> None:
-        with whole_folder(tmp_path / "a.algid", force=False) as folder:
-            (folder / "result.json").write_text("half")
-            algid.cli._stop(15, None)
-
-    with pytest.raises(SystemExit) as stopped:
-        write()
-    assert stopped.value.code == 143
-    assert not list(tmp_path.iterdir())
+@pytest.mark.parametrize(("sent", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_stop_gets_one_line_and_leaves_nothing_half_written(
+    sent: signal.Signals, code: int, logs: Path, tmp_path: Path
+) -> None:
+    long = pl.concat([pl.read_csv(logs / "case1-unloaded.csv")] * 400)
+    long = long.with_columns(t=pl.int_range(pl.len()) * 1e-3)
+    long.write_csv(tmp_path / "long.csv")
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "algid", "identify", str(tmp_path / "long.csv"), "-o", str(out)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
+        while not (out.exists() and list(out.iterdir())) and running.poll() is None:
+            time.sleep(0.01)
+        running.send_signal(sent)
+        printed, told = running.communicate()
+    assert (running.returncode, printed, told) == (code, "", "algid: stopped; nothing half-written is left\n")
+    assert list(out.iterdir()) == []
 
 
 def test_results_that_fit_no_arm_get_one_line(logs: Path, tmp_path: Path) -> None:
