@@ -41,7 +41,7 @@ def validate(
     sources += [LogSource(log, "loaded", meaning, gravity) for log in loaded or []]
     with progress("samples") as told:
         Passes(told, sources).begin("prediction", sources)
-        found = judge(known, sources)
+        found = judge(known, sources, str(result))
     for name, one in {**found.logs, "all logs": found.total}.items():
         print(_line(name, one))
     if found.total is not None:

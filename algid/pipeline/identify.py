@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from algid.arm import CONSTANT_NAMES, FloatArray
-from algid.errors import LogError, ResultError
+from algid.errors import LogError, ResultError, SettingError
 from algid.identify.paper.method import SHORTEST
 from algid.pipeline.folder import result_folder, whole_folder
 from algid.pipeline.outcome import Outcome, result_of
@@ -20,7 +20,7 @@ from algid.pipeline.series import write_fit_series
 from algid.pipeline.settings import Settings
 from algid.pipeline.sources import LogLike, LogSource, sources_of
 from algid.progress import Told
-from algid.results import Result, write_result
+from algid.results import Result, read_result, write_result
 from algid.threads import one_blas_thread
 
 if TYPE_CHECKING:
@@ -29,17 +29,33 @@ if TYPE_CHECKING:
 SERIES_SECONDS = 600.0  # the paper's convergence series is drawn beside other estimators up to this length of log
 
 
+@dataclass(frozen=True)
+class Earlier:
+    """A result to start from, and what to call it where it is wrong: its file, or its log."""
+
+    result: Result
+    file: str
+
+    @classmethod
+    def of(cls, parameters: Result | Path | None) -> Earlier | None:
+        """The result itself, or that of a file."""
+        if parameters is None or isinstance(parameters, Result):
+            return None if parameters is None else cls(parameters, parameters.log.path)
+        return cls(read_result(parameters), str(parameters))
+
+
 def identify(
     unloaded: LogLike | Iterable[LogLike] | None,
     loaded: LogLike | Iterable[LogLike] | None = None,
     settings: Settings | None = None,
     *,
-    parameters: Result | None = None,
+    parameters: Result | Path | None = None,
     profile: Profile | None = None,
     out: Path | None = None,
     name: str | None = None,
     force: bool = False,
     report: bool = True,
+    export: bool = False,
     command: str | None = None,
     shared_library: bool = False,
     told: Told | None = None,
@@ -51,7 +67,7 @@ def identify(
     unloaded, loaded : path or `Log`, or several
         Logs of the arm without and with the payload.
     settings : Settings
-    parameters : Result
+    parameters : Result or path of one
         An arm identified before; then no unloaded log is needed.
     profile : Profile
         What the logs' names, units and signs mean.
@@ -63,6 +79,8 @@ def identify(
         Replace a result that is there.
     report : bool
         Write time series and pages beside ``result.json``.
+    export : bool
+        Write ``estimates.mcap`` beside them: see `algid.report.export`.
     command : str
         The command line behind the call, for the result.
     shared_library : bool
@@ -78,21 +96,27 @@ def identify(
         If there is neither an unloaded log nor `parameters`.
     """
     settings = settings or Settings()
+    earlier = Earlier.of(parameters)
     bare = sources_of(unloaded, "unloaded", profile, settings.gravity)
     burdened = sources_of(loaded, "loaded", profile, settings.gravity)
-    if not bare and (parameters is None or not burdened):
+    if not bare and (earlier is None or not burdened):
         raise ValueError("an unloaded log is needed, or parameters and a loaded log")
+    if settings.cross_validate and (len(bare) == 1 or len(burdened) == 1):
+        kind = "unloaded" if len(bare) == 1 else "loaded"
+        raise SettingError(f"--cross-validate: expected two {kind} logs or more, found one; give more, or leave it out")
     passes = Passes(told, [*bare, *burdened])
     if out is None:
-        return _identify(bare, burdened, settings, parameters, None, report, passes)
+        return _identify(bare, burdened, settings, earlier, None, report, passes)
     folder = result_folder((bare + burdened)[0].name, out) if name is None else out / f"{name}.algid"
     with whole_folder(folder, force) as temporary:
-        result = _identify(bare, burdened, settings, parameters, temporary, report, passes)
+        result = _identify(bare, burdened, settings, earlier, temporary, report, passes)
         if command is not None:
             result = result.model_copy(update={"settings": result.settings | {"command": command}})
         write_result(result, temporary / "result.json")
         if report:
             _write_pages(temporary, result, shared_library, told)
+        if export:
+            _export(temporary, told)
     return result
 
 
@@ -100,22 +124,22 @@ def _identify(
     bare: Sequence[LogSource],
     burdened: Sequence[LogSource],
     settings: Settings,
-    parameters: Result | None,
+    earlier: Earlier | None,
     folder: Path | None,
     report: bool,
     passes: Passes,
 ) -> Result:
     with one_blas_thread():
         if settings.estimator == "paper":
-            return _by_the_paper(bare, burdened, settings, parameters, folder)
-        return _by_likelihood(bare, burdened, settings, parameters, folder if report else None, passes)
+            return _by_the_paper(bare, burdened, settings, earlier, folder)
+        return _by_likelihood(bare, burdened, settings, earlier, folder if report else None, passes)
 
 
 def _by_the_paper(
     bare: Sequence[LogSource],
     burdened: Sequence[LogSource],
     settings: Settings,
-    parameters: Result | None,
+    earlier: Earlier | None,
     folder: Path | None,
 ) -> Result:
     if len(bare) > 1 or len(burdened) > 1:
@@ -124,7 +148,7 @@ def _by_the_paper(
             "give one, or use --estimator refined or weak"
         )
     first, second = _firsts(bare, burdened)
-    known = None if parameters is None else known_constants(parameters)
+    known = None if earlier is None else known_constants(earlier)
     return result_of(run_paper(first, second, settings, known, folder), settings, [*bare, *burdened])
 
 
@@ -132,14 +156,14 @@ def _by_likelihood(
     bare: Sequence[LogSource],
     burdened: Sequence[LogSource],
     settings: Settings,
-    parameters: Result | None,
+    earlier: Earlier | None,
     folder: Path | None,
     passes: Passes,
 ) -> Result:
     from algid.pipeline.fitted import outcome_of
     from algid.pipeline.statistical import prior_of, run_fit
 
-    prior = None if parameters is None else prior_of(parameters, settings)
+    prior = None if earlier is None else prior_of(earlier.result, settings, earlier.file)
     logs = [*bare, *burdened]
     fit = run_fit(bare, burdened, settings, prior, passes.told)
     passes.begin("prediction", logs)
@@ -184,7 +208,13 @@ def _write_pages(folder: Path, result: Result, shared_library: bool, told: Told 
     write_report(folder, shared_library, told)
 
 
-def known_constants(parameters: Result) -> FloatArray:
+def _export(folder: Path, told: Told | None) -> None:
+    from algid.report import export_mcap
+
+    export_mcap(folder, told)
+
+
+def known_constants(earlier: Earlier) -> FloatArray:
     """k1 … k7 (7,) of an earlier result.
 
     Raises
@@ -192,9 +222,7 @@ def known_constants(parameters: Result) -> FloatArray:
     ResultError
         If one of them has no estimate.
     """
-    values = [found.estimate if (found := parameters.parameters.get(name)) else None for name in CONSTANT_NAMES]
+    values = [found.estimate if (found := earlier.result.parameters.get(name)) else None for name in CONSTANT_NAMES]
     if any(value is None for value in values):
-        raise ResultError(
-            f"{parameters.log.path}: its result lacks a constant; identify the arm from a better log first"
-        )
+        raise ResultError(f"{earlier.file}: the result lacks a constant; identify the arm from a better log first")
     return np.array(values, dtype=np.float64)

@@ -114,27 +114,27 @@ def _watched(log: LogSource, moving: Pass, settings: Settings, delay: float) -> 
     log.prediction = sums
 
 
-def prior_of(result: Result, settings: Settings) -> Prior:
-    """What an earlier result knows of the arm.
+def prior_of(result: Result, settings: Settings, file: str | None = None) -> Prior:
+    """What an earlier result knows of the arm; where it is wrong, its `file` is named, or its log.
 
     Raises
     ------
     ResultError
         If its estimator gives no error bars, or it does not determine all constants of the model.
     """
-    model = model_of(settings)
+    model, file = model_of(settings), file or result.log.path
     if result.fit is None:
         raise ResultError(
-            f"{result.log.path}: the result of --estimator {result.estimator} has no error bars; "
+            f"{file}: the result of --estimator {result.estimator} has no error bars; "
             "identify with --estimator refined or weak, or use --estimator paper here too"
         )
     known = set(result.fit.covariance_names) & set(result.parameters)
     missing = [name for name in model.names if name not in known]
     if missing:
-        raise ResultError(f"{result.log.path}: the result has no {', '.join(missing)}; use the flags it was made with")
+        raise ResultError(f"{file}: the result has no {', '.join(missing)}; use the flags it was made with")
     places = [result.fit.covariance_names.index(name) for name in model.names]
     covariance = np.array(result.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
     mean = np.array([result.parameters[name].estimate for name in model.names], dtype=np.float64)
     if not (np.isfinite(covariance).all() and np.isfinite(mean).all()):
-        raise ResultError(f"{result.log.path}: the result leaves constants undetermined; identify from more logs first")
+        raise ResultError(f"{file}: the result leaves constants undetermined; identify from more logs first")
     return Prior.of(model.names, mean, covariance)

@@ -79,13 +79,13 @@ def test_quiet_is_silent_on_a_terminal(path: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("command", ["identify", "convert", "validate"])
 def test_a_pipe_gets_none_of_it(command: str, path: Path, tmp_path: Path, case_folder: Path) -> None:
-    arguments = {
+    arguments: dict[str, list[str | Path]] = {
         "identify": ["-q", path, "-o", tmp_path],
         "convert": [path, tmp_path / "log.csv"],
         "validate": [case_folder, path],
-    }[command]
+    }
     done = subprocess.run(
-        [sys.executable, "-m", "algid", command, *map(str, arguments)],
+        [sys.executable, "-m", "algid", command, *map(str, arguments[command])],
         capture_output=True,
         text=True,
         check=True,
