@@ -137,7 +137,7 @@ class Fit(_Model):
 
 
 class Result(_Model):
-    """The outcome of one identification."""
+    """The outcome of one identification; `truth` holds what a synthetic log was made with, by parameter."""
 
     schema_version: Literal[1] = SCHEMA_VERSION
     version: str
@@ -147,6 +147,7 @@ class Result(_Model):
     payload: dict[str, Estimate] = {}
     paper_payload: dict[str, Estimate] = {}
     table4: list[Table4Row] = []
+    truth: dict[str, float] = {}
     fit: Fit | None = None
     settings: dict[str, Any]
     log: LogSummary

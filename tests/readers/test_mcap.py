@@ -19,9 +19,10 @@ from algid.errors import LogError
 from algid.log import Log
 from algid.profile import Profile
 from algid.readers import open_log, read_log
+from algid.ros2 import HEADER
 from algid.writers import write_log
 from tests.readers.logs import EPOCH_NS, noise_log, same
-from tests.readers.mcaps import HEADER, NO_INDEX, Cdr, joint_state, write_mcap
+from tests.readers.mcaps import NO_INDEX, Cdr, joint_state, write_mcap
 
 TOPIC = "/joint_states"
 
