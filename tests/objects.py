@@ -16,8 +16,9 @@ import pytest
 from mcap.writer import CompressionType, Writer
 
 from algid.log import Log
+from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.stores import connect
-from algid.writers.mcap import DEFINITION, TYPE, payloads
+from algid.writers.mcap import payloads
 
 
 @dataclass
@@ -66,7 +67,7 @@ def with_cameras(path: Path, log: Log, images: int, size: int = 1 << 20, every: 
         writer = Writer(stream, chunk_size=1 << 30, compression=CompressionType.ZSTD)
         close_chunk = getattr(writer, "_Writer__finalize_chunk")  # noqa: B009
         writer.start(profile="ros2", library="test")
-        joints = _channel(writer, "/joint_states", TYPE, DEFINITION)
+        joints = _channel(writer, "/joint_states", JOINT_STATE, JOINT_STATE_DEFINITION)
         camera = _channel(writer, "/camera", "sensor_msgs/msg/CompressedImage", "uint8[] data\n")
         writer.add_metadata("calibration", {"camera": "none"})
         shots = images * every // len(log)
