@@ -5,8 +5,6 @@ Everything is optional; what a profile leaves out is told from the log. A key th
 
 from __future__ import annotations
 
-import reprlib
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
@@ -14,6 +12,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from algid.errors import SettingError
+from algid.tomlfile import first_misfit, read_toml
 
 AngleUnit = Literal["rad", "deg", "rev", "counts"]
 VelocityUnit = Literal["rad", "deg", "rev", "counts", "rpm"]
@@ -98,7 +97,7 @@ def with_settings(profile: Profile, settings: Mapping[str, Any]) -> Profile:
     try:
         return Profile.model_validate(merged)
     except ValidationError as error:
-        raise SettingError(f"setting {_told(error)}") from error
+        raise SettingError(f"setting {first_misfit(error)}") from error
 
 
 def load_profile(path: Path) -> Profile:
@@ -109,22 +108,4 @@ def load_profile(path: Path) -> Profile:
     SettingError
         If the file is missing, is not TOML, or holds a key or a value that is not known.
     """
-    try:
-        return Profile.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except (OSError, UnicodeDecodeError) as error:
-        raise SettingError(f"{path}: the profile cannot be read ({error}); check the name") from error
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise SettingError(f"{path}: the profile is not TOML: {error}") from error
-    except ValidationError as error:
-        raise SettingError(f"{path}: {_told(error)}") from error
-
-
-def _shown(value: object) -> str:
-    """As text; tables, which may nest without end, only a few levels deep."""
-    return reprlib.repr(value) if isinstance(value, dict | list) else str(value)
-
-
-def _told(error: ValidationError) -> str:
-    first = error.errors()[0]
-    place = ".".join(str(part) for part in first["loc"])
-    return f"{place}: {first['msg']}; found {_shown(first['input'])[:60]!r}"
+    return read_toml(path, Profile)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Generic, TypeVar
 
 from algid.errors import LogError
 from algid.readers.sniff import sniff
@@ -17,6 +18,34 @@ class Entry:
     name: str
     type: str
     count: int | None = None
+
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Look(Generic[T]):
+    """A log that may be refused: its format and entries in any case, then what was read of it, or why not."""
+
+    format: str
+    entries: tuple[Entry, ...]
+    found: T | None = None
+    refused: str | None = None
+
+
+def look(path: Path, read: Callable[[], T]) -> Look[T]:
+    """What a log holds, and what `read` makes of it.
+
+    Raises
+    ------
+    LogError
+        As `contents`; what `read` raises is told in `refused`.
+    """
+    kind, entries = contents(path)
+    try:
+        return Look(kind, entries, found=read())
+    except LogError as error:
+        return Look(kind, entries, refused=str(error))
 
 
 def contents(path: Path) -> tuple[str, tuple[Entry, ...]]:

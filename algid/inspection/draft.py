@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from algid.errors import LogError
-from algid.inspection.contents import Entry, contents
+from algid.inspection.contents import Entry, look
 from algid.readers import open_log
 from algid.readers.table import CHANNELS
 
@@ -34,12 +33,10 @@ def draft_profile(path: Path) -> str:
     LogError
         If there is no such log, or its format is unknown.
     """
-    kind, entries = contents(path)
-    try:
-        mapping = open_log(path).origin.mapping
-    except LogError as error:
-        return _HEAD + f"# {_safe(str(error))}\n" + _listed(entries) + _channels({}, kind)
-    return _HEAD + _source(mapping, kind) + _listed(entries) + _channels(mapping, kind)
+    log = look(path, lambda: open_log(path).origin.mapping)
+    mapping = log.found or {}
+    known = _source(mapping, log.format) if mapping else f"# {_safe(log.refused or '')}\n"
+    return _HEAD + known + _listed(log.entries) + _channels(mapping, log.format)
 
 
 def _source(mapping: dict[str, str], kind: str) -> str:

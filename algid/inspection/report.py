@@ -7,9 +7,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from algid.errors import LogError
 from algid.inspection.checks import Finding, examine
-from algid.inspection.contents import Entry, contents
+from algid.inspection.contents import Entry, look
 from algid.inspection.dynamics import DynamicFigures, dynamic_figures
 from algid.inspection.signals import ClockFigures, SignalFigures, clock_figures, signal_figures
 from algid.log import Log, Notice
@@ -54,18 +53,17 @@ def inspect_log(path: Path, profile: Profile | None = None) -> Inspection:
     LogError
         If there is no such log, or its format is unknown.
     """
-    kind, entries = contents(path)
-    try:
-        log = read_log(path, profile)
-    except LogError as error:
-        return Inspection(str(path), kind, entries, refused=str(error))
+    seen = look(path, lambda: read_log(path, profile))
+    if seen.found is None:
+        return Inspection(str(path), seen.format, seen.entries, refused=seen.refused)
+    log = seen.found
     gravity = profile.gravity if profile is not None else 9.81
     findings = examine(log, gravity=gravity)
     reasons = [f"{one.code}: {one.text}" for one in findings if one.refuse]
     return Inspection(
         path=str(path),
-        format=kind,
-        entries=entries,
+        format=seen.format,
+        entries=seen.entries,
         refused="; ".join(reasons) or None,
         mapping=log.origin.mapping,
         synthetic=log.origin.truth is not None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -41,11 +42,7 @@ class TableReader:
         LogError
             If a value is not finite, time runs wrong, or there are fewer than two samples.
         """
-        unwrapper = Unwrapper(self.unwrap)
-        for table, notices in self._samples(rows):
-            room = Room.empty(len(table), velocity=table.has_velocities)
-            self._convert(table, room, unwrapper)
-            yield Log(room.stamp_ns, room.theta, room.tau, self.origin, room.omega, notices)
+        return self._gathered(rows)
 
     def whole(self) -> Log:
         """The whole log.
@@ -55,13 +52,26 @@ class TableReader:
         LogError
             As `blocks`.
         """
-        unwrapper, gatherer, notices = Unwrapper(self.unwrap), None, self.notices[:0]
-        for table, said in self._samples(ROWS):
+        (log,) = self._gathered(sys.maxsize)
+        return log
+
+    def _gathered(self, most: int) -> Iterator[Log]:
+        """Logs of at most `most` samples, each converted from small tables straight into its arrays."""
+        unwrapper = Unwrapper(self.unwrap)
+        gatherer: Gatherer | None = None
+        notices: tuple[Notice, ...] = ()
+        for table, said in self._samples(min(ROWS, most)):
+            if gatherer is not None and len(gatherer) + len(table) > most:
+                yield self._log(gatherer, notices)
+                gatherer, notices = None, ()
             if gatherer is None:
-                gatherer = Gatherer(self.rows or len(table), velocity=table.has_velocities)
+                gatherer = Gatherer(min(most, self.rows or len(table)), velocity=table.has_velocities)
             self._convert(table, gatherer.more(len(table)), unwrapper)
             notices += said
-        assert gatherer is not None, "there are two samples at least"
+        if gatherer is not None:
+            yield self._log(gatherer, notices)
+
+    def _log(self, gatherer: Gatherer, notices: tuple[Notice, ...]) -> Log:
         room = gatherer.filled()
         return Log(room.stamp_ns, room.theta, room.tau, self.origin, room.omega, notices)
 

@@ -1,4 +1,4 @@
-"""Arrays for a whole log: tables are converted straight into them, so that each sample is copied once."""
+"""Arrays for a log or a block of it: tables are converted straight into them, so that each sample is copied once."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from algid.arm import FloatArray
 from algid.log import IntArray
 
 ROWS = 1 << 16
-"""Rows a block: small enough to stay in a core's cache between decoding and copying."""
+"""Rows a table: few enough to stay in a core's cache between decoding and copying."""
 _MOST_AT_ONCE = 1 << 26
 """Rows to reserve on a file's word alone."""
 
@@ -53,6 +53,9 @@ class Gatherer:
     def __init__(self, rows: int, *, velocity: bool) -> None:
         self._room = Room.empty(min(rows, _MOST_AT_ONCE), velocity=velocity)
         self._used = 0
+
+    def __len__(self) -> int:
+        return self._used
 
     def more(self, rows: int) -> Room:
         """Room for the next `rows` samples."""

@@ -325,6 +325,17 @@ def test_a_file_of_which_damage_left_nothing_says_so_and_where(tmp_path: Path) -
         read_log(tmp_path / "log.mcap")
 
 
+def test_damage_is_not_blamed_for_a_choice_that_is_missing(tmp_path: Path) -> None:
+    names = [f"joint{number}" for number in range(7)]
+    messages = [(TOPIC, row, joint_state(row, names, [0.0] * 7, (), [1.0] * 7).done()) for row in range(100)]
+    write_mcap(tmp_path / "log.mcap", messages, compression=CompressionType.NONE)
+    content = (tmp_path / "log.mcap").read_bytes()
+    (tmp_path / "log.mcap").write_bytes(content[: len(content) // 2])
+    with pytest.raises(LogError, match="has 7 joints") as caught:
+        read_log(tmp_path / "log.mcap")
+    assert "damaged" not in str(caught.value)
+
+
 def test_a_chunk_that_claims_too_much_is_left_out_unread(tmp_path: Path) -> None:
     log = noise_log(500, start_ns=EPOCH_NS)
     write_mcap(tmp_path / "log.mcap", messages_of(log))

@@ -134,5 +134,5 @@ def test_profiles_are_strict(text: str, told: str, tmp_path: Path) -> None:
     (tmp_path / "algid.toml").write_text(text)
     with pytest.raises(SettingError, match=told):
         load_profile(tmp_path / "algid.toml")
-    with pytest.raises(SettingError, match="cannot be read"):
+    with pytest.raises(SettingError, match="cannot read it"):
         load_profile(tmp_path / "none.toml")

@@ -32,12 +32,12 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
     LogError
         If no topic holds the joints, a message is encoded in an unknown way, or the file cannot be read.
     """
-    from algid.readers.mcap.plan import plan
+    from algid.readers.mcap.plan import NothingFoundError, plan
 
     with opened(paths[0]) as (file, found):
         try:
             wanted = plan(file, found, profile)
-        except LogError as error:
+        except NothingFoundError as error:
             raise _blamed(paths[0], found, error) from error
         truth = _truth(paths[0], found)
         rows = wanted.topics[0].count(found)

@@ -31,6 +31,10 @@ _SAMPLES = 64
 _USUAL = "/joint_states"
 
 
+class NothingFoundError(LogError):
+    """There is no such topic or message; damage to the file may be why."""
+
+
 @dataclass(frozen=True)
 class Plan:
     """The topics to read, the main one first, and what to tell of where each channel comes from."""
@@ -81,7 +85,7 @@ def _topic(
     paths = {channel: path for channel, (topic, path) in sources.items() if topic == name}
     shapes = list(_shapes(file, found, name))
     if not shapes:
-        raise LogError(f"{file.path}: there is no message on topic {name!r}; found {listed(found)}")
+        raise NothingFoundError(f"{file.path}: there is no message on topic {name!r}; found {listed(found)}")
     for channel, path in paths.items():
         if not any(shape.find(path) for shape in shapes):
             known = [*shapes[0].numbers][:12]
@@ -120,7 +124,9 @@ def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> tuple
     if profile is not None and all(profile.channel(name).source for name in JOINT_CHANNELS):
         return None
     wanted = f"the joints {profile.joints}" if profile and profile.joints else "positions and efforts of two joints"
-    raise LogError(f"{file.path}: no topic holds {wanted}; found {listed(found)}; name topics and fields in a profile")
+    raise NothingFoundError(
+        f"{file.path}: no topic holds {wanted}; found {listed(found)}; name topics and fields in a profile"
+    )
 
 
 def _joints(names: list[str], profile: Profile | None) -> tuple[str, str] | None:

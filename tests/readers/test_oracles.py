@@ -1,0 +1,224 @@
+"""Messages serialised by rosbags, read by algid, rosbags and mcap-ros2-support: the same to the last bit."""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import CompressionType
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from algid.arm import FloatArray
+from algid.log import Log
+from algid.profile import Profile
+from algid.readers import read_log
+from tests.readers.logs import EPOCH_NS, noise_log
+from tests.readers.mcaps import write_mcap
+
+TOPIC = "/arm"
+CHANNELS = ("theta1", "theta2", "tau1", "tau2")
+CUSTOM = {
+    "control_msgs/msg/InterfaceValue": "string[] interface_names\nfloat64[] values\n",
+    "control_msgs/msg/DynamicJointState": (
+        "std_msgs/Header header\nstring[] joint_names\ncontrol_msgs/InterfaceValue[] interface_values\n"
+    ),
+    "lab/msg/Joint": "bool[3] flags\nfloat32 temperature\nfloat64 angle\nchar mode\nfloat64[2] torques\n",
+    "lab/msg/State": (
+        "uint8 READY=1\nstring<=16 label\nuint16 errors\nlab/Joint[2] joints\nint8[] spare\n"
+        "lab/Joint[<=3] more\nstring[] words\nbyte last\n"
+    ),
+}
+
+
+@functools.cache
+def store() -> Any:
+    """The types of ROS 2, and those above."""
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    types.register({key: kind for name, text in CUSTOM.items() for key, kind in get_types_from_msg(text, name).items()})
+    return types
+
+
+def made(name: str, /, **fields: Any) -> Any:
+    """A message, or a part of one."""
+    return store().types[name](**fields)
+
+
+def header(stamp: int, frame: str) -> Any:
+    """A stamped header."""
+    time = made("builtin_interfaces/msg/Time", sec=stamp // 10**9, nanosec=stamp % 10**9)
+    return made("std_msgs/msg/Header", stamp=time, frame_id=frame)
+
+
+def joint_state(stamp: int, values: Sequence[float], draw: np.random.Generator) -> Any:
+    """Three joints in any order, the gripper's numbers made up."""
+    order = draw.permutation(3)
+    position, effort = (np.array([*pair, draw.normal()])[order] for pair in (values[:2], values[2:]))
+    names = [["shoulder", "elbow", "gripper"][place] for place in order]
+    kind = "sensor_msgs/msg/JointState"
+    frame = "f" * int(draw.integers(0, 9))
+    return made(kind, header=header(stamp, frame), name=names, position=position, velocity=np.empty(0), effort=effort)
+
+
+def dynamic(stamp: int, values: Sequence[float], draw: np.random.Generator) -> Any:
+    """Joints and interfaces in any order."""
+    joints = []
+    names = draw.permutation(["shoulder", "elbow"]).tolist()
+    for name in names:
+        joint = ("shoulder", "elbow").index(name)
+        told = {"position": values[joint], "effort": values[2 + joint], "temperature": draw.normal()}
+        kinds = draw.permutation([*told]).tolist()
+        numbers = np.array([told[kind] for kind in kinds])
+        joints.append(made("control_msgs/msg/InterfaceValue", interface_names=kinds, values=numbers))
+    kind = "control_msgs/msg/DynamicJointState"
+    return made(kind, header=header(stamp, ""), joint_names=names, interface_values=joints)
+
+
+def array(_stamp: int, values: Sequence[float], draw: np.random.Generator) -> Any:
+    """Numbers without names, dimensions of any label."""
+    dimension = made("std_msgs/msg/MultiArrayDimension", label="x" * int(draw.integers(0, 6)), size=5, stride=5)
+    layout = made("std_msgs/msg/MultiArrayLayout", dim=[dimension] * int(draw.integers(0, 3)), data_offset=0)
+    return made("std_msgs/msg/Float64MultiArray", layout=layout, data=np.array([draw.normal(), *values]))
+
+
+def wrench(stamp: int, values: Sequence[float], draw: np.random.Generator) -> Any:
+    """A force and a torque."""
+    kind = "geometry_msgs/msg/Vector3"
+    force, torque = (made(kind, x=pair[0], y=pair[1], z=draw.normal()) for pair in (values[:2], values[2:]))
+    both = made("geometry_msgs/msg/Wrench", force=force, torque=torque)
+    return made("geometry_msgs/msg/WrenchStamped", header=header(stamp, "tool"), wrench=both)
+
+
+def custom(_stamp: int, values: Sequence[float], draw: np.random.Generator) -> Any:
+    """Numbers of every width in every place."""
+
+    def joint(angle: float, torque: float) -> Any:
+        flags, torques = draw.integers(0, 2, 3).astype(bool), np.array([draw.normal(), torque])
+        warm = float(np.float32(draw.normal()))
+        return made("lab/msg/Joint", flags=flags, temperature=warm, angle=angle, mode=7, torques=torques)
+
+    words = ["w" * int(size) for size in draw.integers(0, 5, int(draw.integers(0, 3)))]
+    return made(
+        "lab/msg/State",
+        label="l" * int(draw.integers(0, 16)),
+        errors=int(draw.integers(0, 1 << 16)),
+        joints=[joint(values[0], values[2]), joint(values[1], values[3])],
+        spare=draw.integers(-100, 100, int(draw.integers(0, 4))).astype(np.int8),
+        more=[joint(0.0, 0.0)] * int(draw.integers(0, 3)),
+        words=words,
+        last=3,
+    )
+
+
+def indexed(*paths: str) -> dict[str, Any]:
+    """A profile that names each channel's field."""
+    return {"topic": TOPIC, **{name: {"source": path} for name, path in zip(CHANNELS, paths, strict=True)}}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A type of message: how one is made, what tells its joints to algid, and to anyone else."""
+
+    type: str
+    make: Callable[[int, Sequence[float], np.random.Generator], Any]
+    profile: dict[str, Any]
+    values: Callable[[Any], list[float]]
+
+
+def fields(*paths: str) -> Callable[[Any], list[float]]:
+    """Reads numbers by their paths out of a decoded message."""
+
+    def one(found: Any, path: str) -> float:
+        for part in re.findall(r"\w+", path):
+            found = found[int(part)] if part.isdigit() else getattr(found, part)
+        return float(found)
+
+    return lambda message: [one(message, path) for path in paths]
+
+
+def named(message: Any) -> list[float]:
+    """Positions and efforts of a JointState by name."""
+    joints = [list(message.name).index(name) for name in ("shoulder", "elbow")]
+    return [float(numbers[joint]) for numbers in (message.position, message.effort) for joint in joints]
+
+
+def interfaces(message: Any) -> list[float]:
+    """Positions and efforts of a DynamicJointState by name."""
+    found = []
+    for interface in ("position", "effort"):
+        for joint in ("shoulder", "elbow"):
+            value = message.interface_values[list(message.joint_names).index(joint)]
+            found.append(float(value.values[list(value.interface_names).index(interface)]))
+    return found
+
+
+JOINTS = {"joints": ["shoulder", "elbow"]}
+WRENCH = ("wrench.force.x", "wrench.force.y", "wrench.torque.x", "wrench.torque.y")
+STATE = ("joints[0].angle", "joints[1].angle", "joints[0].torques[1]", "joints[1].torques[1]")
+ARRAY = ("data[1]", "data[2]", "data[3]", "data[4]")
+KINDS = (
+    Kind("sensor_msgs/msg/JointState", joint_state, JOINTS, named),
+    Kind("control_msgs/msg/DynamicJointState", dynamic, JOINTS, interfaces),
+    Kind("std_msgs/msg/Float64MultiArray", array, indexed(*ARRAY), fields(*ARRAY)),
+    Kind("geometry_msgs/msg/WrenchStamped", wrench, indexed(*WRENCH), fields(*WRENCH)),
+    Kind("lab/msg/State", custom, indexed(*STATE), fields(*STATE)),
+)
+
+
+def write(path: Path, kind: Kind, log: Log, *, little: bool, **options: Any) -> None:
+    """The log as messages of a kind, serialised by rosbags."""
+    draw = np.random.default_rng(8)
+    rows = np.concatenate([log.theta, log.tau]).T.tolist()
+    messages = [
+        (TOPIC, stamp, bytes(store().serialize_cdr(kind.make(stamp, row, draw), kind.type, little_endian=little)))
+        for stamp, row in zip(log.stamp_ns.tolist(), rows, strict=True)
+    ]
+    definition, _ = store().generate_msgdef(kind.type, ros_version=2)
+    write_mcap(path, messages, {TOPIC: (kind.type, "ros2msg", definition.encode())}, **options)
+
+
+def by_mcap_ros2(path: Path, kind: Kind) -> FloatArray:
+    """Angles and torques (4, N) as mcap-ros2-support decodes them."""
+    with path.open("rb") as stream:
+        reading = make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages()
+        return np.array([kind.values(message.decoded_message) for message in reading]).T
+
+
+def by_rosbags(path: Path, kind: Kind) -> FloatArray:
+    """Angles and torques (4, N) as rosbags deserialises them."""
+    with AnyReader([path]) as reader:
+        messages = (reader.deserialize(data, connection.msgtype) for connection, _, data in reader.messages())
+        return np.array([kind.values(message) for message in messages]).T
+
+
+PACKINGS: list[tuple[CompressionType, dict[str, Any]]] = [
+    (CompressionType.ZSTD, {}),
+    (CompressionType.LZ4, {}),
+    (CompressionType.NONE, {}),
+    (CompressionType.NONE, {"use_chunking": False}),
+]
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.type.split("/")[-1])
+@pytest.mark.parametrize(("compression", "options"), PACKINGS, ids=["zstd", "lz4", "none", "unchunked"])
+@pytest.mark.parametrize("little", [True, False], ids=["little", "big"])
+def test_every_type_reads_as_in_other_readers(
+    kind: Kind, compression: CompressionType, options: dict[str, Any], little: bool, tmp_path: Path
+) -> None:
+    log = noise_log(60, start_ns=EPOCH_NS, velocity=False)
+    path = tmp_path / "log.mcap"
+    write(path, kind, log, little=little, compression=compression, **options)
+    found = read_log(path, Profile.model_validate(kind.profile))
+    ours = np.concatenate([found.theta, found.tau])
+    assert np.array_equal(found.stamp_ns, log.stamp_ns)
+    assert ours.tobytes() == np.concatenate([log.theta, log.tau]).tobytes()
+    assert ours.tobytes() == np.ascontiguousarray(by_mcap_ros2(path, kind)).tobytes()
+    assert ours.tobytes() == np.ascontiguousarray(by_rosbags(path, kind)).tobytes()
