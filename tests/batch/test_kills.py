@@ -50,7 +50,7 @@ def _start(logs: Path, out: Path, *flags: str) -> subprocess.Popen[str]:
 
 
 def _digest(out: Path) -> dict[str, str]:
-    files = {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in out.rglob("*") if p.name == "result.json"}
+    files = {str(p.relative_to(out)): hashlib.sha256(p.read_bytes()).hexdigest() for p in out.rglob("result.json")}
     left = [str(p) for p in out.rglob(".*") if p.name not in (".jobs", ".lock")]
     return files | {"left": str(left), "jobs": pl.read_parquet(out / "jobs.parquet").drop("seconds").write_json()}
 
@@ -90,6 +90,48 @@ def test_ctrl_c_ends_without_a_traceback_and_keeps_what_is_finished(logs: Path, 
     assert running.returncode == 130
     assert f"{table.height} ok" in told
     assert set(table["status"]) == {"ok"}
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of 64 kB; skips where none may be mounted."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    if not _mounts("-t", "tmpfs", "-o", "size=64k", "tmpfs", str(place)):
+        pytest.skip("no small file system can be mounted here")
+    yield place
+    subprocess.run(["umount", str(place)], check=True)
+
+
+def _mounts(*flags: str) -> bool:
+    try:
+        return subprocess.run(["mount", *flags], capture_output=True, check=False).returncode == 0
+    except OSError:
+        return False
+
+
+def test_a_full_disk_stops_a_batch_that_ends_as_undisturbed_once_there_is_room(
+    logs: Path, tmp_path: Path, small_disk: Path
+) -> None:
+    out = small_disk / "out"
+    first = _start(logs, out)
+    told, errors = first.communicate()
+    assert first.returncode == 1
+    assert "No space left on device" in errors
+    assert "make room and run again" in errors
+    assert "Traceback" not in errors
+    finished = [path.parent.stem for path in out.rglob("result.json")]
+    assert 0 < len(finished) < JOBS
+    assert "failed" not in told
+    assert not [path for path in out.rglob(".*") if path.name not in (".jobs", ".lock")]
+    assert _mounts("-o", "remount,size=16m", str(small_disk))
+    second = _start(logs, out)
+    told, errors = second.communicate()
+    assert (second.returncode, errors) == (0, "")
+    assert f"{JOBS} ok" in told
+    whole = _start(logs, tmp_path / "whole")
+    whole.communicate()
+    assert _digest(out) == _digest(tmp_path / "whole")
 
 
 class Dask:
