@@ -12,7 +12,7 @@ import numpy as np
 from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.errors import LogError, ResultError
 from algid.identify.paper.method import SHORTEST
-from algid.pipeline.folder import result_folder, whole_folder
+from algid.pipeline.folder import remove_stale, result_folder, whole_folder
 from algid.pipeline.outcome import Outcome, result_of
 from algid.pipeline.paper import run_paper
 from algid.pipeline.series import write_fit_series
@@ -80,6 +80,8 @@ def identify(
     if out is None:
         return _identify(bare, burdened, settings, parameters, None, report)
     folder = result_folder((bare + burdened)[0].name, out) if name is None else out / f"{name}.algid"
+    if name is None:  # a batch sweeps its whole output once
+        remove_stale(folder)
     with whole_folder(folder, force) as temporary:
         result = _identify(bare, burdened, settings, parameters, temporary, report)
         if command is not None:
