@@ -5,6 +5,7 @@ An object appears whole or not at all, as a file does through `algid.outfiles.wh
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -102,6 +103,11 @@ class ObjectStore:
         from pyarrow.fs import FileType
 
         return bool(self.filesystem.get_file_info(f"{self.root}/{name}").type == FileType.File)
+
+    def remove(self, name: str) -> None:
+        """Remove an object, if it is there."""
+        with suppress(FileNotFoundError):
+            self.filesystem.delete_file(f"{self.root}/{name}")
 
 
 def open_store(place: str) -> Store:

@@ -15,8 +15,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,11 +24,13 @@ import numpy as np
 import polars as pl
 
 from algid.api import synthesise
+from algid.memory import keep_freed
 from algid.pipeline.identify import identify
 from algid.writers import write_log
 
 BATCH = [sys.executable, "-m", "algid", "batch"]
 PORT = 18786
+ADDRESS = f"tcp://127.0.0.1:{PORT}"
 
 
 def logs(folder: Path, count: int) -> Path:
@@ -54,6 +56,7 @@ def alone(source: Path, out: Path) -> float:
     """Seconds of identification alone, in this process with one thread."""
     shutil.rmtree(out, ignore_errors=True)
     paths = sorted(source.iterdir())
+    keep_freed()  # as workers do
     start = time.perf_counter()
     for path in paths:
         identify(path, out=out, report=False)
@@ -61,30 +64,53 @@ def alone(source: Path, out: Path) -> float:
 
 
 @contextmanager
-def dask(workers: int) -> Iterator[list[subprocess.Popen[bytes]]]:
-    """A scheduler and workers of this machine."""
-    code = "from distributed.cli import dask_scheduler, dask_worker; dask_{}.main()"
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    env = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "POLARS_MAX_THREADS": "1"}
-    base = [sys.executable, "-c"]
-    address = f"tcp://127.0.0.1:{PORT}"
-    started = [
-        subprocess.Popen(
-            [*base, code.format("scheduler"), "--host", "127.0.0.1", "--port", str(PORT), "--no-dashboard"],
-            env=env,
-            **quiet,  # type: ignore[call-overload]
-        )
-    ]
-    for _ in range(workers):
-        worker = [*base, code.format("worker"), address, "--nthreads", "1", "--no-dashboard", "--no-nanny"]
-        started.append(subprocess.Popen(worker, env=env, **quiet))  # type: ignore[call-overload]
+def dask(workers: int, folder: Path) -> Iterator[Dask]:
+    """A scheduler and workers of this machine; what they say goes to files in `folder`."""
+    cluster = Dask(folder)
     try:
-        time.sleep(8)
-        yield started
+        cluster.start("scheduler", "--host", "127.0.0.1", "--port", str(PORT), until="Scheduler at")
+        for _ in range(workers):
+            cluster.add_worker()
+        yield cluster
     finally:
-        for process in started:
+        for process in cluster.running:
             process.kill()
             process.wait()
+
+
+class Dask:
+    """Processes of a cluster: the scheduler first, then the workers."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.running: list[subprocess.Popen[bytes]] = []
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def add_worker(self) -> None:
+        """Start a worker of one thread, and wait until the scheduler knows it."""
+        self.start("worker", ADDRESS, "--nthreads", "1", "--no-nanny", until="Registered to")
+
+    def kill_a_worker(self, instants: random.Random) -> None:
+        """Kill one, and start another in its place."""
+        victim = instants.choice(self.running[1:])
+        victim.kill()
+        victim.wait()
+        self.running.remove(victim)
+        self.add_worker()
+
+    def start(self, kind: str, *flags: str, until: str) -> None:
+        """Start a process, and wait for what it says when it is ready."""
+        code = f"from distributed.cli import dask_{kind}; dask_{kind}.main()"
+        env = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "POLARS_MAX_THREADS": "1"}
+        said = self.folder / f"{kind}{time.monotonic_ns()}.txt"
+        with said.open("wb") as stream:
+            command = [sys.executable, "-c", code, *flags, "--no-dashboard"]
+            self.running.append(subprocess.Popen(command, env=env, stdout=stream, stderr=stream))
+        end = time.monotonic() + 60
+        while until not in said.read_text():
+            if time.monotonic() > end or self.running[-1].poll() is not None:
+                raise RuntimeError(f"the {kind} does not start: {said.read_text()[-2000:]}")
+            time.sleep(0.05)
 
 
 def digest(out: Path) -> str:
@@ -97,35 +123,73 @@ def digest(out: Path) -> str:
     return found.hexdigest()
 
 
-def kills(source: Path, out: Path, count: int, seconds: float) -> bool:
-    """Whether a batch whose parent or worker is killed `count` times ends as an undisturbed one."""
+def kills(source: Path, out: Path, count: int, seconds: float) -> list[tuple[str, int, bool]]:
+    """Kill batches `count` times at random instants: whom, how often, and whether all ended as undisturbed ones.
+
+    A batch whose parent was killed is run again, and killed again, until one ends.
+    """
     whole = out.with_name("whole")
     run(source, whole, "--workers", "2")
+    expected = digest(whole)
+    share = count // 4
+    pool = ("--workers", "2")
+    found = [
+        ("the parent", count - 3 * share, _survives(source, out, pool, count - 3 * share, seconds, kill, expected)),
+        ("a worker of the pool", share, _survives(source, out, pool, share, seconds, kill_a_worker, expected)),
+    ]
+    with dask(2, out.with_name("dask")) as cluster:
+        flags = ("--scheduler", ADDRESS)
+        seconds = max(seconds, run(source, out, *flags))
+
+        def kill_of_cluster(_parent: int, instants: random.Random) -> None:
+            cluster.kill_a_worker(instants)
+
+        for whom, killing in (("the parent of a Dask batch", kill), ("a Dask worker", kill_of_cluster)):
+            found.append((whom, share, _survives(source, out, flags, share, seconds, killing, expected)))
+    return found
+
+
+def _survives(
+    source: Path,
+    out: Path,
+    flags: tuple[str, ...],
+    count: int,
+    seconds: float,
+    killing: Callable[[int, random.Random], None],
+    expected: str,
+) -> bool:
     instants = random.Random(0)
+    command = [*BATCH, str(source), "-o", str(out), "--no-report", "-q", *flags]
     shutil.rmtree(out, ignore_errors=True)
     same = True
-    for number in range(count):
+    for _ in range(count):
         if (out / "jobs.parquet").exists():
             shutil.rmtree(out)
-        batch = subprocess.Popen([*BATCH, str(source), "-o", str(out), "--no-report", "-q", "--workers", "2"])
+        batch = subprocess.Popen(command)
         time.sleep(instants.uniform(0.2, 1.0) * seconds)
-        if number % 2:
-            batch.kill()
-        else:
-            kill_a_worker(batch.pid, instants)
-        batch.wait()
-        if batch.returncode == 0:
-            same &= digest(out) == digest(whole)
-    subprocess.run([*BATCH, str(source), "-o", str(out), "--no-report", "-q", "--workers", "2"], check=True)
-    return same and digest(out) == digest(whole)
+        killing(batch.pid, instants)
+        if batch.wait() == 0:
+            same &= digest(out) == expected
+        elif batch.returncode != -signal.SIGKILL:
+            same = False
+    subprocess.run(command, check=True)
+    return same and digest(out) == expected
+
+
+def kill(parent: int, _instants: random.Random) -> None:
+    """Kill the batch itself, unless it has ended."""
+    if Path(f"/proc/{parent}/stat").read_text().rpartition(")")[2].split()[0] != "Z":
+        os.kill(parent, signal.SIGKILL)
 
 
 def kill_a_worker(parent: int, instants: random.Random) -> None:
     """Kill one of the processes that work for the batch `parent`."""
-    children = Path(f"/proc/{parent}/task/{parent}/children")
-    found = [int(c) for task in children.parents[1].iterdir() for c in (task / "children").read_text().split()]
-    working = [pid for pid in found if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
-    if working:
+    tasks = Path(f"/proc/{parent}/task")
+    with suppress(OSError):  # it may end meanwhile
+        found = [int(c) for task in tasks.iterdir() for c in (task / "children").read_text().split()]
+        working = [pid for pid in found if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+        if not working:
+            return
         os.kill(instants.choice(working), signal.SIGKILL)
 
 
@@ -139,8 +203,8 @@ def main(folder: Path, count: int = 1000, killed: int = 50) -> None:
     print("\n| what | asked | measured |\n|---|---|---|")
     print(f"| two workers over one | ≥ 1.8 | {one / two:.2f} ({one:.1f} s, {two:.1f} s) |")
     print(f"| overhead of one worker beyond identification | ≤ 15 % | {100 * (one / bare - 1):.0f} % ({bare:.1f} s) |")
-    with dask(2):
-        cluster = run(source, out, "--scheduler", f"tcp://127.0.0.1:{PORT}")
+    with dask(2, folder / "dask"):
+        cluster = run(source, out, "--scheduler", ADDRESS)
     print(
         f"| Dask's two workers over the process pool's | ≥ 0.85 | {two / cluster:.2f} ({cluster:.1f} s) |", flush=True
     )
@@ -149,8 +213,9 @@ def main(folder: Path, count: int = 1000, killed: int = 50) -> None:
     for path in sorted(source.iterdir())[:12]:
         shutil.copy(path, small)
     seconds = run(small, out, "--workers", "2")
-    told = "the same bytes" if kills(small, out, killed, seconds) else "DIFFERENT"
-    print(f"| {killed} kills of parent and workers | as undisturbed | {told} |")
+    for whom, times, same in kills(small, out, killed, seconds):
+        told = "the same bytes" if same else "DIFFERENT"
+        print(f"| {times} kills of {whom} at random instants | as undisturbed | {told} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ from algid.batch.jobs import Job
 from algid.batch.records import End, Input, Record, estimates_of, stat_of
 from algid.batch.stage import naming, staged
 from algid.errors import AlgidError
+from algid.memory import keep_freed
 from algid.pipeline.identify import identify
 from algid.pipeline.settings import Settings
 from algid.pipeline.sources import Staged, sha256_of
@@ -52,6 +53,7 @@ def run_task(task: Task) -> Record:
     DiskFullError
         If there is no space left.
     """
+    keep_freed()
     start = time.perf_counter()
     inputs = tuple(stat_of(path) for path in (*task.job.logs, *task.job.loaded))
     try:

@@ -65,7 +65,7 @@ def batch(
     store = open_store(out)
     with locked(out):
         sweep(store)
-        with _executor(scheduler, workers, memory_limit) as (executor, slots), _progress(quiet) as told:
+        with _executor(out, scheduler, workers, memory_limit) as (executor, slots), _progress(quiet) as told:
             running = Batch(store, recipe, executor, slots, told)
             with stopped_by_signals(running.stop):
                 ended = _watch(running, sources, out, alone, retry_failed) if watch else running.run(jobs, retry_failed)
@@ -91,7 +91,9 @@ def _profiles(choice: Choice) -> Callable[[str | None], Profile | None]:
 
 
 @contextmanager
-def _executor(scheduler: str | None, workers: int | None, memory_limit: str | None) -> Iterator[tuple[Executor, int]]:
+def _executor(
+    out: str, scheduler: str | None, workers: int | None, memory_limit: str | None
+) -> Iterator[tuple[Executor, int]]:
     """The workers, and how many jobs to hand out at once; they end with the block."""
     from algid.batch.processes import Processes
     from algid.errors import SettingError
@@ -101,7 +103,7 @@ def _executor(scheduler: str | None, workers: int | None, memory_limit: str | No
             raise SettingError("--scheduler: workers and their memory are the cluster's; set them where it is started")
         from algid.batch.cluster import cluster
 
-        with cluster(scheduler) as found:
+        with cluster(scheduler, out) as found:
             yield found
         return
     count = workers or len(os.sched_getaffinity(0))

@@ -12,7 +12,7 @@ import numpy as np
 from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.errors import LogError, ResultError, SettingError
 from algid.identify.paper.method import SHORTEST
-from algid.pipeline.folder import result_folder, whole_folder
+from algid.pipeline.folder import remove_stale, result_folder, whole_folder
 from algid.pipeline.outcome import Outcome, result_of
 from algid.pipeline.paper import run_paper
 from algid.pipeline.passes import Passes
@@ -108,6 +108,8 @@ def identify(
     if out is None:
         return _identify(bare, burdened, settings, earlier, None, report, passes)
     folder = result_folder((bare + burdened)[0].name, out) if name is None else out / f"{name}.algid"
+    if name is None:  # a batch sweeps its whole output once
+        remove_stale(folder)
     with whole_folder(folder, force) as temporary:
         result = _identify(bare, burdened, settings, earlier, temporary, report, passes)
         if command is not None:

@@ -6,11 +6,14 @@ import hashlib
 import os
 import random
 import signal
+import socket
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -33,8 +36,9 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def _start(logs: Path, out: Path) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "algid", "batch", str(logs), "-o", str(out), "--workers", "2", "--no-report"]
+def _start(logs: Path, out: Path, *flags: str) -> subprocess.Popen[str]:
+    where = flags or ("--workers", "2")
+    command = [sys.executable, "-m", "algid", "batch", str(logs), "-o", str(out), "--no-report", *where]
     root = str(Path(__file__).parents[2])
     return subprocess.Popen(
         command,
@@ -46,9 +50,15 @@ def _start(logs: Path, out: Path) -> subprocess.Popen[str]:
 
 
 def _digest(out: Path) -> dict[str, str]:
-    files = {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in out.rglob("*") if p.name == "result.json"}
+    files = {str(p.relative_to(out)): hashlib.sha256(p.read_bytes()).hexdigest() for p in out.rglob("result.json")}
     left = [str(p) for p in out.rglob(".*") if p.name not in (".jobs", ".lock")]
     return files | {"left": str(left), "jobs": pl.read_parquet(out / "jobs.parquet").drop("seconds").write_json()}
+
+
+def _wait_for_records(out: Path, count: int) -> None:
+    end = time.monotonic() + 60
+    while len(list((out / ".jobs").glob("*.json"))) < count and time.monotonic() < end:
+        time.sleep(0.005)
 
 
 def test_a_batch_killed_again_and_again_ends_as_an_undisturbed_one(logs: Path, tmp_path: Path) -> None:
@@ -72,9 +82,7 @@ def test_a_batch_killed_again_and_again_ends_as_an_undisturbed_one(logs: Path, t
 
 def test_ctrl_c_ends_without_a_traceback_and_keeps_what_is_finished(logs: Path, tmp_path: Path) -> None:
     running = _start(logs, tmp_path / "out")
-    end = time.monotonic() + 60
-    while not list((tmp_path / "out/.jobs").glob("*.json")) and time.monotonic() < end:
-        time.sleep(0.005)
+    _wait_for_records(tmp_path / "out", 1)
     running.send_signal(signal.SIGINT)
     told, errors = running.communicate()
     table = pl.read_parquet(tmp_path / "out/jobs.parquet")
@@ -82,3 +90,112 @@ def test_ctrl_c_ends_without_a_traceback_and_keeps_what_is_finished(logs: Path, 
     assert running.returncode == 130
     assert f"{table.height} ok" in told
     assert set(table["status"]) == {"ok"}
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of 64 kB; skips where none may be mounted."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    if not _mounts("-t", "tmpfs", "-o", "size=64k", "tmpfs", str(place)):
+        pytest.skip("no small file system can be mounted here")
+    yield place
+    subprocess.run(["umount", str(place)], check=True)
+
+
+def _mounts(*flags: str) -> bool:
+    try:
+        return subprocess.run(["mount", *flags], capture_output=True, check=False).returncode == 0
+    except OSError:
+        return False
+
+
+def test_a_full_disk_stops_a_batch_that_ends_as_undisturbed_once_there_is_room(
+    logs: Path, tmp_path: Path, small_disk: Path
+) -> None:
+    out = small_disk / "out"
+    first = _start(logs, out)
+    told, errors = first.communicate()
+    assert first.returncode == 1
+    assert "No space left on device" in errors
+    assert "make room and run again" in errors
+    assert "Traceback" not in errors
+    finished = [path.parent.stem for path in out.rglob("result.json")]
+    assert 0 < len(finished) < JOBS
+    assert "failed" not in told
+    assert not [path for path in out.rglob(".*") if path.name not in (".jobs", ".lock")]
+    assert _mounts("-o", "remount,size=16m", str(small_disk))
+    second = _start(logs, out)
+    told, errors = second.communicate()
+    assert (second.returncode, errors) == (0, "")
+    assert f"{JOBS} ok" in told
+    whole = _start(logs, tmp_path / "whole")
+    whole.communicate()
+    assert _digest(out) == _digest(tmp_path / "whole")
+
+
+class Dask:
+    """A scheduler and its workers, processes of this machine that end with the test."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.running: list[subprocess.Popen[bytes]] = []
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            self.port = free.getsockname()[1]
+        self.address = f"tcp://127.0.0.1:{self.port}"
+
+    def start(self, kind: str, *flags: str, until: str) -> subprocess.Popen[bytes]:
+        """A scheduler or a worker, once it says that it is ready."""
+        said = self.folder / f"{kind}{len(self.running)}.txt"
+        code = f"from distributed.cli import dask_{kind}; dask_{kind}.main()"
+        env: dict[str, Any] = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+        with said.open("wb") as stream:
+            command = [sys.executable, "-c", code, *flags, "--no-dashboard"]
+            self.running.append(subprocess.Popen(command, env=env, stdout=stream, stderr=stream))
+        end = time.monotonic() + 60
+        while until not in said.read_text():
+            assert time.monotonic() < end, said.read_text()
+            assert self.running[-1].poll() is None, said.read_text()
+            time.sleep(0.05)
+        return self.running[-1]
+
+    def worker(self) -> subprocess.Popen[bytes]:
+        """A worker with one thread that nobody starts again when it dies."""
+        return self.start("worker", self.address, "--nthreads", "1", "--no-nanny", until="Registered to")
+
+
+@pytest.fixture
+def dask(tmp_path: Path) -> Iterator[Dask]:
+    pytest.importorskip("distributed", reason="distributed is absent")
+    cluster = Dask(tmp_path)
+    try:
+        cluster.start("scheduler", "--host", "127.0.0.1", "--port", str(cluster.port), until="Scheduler at")
+        yield cluster
+    finally:
+        for process in cluster.running:
+            process.kill()
+            process.wait()
+
+
+def test_on_dask_the_deaths_of_a_worker_and_of_the_batch_change_no_result(
+    logs: Path, tmp_path: Path, dask: Dask
+) -> None:
+    pool = _start(logs, tmp_path / "whole")
+    victim, _ = dask.worker(), dask.worker()
+    pool.communicate()
+    first = _start(logs, tmp_path / "out", "--scheduler", dask.address)
+    _wait_for_records(tmp_path / "out", 1)
+    victim.kill()
+    told, errors = first.communicate()
+    assert first.returncode == 0, errors
+    assert f"{JOBS} ok" in told
+    assert _digest(tmp_path / "out") == _digest(tmp_path / "whole")
+    second = _start(logs, tmp_path / "again", "--scheduler", dask.address)
+    _wait_for_records(tmp_path / "again", 2)
+    second.kill()
+    second.communicate()
+    last = _start(logs, tmp_path / "again", "--scheduler", dask.address)
+    _, errors = last.communicate()
+    assert last.returncode == 0, errors
+    assert _digest(tmp_path / "again") == _digest(tmp_path / "whole")
