@@ -93,10 +93,15 @@ def quality_tables(result: TrackResult) -> list[Table]:
 def fit_table(result: TrackResult) -> Table:
     """What the track leaves of the torque."""
     rows = (
-        ("torque explained by arm and payload, noise aside", f"{100 * result.track.explained:.2f} %"),
+        ("torque explained by arm and payload, noise aside", _percent(result.track.explained)),
         ("slow errors and noise over the sensors' noise", significant(math.sqrt(result.track.colour), 3)),
     )
     return Table("Fit", (Column("What", "name"), Column("Value", "number")), rows)
+
+
+def _percent(share: float) -> str:
+    """A share in percent, never rounded up to all."""
+    return f"{100 * share:.2f} %" if share <= 0.9999 else "over 99.99 %"
 
 
 def provenance_tables(result: TrackResult) -> list[Table]:
