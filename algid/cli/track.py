@@ -2,46 +2,79 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from algid.cli import profiles
+from algid.cli import EXIT_INCOMPLETE
+from algid.cli.report import Export, ResultFormat
+from algid.cli.settings import Choice, takes_profile
+
+if TYPE_CHECKING:
+    from algid.track.result import TrackResult
 
 
+@takes_profile
 def track(
+    choice: Choice,
     log: Annotated[Path, typer.Argument(help="A log of the arm while objects are picked and placed.")],
     parameters: Annotated[Path, typer.Option(help="Result of the arm, with error bars.")],
-    out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write into.")] = Path(),
-    l1: Annotated[float | None, typer.Option("--l1", help="Length of link 1, m; the result's by default.")] = None,
-    l2: Annotated[float | None, typer.Option("--l2", help="Length of link 2, m; the result's by default.")] = None,
-    profile: profiles.ProfileFile = None,
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the folder LOG.track.")] = Path(),
+    l1: Annotated[
+        float | None, typer.Option("--l1", help="Length of link 1, m; the result's by default.", min=1e-3)
+    ] = None,
+    l2: Annotated[
+        float | None, typer.Option("--l2", help="Length of link 2, m; the result's by default.", min=1e-3)
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a track that is there.")] = False,
+    export: Annotated[Export | None, typer.Option(help="Also write track.mcap, for Foxglove and PlotJuggler.")] = None,
+    form: Annotated[ResultFormat, typer.Option("--format", help="What to print.")] = ResultFormat.TABLE,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Find when the payload changed and what each stretch weighs; write LOG.track.parquet and LOG.stretches.parquet.
+    """Find when the payload changed and what each stretch weighs; write LOG.track.
+
+    Exit code 3 tells that a stretch could not be weighed or that samples were lost.
 
     Example: algid track picking.mcap --parameters case1-unloaded.algid -o tracks
     """
-    from algid.errors import LogError
-    from algid.pipeline.sources import LogSource
-    from algid.results import read_result
-    from algid.track.files import write_track
-    from algid.track.known import arm_of
-    from algid.track.payload import track as run
+    from algid.pipeline.folder import refuse_existing, whole_folder
+    from algid.report.progress import waiting
+    from algid.track.files import track_folder, write_track
+    from algid.track.run import track_log
 
-    source = LogSource(log, "loaded", profiles.profile_from(profile))
-    result = read_result(parameters)
-    first = next(source.segments(), None)
-    if first is None:
-        raise LogError(f"{log}: it holds no samples; record longer")
-    arm, covariance = arm_of(result, first, l1, l2)
-    try:
-        found = run(source.segments, arm, covariance)
-    except ValueError as error:
-        raise LogError(f"{log}: {error}; record longer") from error
-    typer.echo("   from, s      to, s     m_p, kg    ± 95 %, kg")
-    for stretch in found.stretches:
-        half = stretch.ci95[1] - stretch.m_p
-        typer.echo(f"{stretch.start:10.3f} {stretch.end:10.3f} {stretch.m_p:11.6f} {half:13.6f}")
-    for path in write_track(found, log.stem, out):
-        typer.echo(f"wrote {path}", err=True)
+    folder = track_folder(str(log), out)
+    refuse_existing(folder, force)
+    settings = {"command": shlex.join(["algid", *sys.argv[1:]])}
+    with waiting(f"payload of {log.name}", quiet):
+        result = track_log(log, parameters, l1=l1, l2=l2, profile=choice.profile(), settings=settings)
+        with whole_folder(folder, force) as temporary:
+            write_track(result, temporary, mcap=export is Export.MCAP)
+    if not quiet:
+        _print(result, form)
+        typer.echo(f"wrote {folder}", err=True)
+    if not result.complete or result.data_lost:
+        raise typer.Exit(EXIT_INCOMPLETE)
+
+
+def _print(result: TrackResult, form: ResultFormat) -> None:
+    from algid.track.page import markdown
+    from algid.track.result import track_json
+
+    if form is not ResultFormat.TABLE:
+        print(track_json(result) if form is ResultFormat.JSON else markdown(result), end="")
+        return
+    from rich.console import Console
+
+    from algid.report.terminal import print_one, print_verdict
+    from algid.track.tables import change_table, stretch_table
+    from algid.track.verdict import verdict
+
+    console = Console()
+    print_verdict(verdict(result), console)
+    for table in (stretch_table(result), change_table(result)):
+        if table.rows:
+            console.print()
+            print_one(table, console)

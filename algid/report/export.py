@@ -64,7 +64,7 @@ def export_mcap(folder: Path, told: Told | None = None) -> Path:
         writer.start(profile="ros2", library=f"algid {result.version}")
         _write_torques(writer, folder / "torque.parquet", len(result.logs), told)
         for name in ("estimates", "loaded"):
-            _write_series(writer, folder / f"{name}.parquet", f"/algid/{name}")
+            write_series(writer, folder / f"{name}.parquet", f"/algid/{name}")
         writer.finish()  # type: ignore[no-untyped-call]
     return path
 
@@ -102,7 +102,8 @@ def _write_torques(writer: Writer, path: Path, logs: int, told: Told | None) -> 
             told("export", done, total)
 
 
-def _write_series(writer: Writer, path: Path, topic: str) -> None:
+def write_series(writer: Writer, path: Path, topic: str) -> None:
+    """Write a Parquet series, a message a row and a field a column but ``t``; nothing where there is no file."""
     if not path.exists():
         return
     [start] = start_stamps(path, 1)

@@ -67,6 +67,11 @@ def _bounds(result: Result) -> Table:
 
 def log_tables(result: Result) -> list[Table]:
     """The logs that were used and which channel each signal was taken from."""
+    return tables_of(result.logs)
+
+
+def tables_of(logs: list[LogSummary]) -> list[Table]:
+    """`logs` and which channel each signal was taken from."""
     columns = (
         Column("Log", "name"),
         Column("Arm", "text"),
@@ -77,8 +82,8 @@ def log_tables(result: Result) -> list[Table]:
     )
     channels = (Column("Signal", "name"), Column("Taken from", "text"), Column("Log", "text"))
     return [
-        Table("Logs", columns, tuple(_log_row(log) for log in result.logs)),
-        Table("Channels", channels, _channel_rows(result.logs)),
+        Table("Logs", columns, tuple(_log_row(log) for log in logs)),
+        Table("Channels", channels, _channel_rows(logs)),
     ]
 
 

@@ -78,13 +78,13 @@ def page_html(folder: Path, result: Result, library: str | None, told: Told | No
     judged = verdict(result)
     body = [
         _head(result, judged),
-        _contents(figures),
+        contents(figures),
         '<main id="numbers">',
         *map(table_html, estimate_tables(result)),
         *map(figure_html, figures),
-        *_section("fit", "What the estimator knows of the logs", fit_tables(result)),
-        *_section("data", "Data quality", [*quality_tables(torque, result), *log_tables(result)], _warnings(result)),
-        *_section("settings", "Settings and provenance", [settings_table(result.settings), provenance_table(result)]),
+        *section("fit", "What the estimator knows of the logs", fit_tables(result)),
+        *section("data", "Data quality", [*quality_tables(torque, result), *log_tables(result)], _warnings(result)),
+        *section("settings", "Settings and provenance", [settings_table(result.settings), provenance_table(result)]),
         "</main>",
         f"<footer>Made by algid {escaped(result.version)} from {escaped(str(folder.name))}/result.json.</footer>",
         '<noscript><p class="missing">The figures need JavaScript; all numbers stand without it.</p></noscript>',
@@ -151,11 +151,12 @@ def _head(result: Result, judged: Verdict) -> str:
     return (
         f'<header><p class="kicker">algid · identification of a two-link arm</p>'
         f"<h1>{escaped(file_name(result.log.path))}{more}</h1>\n"
-        f'<p class="facts">{escaped(facts)}</p>\n{_banner(judged)}</header>'
+        f'<p class="facts">{escaped(facts)}</p>\n{banner(judged)}</header>'
     )
 
 
-def _banner(judged: Verdict) -> str:
+def banner(judged: Verdict) -> str:
+    """The verdict's sentence and its reasons, in its colour."""
     word = LEVEL_WORDS[judged.level]
     told = judged.level == "reservations" and len(judged.reasons) == 1
     reasons = "" if told else "".join(f"<li>{escaped(reason)}</li>" for reason in judged.reasons)
@@ -166,14 +167,16 @@ def _banner(judged: Verdict) -> str:
     )
 
 
-def _contents(figures: Sequence[Figure | Missing]) -> str:
+def contents(figures: Sequence[Figure | Missing]) -> str:
+    """Links to the page's parts."""
     targets = [("numbers", "Numbers"), *((figure.key, figure.title) for figure in figures)]
     targets += [("data", "Data quality"), ("settings", "Settings and provenance")]
     links = "".join(f'<li><a href="#{key}">{escaped(title)}</a></li>' for key, title in targets)
     return f'<nav aria-label="Contents"><ul>{links}</ul></nav>'
 
 
-def _section(key: str, title: str, tables: Sequence[Table], extra: str = "") -> list[str]:
+def section(key: str, title: str, tables: Sequence[Table], extra: str = "") -> list[str]:
+    """A titled part of the page; nothing where it would be empty."""
     if not tables and not extra:
         return []
     return [

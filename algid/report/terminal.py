@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from algid.report.table import Table
 from algid.report.tables import estimate_tables
-from algid.report.verdict import LEVEL_WORDS, Level, verdict
+from algid.report.verdict import LEVEL_WORDS, Level, Verdict, verdict
 from algid.results import Result, Status
 
 if TYPE_CHECKING:
@@ -19,16 +19,20 @@ LEVEL_STYLES: dict[Level, str] = {"good": "bold green", "reservations": "bold ye
 
 def print_table(result: Result, console: Console) -> None:
     """Print the verdict, the estimates and what is known against them to `console`."""
+    print_verdict(verdict(result), console)
+    for table in estimate_tables(result):
+        console.print()
+        print_one(table, console)
+
+
+def print_verdict(judged: Verdict, console: Console) -> None:
+    """Print the sentence and the reasons behind it."""
     from rich.text import Text
 
-    judged = verdict(result)
     word = LEVEL_WORDS[judged.level]
     console.print(Text.assemble((word, LEVEL_STYLES[judged.level]), judged.sentence.removeprefix(word)))
     if judged.reasons:
         console.print(_points(judged.reasons))
-    for table in estimate_tables(result):
-        console.print()
-        print_one(table, console)
 
 
 def _points(reasons: Sequence[str]) -> RichTable:

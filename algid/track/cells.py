@@ -11,6 +11,7 @@ A       Σ g², information on m_p                    (C,)
 B       Σ g e, so that m_p = ΣB / ΣA                (C,)
 S       Σ g Y, how constants' errors enter          (C, q)
 E       Σ e²                                        (C,)
+Q       Σ of the whitened torques squared           (C,)
 ======  ==========================================  =========
 """
 
@@ -50,6 +51,11 @@ class Arm:
         """d (q,): what a payload of 1 kg adds to the coefficients."""
         return self.added(payload_constants(1.0, self.l1, self.l2, self.model.gravity))
 
+    @property
+    def bare(self) -> float:
+        """Mass in kg that at the tip has the inertia k3 of link 2 about joint 2."""
+        return abs(float(self.k[self.model.names.index("k3")])) / self.l2**2
+
     def added(self, z: FloatArray) -> FloatArray:
         """Payload constants z (5,) as changes of the coefficients (q,)."""
         return np.array([z[_PAYLOAD_OF[name]] if name in _PAYLOAD_OF else 0.0 for name in self.model.names])
@@ -65,6 +71,7 @@ class Cells:
     B: FloatArray
     S: FloatArray
     E: FloatArray
+    Q: FloatArray
     rows: FloatArray
 
     def __len__(self) -> int:
@@ -74,12 +81,21 @@ class Cells:
         """Cells `first` to `last` - 1."""
         return Cells(*(getattr(self, name)[first:last] for name in self.__dataclass_fields__))
 
+    @property
+    def mass(self) -> float:
+        """The payload in kg that fits all cells best."""
+        return float(self.B.sum() / max(self.A.sum(), 1e-300))
+
     def sensitivity(self, arm: Arm, mass: float | FloatArray) -> FloatArray:
         """T (C, q + 2): how the scores of a payload of `mass` kg, one or (C,), shift with constants, l1 and l2."""
         g, l1, l2 = arm.model.gravity, arm.l1, arm.l2
         by_l1 = self.S @ arm.added(np.array([2 * l1, 0.0, l2, g, 0.0]))
         by_l2 = self.S @ arm.added(np.array([0.0, 2 * l2, l1, 0.0, g]))
         return np.column_stack([self.S, mass * by_l1, mass * by_l2])
+
+    def squares(self, mass: float | FloatArray) -> FloatArray:
+        """Σ (e − g m_p)² (C,): what a payload of `mass` kg, one or (C,), leaves."""
+        return np.asarray(self.E - 2 * mass * self.B + mass**2 * self.A)
 
 
 def joined(parts: Sequence[Cells]) -> Cells:
@@ -89,7 +105,7 @@ def joined(parts: Sequence[Cells]) -> Cells:
 
 def cells_of(segments: Iterable[Segment], arm: Arm, mass: float, settle: int = 1) -> list[Cells]:
     """Cells of each piece of a log, linearised at a payload of `mass` kg and, `settle` times, at its trajectory."""
-    long_enough = (piece for piece in pieces(segments, _PIECE_SAMPLES) if len(piece) >= 8 * POINTS)
+    long_enough = (piece for piece in pieces(segments, _PIECE_SAMPLES) if len(piece) >= 3 * POINTS)
     return [_cells(piece, arm, mass, settle) for piece in long_enough]
 
 
@@ -109,6 +125,7 @@ def _sums(linear: Linearised, piece: Segment, stencil: Stencil, arm: Arm, mass: 
     Y, e = linear.columns[:-1], linear.columns[-1]
     g = arm.unit @ Y
     e = e + mass * g
+    torque = e + arm.k @ Y
     step = max(1, round(CELL / piece.dt))
     count = e.size // (2 * step)
 
@@ -123,5 +140,6 @@ def _sums(linear: Linearised, piece: Segment, stencil: Stencil, arm: Arm, mass: 
         by_cell(g * e),
         by_cell(g * Y).T,
         by_cell(e * e),
+        by_cell(torque * torque),
         np.full(count, 2.0 * step),
     )

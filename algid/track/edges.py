@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,42 +11,52 @@ from algid.arm import FloatArray
 from algid.track.cells import Arm, Cells
 from algid.track.changes import cuts
 from algid.track.colour import excess
+from algid.track.jolts import CALM, GUARD, fused, placed
 
 SHORTEST = 10  # cells: no object is carried for less than 0.2 s
-GUARD = 3  # cells left out on both sides of a change, which lies somewhere among them
 PENALTY = 60.0  # of a change: 7.7 standard deviations, far beyond what white rows reach
 MOST_ROUNDS = 6
 
 
 @dataclass(frozen=True)
 class Edges:
-    """Cells at which stretches begin, and the last one's end; the rows' variance, for intervals."""
+    """Cells at which stretches begin, and the last one's end; the cells between which each change surely lies."""
 
     places: list[int]
-    scale: float
+    spans: list[tuple[int, int]]
 
 
-def edges(cells: Cells, arm: Arm, covariance: FloatArray) -> Edges:
-    """The changes of payload among `cells`; `covariance` as for `algid.track.payload.track`.
+def edges(cells: Cells, arm: Arm) -> Edges:
+    """The changes of payload among `cells`.
 
     What a change would explain counts as an error at first, and no longer once the change is found: errors are
     told again from what the stretches leave, until the changes stay.
     """
-    places = [0, len(cells)]
+    places: list[int] = [0, len(cells)]
+    spans: list[tuple[int, int]] = []
     masses: FloatArray = np.zeros(len(cells))
-    exact = np.zeros_like(covariance)
+    exact = np.zeros((arm.k.size + 2,) * 2)
     for _ in range(MOST_ROUNDS):
         # a change must stand up to slow errors whatever their reason, wrong constants of the arm included
-        penalty = PENALTY * _scale(cells, masses, arm, exact)
+        penalty = PENALTY * variance(_calm(cells, spans), masses, arm, exact)
         before = places
-        places = _merged([0, *cuts(cells.A, cells.B, penalty, SHORTEST), len(cells)], cells, penalty)
+        places = [0, *cuts(cells.A, cells.B, penalty, SHORTEST), len(cells)]
+        places, spans = placed(_merged(fused(places, cells, penalty), cells, penalty), cells)
         if places == before:
             break
         masses = _masses(cells, places)
-    return Edges(places, _scale(cells, masses, arm, covariance))
+    return Edges(places, spans)
 
 
-def _scale(cells: Cells, masses: FloatArray, arm: Arm, covariance: FloatArray) -> float:
+def _calm(cells: Cells, spans: Sequence[tuple[int, int]]) -> Cells:
+    """The cells, those around changes emptied: their jolts are no errors of the arm's model."""
+    calm = np.ones(len(cells))
+    for low, high in spans:
+        calm[max(low - GUARD - CALM, 0) : high + GUARD + CALM] = 0.0
+    return replace(cells, A=calm * cells.A, B=calm * cells.B, S=calm[:, None] * cells.S, E=calm * cells.E)
+
+
+def variance(cells: Cells, masses: FloatArray, arm: Arm, covariance: FloatArray) -> float:
     """Variance of the rows about `masses` (C,), of the constants' errors freed, one at least."""
     T = cells.sensitivity(arm, masses)
     return max(_roughness(cells), excess(cells.A, cells.B - cells.A * masses, T, covariance))

@@ -21,10 +21,13 @@ from algid.arm import FloatArray
 from algid.identify.stencil import Stencil
 from algid.sampling import Segment
 from algid.track.cells import CELL, Arm, Cells, cells_of, joined
-from algid.track.edges import GUARD, SHORTEST, edges
+from algid.track.edges import SHORTEST, Edges, edges, variance
+from algid.track.jolts import CALM, GUARD
 
 QUANTILE = 1.959964  # of the normal distribution, for 95 %
 ROUNDS = 2  # of linearising each stretch at its own mass and looking for the changes again
+HOLE = 0.3  # s: cells this far apart have no log between them
+FEWEST = 4  # cells that weigh a stretch
 HALF_BAND = 0.25  # s: m_p(t) rests on so much log on both sides of t
 
 Pass = Callable[[], Iterable[Segment]]
@@ -49,7 +52,12 @@ class Stretch:
 class Track:
     """Stretches, and m_p(t) with its standard deviation and the stretch that each instant lies in, each (C,).
 
-    `colour` is the variance of the rows over that of sensor noise: above one, the arm's model lacks something.
+    Times at which the payload may be changing have no m_p(t).
+    `left` (C,) is the RMS of what arm and payload leave of the torque, over the sensors' noise. `changes` (n, 3)
+    are each change's time in s, and the times between which it surely lies. `colour` is the rows' variance over
+    that of sensor noise, slow errors included: above one, the arm's model lacks something. `explained` is the share
+    of the torque's power, noise aside, that arm and payload explain. `holes` (h, 2) are the times from and to which
+    the log has no samples. `bare` is the mass in kg that at the tip would weigh on joint 2 as link 2 does.
     """
 
     stretches: list[Stretch]
@@ -57,7 +65,12 @@ class Track:
     m_p: FloatArray
     std: FloatArray
     stretch: FloatArray
+    left: FloatArray
+    changes: FloatArray
     colour: float
+    explained: float
+    holes: FloatArray
+    bare: float
 
 
 def track(source: Pass, arm: Arm, covariance: FloatArray) -> Track:
@@ -66,7 +79,7 @@ def track(source: Pass, arm: Arm, covariance: FloatArray) -> Track:
     Parameters
     ----------
     source : callable
-        Gives a fresh iterable of the log's `Segment`; called three times.
+        Gives a fresh iterable of the log's `Segment`; called four times.
     arm : Arm
     covariance : (q + 2, q + 2) float64
         Of the arm's coefficients and link lengths.
@@ -80,17 +93,43 @@ def track(source: Pass, arm: Arm, covariance: FloatArray) -> Track:
     if not parts or sum(map(len, parts)) < 2 * SHORTEST:
         raise ValueError(f"the log is too short: expected {2 * SHORTEST * CELL:g} s at least")
     cells = joined(parts)
-    found = edges(cells, arm, covariance)
+    found = edges(cells, arm)
     for _ in range(ROUNDS):
         cells = joined(_settled(source, arm, _parts(cells, found.places)))
-        found = edges(cells, arm, covariance)
-    own = _parts(cells, found.places)
-    inner = [_inner(part, place > 0, place < len(own) - 1) for place, part in enumerate(own)]
-    stretches = [_stretch(whole, kept, arm, covariance, found.scale) for whole, kept in zip(own, inner, strict=True)]
-    curves = [_curve(part, arm, covariance, s.m_p, found.scale) for part, s in zip(own, stretches, strict=True)]
-    number = np.repeat(np.arange(len(own)), [len(part) for part in own]).astype(np.float64)
-    t, m_p, std = np.concatenate(curves, axis=1)
-    return Track(stretches, t, m_p, std, number, found.scale)
+        found = edges(cells, arm)
+    # whitening remembers: what a stretch is weighed by starts behind the jolt at its beginning
+    own, inner = _parts(cells, found.places), _settled(source, arm, _inner_parts(cells, found))
+    counts, calm = [len(part) for part in inner], joined(inner)
+    masses = np.repeat([part.mass for part in inner], counts)
+    colour = variance(calm, masses, arm, covariance)
+    stretches = [_stretch(whole, kept, arm, covariance, colour) for whole, kept in zip(own, inner, strict=True)]
+    t, m_p, std = np.concatenate([_curve(part, arm, covariance, colour) for part in inner], axis=1)
+    squares = calm.squares(masses)
+    return Track(
+        stretches,
+        t,
+        m_p,
+        std,
+        np.repeat(np.arange(len(inner)), counts).astype(np.float64),
+        np.sqrt(np.maximum(squares, 0.0) / calm.rows),
+        _changes(cells, found),
+        colour,
+        _explained(calm, squares),
+        _holes(cells),
+        arm.bare,
+    )
+
+
+def _explained(cells: Cells, squares: FloatArray) -> float:
+    signal = cells.Q.sum() - cells.rows.sum()
+    left = max(squares.sum() - cells.rows.sum(), 0.0)
+    return float(1 - left / signal) if signal > 0 else 0.0
+
+
+def _holes(cells: Cells) -> FloatArray:
+    """Times (h, 2) from and to which there are no samples."""
+    wide = np.flatnonzero(cells.start[1:] - cells.end[:-1] > HOLE)
+    return np.stack([cells.end[wide], cells.start[wide + 1]], axis=1)
 
 
 def _parts(cells: Cells, places: Sequence[int]) -> list[Cells]:
@@ -101,8 +140,7 @@ def _settled(source: Pass, arm: Arm, rough: Sequence[Cells]) -> list[Cells]:
     """Each stretch's cells, linearised again at its own mass, in one pass over the log."""
     found = list(rough)
     for place, own in groupby(_by_stretch(source(), arm, rough), key=itemgetter(0)):
-        mass = float(rough[place].B.sum() / max(rough[place].A.sum(), 1e-300))
-        if cells := cells_of((segment for _, segment in own), arm, mass):
+        if cells := cells_of((segment for _, segment in own), arm, rough[place].mass):
             found[place] = joined(cells)
     return found
 
@@ -126,26 +164,40 @@ def _cut(segment: Segment, start: float, end: float, shift: float) -> Segment | 
     return segment.part(first, last) if last - first > 1 else None
 
 
-def _inner(cells: Cells, before: bool, after: bool) -> Cells:
-    """Cells away from the changes at the stretch's ends."""
-    return cells.part(GUARD if before else 0, len(cells) - (GUARD if after else 0))
+def _inner_parts(cells: Cells, found: Edges) -> list[Cells]:
+    """Each stretch's cells, less those around the changes at its ends; at least some of its middle."""
+    begins = [found.places[0], *(high + GUARD + CALM for _, high in found.spans)]
+    ends = [*(low - GUARD - CALM for low, _ in found.spans), found.places[-1]]
+    parts = []
+    for place, (first, last) in enumerate(pairwise(found.places)):
+        begin, end = begins[place], ends[place]
+        if end - begin < FEWEST:
+            begin, end = min(first + GUARD, last - FEWEST), max(last - GUARD, first + FEWEST)
+        parts.append(cells.part(begin, end))
+    return parts
+
+
+def _changes(cells: Cells, found: Edges) -> FloatArray:
+    start = cells.start
+    rows = [
+        (start[at], start[low - GUARD], cells.end[high + GUARD - 1])
+        for at, (low, high) in zip(found.places[1:-1], found.spans, strict=True)
+    ]
+    return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
 
 def _stretch(whole: Cells, cells: Cells, arm: Arm, covariance: FloatArray, colour: float) -> Stretch:
-    A, B = cells.A.sum(), cells.B.sum()
-    mass = float(B / max(A, 1e-300))
-    T = cells.sensitivity(arm, mass).sum(axis=0)
-    std = float(_std(np.array([A]), T[None], _noise(cells, mass, colour), covariance)[0])
+    mass, T = cells.mass, cells.sensitivity(arm, cells.mass).sum(axis=0)
+    std = float(_std(np.array([cells.A.sum()]), T[None], _noise(cells, colour), covariance)[0])
     return Stretch(float(whole.start[0]), float(whole.end[-1]), mass, std)
 
 
-def _noise(cells: Cells, mass: float, colour: float) -> float:
+def _noise(cells: Cells, colour: float) -> float:
     """Variance of a stretch's rows: its own, or the log's where that is larger."""
-    left = cells.E.sum() - 2 * mass * cells.B.sum() + mass**2 * cells.A.sum()
-    return max(colour, float(left / (cells.rows.sum() - 1)))
+    return max(colour, float(cells.squares(cells.mass).sum() / (cells.rows.sum() - 1)))
 
 
-def _curve(cells: Cells, arm: Arm, covariance: FloatArray, mass: float, colour: float) -> FloatArray:
+def _curve(cells: Cells, arm: Arm, covariance: FloatArray, colour: float) -> FloatArray:
     """Times, masses and their standard deviations (3, C), each cell from its neighbourhood within the stretch."""
     half = round(HALF_BAND / CELL)
     low = np.clip(np.arange(len(cells)) - half, 0, None)
@@ -156,7 +208,7 @@ def _curve(cells: Cells, arm: Arm, covariance: FloatArray, mass: float, colour: 
         return np.asarray(total[high] - total[low])
 
     A, B = np.maximum(moving(cells.A), 1e-300), moving(cells.B)
-    std = _std(A, moving(cells.sensitivity(arm, mass)), _noise(cells, mass, colour), covariance)
+    std = _std(A, moving(cells.sensitivity(arm, cells.mass)), _noise(cells, colour), covariance)
     return np.stack([(cells.start + cells.end) / 2, B / A, std])
 
 

@@ -1,0 +1,83 @@
+"""From a log and an arm's result to a judged track."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from algid import __version__
+from algid.errors import LogError
+from algid.pipeline.sources import LogLike, LogSource
+from algid.report.verdict import verdict
+from algid.results import read_result
+from algid.threads import one_blas_thread
+from algid.track.known import arm_of
+from algid.track.payload import track
+from algid.track.result import TrackResult
+
+if TYPE_CHECKING:
+    from algid.profile import Profile
+
+
+def track_log(
+    log: LogLike,
+    parameters: Path,
+    *,
+    l1: float | None = None,
+    l2: float | None = None,
+    profile: Profile | None = None,
+    settings: Mapping[str, Any] | None = None,
+) -> TrackResult:
+    """Find when the payload changed during a log and what each stretch weighs.
+
+    Parameters
+    ----------
+    log : path or `Log`
+    parameters : Path
+        Result folder of the arm, or its `result.json`.
+    l1, l2 : float, m
+        Link lengths; the result's by default.
+    profile : Profile
+        What the log's names, units and signs mean.
+    settings : mapping
+        What else the result should tell of the call.
+
+    Raises
+    ------
+    LogError
+        If the log cannot be used or is too short.
+    ResultError
+        If the result cannot be read, or leaves a constant or a link length open.
+    """
+    result = read_result(parameters)
+    source = LogSource(log, "loaded", profile, result.settings.get("gravity", 9.81), changing=True)
+    first = next(source.segments(), None)
+    if first is None:
+        raise LogError(f"{source.name}: it holds no samples; record longer")
+    arm, covariance = arm_of(result, first, l1, l2)
+    try:
+        with one_blas_thread():
+            found = track(source.segments, arm, covariance)
+    except ValueError as error:
+        raise LogError(f"{source.name}: {error}; record longer") from error
+    truth = source.origin.truth
+    judged = verdict(result)
+    return TrackResult(
+        track=found,
+        log=source.summary(),
+        arm=str(parameters),
+        arm_sha256=_sha256(parameters),
+        arm_sentence=None if judged.level == "good" else judged.sentence,
+        settings={"l1": arm.l1, "l2": arm.l2, "gravity": arm.model.gravity, **(settings or {})},
+        version=__version__,
+        schedule=None if truth is None else truth.schedule or ((0.0, truth.payload),),
+        warnings=tuple(notice.text for notice in source.notices),
+        data_lost=any(notice.lossy for notice in source.notices),
+    )
+
+
+def _sha256(parameters: Path) -> str:
+    file = parameters / "result.json" if parameters.is_dir() else parameters
+    return hashlib.sha256(file.read_bytes()).hexdigest()

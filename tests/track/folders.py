@@ -1,0 +1,18 @@
+"""Case 1's arm, and its sensors' noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from algid.log import Log
+from algid.synth.cases import load_case
+
+CASE = load_case("case1")
+
+
+def noisy(log: Log, rng: np.random.Generator) -> Log:
+    """The log as sensors of 1e-3 rad and 1e-2 N m see it."""
+    theta = log.theta + 1e-3 * rng.standard_normal(log.theta.shape)
+    return replace(log, theta=theta, tau=log.tau + 1e-2 * rng.standard_normal(log.tau.shape), omega=None)

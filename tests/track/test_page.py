@@ -1,0 +1,154 @@
+"""A track's folder: the same digits everywhere, a page that opens offline, a log for other viewers."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from typer.testing import CliRunner
+
+import algid
+from algid.cli.app import app
+from algid.pipeline.identify import identify
+from algid.synth.sensors import Sensors
+from algid.track.files import write_track
+from algid.track.page import markdown, page_html
+from algid.track.payload import Stretch
+from algid.track.result import StretchStatus, TrackResult, track_json
+from algid.track.run import track_log
+from algid.track.tables import change_table, fixed, stretch_table
+from algid.track.verdict import verdict
+from algid.writers import write_log
+from tests.report.browser import DRIVER, Browser
+from tests.report.folders import HOSTILE
+from tests.report.test_browser import assert_sound
+from tests.track.folders import CASE, noisy
+
+START_NS = 1_700_000_000_000_000_000
+
+
+@pytest.fixture(scope="module")
+def files(picking: algid.Log, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A log with its schedule, and the result of its arm."""
+    folder = tmp_path_factory.mktemp("track")
+    unloaded, _ = algid.synthesise("case1", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
+    identify(unloaded, out=folder, name="arm", report=False)
+    log = noisy(picking, np.random.default_rng(4))
+    write_log(folder / "picking.mcap", replace(log, stamp_ns=log.stamp_ns + START_NS), truth=log.origin.truth)
+    return folder / "picking.mcap", folder / "arm.algid"
+
+
+@pytest.fixture(scope="module")
+def result(files: tuple[Path, Path]) -> TrackResult:
+    return track_log(*files, l1=CASE.arm.l1, l2=CASE.arm.l2)
+
+
+def test_the_sentence_tells_changes_and_masses(result: TrackResult) -> None:
+    judged = verdict(result)
+    assert judged.level == "good"
+    assert re.fullmatch(
+        r"Good: the payload changes twice at 1\.\d+ and [23]\.\d+ s, "
+        r"weighing -?0\.00\d+, 0\.0[45]\d+ and -?0\.00\d+ kg, "
+        r"the least certain to ± 0\.00\d+ kg \(95 %\)\.",
+        judged.sentence,
+    )
+
+
+def test_every_format_shows_the_same_digits(result: TrackResult) -> None:
+    rows = [*stretch_table(result).rows, *change_table(result).rows]
+    page, text = page_html(result), markdown(result).replace("\\", "")
+    for cell in {cell for row in rows for cell in row}:
+        assert f">{cell}<" in page
+        assert f" {cell} |" in text
+    for row, stretch in zip(rows, json.loads(track_json(result))["stretches"], strict=False):
+        assert row[3] == fixed(stretch["m_p"], stretch["std"])
+        assert row[5:7] == (stretch["unit"], stretch["status"])
+
+
+def test_the_schedule_stands_beside_the_stretches(result: TrackResult) -> None:
+    stretches = json.loads(track_json(result))["stretches"]
+    assert [stretch["truth"] for stretch in stretches] == [0.0, 0.05, 0.0]
+    changes = change_table(result)
+    assert [row[-1] for row in changes.rows] == ["1.500", "3.000"]
+    for (_, low, high), true in zip(result.track.changes, (1.5, 3.0), strict=True):
+        assert low < true < high
+
+
+def test_the_mcap_bears_the_stamps_of_the_log(result: TrackResult, tmp_path: Path) -> None:
+    write_track(result, tmp_path, mcap=True)
+    rows = pl.read_parquet(tmp_path / "track.parquet")
+    with (tmp_path / "track.mcap").open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        found = [(m.channel.topic, m.message.log_time, m.decoded_message) for m in reader.iter_decoded_messages()]
+    assert {topic for topic, _, _ in found} == {"/algid/payload"}
+    assert [time for _, time, _ in found] == (START_NS + np.rint(rows["t"].to_numpy() * 1e9).astype(np.int64)).tolist()
+    for name in ("m_p", "low", "high", "stretch_m_p", "stretch_low", "stretch_high"):
+        assert [getattr(message, name) for _, _, message in found] == rows[name].to_list()
+
+
+def test_masses_that_cannot_be_are_not_passed_on(result: TrackResult) -> None:
+    less, still = Stretch(0.0, 1.0, -0.2, 0.01), Stretch(1.0, 2.0, 0.1, 3.0)
+    found = replace(result, track=replace(result.track, stretches=[less, still, less]))
+    assert found.statuses == [StretchStatus.NEGATIVE_MASS, StretchStatus.WEAK_EXCITATION, StretchStatus.NEGATIVE_MASS]
+    judged = verdict(found)
+    assert judged.level == "failed"
+    assert "2 of 3 stretches weigh less than nothing" in judged.sentence
+    assert judged.reasons[:2] == (
+        "stretch 2 moves too little to be weighed",
+        "stretches 1 and 3 weigh less than nothing, which no payload does",
+    )
+
+
+def test_the_arm_of_another_log_is_told(files: tuple[Path, Path], tmp_path: Path) -> None:
+    other, _ = algid.synthesise("case2", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
+    write_log(tmp_path / "other.mcap", other)
+    judged = verdict(track_log(tmp_path / "other.mcap", files[1], l1=CASE.arm.l1, l2=CASE.arm.l2))
+    assert judged.level == "failed"
+
+
+def test_names_that_attack_stay_text(result: TrackResult) -> None:
+    hostile = replace(result, arm=HOSTILE, log=result.log.model_copy(update={"path": HOSTILE}), warnings=(HOSTILE,))
+    own = re.sub(r"<(script|style)[^>]*>.*?</\1>", "", page_html(hostile), flags=re.DOTALL)
+    assert "<img" not in own
+    assert "<script" not in own
+
+
+def test_the_command_prints_json_alone_and_keeps_what_is_there(files: tuple[Path, Path], tmp_path: Path) -> None:
+    lengths = ["--l1", str(CASE.arm.l1), "--l2", str(CASE.arm.l2)]
+    command = ["track", str(files[0]), "--parameters", str(files[1]), *lengths, "-o", str(tmp_path)]
+    done = CliRunner().invoke(app, [*command, "--format", "json", "--export", "mcap"])
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout)["schema_version"] == 1
+    folder = tmp_path / "picking.track"
+    names = {"track.json", "track.parquet", "stretches.parquet", "report.html", "report.md", "track.mcap"}
+    assert {path.name for path in folder.iterdir()} == names
+    again = CliRunner().invoke(app, command)
+    assert "exists already" in str(again.exception)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    opened = Browser()
+    yield opened
+    opened.close()
+
+
+@pytest.mark.skipif(
+    DRIVER is None or shutil.which("chromium") is None, reason="chromium and chromium-driver are not installed"
+)
+@pytest.mark.parametrize(("width", "dark"), [(1400, False), (400, True)])
+def test_the_page_is_drawn_whole(browser: Browser, result: TrackResult, tmp_path: Path, width: int, dark: bool) -> None:
+    write_track(result, tmp_path)
+    page = tmp_path / "report.html"
+    seen = browser.look(page, width, dark)
+    assert_sound(seen, page, "picking.mcap · algid")
+    assert seen.drawn == 2
