@@ -21,6 +21,7 @@ from algid.pipeline.velocities import with_velocities
 from algid.progress import Told
 from algid.results import Result
 from algid.sampling import Segment
+from algid.threads import beside
 
 Pass = Callable[[], Iterable[Segment]]
 
@@ -97,19 +98,16 @@ def _passes(logs: Sequence[LogSource], settings: Settings) -> list[Pass]:
     ]
     if settings.delay == "estimate":  # what the prediction is scored by depends on it
         return passes
-    return [partial(_watched, log, moving, settings, settings.delay) for log, moving in zip(logs, passes, strict=True)]
+    return [partial(_watched, log, moving, settings) for log, moving in zip(logs, passes, strict=True)]
 
 
-def _watched(log: LogSource, moving: Pass, settings: Settings, delay: float) -> Iterator[Segment]:
+def _watched(log: LogSource, moving: Pass, settings: Settings) -> Iterator[Segment]:
     """A pass that also gathers, once, what the prediction will be scored by."""
     if log.prediction is not None:
         yield from moving()
         return
-    hold = 0.5 if settings.torque_hold == "zoh" else 0.0
-    sums = PredictionSums(model_of(settings), lambda dt: delay + hold * dt)
-    for segment in moving():
-        sums.push(segment)
-        yield segment
+    sums = PredictionSums(model_of(settings), settings.torque_shift)
+    yield from beside(moving(), sums.push)
     sums.finish()
     log.prediction = sums
 
