@@ -84,9 +84,10 @@ def estimate(value: float, std: float, interval: tuple[float, float], unit: str,
 
 
 def table_rows(fit: Fit) -> tuple[dict[str, float], dict[str, float]]:
-    """Table 4's rows and their standard deviations."""
+    """Table 4's rows and their standard deviations; none of a parameter that is not identifiable."""
     rows: dict[str, float] = {}
     stds: dict[str, float] = {}
+    lost = {name for name, status in zip(fit.names, fit.status, strict=True) if status == "NOT_IDENTIFIABLE"}
     for loaded in (False, True):
         if loaded and not fit.shared.payload:
             continue
@@ -96,7 +97,7 @@ def table_rows(fit: Fit) -> tuple[dict[str, float], dict[str, float]]:
         coefficients = fit.shared.coefficients(fit.values, loaded)
         for name, weight in weights.items():
             spread = fit.spread(weight @ jacobian)
-            if np.isfinite(spread):
+            if np.isfinite(spread) and name not in lost:
                 rows[name], stds[name] = float(weight @ coefficients), spread
     if fit.shared.payload and np.isfinite(fit.std[fit.names.index("m_p")]):
         rows["m_p"] = float(fit.values[fit.names.index("m_p")])

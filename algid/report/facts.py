@@ -12,6 +12,8 @@ from algid.report.torquelog import TorqueLog
 from algid.report.verdict import replaced_estimator
 from algid.results import LogSummary, Result
 
+LONGEST_VALUE = 4_000  # characters: a command that names many logs is there to be copied
+
 
 def fit_tables(result: Result) -> list[Table]:
     """What a statistical estimator knows beside the estimates: noise, whiteness, terms, bounds."""
@@ -106,7 +108,7 @@ def _channel_rows(logs: list[LogSummary]) -> tuple[tuple[str, ...], ...]:
 
 def settings_table(settings: Mapping[str, Any]) -> Table:
     """The settings, nested ones by their dotted names."""
-    rows = tuple((visible(name), visible(value)) for name, value in flat_settings(settings).items())
+    rows = tuple((visible(name), visible(value, LONGEST_VALUE)) for name, value in flat_settings(settings).items())
     return Table("Settings", (Column("Setting", "name"), Column("Value", "text")), rows)
 
 

@@ -16,13 +16,13 @@ ESTIMATE_COLUMNS = (
     Column("Parameter", "name"),
     Column("Estimate", "number"),
     Column("± std", "number"),
-    Column("± std, %", "number", rank=2),
+    Column("± std, %", "number", rank=3),
     Column("Unit", "text"),
     Column("Status", "status"),
-    Column("95 % interval", "number", rank=3),
-    Column("Truth", "number", rank=1),
+    Column("95 % interval", "number", rank=4),
+    Column("Truth", "number", rank=2),
     Column("Error %", "number"),
-    Column("Paper %", "number"),
+    Column("Paper %", "number", rank=1),
 )
 TABLE4_COLUMNS = tuple(
     column for column in ESTIMATE_COLUMNS if column.kind != "status" and "interval" not in column.heading
@@ -46,7 +46,8 @@ def estimate_tables(result: Result) -> list[Table]:
     ]
     tables = [_estimates(title, group, result) for title, group in groups if group]
     if any(row.truth is not None for row in result.table4):
-        rows = tuple(_table4_row(row) for row in result.table4)
+        known = [row for row in result.table4 if row.estimate is not None or row.truth is not None]
+        rows = tuple(map(_table4_row, known))
         note = "Names and order of the paper's Table 4; Paper % is the error it reports."
         tables.append(Table("Table 4", TABLE4_COLUMNS, rows, note).without_empty())
     prediction = _prediction(result)

@@ -51,6 +51,7 @@ def _points(reasons: Sequence[str]) -> RichTable:
 def print_one(table: Table, console: Console) -> None:
     """Print one table, less the columns that the console has no room for; no digit is ever cut off."""
     from rich.measure import Measurement
+    from rich.text import Text
 
     made = rich_table(table)
     while Measurement.get(console, console.options.update(width=10_000), made).maximum > console.width:
@@ -59,6 +60,8 @@ def print_one(table: Table, console: Console) -> None:
             break
         table, made = fewer, rich_table(fewer)
     console.print(made)
+    if table.note:
+        console.print(Text(table.note, "dim"))
 
 
 def rich_table(table: Table) -> RichTable:
@@ -67,9 +70,14 @@ def rich_table(table: Table) -> RichTable:
     from rich.table import Table as RichTable
     from rich.text import Text
 
-    title, caption = Text(table.title, "bold"), Text(table.note, "dim") if table.note else None
-    made = RichTable(title=title, caption=caption, box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    made.title_justify = made.caption_justify = "left"
+    made = RichTable(
+        title=Text(table.title, "bold"),
+        title_justify="left",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+        show_edge=False,
+        collapse_padding=True,
+    )
     for column in table.columns:
         right = column.kind == "number"
         made.add_column(Text(column.heading), justify="right" if right else "left", overflow="fold")

@@ -164,9 +164,13 @@ def _unexplained(prediction: TorquePrediction | None, least: float) -> Iterator[
 
 
 def _far_from_truth(result: Result) -> Iterator[str]:
-    for row in result.table4:
-        if row.truth is None or row.estimate is None or not row.std:
-            continue
-        distance = abs(row.estimate - row.truth) / row.std
-        if distance > FAR_FROM_TRUTH:
-            yield f"{visible(row.parameter)} lies {significant(distance, 2)} σ from the truth"
+    distances = {
+        visible(row.parameter): abs(row.estimate - row.truth) / row.std
+        for row in result.table4
+        if row.truth is not None and row.estimate is not None and row.std
+    }
+    far = {name: significant(distance, 2) for name, distance in distances.items() if distance > FAR_FROM_TRUTH}
+    if len(far) == 1:
+        yield from (f"{name} lies {distance} σ from the truth" for name, distance in far.items())
+    elif far:
+        yield f"{joined([f'{name} ({distance} σ)' for name, distance in far.items()])} lie far from the truth"

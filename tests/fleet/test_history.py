@@ -91,3 +91,10 @@ def test_a_table_without_robots_is_refused(tmp_path: Path) -> None:
         _history(_jobs(1, 3, seed=1).with_columns(robot=pl.lit(None, dtype=pl.String)), tmp_path)
     with pytest.raises(ResultError, match="cannot read it"):
         history_of(tmp_path / "absent.parquet")
+
+
+def test_each_parameter_is_told_as_it_is_followed(tmp_path: Path) -> None:
+    _jobs(1, 40, seed=1).write_parquet(tmp_path / "jobs.parquet")
+    calls: list[tuple[str, int, int]] = []
+    history_of(tmp_path / "jobs.parquet", lambda *call: calls.append(call))
+    assert calls == [("following", place, 7) for place in range(7)]

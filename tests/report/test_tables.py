@@ -144,7 +144,7 @@ def test_the_terminal_has_no_colour_without_a_colour_system(result: Result, monk
     assert "\x1b[3" not in terminal(result, force_terminal=True)
 
 
-@pytest.mark.parametrize("width", [80, 100, 112, 140])
+@pytest.mark.parametrize("width", [80, 100, 106, 140])
 def test_a_narrow_terminal_drops_columns_and_never_digits(result: Result, width: int) -> None:
     table = estimate_tables(result)[0]
     shown = from_terminal(terminal(result, width), "Parameters")

@@ -121,3 +121,11 @@ def test_an_undetermined_parameter_is_told_once(result: Result) -> None:
     lost = Estimate(estimate=None, unit="kg m^2", status=Status.NOT_IDENTIFIABLE)
     told = with_parameter(result, "k5", lost).model_copy(update={"warnings": ["k5 is not determined"]})
     assert verdict(told).reasons == ("k5 is not identifiable",)
+
+
+def test_many_estimates_far_from_the_truth_are_one_reason(result: Result) -> None:
+    wrong = [row.model_copy(update={"truth": row.truth * 2}) for row in result.table4 if row.truth is not None]
+    reasons = verdict(result.model_copy(update={"table4": wrong})).reasons
+    assert len(reasons) == 1
+    assert reasons[0].startswith("k1 (")
+    assert reasons[0].endswith(" σ) lie far from the truth")

@@ -9,7 +9,8 @@ from scipy.integrate import solve_ivp
 from algid.arm import energy, forward_dynamics
 from algid.integrals import integral
 from algid.synth.cases import load_case
-from algid.synth.excitation import SampledTorque, no_torque, wide_multi_sine
+from algid.synth.excitation import Hold, SampledTorque, Torque, no_torque, wide_multi_sine
+from algid.synth.run import Recording, held, synthesise
 from algid.synth.simulator import simulate
 
 CASE = load_case("case1")
@@ -69,3 +70,18 @@ def test_sampled_torque_is_integrated_from_corner_to_corner(hold: str) -> None:
 def test_times_must_increase() -> None:
     with pytest.raises(ValueError, match="increasing times"):
         simulate(K, no_torque, np.array([0.0, 0.0]))
+
+
+@pytest.mark.parametrize("hold", [None, "zoh"])
+def test_the_simulation_tells_how_far_it_is_and_changes_nothing_by_it(hold: Hold | None) -> None:
+    recording = Recording(rate=200.0, duration=0.5)
+    torque: Torque = wide_multi_sine(CASE.arm)
+    torque = torque if hold is None else held(torque, recording.rate, recording.duration, hold)
+    calls: list[tuple[str, int, int]] = []
+    watched = synthesise(CASE, torque, recording, lambda *call: calls.append(call))
+    for stage in ("unloaded", "loaded"):
+        done = [(done, total) for told, done, total in calls if told == stage]
+        assert done == sorted(done)
+        assert done[-1] == (101, 101)
+    for log, alone in zip(watched, synthesise(CASE, torque, recording), strict=True):
+        np.testing.assert_array_equal(log.theta, alone.theta)

@@ -10,6 +10,7 @@
     displayModeBar: "hover",
     modeBarButtons: [["zoom2d", "pan2d", "autoScale2d", "resetScale2d", "toImage"]],
   };
+  const [NAME, CELL, FRAME, BARRED] = [110, 34, 70, 190]; // pixels: a log's name, a number; axes, with a colour bar
   const drawn = new Map();
   const hidden = new Set();
   let syncing = false;
@@ -36,7 +37,11 @@
     if (touch) layout.dragmode = false; // a finger scrolls the page
     if (width) Object.assign(layout, { width, autosize: false });
     const traces = paint(panel.traces, "", style);
+    const room = width || document.getElementById(panel.id).clientWidth;
+    const names = layout.annotations || [];
+    if (room < NAME * names.length + (traces[0].type === "heatmap" ? BARRED : FRAME)) layout.annotations = [];
     for (const trace of traces) {
+      if (trace.texttemplate && room < CELL * trace.x.length + BARRED) delete trace.texttemplate;
       if (hidden.has(panel.figure + " " + trace.legendgroup)) trace.visible = false;
     }
     return [traces, layout];

@@ -24,6 +24,8 @@ def correlation(result: Result) -> Figure | Missing:
     reading = "Read: a strong colour off the diagonal means two estimates err together: trust their combination first."
     pairs = _strong_pairs(names, matrix)
     note = f"Correlated beyond {STRONG:g}: {joined(pairs)}." if pairs else f"No pair is correlated beyond {STRONG:g}."
+    if np.isnan(matrix).any():
+        note += " What is not identifiable has no correlation."
     return Figure("correlation", TITLE, (_panel(names, matrix, note),), reading, note=note)
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from algid.arm import FloatArray
 from algid.report.figures.base import Figure, Legend, Missing, Panel, axis, band, line, packed
 from algid.report.spectrum import LAGS
 from algid.report.torquelog import TorqueLog
 from algid.results import Result
 
+FEW_POWERS = 4
 TITLE = "Residual: spectrum and whiteness"
 LEGEND = (
     Legend("measured", "measured torque", "@measured"),
@@ -37,7 +39,7 @@ def _spectrum(found: TorqueLog, joint: int) -> Panel:
     ]
     layout = {
         "xaxis": axis("frequency, Hz", type="log", **_decades()),
-        "yaxis": axis("(N m)²/Hz", type="log", dtick=2, tickfont={"size": 10}),
+        "yaxis": axis("(N m)²/Hz", type="log", tickfont={"size": 10}, **_powers(found.density[[joint - 1, joint + 1]])),
         "hovermode": "closest",
     }
     return Panel(
@@ -47,6 +49,13 @@ def _spectrum(found: TorqueLog, joint: int) -> Panel:
         f"Joint {joint}: spectrum",
         260,
     )
+
+
+def _powers(density: FloatArray) -> dict[str, object]:
+    """Ticks at every other power of ten where there are many; plotly's own where there are few."""
+    positive = density[density > 0]
+    many = positive.size and positive.max() > 10.0**FEW_POWERS * positive.min()
+    return {"dtick": 2} if many else {"nticks": 5}
 
 
 def _decades() -> dict[str, object]:

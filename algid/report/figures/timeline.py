@@ -14,6 +14,7 @@ from algid.results import LogSummary
 
 SPACE = 0.01  # of the whole time, between two logs
 MOST_NAMES = 6
+ROOM = 40  # pixels above a panel: names, and the buttons above them where a screen has no pointer to show them by
 
 
 def offsets(ranges: Mapping[int, LogRange]) -> dict[int, float]:
@@ -45,7 +46,9 @@ def separators(ranges: Mapping[int, LogRange], moved: Mapping[int, float], logs:
     starts = {log: moved[log] + span.first for log, span in sorted(ranges.items())}
     shapes = [upright(start, "@muted/0.6") for start in list(starts.values())[1:]]
     named = starts if len(starts) <= MOST_NAMES else {}
-    return {"shapes": shapes, "annotations": [_name(start, _words(log, logs)) for log, start in named.items()]}
+    names = [_name(start, _words(log, logs)) for log, start in named.items()]
+    room = {"margin": {"t": ROOM}} if names else {}
+    return {"shapes": shapes, "annotations": names, **room}
 
 
 def _words(log: int, logs: list[LogSummary]) -> str:

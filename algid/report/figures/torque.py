@@ -63,5 +63,5 @@ def _note(found: TorqueLog) -> str:
         for residual, rms in zip(found.residual_rms, found.rms, strict=True)
     ]
     noisy = any(2 * residual > rms for residual, rms in zip(found.residual_rms, found.rms, strict=True))
-    why = " The prediction differentiates angles twice, and with them their noise: see Torque prediction below."
+    why = " The prediction differentiates angles twice, and with them their noise: see Torque prediction above."
     return f"Residual: joint 1 {shares[0]}, joint 2 {shares[1]}.{why if noisy else ''}"
