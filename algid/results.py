@@ -58,10 +58,13 @@ class Table4Row(_Model):
 
 
 class LogSummary(_Model):
-    """A log that was used: first stamp in ns, duration in s, rate in Hz, each signal's channel."""
+    """A log that was used: first stamp in ns, duration in s, rate in Hz, each signal's channel.
+
+    `sha256` is null where only what was needed of a log was fetched from an object store.
+    """
 
     path: str
-    sha256: str
+    sha256: str | None
     role: Literal["unloaded", "loaded"]
     format: str
     rows: int
@@ -134,7 +137,7 @@ class Fit(_Model):
 
 
 class Result(_Model):
-    """The outcome of one identification."""
+    """The outcome of one identification; `truth` holds what a synthetic log was made with, by parameter."""
 
     schema_version: Literal[1] = SCHEMA_VERSION
     version: str
@@ -144,6 +147,7 @@ class Result(_Model):
     payload: dict[str, Estimate] = {}
     paper_payload: dict[str, Estimate] = {}
     table4: list[Table4Row] = []
+    truth: dict[str, float] = {}
     fit: Fit | None = None
     settings: dict[str, Any]
     log: LogSummary

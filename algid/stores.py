@@ -86,7 +86,7 @@ class ObjectStore:
                 stream.write(content)
         except OSError as error:
             raise OutputError(
-                f"{self.root}/{name}: cannot write there ({_told(error)}); check rights and name"
+                f"{self.root}/{name}: cannot write there ({told_by(error)}); check rights and name"
             ) from error
 
     def names(self, under: str) -> list[str]:
@@ -132,7 +132,7 @@ def connect(url: str) -> tuple[Any, str]:
     try:
         filesystem, path = FileSystem.from_uri(url.replace("az://", "abfs://", 1))
     except (pa.ArrowException, OSError, ValueError) as error:
-        raise OutputError(f"{url}: the object store cannot be reached ({_told(error)}); check the URL") from error
+        raise OutputError(f"{url}: the object store cannot be reached ({told_by(error)}); check the URL") from error
     return filesystem, path.rstrip("/")
 
 
@@ -146,7 +146,8 @@ def list_urls(url: str) -> list[tuple[str, str]]:
     return below or [(url, root.rpartition("/")[2])]
 
 
-def _told(error: BaseException) -> str:
+def told_by(error: BaseException) -> str:
+    """The first line of what an object store's client says."""
     return str(error).split("\n", maxsplit=1)[0][:200]
 
 
@@ -173,7 +174,7 @@ def fetched(url: str, folder: Path) -> Path:
     try:
         copy_files(path, str(copy), source_filesystem=filesystem, destination_filesystem=LocalFileSystem())
     except OSError as error:
-        raise LogError(f"{url}: it cannot be read ({_told(error)}); check name and rights") from error
+        raise LogError(f"{url}: it cannot be read ({told_by(error)}); check name and rights") from error
     return copy
 
 

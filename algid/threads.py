@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from itertools import islice
 from typing import Generic, TypeVar
@@ -42,6 +42,22 @@ def ahead(source: Iterator[T]) -> Iterator[T]:
         while item := coming.result():
             coming = pool.submit(list, islice(source, 1))
             yield item[0]
+
+
+def beside(source: Iterable[T], work: Callable[[T], None]) -> Iterator[T]:
+    """The same items, each worked on in a thread of its own while it is used; in order, one at a time.
+
+    Once the items are at their end, so is the work; its exception is raised here.
+    """
+    from concurrent.futures import ThreadPoolExecutor
+
+    with ThreadPoolExecutor(1) as pool:
+        before = pool.submit(lambda: None)
+        for item in source:
+            before.result()
+            before = pool.submit(work, item)
+            yield item
+        before.result()
 
 
 class Beside(Generic[T]):

@@ -11,13 +11,14 @@ from mcap.writer import CompressionType, Writer
 
 from algid.log import Log, Origin
 from algid.outfiles import whole_file
+from algid.ros2 import HEADER, JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.writers import write_log
-from algid.writers.mcap import DEFINITION, TYPE, payloads
+from algid.writers.mcap import payloads
 
 ROWS = 1_000_000
 START_NS = 1_700_000_000_000_000_000
 _IMU = "sensor_msgs/msg/Imu"
-_HEADER = DEFINITION[DEFINITION.index("====") :]
+
 _IMU_DEFINITION = f"""\
 std_msgs/Header header
 geometry_msgs/Quaternion orientation
@@ -26,7 +27,7 @@ geometry_msgs/Vector3 angular_velocity
 float64[9] angular_velocity_covariance
 geometry_msgs/Vector3 linear_acceleration
 float64[9] linear_acceleration_covariance
-{_HEADER}================================================================================
+{HEADER}================================================================================
 MSG: geometry_msgs/Quaternion
 float64 x
 float64 y
@@ -58,7 +59,7 @@ def joint_and_imu(path: Path) -> None:
     with whole_file(path) as temporary, temporary.open("wb") as stream:
         writer = Writer(stream, chunk_size=768 * 1024, compression=CompressionType.ZSTD)
         writer.start(profile="ros2", library="algid bench")
-        joints = _channel(writer, "/joint_states", TYPE, DEFINITION)
+        joints = _channel(writer, "/joint_states", JOINT_STATE, JOINT_STATE_DEFINITION)
         imu = _channel(writer, "/imu/data", _IMU, _IMU_DEFINITION)
         other = imu_payloads(ROWS // 5)
         for row, (stamp, payload) in enumerate(zip(log.stamp_ns.tolist(), payloads(log), strict=True)):
@@ -86,7 +87,7 @@ def with_cameras(path: Path, gigabytes: float = 2.0) -> None:
     with whole_file(path) as temporary, temporary.open("wb") as stream:
         writer = Writer(stream, chunk_size=4 << 20, compression=CompressionType.ZSTD)
         writer.start(profile="ros2", library="algid bench")
-        joints = _channel(writer, "/joint_states", TYPE, DEFINITION)
+        joints = _channel(writer, "/joint_states", JOINT_STATE, JOINT_STATE_DEFINITION)
         camera = _channel(writer, "/camera/image", "sensor_msgs/msg/CompressedImage", "uint8[] data\n")
         head = struct.pack("<BBBBI", 0, 1, 0, 0, len(image))
         for row, (stamp, payload) in enumerate(zip(log.stamp_ns.tolist(), payloads(log), strict=True)):

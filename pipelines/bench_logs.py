@@ -17,9 +17,10 @@ import zstandard
 from algid.arm import FloatArray, inverse_dynamics
 from algid.log import Log, Origin
 from algid.outfiles import whole_file
+from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.synth.cases import load_case
 from algid.writers import write_log
-from algid.writers.mcap import DEFINITION, TOPIC, TYPE, payloads
+from algid.writers.mcap import TOPIC, payloads
 
 RATE = 1000
 PERIOD = 10.0  # s
@@ -82,7 +83,7 @@ def mcap(path: Path, rows: int) -> Path:
 
 
 def _write_mcap(stream: BinaryIO, log: Iterator[Log]) -> None:
-    schema = struct.pack("<H", 1) + _text(TYPE) + _text("ros2msg") + _text(DEFINITION)
+    schema = struct.pack("<H", 1) + _text(JOINT_STATE) + _text("ros2msg") + _text(JOINT_STATE_DEFINITION)
     channel = struct.pack("<HH", 0, 1) + _text(TOPIC) + _text("cdr") + struct.pack("<I", 0)
     head = _record(1, _text("ros2") + _text("algid bench")) + _record(3, schema) + _record(4, channel)
     stream.write(_MAGIC + head)
@@ -146,7 +147,7 @@ def bag(path: Path, rows: int) -> Path:
     if not path.exists():
         store = get_typestore(Stores.ROS2_HUMBLE)
         with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-            connection = writer.add_connection(TOPIC, TYPE, typestore=store)
+            connection = writer.add_connection(TOPIC, JOINT_STATE, typestore=store)
             for block in blocks(rows):
                 for stamp, payload in zip(block.stamp_ns.tolist(), payloads(block), strict=True):
                     writer.write(connection, stamp, payload)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Iterator
 from pathlib import Path
-from urllib.parse import quote
 
 import polars as pl
 import pytest
@@ -16,26 +14,16 @@ from algid.batch.plan import Recipe
 from algid.batch.records import End
 from algid.batch.run import Batch
 from algid.pipeline.settings import Settings
-from algid.stores import connect, open_store
+from algid.stores import open_store
 from algid.synth.sensors import Sensors
 from tests.batch.test_run import Here
+from tests.objects import s3
 
 
 @pytest.fixture
 def bucket(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
-    server = pytest.importorskip("moto.server", reason="moto is absent")
-    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
-        monkeypatch.setenv(name, "testing")
-    monkeypatch.setenv("AWS_EC2_METADATA_DISABLED", "true")
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    running = server.ThreadedMotoServer(ip_address="127.0.0.1", port=port, verbose=False)
-    running.start()
-    query = f"?scheme=http&endpoint_override={quote(f'127.0.0.1:{port}')}&region=us-east-1&allow_bucket_creation=true"
-    connect(f"s3://lab/{query}")[0].create_dir("lab")
-    yield query
-    running.stop()
+    with s3(monkeypatch) as served:
+        yield served.query
 
 
 def test_a_batch_reads_and_writes_objects(bucket: str, tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from algid.threads import Beside, ahead, one_blas_thread
+from algid.threads import Beside, ahead, beside, one_blas_thread
 
 
 def test_items_read_ahead_keep_their_order() -> None:
@@ -32,6 +32,21 @@ def test_no_thread_is_left_when_the_consumer_leaves() -> None:
     next(items)
     items.close()  # type: ignore[attr-defined]
     assert threading.active_count() == before
+
+
+def test_items_are_worked_on_in_order_and_to_the_last_one() -> None:
+    seen: list[int] = []
+    assert list(beside(range(100), seen.append)) == list(range(100))
+    assert seen == list(range(100))
+
+
+def test_an_error_of_the_work_beside_reaches_the_consumer() -> None:
+    def work(item: int) -> None:
+        if item == 2:
+            raise ValueError("damaged")
+
+    with pytest.raises(ValueError, match="damaged"):
+        list(beside(range(3), work))
 
 
 def test_work_beside_gives_its_result_or_its_error() -> None:

@@ -43,8 +43,8 @@ class Input:
 class Record:
     """A job's end: `basis` stands for settings, profile, known parameters and version; `seconds` is its duration.
 
-    `estimates` holds estimate, standard deviation and status by name; `start_ns` and `log_seconds` are the first
-    log's first stamp and the length of all logs.
+    `estimates` holds estimate, standard deviation and status by name, `estimator` whose they are; `start_ns` and
+    `log_seconds` are the first log's first stamp and the length of all logs.
     """
 
     job: Job
@@ -57,6 +57,7 @@ class Record:
     seconds: float = 0.0
     start_ns: int | None = None
     log_seconds: float | None = None
+    estimator: str | None = None
     estimates: Mapping[str, tuple[float | None, float | None, str]] = field(default_factory=dict)
 
 

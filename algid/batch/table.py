@@ -29,9 +29,10 @@ def write_jobs(store: Store, records: Sequence[Record]) -> None:
 def jobs_frame(records: Sequence[Record]) -> pl.DataFrame:
     """A row a record.
 
-    Columns: job, robot, time, status, reason, seconds, log_seconds, estimator, version, settings (JSON), logs and
-    sha256 (lists); ``label_X`` for each label; ``k``, ``k_std`` and ``k_status`` for each estimate, null where
-    there is none.
+    Columns: job, robot, time, status, reason, seconds, log_seconds, estimator (whose numbers these are; the one
+    asked for stands in the settings), version, settings (JSON); logs, sha256, size in bytes and time of change
+    (lists; a log that was fetched in part has no sha256); ``label_X`` for each label; ``k``, ``k_std`` and
+    ``k_status`` for each estimate, null where there is none.
     """
     import polars as pl
 
@@ -43,11 +44,15 @@ def jobs_frame(records: Sequence[Record]) -> pl.DataFrame:
         "reason": pl.Series([r.reason for r in records], dtype=pl.String),
         "seconds": pl.Series([r.seconds for r in records], dtype=pl.Float64),
         "log_seconds": pl.Series([r.log_seconds for r in records], dtype=pl.Float64),
-        "estimator": pl.Series([r.settings["estimator"] for r in records], dtype=pl.String),
+        "estimator": pl.Series([r.estimator for r in records], dtype=pl.String),
         "version": pl.Series([r.version for r in records], dtype=pl.String),
         "settings": pl.Series([json.dumps(r.settings, sort_keys=True) for r in records], dtype=pl.String),
         "logs": pl.Series([[i.path for i in r.inputs] for r in records], dtype=pl.List(pl.String)),
         "sha256": pl.Series([[i.sha256 for i in r.inputs] for r in records], dtype=pl.List(pl.String)),
+        "size": pl.Series([[i.size for i in r.inputs] for r in records], dtype=pl.List(pl.Int64)),
+        "changed": pl.Series([[i.mtime_ns for i in r.inputs] for r in records], dtype=pl.List(pl.Int64)).cast(
+            pl.List(pl.Datetime("ns", "UTC"))
+        ),
     }
     for name in _names([r.job.labels for r in records]):
         columns[f"label_{name}"] = _label_column([r.job.labels.get(name) for r in records])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any
 from algid import __version__
 from algid.batch.jobs import Job
 from algid.batch.records import End, Input, Record, estimates_of, stat_of
+from algid.batch.stage import naming, staged
 from algid.errors import AlgidError
 from algid.pipeline.identify import identify
 from algid.pipeline.settings import Settings
 from algid.pipeline.sources import Staged, sha256_of
 from algid.results import Result
-from algid.stores import fetched, is_url, open_store, put_folder
+from algid.stores import is_url, open_store, put_folder
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -82,25 +83,29 @@ def _identified(task: Task) -> Result:
     with tempfile.TemporaryDirectory(prefix="algid-") as temporary:
         stage = Path(temporary)
         place = (stage if is_url(task.out) else Path(task.out)) / task.job.name
-        result = identify(
-            [_staged(path, stage / str(number)) for number, path in enumerate(task.job.logs)],
-            [_staged(path, stage / f"loaded{number}") for number, path in enumerate(task.job.loaded)],
-            task.settings,
-            parameters=task.parameters,
-            profile=task.profile,
-            out=place.parent,
-            name=place.name,
-            force=True,
-            report=task.report,
-            shared_library=not is_url(task.out),
-        )
+        logs = _here(task.job.logs, stage / "logs", task.profile)
+        loaded = _here(task.job.loaded, stage / "loaded", task.profile)
+        with naming({log.path: log.url for log in (*logs, *loaded) if isinstance(log, Staged)}):
+            result = identify(
+                logs,
+                loaded,
+                task.settings,
+                parameters=task.parameters,
+                profile=task.profile,
+                out=place.parent,
+                name=place.name,
+                force=True,
+                report=task.report,
+                shared_library=not is_url(task.out),
+            )
         if is_url(task.out):
             put_folder(open_store(task.out), f"{task.job.name}.algid", place.with_name(f"{place.name}.algid"))
         return result
 
 
-def _staged(path: str, folder: Path) -> str | Staged:
-    return Staged(fetched(path, folder), path) if is_url(path) else path
+def _here(paths: Sequence[str], folder: Path, profile: Profile | None) -> list[str | Staged]:
+    """Logs as they can be read on this machine."""
+    return [staged(path, folder / str(n), profile) if is_url(path) else path for n, path in enumerate(paths)]
 
 
 def _of_result(result: Result) -> dict[str, Any]:
@@ -110,6 +115,7 @@ def _of_result(result: Result) -> dict[str, Any]:
         "reason": "" if good else _what_lacks(result),
         "start_ns": result.log.start_ns,
         "log_seconds": sum(log.duration for log in result.logs),
+        "estimator": result.estimator,
         "estimates": estimates_of(result),
         "sha256": {log.path: log.sha256 for log in result.logs},
     }

@@ -15,7 +15,8 @@ def main() -> None:
     """Run algid; the entry point of the console script."""
     from algid.threads import bound_by_environment
 
-    signal.signal(signal.SIGTERM, _stop)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _stop)
     bound_by_environment()  # before anything loads numpy
     from algid.cli.app import app
     from algid.errors import AlgidError
@@ -28,14 +29,18 @@ def main() -> None:
     except BrokenPipeError:  # the reader of our output has seen enough
         sys.stderr.close()
         sys.exit(EXIT_FAILED)
-    except KeyboardInterrupt:
+    except _StoppedError:
         print("algid: stopped; nothing half-written is left", file=sys.stderr)
-        sys.exit(130)
+        raise
+
+
+class _StoppedError(SystemExit):
+    """A signal ends algid. typer hands it on, where it would make a `KeyboardInterrupt` an exit without a word."""
 
 
 def _stop(number: int, _frame: FrameType | None) -> None:
     """Leave by an exception, so that what is half-written is taken away."""
-    sys.exit(128 + number)
+    raise _StoppedError(128 + number)
 
 
 def _one_line(error: Exception) -> str:

@@ -65,7 +65,7 @@ def batch(
     store = open_store(out)
     with locked(out):
         sweep(store)
-        with _executor(scheduler, workers, memory_limit) as (executor, slots), _progress() as told:
+        with _executor(scheduler, workers, memory_limit) as (executor, slots), _progress(quiet) as told:
             running = Batch(store, recipe, executor, slots, told)
             with stopped_by_signals(running.stop):
                 ended = _watch(running, sources, out, alone, retry_failed) if watch else running.run(jobs, retry_failed)
@@ -128,9 +128,9 @@ def _bytes(text: str) -> int:
 
 
 @contextmanager
-def _progress() -> Iterator[Callable[[Progress], None]]:
+def _progress(quiet: bool) -> Iterator[Callable[[Progress], None]]:
     """Tells of each job that ends: a line that is written over on a terminal, nothing elsewhere."""
-    if not sys.stderr.isatty():
+    if quiet or not sys.stderr.isatty():
         yield lambda _progress: None
         return
 

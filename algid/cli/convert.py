@@ -12,6 +12,7 @@ from algid.cli.settings import Choice, takes_profile
 
 if TYPE_CHECKING:
     from algid.log import Log, Notice
+    from algid.progress import Told
 
 
 @takes_profile
@@ -29,6 +30,7 @@ def convert(
     """
     from algid.errors import OutputError
     from algid.readers import open_log
+    from algid.report.progress import progress
     from algid.writers import FORMATS, write_log
 
     if target.suffix.lstrip(".").lower() not in FORMATS:
@@ -38,13 +40,19 @@ def convert(
     chosen = choice.profile()
     reader = open_log(source, chosen)
     notices: list[Notice] = []
-    write_log(target, _noted(reader.blocks(), notices), truth=reader.origin.truth)
+    with progress("samples") as told:
+        write_log(target, _noted(reader.blocks(), notices, reader.rows, told), truth=reader.origin.truth)
     for notice in notices:
         typer.echo(f"{notice.code}: {notice.text}", err=True)
     raise typer.Exit(3 if any(notice.lossy for notice in notices) else 0)
 
 
-def _noted(blocks: Iterable[Log], notices: list[Notice]) -> Iterator[Log]:
+def _noted(blocks: Iterable[Log], notices: list[Notice], rows: int, told: Told | None) -> Iterator[Log]:
+    """The blocks; keeps their notices, and tells how far the writing of `rows` samples has come."""
+    done = 0
     for block in blocks:
         notices += block.notices
         yield block
+        done += len(block)
+        if told is not None:
+            told("writing", done, rows)

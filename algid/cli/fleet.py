@@ -21,10 +21,12 @@ def fleet(
 
     from algid.fleet.history import history_of, write_history
     from algid.fleet.page import drift_table, finding_table
+    from algid.report.progress import progress
     from algid.report.terminal import print_one
 
-    history = history_of(out / "jobs.parquet")
-    written = write_history(history, out)
+    with progress("parameters") as told:
+        history = history_of(out / "jobs.parquet", told)
+        written = write_history(history, out)
     console = Console()
     for table in (drift_table(history), finding_table(history)):
         if table.rows:

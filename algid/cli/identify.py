@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from algid.cli import EXIT_INCOMPLETE
-from algid.cli.report import ResultFormat, print_result
+from algid.cli.report import ExportTo, ResultFormat, print_result
 from algid.cli.settings import Choice, takes_settings
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ def identify(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a result that is there.")] = False,
     report: Annotated[bool, typer.Option(help="Write pages and time series beside result.json.")] = True,
+    export: ExportTo = None,
     output: Annotated[ResultFormat, typer.Option("--format", help="What to print.")] = ResultFormat.TABLE,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
     verbose: Annotated[bool, typer.Option("-v", "--verbose", help="Tell logs, channels and settings too.")] = False,
@@ -40,25 +41,27 @@ def identify(
 
     Example: algid identify run-unloaded.mcap --loaded run-loaded.mcap -o results
     """
+    from algid.errors import SettingError
     from algid.pipeline.identify import identify as run
-    from algid.report.progress import waiting
-    from algid.results import read_result
+    from algid.report.progress import progress
 
+    if export is not None and not report:
+        raise SettingError("--export: the log is made from the time series; leave --no-report out")
     settings = choice.settings()
-    known = None if parameters is None else read_result(parameters)
-    bare, burdened = (logs, loaded or []) if known is None else ([], [*logs, *(loaded or [])])
-    count = len(bare) + len(burdened)
-    with waiting(f"{settings.estimator} estimator on {count} log{'s' if count > 1 else ''}", quiet):
+    bare, burdened = (logs, loaded or []) if parameters is None else ([], [*logs, *(loaded or [])])
+    with progress("samples", quiet) as told:
         result = run(
             bare,
             burdened,
             settings,
-            parameters=known,
+            parameters=parameters,
             profile=choice.profile(),
             out=out,
             force=force,
             report=report,
+            export=export is not None,
             command=shlex.join(["algid", *sys.argv[1:]]),
+            told=told,
         )
     if verbose:
         _tell(result, out)

@@ -26,12 +26,13 @@ class Export(StrEnum):
     MCAP = "mcap"
 
 
+ExportTo = Annotated[Export | None, typer.Option(help="Also write estimates.mcap, for Foxglove and PlotJuggler.")]
+
+
 def report(
     results: Annotated[list[Path], typer.Argument(metavar="RESULT...", help="Result folders of algid identify.")],
     form: Annotated[ResultFormat, typer.Option("--format", help="How to print the result.")] = ResultFormat.TABLE,
-    export: Annotated[
-        Export | None, typer.Option(help="Also write estimates.mcap, for Foxglove and PlotJuggler.")
-    ] = None,
+    export: ExportTo = None,
     shared_library: Annotated[
         bool, typer.Option("--shared-library", help="Put the plotting library once beside the folders.")
     ] = False,
@@ -41,13 +42,15 @@ def report(
     Example: algid report case1-unloaded.algid --export mcap
     """
     from algid.report import export_mcap, write_markdown, write_report
+    from algid.report.progress import progress
     from algid.results import read_result
 
     for folder in results:
         result = read_result(folder)
-        written = [write_report(folder, shared_library), write_markdown(folder)]
-        if export is Export.MCAP:
-            written.append(export_mcap(folder))
+        with progress("samples") as told:
+            written = [write_report(folder, shared_library, told), write_markdown(folder)]
+            if export is Export.MCAP:
+                written.append(export_mcap(folder, told))
         print_result(result, form)
         for path in written:
             typer.echo(f"wrote {path}", err=True)

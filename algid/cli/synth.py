@@ -11,6 +11,7 @@ import typer
 
 if TYPE_CHECKING:
     from algid.log import Log
+    from algid.progress import Told
     from algid.synth.cases import Case
     from algid.synth.excitation import Torque
     from algid.synth.run import Recording
@@ -65,6 +66,7 @@ def synth(
 
     Example: algid synth case1 -o logs --position-noise 1e-3 --torque-noise 1e-2 --duration 10 --torque wide
     """
+    from algid.report.progress import progress
     from algid.synth.cases import load_case
     from algid.synth.run import EXCITATIONS, Recording, held, synthesise
     from algid.synth.sensors import Sensors
@@ -76,23 +78,24 @@ def synth(
     drive = _torque(described, torque, torque_hold)
     if torque_hold is not Hold.EXACT and torque in EXCITATIONS:
         drive = held(drive, rate, duration, "zoh" if torque_hold is Hold.ZOH else "foh")
-    if payload_schedule is None:
-        logs: tuple[Log, ...] = synthesise(described, drive, recording)
-    else:
-        logs = (_scheduled(described, drive, recording, payload_schedule),)
+    with progress("samples") as told:
+        if payload_schedule is None:
+            logs: tuple[Log, ...] = synthesise(described, drive, recording, told)
+        else:
+            logs = (_scheduled(described, drive, recording, payload_schedule, told),)
     for log in logs:
         path = out / f"{log.origin.path}.{kind.value}"
         write_log(path, log, truth=log.origin.truth, kind=kind.value)
         print(path)
 
 
-def _scheduled(case: Case, torque: Torque, recording: Recording, text: str) -> Log:
+def _scheduled(case: Case, torque: Torque, recording: Recording, text: str, told: Told | None) -> Log:
     from algid.errors import SettingError
     from algid.synth.run import with_schedule
 
     try:
         pairs = [tuple(map(float, part.split("="))) for part in text.split(",")]
-        return with_schedule(case, torque, recording, [(time, mass) for time, mass in pairs])
+        return with_schedule(case, torque, recording, [(time, mass) for time, mass in pairs], told)
     except ValueError as error:
         raise SettingError(f"--payload-schedule {text}: {error}; give times and payloads like 2=0.05,4=0") from error
 

@@ -28,8 +28,10 @@ def validate(
 
     Example: algid validate run1-unloaded.algid run2-unloaded.mcap --max-nrmse 0.3
     """
+    from algid.pipeline.passes import Passes
     from algid.pipeline.sources import LogSource
     from algid.pipeline.validate import validate as judge
+    from algid.report.progress import progress
     from algid.results import read_result
 
     meaning = choice.profile()
@@ -37,7 +39,9 @@ def validate(
     gravity = float(known.settings.get("gravity", 9.81))
     sources = [LogSource(log, "unloaded", meaning, gravity) for log in logs]
     sources += [LogSource(log, "loaded", meaning, gravity) for log in loaded or []]
-    found = judge(known, sources)
+    with progress("samples") as told:
+        Passes(told, sources).begin("prediction", sources)
+        found = judge(known, sources, str(result))
     for name, one in {**found.logs, "all logs": found.total}.items():
         print(_line(name, one))
     if found.total is not None:

@@ -10,6 +10,7 @@ from algid.errors import ResultError
 from algid.fleet.findings import mislabelled, outliers
 from algid.fleet.windows import parameters_in, read_jobs, windows
 from algid.outfiles import whole_file
+from algid.progress import Told
 
 if TYPE_CHECKING:
     import polars as pl
@@ -33,8 +34,8 @@ class History:
         return found.sort(pl.col("p"), "robot", "parameter")
 
 
-def history_of(path: Path) -> History:
-    """The history in ``jobs.parquet`` at `path`.
+def history_of(path: Path, told: Told | None = None) -> History:
+    """The history in ``jobs.parquet`` at `path`; `told` hears how many parameters have been followed.
 
     Raises
     ------
@@ -47,7 +48,12 @@ def history_of(path: Path) -> History:
     names = parameters_in(jobs)
     if not jobs.height or not names:
         raise ResultError(f"{path}: no finished job has a robot, a time and parameters; name them in a manifest")
-    history = pl.concat([windows(jobs, name) for name in names])
+    followed = []
+    for place, name in enumerate(names):
+        if told is not None:
+            told("following", place, len(names))
+        followed.append(windows(jobs, name))
+    history = pl.concat(followed)
     findings = pl.concat([mislabelled(jobs), outliers(jobs)]).sort(
         "kind", "robot", "time", "parameter", descending=False
     )

@@ -84,6 +84,11 @@ class LogEvidence:
         self._least = _NEGLIGIBLE * np.max([np.sqrt(np.mean(piece.tau**2, axis=1)) for piece in self.kept], axis=0)
 
     @property
+    def trained(self) -> int:
+        """Samples of the training set."""
+        return sum(map(len, self.kept))
+
+    @property
     def refuted(self) -> bool:
         """Whether the torque's error is no white noise: far above what neighbouring samples differ by."""
         return bool(np.any(self.noise.tau > np.maximum(_EXCESS * self._sensor, self._least)))

@@ -93,9 +93,20 @@ class Motion:
     @cached_property
     def trigonometry(self) -> tuple[FloatArray, ...]:
         """Sine and cosine of θ1, of θ2 and of θ1 + θ2, each (N,)."""
-        s1, s2 = np.sin(self.theta)
-        c1, c2 = np.cos(self.theta)
+        (s1, s2), (c1, c2) = sine_cosine(self.theta)
         return s1, c1, s2, c2, s1 * c2 + c1 * s2, c1 * c2 - s1 * s2
+
+
+def sine_cosine(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Sine and cosine of angles, each in the shape of `theta`, through one tangent of the half angle.
+
+    Exact to a unit in the last place of 1, also where the tangent has its poles. NumPy has vector instructions
+    for the tangent on more processors than for sine and cosine: this is several times faster there.
+    """
+    half = np.tan(0.5 * theta)
+    square = half * half
+    scale = 1 / (1 + square)
+    return 2 * half * scale, (1 - square) * scale
 
 
 def regressor(model: Model, motion: Motion) -> FloatArray:

@@ -28,7 +28,7 @@ from numpy.polynomial import Polynomial
 
 from algid.arm import FloatArray
 from algid.identify.filters import correlate, differentiator, half_length
-from algid.identify.model import Model
+from algid.identify.model import Model, sine_cosine
 from algid.sampling import Segment
 
 OVERLAP = 8
@@ -113,8 +113,7 @@ class Windows:
         tau = piece.tau[:, margin - self.whole : len(piece) - margin - self.whole]
         weight, slope, bend = self._plain
         omega = self._velocity(piece)
-        s2, c2 = np.sin(theta[1]), np.cos(theta[1])
-        c1, s1 = np.cos(theta[0]), np.sin(theta[0])
+        (s1, s2), (c1, c2) = sine_cosine(theta)
         momentum = c2 * omega[0]
         centripetal = omega[0] * (omega[0] + omega[1]) * s2
         theta_slope1, theta_slope2, momentum_slope = self.moments(np.stack([*theta, momentum]), slope)

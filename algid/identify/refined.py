@@ -26,6 +26,7 @@ from algid.identify.weak import Source, WeakSettings
 from algid.identify.weak import fit as weak_fit
 from algid.identify.whiteness import judge
 from algid.identify.whitening import NoiseLevels
+from algid.progress import Told
 
 _STEPS = 20
 _NOISE_STEPS = 12  # then the noise levels stay, so that the rest can settle
@@ -87,7 +88,12 @@ class _Training:
     refuted: bool = False
 
 
-def fit(unloaded: Sequence[Source], loaded: Sequence[Source] = (), settings: RefinedSettings | None = None) -> Fit:
+def fit(
+    unloaded: Sequence[Source],
+    loaded: Sequence[Source] = (),
+    settings: RefinedSettings | None = None,
+    told: Told | None = None,
+) -> Fit:
     """Most likely parameters of the arm, and of its payload where there are loaded logs.
 
     Parameters
@@ -95,6 +101,8 @@ def fit(unloaded: Sequence[Source], loaded: Sequence[Source] = (), settings: Ref
     unloaded, loaded : sequences of callables
         Each gives a fresh iterable of `Segment`, the stretches of one log in time; it is called several times.
     settings : RefinedSettings
+    told : callable
+        Called with each step of the training and how many samples of how many it has gone over.
 
     Returns
     -------
@@ -113,7 +121,7 @@ def fit(unloaded: Sequence[Source], loaded: Sequence[Source] = (), settings: Ref
     settings, prior = replace(settings, prior=_anchored(start)), settings.prior
     logs = [*_opened(unloaded, False, shared, settings), *_opened(loaded, True, shared, settings)]
     try:
-        training = _train(shared, logs, start.values, settings)
+        training = _train(shared, logs, start.values, settings, told)
         if training.refuted:
             return replace(start, note=_REFUTED, iterations=training.iterations)
         if not training.settled or not np.all(np.isfinite(training.beta)):
@@ -201,9 +209,18 @@ def _weak_settings(settings: RefinedSettings) -> WeakSettings:
     )
 
 
-def _train(shared: Shared, logs: Sequence[LogEvidence], beta: FloatArray, settings: RefinedSettings) -> _Training:
+def _train(
+    shared: Shared, logs: Sequence[LogEvidence], beta: FloatArray, settings: RefinedSettings, tell: Told | None
+) -> _Training:
+    total = sum(log.trained for log in logs)
     for iteration in range(1, _STEPS + 1):
-        outcomes = [log.train(shared.coefficients(beta, log.loaded)) for log in logs]
+        outcomes: list[Outcome] = []
+        done = 0
+        for log in logs:
+            outcomes.append(log.train(shared.coefficients(beta, log.loaded)))
+            done += log.trained
+            if tell is not None:
+                tell(f"fitting, step {iteration}", done, total)
         better, S, _ = combine(shared, [outcome.information for outcome in outcomes], beta, settings.prior)
         free = settings.noise is None and iteration <= _NOISE_STEPS
         told = max(map(LogEvidence.improve_noise, logs, outcomes)) if free else 0.0
@@ -223,7 +240,7 @@ def _finish(
     for _ in range(_PASSES):
         outcomes = [log.run(shared.coefficients(beta, log.loaded)) for log in logs]
         better, S, _ = combine(shared, [outcome.information for outcome in outcomes], beta, settings.prior)
-        share = sum(len(piece) for log in logs for piece in log.kept)
+        share = sum(log.trained for log in logs)
         far = _distance(better - beta, S) * np.sqrt(share / max(share, _count(outcomes)))
         beta = better
         if far < _FAR * np.sqrt(beta.size):

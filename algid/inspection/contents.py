@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from algid.errors import LogError
 from algid.readers.sniff import sniff
 
 
@@ -53,16 +54,27 @@ def _topics(path: Path) -> Iterator[Entry]:
 
 
 def _parquet(path: Path) -> Iterator[Entry]:
-    from algid.readers.parquet import schema_of
+    from algid.readers.parquet import counted_rows, schema_of
 
+    rows = _known(lambda: counted_rows(path))
     for name, kind in schema_of(path).items():
-        yield Entry(name, str(kind))
+        yield Entry(name, str(kind), rows)
 
 
 def _csv(path: Path, kind: str) -> Iterator[Entry]:
-    from algid.readers.csv import head_bytes
-    from algid.readers.dialect import detect
+    from algid.readers.csv import counted_rows, head_bytes
+    from algid.readers.dialect import detect, kinds
 
-    dialect = detect(path, head_bytes(path, kind))
-    for name in dialect.columns:
-        yield Entry(name, "whole numbers" if name in dialect.whole else "text or numbers")
+    head = head_bytes(path, kind)
+    dialect = detect(path, head)
+    rows = _known(lambda: counted_rows(path, kind, dialect))
+    for name, told in kinds(path, head, dialect).items():
+        yield Entry(name, told, rows)
+
+
+def _known(count: Callable[[], int]) -> int | None:
+    """What can be counted; None in a damaged file, of which reading will tell more."""
+    try:
+        return count()
+    except LogError:
+        return None

@@ -30,6 +30,7 @@ def outcome_of(fit: Fit, unloaded: Sequence[LogSource], loaded: Sequence[LogSour
     found = _estimates(fit)
     payload = {name: found.pop(name) for name in PAYLOAD_PARAMETERS if name in found}
     rows, stds = table_rows(fit)
+    summary = fit_summary(fit, unloaded, loaded, settings)
     units = {**TABLE_UNITS, "l1": "m", "l2": "m"}
     return Outcome(
         parameters=found,
@@ -38,9 +39,14 @@ def outcome_of(fit: Fit, unloaded: Sequence[LogSource], loaded: Sequence[LogSour
         rows=rows,
         estimator=fit.estimator,
         stds=stds,
-        fit=fit_summary(fit, unloaded, loaded, settings),
-        warnings=list(fit_warnings(fit)),
+        fit=summary,
+        warnings=[*fit_warnings(fit), *_not_crossed(summary, settings)],
     )
+
+
+def _not_crossed(summary: results.Fit, settings: Settings) -> Iterator[str]:
+    if settings.cross_validate and summary.cross_validation is None:
+        yield "no cross-validation: a log is too short to be fitted, or to be judged"
 
 
 def _row_estimate(rows: dict[str, float], stds: dict[str, float], name: str, fit: Fit, unit: str) -> Estimate:

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from algid.arm import CONSTANT_NAMES, FloatArray
-from algid.errors import LogError, ResultError
+from algid.errors import LogError, ResultError, SettingError
 from algid.identify.paper.method import SHORTEST
 from algid.pipeline.folder import result_folder, whole_folder
 from algid.pipeline.outcome import Outcome, result_of
 from algid.pipeline.paper import run_paper
+from algid.pipeline.passes import Passes
 from algid.pipeline.series import write_fit_series
 from algid.pipeline.settings import Settings
 from algid.pipeline.sources import LogLike, LogSource, sources_of
-from algid.results import Result, write_result
+from algid.progress import Told
+from algid.results import Result, read_result, write_result
 from algid.threads import one_blas_thread
 
 if TYPE_CHECKING:
@@ -27,19 +29,36 @@ if TYPE_CHECKING:
 SERIES_SECONDS = 600.0  # the paper's convergence series is drawn beside other estimators up to this length of log
 
 
+@dataclass(frozen=True)
+class Earlier:
+    """A result to start from, and what to call it where it is wrong: its file, or its log."""
+
+    result: Result
+    file: str
+
+    @classmethod
+    def of(cls, parameters: Result | Path | None) -> Earlier | None:
+        """The result itself, or that of a file."""
+        if parameters is None or isinstance(parameters, Result):
+            return None if parameters is None else cls(parameters, parameters.log.path)
+        return cls(read_result(parameters), str(parameters))
+
+
 def identify(
     unloaded: LogLike | Iterable[LogLike] | None,
     loaded: LogLike | Iterable[LogLike] | None = None,
     settings: Settings | None = None,
     *,
-    parameters: Result | None = None,
+    parameters: Result | Path | None = None,
     profile: Profile | None = None,
     out: Path | None = None,
     name: str | None = None,
     force: bool = False,
     report: bool = True,
+    export: bool = False,
     command: str | None = None,
     shared_library: bool = False,
+    told: Told | None = None,
 ) -> Result:
     """Identify the constants k1 … k7 of an arm and, from loaded logs, its tip payload.
 
@@ -48,7 +67,7 @@ def identify(
     unloaded, loaded : path or `Log`, or several
         Logs of the arm without and with the payload.
     settings : Settings
-    parameters : Result
+    parameters : Result or path of one
         An arm identified before; then no unloaded log is needed.
     profile : Profile
         What the logs' names, units and signs mean.
@@ -60,10 +79,14 @@ def identify(
         Replace a result that is there.
     report : bool
         Write time series and pages beside ``result.json``.
+    export : bool
+        Write ``estimates.mcap`` beside them: see `algid.report.export`.
     command : str
         The command line behind the call, for the result.
     shared_library : bool
         Put the pages' plotting library once beside the result folders instead of into each page.
+    told : callable
+        Called with the stage and how many samples of how many it has gone over, as the work goes on.
 
     Raises
     ------
@@ -73,20 +96,27 @@ def identify(
         If there is neither an unloaded log nor `parameters`.
     """
     settings = settings or Settings()
+    earlier = Earlier.of(parameters)
     bare = sources_of(unloaded, "unloaded", profile, settings.gravity)
     burdened = sources_of(loaded, "loaded", profile, settings.gravity)
-    if not bare and (parameters is None or not burdened):
+    if not bare and (earlier is None or not burdened):
         raise ValueError("an unloaded log is needed, or parameters and a loaded log")
+    if settings.cross_validate and (len(bare) == 1 or len(burdened) == 1):
+        kind = "unloaded" if len(bare) == 1 else "loaded"
+        raise SettingError(f"--cross-validate: expected two {kind} logs or more, found one; give more, or leave it out")
+    passes = Passes(told, [*bare, *burdened])
     if out is None:
-        return _identify(bare, burdened, settings, parameters, None, report)
+        return _identify(bare, burdened, settings, earlier, None, report, passes)
     folder = result_folder((bare + burdened)[0].name, out) if name is None else out / f"{name}.algid"
     with whole_folder(folder, force) as temporary:
-        result = _identify(bare, burdened, settings, parameters, temporary, report)
+        result = _identify(bare, burdened, settings, earlier, temporary, report, passes)
         if command is not None:
             result = result.model_copy(update={"settings": result.settings | {"command": command}})
         write_result(result, temporary / "result.json")
         if report:
-            _write_pages(temporary, result, shared_library)
+            _write_pages(temporary, result, shared_library, told)
+        if export:
+            _export(temporary, told)
     return result
 
 
@@ -94,21 +124,22 @@ def _identify(
     bare: Sequence[LogSource],
     burdened: Sequence[LogSource],
     settings: Settings,
-    parameters: Result | None,
+    earlier: Earlier | None,
     folder: Path | None,
     report: bool,
+    passes: Passes,
 ) -> Result:
     with one_blas_thread():
         if settings.estimator == "paper":
-            return _by_the_paper(bare, burdened, settings, parameters, folder)
-        return _by_likelihood(bare, burdened, settings, parameters, folder if report else None)
+            return _by_the_paper(bare, burdened, settings, earlier, folder)
+        return _by_likelihood(bare, burdened, settings, earlier, folder if report else None, passes)
 
 
 def _by_the_paper(
     bare: Sequence[LogSource],
     burdened: Sequence[LogSource],
     settings: Settings,
-    parameters: Result | None,
+    earlier: Earlier | None,
     folder: Path | None,
 ) -> Result:
     if len(bare) > 1 or len(burdened) > 1:
@@ -117,7 +148,7 @@ def _by_the_paper(
             "give one, or use --estimator refined or weak"
         )
     first, second = _firsts(bare, burdened)
-    known = None if parameters is None else known_constants(parameters)
+    known = None if earlier is None else known_constants(earlier)
     return result_of(run_paper(first, second, settings, known, folder), settings, [*bare, *burdened])
 
 
@@ -125,24 +156,33 @@ def _by_likelihood(
     bare: Sequence[LogSource],
     burdened: Sequence[LogSource],
     settings: Settings,
-    parameters: Result | None,
+    earlier: Earlier | None,
     folder: Path | None,
+    passes: Passes,
 ) -> Result:
     from algid.pipeline.fitted import outcome_of
     from algid.pipeline.statistical import prior_of, run_fit
 
-    prior = None if parameters is None else prior_of(parameters, settings)
-    fit = run_fit(bare, burdened, settings, prior)
+    prior = None if earlier is None else prior_of(earlier.result, settings, earlier.file)
+    logs = [*bare, *burdened]
+    fit = run_fit(bare, burdened, settings, prior, passes.told)
+    passes.begin("prediction", logs)
     outcome = outcome_of(fit, bare, burdened, settings)
     if folder is not None:
-        write_fit_series(folder, fit, [*bare, *burdened], settings)
+        passes.begin("series", logs)
+        write_fit_series(folder, fit, logs, settings)
         if settings.estimator == "refined":
-            outcome = _with_the_papers(outcome, bare, burdened, settings, folder)
-    return result_of(outcome, settings, [*bare, *burdened])
+            outcome = _with_the_papers(outcome, bare, burdened, settings, folder, passes)
+    return result_of(outcome, settings, logs)
 
 
 def _with_the_papers(
-    outcome: Outcome, bare: Sequence[LogSource], burdened: Sequence[LogSource], settings: Settings, folder: Path
+    outcome: Outcome,
+    bare: Sequence[LogSource],
+    burdened: Sequence[LogSource],
+    settings: Settings,
+    folder: Path,
+    passes: Passes,
 ) -> Outcome:
     """The paper's convergence series of the first log of each kind, and its route to the payload."""
     first, second = _firsts(bare, burdened)
@@ -150,6 +190,7 @@ def _with_the_papers(
     durations = [log.summary().duration for log in logs]
     if first is None or settings.gravity == 0 or min(durations) < SHORTEST or max(durations) > SERIES_SECONDS:
         return outcome
+    passes.begin("series", logs)
     return replace(outcome, paper_payload=run_paper(first, second, settings, None, folder).payload)
 
 
@@ -157,14 +198,23 @@ def _firsts(bare: Sequence[LogSource], burdened: Sequence[LogSource]) -> tuple[L
     return bare[0] if bare else None, burdened[0] if burdened else None
 
 
-def _write_pages(folder: Path, result: Result, shared_library: bool) -> None:
+def _write_pages(folder: Path, result: Result, shared_library: bool, told: Told | None) -> None:
     from algid.report import markdown, write_report
 
+    if told is not None:
+        told("report", 0, 0)
+
     (folder / "report.md").write_text(markdown(result), encoding="utf-8")
-    write_report(folder, shared_library)
+    write_report(folder, shared_library, told)
 
 
-def known_constants(parameters: Result) -> FloatArray:
+def _export(folder: Path, told: Told | None) -> None:
+    from algid.report import export_mcap
+
+    export_mcap(folder, told)
+
+
+def known_constants(earlier: Earlier) -> FloatArray:
     """k1 … k7 (7,) of an earlier result.
 
     Raises
@@ -172,9 +222,7 @@ def known_constants(parameters: Result) -> FloatArray:
     ResultError
         If one of them has no estimate.
     """
-    values = [found.estimate if (found := parameters.parameters.get(name)) else None for name in CONSTANT_NAMES]
+    values = [found.estimate if (found := earlier.result.parameters.get(name)) else None for name in CONSTANT_NAMES]
     if any(value is None for value in values):
-        raise ResultError(
-            f"{parameters.log.path}: its result lacks a constant; identify the arm from a better log first"
-        )
+        raise ResultError(f"{earlier.file}: the result lacks a constant; identify the arm from a better log first")
     return np.array(values, dtype=np.float64)

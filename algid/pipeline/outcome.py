@@ -10,7 +10,7 @@ from algid import __version__
 from algid.log import Truth
 from algid.pipeline.settings import Settings
 from algid.pipeline.sources import LogSource
-from algid.pipeline.table4 import paper_errors, table4, true_rows
+from algid.pipeline.table4 import paper_errors, table4, true_parameters, true_rows
 from algid.results import Estimate, Fit, Result
 
 NAMED = 3  # logs that a warning names beside the first
@@ -44,6 +44,7 @@ def result_of(outcome: Outcome, settings: Settings, logs: Sequence[LogSource]) -
         payload=outcome.payload,
         paper_payload=outcome.paper_payload,
         table4=table4(outcome.rows, outcome.stds, true_rows(truth, payload), paper_errors(truth)),
+        truth=true_parameters(truth, payload),
         fit=outcome.fit,
         settings=settings.as_json(),
         log=first,

@@ -18,6 +18,7 @@ from algid.threads import Beside, ahead
 
 if TYPE_CHECKING:
     from algid.identify.prediction import PredictionSums
+    from algid.pipeline.passes import Passes
     from algid.profile import Profile
 
 Role = Literal["unloaded", "loaded"]
@@ -27,10 +28,14 @@ EXAMINED = 1 << 16
 
 @dataclass(frozen=True)
 class Staged:
-    """A log that was fetched from an object store: its copy on this machine, and its URL."""
+    """A log that was fetched from an object store: its copy on this machine, and its URL.
+
+    A copy that is not `whole` holds what the reader needs, and zeros elsewhere: the log's hash is not known then.
+    """
 
     path: Path
     url: str
+    whole: bool = True
 
 
 LogLike = str | Path | Log | Staged
@@ -58,12 +63,16 @@ class LogSource:
         self.role = role
         self.name = log.origin.path if isinstance(log, Log) else log.url if isinstance(log, Staged) else str(log)
         self._log = log.path if isinstance(log, Staged) else log
+        self._whole = not isinstance(log, Staged) or log.whole
         self._profile = profile
         self._gravity = gravity
         self._found: list[Notice] | None = None
         self._digest: Beside[str] | None = None
         self.prediction: PredictionSums | None = None
         """What scores a prediction of this log, where an estimator's pass has gathered it."""
+        self.passes: Passes | None = None
+        """Who is told how far each pass has come."""
+        self._promised = 0
         self.origin, self._blocks = self._open()
         self._seen: _Seen | None = None
         if not changing:
@@ -72,10 +81,12 @@ class LogSource:
     def _open(self) -> tuple[Origin, Callable[[], Iterator[Log]]]:
         if isinstance(self._log, Log):
             log = self._log
+            self._promised = len(log)
             return log.origin, lambda: iter([log])
         from algid.readers import open_log
 
         reader = open_log(self._log, self._profile)
+        self._promised = reader.rows
         return reader.origin, lambda: ahead(reader.blocks())
 
     def _refuse_the_other_role(self) -> None:
@@ -94,6 +105,7 @@ class LogSource:
     def _counted(self) -> Iterator[Log]:
         seen = _Seen()
         self._start_hashing()
+        self._tell(seen)
         for block, alone in _with_end(self._blocks()):
             if len(block) and not seen.rows:
                 seen.first_ns = int(block.stamp_ns[0])
@@ -103,7 +115,22 @@ class LogSource:
             seen.rows += len(block)
             seen.notices += block.notices
             yield block
+            self._tell(seen)
         self._seen = seen
+
+    def _tell(self, seen: _Seen) -> None:
+        if self.passes is not None:
+            self.passes.advance(self, seen.rows)
+
+    @property
+    def was_read(self) -> bool:
+        """Whether a pass has come to the end of the log."""
+        return self._seen is not None
+
+    @property
+    def expected(self) -> int:
+        """Samples of a pass: counted where one has been made, else as the file tells, 0 where it does not."""
+        return self._promised if self._seen is None else self._seen.rows
 
     def _examined(self, block: Log, alone: bool) -> list[Notice]:
         """What the named checks find in the first block; they refuse a log only where that is all of it."""
@@ -139,13 +166,14 @@ class LogSource:
         return self.seen.first_ns
 
     @cached_property
-    def sha256(self) -> str:
-        """Of the file, of a folder's files in the order of their names, or of a log in memory."""
-        return self._start_hashing().result()
+    def sha256(self) -> str | None:
+        """Of the file, of a folder's files in the order of their names, or of a log in memory; None of parts."""
+        digest = self._start_hashing()
+        return None if digest is None else digest.result()
 
-    def _start_hashing(self) -> Beside[str]:
+    def _start_hashing(self) -> Beside[str] | None:
         """Hash the log beside the first pass over it."""
-        if self._digest is None:
+        if self._digest is None and self._whole:
             self._digest = Beside(self._hash)
         return self._digest
 

@@ -18,14 +18,22 @@ from algid.identify.prediction import PredictionSums
 from algid.pipeline.settings import Settings
 from algid.pipeline.sources import LogSource
 from algid.pipeline.velocities import with_velocities
+from algid.progress import Told
 from algid.results import Result
 from algid.sampling import Segment
+from algid.threads import beside
 
 Pass = Callable[[], Iterable[Segment]]
 
 
-def run_fit(unloaded: Sequence[LogSource], loaded: Sequence[LogSource], settings: Settings, prior: Prior | None) -> Fit:
-    """Fit the settings' estimator to logs.
+def run_fit(
+    unloaded: Sequence[LogSource],
+    loaded: Sequence[LogSource],
+    settings: Settings,
+    prior: Prior | None,
+    told: Told | None = None,
+) -> Fit:
+    """Fit the settings' estimator to logs, telling the refined one's steps.
 
     Raises
     ------
@@ -39,7 +47,7 @@ def run_fit(unloaded: Sequence[LogSource], loaded: Sequence[LogSource], settings
         if settings.estimator == "weak":
             fit = weak.fit(*sources, weak_settings, settings.lengths, prior)
         else:
-            fit = refined.fit(*sources, _refined_settings(settings, weak_settings, prior))
+            fit = refined.fit(*sources, _refined_settings(settings, weak_settings, prior), told)
     except ValueError as error:
         names = ", ".join(log.name for log in (*unloaded, *loaded))
         raise LogError(f"{names}: {error}; record longer") from error
@@ -90,44 +98,41 @@ def _passes(logs: Sequence[LogSource], settings: Settings) -> list[Pass]:
     ]
     if settings.delay == "estimate":  # what the prediction is scored by depends on it
         return passes
-    return [partial(_watched, log, moving, settings, settings.delay) for log, moving in zip(logs, passes, strict=True)]
+    return [partial(_watched, log, moving, settings) for log, moving in zip(logs, passes, strict=True)]
 
 
-def _watched(log: LogSource, moving: Pass, settings: Settings, delay: float) -> Iterator[Segment]:
+def _watched(log: LogSource, moving: Pass, settings: Settings) -> Iterator[Segment]:
     """A pass that also gathers, once, what the prediction will be scored by."""
     if log.prediction is not None:
         yield from moving()
         return
-    hold = 0.5 if settings.torque_hold == "zoh" else 0.0
-    sums = PredictionSums(model_of(settings), lambda dt: delay + hold * dt)
-    for segment in moving():
-        sums.push(segment)
-        yield segment
+    sums = PredictionSums(model_of(settings), settings.torque_shift)
+    yield from beside(moving(), sums.push)
     sums.finish()
     log.prediction = sums
 
 
-def prior_of(result: Result, settings: Settings) -> Prior:
-    """What an earlier result knows of the arm.
+def prior_of(result: Result, settings: Settings, file: str | None = None) -> Prior:
+    """What an earlier result knows of the arm; where it is wrong, its `file` is named, or its log.
 
     Raises
     ------
     ResultError
         If its estimator gives no error bars, or it does not determine all constants of the model.
     """
-    model = model_of(settings)
+    model, file = model_of(settings), file or result.log.path
     if result.fit is None:
         raise ResultError(
-            f"{result.log.path}: the result of --estimator {result.estimator} has no error bars; "
+            f"{file}: the result of --estimator {result.estimator} has no error bars; "
             "identify with --estimator refined or weak, or use --estimator paper here too"
         )
     known = set(result.fit.covariance_names) & set(result.parameters)
     missing = [name for name in model.names if name not in known]
     if missing:
-        raise ResultError(f"{result.log.path}: the result has no {', '.join(missing)}; use the flags it was made with")
+        raise ResultError(f"{file}: the result has no {', '.join(missing)}; use the flags it was made with")
     places = [result.fit.covariance_names.index(name) for name in model.names]
     covariance = np.array(result.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
     mean = np.array([result.parameters[name].estimate for name in model.names], dtype=np.float64)
     if not (np.isfinite(covariance).all() and np.isfinite(mean).all()):
-        raise ResultError(f"{result.log.path}: the result leaves constants undetermined; identify from more logs first")
+        raise ResultError(f"{file}: the result leaves constants undetermined; identify from more logs first")
     return Prior.of(model.names, mean, covariance)

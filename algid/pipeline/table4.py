@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from algid.arm import FloatArray, with_payload
+from algid.arm import CONSTANT_NAMES, FloatArray, with_payload
 from algid.log import Truth
 from algid.results import Table4Row
 
@@ -50,6 +50,14 @@ def true_rows(truth: Truth | None, payload: float | None) -> dict[str, float]:
         rows |= loaded_rows(with_payload(k, truth.arm.payload_constants(payload)))
         rows["m_p"] = payload
     return rows
+
+
+def true_parameters(truth: Truth | None, payload: float | None) -> dict[str, float]:
+    """k1 … k7 of the arm behind a synthetic log, and with the loaded log's `payload` in kg what goes with it."""
+    if truth is None:
+        return {}
+    constants = dict(zip(CONSTANT_NAMES, truth.arm.constants().tolist(), strict=True))
+    return constants | ({"m_p": payload, "l1": truth.arm.l1, "l2": truth.arm.l2} if payload else {})
 
 
 def paper_errors(truth: Truth | None) -> dict[str, float]:

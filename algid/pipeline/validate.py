@@ -26,8 +26,8 @@ class Validation:
     total: TorquePrediction | None
 
 
-def validate(result: Result, logs: Sequence[LogSource]) -> Validation:
-    """Predict the torque of `logs` by the estimates of `result`.
+def validate(result: Result, logs: Sequence[LogSource], name: str) -> Validation:
+    """Predict the torque of `logs` by the estimates of `result`, whose file is called `name`.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def validate(result: Result, logs: Sequence[LogSource]) -> Validation:
     total, delay = PredictionScore(), result.parameters.get("delay")
     for log in logs:
         shift = settings.torque_shift(1 / log.summary().rate, None if delay is None else delay.estimate)
-        one = score(model, torque_constants(result, model, log.role), log.segments(), shift)
+        one = score(model, torque_constants(result, model, log.role, name), log.segments(), shift)
         found[log.name] = prediction(one)
         total += one
     return Validation(found, prediction(total))
@@ -52,8 +52,8 @@ def settings_of(result: Result) -> Settings:
     return Settings(**{name: result.settings[name] for name in names if name in result.settings})
 
 
-def torque_constants(result: Result, model: Model, role: Role) -> FloatArray:
-    """Coefficients of the model's columns for a log of that role.
+def torque_constants(result: Result, model: Model, role: Role, file: str) -> FloatArray:
+    """Coefficients of the model's columns for a log of that role, from the result of that file.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def torque_constants(result: Result, model: Model, role: Role) -> FloatArray:
     values |= {name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None}
     missing = next((name for name in wanted if values.get(name) is None), None)
     if missing is not None:
-        raise ResultError(f"{result.log.path}: the result has no {missing}; identify it from logs that tell it")
+        raise ResultError(f"{file}: the result has no {missing}; identify it from logs that tell it")
     known = {name: float(value) for name, value in values.items() if value is not None}
     if role == "loaded":
         z = payload_constants(known["m_p"], known["l1"], known["l2"], model.gravity)

@@ -74,7 +74,4 @@ def read_log(path: str | Path, profile: Profile | None = None) -> Log:
     LogError
         As `open_log`, and if a value is not finite or time runs wrong.
     """
-    from algid.readers.gather import ROWS, whole_log
-
-    reader = open_log(path, profile)
-    return whole_log(reader.blocks(ROWS), reader.rows)
+    return open_log(path, profile).whole()

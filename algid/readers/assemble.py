@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -13,8 +12,10 @@ from algid.errors import LogError
 from algid.log import Log, Notice, Origin
 from algid.readers.base import BLOCK_ROWS
 from algid.readers.convert import Conversion
+from algid.readers.gather import ROWS, Gatherer, Room
 from algid.readers.order import Sorter
 from algid.readers.table import Table, cut
+from algid.readers.unwrap import Unwrapper
 
 _LARGEST = 1e100
 """Beyond this a value is no angle and no torque, and its square would overflow."""
@@ -40,20 +41,48 @@ class TableReader:
         LogError
             If a value is not finite, time runs wrong, or there are fewer than two samples.
         """
-        tables = self._finite(self.tables(rows))
-        notices, total, turns = self.notices, 0, np.array([[math.nan, 0.0]] * 2)
-        for table in cut(Sorter(self.origin.path).run(tables), rows):
+        unwrapper = Unwrapper(self.unwrap)
+        for table, notices in self._samples(rows):
+            room = Room.empty(len(table), velocity=table.has_velocities)
+            self._convert(table, room, unwrapper)
+            yield Log(room.stamp_ns, room.theta, room.tau, self.origin, room.omega, notices)
+
+    def whole(self) -> Log:
+        """The whole log.
+
+        Raises
+        ------
+        LogError
+            As `blocks`.
+        """
+        unwrapper, gatherer, notices = Unwrapper(self.unwrap), None, self.notices[:0]
+        for table, said in self._samples(ROWS):
+            if gatherer is None:
+                gatherer = Gatherer(self.rows or len(table), velocity=table.has_velocities)
+            self._convert(table, gatherer.more(len(table)), unwrapper)
+            notices += said
+        assert gatherer is not None, "there are two samples at least"
+        room = gatherer.filled()
+        return Log(room.stamp_ns, room.theta, room.tau, self.origin, room.omega, notices)
+
+    def _samples(self, rows: int) -> Iterator[tuple[Table, tuple[Notice, ...]]]:
+        """Checked and sorted tables that are not empty, with what is to be told of each."""
+        notices, total = self.notices, 0
+        for table in cut(Sorter(self.origin.path).run(self._finite(self.tables(rows))), rows):
             notices += table.notices
-            if not len(table):
-                continue
-            theta, tau, omega = self.conversion.apply(table)
-            turns = self._unwrapped(theta, turns)
-            total += len(table)
-            yield Log(table.stamp_ns, theta, tau, self.origin, omega, notices)
-            notices = ()
+            if len(table):
+                total += len(table)
+                yield table, notices
+                notices = ()
         if total < 2:
-            why = "".join(f" ({notice.text})" for notice in notices[:1])
+            worst = sorted(notices, key=lambda notice: not notice.lossy)[:1]
+            why = "".join(f" ({notice.text})" for notice in worst)
             raise LogError(f"{self.origin.path}: {total} samples; a log needs two at least{why}")
+
+    def _convert(self, table: Table, room: Room, unwrapper: Unwrapper) -> None:
+        room.stamp_ns[:] = table.stamp_ns
+        self.conversion.apply(table, room)
+        unwrapper.run(room.theta)
 
     def _finite(self, tables: Iterator[Table]) -> Iterator[Table]:
         first = 0
@@ -64,25 +93,17 @@ class TableReader:
             yield table
 
     def _check(self, name: str, values: FloatArray, first: int) -> None:
-        # min and max are NaN when any value is, and need no array of their own
-        if values.size and not (values.min() > -_LARGEST and values.max() < _LARGEST):
-            row = int(np.flatnonzero(~(np.abs(values) < _LARGEST))[0])
+        # one pass without an array of its own: a small sum of squares has no large term, and no NaN
+        if not np.einsum("i,i->", values, values) < _LARGEST:
+            self._refuse_large(name, values, first)
+
+    def _refuse_large(self, name: str, values: FloatArray, first: int) -> None:
+        wrong = np.flatnonzero(~(np.abs(values) < _LARGEST))
+        if wrong.size:
+            row = int(wrong[0])
             source = self.origin.mapping.get(name, name)
             raise LogError(
                 f"{self.origin.path}: {name} ({source}) in sample {first + row + 1}: "
                 f"expected a finite number below {_LARGEST:g} in size, found {values[row]}; "
                 "cut that part out or name another source"
             )
-
-    def _unwrapped(self, theta: FloatArray, before: FloatArray) -> FloatArray:
-        """Unwrap in place where a profile says so; keeps each joint's last angle and turns so far."""
-        after = before.copy()
-        for joint in (0, 1):
-            if self.unwrap[joint] and theta.shape[1]:
-                last, turns = before[joint]
-                start = theta[joint, 0] if math.isnan(last) else last
-                raw = np.concatenate([[start], theta[joint]])
-                whole = turns - np.cumsum(np.rint(np.diff(raw) / (2 * math.pi)))
-                after[joint] = raw[-1], whole[-1]
-                theta[joint] += 2 * math.pi * whole
-        return after

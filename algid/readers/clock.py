@@ -16,6 +16,9 @@ NANOSECONDS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
 """Nanoseconds in one unit of time."""
 _EPOCH = (("s", 1e8, 1e11), ("ms", 1e11, 1e14), ("us", 1e14, 1e17), ("ns", 1e17, 1e20))
 _LARGEST = 9.2e18
+_STEPS = (("s", 0.2), ("ms", 50.0), ("us", 50_000.0))
+SLOWEST_NS = 200_000_000
+"""A longer median step is no recording of an arm in motion: it has 5 Hz at least."""
 
 
 def time_unit(times: NDArray[Any]) -> str:
@@ -28,16 +31,25 @@ def time_unit(times: NDArray[Any]) -> str:
     for unit, low, high in _EPOCH:
         if low <= first < high and _plausible(times, NANOSECONDS[unit]):
             return unit
+    return unit_of_step(median_step(times))
+
+
+def unit_of_step(step: float) -> str:
+    """The unit in which a median step is one of a log: see `time_unit`."""
+    return next((unit for unit, longest in _STEPS if step < longest), "ns")
+
+
+def median_step(times: NDArray[Any]) -> float:
+    """Median size of the steps between times (N,) that differ; 0 where none do."""
     steps = np.abs(np.diff(times.astype(np.float64)))
-    step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
-    return "s" if step < 0.2 else "ms" if step < 50 else "us" if step < 50_000 else "ns"
+    steps = steps[steps > 0]
+    return float(np.median(steps)) if steps.size else 0.0
 
 
 def _plausible(times: NDArray[Any], nanoseconds: int) -> bool:
-    """Whether the median step is between 20 µs and 10 s in a unit of so many nanoseconds."""
-    steps = np.abs(np.diff(times.astype(np.float64)))
-    steps = steps[steps > 0]
-    return steps.size == 0 or 2e4 <= float(np.median(steps)) * nanoseconds <= 1e10
+    """Whether the median step is between 20 µs and 10 s in a unit of so many nanoseconds, if there is one."""
+    step = median_step(times)
+    return step == 0 or 2e4 <= step * nanoseconds <= 1e10
 
 
 def to_nanoseconds(times: NDArray[Any], unit: str) -> IntArray:

@@ -19,12 +19,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Columns:
-    """By canonical channel its column; the units that names state; the unit of time, where known."""
+    """By canonical channel its column; the units that names state; the unit of time, where known.
+
+    `time_told`: a name or a profile states the unit of time; otherwise it is only taken to be so.
+    """
 
     sources: Mapping[str, str]
     units: Mapping[str, str]
     time_unit: str | None
     notices: tuple[Notice, ...] = ()
+    time_told: bool = False
 
     def reader(
         self,
@@ -62,10 +66,10 @@ def assign(path: str, available: Sequence[str], profile: Profile | None) -> Colu
         )
     units = {name: unit for name, unit in choice.units.items() if sources.get(name) == choice.columns[name]}
     units |= _currents(sources)
+    told = (profile.time_unit if profile else None) or units.get("t")
     if all(sources[name] == name for name in ("t", *JOINT_CHANNELS)):
         units.setdefault("t", "s")  # algid's own names mean algid's own units
-    time_unit = profile.time_unit if profile and profile.time_unit else units.get("t")
-    return Columns(sources, units, time_unit, _notices(sources))
+    return Columns(sources, units, told or units.get("t"), _notices(sources), time_told=told is not None)
 
 
 def check_written(path: str, available: Sequence[str], sums: Mapping[str, int]) -> None:

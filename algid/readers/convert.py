@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,8 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.errors import LogError
-from algid.readers.table import VELOCITIES, Table
+from algid.readers.gather import Room
+from algid.readers.table import JOINT_CHANNELS, VELOCITIES, Table
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -31,29 +32,28 @@ class Conversion:
     hanging: bool = False
     absolute: bool = False
 
-    def apply(self, table: Table) -> tuple[FloatArray, FloatArray, FloatArray | None]:
-        """Angles, torques and, where recorded, velocities of a table: each (2, N), rad, N m, rad/s."""
-        theta = self._joint_pair(table, "theta1", "theta2")
-        tau = self._joint_pair(table, "tau1", "tau2")
-        omega = self._joint_pair(table, *VELOCITIES) if VELOCITIES[0] in table.columns else None
+    def apply(self, table: Table, room: Room) -> None:
+        """Fill in a table's angles, torques and, where recorded, velocities in rad, N m, rad/s."""
+        theta, omega = room.theta, room.omega
+        self._joint_pair(table, JOINT_CHANNELS[:2], theta)
+        self._joint_pair(table, JOINT_CHANNELS[2:], room.tau)
+        if omega is not None:
+            self._joint_pair(table, VELOCITIES, omega)
         if self.absolute:
             theta[1] -= theta[0]
             if omega is not None:
                 omega[1] -= omega[0]
         if self.hanging:
             theta[0] -= math.pi / 2
-        return theta, tau, omega
 
-    def _joint_pair(self, table: Table, first: str, second: str) -> FloatArray:
-        both = np.empty((2, len(table)))
-        for row, name in zip(both, (first, second), strict=True):
+    def _joint_pair(self, table: Table, names: Sequence[str], both: FloatArray) -> None:
+        for row, name in zip(both, names, strict=True):
             if self.factors[name] == 1:
                 row[:] = table.columns[name]
             else:
                 np.multiply(table.columns[name], self.factors[name], out=row)
             if self.offsets[name]:
                 row += self.offsets[name]
-        return both
 
 
 def conversion(path: str, profile: Profile | None, told: Mapping[str, str]) -> Conversion:
@@ -64,7 +64,7 @@ def conversion(path: str, profile: Profile | None, told: Mapping[str, str]) -> C
     LogError
         If a torque is in amperes without a torque constant, or counts without counts a turn.
     """
-    names = ("theta1", "theta2", "tau1", "tau2", *VELOCITIES)
+    names = (*JOINT_CHANNELS, *VELOCITIES)
     factors = {name: _factor(path, name, profile, told.get(name)) for name in names}
     if profile is None:
         return Conversion(factors, dict.fromkeys(names, 0.0))

@@ -15,7 +15,7 @@ from algid.readers import frames
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign, check_written
 from algid.readers.dialect import Dialect, detect
-from algid.readers.inflate import head_of, pieces
+from algid.readers.inflate import head_of, whole_lines
 from algid.readers.table import Table
 from algid.truth import Companion, loads
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from algid.profile import Profile
 
 _HEAD = 1 << 16
-_LONGEST_LINE = 1 << 16
 _EXCESS = "excess"
 
 
@@ -63,6 +62,23 @@ def head_bytes(path: Path, kind: str) -> bytes:
 def _rows(path: Path, kind: str, head: bytes) -> int:
     """Rows to expect of plain text, from the length of its first lines and a tenth more."""
     return 0 if kind != "csv" else int(1.1 * path.stat().st_size * head.count(b"\n") / len(head)) + 16
+
+
+def counted_rows(path: Path, kind: str, dialect: Dialect) -> int:
+    """Lines of the table under its header that are neither empty nor comments.
+
+    Raises
+    ------
+    LogError
+        If compressed text is damaged, or a line is no table's.
+    """
+    comment = dialect.comment.encode() if dialect.comment else b"\n"  # which no line begins with
+    rows, skip = 0, dialect.skip
+    for text in whole_lines(path, kind):
+        lines = text.split(b"\n")
+        rows += sum(1 for line in lines[skip:] if line.strip() and not line.startswith(comment))
+        skip = max(0, skip - len(lines))
+    return rows
 
 
 def _companion(path: Path) -> Companion | None:
@@ -103,25 +119,12 @@ class _Text:
             yield from self._scan(self.path, self.dialect.skip).collect_batches(chunk_size=rows)
             return
         skip = self.dialect.skip
-        for text in self._slices():
-            yield self._scan(io.BytesIO(text), skip).collect()
+        for text in whole_lines(self.path, self.kind):
+            yield self._scan(io.BytesIO(self._plain(text)), skip).collect()
             skip = 0
 
-    def _slices(self) -> Iterator[bytes]:
-        """The text in pieces that end with a line; runs of blanks become one tab where they separate."""
-        rest = b""
-        for piece in pieces(self.path, self.kind):
-            text = rest + piece
-            end = text.rfind(b"\n") + 1
-            if not end and len(text) > _LONGEST_LINE:
-                raise LogError(f"{self.path}: a line of more than 65,000 characters; expected rows of numbers")
-            rest = text[end:]
-            if end:
-                yield self._plain(text[:end])
-        if rest:
-            yield self._plain(rest)
-
     def _plain(self, text: bytes) -> bytes:
+        """Runs of blanks become one tab where they separate."""
         if self.dialect.separator:
             return text
         return re.sub(rb"[ \t]+", b"\t", re.sub(rb"(?m)^[ \t]+|[ \t]+$|[ \t]+(?=\r$)", b"", text))
@@ -173,7 +176,7 @@ class _Text:
             raise LogError(
                 f"{self.path}: row {row} has more cells than the header's {len(self.dialect.columns)}; mend that row"
             )
-        frame = frame.drop(_EXCESS)
+        frame.drop_in_place(_EXCESS)  # in place: `drop` would queue behind the parsing of the next rows
         if any(frame.null_count().row(0)):  # an empty line is no row
             frame = frame.filter(~pl.all_horizontal(pl.all().is_null()))
         return frame

@@ -75,12 +75,23 @@ def detect(path: Path, head: bytes) -> Dialect:
     return _checked(path, columns, separator, number, comment, [line for _, line in data[first_row:]], row)
 
 
+def kinds(path: Path, head: bytes, found: Dialect) -> dict[str, str]:
+    """By column "Int64", "Float64" or "String", as far as the first lines tell."""
+    lines = _lines(path, head)[found.skip :]
+    rows = [split(line, found.separator) for line in lines if line.strip() and not _comment(line, found.comment)]
+    table = zip(*(cells for cells in rows if len(cells) == len(found.columns)), strict=True)
+    numbers = [all(not cell or _NUMBER.match(cell) for cell in cells) for cells in table]
+    return {
+        column: "Int64" if column in found.whole else "Float64" if number else "String"
+        for column, number in zip(found.columns, numbers, strict=True)
+    }
+
+
 def split(line: str, separator: str) -> list[str]:
     """Cells of a line, blanks and quotes stripped."""
-    if separator and '"' in line:
-        cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
-    else:
-        cells = line.split(separator) if separator else line.split()
+    if '"' not in line:
+        return [cell.strip() for cell in line.split(separator)] if separator else line.split()
+    cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True), []) if separator else line.split()
     return [cell.strip().strip('"').strip() for cell in cells]
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.errors import LogError
-from algid.log import Notice
-from algid.readers.clock import time_unit, to_nanoseconds
+from algid.log import IntArray, Notice
+from algid.readers.clock import NANOSECONDS, SLOWEST_NS, median_step, time_unit, to_nanoseconds, unit_of_step
 from algid.readers.columns import Columns
 from algid.readers.table import Table
 from algid.truth import add, word_sum
@@ -42,6 +42,8 @@ def tables(path: str, frames: Iterator[pl.DataFrame], columns: Columns, sums: Ma
             stamps = to_nanoseconds(times, unit)
         except ValueError as error:
             raise LogError(f"{path}: {error} in column {columns.sources['t']!r}, past row {done}") from error
+        if not (done or columns.time_told):
+            notices += _slow(columns.sources["t"], stamps, unit)
         channels = {name: frame[name].to_numpy() for name in frame.columns if name != "t"}
         done += frame.height
         yield Table(stamps, channels, tuple(notices))
@@ -57,6 +59,19 @@ def _detected(path: str, times: NDArray[Any], notices: list[Notice]) -> str:
     if unit != "s":
         notices.append(Notice("TIME_UNIT", f"times are taken for {unit}, from their size and their steps"))
     return unit
+
+
+def _slow(column: str, stamps: IntArray, unit: str) -> list[Notice]:
+    """What to say where nobody told the unit of time and samples are too far apart for an arm."""
+    step = median_step(stamps - stamps[:1])
+    if step <= SLOWEST_NS:
+        return []
+    likely = unit_of_step(step / NANOSECONDS[unit])
+    text = (
+        f"times in {column!r} are taken for {unit}, which makes {1e9 / step:.3g} Hz, too slow for an arm in motion; "
+        f'if they are in {likely}, set time_unit = "{likely}" in a profile'
+    )
+    return [Notice("SLOW_CLOCK", text)]
 
 
 def _complete(path: str, frames: Iterator[pl.DataFrame]) -> Iterator[tuple[pl.DataFrame, tuple[Notice, ...]]]:

@@ -12,6 +12,7 @@ from algid.errors import LogError
 
 _PIECE = 1 << 24
 _HEAD = 1 << 16
+_LONGEST_LINE = 1 << 16
 
 
 def pieces(path: Path, name: str, size: int = _PIECE) -> Iterator[bytes]:
@@ -36,6 +37,27 @@ def pieces(path: Path, name: str, size: int = _PIECE) -> Iterator[bytes]:
                 yield piece
     except (OSError, EOFError, zlib.error, zstandard.ZstdError) as error:
         raise LogError(f"{path}: the compressed data are damaged or cut off ({error}); copy it again") from error
+
+
+def whole_lines(path: Path, name: str) -> Iterator[bytes]:
+    """As `pieces`, in pieces that end with a line.
+
+    Raises
+    ------
+    LogError
+        As `pieces`, and if a line is no table's.
+    """
+    rest = b""
+    for piece in pieces(path, name):
+        text = rest + piece
+        end = text.rfind(b"\n") + 1
+        if not end and len(text) > _LONGEST_LINE:
+            raise LogError(f"{path}: a line of more than 65,000 characters; expected rows of numbers")
+        rest = text[end:]
+        if end:
+            yield text[:end]
+    if rest:
+        yield rest
 
 
 def head_of(path: Path, name: str) -> bytes:

@@ -66,16 +66,21 @@ TIMES = (
         "time_sec",
     ),
     *("seconds", "secs", "sec", "elapsed", "elapsed_time", "log_time", "header.stamp", "header/stamp"),
+    *("milliseconds", "millis", "microseconds", "micros", "nanoseconds", "nanos"),
 )
 UNITS = {
     "deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "rad": "rad", "radian": "rad",
     "radians": "rad", "rev": "rev", "turns": "rev", "deg/s": "deg", "rad/s": "rad", "rads": "rad",
     "rpm": "rpm",
     "nm": "N m", "n.m": "N m", "n*m": "N m", "n m": "N m", "n·m": "N m", "mnm": "mN m", "a": "A", "amp": "A",
-    "s": "s", "sec": "s", "ms": "ms", "us": "us", "µs": "us", "μs": "us", "ns": "ns",
+    "s": "s", "sec": "s", "secs": "s", "seconds": "s", "ms": "ms", "msec": "ms", "millis": "ms", "milliseconds": "ms",
+    "us": "us", "µs": "us", "μs": "us", "usec": "us", "micros": "us", "microseconds": "us",
+    "ns": "ns", "nsec": "ns", "nanos": "ns", "nanoseconds": "ns",
 }  # fmt: skip
 _BRACKET_UNIT = re.compile(r"^(.*\S)\s*[\[(]\s*([^\[\]()]*[^\[\]()\d\s][^\[\]()]*)\s*[\])]$")
-_SUFFIX_UNIT = re.compile(r"^(.*[^_\W])_(deg|rad|rev|nm|mnm|s|sec|ms|us|ns|rpm)$")
+_SUFFIX_UNIT = re.compile(
+    r"^(.*[^_\W])_(deg|rad|rev|nm|mnm|rpm|s|secs?|seconds|[mun]s(?:ec)?|millis|micros|nanos|(?:milli|micro|nano)seconds)$"
+)
 _JOINT_FIRST = re.compile(r"^(?:joint|axis|motor|link|j)[_ ]?(\d{1,3})[_./ ]+(.+)$")
 _JOINT_LAST = re.compile(r"^(.*?[^\W\d])[_./ ]*\[?(\d{1,3})\]?$")
 
@@ -107,6 +112,8 @@ def take_apart(column: str) -> Name:
         if found and found[2].strip() in UNITS:
             text, unit = found[1].strip(), UNITS[found[2].strip()]
             break
+    if text in TIMES and text in UNITS:  # "millis" says its unit itself
+        unit = UNITS[text]
     if found := re.match(r"^(.*)/([^/]+)/(position|velocity|effort)$", text):
         return Name(found[3], f"{found[1]}/{found[2]}", unit)
     if found := re.match(r"^.*/(position|velocity|effort)[.\[/](\d+)\]?$", text):

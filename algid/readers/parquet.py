@@ -39,7 +39,7 @@ def open_parquet(path: Path, profile: Profile | None = None) -> TableReader:
     try:
         metadata = pl.read_parquet_metadata(path)
         available = _flat_names(path, schema)
-        rows = _counted_rows(path)
+        rows = counted_rows(path)
     except (pl.exceptions.PolarsError, OSError, pl.exceptions.PanicException) as error:
         raise _damaged(path, error) from error
     companion = _companion(path, metadata)
@@ -82,7 +82,7 @@ def _check_footer(path: Path) -> None:
         raise LogError(f"{path}: the Parquet footer claims {length} bytes of a file of {size}; copy the file again")
 
 
-def _counted_rows(path: Path) -> int:
+def counted_rows(path: Path) -> int:
     """Rows of the file, once its footer, its row groups and their columns agree on them.
 
     Raises
@@ -166,14 +166,18 @@ class _Groups:
         return frames.tables(str(self.path), self._frames(rows), self._columns(), self.sums)
 
     def _frames(self, rows: int) -> Iterator[pl.DataFrame]:
+        """Frames of `rows` rows, the last of fewer. Columns come in two lots, since one lot takes one core."""
         import polars as pl
 
-        frame = pl.scan_parquet(self.path, glob=False).select(
-            self._number(name, source) for name, source in self.columns.sources.items()
-        )
+        frame = pl.scan_parquet(self.path, glob=False)
+        numbers = [self._number(name, source) for name, source in self.columns.sources.items()]
+        middle = (len(numbers) // 2 + 1) // 2 * 2  # both joints in one lot: they may share a list column
         try:
-            yield from frame.collect_batches(chunk_size=rows)
-        except (pl.exceptions.PolarsError, OSError, pl.exceptions.PanicException) as error:
+            # both begin here and run while the frames are being used
+            lots = [frame.select(lot).collect_batches(chunk_size=rows) for lot in (numbers[:middle], numbers[middle:])]
+            for first, second in zip(*lots, strict=True):
+                yield first.hstack(second)
+        except (pl.exceptions.PolarsError, OSError, ValueError, pl.exceptions.PanicException) as error:
             raise _damaged(self.path, error) from error
 
     def _number(self, name: str, source: str) -> pl.Expr:
@@ -197,7 +201,7 @@ class _Groups:
 
         column, _ = self.available[self.columns.sources["t"]]
         if isinstance(self.schema[column], (pl.Datetime, pl.Duration)):
-            return Columns(self.columns.sources, self.columns.units, "ns")
+            return replace(self.columns, time_unit="ns", time_told=True)
         return self.columns
 
 

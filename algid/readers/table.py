@@ -26,6 +26,11 @@ class Table:
     def __len__(self) -> int:
         return int(self.stamp_ns.size)
 
+    @property
+    def has_velocities(self) -> bool:
+        """Whether velocities were recorded."""
+        return VELOCITIES[0] in self.columns
+
     def part(self, first: int, last: int) -> Table:
         """Rows `first` to `last` - 1 as views; the notices stay with the first part."""
         columns = {name: values[first:last] for name, values in self.columns.items()}

@@ -13,6 +13,9 @@ from algid.errors import ResultError
 
 ROWS = 1 << 18
 
+LARGEST = 1e100
+"""Beyond this nothing of an arm is a number: squares would overflow."""
+
 Block = dict[str, FloatArray]
 
 
@@ -28,7 +31,7 @@ def columns_of(path: Path) -> list[str]:
 
 
 def blocks(path: Path, names: Sequence[str], rows: int = ROWS) -> Iterator[Block]:
-    """Yield the columns `names` of `path`, `rows` samples at a time, missing values as NaN.
+    """Yield the columns `names` of `path`, `rows` samples at a time, missing values and those beyond `LARGEST` as NaN.
 
     Raises
     ------
@@ -72,8 +75,9 @@ def by_log(found: Iterator[Block]) -> Iterator[tuple[int, Block]]:
 
 
 def _array(column: object) -> FloatArray:
-    values = column.to_numpy(zero_copy_only=False)  # type: ignore[attr-defined]  # pyarrow has no types
-    return np.asarray(values, dtype=np.float64)
+    values = np.asarray(column.to_numpy(zero_copy_only=False), dtype=np.float64)  # type: ignore[attr-defined]
+    beyond = np.isfinite(values) & (np.abs(values) > LARGEST)
+    return np.where(beyond, np.nan, values) if beyond.any() else values
 
 
 def _unreadable(path: Path, error: Exception) -> ResultError:

@@ -22,17 +22,17 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.outfiles import whole_file
-from algid.report.blocks import blocks, by_log, columns_of
+from algid.progress import Told
+from algid.report.blocks import blocks, by_log, columns_of, row_count
 from algid.report.ros2 import (
     ESTIMATES,
-    JOINT_STATE,
-    JOINT_STATE_SCHEMA,
     JointTorque,
     estimates_schema,
     field_names,
     numbers_message,
 )
 from algid.results import read_result
+from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
@@ -42,8 +42,8 @@ TORQUES = ("log", "t", "tau1", "tau2", "tau1_predicted", "tau2_predicted")
 ROWS = 1 << 14
 
 
-def export_mcap(folder: Path) -> Path:
-    """Write `estimates.mcap` into the result folder `folder`.
+def export_mcap(folder: Path, told: Told | None = None) -> Path:
+    """Write `estimates.mcap` into the result folder `folder`, telling how far it has come.
 
     The messages bear the log's own stamps where each Parquet file tells its logs' first ones, in ns, as a
     JSON list in its metadata ``start_ns``; otherwise time counts from zero.
@@ -62,7 +62,7 @@ def export_mcap(folder: Path) -> Path:
     with whole_file(path) as temporary, temporary.open("wb") as stream:
         writer = Writer(stream, compression=CompressionType.ZSTD)
         writer.start(profile="ros2", library=f"algid {result.version}")
-        _write_torques(writer, folder / "torque.parquet", len(result.logs))
+        _write_torques(writer, folder / "torque.parquet", len(result.logs), told)
         for name in ("estimates", "loaded"):
             write_series(writer, folder / f"{name}.parquet", f"/algid/{name}")
         writer.finish()  # type: ignore[no-untyped-call]
@@ -78,13 +78,14 @@ def start_stamps(path: Path, logs: int) -> list[int]:
     return (known + [0] * logs)[:logs]
 
 
-def _write_torques(writer: Writer, path: Path, logs: int) -> None:
+def _write_torques(writer: Writer, path: Path, logs: int, told: Told | None) -> None:
     if not path.exists():
         return
     starts = start_stamps(path, logs)
-    schema = writer.register_schema(JOINT_STATE, "ros2msg", JOINT_STATE_SCHEMA.encode())
+    schema = writer.register_schema(JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode())
     message = JointTorque(("joint1", "joint2")).message
     channels: dict[str, int] = {}
+    done, total = 0, row_count(path)
     for log, block in by_log(blocks(path, TORQUES, ROWS)):
         stamps = _stamps(block["t"], starts[log] if log < len(starts) else 0)
         place = "/algid" if log == 0 else f"/algid/log{log + 1}"
@@ -96,6 +97,9 @@ def _write_torques(writer: Writer, path: Path, logs: int) -> None:
                 channels[topic] = writer.register_channel(topic, "cdr", schema)
             for stamp, tau1, tau2 in zip(stamps, *values.tolist(), strict=True):
                 writer.add_message(channels[topic], stamp, message(stamp, tau1, tau2), stamp)
+        done += len(stamps)
+        if told is not None:
+            told("export", done, total)
 
 
 def write_series(writer: Writer, path: Path, topic: str) -> None:

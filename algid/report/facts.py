@@ -10,14 +10,14 @@ from algid.report.table import Column, Table
 from algid.report.text import file_name, visible
 from algid.report.torquelog import TorqueLog
 from algid.report.verdict import replaced_estimator
-from algid.results import LogSummary, Result, TorquePrediction
+from algid.results import LogSummary, Result
 
 
 def fit_tables(result: Result) -> list[Table]:
-    """What a statistical estimator knows beside the estimates: noise, residual, terms, bounds."""
+    """What a statistical estimator knows beside the estimates: noise, whiteness, terms, bounds."""
     if result.fit is None:
         return []
-    tables = [_noise(result), _whiteness(result), _prediction(result), _terms(result), _bounds(result)]
+    tables = [_noise(result), _whiteness(result), _terms(result), _bounds(result)]
     return [table for table in tables if table.rows]
 
 
@@ -47,35 +47,6 @@ def _whiteness(result: Result) -> Table:
     }
     note = f"The intervals rest on {how[result.fit.intervals]}."
     return Table("Whiteness of the residual", columns, rows, note).without_empty()
-
-
-def _prediction(result: Result) -> Table:
-    assert result.fit is not None
-    found = [("on the logs used", result.fit.residual), ("each log left out in turn", result.fit.cross_validation)]
-    rows = tuple(row for where, prediction in found if prediction is not None for row in _joints(where, prediction))
-    columns = (
-        Column("Torque predicted", "name"),
-        Column("Joint", "text"),
-        Column("RMSE, N m", "number"),
-        Column("RMSE / RMS, %", "number"),
-        Column("R²", "number"),
-        Column("Filter", "text", rank=1),
-    )
-    return Table("Torque prediction", columns, rows).without_empty()
-
-
-def _joints(where: str, found: TorquePrediction) -> list[tuple[str, ...]]:
-    return [
-        (
-            where,
-            str(joint + 1),
-            significant(found.rmse[joint], 3),
-            significant(100 * found.nrmse[joint], 3),
-            f"{found.r2[joint]:.5f}",
-            visible(found.filter),
-        )
-        for joint in range(2)
-    ]
 
 
 def _terms(result: Result) -> Table:
@@ -171,7 +142,9 @@ def _estimator(result: Result) -> str:
 def provenance_table(result: Result) -> Table:
     """What made the result, from what."""
     rows = [("algid", visible(result.version)), ("estimator", _estimator(result))]
-    rows += [(f"sha256 of {file_name(log.path)}", visible(log.sha256)) for log in result.logs]
+    rows += [
+        (f"sha256 of {file_name(log.path)}", visible(log.sha256 or "unknown, fetched in part")) for log in result.logs
+    ]
     rows += [(f"path of {file_name(log.path)}", visible(log.path)) for log in result.logs]
     return Table("Provenance", (Column("What", "name"), Column("Value", "text")), tuple(rows))
 

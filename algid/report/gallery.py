@@ -6,6 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from algid.errors import ResultError
+from algid.progress import Told
+from algid.report.blocks import LARGEST
 from algid.report.figures.base import Figure, Missing
 from algid.report.figures.closeup import TITLE as CLOSEUP
 from algid.report.figures.closeup import closeup
@@ -19,11 +21,12 @@ from algid.report.figures.residual import residual
 from algid.report.figures.torque import TITLE as TORQUE
 from algid.report.figures.torque import torque
 from algid.report.torquelog import TorqueLog, read_torque
-from algid.results import Result
+from algid.results import Estimate, Result
 
 
-def gallery(folder: Path, result: Result) -> tuple[TorqueLog | None, list[Figure | Missing]]:
+def gallery(folder: Path, result: Result, told: Told | None = None) -> tuple[TorqueLog | None, list[Figure | Missing]]:
     """What the figures need of `torque.parquet`, where it can be read, and the figures."""
+    result = drawable(result)
     series, loaded, seconds = (folder / f"{name}.parquet" for name in ("estimates", "loaded", "information"))
     figures = [_try("convergence", "Convergence of the estimates", series, lambda: convergence(series, result))]
     if loaded.exists():
@@ -31,7 +34,7 @@ def gallery(folder: Path, result: Result) -> tuple[TorqueLog | None, list[Figure
             _try("loaded", "Convergence, loaded log", loaded, lambda: convergence(loaded, result, loaded=True))
         )
     measured = folder / "torque.parquet"
-    found = _torque_log(measured)
+    found = _torque_log(measured, told)
     if isinstance(found, Missing):
         figures.append(found)
     else:
@@ -46,12 +49,29 @@ def gallery(folder: Path, result: Result) -> tuple[TorqueLog | None, list[Figure
     return read, figures
 
 
-def _torque_log(path: Path) -> TorqueLog | Missing:
+def drawable(result: Result) -> Result:
+    """`result` without the numbers beyond `LARGEST`, which the tables show but no figure can."""
+
+    def kept(found: Estimate) -> Estimate:
+        numbers = (found.estimate, found.std, *(found.ci95 or ()))
+        if all(number is None or abs(number) <= LARGEST for number in numbers):
+            return found
+        return found.model_copy(update={"estimate": None, "std": None, "ci95": None})
+
+    groups = ("parameters", "loaded", "payload", "paper_payload")
+    changed = {group: {name: kept(e) for name, e in getattr(result, group).items()} for group in groups}
+    if result.fit is None:
+        return result.model_copy(update=changed)
+    covariance = [[None if v is None or abs(v) > LARGEST else v for v in row] for row in result.fit.covariance]
+    return result.model_copy(update={**changed, "fit": result.fit.model_copy(update={"covariance": covariance})})
+
+
+def _torque_log(path: Path, told: Told | None) -> TorqueLog | Missing:
     title = f"{TORQUE}, residual, coverage"
     if not path.exists():
         return Missing("torque", title, _absent(path))
     try:
-        return read_torque(path)
+        return read_torque(path, told)
     except ResultError as error:
         return Missing("torque", title, str(error))
 

@@ -14,6 +14,7 @@ from importlib import resources
 from pathlib import Path
 
 from algid.outfiles import whole_file
+from algid.progress import Told
 from algid.report.facts import fit_tables, log_tables, provenance_table, quality_tables, settings_table
 from algid.report.figures.base import Figure, Missing
 from algid.report.gallery import gallery
@@ -30,7 +31,7 @@ LIBRARY = "plotly.min.js"
 SIGNS = {"good": "✓", "reservations": "!", "failed": "✕"}
 
 
-def write_report(folder: Path, shared_library: bool = False) -> Path:
+def write_report(folder: Path, shared_library: bool = False, told: Told | None = None) -> Path:
     """Write `report.html` into the result folder `folder`, from what it holds.
 
     Parameters
@@ -41,6 +42,8 @@ def write_report(folder: Path, shared_library: bool = False) -> Path:
     shared_library : bool
         Whether the plotting library stands once beside the folder, for a folder of many results, instead
         of inside the page.
+    told : callable
+        Called as samples of the torque are read.
 
     Raises
     ------
@@ -56,7 +59,7 @@ def write_report(folder: Path, shared_library: bool = False) -> Path:
     page = folder / "report.html"
     if shared_library:
         _write_once(folder.parent / LIBRARY, library)
-    text = page_html(folder, result, None if shared_library else library)
+    text = page_html(folder, result, None if shared_library else library, told)
     with whole_file(page) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return page
@@ -69,9 +72,9 @@ def _write_once(path: Path, text: str) -> None:
             temporary.write_bytes(content)
 
 
-def page_html(folder: Path, result: Result, library: str | None) -> str:
+def page_html(folder: Path, result: Result, library: str | None, told: Told | None = None) -> str:
     """The page's text; without `library` it asks for the one beside the folder."""
-    torque, figures = gallery(folder, result)
+    torque, figures = gallery(folder, result, told)
     judged = verdict(result)
     body = [
         _head(result, judged),

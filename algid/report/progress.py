@@ -1,34 +1,44 @@
-"""Progress of long work: on stderr, and only on a terminal."""
+"""Progress of long work: on standard error, and only on a terminal."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import sys
+from collections.abc import Iterator
 from contextlib import contextmanager
 
-Advance = Callable[[float], None]
+from algid.progress import Told
+
+WIDEST = 40
+BESIDE = 60  # columns that words, counts and the time left take beside the bar
 
 
 @contextmanager
-def progress(words: str, total: float, quiet: bool = False) -> Iterator[Advance]:
-    """Show a bar while the block runs; give what the block calls with each part of `total` that is done."""
+def progress(unit: str, quiet: bool = False) -> Iterator[Told | None]:
+    """Show a bar while the block runs; give what the block is to tell its progress to, None where nobody looks.
+
+    What is done of each stage is counted in `unit`. The bar is gone once the block has ended.
+    """
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
-    parts = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
-    with Progress(*parts, console=console, transient=True, disable=quiet or not console.is_terminal) as bar:
-        task = bar.add_task(words, total=total)
-        yield lambda done: bar.advance(task, done)
+    width = min(max(console.width - BESIDE, 4), WIDEST)
+    counts = TextColumn("{task.fields[counts]}", markup=False)
+    parts = (TextColumn("{task.description}", markup=False), BarColumn(width), counts, TimeRemainingColumn())
+    with Progress(*parts, console=console, transient=True, redirect_stdout=False) as bar:
 
+        def told(stage: str, done: int, total: int) -> None:
+            known = total if total >= done else 0
+            counts = f"{done:,} of {known:,} {unit}" if known else f"{done:,} {unit}" if done else ""
+            task = next(iter(bar.tasks), None)
+            if task and task.description == stage and task.completed <= done and task.total == (known or None):
+                bar.update(task.id, completed=done, counts=counts)
+                return
+            if task:
+                bar.remove_task(task.id)
+            bar.add_task(stage, total=known or None, completed=done, counts=counts)
 
-@contextmanager
-def waiting(words: str, quiet: bool = False) -> Iterator[None]:
-    """Show that something of unknown length is being done while the block runs."""
-    from rich.console import Console
-
-    console = Console(stderr=True)
-    if quiet or not console.is_terminal:
-        yield
-        return
-    with console.status(words.replace("[", "\\[")):
-        yield
+        yield told

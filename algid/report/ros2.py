@@ -4,25 +4,9 @@ from __future__ import annotations
 
 import struct
 
-JOINT_STATE = "sensor_msgs/msg/JointState"
+from algid.ros2 import HEADER
+
 ESTIMATES = "algid_msgs/msg/Estimates"
-
-_HEADER = """================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-"""
-
-JOINT_STATE_SCHEMA = f"""std_msgs/Header header
-string[] name
-float64[] position
-float64[] velocity
-float64[] effort
-{_HEADER}"""
 
 _ENCAPSULATION = b"\x00\x01\x00\x00"
 _BILLION = 1_000_000_000
@@ -31,7 +15,7 @@ _BILLION = 1_000_000_000
 def estimates_schema(names: list[str]) -> str:
     """Message definition with one float64 of each name."""
     fields = "".join(f"float64 {name}\n" for name in names)
-    return f"std_msgs/Header header\n{fields}{_HEADER}"
+    return f"std_msgs/Header header\n{fields}{HEADER}"
 
 
 def field_names(columns: list[str]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from algid.report.table import Table
@@ -30,8 +31,21 @@ def print_verdict(judged: Verdict, console: Console) -> None:
 
     word = LEVEL_WORDS[judged.level]
     console.print(Text.assemble((word, LEVEL_STYLES[judged.level]), judged.sentence.removeprefix(word)))
-    for reason in judged.reasons:
-        console.print(Text(f"  • {reason}"))
+    if judged.reasons:
+        console.print(_points(judged.reasons))
+
+
+def _points(reasons: Sequence[str]) -> RichTable:
+    """Reasons as a list whose longer points stay clear of the bullets."""
+    from rich.table import Table as RichTable
+    from rich.text import Text
+
+    points = RichTable.grid(padding=(0, 1))
+    points.add_column()
+    points.add_column(overflow="fold")
+    for reason in reasons:
+        points.add_row(" •", Text(reason))
+    return points
 
 
 def print_one(table: Table, console: Console) -> None:
@@ -54,7 +68,7 @@ def rich_table(table: Table) -> RichTable:
     from rich.text import Text
 
     title, caption = Text(table.title, "bold"), Text(table.note, "dim") if table.note else None
-    made = RichTable(title=title, caption=caption, box=box.SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
+    made = RichTable(title=title, caption=caption, box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     made.title_justify = made.caption_justify = "left"
     for column in table.columns:
         right = column.kind == "number"

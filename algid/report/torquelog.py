@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.progress import Told
 from algid.report.blocks import Block, blocks, by_log, row_count
 from algid.report.reduce import MinMax, Thinned, broken_at_gaps, bucket_size
 from algid.report.spectrum import Spectrum, stretch_length
@@ -61,12 +62,14 @@ class TorqueLog:
     reduced: bool
 
 
-def read_torque(path: Path) -> TorqueLog:
-    """Read `path`. Raises `ResultError` where it cannot be read or lacks a column."""
+def read_torque(path: Path, told: Told | None = None) -> TorqueLog:
+    """Read `path`, telling how far. Raises `ResultError` where it cannot be read or lacks a column."""
     total = row_count(path)
     gathering = _Gathering(total)
     for log, block in by_log(blocks(path, COLUMNS)):
         gathering.take(log, block)
+        if told is not None:
+            told("report", sum(span.samples for span in gathering.ranges.values()), total)
     return gathering.result()
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from algid.arm import with_payload
 from algid.log import Log, Truth
+from algid.progress import Told
 from algid.synth.cases import Case
 from algid.synth.excitation import Hold, SampledTorque, Torque, no_torque, wide_multi_sine
 from algid.synth.sensors import Sensors, record, sample_times
@@ -53,14 +54,20 @@ def held(torque: Torque, rate: float, duration: float, hold: Hold) -> SampledTor
     return SampledTorque(t, torque(t), hold)
 
 
-def synthesise(case: Case, torque: Torque, recording: Recording) -> tuple[Log, Log]:
-    """The unloaded and the loaded log of a case; the loaded one has noise of its own."""
-    unloaded = _one(case, torque, recording, payload=0.0)
+def synthesise(case: Case, torque: Torque, recording: Recording, told: Told | None = None) -> tuple[Log, Log]:
+    """The unloaded and the loaded log of a case; the loaded one has noise of its own. `told` hears how far each is."""
+    unloaded = _one(case, torque, recording, 0.0, told)
     other = replace(recording.sensors, seed=recording.sensors.seed + 1)
-    return unloaded, _one(case, torque, replace(recording, sensors=other), payload=case.payload)
+    return unloaded, _one(case, torque, replace(recording, sensors=other), case.payload, told)
 
 
-def with_schedule(case: Case, torque: Torque, recording: Recording, schedule: Sequence[tuple[float, float]]) -> Log:
+def with_schedule(
+    case: Case,
+    torque: Torque,
+    recording: Recording,
+    schedule: Sequence[tuple[float, float]],
+    told: Told | None = None,
+) -> Log:
     """A log during which the payload changes: pairs of time in s, increasing, and payload in kg from then on.
 
     Before the first time the arm is bare. An object is grasped and let go at the tip's own velocity, so that the
@@ -86,7 +93,7 @@ def with_schedule(case: Case, torque: Torque, recording: Recording, schedule: Se
             continue
         k = with_payload(case.arm.constants(), case.arm.payload_constants(mass))
         every = np.unique(np.concatenate([[start], own, [close]]))
-        motion = simulate(k, torque, every, state[:2], state[2:])
+        motion = simulate(k, torque, every, state[:2], state[2:], _counted(told, "schedule", recording))
         state = np.concatenate([motion.theta[:, -1], motion.omega[:, -1]])
         kept = np.isin(every, own)
         parts.append(Motion(own, motion.theta[:, kept], motion.omega[:, kept], motion.tau[:, kept]))
@@ -95,10 +102,19 @@ def with_schedule(case: Case, torque: Torque, recording: Recording, schedule: Se
     return record(whole, recording.sensors, truth, f"{case.name}-schedule")
 
 
-def _one(case: Case, torque: Torque, recording: Recording, payload: float) -> Log:
+def _one(case: Case, torque: Torque, recording: Recording, payload: float, told: Told | None) -> Log:
     k = with_payload(case.arm.constants(), case.arm.payload_constants(payload))
     t = sample_times(recording.rate, recording.duration, recording.sensors)
     initial = np.array(recording.initial)
-    motion = simulate(k, torque, t, initial[:2], initial[2:])
+    role = "loaded" if payload else "unloaded"
+    motion = simulate(k, torque, t, initial[:2], initial[2:], _counted(told, role, recording))
     truth = Truth(arm=case.arm, payload=payload, case=case.name)
-    return record(motion, recording.sensors, truth, f"{case.name}-{'loaded' if payload else 'unloaded'}")
+    return record(motion, recording.sensors, truth, f"{case.name}-{role}")
+
+
+def _counted(told: Told | None, stage: str, recording: Recording) -> Callable[[float], None] | None:
+    """Tells a time that the simulation has come to in samples."""
+    if told is None:
+        return None
+    total = round(recording.rate * recording.duration) + 1
+    return lambda now: told(stage, min(round(recording.rate * now) + 1, total), total)

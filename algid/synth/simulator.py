@@ -13,6 +13,7 @@ tau     joint torques                 (2, N)  N m
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -44,6 +45,7 @@ def simulate(
     t: FloatArray,
     theta0: FloatArray = HANGING,
     omega0: FloatArray | None = None,
+    reached: Callable[[float], None] | None = None,
 ) -> Motion:
     """Move the arm `k` by `torque` from rest, or from `theta0` (2,) rad and `omega0` (2,) rad/s at `t[0]`.
 
@@ -52,6 +54,8 @@ def simulate(
     k : (7,) float64, constants k1 … k7, with the payload's share where there is one
     torque : callable (M,) s -> (2, M) N m
     t : (N,) float64, s, increasing, at least two
+    reached : callable
+        Called with each time in s that the integration has come to.
 
     Returns
     -------
@@ -66,22 +70,31 @@ def simulate(
     if t.size < 2 or np.any(np.diff(t) <= 0):
         raise ValueError(f"t must hold at least two increasing times, got {t.size}")
     start = np.concatenate([theta0, np.zeros(2) if omega0 is None else omega0])
-    states = _states(k, torque, t, start)
+    states = _states(k, torque, t, start, reached or (lambda _now: None))
     return Motion(t=t, theta=states[:2], omega=states[2:], tau=torque(t))
 
 
-def _states(k: FloatArray, torque: Torque, t: FloatArray, start: FloatArray) -> FloatArray:
+def _states(
+    k: FloatArray, torque: Torque, t: FloatArray, start: FloatArray, reached: Callable[[float], None]
+) -> FloatArray:
     if isinstance(torque, SampledTorque):
-        return _piecewise(k, torque, t, start)
-    return _smooth(k, torque, t, start)
+        return _piecewise(k, torque, t, start, reached)
+    return _smooth(k, torque, t, start, reached)
 
 
 def _rate(k: FloatArray, state: FloatArray, tau: FloatArray) -> FloatArray:
     return np.concatenate([state[2:], forward_dynamics(k, state[:2], state[2:], tau)])
 
 
-def _smooth(k: FloatArray, torque: Torque, t: FloatArray, start: FloatArray) -> FloatArray:
+def _smooth(
+    k: FloatArray, torque: Torque, t: FloatArray, start: FloatArray, reached: Callable[[float], None]
+) -> FloatArray:
     """States (4, N) under a smooth torque."""
+
+    def step(now: float, _state: FloatArray) -> float:
+        reached(now)
+        return 1.0  # an event that never comes: scipy asks for it once a step
+
     solution = solve_ivp(
         lambda now, state: _rate(k, state, torque(np.array([now]))[:, 0]),
         (t[0], t[-1]),
@@ -91,12 +104,15 @@ def _smooth(k: FloatArray, torque: Torque, t: FloatArray, start: FloatArray) -> 
         rtol=RELATIVE_TOLERANCE,
         atol=ABSOLUTE_TOLERANCE,
         max_step=LONGEST_STEP,
+        events=step,
     )
     states: FloatArray = solution.y
     return states
 
 
-def _piecewise(k: FloatArray, torque: SampledTorque, t: FloatArray, start: FloatArray) -> FloatArray:
+def _piecewise(
+    k: FloatArray, torque: SampledTorque, t: FloatArray, start: FloatArray, reached: Callable[[float], None]
+) -> FloatArray:
     """States (4, N) under a sampled torque: each step ends where the torque has a corner."""
     corners = torque.t[(torque.t > t[0]) & (torque.t < t[-1])]
     ends = np.unique(np.concatenate([t, corners]))
@@ -104,6 +120,7 @@ def _piecewise(k: FloatArray, torque: SampledTorque, t: FloatArray, start: Float
     states[:, 0] = start
     for index, (begin, end) in enumerate(pairwise(ends)):
         states[:, index + 1] = _step(k, _piece(torque, begin, end), begin, end, states[:, index])
+        reached(end)
     return states[:, np.searchsorted(ends, t)]
 
 

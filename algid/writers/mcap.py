@@ -13,29 +13,12 @@ import numpy as np
 
 from algid.log import Log, Truth
 from algid.outfiles import whole_file
+from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.truth import KEY, Companion
 from algid.writers.blocks import as_blocks
 
 TOPIC = "/joint_states"
-TYPE = "sensor_msgs/msg/JointState"
 JOINTS = ("joint1", "joint2")
-DEFINITION = """\
-# State of torque controlled joints: one entry a joint, the same order in every array.
-std_msgs/Header header
-
-string[] name
-float64[] position
-float64[] velocity
-float64[] effort
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-"""
 _CHUNK = 768 * 1024
 _QOS = """\
 - history: 1
@@ -67,7 +50,7 @@ def write(path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None, c
     with whole_file(path) as temporary, temporary.open("wb") as stream:
         writer = Writer(stream, chunk_size=chunk_size)
         writer.start(profile="ros2", library="algid")
-        schema = writer.register_schema(name=TYPE, encoding="ros2msg", data=DEFINITION.encode())
+        schema = writer.register_schema(JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode())
         channel = writer.register_channel(
             topic=TOPIC,
             message_encoding="cdr",

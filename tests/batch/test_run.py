@@ -91,7 +91,20 @@ def test_a_bad_log_fails_alone_and_the_table_has_a_row_a_job(logs: Path) -> None
     assert row["k1"] == result.parameters["k1"].estimate
     assert row["m_p_std"] == result.payload["m_p"].std
     assert row["sha256"] == [log.sha256 for log in result.logs]
+    assert row["size"] == [Path(log.path).stat().st_size for log in result.logs]
+    assert row["changed"][0].timestamp() == pytest.approx(Path(result.log.path).stat().st_mtime, abs=1e-5)
     assert "no column for t, theta1" in str(table["reason"][0])
+
+
+def test_the_table_names_the_estimator_whose_numbers_are_reported(logs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def handed_back(*args: Any, **more: Any) -> Any:
+        return identify(*args, **more).model_copy(update={"estimator": "weak"})
+
+    monkeypatch.setattr("algid.batch.work.identify", handed_back)
+    _run(logs, recipe=replace(RECIPE, settings=Settings(estimator="refined")))
+    table = pl.read_parquet(logs.parent / "out/jobs.parquet")
+    assert table["estimator"].to_list() == [None, "weak", "weak"]
+    assert '"estimator": "refined"' in table["settings"][1]
 
 
 def test_what_is_done_is_not_done_again(logs: Path) -> None:

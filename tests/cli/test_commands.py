@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import polars as pl
@@ -55,6 +57,18 @@ def test_synth_identify_check(logs: Path, tmp_path: Path) -> None:
     assert bad.code == 1
     assert bad.out.splitlines()[0].startswith("OVER  k1")
     assert bad.out.splitlines()[1].startswith("ok    k2")
+
+
+def test_export_writes_beside_the_result_what_report_would(logs: Path, tmp_path: Path) -> None:
+    found = Outcome("identify", logs / "case1-unloaded.csv", "-o", tmp_path, "-q", "--export", "mcap")
+    assert (found.code, found.out, found.err) == (0, "", "")
+    exported = tmp_path / "case1-unloaded.algid" / "estimates.mcap"
+    ours = exported.read_bytes()
+    Outcome("report", exported.parent, "--export", "mcap")
+    assert exported.read_bytes() == ours
+    without = Outcome("identify", logs / "case1-unloaded.csv", "-o", tmp_path / "x", "--export", "mcap", "--no-report")
+    assert (without.code, without.err.count("\n")) == (2, 1)
+    assert "leave --no-report out" in without.err
 
 
 def test_verbose_tells_on_stderr_what_was_read_and_how(logs: Path, tmp_path: Path) -> None:
@@ -143,6 +157,7 @@ def test_bad_logs_get_one_line_and_nothing_is_written(change: str, logs: Path, t
         (("identify", "x.csv", "--poles", "1,2,3"), "--poles"),
         (("identify", "x.csv", "--estimator", "paper", "--friction", "coulomb"), "--friction"),
         (("check", "nothing.algid"), "nothing.algid"),
+        (("identify", "--parameters", "nothing.algid", "x.csv"), "nothing.algid"),
     ],
 )
 def test_wrong_calls_get_one_line(arguments: tuple[str, ...], said: str, tmp_path: Path) -> None:
@@ -203,25 +218,36 @@ def test_validate_predicts_another_log(tmp_path: Path) -> None:
     assert Outcome("validate", folder, logs[1][0], "--max-nrmse", "1e-9").code == 1
 
 
+def test_cross_validation_of_one_log_is_a_wrong_call(logs: Path, tmp_path: Path) -> None:
+    found = Outcome("identify", logs / "case1-unloaded.csv", "--cross-validate", "-o", tmp_path)
+    assert (found.code, found.out) == (2, "")
+    expected = "expected two unloaded logs or more, found one; give more, or leave it out"
+    assert found.err == f"algid: --cross-validate: {expected}\n"
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_poles_that_are_no_numbers_are_told_in_words(logs: Path) -> None:
     found = Outcome("identify", logs / "case1-unloaded.csv", "--poles=-80,x")
     assert found.code == 2
     assert "expected numbers between commas; give six like" in found.err
 
 
-def test_a_stop_leaves_nothing_half_written(tmp_path: Path) -> None:
-    import algid.cli
-    from algid.pipeline.folder import whole_folder
-
-    def write() -> None:
-        with whole_folder(tmp_path / "a.algid", force=False) as folder:
-            (folder / "result.json").write_text("half")
-            algid.cli._stop(15, None)
-
-    with pytest.raises(SystemExit) as stopped:
-        write()
-    assert stopped.value.code == 143
-    assert not list(tmp_path.iterdir())
+@pytest.mark.parametrize(("sent", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_stop_gets_one_line_and_leaves_nothing_half_written(
+    sent: signal.Signals, code: int, logs: Path, tmp_path: Path
+) -> None:
+    long = pl.concat([pl.read_csv(logs / "case1-unloaded.csv")] * 400)
+    long = long.with_columns(t=pl.int_range(pl.len()) * 1e-3)
+    long.write_csv(tmp_path / "long.csv")
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "algid", "identify", str(tmp_path / "long.csv"), "-o", str(out)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
+        while not (out.exists() and list(out.iterdir())) and running.poll() is None:
+            time.sleep(0.01)
+        running.send_signal(sent)
+        printed, told = running.communicate()
+    assert (running.returncode, printed, told) == (code, "", "algid: stopped; nothing half-written is left\n")
+    assert list(out.iterdir()) == []
 
 
 def test_results_that_fit_no_arm_get_one_line(logs: Path, tmp_path: Path) -> None:
@@ -229,6 +255,7 @@ def test_results_that_fit_no_arm_get_one_line(logs: Path, tmp_path: Path) -> Non
     content = json.loads((tmp_path / "case1-unloaded.algid" / "result.json").read_text())
     crooked = {**content, "fit": {**content["fit"], "covariance": [[1.0]]}}
     empty = {**content, "parameters": {}}
+    lost = {**content, "parameters": {**content["parameters"], "k3": {**content["parameters"]["k3"], "estimate": None}}}
     texts = [json.dumps(crooked), json.dumps(empty), "[" * 100_000]
     for text, said in zip(texts, ("covariance should have 7 rows", "the result has no k1", "not JSON"), strict=True):
         path = tmp_path / "result.json"
@@ -236,3 +263,12 @@ def test_results_that_fit_no_arm_get_one_line(logs: Path, tmp_path: Path) -> Non
         found = Outcome("identify", "--parameters", path, logs / "case1-loaded.csv", "-o", tmp_path / "out")
         assert (found.code, found.err.count("\n")) == (2, 1), found.err
         assert said in found.err
+    path.write_text(json.dumps(lost))
+    for call in (
+        ("validate", path),
+        ("identify", "--parameters", path),
+        ("identify", "--estimator", "paper", "--parameters", path),
+    ):
+        wrong = Outcome(*call, logs / f"case1-{'unloaded' if call[0] == 'validate' else 'loaded'}.csv", cwd=tmp_path)
+        assert (wrong.code, wrong.out) == (2, "")
+        assert wrong.err.startswith(f"algid: {path}: the result "), wrong.err  # the file at fault, not its log

@@ -1,7 +1,9 @@
+import math
+
 import numpy as np
 
 from algid import arm
-from algid.identify.model import Model, Motion, partials, regressor
+from algid.identify.model import Model, Motion, partials, regressor, sine_cosine
 
 FULL = Model(coulomb=True, offset=True, rotor=True, coulomb_speed=0.5)
 C = np.array([0.03, 1.4, 0.05, 1.9, 0.06, 0.1, 0.2, 0.25, 0.15, 0.01, -0.02, 0.003])
@@ -20,6 +22,17 @@ def test_plain_columns_are_those_of_the_arm() -> None:
     motion = _motion()
     ours = regressor(Model(), motion)
     assert np.allclose(ours, arm.regressor(motion.theta, motion.omega, motion.alpha), atol=1e-13)  # rounding
+
+
+def test_sine_and_cosine_are_exact_at_every_angle() -> None:
+    corners = np.pi / 2 * np.arange(-40, 41)  # where the half angle's tangent has its poles and zeros
+    around = [corners, np.nextafter(corners, 1e9), np.nextafter(corners, -1e9), corners + 1e-8, corners - 1e-8]
+    wide = 1e6 * np.random.default_rng(3).standard_normal(1000)  # an encoder that has turned for days
+    theta = np.concatenate([*around, wide])
+    sine, cosine = sine_cosine(theta)
+    unit = np.finfo(float).eps  # a unit in the last place of 1
+    assert np.max(np.abs(sine - [math.sin(angle) for angle in theta])) <= unit
+    assert np.max(np.abs(cosine - [math.cos(angle) for angle in theta])) <= unit
 
 
 def test_partials_are_the_slopes_of_the_torque() -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 from pathlib import Path
 
+import numpy as np
+import polars as pl
 import pytest
 import typer
 from typer.testing import CliRunner
@@ -41,6 +44,61 @@ def test_inspect_tells_what_a_log_is(kind: str, tmp_path: Path) -> None:
     assert found["clock"]["rows"] == 6000
     assert found["clock"]["rate"] == pytest.approx(1000)
     assert set(found["signals"]) == {f"{name}{joint}" for name in ("theta", "tau", "omega") for joint in (1, 2)}
+
+
+def test_inspect_tells_types_and_counts_of_flat_logs(tmp_path: Path) -> None:
+    log = moving_log()
+    write_log(tmp_path / "arm.parquet", log)
+    write_log(tmp_path / "arm.csv", log)
+    text = (tmp_path / "arm.csv").read_text()
+    lines = text.splitlines()
+    noted = [
+        "# made by hand",
+        f"note;n;{lines[0].replace(',', ';')}",
+        "",
+        *(f"x;7;{one.replace(',', ';')}" for one in lines[1:]),
+    ]
+    (tmp_path / "noted.csv.gz").write_bytes(
+        gzip.compress("\r\n".join([*noted[:9], "# pause", "", *noted[9:]]).encode())
+    )
+    names = lines[0].split(",")
+
+    def entries(name: str) -> list[list[object]]:
+        found = json.loads(run("inspect", tmp_path / name, "--format", "json"))
+        return [[one["name"], one["type"], one["count"]] for one in found["entries"]]
+
+    assert entries("arm.csv") == [[name, "Float64", 6000] for name in names]
+    assert [one for one in entries("arm.parquet") if one[0] != "stamp_ns"] == entries("arm.csv")
+    assert ["stamp_ns", "Int64", 6000] in entries("arm.parquet")
+    assert entries("noted.csv.gz") == [["note", "String", 6000], ["n", "Int64", 6000], *entries("arm.csv")]
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("ms", 1), ("us", 1000)])
+def test_times_too_far_apart_are_told_and_how_to_mend_them(unit: str, factor: int, tmp_path: Path) -> None:
+    log = moving_log()
+    frame = pl.DataFrame(
+        {
+            name: row
+            for pair in ("theta", "tau")
+            for name, row in zip((f"{pair}1", f"{pair}2"), getattr(log, pair), strict=True)
+        }
+    )
+    times = pl.Series(np.arange(len(log)) * factor)
+    for name in ("t", f"t_{unit}"):
+        frame.with_columns(times.alias(name)).write_csv(tmp_path / f"{name}.csv")
+        frame.with_columns(times.alias(name)).write_parquet(tmp_path / f"{name}.parquet")
+    for kind in ("csv", "parquet"):
+        slow = json.loads(run("inspect", tmp_path / f"t.{kind}", "--format", "json"))
+        (notice,) = [one for one in slow["notices"] if one["code"] == "SLOW_CLOCK"]
+        assert f'time_unit = "{unit}"' in notice["text"]
+        assert slow["clock"]["rate"] == pytest.approx(1 / factor)
+        told = json.loads(run("inspect", tmp_path / f"t_{unit}.{kind}", "--format", "json"))
+        assert told["clock"]["rate"] == pytest.approx(1000)
+        assert "SLOW_CLOCK" not in [one["code"] for one in told["notices"]]
+        (tmp_path / "algid.toml").write_text(f'time_unit = "{unit}"\n')
+        mended = run("inspect", tmp_path / f"t.{kind}", "--profile", tmp_path / "algid.toml", "--format", "json")
+        assert json.loads(mended)["clock"]["rate"] == pytest.approx(1000)
+        assert "SLOW_CLOCK" not in mended
 
 
 def test_inspect_works_on_what_it_refuses(tmp_path: Path) -> None:

@@ -10,9 +10,7 @@ from typing import Any
 
 from mcap.writer import CompressionType, IndexType, Writer
 
-from algid.writers.mcap import DEFINITION, TYPE
-
-HEADER = DEFINITION[DEFINITION.index("====") :]
+from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 
 
 @dataclass
@@ -76,11 +74,11 @@ def write_mcap(
     """Write messages (topic, log time, bytes); `schemas` gives name, encoding and data by topic."""
     with path.open("wb") as stream:
         writer = Writer(stream, chunk_size=chunk_size, compression=compression, **options)
-        writer.start()
+        writer.start(profile="ros2")
         channels: dict[str, int] = {}
         for topic, stamp, data in messages:
             if topic not in channels:
-                name, kind, text = (schemas or {}).get(topic, (TYPE, "ros2msg", DEFINITION.encode()))
+                name, kind, text = (schemas or {}).get(topic, (JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode()))
                 schema = writer.register_schema(name, kind, text)
                 channels[topic] = writer.register_channel(topic, encoding, schema)
             writer.add_message(channels[topic], stamp, data, stamp)

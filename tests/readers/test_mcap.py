@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import struct
 from pathlib import Path
 from typing import Any
@@ -18,9 +19,10 @@ from algid.errors import LogError
 from algid.log import Log
 from algid.profile import Profile
 from algid.readers import open_log, read_log
+from algid.ros2 import HEADER
 from algid.writers import write_log
 from tests.readers.logs import EPOCH_NS, noise_log, same
-from tests.readers.mcaps import HEADER, NO_INDEX, Cdr, joint_state, write_mcap
+from tests.readers.mcaps import NO_INDEX, Cdr, joint_state, write_mcap
 
 TOPIC = "/joint_states"
 
@@ -229,6 +231,49 @@ def test_a_cut_file_yields_what_is_there(share: float, tmp_path: Path) -> None:
     assert any(notice.lossy for notice in found.notices)
 
 
+@pytest.mark.parametrize("compression", list(CompressionType))
+@pytest.mark.parametrize("options", [{}, {"enable_crcs": False}])
+def test_a_chunk_that_breaks_off_yields_its_whole_messages(
+    compression: CompressionType, options: dict[str, Any], tmp_path: Path
+) -> None:
+    log = noise_log(20_000, start_ns=EPOCH_NS)
+    write_mcap(tmp_path / "whole.mcap", messages_of(log), compression=compression, chunk_size=1 << 24, **options)
+    content = (tmp_path / "whole.mcap").read_bytes()
+    with (tmp_path / "whole.mcap").open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    (chunk,) = summary.chunk_indexes
+    (tmp_path / "cut.mcap").write_bytes(content[: chunk.chunk_start_offset + chunk.chunk_length * 6 // 10])
+    found = read_log(tmp_path / "cut.mcap")
+    # zstd and lz4 lose the block that breaks off, 128 and 64 KiB of about 3 MB
+    assert 0.53 < len(found) / len(log) < 0.61
+    assert same(found, log.part(0, len(found)))
+    notices = {notice.code: notice for notice in found.notices if notice.lossy}
+    assert notices.keys() == {"CUT_OFF", "TORN_CHUNK"}
+    assert f"{len(found)} messages" in notices["TORN_CHUNK"].text
+    assert "could not be checked" in notices["TORN_CHUNK"].text
+    told = re.search(r"about (\d+) are lost", notices["TORN_CHUNK"].text)
+    assert told is not None
+    # all messages are of one size, the schema and the channel are the rest
+    assert abs(int(told[1]) - (len(log) - len(found))) < 200
+
+
+def test_a_torn_chunk_that_is_damaged_too_is_left_out(tmp_path: Path) -> None:
+    log = noise_log(3000, start_ns=EPOCH_NS)
+    write_mcap(tmp_path / "whole.mcap", messages_of(log), chunk_size=1 << 17)
+    content = bytearray((tmp_path / "whole.mcap").read_bytes())
+    with (tmp_path / "whole.mcap").open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    last = summary.chunk_indexes[-1]
+    place = last.chunk_start_offset + 60  # within the frame's header and first block
+    content[place : place + 20] = b"\xff" * 20
+    (tmp_path / "cut.mcap").write_bytes(content[: last.chunk_start_offset + last.chunk_length // 2])
+    found = read_log(tmp_path / "cut.mcap")
+    assert same(found, log.part(0, len(found)))
+    assert {"CUT_OFF", "DAMAGED_CHUNK"} <= {notice.code for notice in found.notices if notice.lossy}
+
+
 def test_a_flipped_bit_costs_its_chunk_and_is_told(tmp_path: Path) -> None:
     log = noise_log(2000, start_ns=EPOCH_NS)
     write_mcap(tmp_path / "log.mcap", messages_of(log), compression=CompressionType.NONE)
@@ -256,6 +301,28 @@ def test_a_message_index_that_lies_is_not_believed(tmp_path: Path) -> None:
     struct.pack_into("<Q", content, index + 15 + 8, 31)  # the first message's offset
     (tmp_path / "log.mcap").write_bytes(content)
     assert same(read_log(tmp_path / "log.mcap"), log)
+
+
+def test_a_file_of_which_damage_left_nothing_says_so_and_where(tmp_path: Path) -> None:
+    log = noise_log(100, start_ns=EPOCH_NS)
+    write_mcap(tmp_path / "log.mcap", messages_of(log), compression=CompressionType.NONE, chunk_size=1 << 20)
+    whole = (tmp_path / "log.mcap").read_bytes()
+    with (tmp_path / "log.mcap").open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    (chunk,) = summary.chunk_indexes
+    content = bytearray(whole)
+    content[content.index(struct.pack("<d", log.theta[0, 50]))] ^= 1
+    (tmp_path / "log.mcap").write_bytes(content)
+    with pytest.raises(LogError, match=rf"damaged \(.*checksum.*byte {chunk.chunk_start_offset + 9}\).*no topic"):
+        read_log(tmp_path / "log.mcap")
+    content[content.rindex(b"JointState")] ^= 1  # in the summary
+    (tmp_path / "log.mcap").write_bytes(content)
+    with pytest.raises(LogError, match=r"damaged \(its summary: its checksum is wrong; .*\).*no topic"):
+        read_log(tmp_path / "log.mcap")
+    (tmp_path / "log.mcap").write_bytes(whole[: chunk.chunk_start_offset + 100])
+    with pytest.raises(LogError, match=rf"damaged \(.*breaks off at byte {chunk.chunk_start_offset}\).*no topic"):
+        read_log(tmp_path / "log.mcap")
 
 
 def test_a_chunk_that_claims_too_much_is_left_out_unread(tmp_path: Path) -> None:

@@ -51,6 +51,19 @@ def test_units_in_names() -> None:
     assert take_apart("velocity_rpm").unit == "rpm"
 
 
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        *(("t_ms", "ms"), ("time_us", "us"), ("timestamp_nanoseconds", "ns"), ("Time (msec)", "ms")),
+        *(("seconds", "s"), ("millis", "ms"), ("elapsed_s", "s"), ("t", None), ("time", None)),
+    ],
+)
+def test_units_of_time_in_names(name: str, unit: str | None) -> None:
+    chosen = choose([name, "q1", "q2", "tau1", "tau2"])
+    assert chosen.columns["t"] == name
+    assert chosen.units.get("t") == unit
+
+
 def test_more_joints_than_two_need_a_choice() -> None:
     columns = ["t", *(f"{name}{joint}" for name in ("q", "tau") for joint in range(7))]
     with pytest.raises(LookupError, match="7 joints"):

@@ -13,9 +13,10 @@ from algid.errors import LogError, SettingError
 from algid.log import Log
 from algid.profile import Profile, load_profile
 from algid.readers import read_log
+from algid.ros2 import HEADER
 from algid.writers import write_log
 from tests.readers.logs import EPOCH_NS, noise_log
-from tests.readers.mcaps import HEADER, Cdr, joint_state, write_mcap
+from tests.readers.mcaps import Cdr, joint_state, write_mcap
 
 WRENCH = (
     "std_msgs/Header header\ngeometry_msgs/Wrench wrench\n"

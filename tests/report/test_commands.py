@@ -11,7 +11,6 @@ from typer.testing import CliRunner
 from algid.cli.compare import compare, labels
 from algid.cli.report import report
 from algid.errors import SettingError
-from algid.report.progress import progress
 from algid.results import read_result, result_json
 
 app = typer.Typer()
@@ -66,10 +65,3 @@ def test_one_result_is_too_few(folder: Path) -> None:
 def test_labels_are_names_where_they_tell_apart() -> None:
     assert labels([Path("a/x.algid"), Path("a/y.algid/result.json")]) == ["x", "y"]
     assert labels([Path("a/x.algid"), Path("b/x.algid")]) == ["a/x.algid", "b/x.algid"]
-
-
-def test_progress_is_silent_off_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    with progress("reading", 2.0) as advance:
-        advance(1.0)
-        advance(1.0)
-    assert capsys.readouterr() == ("", "")

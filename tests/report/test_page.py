@@ -21,7 +21,7 @@ from algid.report.figures.base import Figure, Missing
 from algid.report.gallery import gallery
 from algid.report.html import escaped, script_json
 from algid.report.torquelog import read_torque
-from algid.results import Result, read_result, write_result
+from algid.results import Estimate, Result, read_result, write_result
 from tests.report.folders import HOSTILE, hostile
 
 
@@ -181,6 +181,20 @@ def test_a_log_without_prediction_has_its_torque_alone(folder: Path) -> None:
 
 def _ids(text: str) -> Iterator[str]:
     yield from re.findall(r'\sid="([^"]+)"', re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL))
+
+
+def test_numbers_that_no_arm_has_are_told_and_not_drawn(folder: Path, result: Result) -> None:
+    huge = Estimate(estimate=1e308, std=1.1e308, ci95=(-1.7e308, 1.7e308), unit="kg m^2")
+    assert result.fit is not None
+    fit = result.fit.model_copy(update={"covariance": [[1e308] * 7] * 7})
+    names = dict.fromkeys(result.parameters, huge)
+    write_result(result.model_copy(update={"parameters": names, "fit": fit}), folder / "result.json")
+    torque = pl.read_parquet(folder / "torque.parquet")
+    beyond = pl.when(pl.int_range(pl.len()) % 3 == 0).then(pl.lit(-1.7e308)).otherwise(pl.col("tau1_predicted"))
+    torque.with_columns(tau1_predicted=beyond).write_parquet(folder / "torque.parquet")
+    page = write_report(folder).read_text(encoding="utf-8")  # pytest makes any overflow an error
+    assert "1.0e+308" in page
+    assert "k1, k3 or k5 has no estimate that can be drawn" in page
 
 
 def test_every_link_within_the_page_leads_somewhere(folder: Path) -> None:

@@ -13,9 +13,10 @@ from algid.report import markdown, print_table, write_report
 from algid.report.facts import flat_settings, log_tables, settings_table
 from algid.report.markdown import escaped
 from algid.report.numbers import digits_of, resolved, significant
+from algid.report.page import page_html
 from algid.report.table import Table
 from algid.report.tables import estimate_tables
-from algid.results import Estimate, Result, Status, result_json
+from algid.results import Estimate, Result, Status, TorquePrediction, result_json
 from tests.report.folders import estimate, hostile
 
 
@@ -38,7 +39,7 @@ def from_html(text: str) -> list[list[str]]:
 def from_terminal(text: str, heading: str) -> list[list[str]]:
     """Rows of the table under `heading`, split where two blanks part the cells."""
     lines = text.splitlines()
-    start = next(i for i, line in enumerate(lines) if line.strip() == heading) + 4
+    start = next(i for i, line in enumerate(lines) if line.strip() == heading) + 3
     rows = []
     for line in lines[start:]:
         if not line.strip():
@@ -78,6 +79,29 @@ def test_truth_and_the_papers_error_stand_beside_the_estimate(result: Result) ->
     assert row["Parameter"] == "k1"
     assert row["Truth"] == "8.1532e-4"  # m2 l1 lc2 of Table 3
     assert row["Paper %"] == "0.2449"
+
+
+def test_the_truth_of_what_table_4_lacks_is_the_arms_own(result: Result) -> None:
+    k5 = result.parameters["k5"].estimate
+    assert k5 is not None
+    known = result.model_copy(update={"truth": {"k1": 7.0, "k5": k5 / 1.25, "l1": 0.1626}})
+    parameters, payload, *_ = estimate_tables(known)
+    headings = [column.heading for column in parameters.columns]
+    rows = {row[0]: dict(zip(headings, row, strict=True)) for row in parameters.rows}
+    assert rows["k5"]["Error %"] == "25.00"
+    assert rows["k5"]["Paper %"] == "–"  # the paper gives the sum k5+k3 alone
+    assert rows["k1"]["Truth"] == "8.1532e-4"  # Table 4's own
+    assert "0.16260" in next(row for row in payload.rows if row[0] == "l1")
+
+
+def test_cross_validation_stands_beside_the_residual_in_every_format(result: Result, case_folder: Path) -> None:
+    crossed = TorquePrediction(rmse=(0.25, 0.125), nrmse=(0.5, 0.0625), r2=(0.75, 0.996), filter="3 Hz")
+    assert result.fit is not None
+    changed = result.model_copy(update={"fit": result.fit.model_copy(update={"cross_validation": crossed})})
+    expected = ["each log by the others", "1", "0.250", "50.0", "0.75000"]
+    assert expected in from_terminal(terminal(changed), "Torque prediction")
+    assert expected in from_markdown(markdown(changed))
+    assert expected in from_html(page_html(case_folder, changed, None))
 
 
 def test_the_error_belongs_to_the_estimate_beside_it(result: Result) -> None:

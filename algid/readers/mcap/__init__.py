@@ -35,7 +35,10 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
     from algid.readers.mcap.plan import plan
 
     with opened(paths[0]) as (file, found):
-        wanted = plan(file, found, profile)
+        try:
+            wanted = plan(file, found, profile)
+        except LogError as error:
+            raise _blamed(paths[0], found, error) from error
         truth = _truth(paths[0], found)
         rows = wanted.topics[0].count(found)
     name = str(paths[0] if len(paths) == 1 else paths[0].parent)
@@ -80,6 +83,16 @@ def opened(path: Path) -> Iterator[tuple[File, Catalogue]]:
         except DamagedError as error:
             raise LogError(f"{path}: the MCAP file cannot be read: {error}") from error
         yield file, found
+
+
+def _blamed(path: Path, found: Catalogue, error: LogError) -> LogError:
+    """The error, with the damage to the file first where there is any."""
+    places = list(dict.fromkeys(found.damage))
+    if not places:
+        return error
+    where = "; ".join(places[:3]) + (f"; {len(places) - 3} more" if len(places) > 3 else "")
+    left = str(error).removeprefix(f"{path}: ")
+    return LogError(f"{path}: the MCAP file is damaged ({where}); copy it again; in what is left: {left}")
 
 
 def _truth(path: Path, found: Catalogue) -> Truth | None:

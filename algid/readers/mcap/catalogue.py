@@ -15,8 +15,8 @@ import numpy as np
 
 from algid.log import Notice
 from algid.readers.mcap import framing
-from algid.readers.mcap.chunks import unpack
-from algid.readers.mcap.framing import DamagedError, File, parse
+from algid.readers.mcap.chunks import unpack, unpack_torn
+from algid.readers.mcap.framing import BrokenOffError, DamagedError, File, parse
 from algid.readers.mcap.messages import alike
 
 _FOOTER_SIZE = 9 + 20 + 8
@@ -28,7 +28,7 @@ _SPAN = 1 << 23
 class Span:
     """Records side by side in the file: a chunk with the message indexes behind it, or loose records.
 
-    `channels` are those that the index names; None where nobody knows.
+    `channels` are those that the index names; None where nobody knows. `torn`: a chunk that breaks off.
     """
 
     start: int
@@ -36,11 +36,15 @@ class Span:
     index_length: int = 0
     channels: frozenset[int] | None = None
     loose: bool = False
+    torn: bool = False
 
 
 @dataclass
 class Catalogue:
-    """Schemas and channels by id, spans in file order, messages by channel where counted."""
+    """Schemas and channels by id, spans in file order, messages by channel where counted.
+
+    `damage` names the places where bytes were met that are not what the format says.
+    """
 
     schemas: dict[int, Any] = field(default_factory=dict)
     channels: dict[int, Any] = field(default_factory=dict)
@@ -49,23 +53,25 @@ class Catalogue:
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     notices: list[Notice] = field(default_factory=list)
     walked: bool = False
+    damage: list[str] = field(default_factory=list)
 
 
 def catalogue(file: File) -> Catalogue:
     """The catalogue of an opened file; `DamagedError` only where not even the start can be read."""
     if file.size < len(framing.MAGIC) or file.read(0, len(framing.MAGIC)) != framing.MAGIC:
         raise DamagedError("the file does not begin as MCAP does")
+    notice, damage = Notice("NO_INDEX", "the file has no usable index; read by scanning"), []
     try:
         found = _from_summary(file)
     except DamagedError as error:
         found = None
+        damage = [f"its summary: {error}"]
         notice = Notice("DAMAGED_SUMMARY", f"the file's summary cannot be used ({error}); read by scanning")
-    else:
-        notice = Notice("NO_INDEX", "the file has no usable index; read by scanning")
     if found is not None:
         return found
     walked = _walked(file)
     walked.notices.insert(0, notice)
+    walked.damage[:0] = damage
     return walked
 
 
@@ -159,15 +165,19 @@ def _walked(file: File) -> Catalogue:
             else:
                 _place(file, record, found, spans)
             end = record.end
-    except DamagedError:
-        lost = file.size - end
-        text = f"the file breaks off: its last {lost} bytes are an unfinished record and were left out"
+    except DamagedError as error:
+        last = error.record if isinstance(error, BrokenOffError) else None
+        torn = [Span(last.start, file.size - last.start, torn=True)] if last and last.code == framing.CHUNK else []
+        told = "chunk, read as far as it goes" if torn else "record and were left out"
+        text = f"the file breaks off: its last {file.size - end} bytes are an unfinished {told}"
         found.notices.append(Notice("CUT_OFF", text, lossy=True))
+        found.damage.append(f"it breaks off at byte {end}")
     else:
+        torn = []
         if end != file.size:
             text = "the file breaks off behind its last whole record"
             found.notices.append(Notice("CUT_OFF", text, lossy=True))
-    found.spans = [_span(*span) for span in spans]
+    found.spans = [_span(*span) for span in spans] + torn
     _inner_channels(file, found)
     return found
 
@@ -202,6 +212,7 @@ def _define(code: int, content: bytes, found: Catalogue) -> None:
             found.channels.setdefault(channel.id, channel)
     except DamagedError as error:
         found.notices.append(Notice("DAMAGED_RECORD", f"{error}; left out", lossy=True))
+        found.damage.append(str(error))
 
 
 def _inner_channels(file: File, found: Catalogue) -> None:
@@ -210,14 +221,15 @@ def _inner_channels(file: File, found: Catalogue) -> None:
         if span.loose:
             continue
         try:
-            content = unpack(file.read(span.start, span.length))
+            packed = file.read(span.start, span.length)
+            content = unpack_torn(packed)[0] if span.torn else unpack(packed)
             if alike(np.frombuffer(content, np.uint8)) is not None:
                 continue
             for record in framing.walk_bytes(content, 0, len(content)):
                 if record.code in (framing.SCHEMA, framing.CHANNEL):
                     _define(record.code, bytes(content[record.start : record.end]), found)
-        except DamagedError:
-            continue
+        except DamagedError as error:
+            found.damage.append(f"{error} (at byte {span.start})")
 
 
 def _keep_metadata(file: File, record: framing.Record, found: Catalogue) -> None:

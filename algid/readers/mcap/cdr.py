@@ -9,7 +9,7 @@ import struct
 from dataclasses import dataclass
 
 from algid.readers.mcap.ros2msg import PRIMITIVES, Field, Types
-from algid.readers.mcap.shape import MisfitError, Numbers, Shape
+from algid.readers.mcap.shape import MOST_PARTS, MisfitError, Numbers, Shape
 
 _ENDINGS = {0: ">", 1: "<"}
 _HEAD = 4
@@ -24,8 +24,12 @@ class _Walk:
     shape: Shape
     order: str = "<"
     place: int = _HEAD
+    parts: int = 0
 
     def structure(self, name: str, prefix: str) -> None:
+        self.parts += 1
+        if self.parts > MOST_PARTS:
+            raise MisfitError(f"a message of more than {MOST_PARTS} parts")
         for field in self.types[name]:
             self.field(field, f"{prefix}{field.name}")
 

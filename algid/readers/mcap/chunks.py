@@ -4,11 +4,37 @@ from __future__ import annotations
 
 import struct
 import zlib
+from dataclasses import dataclass
 
-from algid.readers.mcap.framing import DamagedError
+from algid.readers.mcap.framing import BrokenOffError, DamagedError, walk_bytes
 
 LARGEST_CHUNK = 1 << 28
 """A recorder closes a chunk at some MiB; beyond 256 MiB it is a mistake or an attack."""
+_PIECE = 1 << 20
+
+
+@dataclass(frozen=True)
+class _Chunk:
+    """A chunk record's head and what is there of its packed records."""
+
+    size: int
+    crc: int
+    compression: bytes
+    packed_size: int
+    packed: memoryview
+
+
+def _chunk(content: bytes) -> _Chunk:
+    if len(content) < 40:
+        raise DamagedError("a chunk breaks off")
+    _, _, size, crc, name_length = struct.unpack_from("<QQQII", content)
+    if name_length > 32 or 32 + name_length + 8 > len(content):
+        raise DamagedError("a chunk's compression has no name")
+    name = content[32 : 32 + name_length]
+    (packed_size,) = struct.unpack_from("<Q", content, 32 + name_length)
+    if size > LARGEST_CHUNK:
+        raise DamagedError(f"a chunk claims {size} bytes unpacked, more than {LARGEST_CHUNK}")
+    return _Chunk(size, crc, name, packed_size, memoryview(content)[40 + name_length :])
 
 
 def unpack(content: bytes) -> bytes:
@@ -19,24 +45,42 @@ def unpack(content: bytes) -> bytes:
     DamagedError
         If the chunk is larger than `LARGEST_CHUNK`, packed in an unknown way, or not what its CRC says.
     """
-    if len(content) < 40:
-        raise DamagedError("a chunk breaks off")
-    _, _, size, crc, name_length = struct.unpack_from("<QQQII", content)
-    if name_length > 32 or 32 + name_length + 8 > len(content):
-        raise DamagedError("a chunk's compression has no name")
-    name = content[32 : 32 + name_length]
-    (packed_size,) = struct.unpack_from("<Q", content, 32 + name_length)
-    packed = memoryview(content)[40 + name_length :]
-    if packed_size != len(packed):
-        raise DamagedError(f"a chunk claims {packed_size} bytes and has {len(packed)}")
-    if size > LARGEST_CHUNK:
-        raise DamagedError(f"a chunk claims {size} bytes unpacked, more than {LARGEST_CHUNK}")
-    unpacked = _unpacked(name, packed, size)
-    if len(unpacked) != size:
-        raise DamagedError(f"a chunk of {size} bytes unpacks to {len(unpacked)}")
-    if crc and zlib.crc32(unpacked) != crc:
-        raise DamagedError("a chunk's checksum is wrong")
+    chunk = _chunk(content)
+    if chunk.packed_size != len(chunk.packed):
+        raise DamagedError(f"a chunk claims {chunk.packed_size} bytes and has {len(chunk.packed)}")
+    unpacked = _unpacked(chunk.compression, chunk.packed, chunk.size)
+    if len(unpacked) != chunk.size:
+        raise DamagedError(f"a chunk of {chunk.size} bytes unpacks to {len(unpacked)}")
+    _check_sum(chunk, unpacked)
     return unpacked
+
+
+def _check_sum(chunk: _Chunk, unpacked: bytes) -> None:
+    if chunk.crc and zlib.crc32(unpacked) != chunk.crc:
+        raise DamagedError("a chunk's checksum is wrong")
+
+
+def unpack_torn(content: bytes) -> tuple[bytes, int]:
+    """The whole records at the start of a chunk that breaks off, and the size that all of them would have.
+
+    They can be checked only where all are there: the chunk's CRC covers all of it.
+
+    Raises
+    ------
+    DamagedError
+        As `unpack`.
+    """
+    chunk = _chunk(content)
+    unpacked = _start(chunk.compression, chunk.packed[: chunk.packed_size], chunk.size)
+    if len(unpacked) == chunk.size:
+        _check_sum(chunk, unpacked)
+    end = 0
+    try:
+        for record in walk_bytes(unpacked, 0, len(unpacked)):
+            end = record.end
+    except BrokenOffError:
+        pass
+    return unpacked[:end], chunk.size
 
 
 def has_checksum(content: bytes) -> bool:
@@ -51,7 +95,22 @@ def _unpacked(name: bytes, packed: memoryview, size: int) -> bytes:
         return _zstd(packed, size)
     if name == b"lz4":
         return _lz4(packed, size)
-    raise DamagedError(f"a chunk is packed with {name.decode(errors='replace')!r}; expected zstd, lz4 or nothing")
+    raise _unknown(name)
+
+
+def _start(name: bytes, packed: memoryview, size: int) -> bytes:
+    """As `_unpacked`, but as far as it goes, at most `size` bytes."""
+    if name == b"":
+        return bytes(packed[:size])
+    if name == b"zstd":
+        return _zstd_start(packed, size)
+    if name == b"lz4":
+        return _lz4(packed, size)[:size]  # this one goes as far as it can anyway
+    raise _unknown(name)
+
+
+def _unknown(name: bytes) -> DamagedError:
+    return DamagedError(f"a chunk is packed with {name.decode(errors='replace')!r}; expected zstd, lz4 or nothing")
 
 
 def _zstd(packed: memoryview, size: int) -> bytes:
@@ -65,6 +124,19 @@ def _zstd(packed: memoryview, size: int) -> bytes:
         return zstandard.ZstdDecompressor().decompress(packed, max_output_size=size or 1)
     except zstandard.ZstdError as error:
         raise DamagedError(f"a chunk cannot be unpacked ({error})") from error
+
+
+def _zstd_start(packed: memoryview, size: int) -> bytes:
+    import zstandard
+
+    unpacked = bytearray()
+    try:
+        stream = zstandard.ZstdDecompressor().stream_reader(packed)
+        while piece := stream.read(min(_PIECE, size - len(unpacked))):
+            unpacked += piece
+    except zstandard.ZstdError as error:
+        raise DamagedError(f"a chunk cannot be unpacked ({error})") from error
+    return bytes(unpacked)
 
 
 def _lz4(packed: memoryview, size: int) -> bytes:

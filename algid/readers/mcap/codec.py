@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.errors import LogError
-from algid.readers.mcap import cdr, jsontext, protobuf, ros2msg
+from algid.readers.mcap import cdr, jsontext, protobuf, ros2idl, ros2msg
 from algid.readers.mcap.layout import Decoder, Fields, Walk
 from algid.readers.mcap.messages import Messages
 from algid.readers.mcap.shape import MisfitError
+
+_DEFINITIONS = {"ros2msg": ros2msg.parse, "ros2idl": ros2idl.parse}
 
 
 class Decodes(Protocol):
@@ -40,8 +42,8 @@ def walk_for(path: str, channel: Any, schema: Any) -> Walk:
     place = f"{path}: topic {channel.topic!r}"
     encoding = (channel.message_encoding, schema.encoding if schema else "")
     try:
-        if encoding == ("cdr", "ros2msg"):
-            types = ros2msg.parse(schema.name, schema.data.decode("utf-8", errors="replace"))
+        if encoding[0] == "cdr" and encoding[1] in _DEFINITIONS:
+            types = _DEFINITIONS[encoding[1]](schema.name, schema.data.decode("utf-8", errors="replace"))
             return lambda payload: cdr.walk(payload, schema.name, types)
         if encoding == ("protobuf", "protobuf"):
             messages = protobuf.parse(schema.data)
@@ -52,7 +54,7 @@ def walk_for(path: str, channel: Any, schema: Any) -> Walk:
         return jsontext.walk
     raise LogError(
         f"{place}: message encoding {encoding[0]!r} with schema encoding {encoding[1]!r}; "
-        "expected cdr with ros2msg, protobuf, or json"
+        "expected cdr with ros2msg or ros2idl, protobuf, or json"
     )
 
 

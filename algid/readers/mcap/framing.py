@@ -29,6 +29,14 @@ class DamagedError(Exception):
     """Bytes that are not what the format says; the reader decides what can still be had."""
 
 
+class BrokenOffError(DamagedError):
+    """A record that reaches past the end; `record` is what its head says, None where even that breaks off."""
+
+    def __init__(self, start: int, record: Record | None = None) -> None:
+        super().__init__(f"a record at byte {start} breaks off")
+        self.record = record
+
+
 @dataclass
 class File:
     """An opened file, read by offset; counts the bytes it read."""
@@ -77,7 +85,7 @@ class Record:
 
 
 def walk(file: File, start: int, end: int) -> Iterator[Record]:
-    """The records between two offsets of the file, in order; `DamagedError` where one breaks off.
+    """The records between two offsets of the file, in order; `BrokenOffError` where one breaks off.
 
     Neighbours are read a window at a time where they are messages, and by their frames alone where they
     are chunks.
@@ -85,29 +93,29 @@ def walk(file: File, start: int, end: int) -> Iterator[Record]:
     window, base, last = b"", start, 0
     while start < end:
         if start + FRAME.size > end:
-            raise DamagedError(f"a record at byte {start} breaks off")
+            raise BrokenOffError(start)
         if not base <= start <= base + len(window) - FRAME.size:
             width = min(_WINDOW, end - start) if last == MESSAGE else FRAME.size
             window, base = file.read(start, width), start
         code, length = FRAME.unpack_from(window, start - base)
         record = Record(code, start + FRAME.size, length)
         if record.end > end:
-            raise DamagedError(f"a record at byte {start} breaks off")
+            raise BrokenOffError(start, record)
         yield record
         start, last = record.end, code
 
 
 def walk_bytes(content: bytes | memoryview, start: int, end: int) -> Iterator[Record]:
-    """The records within unpacked bytes; `DamagedError` where one reaches past `end`."""
+    """The records within unpacked bytes; `BrokenOffError` where one reaches past `end`."""
     while start < end:
         if start + FRAME.size > end:
-            raise DamagedError(f"a record at byte {start} breaks off")
+            raise BrokenOffError(start)
         code, length = FRAME.unpack_from(content, start)
-        start += FRAME.size
-        if start + length > end:
-            raise DamagedError(f"a record at byte {start} breaks off")
-        yield Record(code, start, length)
-        start += length
+        record = Record(code, start + FRAME.size, length)
+        if record.end > end:
+            raise BrokenOffError(start, record)
+        yield record
+        start = record.end
 
 
 def parse(kind: Any, content: bytes) -> Any:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from algid.log import Notice
 from algid.readers.mcap.catalogue import Catalogue, Span
-from algid.readers.mcap.chunks import has_checksum, unpack
+from algid.readers.mcap.chunks import has_checksum, unpack, unpack_torn
 from algid.readers.mcap.framing import DamagedError, File
 from algid.readers.mcap.messages import Messages, find
 
@@ -20,11 +20,13 @@ _AHEAD_BYTES = 1 << 23
 
 @dataclass(frozen=True)
 class Batch:
-    """Messages of one span, or None and why they are lost."""
+    """Messages of one span, or None and why they are lost; of a torn chunk also how much is there."""
 
     messages: Messages | None
     checked: bool
     reason: str = ""
+    torn: tuple[int, int] | None = None
+    """Bytes of a torn chunk's records, unpacked: what is there, and what there should be."""
 
 
 def spans_of(catalogue: Catalogue, channels: frozenset[int]) -> list[Span]:
@@ -54,6 +56,10 @@ def _load(file: File, span: Span, channels: frozenset[int]) -> Batch:
         content = file.read(span.start, span.length + span.index_length)
         if span.loose:
             return Batch(find(content, b"", channels), checked=False)
+        if span.torn:
+            records, size = unpack_torn(content)
+            torn = (len(records), size) if len(records) < size else None
+            return Batch(find(records, b"", channels), torn is not None or has_checksum(content), torn=torn)
         chunk, index = content[: span.length], content[span.length :]
         return Batch(find(unpack(chunk), index, channels), has_checksum(chunk))
     except DamagedError as error:
@@ -68,6 +74,7 @@ class Account:
     reason: str = ""
     unchecked: bool = False
     found: int = 0
+    torn: str = ""
 
     def add(self, batch: Batch) -> None:
         """Count one batch."""
@@ -77,6 +84,8 @@ class Account:
         else:
             self.found += len(batch.messages)
             self.unchecked |= not batch.checked and len(batch.messages) > 0
+            if batch.torn:
+                self.torn = _torn(len(batch.messages), *batch.torn)
 
     def notices(self, counted: int | None) -> list[Notice]:
         """What to say; `counted` is how many messages the statistics promise."""
@@ -88,6 +97,17 @@ class Account:
         elif counted is not None and counted != self.found:
             told = f"the file counts {counted} messages and holds {self.found}"
             said.append(Notice("MISSING_MESSAGES", told, lossy=True))
+        if self.torn:
+            said.append(Notice("TORN_CHUNK", self.torn, lossy=True))
         if self.unchecked:
             said.append(Notice("NO_CHECKSUM", "the file has no checksums: damaged values would go unseen"))
         return said
+
+
+def _torn(messages: int, held: int, size: int) -> str:
+    """What to say of a chunk that breaks off; the lost messages are counted by the share of bytes."""
+    lost = f"about {round(messages * (size - held) / held)} are lost" if messages else "the rest is lost"
+    return (
+        f"the last chunk breaks off: {messages} messages in its first {held} of {size} bytes were taken, {lost}; "
+        "they could not be checked, since the chunk's checksum covers all of it"
+    )

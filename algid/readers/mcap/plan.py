@@ -148,6 +148,8 @@ def _shapes(file: File, found: Catalogue, topic: str) -> Iterator[Shape]:
     walk = walk_for(str(file.path), channel, found.schemas.get(channel.schema_id))
     for batch in batches(file, found, channels):
         messages = batch.messages
+        if messages is None:
+            found.damage.append(batch.reason)
         if messages is None or not len(messages):
             continue
         for start, size in zip(messages.starts[:_SAMPLES], messages.sizes[:_SAMPLES], strict=True):

@@ -49,7 +49,7 @@ def parse(root: str, text: str) -> Types:
             raise DefinitionError(f"{root}: expected 'MSG: package/Type', found {head[:60]!r}")
         types[found[1]] = _fields(found[1], body)
     resolved = {name: tuple(_resolved(field, name, types) for field in fields) for name, fields in types.items()}
-    _check_depth(root, resolved, 0)
+    check_depth(root, resolved)
     return resolved
 
 
@@ -96,9 +96,21 @@ def _with_msg(name: str) -> str:
     return f"{package}/msg/{rest}"
 
 
-def _check_depth(name: str, types: Types, depth: int) -> None:
-    if depth > _DEEPEST:
+def check_depth(root: str, types: Types) -> None:
+    """Refuse types that contain each other, or go too deep.
+
+    Raises
+    ------
+    DefinitionError
+    """
+    _height(root, types, {}, 0)
+
+
+def _height(name: str, types: Types, known: dict[str, int], above: int) -> int:
+    """Types below one another under `name`; each is looked at once, however often it is used."""
+    if name not in known and above <= _DEEPEST:
+        below = (_height(field.type, types, known, above + 1) for field in types[name] if field.type in types)
+        known[name] = 1 + max(below, default=0)
+    if above + known.get(name, 1) > _DEEPEST:
         raise DefinitionError(f"{name}: types nested more than {_DEEPEST} deep")
-    for field in types[name]:
-        if field.type in types:
-            _check_depth(field.type, types, depth + 1)
+    return known[name]

@@ -64,8 +64,9 @@ class Missing:
 
 
 def packed(values: FloatArray, precise: bool = False) -> dict[str, str]:
-    """`values` as plotly's typed array: single precision, or double where `precise`."""
-    kind = "f8" if precise else "f4"
+    """`values` as plotly's typed array: single precision, or double where `precise` or beyond its range."""
+    size = np.abs(values[np.isfinite(values)])
+    kind = "f8" if precise or np.any(size > np.finfo(np.float32).max) else "f4"
     data = np.ascontiguousarray(values, dtype=f"<{kind}")
     return {"dtype": kind, "bdata": base64.b64encode(data.tobytes()).decode("ascii")}
 

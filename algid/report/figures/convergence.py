@@ -61,7 +61,8 @@ def _target(name: str, result: Result, loaded: bool) -> Target:
     found = next((group[name] for group in groups if name in group), None)
     row = next((row for row in result.table4 if row.parameter == name), None)
     unit = found.unit if found is not None else row.unit if row is not None else ""
-    return Target(found, None if row is None else row.truth, unit_text(unit))
+    truth = result.truth.get(name) if row is None else row.truth
+    return Target(found, truth, unit_text(unit))
 
 
 def _panel(read: SeriesLog, name: str, target: Target, sync: str) -> Panel:

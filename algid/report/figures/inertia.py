@@ -24,7 +24,7 @@ def inertia(result: Result, found: TorqueLog | None) -> Figure | Missing:
     values = [estimate.estimate for estimate in estimates if estimate is not None]
     known = [value for value in values if value is not None]
     if len(known) < len(NAMES):
-        return Missing("inertia", TITLE, "k1, k3 or k5 has no estimate")
+        return Missing("inertia", TITLE, "k1, k3 or k5 has no estimate that can be drawn")
     theta2 = np.linspace(-np.pi, np.pi, 181)
     parts, stds = _parts(known, theta2), _stds(result, theta2)
     smallest = _smallest_eigenvalue(parts)

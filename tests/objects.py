@@ -1,0 +1,88 @@
+"""A local server that speaks S3 and counts what it hands out, and a log with cameras beside the joints."""
+
+from __future__ import annotations
+
+import socket
+import struct
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+import pytest
+from mcap.writer import CompressionType, Writer
+
+from algid.log import Log
+from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
+from algid.stores import connect
+from algid.writers.mcap import payloads
+
+
+@dataclass
+class Served:
+    """The query behind an S3 URL, and the bytes that each answer to a GET had."""
+
+    query: str
+    answers: list[int] = field(default_factory=list)
+
+    def counting(self, app: Callable[..., Iterable[bytes]]) -> Callable[..., Iterable[bytes]]:
+        """The application, its answers counted."""
+
+        def counted(environ: dict[str, Any], start: Any) -> list[bytes]:
+            content = list(app(environ, start))
+            if environ["REQUEST_METHOD"] == "GET":
+                self.answers.append(sum(map(len, content)))
+            return content
+
+        return counted
+
+
+@contextmanager
+def s3(monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
+    """A server with a bucket ``lab``; skips where moto is absent."""
+    server = pytest.importorskip("moto.server", reason="moto is absent")
+    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
+        monkeypatch.setenv(name, "testing")
+    monkeypatch.setenv("AWS_EC2_METADATA_DISABLED", "true")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    running = server.ThreadedMotoServer(ip_address="127.0.0.1", port=port, verbose=False)
+    running.start()
+    place = quote(f"127.0.0.1:{port}")
+    served = Served(f"?scheme=http&endpoint_override={place}&region=us-east-1&allow_bucket_creation=true")
+    running._server.app = served.counting(running._server.app)
+    connect(f"s3://lab/{served.query}")[0].create_dir("lab")
+    yield served
+    running.stop()
+
+
+def with_cameras(path: Path, log: Log, images: int, size: int = 1 << 20, every: int = 250) -> None:
+    """Joint states in chunks of their own between chunks of `images` images that do not compress."""
+    noise = np.random.default_rng(3)
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=1 << 30, compression=CompressionType.ZSTD)
+        close_chunk = getattr(writer, "_Writer__finalize_chunk")  # noqa: B009
+        writer.start(profile="ros2", library="test")
+        joints = _channel(writer, "/joint_states", JOINT_STATE, JOINT_STATE_DEFINITION)
+        camera = _channel(writer, "/camera", "sensor_msgs/msg/CompressedImage", "uint8[] data\n")
+        writer.add_metadata("calibration", {"camera": "none"})
+        shots = images * every // len(log)
+        for row, (stamp, payload) in enumerate(zip(log.stamp_ns.tolist(), payloads(log), strict=True)):
+            if row % every == 0:
+                for _ in range(shots):
+                    close_chunk()
+                    writer.add_message(
+                        camera, stamp, struct.pack("<BBBBI", 0, 1, 0, 0, size) + noise.bytes(size), stamp
+                    )
+                close_chunk()
+            writer.add_message(joints, stamp, payload, stamp, row)
+        writer.finish()  # type: ignore[no-untyped-call]
+
+
+def _channel(writer: Writer, topic: str, name: str, definition: str) -> int:
+    schema = writer.register_schema(name=name, encoding="ros2msg", data=definition.encode())
+    return writer.register_channel(topic=topic, message_encoding="cdr", schema_id=schema)

@@ -1,0 +1,228 @@
+"""Definitions in IDL, with ros2msg and rosbags as oracles."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_types_from_idl, get_typestore
+
+from algid.errors import LogError
+from algid.profile import Profile
+from algid.readers import read_log
+from algid.readers.mcap import ros2idl, ros2msg
+from algid.readers.mcap.ros2msg import DefinitionError
+from tests.readers.logs import EPOCH_NS, noise_log, same
+from tests.readers.mcaps import Cdr, joint_state, write_mcap
+
+LINE = "=" * 80 + "\n"
+STORE = get_typestore(Stores.ROS2_HUMBLE)
+# written as rosidl_adapter writes it
+JOINT_STATE = """\
+// generated from rosidl_adapter/resource/msg.idl.em
+// with input from sensor_msgs/msg/JointState.msg
+
+#include "std_msgs/msg/Header.idl"
+
+module sensor_msgs {
+  module msg {
+    @verbatim (language="comment", text=
+      "This is a message that holds data to describe the state of a set of joints; (rad, Nm)." "\\n"
+      "@ is no annotation here, // no comment, } no end")
+    struct JointState {
+      std_msgs::msg::Header header;
+
+      @verbatim (language="comment", text="names")
+      sequence<string> name;
+
+      @unit (value="rad")
+      sequence<double> position;
+
+      sequence<double> velocity;
+
+      sequence<double> effort;
+    };
+  };
+};
+"""
+HEADER = """\
+#include "builtin_interfaces/msg/Time.idl"
+module std_msgs { module msg { struct Header { builtin_interfaces::msg::Time stamp; string frame_id; }; }; };
+"""
+TIME = """\
+module builtin_interfaces { module msg { /* seconds
+and the rest */ struct Time { int32 sec; uint32 nanosec; }; }; };
+"""
+STATE_TEXT = (
+    f"{LINE}IDL: sensor_msgs/msg/JointState\n{JOINT_STATE}\n{LINE}IDL: std_msgs/msg/Header\n{HEADER}\n"
+    f"{LINE}IDL: builtin_interfaces/msg/Time\n{TIME}"
+)
+IDL_NAMES = {"bool": "boolean", "byte": "octet", "char": "uint8", "float32": "float", "float64": "double"}
+
+
+def idl_of(name: str) -> str:
+    """The sections of a type of the store and of all it is made of, built from its ros2msg text."""
+    definition, _ = STORE.generate_msgdef(name, ros_version=2)
+    types = ros2msg.parse(name, definition)
+    sections = []
+    for owner, fields in types.items():
+        package, _, last = owner.replace("/msg/", "/").partition("/")
+        lines, typedefs = [], []
+        for one in fields:
+            kind = IDL_NAMES.get(one.type, "::".join(_full(one.type)))
+            if one.count == -1:
+                kind = f"sequence<{kind}>"
+            elif one.count is not None:
+                alias = f"{kind.replace('::', '__')}__{one.count}"
+                typedefs.append(f"typedef {kind} {alias}[{one.count}];")
+                kind = alias
+            lines.append(f"{kind} {one.name};")
+        text = f"module {package} {{ module msg {{ {' '.join(typedefs)} struct {last} {{ {' '.join(lines)} }}; }}; }};"
+        sections.append(f"{LINE}IDL: {package}/msg/{last}\n{text}\n")
+    return "".join(sections)
+
+
+def _full(kind: str) -> list[str]:
+    package, _, last = kind.replace("/msg/", "/").partition("/")
+    return [package, "msg", last] if last else [package]
+
+
+@pytest.mark.parametrize("package", ["geometry_msgs", "sensor_msgs", "std_msgs", "trajectory_msgs"])
+def test_every_type_has_the_same_fields_as_in_ros2msg(package: str) -> None:
+    names = [name for name in STORE.fielddefs if name.startswith(f"{package}/msg/")]
+    assert len(names) > 3
+    for name in names:
+        definition, _ = STORE.generate_msgdef(name, ros_version=2)
+        wanted = ros2msg.parse(name, definition)
+        found = ros2idl.parse(name, idl_of(name))
+        for owner, fields in wanted.items():
+            other = found["/".join(_full(owner))]
+            for one, another in zip(fields, other, strict=True):
+                kind = {"char": "uint8"}.get(one.type, "/".join(_full(one.type)))
+                assert (another.name, another.type, another.count) == (one.name, kind, one.count)
+
+
+def test_the_definitions_mean_the_same_to_rosbags() -> None:
+    # rosbags knows no #include
+    types = (
+        get_types_from_idl(without_includes(JOINT_STATE))
+        | get_types_from_idl(without_includes(HEADER))
+        | get_types_from_idl(TIME)
+    )
+    assert types == {name: STORE.fielddefs[name] for name in types}
+    found = ros2idl.parse("sensor_msgs/msg/JointState", STATE_TEXT)
+    assert found.keys() == types.keys()
+    assert [(one.name, one.type, one.count) for one in found["sensor_msgs/msg/JointState"]] == [
+        ("header", "std_msgs/msg/Header", None),
+        ("name", "string", -1),
+        ("position", "float64", -1),
+        ("velocity", "float64", -1),
+        ("effort", "float64", -1),
+    ]
+
+
+def without_includes(text: str) -> str:
+    """The text as rosbags can read it."""
+    return re.sub("(?m)^#include.*$", "", text)
+
+
+def decoded(path: Path) -> list[Any]:
+    """The messages of a file as rosbags reads them, by the file's own definitions."""
+    with AnyReader([path]) as reader:
+        return [reader.deserialize(data, connection.msgtype) for connection, _, data in reader.messages()]
+
+
+def test_joint_states_read_as_in_rosbags(tmp_path: Path) -> None:
+    log = noise_log(200, start_ns=EPOCH_NS)
+    assert log.omega is not None
+    rows = zip(log.stamp_ns.tolist(), log.theta.T.tolist(), log.omega.T.tolist(), log.tau.T.tolist(), strict=True)
+    messages = [("/js", stamp, joint_state(stamp, ["a", "b"], *values, frame="base").done()) for stamp, *values in rows]
+    for name, text in (("log", STATE_TEXT), ("plain", without_includes(STATE_TEXT))):
+        schema = ("sensor_msgs/msg/JointState", "ros2idl", text.encode())
+        write_mcap(tmp_path / f"{name}.mcap", messages, {"/js": schema})
+    found = read_log(tmp_path / "log.mcap")
+    assert same(found, log)
+    theirs = decoded(tmp_path / "plain.mcap")
+    assert np.array_equal(np.array([one.position for one in theirs]).T, found.theta)
+    assert np.array_equal(np.array([one.effort for one in theirs]).T, found.tau)
+
+
+def test_every_kind_of_member_takes_its_place(tmp_path: Path) -> None:
+    text = """
+    module arm {
+      module msg {
+        module State_Constants { const uint8 BRAKED = 1; @unit (value="s") const string<5> NAME = "};"; };
+        typedef float float__3[3];
+        typedef float__3 currents;
+        struct Joint { octet flags; double angle, torque; };
+        typedef Joint Joint__2[2];
+      };
+      struct Clock { long long ns; };
+    };
+    module arm { module msg {
+        struct State {
+          @default (value=TRUE) boolean ready;
+          ::arm::Clock clock;
+          unsigned long long count; unsigned short small; short tiny[3];
+          string<8> label; wstring note; sequence<string, 4> tags;
+          sequence<float, 3> few; currents amps;
+          sequence<Joint> spare; Joint__2 joints;
+        };
+    }; };
+    """
+    log = noise_log(30, start_ns=EPOCH_NS, velocity=False)
+    draw = np.random.default_rng(3)
+    messages = []
+    for row, stamp in enumerate(log.stamp_ns.tolist()):
+        data = Cdr().put("B", 1).put("q", stamp).put("Q", row).put("H", 7).put("h", 1, 2, 3)
+        data.text("x" * int(draw.integers(0, 8))).put("I", 0).put("I", 2).text("one").text("three")
+        data.put("I", 3).put("f", 0.1, 0.2, 0.3).put("f", 1, 2, 3)
+        data.put("I", 1).put("B", 9).put("d", 0.5, 0.25)
+        for joint in (0, 1):
+            data.put("B", joint).put("d", log.theta[joint, row], log.tau[joint, row])
+        messages.append(("/state", stamp, data.done()))
+    write_mcap(tmp_path / "log.mcap", messages, {"/state": ("arm/msg/State", "ros2idl", text.encode())})
+    paths = {
+        f"{name}{joint + 1}": {"source": f"joints[{joint}].{part}"}
+        for name, part in (("theta", "angle"), ("tau", "torque"))
+        for joint in (0, 1)
+    }
+    found = read_log(tmp_path / "log.mcap", Profile.model_validate({"topic": "/state", **paths}))
+    assert same(found, log)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("union U switch (long) { case 1: long a; };", "'union' where module, struct, typedef or const"),
+        ("module a { module msg { struct T { sequence<sequence<double>> x; }; }; };", "sequence of sequences"),
+        ("module a { module msg { struct T { Other x; }; }; };", "'Other' of 'x' is not defined"),
+        ("module a { module msg { struct T { @optional double x; }; }; };", "@optional"),
+        ("module a { module msg { struct T { double x[2][2]; }; }; };", "list of lists|expected ',' or ';'"),
+        ("module a { module msg { struct T { double x", "breaks off"),
+        ("module a { module msg { struct T { sequence<T> x; }; }; };", "nested more than 32"),
+        ("module a { module msg { typedef U V; typedef V U; struct T { U x; }; }; };", "typedefs.*nested"),
+        ("module a { struct Other { double x; }; };", "not defined; found a/Other"),
+        ("module a {" * 100, "modules nested"),
+        ("module a { module msg { struct T { }; }; };", "no member"),
+        ("}", "'}' where module"),
+    ],
+)
+def test_what_cannot_be_read_is_refused_in_one_line(text: str, told: str) -> None:
+    with pytest.raises(DefinitionError, match=told):
+        ros2idl.parse("a/msg/T", text)
+
+
+def test_definitions_that_fan_out_are_not_followed_without_end(tmp_path: Path) -> None:
+    levels = "".join(f"struct T{level} {{ T{level - 1} a, b, c, d; }};" for level in range(1, 20))
+    text = f"module a {{ module msg {{ struct T0 {{ double x; }}; {levels} }}; }};"
+    assert len(ros2idl.parse("a/msg/T19", text)) == 20
+    messages = [("/state", row, bytes([0, 1, 0, 0]) + bytes(1 << 20)) for row in (1, 2)]
+    write_mcap(tmp_path / "log.mcap", messages, {"/state": ("a/msg/T19", "ros2idl", text.encode())})
+    profile = Profile.model_validate({"topic": "/state", **{name: {"source": "x"} for name in ("theta1", "theta2")}})
+    with pytest.raises(LogError, match="more than 20000 parts"):
+        read_log(tmp_path / "log.mcap", profile)

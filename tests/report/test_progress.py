@@ -1,0 +1,120 @@
+"""The bar as a terminal gets it; silence everywhere else."""
+
+from __future__ import annotations
+
+import os
+import pty
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from algid.log import Log, Origin
+from algid.pipeline.identify import identify
+from algid.pipeline.settings import Settings
+from algid.report.progress import progress
+from algid.synth.cases import load_case
+from tests.report.folders import record
+
+COLOUR = re.compile(r"\x1b\[[0-9;]*3[0-9]")
+
+
+@pytest.fixture(scope="module")
+def log() -> Log:
+    recorded = record(load_case("case1"), 2.0)
+    stamps = np.rint(recorded.motion.t * 1e9).astype(np.int64)
+    return Log(stamps, recorded.motion.theta, recorded.measured, Origin("made.csv", "csv", {}))
+
+
+@pytest.fixture(scope="module")
+def path(log: Log, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from algid.writers import write_log
+
+    path = tmp_path_factory.mktemp("progress") / "log.parquet"
+    write_log(path, log)
+    return path
+
+
+def on_a_terminal(*arguments: object, **environment: str) -> tuple[str, str]:
+    """What a command that ends well prints to a pipe as stdout and to a terminal as stderr."""
+    ours, theirs = pty.openpty()
+    command = [sys.executable, "-m", "algid", *map(str, arguments)]
+    settings = {"TERM": "xterm", **{k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "TERM")}}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=theirs, env=settings | environment) as running:
+        os.close(theirs)
+        seen = b""
+        try:
+            while part := os.read(ours, 1 << 16):
+                seen += part
+        except OSError:  # Linux: the other end is closed
+            pass
+        printed = running.communicate()[0].decode()
+    os.close(ours)
+    assert running.returncode == 0, seen
+    return printed, seen.decode()
+
+
+def test_a_terminal_is_shown_stages_and_samples_and_is_left_clean(path: Path, tmp_path: Path) -> None:
+    printed, seen = on_a_terminal("identify", path, "-o", tmp_path)
+    assert "reading" in seen
+    assert "of 2,000 samples" in seen
+    assert COLOUR.search(seen)
+    assert "k1" in printed
+    assert "\x1b" not in printed
+    assert seen.endswith(("\x1b[2K", "\x1b[?25h"))  # the line is cleared, the cursor is back
+
+
+def test_no_color_is_honoured(path: Path, tmp_path: Path) -> None:
+    _, seen = on_a_terminal("identify", path, "-o", tmp_path, NO_COLOR="1")
+    assert "samples" in seen
+    assert not COLOUR.search(seen)
+
+
+def test_quiet_is_silent_on_a_terminal(path: Path, tmp_path: Path) -> None:
+    assert on_a_terminal("identify", path, "-o", tmp_path, "-q") == ("", "")
+
+
+@pytest.mark.parametrize("command", ["identify", "convert", "validate"])
+def test_a_pipe_gets_none_of_it(command: str, path: Path, tmp_path: Path, case_folder: Path) -> None:
+    arguments: dict[str, list[str | Path]] = {
+        "identify": ["-q", path, "-o", tmp_path],
+        "convert": [path, tmp_path / "log.csv"],
+        "validate": [case_folder, path],
+    }
+    done = subprocess.run(
+        [sys.executable, "-m", "algid", command, *map(str, arguments[command])],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "FORCE_COLOR": "1"},  # asks for colour, not for a terminal's bars
+    )
+    assert done.stderr == ""
+
+
+def test_nobody_is_told_where_nobody_looks(capsys: pytest.CaptureFixture[str]) -> None:
+    with progress("samples") as told:
+        assert told is None
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("estimator", ["refined", "weak", "paper"])
+def test_every_stage_comes_to_its_end(estimator: str, log: Log, tmp_path: Path) -> None:
+    calls: list[tuple[str, int, int]] = []
+    settings = Settings(estimator=estimator)  # type: ignore[arg-type]
+    identify([log, log] if estimator != "paper" else log, None, settings, out=tmp_path, told=lambda *c: calls.append(c))
+    stages = dict.fromkeys(stage for stage, _, _ in calls)
+    samples = (2 if estimator != "paper" else 1) * len(log)
+    assert next(iter(stages)) == "reading"
+    assert list(stages)[-1] == "report"
+    for stage in stages:
+        done = [(done, total) for told, done, total in calls if told == stage and total]
+        assert all(0 <= one <= total for one, total in done)
+        if done and not (stage == "series" and estimator == "refined"):  # whose last one is the first log's alone
+            assert done[-1] == (samples, samples)
+
+
+def test_a_told_identification_finds_the_same(log: Log) -> None:
+    assert identify(log, told=lambda *_: None) == identify(log)
