@@ -41,14 +41,16 @@ def track(
     Example: algid track picking.mcap --parameters case1-unloaded.algid -o tracks
     """
     from algid.pipeline.folder import refuse_existing, whole_folder
-    from algid.report.progress import waiting
+    from algid.report.progress import progress
     from algid.track.files import track_folder, write_track
     from algid.track.run import track_log
 
     folder = track_folder(str(log), out)
     refuse_existing(folder, force)
     settings = {"command": shlex.join(["algid", *sys.argv[1:]])}
-    with waiting(f"payload of {log.name}", quiet):
+    with progress("passes", quiet) as told:
+        if told is not None:
+            told("weighing the payload", 0, 0)
         result = track_log(log, parameters, l1=l1, l2=l2, profile=choice.profile(), settings=settings)
         with whole_folder(folder, force) as temporary:
             write_track(result, temporary, mcap=export is Export.MCAP)

@@ -111,7 +111,7 @@ def provenance_tables(result: TrackResult) -> list[Table]:
         ("arm's result", visible(result.arm)),
         ("sha256 of the arm's result", visible(result.arm_sha256)),
         ("path of the log", visible(result.log.path)),
-        (f"sha256 of {file_name(result.log.path)}", visible(result.log.sha256)),
+        (f"sha256 of {file_name(result.log.path)}", visible(result.log.sha256 or "unknown, fetched in part")),
     )
     return [
         settings_table(result.settings),
