@@ -24,12 +24,17 @@ import numpy as np
 import polars as pl
 
 from algid.api import synthesise
+from algid.batch.processes import THREADS
 from algid.memory import keep_freed
 from algid.pipeline.identify import identify
 from algid.writers import write_log
 
 BATCH = [sys.executable, "-m", "algid", "batch"]
 PORT = 18786
+CLUSTER = {
+    **dict.fromkeys(THREADS, "1"),
+    "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",  # it samples stacks: some 6 % of a worker's processor time
+}
 ADDRESS = f"tcp://127.0.0.1:{PORT}"
 
 
@@ -101,11 +106,10 @@ class Dask:
     def start(self, kind: str, *flags: str, until: str) -> None:
         """Start a process, and wait for what it says when it is ready."""
         code = f"from distributed.cli import dask_{kind}; dask_{kind}.main()"
-        env = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "POLARS_MAX_THREADS": "1"}
         said = self.folder / f"{kind}{time.monotonic_ns()}.txt"
         with said.open("wb") as stream:
             command = [sys.executable, "-c", code, *flags, "--no-dashboard"]
-            self.running.append(subprocess.Popen(command, env=env, stdout=stream, stderr=stream))
+            self.running.append(subprocess.Popen(command, env={**os.environ, **CLUSTER}, stdout=stream, stderr=stream))
         end = time.monotonic() + 60
         while until not in said.read_text():
             if time.monotonic() > end or self.running[-1].poll() is not None:
