@@ -1,7 +1,7 @@
-"""Memory that was used once is kept for the next job.
+"""Memory that was used once is kept for the next block of a log, or the next log.
 
 glibc hands freed arrays back to the system and takes them anew for the next ones, filled with zeros page by page:
-a fifth of the processor time of short logs.
+a fifth of the processor time of short logs, an eighth of the time that `weak` takes for a day.
 """
 
 from __future__ import annotations

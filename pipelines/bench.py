@@ -23,16 +23,18 @@ from pipelines.bench_stages import stages
 from pipelines.bench_table import Row, day_rows, markdown, rows
 
 HOUR, MILLION, DAY = 3_600_000, 1_000_000, 86_400_000
+_QUICK = 3  # runs a round of what takes a second: a start-up is taken from it, and both scatter
 EMPTY_APP = "import typer\napp = typer.Typer()\nfor n in ('a', 'b'): app.command(n)(lambda: None)\napp()"
 
 
 @dataclass
 class Contender:
-    """A command, the rounds it takes part in, and what its runs cost."""
+    """A command, the rounds it takes part in, how many `times` in each, and what its runs cost."""
 
     name: str
     command: Sequence[str]
     rounds: int = 99
+    times: int = 1
     costs: list[Cost] = field(default_factory=list)
     failed: str = ""
 
@@ -41,7 +43,7 @@ class Contender:
         if number >= self.rounds or self.failed:
             return
         try:
-            self.costs.append(run(self.command))
+            self.costs += [run(self.command) for _ in range(self.times)]
         except RuntimeError as error:
             self.failed = str(error).strip().splitlines()[-1]
 
@@ -64,15 +66,14 @@ def contenders(folder: Path) -> list[Contender]:
     hour = bench_logs.parquet(folder / "hour.parquet", HOUR)
     out = folder / "out"
     found = [
-        Contender("help", python("-m", "algid", "--help")),
-        Contender("empty typer help", python("-c", EMPTY_APP, "--help")),
+        Contender("help", python("-m", "algid", "--help"), times=_QUICK),
+        Contender("empty typer help", python("-c", EMPTY_APP, "--help"), times=_QUICK),
         Contender("ten seconds, report", identify(ten, out)),
-        Contender("polars", peer("polars", million)),
+        Contender("polars", peer("polars", million), times=_QUICK),
     ]
     for name, log in (("second", second), ("million", million)):
-        found += [
-            Contender(f"{e} {name}", identify(log, out, "--estimator", e, "--no-report")) for e in ("weak", "paper")
-        ]
+        weak, paper = (identify(log, out, "--estimator", e, "--no-report") for e in ("weak", "paper"))
+        found += [Contender(f"weak {name}", weak, times=_QUICK), Contender(f"paper {name}", paper)]
         found += [Contender(f"{p} {name}", peer(p, log), rounds=3) for p in ("least_squares", "pysindy")]
         found.append(Contender(f"pinocchio {name}", peer("pinocchio", log), rounds=1))
     found.append(Contender("refined second", identify(second, out, "--no-report")))

@@ -42,11 +42,13 @@ def identify(
     Example: algid identify run-unloaded.mcap --loaded run-loaded.mcap -o results
     """
     from algid.errors import SettingError
+    from algid.memory import keep_freed
     from algid.pipeline.identify import identify as run
     from algid.report.progress import progress
 
     if export is not None and not report:
         raise SettingError("--export: the log is made from the time series; leave --no-report out")
+    keep_freed()
     settings = choice.settings()
     bare, burdened = (logs, loaded or []) if parameters is None else ([], [*logs, *(loaded or [])])
     with progress("samples", quiet) as told:

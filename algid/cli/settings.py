@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import wraps
+from functools import cache, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -129,11 +129,11 @@ def takes_settings(command: Callable[..., None]) -> Callable[..., None]:
 
 def takes_profile(command: Callable[..., None]) -> Callable[..., None]:
     """Give `command`, whose first parameter is the `Choice`, the options of logs after its own."""
-    return _taking(command, _parameters(_profile), [])
+    return _taking(command, _parameters(_profile), ())
 
 
 def _taking(
-    command: Callable[..., None], profile: list[inspect.Parameter], settings: list[inspect.Parameter]
+    command: Callable[..., None], profile: Sequence[inspect.Parameter], settings: Sequence[inspect.Parameter]
 ) -> Callable[..., None]:
     own = _parameters(command)[1:]
 
@@ -149,9 +149,10 @@ def _taking(
     return with_options
 
 
-def _parameters(function: Callable[..., None]) -> list[inspect.Parameter]:
+@cache
+def _parameters(function: Callable[..., None]) -> tuple[inspect.Parameter, ...]:
     found = inspect.signature(function, eval_str=True).parameters.values()
-    return [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in found]
+    return tuple(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in found)
 
 
 def _delay(text: str) -> float | Literal["estimate"]:

@@ -106,7 +106,7 @@ class LogSource:
         seen = _Seen()
         self._start_hashing()
         self._tell(seen)
-        for block, alone in _with_end(self._blocks()):
+        for block, alone in _with_end(self._blocks(), self._promised):
             if len(block) and not seen.rows:
                 seen.first_ns = int(block.stamp_ns[0])
                 seen.notices += self._examined(block, alone)
@@ -202,10 +202,18 @@ class LogSource:
         )
 
 
-def _with_end(blocks: Iterator[Log]) -> Iterator[tuple[Log, bool]]:
-    """Each block, and whether it is the only one."""
+def _with_end(blocks: Iterator[Log], promised: int) -> Iterator[tuple[Log, bool]]:
+    """Each block, and whether it is the only one.
+
+    Where more than twice its samples are promised it is not, and need not wait for the second one: a reader
+    refuses a log of which it would have to drop half.
+    """
     first = next(blocks, None)
     if first is None:
+        return
+    if promised > 2 * len(first):
+        yield first, False
+        yield from ((block, False) for block in blocks)
         return
     second = next(blocks, None)
     yield first, second is None
