@@ -43,7 +43,7 @@ class Contender:
         if number >= self.rounds or self.failed:
             return
         try:
-            self.costs += [run(self.command) for _ in range(self.times)]
+            self.costs.append(run(self.command))
         except RuntimeError as error:
             self.failed = str(error).strip().splitlines()[-1]
 
@@ -65,15 +65,17 @@ def contenders(folder: Path) -> list[Contender]:
     million = bench_logs.parquet(folder / "million.parquet", MILLION)
     hour = bench_logs.parquet(folder / "hour.parquet", HOUR)
     out = folder / "out"
+    weak = [identify(log, out, "--estimator", "weak", "--no-report") for log in (second, million)]
     found = [
+        Contender("weak second", weak[0], times=_QUICK),
+        Contender("weak million", weak[1], times=_QUICK),
+        Contender("polars", peer("polars", million), times=_QUICK),
         Contender("help", python("-m", "algid", "--help"), times=_QUICK),
         Contender("empty typer help", python("-c", EMPTY_APP, "--help"), times=_QUICK),
         Contender("ten seconds, report", identify(ten, out)),
-        Contender("polars", peer("polars", million), times=_QUICK),
     ]
     for name, log in (("second", second), ("million", million)):
-        weak, paper = (identify(log, out, "--estimator", e, "--no-report") for e in ("weak", "paper"))
-        found += [Contender(f"weak {name}", weak, times=_QUICK), Contender(f"paper {name}", paper)]
+        found.append(Contender(f"paper {name}", identify(log, out, "--estimator", "paper", "--no-report")))
         found += [Contender(f"{p} {name}", peer(p, log), rounds=3) for p in ("least_squares", "pysindy")]
         found.append(Contender(f"pinocchio {name}", peer("pinocchio", log), rounds=1))
     found.append(Contender("refined second", identify(second, out, "--no-report")))
@@ -131,8 +133,10 @@ def main() -> None:
     given.out.mkdir(parents=True, exist_ok=True)
     taking_part = day(given.out) if given.day else contenders(given.out)
     for number in range(given.rounds):
-        for contender in taking_part:
-            contender.go(number)
+        for turn in range(_QUICK):  # the machine's speed drifts: what is compared runs side by side
+            for contender in taking_part:
+                if turn < contender.times:
+                    contender.go(number)
     costs = {one.name: middle(one.costs) for one in taking_part if one.costs}
     failed = {one.name: one.failed for one in taking_part if one.failed}
     if given.day:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -41,6 +40,8 @@ def identify(
 
     Example: algid identify run-unloaded.mcap --loaded run-loaded.mcap -o results
     """
+    import shlex
+
     from algid.errors import SettingError
     from algid.memory import keep_freed
     from algid.pipeline.identify import identify as run

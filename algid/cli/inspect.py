@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -29,6 +28,8 @@ def inspect(
 
     Example: algid inspect arm.mcap --joints shoulder,elbow --zero hanging
     """
+    import json
+
     from rich.console import Console
 
     from algid.errors import SettingError

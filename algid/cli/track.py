@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -40,6 +39,8 @@ def track(
 
     Example: algid track picking.mcap --parameters case1-unloaded.algid -o tracks
     """
+    import shlex
+
     from algid.pipeline.folder import refuse_existing, whole_folder
     from algid.report.progress import progress
     from algid.track.files import track_folder, write_track
