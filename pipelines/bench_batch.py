@@ -25,6 +25,7 @@ import polars as pl
 
 from algid.api import synthesise
 from algid.batch.processes import THREADS
+from algid.beside import keep_to_one_core
 from algid.memory import keep_freed
 from algid.pipeline.identify import identify
 from algid.writers import write_log
@@ -62,6 +63,7 @@ def alone(source: Path, out: Path) -> float:
     shutil.rmtree(out, ignore_errors=True)
     paths = sorted(source.iterdir())
     keep_freed()  # as workers do
+    keep_to_one_core()
     start = time.perf_counter()
     for path in paths:
         identify(path, out=out, report=False)

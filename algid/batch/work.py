@@ -14,6 +14,7 @@ from algid import __version__
 from algid.batch.jobs import Job
 from algid.batch.records import End, Input, Record, estimates_of, stat_of
 from algid.batch.stage import naming, staged
+from algid.beside import keep_to_one_core
 from algid.errors import AlgidError
 from algid.memory import keep_freed
 from algid.pipeline.identify import identify
@@ -54,6 +55,7 @@ def run_task(task: Task) -> Record:
         If there is no space left.
     """
     keep_freed()
+    keep_to_one_core()
     start = time.perf_counter()
     inputs = tuple(stat_of(path) for path in (*task.job.logs, *task.job.loaded))
     try:

@@ -10,11 +10,11 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from algid.beside import Beside, ahead
 from algid.errors import LogError
 from algid.log import Log, Notice, Origin
 from algid.results import LogSummary
 from algid.sampling import Segment, segments
-from algid.threads import Beside, ahead
 
 if TYPE_CHECKING:
     from algid.identify.prediction import PredictionSums

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from algid.beside import beside
 from algid.errors import LogError, ResultError
 from algid.identify import refined, weak
 from algid.identify.consistency import constrained
@@ -21,7 +22,6 @@ from algid.pipeline.velocities import with_velocities
 from algid.progress import Told
 from algid.results import Result
 from algid.sampling import Segment
-from algid.threads import beside
 
 Pass = Callable[[], Iterable[Segment]]
 

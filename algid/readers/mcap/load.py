@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from dataclasses import dataclass
 
+from algid.beside import executor
 from algid.log import Notice
 from algid.readers.mcap.catalogue import Catalogue, Span
 from algid.readers.mcap.chunks import has_checksum, unpack, unpack_torn
@@ -37,7 +38,7 @@ def spans_of(catalogue: Catalogue, channels: frozenset[int]) -> list[Span]:
 def batches(file: File, catalogue: Catalogue, channels: frozenset[int]) -> Iterator[Batch]:
     """The messages of `channels`, a span at a time and in file order; a damaged span yields its reason."""
     waiting: deque[Future[Batch]] = deque()
-    with ThreadPoolExecutor(2, thread_name_prefix="algid-unpack") as pool:
+    with executor(2) as pool:
         try:
             for span in spans_of(catalogue, channels):
                 ahead = _AHEAD if span.length <= _AHEAD_BYTES else 0
