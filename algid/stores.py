@@ -5,7 +5,8 @@ An object appears whole or not at all, as a file does through `algid.outfiles.wh
 
 from __future__ import annotations
 
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -87,7 +88,7 @@ class ObjectStore:
                 stream.write(content)
         except OSError as error:
             raise OutputError(
-                f"{self.root}/{name}: cannot write there ({told_by(error)}); check rights and name"
+                f"{self.root}/{name}: cannot write there ({_told_by(error)}); check rights and name"
             ) from error
 
     def names(self, under: str) -> list[str]:
@@ -138,7 +139,7 @@ def connect(url: str) -> tuple[Any, str]:
     try:
         filesystem, path = FileSystem.from_uri(url.replace("az://", "abfs://", 1))
     except (pa.ArrowException, OSError, ValueError) as error:
-        raise OutputError(f"{url}: the object store cannot be reached ({told_by(error)}); check the URL") from error
+        raise OutputError(f"{url}: the object store cannot be reached ({_told_by(error)}); check the URL") from error
     return filesystem, path.rstrip("/")
 
 
@@ -152,7 +153,7 @@ def list_urls(url: str) -> list[tuple[str, str]]:
     return below or [(url, root.rpartition("/")[2])]
 
 
-def told_by(error: BaseException) -> str:
+def _told_by(error: BaseException) -> str:
     """The first line of what an object store's client says."""
     return str(error).split("\n", maxsplit=1)[0][:200]
 
@@ -162,6 +163,23 @@ def object_stat(url: str) -> tuple[int, int]:
     filesystem, path = connect(url)
     info = filesystem.get_file_info(path)
     return (info.size, info.mtime_ns) if info.is_file else (0, 0)
+
+
+@contextmanager
+def copying(url: str, folder: Path) -> Iterator[tuple[Any, str, Path]]:
+    """The file system and path of an object, and where in `folder` its copy goes, under its own name.
+
+    Raises
+    ------
+    LogError
+        If the object cannot be read within the block.
+    """
+    filesystem, path = connect(url)
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        yield filesystem, path, folder / path.rpartition("/")[2]
+    except OSError as error:
+        raise LogError(f"{url}: it cannot be read ({_told_by(error)}); check name and rights") from error
 
 
 def fetched(url: str, folder: Path) -> Path:
@@ -174,13 +192,8 @@ def fetched(url: str, folder: Path) -> Path:
     """
     from pyarrow.fs import LocalFileSystem, copy_files
 
-    filesystem, path = connect(url)
-    copy = folder / path.rpartition("/")[2]
-    folder.mkdir(parents=True, exist_ok=True)
-    try:
+    with copying(url, folder) as (filesystem, path, copy):
         copy_files(path, str(copy), source_filesystem=filesystem, destination_filesystem=LocalFileSystem())
-    except OSError as error:
-        raise LogError(f"{url}: it cannot be read ({told_by(error)}); check name and rights") from error
     return copy
 
 

@@ -20,7 +20,7 @@ from algid.readers.mcap import framing
 from algid.readers.mcap.catalogue import catalogue, channels_of
 from algid.readers.mcap.framing import DamagedError
 from algid.readers.mcap.load import spans_of
-from algid.stores import connect, fetched, told_by
+from algid.stores import copying, fetched
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -43,17 +43,14 @@ def staged(url: str, folder: Path, profile: Profile | None = None) -> Staged:
     LogError
         If there is no such object, or it cannot be read.
     """
-    filesystem, path = connect(url)
-    copy = folder / path.rpartition("/")[2]
-    folder.mkdir(parents=True, exist_ok=True)
-    try:
-        with filesystem.open_input_file(path) as source:
-            if source.size() >= SMALL:
-                with Partial(copy, source=source) as part, naming({copy: url}):
-                    if _fetched_in_part(part, profile):
-                        return Staged(copy, url, whole=False)
-    except OSError as error:
-        raise LogError(f"{url}: it cannot be read ({told_by(error)}); check name and rights") from error
+    with (
+        copying(url, folder) as (filesystem, path, copy),
+        filesystem.open_input_file(path) as source,
+    ):
+        if source.size() >= SMALL:
+            with Partial(copy, source=source) as part, naming({copy: url}):
+                if _fetched_in_part(part, profile):
+                    return Staged(copy, url, whole=False)
     return Staged(fetched(url, folder), url)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from algid.outfiles import whole_file
@@ -10,7 +11,7 @@ from algid.report.facts import fit_tables, log_tables, provenance_table
 from algid.report.table import Table
 from algid.report.tables import estimate_tables
 from algid.report.text import file_name
-from algid.report.verdict import LEVEL_WORDS, Level, verdict
+from algid.report.verdict import LEVEL_WORDS, Level, Verdict, verdict
 from algid.results import Result, read_result
 
 LEVEL_SIGNS: dict[Level, str] = {"good": "✅", "reservations": "⚠️", "failed": "❌"}
@@ -19,18 +20,26 @@ _SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|~@&])")
 
 def markdown(result: Result) -> str:
     """Verdict, estimates, fit, logs and provenance of `result` as GitHub's Markdown."""
-    judged = verdict(result)
+    return document(
+        f"Identification of {file_name(result.log.path)}",
+        verdict(result),
+        [*estimate_tables(result), *fit_tables(result)],
+        "Logs and provenance",
+        [log_tables(result)[0], provenance_table(result)],
+    )
+
+
+def document(title: str, judged: Verdict, tables: Sequence[Table], summary: str, details: Sequence[Table]) -> str:
+    """A title, a verdict and tables, and `details` folded away below their `summary`."""
     word = LEVEL_WORDS[judged.level]
     lines = [
-        f"### Identification of {escaped(file_name(result.log.path))}",
+        f"### {escaped(title)}",
         "",
         f"{LEVEL_SIGNS[judged.level]} **{word}**{escaped(judged.sentence.removeprefix(word))}",
         "",
         *(f"- {escaped(reason)}" for reason in judged.reasons),
     ]
-    tables = [*estimate_tables(result), *fit_tables(result)]
-    details = [log_tables(result)[0], provenance_table(result)]
-    folded = ["<details><summary>Logs and provenance</summary>", "", *map(markdown_table, details), "</details>"]
+    folded = [f"<details><summary>{summary}</summary>", "", *map(markdown_table, details), "</details>"]
     return "\n".join([*lines, "", *map(markdown_table, tables), *folded]) + "\n"
 
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from algid.report.html import escaped, figure_html, script_json, table_html
-from algid.report.markdown import LEVEL_SIGNS, markdown_table
-from algid.report.markdown import escaped as plain
+from algid.report.markdown import document as markdown_document
 from algid.report.numbers import significant
 from algid.report.page import banner, contents, document, drawing, section
 from algid.report.text import file_name
-from algid.report.verdict import LEVEL_WORDS
 from algid.track.figures import figures
 from algid.track.result import TrackResult
 from algid.track.tables import change_table, fit_table, provenance_tables, quality_tables, stretch_table
@@ -48,16 +46,7 @@ def _warnings(result: TrackResult) -> str:
 
 def markdown(result: TrackResult) -> str:
     """The track as GitHub's Markdown."""
-    judged = verdict(result)
-    word = LEVEL_WORDS[judged.level]
-    lines = [
-        f"### Payload in time of {plain(file_name(result.log.path))}",
-        "",
-        f"{LEVEL_SIGNS[judged.level]} **{word}**{plain(judged.sentence.removeprefix(word))}",
-        "",
-        *(f"- {plain(reason)}" for reason in judged.reasons),
-    ]
     tables = [table for table in (stretch_table(result), change_table(result), fit_table(result)) if table.rows]
     details = [quality_tables(result)[0], provenance_tables(result)[1]]
-    folded = ["<details><summary>Log and provenance</summary>", "", *map(markdown_table, details), "</details>"]
-    return "\n".join([*lines, "", *map(markdown_table, tables), *folded]) + "\n"
+    title = f"Payload in time of {file_name(result.log.path)}"
+    return markdown_document(title, verdict(result), tables, "Log and provenance", details)
