@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from algid.arm import Arm
     from algid.errors import AlgidError
     from algid.log import Log
-    from algid.pipeline.settings import Settings
     from algid.readers import read_log
     from algid.results import Result, read_result
+    from algid.settings import Settings
     from algid.synth.simulator import simulate
     from algid.writers import write_log
 
@@ -46,7 +46,7 @@ _HOMES = {
     "Arm": "algid.arm",
     "Log": "algid.log",
     "Result": "algid.results",
-    "Settings": "algid.pipeline.settings",
+    "Settings": "algid.settings",
     "identify_logs": "algid.api",
     "read_log": "algid.readers",
     "read_result": "algid.results",

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from algid.identification.identify import identify as identify_logs
 from algid.log import Log
-from algid.pipeline.identify import identify as identify_logs
 from algid.synth import run
 from algid.synth.cases import load_case
 from algid.synth.sensors import Sensors

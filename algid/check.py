@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from algid.errors import ResultError, SettingError
+from algid.files import read_toml
 from algid.results import Result, Table4Row
-from algid.tomlfile import read_toml
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from algid.errors import SettingError
-from algid.tomlfile import first_misfit, read_toml
+from algid.files import first_misfit, read_toml
 
 AngleUnit = Literal["rad", "deg", "rev", "counts"]
 VelocityUnit = Literal["rad", "deg", "rev", "counts", "rpm"]

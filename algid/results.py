@@ -15,8 +15,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from algid.errors import ResultError
-from algid.outfiles import whole_file
-from algid.tomlfile import first_misfit
+from algid.files import first_misfit, whole_file
 
 SCHEMA_VERSION: Literal[1] = 1
 

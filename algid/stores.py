@@ -1,6 +1,6 @@
 """Where files live: folders of this machine, and object stores behind s3://, gs:// and az://.
 
-An object appears whole or not at all, as a file does through `algid.outfiles.whole_file`.
+An object appears whole or not at all, as a file does through `algid.files.whole_file`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from algid.errors import LogError, OutputError
-from algid.outfiles import whole_file
+from algid.files import whole_file
 
 SCHEMES = ("s3://", "gs://", "az://")
 

@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 
 from algid.arm import CONSTANT_NAMES, FloatArray
-from algid.identify import refined, weak
-from algid.identify.fit import Fit
-from algid.sampling import Segment
+from algid.estimators import refined, weak
+from algid.estimators.fit import Fit
+from algid.signals.segments import Segment
 from algid.synth.cases import load_case
 from algid.synth.excitation import SampledTorque
 from algid.synth.simulator import simulate

@@ -9,11 +9,11 @@ import numpy as np
 import polars as pl
 from scipy.interpolate import CubicSpline
 
-from algid.identify import refined, weak
-from algid.identify.model import Model
-from algid.identify.prediction import cross_validate
-from algid.identify.weak import Source
-from algid.sampling import Segment
+from algid.estimators import refined, weak
+from algid.estimators.prediction import cross_validate
+from algid.estimators.weak import Source
+from algid.model import Model
+from algid.signals.segments import Segment
 
 PUBLISHED = (0.159, 0.114)
 AIM = (0.140, 0.097)

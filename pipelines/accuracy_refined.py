@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
-from algid.identify import refined
+from algid.estimators import refined
 from pipelines import accuracy, accuracy_scenes
 
 

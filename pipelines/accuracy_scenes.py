@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from algid.arm import Arm, FloatArray, regressor, with_payload
-from algid.identify.paper.stages import stage1, stage2
-from algid.observers import LuenbergerObserver
-from algid.sampling import Segment
+from algid.estimators.paper import stage1, stage2
+from algid.signals.observers import LuenbergerObserver
+from algid.signals.segments import Segment
 from algid.synth.cases import load_case
 from algid.synth.excitation import Torque, wide_multi_sine
 from algid.synth.simulator import simulate

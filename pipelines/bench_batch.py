@@ -24,10 +24,9 @@ import numpy as np
 import polars as pl
 
 from algid.api import synthesise
-from algid.batch.processes import THREADS
-from algid.beside import keep_to_one_core
-from algid.memory import keep_freed
-from algid.pipeline.identify import identify
+from algid.batch.workers import THREADS
+from algid.identification.identify import identify
+from algid.runtime import keep_freed, keep_to_one_core
 from algid.writers import write_log
 
 BATCH = [sys.executable, "-m", "algid", "batch"]

@@ -7,14 +7,13 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from statistics import median
 
-from algid.identify.normal import WeakSettings, normal_equations
-from algid.identify.prediction import PredictionSums
-from algid.identify.weak import fit
-from algid.pipeline.identify import identify
-from algid.pipeline.settings import Settings
+from algid.estimators.prediction import PredictionSums
+from algid.estimators.weak import WeakSettings, fit, normal_equations
+from algid.identification.identify import identify
 from algid.readers import open_log
-from algid.sampling import Segment, segments
-from algid.threads import one_blas_thread
+from algid.runtime import one_blas_thread
+from algid.settings import Settings
+from algid.signals.segments import Segment, segments
 
 _TIMES = 5
 

@@ -18,17 +18,16 @@ from itertools import pairwise
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.identify.model import Model
-from algid.identify.whitening import NoiseLevels
+from algid.estimators.whitening import NoiseLevels
+from algid.identification.identify import identify
 from algid.log import Log
-from algid.pipeline.identify import identify
-from algid.pipeline.settings import Settings
-from algid.sampling import segments
+from algid.model import Model
+from algid.settings import Settings
+from algid.signals.segments import segments
 from algid.synth.cases import load_case
 from algid.synth.run import Recording, excitation, synthesise, with_schedule
 from algid.synth.simulator import simulate
-from algid.track.cells import Arm
-from algid.track.known import arm_of
+from algid.track.bins import Arm, arm_of
 from algid.track.payload import Track, track
 
 CASE = load_case("case1")

@@ -3,7 +3,7 @@
 Angles are measured with white noise, and so are the torques that drive the arm. Linearised along the true
 motion, the arm is a linear system driven by the torque's noise; a Kalman filter whitens what the angles tell,
 and the sensitivity of its innovations to the initial state and to the parameters gives Fisher's information
-(Friedland 1969, separated bias). Nothing is shared with `algid.identify`: no stencil, no window, no regressor.
+(Friedland 1969, separated bias). Nothing is shared with `algid.estimators`: no stencil, no window, no regressor.
 
 ======  ====================================================  =======================
 symbol  name                                                  shape

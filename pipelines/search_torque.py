@@ -24,10 +24,8 @@ import numpy as np
 from scipy.stats import qmc
 
 from algid.arm import FloatArray, forward_dynamics, with_payload
-from algid.identify.paper.columns import columns, stack_rows
-from algid.identify.paper.linear import solve_scaled
-from algid.identify.paper.stages import payload
-from algid.observers import LuenbergerObserver
+from algid.estimators.paper import columns, payload, solve_scaled, stack_rows
+from algid.signals.observers import LuenbergerObserver
 from algid.synth.cases import Case, load_case
 from algid.synth.simulator import HANGING
 

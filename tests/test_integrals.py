@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from algid.integrals import integral, nested_integral
+from algid.signals.differences import integral, nested_integral
 
 
 def largest_error(dt: float, order: int) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from algid.observers import C_OBS, PAPER_POLES, A, C, LuenbergerObserver, observer_gain
+from algid.signals.observers import C_OBS, PAPER_POLES, A, C, LuenbergerObserver, observer_gain
 
 DT = 1e-3
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from algid.log import Log, Origin
-from algid.sampling import LONGEST_GAP, Segment, pieces, segments
+from algid.signals.segments import LONGEST_GAP, Segment, pieces, segments
 
 
 def log_at(stamp_ns: np.ndarray) -> Log:

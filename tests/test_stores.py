@@ -12,12 +12,12 @@ import pytest
 
 import algid
 from algid.batch import lock
-from algid.batch.discover import jobs_of
+from algid.batch.jobs import jobs_of
 from algid.batch.plan import Recipe
 from algid.batch.records import End
 from algid.batch.run import Batch
 from algid.errors import OutputError
-from algid.pipeline.settings import Settings
+from algid.settings import Settings
 from algid.stores import open_store
 from algid.synth.sensors import Sensors
 from tests.batch.test_run import Here

@@ -10,7 +10,7 @@ from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from typing import Any
 
-from algid.batch.processes import WorkerDiedError
+from algid.batch.workers import WorkerDiedError
 from algid.errors import SettingError
 
 CONNECT_SECONDS = 10

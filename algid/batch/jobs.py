@@ -1,12 +1,29 @@
-"""What a batch is made of: a job is the logs of one arm on one occasion."""
+"""What a batch is made of: a job is the logs of one arm on one occasion.
+
+Manifests: a CSV or TOML file with a row, or a table ``[[job]]``, for each job.
+
+``name`` and ``logs`` are needed where there is no ``loaded``; ``profile``, ``robot`` and ``time`` are optional,
+and whatever else stands there is a label. Several logs are a TOML list, or separated by semicolons in CSV. Paths
+are relative to the manifest.
+
+From sources to jobs: files, folders, globs and manifests; X-unloaded.* and X-loaded.* make one job X.
+"""
 
 from __future__ import annotations
 
+import csv
+import glob
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+import os
+import re
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from pathlib import Path
 
 from algid.errors import SettingError
+from algid.stores import is_url, list_urls
 
 Label = str | float | int | bool
 
@@ -62,3 +79,184 @@ def label_of(value: object) -> Label:
     except ValueError:
         return text
     return number if math.isfinite(number) else text
+
+
+_OWN = ("name", "logs", "loaded", "profile", "robot", "time")
+
+
+def is_manifest(path: Path) -> bool:
+    """Whether a source is a manifest: TOML, or CSV with columns name and logs or loaded."""
+    if path.suffix.lower() == ".toml":
+        return True
+    if path.suffix.lower() != ".csv" or not path.is_file():
+        return False
+    with path.open("rb") as stream:
+        head = stream.readline(1 << 16).decode("utf-8-sig", "replace")
+    columns = next(csv.reader([head.strip()]), [])
+    return "name" in columns and ("logs" in columns or "loaded" in columns)
+
+
+def read_manifest(path: Path) -> list[Job]:
+    """The jobs of a manifest, in its order.
+
+    Raises
+    ------
+    SettingError
+        If it cannot be read or a row is wrong.
+    """
+    try:
+        rows = _toml_rows(path) if path.suffix.lower() == ".toml" else _csv_rows(path)
+    except (OSError, UnicodeDecodeError, csv.Error, tomllib.TOMLDecodeError) as error:
+        raise SettingError(f"{path}: the manifest cannot be read ({error}); mend it") from error
+    return [_job(row, f"{path}: {place}", path.parent) for place, row in rows]
+
+
+def _toml_rows(path: Path) -> list[tuple[str, Mapping[str, object]]]:
+    content = tomllib.loads(path.read_text(encoding="utf-8"))
+    tables = content.get("job")
+    if not isinstance(tables, list) or set(content) != {"job"}:
+        raise SettingError(f"{path}: expected tables [[job]] alone, found {', '.join(content) or 'nothing'}")
+    return [(f"job {number}", table) for number, table in enumerate(tables, 1)]
+
+
+def _csv_rows(path: Path) -> Iterable[tuple[str, Mapping[str, object]]]:
+    with path.open(encoding="utf-8-sig", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    if any(None in row for row in rows):
+        raise SettingError(f"{path}: a row has more cells than the header; quote commas within a cell")
+    return [(f"row {number}", {k: v for k, v in row.items() if v}) for number, row in enumerate(rows, 1)]
+
+
+def _job(row: Mapping[str, object], place: str, folder: Path) -> Job:
+    logs, loaded = _paths(row, "logs", place, folder), _paths(row, "loaded", place, folder)
+    if "name" not in row or not (logs or loaded):
+        raise SettingError(f"{place}: expected a name and logs, found {', '.join(row) or 'nothing'}")
+    profile = _paths(row, "profile", place, folder)
+    return Job(
+        name=checked_name(str(row["name"]), place),
+        logs=logs,
+        loaded=loaded,
+        profile=profile[0] if profile else None,
+        robot=None if row.get("robot") is None else str(row["robot"]),
+        time=_time(row.get("time"), place),
+        labels={name: label_of(value) for name, value in row.items() if name not in _OWN},
+    )
+
+
+def _paths(row: Mapping[str, object], name: str, place: str, folder: Path) -> tuple[str, ...]:
+    found = row.get(name)
+    if found is None:
+        return ()
+    parts = found.split(";") if isinstance(found, str) else found
+    if not isinstance(parts, list) or not all(isinstance(part, str) and part.strip() for part in parts):
+        raise SettingError(f"{place}: {name}: expected paths, found {found!r:.60}")
+    return tuple(part.strip() if "://" in part else str(folder / part.strip()) for part in parts)
+
+
+def _time(value: object, place: str) -> str | None:
+    if value is None:
+        return None
+    try:
+        return datetime.fromisoformat(str(value)).isoformat()
+    except ValueError as error:
+        raise SettingError(f"{place}: time: expected ISO 8601 like 2026-01-31T12:00:00Z, found {value!r}") from error
+
+
+SUFFIXES = (".mcap", ".parquet", ".csv", ".csv.gz", ".csv.zst")
+_ROLE = re.compile(r"(?P<base>.+)[-_](?P<role>unloaded|loaded)")
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A log: its path or URL, and its name below the source without suffix."""
+
+    path: str
+    name: str
+
+
+def jobs_of(sources: Sequence[str], out: str, alone: str = "logs") -> list[Job]:
+    """The jobs that sources hold, sorted by name.
+
+    Parameters
+    ----------
+    sources : paths of logs, folders, globs, manifests, or URLs of an object store
+    out : where results go; logs are not looked for within it
+    alone : 'logs' or 'loaded'
+        What a log is whose name does not tell.
+
+    Raises
+    ------
+    SettingError
+        If a source holds no log, or two jobs would have one name.
+    """
+    jobs: dict[str, Job] = {}
+    for source in sources:
+        for job in _of_source(source, out, alone):
+            if job.name in jobs and jobs[job.name] != job:
+                raise _twice(job.name, jobs[job.name], job)
+            jobs[job.name] = job
+    return [jobs[name] for name in sorted(jobs)]
+
+
+def _of_source(source: str, out: str, alone: str) -> list[Job]:
+    if not is_url(source) and is_manifest(Path(source)):
+        return read_manifest(Path(source))
+    return _paired(_logs(source, out), alone)
+
+
+def _logs(source: str, out: str) -> list[_Found]:
+    if is_url(source):
+        return [_Found(url, _stem(name)) for url, name in list_urls(source) if _is_log(name)]
+    path = Path(source)
+    if path.is_dir() and not _is_bag(path):
+        return [_Found(str(log), _stem(log.relative_to(path).as_posix())) for log in _walk(path, Path(out).resolve())]
+    paths = [source] if path.exists() else sorted(glob.glob(source, recursive=True))  # noqa: PTH207  # a pattern may be absolute
+    if not paths:
+        raise SettingError(f"{source}: there is no such file, folder or match; check the name")
+    return [_Found(match, _stem(Path(match).name)) for match in paths if Path(match).is_file() or _is_bag(Path(match))]
+
+
+def _walk(folder: Path, out: Path) -> Iterator[Path]:
+    """Logs below a folder in the order of their names; results and hidden entries are passed over."""
+    for entry in sorted(folder.iterdir()):
+        if entry.name.startswith("."):
+            continue
+        if _is_bag(entry):
+            yield entry
+        elif entry.is_dir():
+            if entry.suffix != ".algid" and entry.resolve() != out:
+                yield from _walk(entry, out)
+        elif _is_log(entry.name) and not (entry.name == "jobs.parquet" and folder.resolve() == out):
+            yield entry
+
+
+def _is_bag(path: Path) -> bool:
+    return path.is_dir() and (path / "metadata.yaml").is_file()
+
+
+def _is_log(name: str) -> bool:
+    return name.lower().endswith(SUFFIXES)
+
+
+def _stem(name: str) -> str:
+    suffix = max((end for end in SUFFIXES if name.lower().endswith(end)), key=len, default="")
+    return name[: len(name) - len(suffix)]
+
+
+def _paired(found: Sequence[_Found], alone: str) -> list[Job]:
+    jobs: dict[str, Job] = {}
+    for log in found:
+        match = _ROLE.fullmatch(log.name)
+        name = checked_name(match["base"] if match else log.name, log.path)
+        loaded = (match["role"] if match else alone) == "loaded"
+        before = jobs.get(name, Job(name, robot=os.path.dirname(name) or None))  # noqa: PTH120  # a name, not a path
+        now = replace(before, loaded=(log.path,)) if loaded else replace(before, logs=(log.path,))
+        if before.loaded if loaded else before.logs:
+            raise _twice(name, before, now)
+        jobs[name] = now
+    return list(jobs.values())
+
+
+def _twice(name: str, first: Job, second: Job) -> SettingError:
+    paths = ", ".join([*first.logs, *first.loaded, *second.logs, *second.loaded])
+    return SettingError(f"{name}: two jobs of one name ({paths}); rename a log, or name the jobs in a manifest")

@@ -6,14 +6,14 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from algid.batch.job import Task, basis_of, ended_record
 from algid.batch.jobs import Job
 from algid.batch.records import FAILURES, End, Input, Record, stat_of
-from algid.batch.work import Task, basis_of, ended_record
 from algid.errors import SettingError
-from algid.pipeline.settings import Settings
-from algid.pipeline.sources import sha256_of
+from algid.identification.source import sha256_of
 from algid.profile import Profile
 from algid.results import Result
+from algid.settings import Settings
 from algid.stores import Store, is_url
 
 

@@ -1,16 +1,21 @@
-"""What is known of a job that has come to an end: one small file each, written whole, below ``OUT/.jobs``."""
+"""What is known of a job that has come to an end: one small file each, written whole, below ``OUT/.jobs``.
+
+`jobs.parquet`: a row a job, in flat columns that SQL can ask.
+"""
 
 from __future__ import annotations
 
+import io
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from algid.batch.jobs import Job
+from algid.batch.jobs import Job, Label
 from algid.results import Result
 from algid.stores import Store, is_url, object_stat
 
@@ -113,3 +118,78 @@ def _parsed(content: bytes) -> Record | None:
         )
     except (ValueError, KeyError, TypeError, AttributeError):
         return None
+
+
+if TYPE_CHECKING:
+    import polars as pl
+
+TABLE = "jobs.parquet"
+FIRST_EPOCH_NS = 10**17  # stamps before 1973 count from some start, not from 1970
+
+
+def write_jobs(store: Store, records: Sequence[Record]) -> None:
+    """Write ``jobs.parquet``, whole or not at all. Raises `OutputError`."""
+    content = io.BytesIO()
+    jobs_frame(records).write_parquet(content)
+    store.write(TABLE, content.getvalue())
+
+
+def jobs_frame(records: Sequence[Record]) -> pl.DataFrame:
+    """A row a record.
+
+    Columns: job, robot, time, status, reason, seconds, log_seconds, estimator (whose numbers these are; the one
+    asked for stands in the settings), version, settings (JSON); logs, sha256, size in bytes and time of change
+    (lists; a log that was fetched in part has no sha256); ``label_X`` for each label; ``k``, ``k_std`` and
+    ``k_status`` for each estimate, null where there is none.
+    """
+    import polars as pl
+
+    columns: dict[str, pl.Series] = {
+        "job": pl.Series([r.job.name for r in records], dtype=pl.String),
+        "robot": pl.Series([r.job.robot for r in records], dtype=pl.String),
+        "time": pl.Series([time_of(r) for r in records], dtype=pl.Datetime("us", "UTC")),
+        "status": pl.Series([r.status.value for r in records], dtype=pl.String),
+        "reason": pl.Series([r.reason for r in records], dtype=pl.String),
+        "seconds": pl.Series([r.seconds for r in records], dtype=pl.Float64),
+        "log_seconds": pl.Series([r.log_seconds for r in records], dtype=pl.Float64),
+        "estimator": pl.Series([r.estimator for r in records], dtype=pl.String),
+        "version": pl.Series([r.version for r in records], dtype=pl.String),
+        "settings": pl.Series([json.dumps(r.settings, sort_keys=True) for r in records], dtype=pl.String),
+        "logs": pl.Series([[i.path for i in r.inputs] for r in records], dtype=pl.List(pl.String)),
+        "sha256": pl.Series([[i.sha256 for i in r.inputs] for r in records], dtype=pl.List(pl.String)),
+        "size": pl.Series([[i.size for i in r.inputs] for r in records], dtype=pl.List(pl.Int64)),
+        "changed": pl.Series([[i.mtime_ns for i in r.inputs] for r in records], dtype=pl.List(pl.Int64)).cast(
+            pl.List(pl.Datetime("ns", "UTC"))
+        ),
+    }
+    for name in _names([r.job.labels for r in records]):
+        columns[f"label_{name}"] = _label_column([r.job.labels.get(name) for r in records])
+    for name in _names([r.estimates for r in records]):
+        found = [r.estimates.get(name, (None, None, None)) for r in records]
+        columns[name] = pl.Series([one[0] for one in found], dtype=pl.Float64)
+        columns[f"{name}_std"] = pl.Series([one[1] for one in found], dtype=pl.Float64)
+        columns[f"{name}_status"] = pl.Series([one[2] for one in found], dtype=pl.String)
+    return pl.DataFrame(columns)
+
+
+def time_of(record: Record) -> datetime | None:
+    """When the job's logs were taken, in UTC: as its manifest says, or as its first stamp does."""
+    if record.job.time is not None:
+        told = datetime.fromisoformat(record.job.time)
+        return told.replace(tzinfo=UTC) if told.tzinfo is None else told.astimezone(UTC)
+    if record.start_ns is None or record.start_ns < FIRST_EPOCH_NS:
+        return None
+    return datetime.fromtimestamp(record.start_ns * 1e-9, UTC)
+
+
+def _names(several: Sequence[Mapping[str, Any]]) -> list[str]:
+    return sorted({name for one in several for name in one})
+
+
+def _label_column(values: Sequence[Label | None]) -> pl.Series:
+    """Numbers where every label is one, text otherwise."""
+    import polars as pl
+
+    if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
+        return pl.Series([None if value is None else float(value) for value in values], dtype=pl.Float64)
+    return pl.Series([None if value is None else str(value) for value in values], dtype=pl.String)

@@ -1,4 +1,7 @@
-"""Run a batch: what is to be done is done, what comes to an end is recorded, whatever happens to the workers."""
+"""Logs that are still being written are left alone until their size has come to rest.
+
+Run a batch: what is to be done is done, what comes to an end is recorded, whatever happens to the workers.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +16,38 @@ from dataclasses import dataclass, replace
 from types import FrameType
 from typing import Any
 
+from algid.batch.job import DiskFullError, Task, ended_record, run_task
 from algid.batch.jobs import Job
 from algid.batch.plan import Plan, Recipe, plan
-from algid.batch.processes import WorkerDiedError
-from algid.batch.records import End, Record, read_records, write_record
-from algid.batch.table import write_jobs
-from algid.batch.work import DiskFullError, Task, ended_record, run_task
+from algid.batch.records import End, Record, read_records, stat_of, write_jobs, write_record
+from algid.batch.workers import WorkerDiedError
 from algid.errors import OutputError
 from algid.stores import FolderStore, Store
+
+LOOK_EVERY = 2.0  # s
+
+
+class Settling:
+    """Tells jobs whose logs have not changed since the look before."""
+
+    def __init__(self) -> None:
+        self._before: dict[str, tuple[int, int]] = {}
+
+    def settled(self, jobs: Sequence[Job]) -> list[Job]:
+        """Those of `jobs` whose logs are as the last call saw them, and hold something."""
+        now = {path: _look(path) for job in jobs for path in (*job.logs, *job.loaded)}
+        before, self._before = self._before, now
+        return [
+            job
+            for job in jobs
+            if all(now[path] == before.get(path) and now[path][0] > 0 for path in (*job.logs, *job.loaded))
+        ]
+
+
+def _look(path: str) -> tuple[int, int]:
+    seen = stat_of(path)
+    return seen.size, seen.mtime_ns
+
 
 MOST_KILLS = 3
 

@@ -13,7 +13,7 @@ EXIT_INCOMPLETE = 3
 
 def main() -> None:
     """Run algid; the entry point of the console script."""
-    from algid.threads import bound_by_environment
+    from algid.runtime import bound_by_environment
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _stop)

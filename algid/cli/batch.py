@@ -74,7 +74,7 @@ def batch(
 
 
 def _jobs(sources: list[str], out: str, alone: str) -> list[Job]:
-    from algid.batch.discover import jobs_of
+    from algid.batch.jobs import jobs_of
     from algid.errors import SettingError
 
     jobs = jobs_of(sources, out, alone)
@@ -95,7 +95,7 @@ def _executor(
     out: str, scheduler: str | None, workers: int | None, memory_limit: str | None
 ) -> Iterator[tuple[Executor, int]]:
     """The workers, and how many jobs to hand out at once; they end with the block."""
-    from algid.batch.processes import Processes
+    from algid.batch.workers import Processes
     from algid.errors import SettingError
 
     if scheduler is not None:
@@ -148,8 +148,8 @@ def _progress(quiet: bool) -> Iterator[Callable[[Progress], None]]:
 
 def _watch(running: Batch, sources: list[str], out: str, alone: str, retry_failed: bool) -> Ended:
     """Look for logs until stopped; nothing but settled ones are taken."""
-    from algid.batch.discover import jobs_of
-    from algid.batch.watch import LOOK_EVERY, Settling
+    from algid.batch.jobs import jobs_of
+    from algid.batch.run import LOOK_EVERY, Settling
     from algid.errors import SettingError
 
     settling = Settling()

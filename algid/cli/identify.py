@@ -43,9 +43,9 @@ def identify(
     import shlex
 
     from algid.errors import SettingError
-    from algid.memory import keep_freed
-    from algid.pipeline.identify import identify as run
+    from algid.identification.identify import identify as run
     from algid.report.progress import progress
+    from algid.runtime import keep_freed
 
     if export is not None and not report:
         raise SettingError("--export: the log is made from the time series; leave --no-report out")
@@ -76,7 +76,7 @@ def identify(
 
 def _tell(result: Result, out: Path) -> None:
     """What was read, how, and where the result went, on standard error."""
-    from algid.pipeline.folder import result_folder
+    from algid.files import result_folder
     from algid.report.text import visible
 
     for log in result.logs:

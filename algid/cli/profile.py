@@ -20,8 +20,8 @@ def new(
     Example: algid profile new arm.mcap -o algid.toml
     """
     from algid.errors import OutputError
+    from algid.files import whole_file
     from algid.inspection.draft import draft_profile
-    from algid.outfiles import whole_file
 
     if output.exists() and not force:
         raise OutputError(f"{output}: exists already; overwrite it with --force")

@@ -1,4 +1,7 @@
-"""The options that decide an identification, shared by every command that identifies."""
+"""The options of every command that reads a log: a profile, and flags that beat it.
+
+The options that decide an identification, shared by every command that identifies.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +15,50 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from algid.cli import profiles
+if TYPE_CHECKING:
+    from algid.profile import Profile
+
+ProfileFile = Annotated[
+    Path | None, typer.Option("--profile", help="algid.toml that says what the log's names and units mean.")
+]
+Topic = Annotated[str | None, typer.Option(help="Topic with the joint states.")]
+Joints = Annotated[str | None, typer.Option(help="The two joints, as NAME,NAME.")]
+AngleUnit = Annotated[str | None, typer.Option(help="rad, deg, rev or counts.")]
+TorqueUnit = Annotated[str | None, typer.Option(help='"N m", "mN m", A or mA.')]
+Zero = Annotated[str | None, typer.Option(help="Where θ1 is nought: horizontal or hanging.")]
+SecondAngle = Annotated[str | None, typer.Option(help="θ2 is relative (to link 1) or absolute.")]
+Clock = Annotated[str | None, typer.Option(help="Stamps of the messages' header, or of the log.")]
+
+
+def profile_from(file: Path | None, **flags: str | None) -> Profile | None:
+    """The profile of a file with flags over it; None where neither is given.
+
+    Raises
+    ------
+    SettingError
+        If the file or a flag is wrong.
+    """
+    given = {name: value for name, value in flags.items() if value is not None}
+    if file is None and not given:
+        return None
+    from algid.profile import Profile, load_profile, with_settings
+
+    settings: dict[str, Any] = {}
+    for name, value in given.items():
+        if name == "joints":
+            settings["joints"] = [part.strip() for part in value.split(",")]
+        elif name == "angle_unit":
+            settings |= {channel: {"unit": value} for channel in ("theta1", "theta2", "omega1", "omega2")}
+        elif name == "torque_unit":
+            settings |= {channel: {"unit": value} for channel in ("tau1", "tau2")}
+        else:
+            settings[name] = value
+    return with_settings(load_profile(file) if file else Profile(), settings)
+
 
 if TYPE_CHECKING:
-    from algid.pipeline.settings import Settings
     from algid.profile import Profile
+    from algid.settings import Settings
 
 
 class Estimator(StrEnum):
@@ -65,7 +107,7 @@ class Choice:
 
     def settings(self) -> Settings:
         """As the pipeline takes them. Raises `SettingError` where an option is wrong."""
-        from algid.pipeline.settings import Settings
+        from algid.settings import Settings
 
         flags: dict[str, Any] = {
             name: value.value if isinstance(value, StrEnum) else value for name, value in self.settings_flags.items()
@@ -76,7 +118,7 @@ class Choice:
 
     def profile(self, file: Path | None = None) -> Profile | None:
         """The profile of `file`, or of ``--profile``, with the flags over it. Raises `SettingError`."""
-        return profiles.profile_from(file or self.profile_file, **self.profile_flags)
+        return profile_from(file or self.profile_file, **self.profile_flags)
 
 
 def _settings(
@@ -110,14 +152,14 @@ def _settings(
 
 
 def _profile(
-    profile: profiles.ProfileFile = None,
-    topic: profiles.Topic = None,
-    joints: profiles.Joints = None,
-    angle_unit: profiles.AngleUnit = None,
-    torque_unit: profiles.TorqueUnit = None,
-    zero: profiles.Zero = None,
-    second_angle: profiles.SecondAngle = None,
-    clock: profiles.Clock = None,
+    profile: ProfileFile = None,
+    topic: Topic = None,
+    joints: Joints = None,
+    angle_unit: AngleUnit = None,
+    torque_unit: TorqueUnit = None,
+    zero: Zero = None,
+    second_angle: SecondAngle = None,
+    clock: Clock = None,
 ) -> None:
     """The options of a profile."""
 
@@ -169,7 +211,7 @@ def _delay(text: str) -> float | Literal["estimate"]:
 def _poles(text: str) -> tuple[complex, ...]:
     """Six poles out of text; complex ones like -80+20j."""
     from algid.errors import SettingError
-    from algid.observers import observer_gain
+    from algid.signals.observers import observer_gain
 
     like = "give six like -80,-390,-391,-392,-393,-394"
     try:

@@ -41,9 +41,9 @@ def track(
     """
     import shlex
 
-    from algid.pipeline.folder import refuse_existing, whole_folder
+    from algid.files import refuse_existing, whole_folder
     from algid.report.progress import progress
-    from algid.track.files import track_folder, write_track
+    from algid.track.page import track_folder, write_track
     from algid.track.run import track_log
 
     folder = track_folder(str(log), out)
@@ -72,8 +72,7 @@ def _print(result: TrackResult, form: ResultFormat) -> None:
     from rich.console import Console
 
     from algid.report.terminal import print_one, print_verdict
-    from algid.track.tables import change_table, stretch_table
-    from algid.track.verdict import verdict
+    from algid.track.tables import change_table, stretch_table, verdict
 
     console = Console()
     print_verdict(verdict(result), console)

@@ -28,9 +28,8 @@ def validate(
 
     Example: algid validate run1-unloaded.algid run2-unloaded.mcap --max-nrmse 0.3
     """
-    from algid.pipeline.passes import Passes
-    from algid.pipeline.sources import LogSource
-    from algid.pipeline.validate import validate as judge
+    from algid.identification.source import LogSource, Passes
+    from algid.identification.validate import validate as judge
     from algid.report.progress import progress
     from algid.results import read_result
 

@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from algid.fleet.windows import ALPHA, SPAN
+from algid.fleet.history import ALPHA, SPAN
 from algid.report.figures.base import Figure, Panel, axis, label
 from algid.report.html import escaped, figure_html, script_json, table_html
-from algid.report.numbers import significant
 from algid.report.page import document, drawing
 from algid.report.table import Column, Table
-from algid.report.text import visible
+from algid.report.text import significant, visible
 
 if TYPE_CHECKING:
     from algid.fleet.history import History

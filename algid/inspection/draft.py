@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from algid.inspection.contents import Entry, look
+from algid.inspection.report import Entry, look
 from algid.readers import open_log
 from algid.readers.table import CHANNELS
 

@@ -1,4 +1,4 @@
-"""Readers of logs: one file a format, behind the `Reader` of `algid.readers.base`."""
+"""Readers of logs: one file a format, behind the `Reader` of `algid.readers.table`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,13 @@
-"""From a format's tables to blocks of a log: the part that every reader shares."""
+"""From a format's tables to blocks of a log: the part that every reader shares.
+
+
+
+Angles that jump by a turn, made continuous across the blocks of a log.
+"""
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -11,12 +17,9 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.errors import LogError
 from algid.log import Log, Notice, Origin
-from algid.readers.base import BLOCK_ROWS
-from algid.readers.convert import Conversion
-from algid.readers.gather import ROWS, Gatherer, Room
+from algid.readers.convert import ROWS, Conversion, Gatherer, Room
 from algid.readers.order import Sorter
-from algid.readers.table import Table, cut
-from algid.readers.unwrap import Unwrapper
+from algid.readers.table import BLOCK_ROWS, Table, cut
 
 _LARGEST = 1e100
 """Beyond this a value is no angle and no torque, and its square would overflow."""
@@ -35,7 +38,7 @@ class TableReader:
     """Samples to expect, 0 where the file does not tell."""
 
     def blocks(self, rows: int = BLOCK_ROWS) -> Iterator[Log]:
-        """Blocks of at most `rows` samples: see `algid.readers.base.Reader`.
+        """Blocks of at most `rows` samples: see `algid.readers.table.Reader`.
 
         Raises
         ------
@@ -117,3 +120,25 @@ class TableReader:
                 f"expected a finite number below {_LARGEST:g} in size, found {values[row]}; "
                 "cut that part out or name another source"
             )
+
+
+_TURN = 2 * math.pi
+
+
+class Unwrapper:
+    """Adds whole turns where an angle jumps, for the joints that a profile says so of."""
+
+    def __init__(self, joints: tuple[bool, bool]) -> None:
+        self._joints = joints
+        self._last = [math.nan, math.nan]  # each joint's last angle as recorded
+        self._turns = [0.0, 0.0]
+
+    def run(self, theta: FloatArray) -> None:
+        """Unwrap the next angles (2, N), rad, in place."""
+        for joint in (0, 1):
+            if self._joints[joint] and theta.shape[1]:
+                start = theta[joint, 0] if math.isnan(self._last[joint]) else self._last[joint]
+                raw = np.concatenate([[start], theta[joint]])
+                turns = self._turns[joint] - np.cumsum(np.rint(np.diff(raw) / _TURN))
+                self._last[joint], self._turns[joint] = raw[-1], turns[-1]
+                theta[joint] += _TURN * turns

@@ -16,7 +16,7 @@ from algid.errors import LogError
 from algid.log import Notice, Origin
 from algid.readers.assemble import TableReader
 from algid.readers.convert import conversion
-from algid.readers.mcap.choose import in_order
+from algid.readers.mcap.topic import in_order
 from algid.readers.table import JOINT_CHANNELS, VELOCITIES, Table
 
 if TYPE_CHECKING:

@@ -1,13 +1,23 @@
-"""The columns of a flat log, chosen by a profile and by their names."""
+"""The columns of a flat log, chosen by a profile and by their names.
+
+From the numbers of a time column to int64 nanoseconds.
+
+float64 seconds since 1970 resolve 0.24 µs, so whole and fractional seconds are converted apart.
+
+From data frames with canonical names to tables: what CSV and Parquet share.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from algid.errors import LogError
-from algid.log import Notice, Origin
+from algid.log import IntArray, Notice, Origin, add, word_sum
 from algid.readers.assemble import TableReader
 from algid.readers.convert import conversion
 from algid.readers.names import COMMANDED, CURRENTS, choose, take_apart
@@ -114,3 +124,159 @@ def _notices(sources: Mapping[str, str]) -> tuple[Notice, ...]:
 def _listed(available: Sequence[str]) -> str:
     names = [repr(name[:40]) for name in available[:16]]
     return ", ".join(names) + (f" and {len(available) - 16} more" if len(available) > 16 else "")
+
+
+NANOSECONDS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
+"""Nanoseconds in one unit of time."""
+_EPOCH = (("s", 1e8, 1e11), ("ms", 1e11, 1e14), ("us", 1e14, 1e17), ("ns", 1e17, 1e20))
+_LARGEST = 9.2e18
+_STEPS = (("s", 0.2), ("ms", 50.0), ("us", 50_000.0))
+SLOWEST_NS = 200_000_000
+"""A longer median step is no recording of an arm in motion: it has 5 Hz at least."""
+
+
+def time_unit(times: NDArray[Any]) -> str:
+    """The unit of a time column (N,) nobody named one for: "s", "ms", "us" or "ns".
+
+    Times since 1970 tell by their size. Times since the start of a log tell by their median step, for logs
+    between 20 Hz and 20 kHz: below 0.2 it is seconds, below 50 ms, below 50,000 µs, else ns.
+    """
+    first = abs(float(times[0]))
+    for unit, low, high in _EPOCH:
+        if low <= first < high and _plausible(times, NANOSECONDS[unit]):
+            return unit
+    return unit_of_step(median_step(times))
+
+
+def unit_of_step(step: float) -> str:
+    """The unit in which a median step is one of a log: see `time_unit`."""
+    return next((unit for unit, longest in _STEPS if step < longest), "ns")
+
+
+def median_step(times: NDArray[Any]) -> float:
+    """Median size of the steps between times (N,) that differ; 0 where none do."""
+    steps = np.abs(np.diff(times.astype(np.float64)))
+    steps = steps[steps > 0]
+    return float(np.median(steps)) if steps.size else 0.0
+
+
+def _plausible(times: NDArray[Any], nanoseconds: int) -> bool:
+    """Whether the median step is between 20 µs and 10 s in a unit of so many nanoseconds, if there is one."""
+    step = median_step(times)
+    return step == 0 or 2e4 <= step * nanoseconds <= 1e10
+
+
+def to_nanoseconds(times: NDArray[Any], unit: str) -> IntArray:
+    """Times (N,) in `unit` as int64 ns, to the nearest; integers stay exact.
+
+    Raises
+    ------
+    ValueError
+        If a time is not finite, or out of the 292 years that int64 nanoseconds span.
+    """
+    factor = NANOSECONDS[unit]
+    if np.issubdtype(times.dtype, np.integer):
+        if times.size and max(abs(int(times.min())), abs(int(times.max()))) * factor > _LARGEST:
+            raise ValueError("a time beyond 292 years")
+        whole_ns = times.astype(np.int64, copy=False)
+        return whole_ns * factor if factor != 1 else whole_ns
+    if not np.all(np.isfinite(times)):
+        raise ValueError("a time that is not finite")
+    if times.size and float(np.abs(times).max()) * factor > _LARGEST:
+        raise ValueError("a time beyond 292 years")
+    whole = np.floor(times)
+    fraction = np.rint((times - whole) * factor)
+    return whole.astype(np.int64) * factor + fraction.astype(np.int64)
+
+
+if TYPE_CHECKING:
+    import polars as pl
+
+
+def tables(path: str, frames: Iterator[pl.DataFrame], columns: Columns, sums: Mapping[str, int]) -> Iterator[Table]:
+    """Tables out of frames that hold one column a channel, and "t".
+
+    Raises
+    ------
+    LogError
+        If a value is missing, a time is no time, or the sums of the values are not the file's own.
+    """
+    expected = {name: sums[source] for name, source in columns.sources.items() if source in sums}
+    unit, seen, done = columns.time_unit, dict.fromkeys(expected, 0), 0
+    for frame, cut_off in _complete(path, frames):
+        if frame.height == 0 and done:
+            continue
+        for name in seen:
+            seen[name] = add(seen[name], word_sum(frame[name].to_numpy()))
+        times = frame["t"].to_numpy()
+        notices = list(cut_off)
+        if unit is None:
+            unit = _detected(path, times, notices)
+        try:
+            stamps = to_nanoseconds(times, unit)
+        except ValueError as error:
+            raise LogError(f"{path}: {error} in column {columns.sources['t']!r}, past row {done}") from error
+        if not (done or columns.time_told):
+            notices += _slow(columns.sources["t"], stamps, unit)
+        channels = {name: frame[name].to_numpy() for name in frame.columns if name != "t"}
+        done += frame.height
+        yield Table(stamps, channels, tuple(notices))
+    _verify(path, seen, expected)
+
+
+def _detected(path: str, times: NDArray[Any], notices: list[Notice]) -> str:
+    if not np.all(np.isfinite(times)):
+        raise LogError(f"{path}: a time is not finite; expected a number in every row")
+    if times.size == 0:
+        return "s"
+    unit = time_unit(times)
+    if unit != "s":
+        notices.append(Notice("TIME_UNIT", f"times are taken for {unit}, from their size and their steps"))
+    return unit
+
+
+def _slow(column: str, stamps: IntArray, unit: str) -> list[Notice]:
+    """What to say where nobody told the unit of time and samples are too far apart for an arm."""
+    step = median_step(stamps - stamps[:1])
+    if step <= SLOWEST_NS:
+        return []
+    likely = unit_of_step(step / NANOSECONDS[unit])
+    text = (
+        f"times in {column!r} are taken for {unit}, which makes {1e9 / step:.3g} Hz, too slow for an arm in motion; "
+        f'if they are in {likely}, set time_unit = "{likely}" in a profile'
+    )
+    return [Notice("SLOW_CLOCK", text)]
+
+
+def _complete(path: str, frames: Iterator[pl.DataFrame]) -> Iterator[tuple[pl.DataFrame, tuple[Notice, ...]]]:
+    """Frames without nulls: a last row that breaks off is dropped and told of, any other null refused."""
+    done, held = 0, None
+    for frame in frames:
+        if held is not None:
+            yield _without_null(path, held, done), ()
+            done += held.height
+        held = frame
+    if held is None:
+        return
+    if held.height and any(value is None for value in held.row(-1)):
+        lost = Notice("CUT_OFF", "the last row breaks off and was dropped", lossy=True)
+        yield _without_null(path, held.head(-1), done), (lost,)
+    else:
+        yield _without_null(path, held, done), ()
+
+
+def _without_null(path: str, frame: pl.DataFrame, done: int) -> pl.DataFrame:
+    for name in frame.columns:
+        if frame[name].null_count():
+            row = done + (frame[name].is_null().arg_max() or 0) + 1
+            raise LogError(f"{path}: {name} has no value in row {row}; expected a number in every row")
+    return frame
+
+
+def _verify(path: str, seen: Mapping[str, int], expected: Mapping[str, int]) -> None:
+    wrong = [name for name, total in seen.items() if total != expected[name]]
+    if wrong:
+        raise LogError(
+            f"{path}: the values of {', '.join(wrong)} are not those that were written: the file was changed "
+            "or damaged; write it again, or remove its truth if it was changed on purpose"
+        )

@@ -10,14 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from algid.errors import LogError
-from algid.log import Origin
-from algid.readers import frames
+from algid.log import Companion, Origin, loads
 from algid.readers.assemble import TableReader
-from algid.readers.columns import Columns, assign, check_written
+from algid.readers.columns import Columns, assign, check_written, tables
 from algid.readers.dialect import Dialect, detect
-from algid.readers.inflate import head_of, whole_lines
+from algid.readers.sniff import head_of, whole_lines
 from algid.readers.table import Table
-from algid.truth import Companion, loads
 
 if TYPE_CHECKING:
     import polars as pl
@@ -101,7 +99,7 @@ class _Text:
 
     def tables(self, rows: int) -> Iterator[Table]:
         """Tables of about `rows` rows."""
-        return frames.tables(str(self.path), self._frames(rows), self.columns, self.sums)
+        return tables(str(self.path), self._frames(rows), self.columns, self.sums)
 
     def _frames(self, rows: int) -> Iterator[pl.DataFrame]:
         import polars as pl

@@ -8,12 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from algid.errors import LogError
-from algid.log import CANONICAL_COLUMNS, Notice, Origin
-from algid.readers import frames
+from algid.log import CANONICAL_COLUMNS, KEY, Companion, Notice, Origin, loads
 from algid.readers.assemble import TableReader
-from algid.readers.columns import Columns, assign, check_written
+from algid.readers.columns import Columns, assign, check_written, tables
 from algid.readers.table import Table
-from algid.truth import KEY, Companion, loads
 
 if TYPE_CHECKING:
     import polars as pl
@@ -163,7 +161,7 @@ class _Groups:
 
     def tables(self, rows: int) -> Iterator[Table]:
         """Tables of about `rows` rows."""
-        return frames.tables(str(self.path), self._frames(rows), self._columns(), self.sums)
+        return tables(str(self.path), self._frames(rows), self._columns(), self.sums)
 
     def _frames(self, rows: int) -> Iterator[pl.DataFrame]:
         """Frames of `rows` rows, the last of fewer. Columns come in two lots, since one lot takes one core."""

@@ -7,10 +7,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from algid.report.facts import flat_settings
-from algid.report.numbers import ABSENT, resolved, significant
 from algid.report.table import Column, Table
-from algid.report.text import file_name, unit_text, visible
+from algid.report.tables import flat_settings
+from algid.report.text import ABSENT, file_name, resolved, significant, unit_text, visible
 from algid.results import Estimate, Result
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from algid.errors import ResultError
 from algid.progress import Told
-from algid.report.blocks import LARGEST
 from algid.report.figures.base import Figure, Missing
 from algid.report.figures.closeup import TITLE as CLOSEUP
 from algid.report.figures.closeup import closeup
@@ -20,7 +19,8 @@ from algid.report.figures.information import information
 from algid.report.figures.residual import residual
 from algid.report.figures.torque import TITLE as TORQUE
 from algid.report.figures.torque import torque
-from algid.report.torquelog import TorqueLog, read_torque
+from algid.report.reduce import LARGEST
+from algid.report.series import TorqueLog, read_torque
 from algid.results import Estimate, Result
 
 

@@ -1,15 +1,48 @@
-"""Pieces of HTML: foreign text escaped, tables, figures, and data inside a script."""
+"""How every panel looks: plotly's template, in the page's colours.
+
+Pieces of HTML: foreign text escaped, tables, figures, and data inside a script.
+"""
 
 from __future__ import annotations
 
 import html
 import json
 from collections.abc import Iterable
+from typing import Any
 
 from algid.report.figures.base import Figure, Legend, Missing
 from algid.report.table import Column, Table
 from algid.report.text import visible
 from algid.results import Status
+
+_AXIS: dict[str, Any] = {
+    "gridcolor": "@grid",
+    "linecolor": "@line",
+    "zerolinecolor": "@line",
+    "zerolinewidth": 1,
+    "tickcolor": "@line",
+    "tickfont": {"color": "@muted", "size": 12},
+    "title": {"font": {"color": "@muted", "size": 12}, "standoff": 6},
+    "automargin": True,
+    "exponentformat": "power",
+}
+
+TEMPLATE: dict[str, Any] = {
+    "layout": {
+        "font": {"family": "system-ui, -apple-system, Segoe UI, Roboto, sans-serif", "size": 12, "color": "@ink"},
+        "paper_bgcolor": "@page",
+        "plot_bgcolor": "@page",
+        "margin": {"l": 58, "r": 12, "t": 22, "b": 40},
+        "showlegend": False,
+        "hoverlabel": {"bgcolor": "@card", "bordercolor": "@line", "font": {"color": "@ink", "size": 12}},
+        "modebar": {"bgcolor": "@page/0", "color": "@muted", "activecolor": "@ink"},
+        "xaxis": _AXIS,
+        "yaxis": _AXIS,
+        "coloraxis": {},
+    },
+    "data": {"heatmap": [{"colorbar": {"tickfont": {"color": "@muted"}}}]},
+}
+
 
 LONGEST_TEXT = 4_000
 LONG_CELL = 40  # beyond, a cell breaks into lines

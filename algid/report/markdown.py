@@ -6,10 +6,9 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from algid.outfiles import whole_file
-from algid.report.facts import fit_tables, log_tables, provenance_table
+from algid.files import whole_file
 from algid.report.table import Table
-from algid.report.tables import estimate_tables
+from algid.report.tables import estimate_tables, fit_tables, log_tables, provenance_table
 from algid.report.text import file_name
 from algid.report.verdict import LEVEL_WORDS, Level, Verdict, verdict
 from algid.results import Result, read_result

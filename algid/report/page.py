@@ -13,17 +13,21 @@ from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 
-from algid.outfiles import whole_file
+from algid.files import whole_file
 from algid.progress import Told
-from algid.report.facts import fit_tables, log_tables, provenance_table, quality_tables, settings_table
 from algid.report.figures.base import Figure, Missing
 from algid.report.gallery import gallery
-from algid.report.html import escaped, figure_html, panel_id, script_json, table_html
-from algid.report.numbers import significant
+from algid.report.html import TEMPLATE, escaped, figure_html, panel_id, script_json, table_html
 from algid.report.table import Table
-from algid.report.tables import estimate_tables
-from algid.report.template import TEMPLATE
-from algid.report.text import file_name
+from algid.report.tables import (
+    estimate_tables,
+    fit_tables,
+    log_tables,
+    provenance_table,
+    quality_tables,
+    settings_table,
+)
+from algid.report.text import file_name, significant
 from algid.report.verdict import LEVEL_WORDS, Verdict, verdict
 from algid.results import Result, read_result
 

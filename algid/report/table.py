@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from algid.report.numbers import ABSENT
+from algid.report.text import ABSENT
 
 Kind = Literal["name", "number", "text", "status"]
 

@@ -1,7 +1,11 @@
-"""Names out of logs are foreign text: what may not reach a terminal or a page as it is."""
+"""Names out of logs are foreign text: what may not reach a terminal or a page as it is.
+
+How a number is written: the one place, so that every format shows the same digits.
+"""
 
 from __future__ import annotations
 
+import math
 import unicodedata
 
 LONGEST = 300
@@ -37,3 +41,56 @@ def joined(words: list[str]) -> str:
 def unit_text(unit: str) -> str:
     """A unit with its power as it is printed: kg m²."""
     return visible(unit).replace("^2", "²")
+
+
+ABSENT = "–"
+SMALLEST_FIXED = 1e-3
+LARGEST_FIXED = 1e6
+MOST_DIGITS = 8
+
+
+def significant(value: float | None, digits: int = 5) -> str:
+    """`value` with that many significant digits; a dash where there is none, ∞ where it is unbounded."""
+    if value is None or math.isnan(value):
+        return ABSENT
+    if math.isinf(value):
+        return "∞" if value > 0 else "−∞"
+    if value == 0:
+        return "0"
+    exponent = _exponent(value, digits)
+    if SMALLEST_FIXED <= abs(value) < LARGEST_FIXED:
+        return f"{value:.{max(digits - 1 - exponent, 0)}f}"
+    mantissa = f"{value / 10.0**exponent:.{digits - 1}f}" if abs(exponent) < 300 else f"{value:.{digits - 1}e}"
+    return f"{mantissa}e{exponent}" if "e" not in mantissa else mantissa
+
+
+def resolved(value: float | None, std: float | None) -> str:
+    """`value` down to the second significant digit of its standard deviation; five digits where there is none."""
+    return significant(value, digits_of(value, std))
+
+
+def digits_of(value: float | None, std: float | None) -> int:
+    """Significant digits of `value` that its standard deviation leaves worth writing: two to eight."""
+    if value is None or std is None or not (math.isfinite(value) and math.isfinite(std)) or value == 0 or std <= 0:
+        return 5
+    leading = math.floor(math.log10(abs(value))) - math.floor(math.log10(std))
+    return min(max(leading + 2, 2), MOST_DIGITS)
+
+
+def percent(part: float | None, whole: float | None, digits: int = 2) -> str:
+    """`part` in percent of the size of `whole`."""
+    if part is None or not whole:
+        return ABSENT
+    return significant(100 * part / abs(whole), digits)
+
+
+def interval(low: float | None, high: float | None, std: float | None) -> str:
+    """An interval, as fine as the standard deviation; a missing end is unbounded."""
+    left = "−∞" if low is None else resolved(low, std)
+    right = "∞" if high is None else resolved(high, std)
+    return f"[{left}, {right}]"
+
+
+def _exponent(value: float, digits: int) -> int:
+    """Decimal exponent of `value` once rounded to `digits` digits."""
+    return int(f"{value:.{digits - 1}e}".partition("e")[2])

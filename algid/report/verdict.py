@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from algid.report.numbers import significant
-from algid.report.text import joined, visible
+from algid.report.text import joined, significant, visible
 from algid.results import Estimate, Fit, Result, Status, TorquePrediction
 
 Level = Literal["good", "reservations", "failed"]

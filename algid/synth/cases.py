@@ -14,8 +14,8 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from algid.arm import Arm
 from algid.errors import SettingError
+from algid.files import read_toml
 from algid.synth.excitation import MultiSine
-from algid.tomlfile import read_toml
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]

@@ -10,7 +10,7 @@ from algid.arm import FloatArray
 from algid.report.figures.base import Figure, Layout, Legend, Panel, Trace, axis, line, packed, times
 from algid.report.reduce import MinMax, broken_at_gaps, bucket_size
 from algid.report.text import joined
-from algid.track.cells import CELL
+from algid.track.bins import CELL
 from algid.track.payload import HALF_BAND, HOLE, QUANTILE, Track
 from algid.track.result import TrackResult
 from algid.track.tables import mass_text

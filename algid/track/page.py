@@ -1,16 +1,24 @@
-"""A track's `report.html` and `report.md`, out of the same tables and sentence."""
+"""A track's `report.html` and `report.md`, out of the same tables and sentence.
+
+A track's folder: ``track.json``, ``track.parquet``, ``stretches.parquet``, the pages, and ``track.mcap``.
+"""
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import numpy as np
+
+from algid.files import whole_file
+from algid.report.export import START_KEY, write_series
 from algid.report.html import escaped, figure_html, script_json, table_html
 from algid.report.markdown import document as markdown_document
-from algid.report.numbers import significant
 from algid.report.page import banner, contents, document, drawing, section
-from algid.report.text import file_name
+from algid.report.text import file_name, significant
 from algid.track.figures import figures
-from algid.track.result import TrackResult
-from algid.track.tables import change_table, fit_table, provenance_tables, quality_tables, stretch_table
-from algid.track.verdict import verdict
+from algid.track.payload import QUANTILE
+from algid.track.result import TrackResult, track_json
+from algid.track.tables import change_table, fit_table, provenance_tables, quality_tables, stretch_table, verdict
 
 
 def page_html(result: TrackResult) -> str:
@@ -50,3 +58,70 @@ def markdown(result: TrackResult) -> str:
     details = [quality_tables(result)[0], provenance_tables(result)[1]]
     title = f"Payload in time of {file_name(result.log.path)}"
     return markdown_document(title, verdict(result), tables, "Log and provenance", details)
+
+
+TOPIC = "/algid/payload"
+
+
+def track_folder(log: str, parent: Path) -> Path:
+    """Where the track of a log goes: `parent/STEM.track`."""
+    return parent / f"{Path(log).stem or 'log'}.track"
+
+
+def write_track(result: TrackResult, folder: Path, mcap: bool = False) -> None:
+    """Write everything into `folder`, `track.mcap` where asked. Raises `OutputError`."""
+    _write_curve(result, folder / "track.parquet")
+    _write_stretches(result, folder / "stretches.parquet")
+    texts = {"track.json": track_json(result), "report.md": markdown(result), "report.html": page_html(result)}
+    for name, text in texts.items():
+        with whole_file(folder / name) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    if mcap:
+        _write_mcap(result, folder)
+
+
+def _write_curve(result: TrackResult, path: Path) -> None:
+    """A row each 20 ms: m_p(t) and its band, and the stretch's number, mass and interval."""
+    import polars as pl
+    import pyarrow.parquet as pq
+
+    found = result.track
+    number = found.stretch.astype(np.int64)
+    masses = np.array([(s.m_p, *s.ci95) for s in found.stretches])[number].T
+    curve = pl.DataFrame(
+        {
+            "t": found.t,
+            "m_p": found.m_p,
+            "low": found.m_p - QUANTILE * found.std,
+            "high": found.m_p + QUANTILE * found.std,
+            "stretch": number,
+            **dict(zip(("stretch_m_p", "stretch_low", "stretch_high"), masses, strict=True)),
+        }
+    )
+    with whole_file(path) as temporary:
+        table = curve.to_arrow()
+        pq.write_table(table.replace_schema_metadata({START_KEY: f"[{result.log.start_ns}]"}), temporary)
+
+
+def _write_stretches(result: TrackResult, path: Path) -> None:
+    import polars as pl
+
+    stretches = result.track.stretches
+    rows = [
+        (s.start, s.end, s.m_p, s.std, *s.ci95, status.value)
+        for s, status in zip(stretches, result.statuses, strict=True)
+    ]
+    frame = pl.DataFrame(rows, schema=["start", "end", "m_p", "m_p_std", "low", "high", "status"], orient="row")
+    with whole_file(path) as temporary:
+        frame.write_parquet(temporary)
+
+
+def _write_mcap(result: TrackResult, folder: Path) -> None:
+    """The curve as a ROS 2 log with the log's own stamps, for Foxglove and PlotJuggler."""
+    from mcap.writer import CompressionType, Writer
+
+    with whole_file(folder / "track.mcap") as temporary, temporary.open("wb") as stream:
+        writer = Writer(stream, compression=CompressionType.ZSTD)
+        writer.start(profile="ros2", library=f"algid {result.version}")
+        write_series(writer, folder / "track.parquet", TOPIC)
+        writer.finish()  # type: ignore[no-untyped-call]

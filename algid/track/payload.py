@@ -5,7 +5,7 @@ The variance of a mass is what its rows leave open and what the arm's own uncert
     var m_p = s² / A + Jᵀ Σ J,    J = T / A
 
 with Σ the covariance of constants and link lengths, T the cells' sensitivity to them and s² the rows' variance
-where it exceeds one, slow errors (`algid.track.colour`) included.
+where it exceeds one, slow errors (`algid.track.change_points`) included.
 """
 
 from __future__ import annotations
@@ -18,11 +18,10 @@ from operator import itemgetter
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.identify.stencil import Stencil
-from algid.sampling import Segment
-from algid.track.cells import CELL, Arm, Cells, cells_of, joined
-from algid.track.edges import SHORTEST, Edges, edges, variance
-from algid.track.jolts import CALM, GUARD
+from algid.signals.differences import Stencil
+from algid.signals.segments import Segment
+from algid.track.bins import CELL, Arm, Cells, cells_of, joined
+from algid.track.change_points import CALM, GUARD, SHORTEST, Edges, edges, variance
 
 QUANTILE = 1.959964  # of the normal distribution, for 95 %
 ROUNDS = 2  # of linearising each stretch at its own mass and looking for the changes again

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from algid import __version__
 from algid.errors import LogError
-from algid.pipeline.sources import LogLike, LogSource
+from algid.identification.source import LogLike, LogSource
 from algid.report.verdict import verdict
 from algid.results import read_result
-from algid.threads import one_blas_thread
-from algid.track.known import arm_of
+from algid.runtime import one_blas_thread
+from algid.track.bins import arm_of
 from algid.track.payload import track
 from algid.track.result import TrackResult
 

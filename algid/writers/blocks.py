@@ -7,8 +7,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from algid.log import Log
-from algid.truth import add, word_sum
+from algid.log import Log, add, word_sum
 
 _EXACT_SECONDS_NS = 1 << 53
 """Stamps below 104 days survive as float64 seconds: their half unit in the last place is under half a ns."""

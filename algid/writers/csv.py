@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from algid.log import Log, Truth
-from algid.outfiles import whole_file
-from algid.truth import Companion
+from algid.files import whole_file
+from algid.log import Companion, Log, Truth
 from algid.writers.blocks import as_blocks, columns, exact_in_seconds, summed
 
 

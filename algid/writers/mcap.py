@@ -11,10 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from algid.log import Log, Truth
-from algid.outfiles import whole_file
+from algid.files import whole_file
+from algid.log import KEY, Companion, Log, Truth
 from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
-from algid.truth import KEY, Companion
 from algid.writers.blocks import as_blocks
 
 TOPIC = "/joint_states"

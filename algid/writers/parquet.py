@@ -6,9 +6,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from algid.errors import OutputError
-from algid.log import Log, Truth
-from algid.outfiles import whole_file
-from algid.truth import KEY, Companion
+from algid.files import whole_file
+from algid.log import KEY, Companion, Log, Truth
 from algid.writers.blocks import as_blocks, columns, summed
 
 

@@ -6,9 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from algid.batch.discover import jobs_of
-from algid.batch.jobs import Job
-from algid.batch.manifest import is_manifest, read_manifest
+from algid.batch.jobs import Job, is_manifest, jobs_of, read_manifest
 from algid.errors import SettingError
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from algid.batch.processes import Processes, WorkerDiedError
+from algid.batch.workers import Processes, WorkerDiedError
 from tests.batch import calls
 
 
@@ -52,7 +52,7 @@ def test_memory_is_bounded_and_the_worker_lives_on(workers: Processes) -> None:
 def test_workers_die_with_their_parent(tmp_path: Path) -> None:
     told = tmp_path / "pid"
     code = (
-        "from algid.batch.processes import Processes\nfrom tests.batch import calls\n"
+        "from algid.batch.workers import Processes\nfrom tests.batch import calls\n"
         f"if __name__ == '__main__':\n    Processes(1).submit(calls.linger, {str(told)!r}).result()\n"
     )
     script = tmp_path / "parent.py"

@@ -15,16 +15,15 @@ import polars as pl
 import pytest
 
 import algid
-from algid.batch.discover import jobs_of
+from algid.batch.jobs import jobs_of
 from algid.batch.lock import locked
 from algid.batch.plan import Recipe
-from algid.batch.processes import WorkerDiedError
 from algid.batch.records import End
-from algid.batch.run import Batch, Ended, sweep
-from algid.batch.watch import Settling
+from algid.batch.run import Batch, Ended, Settling, sweep
+from algid.batch.workers import WorkerDiedError
 from algid.errors import OutputError
-from algid.pipeline.identify import identify
-from algid.pipeline.settings import Settings
+from algid.identification.identify import identify
+from algid.settings import Settings
 from algid.stores import FolderStore
 from algid.synth.sensors import Sensors
 
@@ -100,7 +99,7 @@ def test_the_table_names_the_estimator_whose_numbers_are_reported(logs: Path, mo
     def handed_back(*args: Any, **more: Any) -> Any:
         return identify(*args, **more).model_copy(update={"estimator": "weak"})
 
-    monkeypatch.setattr("algid.batch.work.identify", handed_back)
+    monkeypatch.setattr("algid.batch.job.identify", handed_back)
     _run(logs, recipe=replace(RECIPE, settings=Settings(estimator="refined")))
     table = pl.read_parquet(logs.parent / "out/jobs.parquet")
     assert table["estimator"].to_list() == [None, "weak", "weak"]
@@ -166,7 +165,7 @@ def test_a_full_disk_stops_the_batch_and_keeps_what_is_finished(logs: Path, monk
             raise OutputError("r1/a: cannot write") from OSError(errno.ENOSPC, "No space left on device")
         return identify(*args, **more)
 
-    monkeypatch.setattr("algid.batch.work.identify", full)
+    monkeypatch.setattr("algid.batch.job.identify", full)
     ended = _run(logs)
     assert (ended.ran, ended.left) == (1, 2)
     assert ended.full is not None

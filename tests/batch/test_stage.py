@@ -12,16 +12,15 @@ import polars as pl
 import pytest
 
 import algid
-from algid.batch.partial import merged, without
-from algid.batch.stage import SMALL, staged
+from algid.batch.fetch import SMALL, merged, staged, without
 from algid.errors import LogError
+from algid.identification.identify import identify
+from algid.identification.source import Staged
 from algid.log import Log
-from algid.pipeline.identify import identify
-from algid.pipeline.settings import Settings
-from algid.pipeline.sources import Staged
 from algid.profile import Angle, Profile
 from algid.readers.mcap import opened
 from algid.results import Result
+from algid.settings import Settings
 from algid.stores import open_store
 from algid.synth.sensors import Sensors
 from tests.objects import Served, s3, with_cameras
@@ -81,7 +80,7 @@ def test_a_log_of_joints_alone_is_fetched_whole_and_hashed(served: Served, log: 
     algid.write_log(path, replace(log, theta=log.theta + np.random.default_rng(0).normal(0, 1e-3, log.theta.shape)))
     for size in (1 << 30, 0):  # below the size where parts are worth a request, and above it
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("algid.batch.stage.SMALL", size)
+            patch.setattr("algid.batch.fetch.SMALL", size)
             copy = staged(_put(served, path), tmp_path / "copy")
         assert copy.whole
         assert copy.path.read_bytes() == path.read_bytes()
@@ -124,7 +123,7 @@ def test_of_parquet_the_columns_that_are_read_are_fetched(served: Served, log: L
         frame.write_parquet(path, row_group_size=500)
     profile = Profile(theta1=Angle(source="arm.theta1"), theta2=Angle(source="theta2")) if name == "foreign" else None
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("algid.batch.stage.SMALL", 0)
+        patch.setattr("algid.batch.fetch.SMALL", 0)
         copy = staged(_put(served, path), tmp_path / "copy", profile)
     assert copy.whole == (name == "algid")
     if name == "foreign":
@@ -136,7 +135,7 @@ def test_other_logs_are_fetched_whole(served: Served, log: Log, tmp_path: Path) 
     path = tmp_path / "a.csv"
     algid.write_log(path, log)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("algid.batch.stage.SMALL", 0)
+        patch.setattr("algid.batch.fetch.SMALL", 0)
         copy = staged(_put(served, path), tmp_path / "copy")
     assert copy.whole
     assert _same(copy, path)

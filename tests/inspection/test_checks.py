@@ -10,9 +10,8 @@ import pytest
 
 from algid.arm import Arm, FloatArray, inverse_dynamics
 from algid.errors import LogError
-from algid.inspection.checks import admit, examine
+from algid.inspection.checks import admit, examine, signal_figures
 from algid.inspection.dynamics import dynamic_figures
-from algid.inspection.signals import signal_figures
 from algid.log import Log, Origin
 from algid.profile import Profile
 from algid.readers import read_log

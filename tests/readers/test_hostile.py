@@ -18,8 +18,7 @@ from hypothesis import strategies as st
 
 from algid.errors import LogError
 from algid.readers import read_log
-from algid.readers.mcap.chunks import unpack
-from algid.readers.mcap.framing import DamagedError
+from algid.readers.mcap.framing import DamagedError, unpack
 from pipelines.mutations import clean_files, clean_log, damage
 from tests.readers.logs import same
 

@@ -11,7 +11,7 @@ import pytest
 from algid.errors import LogError
 from algid.log import Notice
 from algid.readers import read_log
-from algid.readers.clock import time_unit, to_nanoseconds
+from algid.readers.columns import time_unit, to_nanoseconds
 from algid.readers.names import choose, take_apart
 from algid.readers.order import Sorter
 from algid.readers.table import Table

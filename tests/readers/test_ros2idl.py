@@ -14,8 +14,7 @@ from rosbags.typesys import Stores, get_types_from_idl, get_typestore
 from algid.errors import LogError
 from algid.profile import Profile
 from algid.readers import read_log
-from algid.readers.mcap import ros2idl, ros2msg
-from algid.readers.mcap.ros2msg import DefinitionError
+from algid.readers.mcap.definitions import DefinitionError, parse_idl, parse_msg
 from tests.readers.logs import EPOCH_NS, noise_log, same
 from tests.readers.mcaps import Cdr, joint_state, write_mcap
 
@@ -67,7 +66,7 @@ IDL_NAMES = {"bool": "boolean", "byte": "octet", "char": "uint8", "float32": "fl
 def idl_of(name: str) -> str:
     """The sections of a type of the store and of all it is made of, built from its ros2msg text."""
     definition, _ = STORE.generate_msgdef(name, ros_version=2)
-    types = ros2msg.parse(name, definition)
+    types = parse_msg(name, definition)
     sections = []
     for owner, fields in types.items():
         package, _, last = owner.replace("/msg/", "/").partition("/")
@@ -97,8 +96,8 @@ def test_every_type_has_the_same_fields_as_in_ros2msg(package: str) -> None:
     assert len(names) > 3
     for name in names:
         definition, _ = STORE.generate_msgdef(name, ros_version=2)
-        wanted = ros2msg.parse(name, definition)
-        found = ros2idl.parse(name, idl_of(name))
+        wanted = parse_msg(name, definition)
+        found = parse_idl(name, idl_of(name))
         for owner, fields in wanted.items():
             other = found["/".join(_full(owner))]
             for one, another in zip(fields, other, strict=True):
@@ -114,7 +113,7 @@ def test_the_definitions_mean_the_same_to_rosbags() -> None:
         | get_types_from_idl(TIME)
     )
     assert types == {name: STORE.fielddefs[name] for name in types}
-    found = ros2idl.parse("sensor_msgs/msg/JointState", STATE_TEXT)
+    found = parse_idl("sensor_msgs/msg/JointState", STATE_TEXT)
     assert found.keys() == types.keys()
     assert [(one.name, one.type, one.count) for one in found["sensor_msgs/msg/JointState"]] == [
         ("header", "std_msgs/msg/Header", None),
@@ -214,13 +213,13 @@ def test_every_kind_of_member_takes_its_place(tmp_path: Path) -> None:
 )
 def test_what_cannot_be_read_is_refused_in_one_line(text: str, told: str) -> None:
     with pytest.raises(DefinitionError, match=told):
-        ros2idl.parse("a/msg/T", text)
+        parse_idl("a/msg/T", text)
 
 
 def test_definitions_that_fan_out_are_not_followed_without_end(tmp_path: Path) -> None:
     levels = "".join(f"struct T{level} {{ T{level - 1} a, b, c, d; }};" for level in range(1, 20))
     text = f"module a {{ module msg {{ struct T0 {{ double x; }}; {levels} }}; }};"
-    assert len(ros2idl.parse("a/msg/T19", text)) == 20
+    assert len(parse_idl("a/msg/T19", text)) == 20
     messages = [("/state", row, bytes([0, 1, 0, 0]) + bytes(1 << 20)) for row in (1, 2)]
     write_mcap(tmp_path / "log.mcap", messages, {"/state": ("a/msg/T19", "ros2idl", text.encode())})
     profile = Profile.model_validate({"topic": "/state", **{name: {"source": "x"} for name in ("theta1", "theta2")}})

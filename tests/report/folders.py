@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 from scipy.signal import butter, filtfilt
 
 from algid.arm import CONSTANT_NAMES, CONSTANT_UNITS, FloatArray, forward_dynamics, regressor, with_payload
-from algid.identify.paper.stages import STAGE2_NAMES, stage1, stage2
+from algid.estimators.paper import STAGE2_NAMES, stage1, stage2
 from algid.results import (
     Estimate,
     Fit,

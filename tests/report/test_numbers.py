@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from algid.report.numbers import interval, percent, resolved, significant
-from algid.report.text import file_name, joined, visible
+from algid.report.text import file_name, interval, joined, percent, resolved, significant, visible
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False, min_value=-1e290, max_value=1e290)
 

@@ -20,7 +20,7 @@ from algid.report import write_report
 from algid.report.figures.base import Figure, Missing
 from algid.report.gallery import gallery
 from algid.report.html import escaped, script_json
-from algid.report.torquelog import read_torque
+from algid.report.series import read_torque
 from algid.results import Estimate, Result, read_result, write_result
 from tests.report.folders import HOSTILE, hostile
 
@@ -149,7 +149,7 @@ def test_nothing_is_lost_of_a_torque_log_in_blocks(case_folder: Path, monkeypatc
     log, moment = whole.worst[1]
     largest = rows.filter((pl.col("log") == log) & (pl.col("t") == moment))
     assert abs(largest["tau1"][0] - largest["tau1_predicted"][0]) == np.abs(residual).max()
-    monkeypatch.setattr("algid.report.blocks.blocks.__defaults__", (317,))
+    monkeypatch.setattr("algid.report.reduce.blocks.__defaults__", (317,))
     cut = read_torque(case_folder / "torque.parquet")
     for log, span in whole.ranges.items():
         assert cut.ranges[log] == replace(span, period=cut.ranges[log].period)

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from algid.identification.identify import identify
 from algid.log import Log, Origin
-from algid.pipeline.identify import identify
-from algid.pipeline.settings import Settings
 from algid.report.progress import progress
+from algid.settings import Settings
 from algid.synth.cases import load_case
 from tests.report.folders import record
 

@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from algid.report.serieslog import read_series
+from algid.report.series import read_series
 
 
 def write(path: Path, **columns: object) -> Path:

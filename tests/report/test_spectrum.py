@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import welch
 
-from algid.report.spectrum import LAGS, Spectrum, stretch_length
+from algid.signals.filters import LAGS, Spectrum, stretch_length
 
 
 def test_the_density_is_welchs_however_the_signal_is_cut() -> None:

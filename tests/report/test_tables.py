@@ -10,12 +10,11 @@ import pytest
 from rich.console import Console
 
 from algid.report import markdown, print_table, write_report
-from algid.report.facts import flat_settings, log_tables, settings_table
 from algid.report.markdown import escaped
-from algid.report.numbers import digits_of, resolved, significant
 from algid.report.page import page_html
 from algid.report.table import Table
-from algid.report.tables import estimate_tables
+from algid.report.tables import estimate_tables, flat_settings, log_tables, settings_table
+from algid.report.text import digits_of, resolved, significant
 from algid.results import Estimate, Result, Status, TorquePrediction, result_json
 from tests.report.folders import estimate, hostile
 

@@ -18,15 +18,13 @@ from typer.testing import CliRunner
 
 import algid
 from algid.cli.app import app
-from algid.pipeline.identify import identify
+from algid.identification.identify import identify
 from algid.synth.sensors import Sensors
-from algid.track.files import write_track
-from algid.track.page import markdown, page_html
+from algid.track.page import markdown, page_html, write_track
 from algid.track.payload import Stretch
 from algid.track.result import StretchStatus, TrackResult, track_json
 from algid.track.run import track_log
-from algid.track.tables import change_table, fixed, stretch_table
-from algid.track.verdict import verdict
+from algid.track.tables import change_table, fixed, stretch_table, verdict
 from algid.writers import write_log
 from tests.report.browser import DRIVER, Browser
 from tests.report.folders import HOSTILE

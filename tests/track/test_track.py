@@ -15,15 +15,15 @@ import algid
 from algid.arm import FloatArray
 from algid.cli.app import app
 from algid.errors import LogError
-from algid.identify.model import Model
-from algid.identify.whitening import NoiseLevels
+from algid.estimators.whitening import NoiseLevels
+from algid.identification.identify import identify
 from algid.log import Log
-from algid.pipeline.identify import identify
-from algid.sampling import segments
+from algid.model import Model
+from algid.signals.segments import segments
 from algid.synth.run import Recording, excitation, with_schedule
 from algid.synth.sensors import Sensors
-from algid.track.cells import Arm
-from algid.track.changes import cuts
+from algid.track.bins import Arm
+from algid.track.change_points import cuts
 from algid.track.payload import Track, track
 from algid.writers import write_log
 from tests.track.folders import CASE, noisy

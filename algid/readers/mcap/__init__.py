@@ -8,17 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from algid.errors import LogError
-from algid.log import Origin, Truth
+from algid.log import Origin, Truth, loads
 from algid.readers.align import Series, aligned
 from algid.readers.assemble import TableReader
-from algid.readers.base import BLOCK_ROWS
 from algid.readers.convert import conversion
 from algid.readers.mcap.catalogue import Catalogue, catalogue, truth_text
 from algid.readers.mcap.framing import DamagedError, File
 from algid.readers.mcap.topic import Topic
 from algid.readers.order import Sorter
-from algid.readers.table import Table, stack
-from algid.truth import loads
+from algid.readers.table import BLOCK_ROWS, Table, stack
 
 if TYPE_CHECKING:
     from algid.profile import Profile

@@ -15,8 +15,7 @@ import numpy as np
 
 from algid.log import Notice
 from algid.readers.mcap import framing
-from algid.readers.mcap.chunks import unpack, unpack_torn
-from algid.readers.mcap.framing import BrokenOffError, DamagedError, File, parse
+from algid.readers.mcap.framing import BrokenOffError, DamagedError, File, parse, unpack, unpack_torn
 from algid.readers.mcap.messages import alike
 
 _FOOTER_SIZE = 9 + 20 + 8
@@ -246,7 +245,7 @@ def _keep_metadata(file: File, record: framing.Record, found: Catalogue) -> None
 
 def truth_text(found: Catalogue) -> str | None:
     """The JSON text of the metadata record "algid", None without one, empty where the record is damaged."""
-    from algid.truth import KEY
+    from algid.log import KEY
 
     return found.metadata[KEY].get(KEY, "") if KEY in found.metadata else None
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
-from algid.readers.mcap.ros2msg import PRIMITIVES, Field, Types
-from algid.readers.mcap.shape import MOST_PARTS, MisfitError, Numbers, Shape
+from algid.readers.mcap.columnar import MOST_PARTS, MisfitError, Numbers, Shape
+from algid.readers.mcap.definitions import PRIMITIVES, Field, Types
 
 _ENDINGS = {0: ">", 1: "<"}
 _HEAD = 4

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.errors import LogError
-from algid.readers.mcap import cdr, jsontext, protobuf, ros2idl, ros2msg
-from algid.readers.mcap.layout import Decoder, Fields, Walk
+from algid.readers.mcap import cdr, protobuf
+from algid.readers.mcap import json as jsontext
+from algid.readers.mcap.columnar import Decoder, Fields, MisfitError, Walk
+from algid.readers.mcap.definitions import DefinitionError, parse_idl, parse_msg
 from algid.readers.mcap.messages import Messages
-from algid.readers.mcap.shape import MisfitError
 
-_DEFINITIONS = {"ros2msg": ros2msg.parse, "ros2idl": ros2idl.parse}
+_DEFINITIONS = {"ros2msg": parse_msg, "ros2idl": parse_idl}
 
 
 class Decodes(Protocol):
@@ -48,7 +49,7 @@ def walk_for(path: str, channel: Any, schema: Any) -> Walk:
         if encoding == ("protobuf", "protobuf"):
             messages = protobuf.parse(schema.data)
             return lambda payload: protobuf.walk(payload, schema.name, messages)
-    except (ros2msg.DefinitionError, MisfitError) as error:
+    except (DefinitionError, MisfitError) as error:
         raise LogError(f"{place}: the message definition cannot be read: {error}") from error
     if encoding[0] == "json":
         return jsontext.walk

@@ -7,12 +7,11 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass
 
-from algid.beside import executor
 from algid.log import Notice
 from algid.readers.mcap.catalogue import Catalogue, Span
-from algid.readers.mcap.chunks import has_checksum, unpack, unpack_torn
-from algid.readers.mcap.framing import DamagedError, File
+from algid.readers.mcap.framing import DamagedError, File, has_checksum, unpack, unpack_torn
 from algid.readers.mcap.messages import Messages, find
+from algid.runtime import executor
 
 _AHEAD = 3
 _AHEAD_BYTES = 1 << 23

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 from algid.errors import LogError
 from algid.readers.mcap.catalogue import Catalogue, channels_of, schema_name
-from algid.readers.mcap.choose import (
+from algid.readers.mcap.codec import walk_for
+from algid.readers.mcap.columnar import MisfitError, Shape
+from algid.readers.mcap.framing import File
+from algid.readers.mcap.load import batches
+from algid.readers.mcap.topic import (
     DYNAMIC_JOINT_STATE,
     JOINT_STATE,
     Fields,
+    Topic,
     in_order,
     joint_fields,
     joint_names,
     stamp_paths,
 )
-from algid.readers.mcap.codec import walk_for
-from algid.readers.mcap.framing import File
-from algid.readers.mcap.load import batches
-from algid.readers.mcap.shape import MisfitError, Shape
-from algid.readers.mcap.topic import Topic
 from algid.readers.table import JOINT_CHANNELS, VELOCITIES
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from algid.readers.mcap.shape import MOST_PARTS, MisfitError, Numbers, Shape
+from algid.readers.mcap.columnar import MOST_PARTS, MisfitError, Numbers, Shape
 
 _FIXED = {1: "<f8", 2: "<f4", 6: "<u8", 7: "<u4", 15: "<i4", 16: "<i8"}
 _VARINTS = {3, 4, 5, 8, 13, 14, 17, 18}

@@ -9,8 +9,8 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.errors import ResultError
 from algid.report.figures.base import Figure, Legend, Missing, Panel, axis, line
-from algid.report.numbers import significant
-from algid.report.torquelog import TorqueLog
+from algid.report.series import TorqueLog
+from algid.report.text import significant
 
 TITLE = "The worst moment, at full rate"
 HALF = 0.5  # s before and after

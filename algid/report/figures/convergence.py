@@ -25,9 +25,8 @@ from algid.report.figures.base import (
     times,
     upright,
 )
-from algid.report.numbers import resolved, significant
-from algid.report.serieslog import EPSILON, LARGEST_CONDITION, Series, SeriesLog, read_series
-from algid.report.text import unit_text
+from algid.report.series import EPSILON, LARGEST_CONDITION, Series, SeriesLog, read_series
+from algid.report.text import resolved, significant, unit_text
 from algid.results import Estimate, Result
 
 HEIGHT = 230

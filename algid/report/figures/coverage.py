@@ -6,8 +6,8 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.report.figures.base import Figure, Panel, axis, packed
-from algid.report.numbers import significant
-from algid.report.torquelog import TorqueLog
+from algid.report.series import TorqueLog
+from algid.report.text import significant
 
 TURN = 540.0  # degrees: an angle that spans more has turned round, and is shown within ±180
 

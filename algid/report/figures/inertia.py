@@ -6,7 +6,7 @@ import numpy as np
 
 from algid.arm import FloatArray, mass_matrix
 from algid.report.figures.base import Figure, Layout, Legend, Missing, Panel, Trace, axis, line, packed
-from algid.report.torquelog import TorqueLog
+from algid.report.series import TorqueLog
 from algid.results import Result
 
 TITLE = "Mass matrix M(θ)"

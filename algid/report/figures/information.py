@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.report.blocks import Block, blocks, by_log, columns_of
 from algid.report.figures.base import Figure, Missing, Panel, axis, label, packed, times
 from algid.report.figures.timeline import offsets, separators
-from algid.report.numbers import significant
-from algid.report.torquelog import LogRange
+from algid.report.reduce import Block, blocks, by_log, columns_of
+from algid.report.series import LogRange
+from algid.report.text import significant
 from algid.results import Result
 
 TITLE = "Information per second of log"

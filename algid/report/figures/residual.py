@@ -6,9 +6,9 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.report.figures.base import Figure, Legend, Missing, Panel, axis, band, line, packed
-from algid.report.spectrum import LAGS
-from algid.report.torquelog import TorqueLog
+from algid.report.series import TorqueLog
 from algid.results import Result
+from algid.signals.filters import LAGS
 
 FEW_POWERS = 4
 TITLE = "Residual: spectrum and whiteness"

@@ -8,8 +8,8 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.report.figures.base import Layout, label, upright
+from algid.report.series import LogRange
 from algid.report.text import file_name
-from algid.report.torquelog import LogRange
 from algid.results import LogSummary
 
 SPACE = 0.01  # of the whole time, between two logs

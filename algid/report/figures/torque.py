@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from algid.report.figures.base import Figure, Layout, Legend, Panel, Trace, axis, line
 from algid.report.figures.timeline import chained, offsets, separators
-from algid.report.numbers import significant
-from algid.report.torquelog import TorqueLog
+from algid.report.series import TorqueLog
+from algid.report.text import significant
 from algid.results import LogSummary
 
 TITLE = "Measured and predicted torque"

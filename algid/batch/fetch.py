@@ -1,0 +1,269 @@
+"""An object of which some parts are had: a sparse file of its size that holds them at their own places.
+
+Readers of files read it as they read the whole. What was not fetched are zeros, which no MCAP or Parquet
+reader takes for data.
+
+Logs out of an object store onto this machine: of MCAP and Parquet what is needed, of everything else the whole.
+
+The format's own reader says what it needs. What it finds where is told by a few small parts of the object: the
+summary and the heads of the message indexes of an MCAP file, the footer of a Parquet file. A file without them, or
+one that is needed nearly as a whole, is fetched as a whole; its hash is known then.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+from bisect import bisect_right
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from operator import itemgetter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from algid.errors import AlgidError, LogError
+from algid.identification.source import Staged
+from algid.readers.mcap import framing
+from algid.readers.mcap.catalogue import catalogue, channels_of
+from algid.readers.mcap.framing import DamagedError, File
+from algid.readers.mcap.load import spans_of
+from algid.stores import copying, fetched
+
+Range = tuple[int, int]
+"""First byte, and the one behind the last."""
+
+GAP = 1 << 16
+"""Bytes between two ranges that are fetched along, to save a request."""
+_PIECE = 1 << 23
+_REQUESTS = 8
+
+
+class UnforeseenError(Exception):
+    """A reader asks for bytes that were not fetched."""
+
+
+@dataclass
+class Partial(File):
+    """The sparse file under construction; also what `algid.readers.mcap` reads while planning.
+
+    Parameters
+    ----------
+    path : Path
+        Of the sparse file.
+    source : pyarrow's random access file of the object
+    on_demand : bool
+        Fetch what is read and not there, instead of raising `UnforeseenError`.
+    """
+
+    source: Any = None
+    on_demand: bool = False
+    _held: list[Range] = field(default_factory=list)
+
+    def __enter__(self) -> Partial:
+        self._handle = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o600)
+        self.size = self.source.size()
+        os.ftruncate(self._handle, self.size)
+        return self
+
+    def fetch(self, ranges: Iterable[Range]) -> None:
+        """Fetch ranges, neighbours in one request, several requests at a time.
+
+        Raises
+        ------
+        DamagedError
+            If a range lies outside the object.
+        OSError
+            If the object cannot be read.
+        """
+        wanted = merged(ranges)
+        if wanted and not 0 <= wanted[0][0] <= wanted[-1][1] <= self.size:
+            raise DamagedError(f"bytes {wanted[0][0]} to {wanted[-1][1]} of an object of {self.size}")
+        wanted = merged(without(wanted, self._held), GAP)
+        with ThreadPoolExecutor(_REQUESTS, thread_name_prefix="algid-fetch") as pool:
+            for _ in pool.map(self._copy, list(_pieces(wanted))):
+                pass
+        self._held = merged([*self._held, *wanted])
+
+    def read(self, start: int, length: int) -> bytes:
+        """The bytes at `start`. Raises `DamagedError` where the object ends before."""
+        place = (start, start + length)
+        if 0 <= start <= place[1] <= self.size and any(without([place], self._held)):
+            if not self.on_demand:
+                raise UnforeseenError(f"bytes {start} to {place[1]}")
+            self.fetch([place])
+        return super().read(start, length)
+
+    def _copy(self, place: Range) -> None:
+        start, end = place
+        content = self.source.read_at(end - start, start)
+        if len(content) != end - start:
+            raise OSError(f"bytes {start} to {end} are gone: it was changed meanwhile")
+        view = memoryview(content)
+        while view:
+            written = os.pwrite(self._handle, view, start)
+            view, start = view[written:], start + written
+
+
+def merged(ranges: Iterable[Range], gap: int = 0) -> list[Range]:
+    """Ranges in order, those made one that lie at most `gap` bytes apart."""
+    found: list[Range] = []
+    for start, end in sorted(ranges):
+        if found and start <= found[-1][1] + gap:
+            found[-1] = (found[-1][0], max(found[-1][1], end))
+        else:
+            found.append((start, end))
+    return found
+
+
+def without(ranges: Iterable[Range], held: Sequence[Range]) -> Iterator[Range]:
+    """What of `ranges` does not lie in any of the `held` ones, which are in order and apart."""
+    for start, end in ranges:
+        place = start
+        for first, last in held[max(0, bisect_right(held, start, key=itemgetter(0)) - 1) :]:
+            if first >= end:
+                break
+            if first > place:
+                yield place, first
+            place = max(place, last)
+        if place < end:
+            yield place, end
+
+
+def _pieces(ranges: Iterable[Range]) -> Iterator[Range]:
+    """The same bytes in pieces that fit into memory side by side."""
+    for start, end in ranges:
+        for place in range(start, end, _PIECE):
+            yield place, min(place + _PIECE, end)
+
+
+if TYPE_CHECKING:
+    from algid.profile import Profile
+
+SMALL = 1 << 20
+"""Bytes of an object that one request brings about as soon as its parts."""
+NEARLY_ALL = 0.9
+_TAIL = 1 << 16
+_MCAP_END = 37  # footer record and magic
+_LARGEST_END = 1 << 28
+_INDEX_HEAD = 15  # bytes of a message index record that name its channel and size
+_METADATA_INDEX = 0x0D
+
+
+def staged(url: str, folder: Path, profile: Profile | None = None) -> Staged:
+    """A copy of a log in `folder`, of the whole or of what identification with `profile` reads.
+
+    Raises
+    ------
+    LogError
+        If there is no such object, or it cannot be read.
+    """
+    with (
+        copying(url, folder) as (filesystem, path, copy),
+        filesystem.open_input_file(path) as source,
+    ):
+        if source.size() >= SMALL:
+            with Partial(copy, source=source) as part, naming({copy: url}):
+                if _fetched_in_part(part, profile):
+                    return Staged(copy, url, whole=False)
+    return Staged(fetched(url, folder), url)
+
+
+@contextmanager
+def naming(copies: dict[Path, str]) -> Iterator[None]:
+    """Errors about copies name the objects that they are of."""
+    try:
+        yield
+    except AlgidError as error:
+        text = str(error)
+        for copy, url in copies.items():
+            text = text.replace(str(copy), url)
+        if text == str(error):
+            raise
+        raise type(error)(text) from error
+
+
+def _fetched_in_part(part: Partial, profile: Profile | None) -> bool:
+    """Fetch what a reader needs; False where that cannot be told, or is nearly everything."""
+    try:
+        part.fetch([(0, len(framing.MAGIC)), (part.size - _TAIL, part.size)])
+        head = part.read(0, len(framing.MAGIC))
+        if head == framing.MAGIC:
+            wanted = _wanted_of_mcap(part, profile)
+        elif head.startswith(b"PAR1"):
+            wanted = _wanted_of_parquet(part, profile)
+        else:
+            return False
+        if sum(end - start for start, end in wanted) > NEARLY_ALL * part.size:
+            return False
+        part.fetch(wanted)
+    except (DamagedError, UnforeseenError):
+        return False
+    return True
+
+
+def _wanted_of_mcap(part: Partial, profile: Profile | None) -> list[Range]:
+    """The chunks that hold the joints, with the indexes behind them."""
+    from algid.readers.mcap.plan import plan
+
+    part.fetch(_read_by_catalogue(part))
+    found = catalogue(part)  # a scan of the whole is unforeseen
+    part.on_demand = True
+    topics = plan(part, found, profile).topics
+    channels = frozenset[int]().union(*(channels_of(found, topic.name, topic.type) for topic in topics))
+    return [(span.start, span.start + span.length + span.index_length) for span in spans_of(found, channels)]
+
+
+def _read_by_catalogue(part: Partial) -> list[Range]:
+    """Where the catalogue looks beyond the summary: heads of message indexes, and metadata."""
+    from mcap import records
+
+    (start,) = struct.unpack("<Q", part.read(part.size - _MCAP_END + 9, 8))
+    end = part.size - _MCAP_END
+    if not 0 < start < end or end - start > _LARGEST_END:
+        raise UnforeseenError("no summary")
+    part.fetch([(start, part.size)])
+    content, wanted = part.read(start, end - start), []
+    for record in framing.walk_bytes(content, 0, len(content)):
+        body = content[record.start : record.end]
+        if record.code == framing.CHUNK_INDEX:
+            offsets = framing.parse(records.ChunkIndex, body).message_index_offsets.values()
+            wanted += [(offset, offset + _INDEX_HEAD) for offset in offsets]
+        elif record.code == _METADATA_INDEX:
+            place = framing.parse(records.MetadataIndex, body)
+            if place.length <= framing.SMALL_RECORD:
+                wanted.append((place.offset, place.offset + place.length))
+    return wanted
+
+
+def _wanted_of_parquet(part: Partial, profile: Profile | None) -> list[Range]:
+    """The pages of the columns that are read, and what lies behind all pages."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    from algid.readers.parquet import open_parquet
+
+    start = part.size - 8 - int.from_bytes(part.read(part.size - 8, 4), "little")
+    if part.size - start > _LARGEST_END:
+        raise UnforeseenError("no footer")
+    part.fetch([(start, part.size)])
+    try:
+        metadata = pq.read_metadata(part.path)
+        if any(metadata.schema.column(place).max_repetition_level for place in range(metadata.num_columns)):
+            raise UnforeseenError("lists have widths that the footer does not tell")
+        names = set(open_parquet(part.path, profile).origin.mapping.values())
+    except (pa.ArrowException, OSError, LogError) as error:
+        raise UnforeseenError(str(error)) from error
+    groups = [metadata.row_group(place) for place in range(metadata.num_row_groups)]
+    pages = [group.column(place) for group in groups for place in range(group.num_columns)]
+    places = [(one.path_in_schema, _place(one)) for one in pages]
+    last = max((end for _, (_, end) in places), default=start)
+    return [(last, part.size), *(place for name, place in places if name in names)]
+
+
+def _place(pages: Any) -> Range:
+    """Where the pages of a column of a row group lie."""
+    offsets = (pages.dictionary_page_offset, pages.data_page_offset)
+    first = min(offset for offset in offsets if offset is not None)
+    return first, first + pages.total_compressed_size

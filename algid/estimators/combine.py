@@ -1,0 +1,227 @@
+"""What logs tell about the shared parameters: quadratic likelihoods that add up.
+
+======  ===================================================  =========  =================
+symbol  name                                                 shape      unit
+======  ===================================================  =========  =================
+S       information on a log's coefficients, by stretch      (B, q, q)  1 / (unit unit)
+g       score at the coefficients `c0`, by stretch           (B, q)     1 / unit
+======  ===================================================  =========  =================
+
+Near c0 the log-likelihood is g·(c − c0) − ½ (c − c0)ᵀ S (c − c0).
+
+Sums over stretches of a log, in bounded memory.
+
+Score and information of an estimate are kept by stretch, because what the stretches disagree about tells the
+error that white noise does not explain. When the stretches become too many, neighbours are added up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.estimators.parametrisation import Shared
+
+RANK_TOLERANCE = 1e-13  # relative eigenvalue of the scaled information that counts as nothing
+_STEPS = 60
+_DONE = 1e-10  # change of the log-likelihood at which the quadratic problem counts as solved
+
+
+@dataclass(frozen=True, eq=False)
+class LogInformation:
+    """One log's quadratic likelihood: see the module's table."""
+
+    loaded: bool
+    c0: FloatArray
+    S: FloatArray
+    g: FloatArray
+
+    @cached_property
+    def total(self) -> tuple[FloatArray, FloatArray]:
+        """S (q, q) and g (q,) over the whole log."""
+        return self.S.sum(axis=0), self.g.sum(axis=0)
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """Gaussian knowledge of the first parameters: mean (p,) and precision (p, p), zero along what is not known."""
+
+    names: tuple[str, ...]
+    mean: FloatArray
+    precision: FloatArray
+
+    @classmethod
+    def of(cls, names: tuple[str, ...], mean: FloatArray, covariance: FloatArray) -> Prior:
+        """The knowledge that an estimate `mean` (p,) with `covariance` (p, p) holds."""
+        return cls(names, mean, scaled_pinv(covariance))
+
+
+def scaled_pinv(S: FloatArray, tolerance: float = RANK_TOLERANCE) -> FloatArray:
+    """Pseudo-inverse of an information matrix after scaling to unit diagonal."""
+    size = np.sqrt(np.maximum(np.diag(S), 0.0))
+    inverse = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
+    return np.linalg.pinv(S * np.outer(inverse, inverse), rcond=tolerance, hermitian=True) * np.outer(inverse, inverse)
+
+
+def combine(
+    shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None = None
+) -> tuple[FloatArray, FloatArray, float]:
+    """Most likely shared parameters by damped Gauss-Newton on the sum of quadratic likelihoods.
+
+    Directions without information keep the values they have in `beta`.
+
+    Returns
+    -------
+    beta (Q,), its information (Q, Q), and the log-likelihood there less that of each log's own coefficients c0
+    """
+    damping = 0.0
+    value, gradient, S = likelihood(shared, logs, beta, prior)
+    for _ in range(_STEPS):
+        step = scaled_pinv(S + damping * np.diag(np.diag(S))) @ gradient
+        trial = likelihood(shared, logs, beta + step, prior)
+        if not np.isfinite(trial[0]) or trial[0] < value - 1e-9 * (1 + abs(value)):
+            damping = max(10 * damping, 1e-3)
+            if damping > 1e12:
+                break
+            continue
+        gain = float(gradient @ step)
+        beta, damping = beta + step, damping / 10 if damping > 1e-6 else 0.0
+        value, gradient, S = trial
+        if gain < _DONE and damping == 0.0:
+            break
+    return beta, S, value
+
+
+def likelihood(
+    shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None
+) -> tuple[float, FloatArray, FloatArray]:
+    """Log-likelihood at `beta` less that at the logs' own coefficients, its gradient (Q,), information (Q, Q)."""
+    size = len(shared.names)
+    value, gradient, S = 0.0, np.zeros(size), np.zeros((size, size))
+    for log in logs:
+        T = shared.jacobian(beta, log.loaded)
+        change = shared.coefficients(beta, log.loaded) - log.c0
+        log_S, log_g = log.total
+        value += float(log_g @ change - 0.5 * change @ log_S @ change)
+        gradient += T.T @ (log_g - log_S @ change)
+        S += T.T @ log_S @ T
+    if prior is not None:
+        places = [shared.names.index(name) for name in prior.names]
+        weight = prior.precision
+        change = beta[places] - prior.mean
+        value -= 0.5 * float(change @ weight @ change)
+        gradient[places] -= weight @ change
+        S[np.ix_(places, places)] += weight
+    return value, gradient, S
+
+
+def sandwich(
+    shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None = None
+) -> tuple[FloatArray, int]:
+    """Covariance (Q, Q) of the score at `beta`, allowing for coloured residuals, and its degrees of freedom.
+
+    Between the inverses of the information it makes the sandwich of White 1982 and Newey & West 1987.
+    """
+    meat = np.zeros((len(shared.names), len(shared.names)))
+    stretches = 0
+    for log in logs:
+        T = shared.jacobian(beta, log.loaded)
+        scores = log.g - log.S @ (shared.coefficients(beta, log.loaded) - log.c0)
+        variance, lags = long_run_variance(scores)
+        meat += T.T @ variance @ T
+        stretches += scores.shape[0] // (lags + 1)
+    if prior is not None:
+        places = [shared.names.index(name) for name in prior.names]
+        meat[np.ix_(places, places)] += prior.precision
+    freedom = max(2, stretches - len(shared.names))
+    return meat * (max(stretches, freedom + 1) / freedom), freedom
+
+
+MOST_BLOCKS = 4096
+
+
+class BlockSums:
+    """Sums (B, ...) over consecutive stretches, B at most `2 * MOST_BLOCKS`."""
+
+    def __init__(self) -> None:
+        self._full: list[FloatArray] = []
+        self._count = 0
+        self._rest: FloatArray | None = None
+        self._factor = 1
+
+    def add(self, blocks: FloatArray) -> None:
+        """Append the sums (b, ...) of the next b stretches."""
+        if self._rest is not None:
+            blocks = np.concatenate([self._rest, blocks])
+        whole = blocks.shape[0] // self._factor
+        self._rest = blocks[whole * self._factor :]
+        self._append(_added(blocks[: whole * self._factor], self._factor))
+        while self._count > 2 * MOST_BLOCKS:
+            self._halve()
+
+    def values(self) -> FloatArray:
+        """All sums (B, ...) in time order; the last stretch may be shorter.
+
+        Raises
+        ------
+        ValueError
+            If nothing was added.
+        """
+        if self._rest is None:
+            raise ValueError("no blocks were added")
+        rest = [self._rest.sum(axis=0, keepdims=True)] if self._rest.shape[0] else []
+        return np.concatenate([*self._full, *rest])
+
+    def _append(self, sums: FloatArray) -> None:
+        if sums.shape[0]:
+            self._full.append(sums)
+            self._count += sums.shape[0]
+
+    def _halve(self) -> None:
+        sums = np.concatenate(self._full)
+        odd = sums.shape[0] % 2
+        # An odd stretch waits, as one entry of the old size, for its partner.
+        self._full, self._count = [], 0
+        self._append(_added(sums[: sums.shape[0] - odd], 2))
+        if odd:
+            filler = np.zeros((self._factor - 1, *sums.shape[1:]))
+            rest = self._rest if self._rest is not None else filler[:0]
+            self._rest = np.concatenate([sums[-1:], filler, rest])
+        self._factor *= 2
+
+
+def _added(blocks: FloatArray, factor: int) -> FloatArray:
+    return blocks if factor == 1 else blocks.reshape(-1, factor, *blocks.shape[1:]).sum(axis=1)
+
+
+def long_run_variance(scores: FloatArray) -> tuple[FloatArray, int]:
+    """Covariance of the sum of correlated scores and the lags used.
+
+    Parameters
+    ----------
+    scores : (B, q), in time order, with zero sum at the estimate
+
+    Returns
+    -------
+    (q, q) covariance of the sum, and the number of lags of Bartlett's window
+
+    Notes
+    -----
+    Newey & West 1987 with the bandwidth of Andrews 1991, eq. (6.2) and (6.4), from a first-order autoregression.
+    """
+    count = scores.shape[0]
+    power = np.sum(scores**2, axis=0)
+    usable = scores[:, power > 0] / np.sqrt(power[power > 0])
+    rho = np.clip(np.sum(usable[1:] * usable[:-1], axis=0), -0.97, 0.97)
+    # α(1) with unit weights: each score was scaled to unit power above.
+    persistence = np.sum(4 * rho**2 / ((1 - rho) ** 6 * (1 + rho) ** 2)) / max(np.sum(1 / (1 - rho) ** 4), 1e-300)
+    lags = int(min(1.1447 * (persistence * count) ** (1 / 3), count / 4))
+    total = scores.T @ scores
+    for lag in range(1, lags + 1):
+        cross = scores[lag:].T @ scores[:-lag]
+        total += (1 - lag / (lags + 1)) * (cross + cross.T)
+    return total, lags

@@ -1,0 +1,192 @@
+"""What physics demands of the estimates: a positive definite mass matrix, no negative friction, mass or length.
+
+M(θ) is positive definite for every θ2 where M22 > 0 and det M > 0; the determinant is concave in cos θ2, so its
+least value lies at θ2 = 0 or θ2 = π. Eq. (2), with the rotor inertia j2 in M22.
+
+Do the optional terms of the model earn their place, and does a loaded log belong to the unloaded arm?
+
+A term's worth is the fall of the likelihood when its coefficients are set to zero, which near the estimate is
+the Wald statistic. It is formed with the covariance that the error bars rest on, so that coloured residuals do
+not make every term look significant; the Bayesian criterion (Schwarz 1978) counts as samples what is independent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy.special import chdtrc, ndtri
+
+from algid.arm import FloatArray
+from algid.estimators.combine import LogInformation, Prior, combine, likelihood, long_run_variance, scaled_pinv
+from algid.estimators.fit import Fit
+from algid.estimators.identifiability import sizes
+from algid.estimators.parametrisation import Shared
+from algid.model import COULOMB_NAMES, OFFSET_NAMES, ROTOR_NAMES
+
+_NOT_NEGATIVE = ("k6", "k7", "f1", "f2", "j2", "m_p", "l1", "l2")
+_NUDGE = 1e-6  # of a parameter's size: step of the differences, and distance kept from a bound
+
+
+@dataclass(frozen=True)
+class BrokenBound:
+    """A bound that the estimates break: its name, the value found, and how many standard deviations beyond.
+
+    `distance` is None where the standard deviation is unknown.
+    """
+
+    bound: str
+    value: float
+    distance: float | None
+
+
+def bounds(shared: Shared) -> dict[str, Callable[[FloatArray], float]]:
+    """Functions of the shared parameters (Q,) that must not be negative, by name."""
+    found: dict[str, Callable[[FloatArray], float]] = {
+        "M22 > 0": lambda beta: _mass(shared, beta)[0],
+        "det M > 0 at theta2 = 0": lambda beta: _mass(shared, beta)[1],
+        "det M > 0 at theta2 = pi": lambda beta: _mass(shared, beta)[2],
+    }
+    for place, name in enumerate(shared.names):
+        if name in _NOT_NEGATIVE:
+            found[f"{name} >= 0"] = lambda beta, place=place: float(beta[place])  # type: ignore[misc]
+    return found
+
+
+def _mass(shared: Shared, beta: FloatArray) -> tuple[float, float, float]:
+    """M22 and the determinant of M at θ2 = 0 and π."""
+    full = shared.model.expand(beta[: len(shared.model.names)])
+    k1, k3, k5, j2 = full[0], full[2], full[4], full[11]
+    det = [(k5 + k3 + 2 * k1 * c) * (k3 + j2) - (k3 + k1 * c) ** 2 for c in (1.0, -1.0)]
+    return float(k3 + j2), float(det[0]), float(det[1])
+
+
+def broken_bounds(fit: Fit) -> list[BrokenBound]:
+    """Bounds that the estimates break; a parameter that the logs leave open breaks none."""
+    size = sizes(fit.names, fit.values)
+    open_ones = {f"{name} >= 0" for name, std in zip(fit.names, fit.std, strict=True) if np.isinf(std)}
+    broken = []
+    for name, bound in bounds(fit.shared).items():
+        value = bound(fit.values)
+        if value >= 0 or name in open_ones:
+            continue
+        slope = _slope(bound, fit.values, size)
+        deviation = float(np.sqrt(max(0.0, float(slope @ fit.covariance @ slope))))
+        broken.append(BrokenBound(name, value, -value / deviation if deviation > 0 else None))
+    return broken
+
+
+def _slope(bound: Callable[[FloatArray], float], beta: FloatArray, size: FloatArray) -> FloatArray:
+    steps = _NUDGE * np.diag(size)
+    return np.array([(bound(beta + step) - bound(beta - step)) / (2 * step.max()) for step in steps])
+
+
+def constrained(fit: Fit) -> Fit:
+    """The most likely parameters within the bounds; the fit itself where it breaks none.
+
+    Standard deviations stay those of the free fit: a bound that holds says nothing about the other parameters'
+    noise. Status NOT_CONVERGED where no point within the bounds was found.
+    """
+    if not broken_bounds(fit):
+        return fit
+    from scipy.optimize import minimize
+
+    size = sizes(fit.names, fit.values)
+    S = likelihood(fit.shared, fit.logs, fit.values, fit.prior)[2]
+    scale = 1 / np.sqrt(np.maximum(np.diag(S), 1 / size**2))
+
+    def cost(x: FloatArray) -> tuple[float, FloatArray]:
+        value, gradient, _ = likelihood(fit.shared, fit.logs, fit.values + scale * x, fit.prior)
+        return -value, -gradient * scale
+
+    demands = [
+        {"type": "ineq", "fun": _demand(bound, fit.values, scale, size)} for bound in bounds(fit.shared).values()
+    ]
+    solution = minimize(
+        cost, np.zeros(scale.size), jac=True, method="SLSQP", constraints=demands, options={"maxiter": 500}
+    )
+    values = fit.values + scale * solution.x
+    moved = replace(fit, values=values)
+    if broken_bounds(moved):
+        return replace(fit, converged=False, status=_failed(fit.status))
+    return moved
+
+
+def _demand(
+    bound: Callable[[FloatArray], float], start: FloatArray, scale: FloatArray, size: FloatArray
+) -> Callable[[FloatArray], float]:
+    """The bound in the solver's coordinates, in units of its own slope, a hair inside."""
+    slope = float(np.linalg.norm(_slope(bound, start, size) * size)) or 1.0
+
+    def demand(x: FloatArray) -> float:
+        return bound(start + scale * x) / slope - _NUDGE
+
+    return demand
+
+
+def _failed(status: Sequence[str]) -> tuple[Literal["OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED"], ...]:
+    return tuple("NOT_CONVERGED" if word == "OK" else "NOT_IDENTIFIABLE" for word in status)
+
+
+TERMS = {"coulomb": COULOMB_NAMES, "offset": OFFSET_NAMES, "rotor": ROTOR_NAMES, "delay": ("delay",)}
+
+
+@dataclass(frozen=True)
+class TermWorth:
+    """An optional term: the criterion with it less that without it (negative: it earns its place)."""
+
+    term: str
+    delta_bic: float
+
+    @property
+    def earned(self) -> bool:
+        """Whether the criterion favours the term."""
+        return self.delta_bic < 0
+
+
+def term_worths(fit: Fit) -> list[TermWorth]:
+    """Worth of each optional term of a fit's model."""
+    worths = []
+    for term, names in TERMS.items():
+        places = [fit.names.index(name) for name in names if name in fit.names]
+        if not places:
+            continue
+        values = fit.values[places]
+        wald = float(values @ scaled_pinv(fit.covariance[np.ix_(places, places)]) @ values)
+        worths.append(TermWorth(term, len(places) * float(np.log(max(2, fit.freedom))) - wald))
+    return worths
+
+
+def payload_distance(fit: Fit) -> float | None:
+    """How far the loaded logs are from the unloaded arm with any payload, in standard deviations.
+
+    None where the logs of either kind do not determine their own constants. The statistic compares the arm's
+    constants with the loaded arm's, less the payload that fits best; it is chi-squared where they agree.
+    """
+    sides = [_alone([log for log in fit.logs if log.loaded is loaded]) for loaded in (False, True)]
+    if not fit.shared.payload or any(side is None for side in sides):
+        return None
+    bare, burdened = [side for side in sides if side is not None]
+    freedom = len(fit.shared.log_names) - (len(fit.shared.names) - len(fit.shared.log_names))
+    arm = Prior.of(fit.shared.log_names, bare[0], bare[1])
+    loaded = LogInformation(True, burdened[0], scaled_pinv(burdened[1])[None], np.zeros_like(burdened[0])[None])
+    _, _, value = combine(fit.shared, [loaded], fit.values, arm)
+    return max(0.0, float(-ndtri(chdtrc(freedom, max(0.0, -2 * value)))))
+
+
+def _alone(logs: list[LogInformation]) -> tuple[FloatArray, FloatArray] | None:
+    """Coefficients (q,) that logs of one kind give by themselves, and their robust covariance (q, q)."""
+    if not logs:
+        return None
+    S = sum((log.total[0] for log in logs[1:]), logs[0].total[0])
+    g = sum(
+        (log.total[1] + log.total[0] @ log.c0 for log in logs[1:]), logs[0].total[1] + logs[0].total[0] @ logs[0].c0
+    )
+    inverse = scaled_pinv(S)
+    if np.linalg.matrix_rank(inverse @ S) < S.shape[0]:
+        return None
+    c = inverse @ g
+    meat = sum((long_run_variance(log.g - log.S @ (c - log.c0))[0] for log in logs), np.zeros_like(S))
+    return c, inverse @ meat @ inverse

@@ -1,0 +1,151 @@
+"""What a statistical estimator hands back: estimates, their covariance, and how far to trust them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from scipy.special import stdtrit
+
+from algid.arm import FloatArray
+from algid.estimators.combine import LogInformation, Prior, combine, sandwich
+from algid.estimators.identifiability import Identifiability, Whiteness, examine, open_directions
+from algid.estimators.parametrisation import Shared
+from algid.estimators.whitening import NoiseLevels
+
+Status = Literal["OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED"]
+Intervals = Literal["likelihood", "sandwich"]
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Estimates of the shared parameters.
+
+    Parameters
+    ----------
+    estimator : "weak" or "refined"
+    shared : Shared
+        Which parameters, in which order.
+    values : (Q,), in `algid.model.UNITS`
+    covariance : (Q, Q)
+        Zero rows where a parameter is not identifiable; see `std`.
+    intervals : "likelihood" or "sandwich"
+        What `covariance` rests on.
+    quantile : float
+        Half width of a 95 % interval in standard deviations, normal or Student's.
+    status : Q of "OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED"
+    unidentifiable : sentences that name what the logs leave open
+    logs : each log's quadratic likelihood, unloaded ones first
+    noise : each log's noise levels; None for the weak estimator
+    whiteness : outcome of the test on the innovations; None for the weak estimator
+    freedom : independent stretches of log behind a sandwich, else samples of torque
+    iterations, converged : of the refined estimator
+    note : why the refined estimator handed back the weak estimate although nothing failed
+    moved : (2,), rad, how far each joint travelled
+    """
+
+    estimator: Literal["weak", "refined"]
+    shared: Shared
+    values: FloatArray
+    covariance: FloatArray
+    intervals: Intervals
+    quantile: float
+    status: tuple[Status, ...]
+    unidentifiable: tuple[str, ...]
+    logs: tuple[LogInformation, ...]
+    noise: tuple[NoiseLevels, ...] | None = None
+    whiteness: Whiteness | None = None
+    freedom: int = 1
+    iterations: int = 0
+    converged: bool = True
+    prior: Prior | None = None
+    note: str | None = None
+    moved: FloatArray = field(default_factory=lambda: np.full(2, np.inf))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the shared parameters."""
+        return self.shared.names
+
+    @cached_property
+    def std(self) -> FloatArray:
+        """Standard deviations (Q,): infinite where a parameter is not identifiable."""
+        std = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return np.where([status == "NOT_IDENTIFIABLE" for status in self.status], np.inf, std)
+
+    @property
+    def ci95(self) -> FloatArray:
+        """95 % intervals (Q, 2)."""
+        half = self.quantile * self.std
+        return np.stack([self.values - half, self.values + half], axis=1)
+
+    def spread(self, share: FloatArray) -> float:
+        """Standard deviation of the sum `share` (Q,) @ values; infinite where the logs leave that sum open.
+
+        A sum may be known where its terms are not: k3 + k5 of an arm whose second joint never moved.
+        """
+        if not np.any((share != 0) & np.isinf(self.std)):
+            return float(np.sqrt(max(float(share @ self.covariance @ share), 0.0)))
+        _, S, _ = combine(self.shared, self.logs, self.values, self.prior)
+        null, size = open_directions(self.names, self.values, S)
+        scaled = share * size
+        if np.linalg.norm(null.T @ scaled) > 1e-3 * np.linalg.norm(scaled):
+            return float("inf")
+        return float(np.sqrt(max(float(share @ self.covariance @ share), 0.0)))
+
+
+def conclude(
+    estimator: Literal["weak", "refined"],
+    shared: Shared,
+    logs: Sequence[LogInformation],
+    beta: FloatArray,
+    moved: FloatArray,
+    prior: Prior | None = None,
+    *,
+    coloured: bool,
+    samples: int = 1,
+) -> Fit:
+    """Solve for the shared parameters from `beta` and attach error bars and statuses."""
+    beta, S, _ = combine(shared, logs, beta, prior)
+    known = examine(shared.names, beta, S, moved)
+    covariance, quantile = known.covariance, 1.959963984540054
+    freedom = samples
+    if coloured:
+        robust, quantile, freedom = _robust(shared, logs, beta, known, prior)
+        # The long-run variance of a short log errs low; white noise alone is the least there can be.
+        covariance = robust if estimator == "weak" else _widened(robust, covariance)
+    return Fit(
+        estimator=estimator,
+        shared=shared,
+        values=beta,
+        covariance=covariance,
+        intervals="sandwich" if coloured else "likelihood",
+        quantile=quantile,
+        freedom=freedom,
+        status=tuple("OK" if yes else "NOT_IDENTIFIABLE" for yes in known.determined),
+        unidentifiable=known.sentences,
+        logs=tuple(logs),
+        prior=prior,
+    )
+
+
+def _robust(
+    shared: Shared,
+    logs: Sequence[LogInformation],
+    beta: FloatArray,
+    known: Identifiability,
+    prior: Prior | None,
+) -> tuple[FloatArray, float, int]:
+    meat, freedom = sandwich(shared, logs, beta, prior)
+    covariance = known.covariance @ meat @ known.covariance
+    return covariance, float(stdtrit(max(2, freedom), 0.975)), freedom
+
+
+def _widened(robust: FloatArray, least: FloatArray) -> FloatArray:
+    """The robust covariance with no standard deviation below that of `least`, correlations kept."""
+    size, floor = np.sqrt(np.maximum(np.diag(robust), 0.0)), np.sqrt(np.maximum(np.diag(least), 0.0))
+    factor = np.divide(np.maximum(size, floor), size, out=np.ones_like(size), where=size > 0)
+    return robust * np.outer(factor, factor)

@@ -1,0 +1,207 @@
+"""Which parameters, and which combinations of them, the logs determine.
+
+A direction counts as undetermined when its standard deviation reaches the size of the parameters it mixes:
+the information matrix is scaled by the largest parameter of each physical class (inertia, gravity, friction …),
+and its small eigenvalues name the directions.
+
+Are the innovations white and Gaussian, as the error bars of the likelihood suppose?
+
+Ljung & Box's test on the innovations of each joint, as they are and summed over 16 and 64 samples, so that slow
+colour is seen as well as fast. The smallest p-value counts three times over (Bonferroni), and a correlation too
+faint to matter counts as none. The excess kurtosis tells heavy tails.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc
+
+from algid.arm import FloatArray
+
+_CLASSES = (
+    ("k1", "k3", "k5", "j2"),
+    ("k2", "k4"),
+    ("k6", "k7"),
+    ("f1", "f2", "o1", "o2"),
+    ("delay",),
+    ("m_p",),
+    ("l1", "l2"),
+)
+_LEAST = {"k6": 1e-6, "f1": 1e-6, "delay": 1e-3, "m_p": 1e-3, "l1": 1e-2, "k2": 1e-4, "k1": 1e-6}
+_UNDETERMINED = 0.5  # standard deviation of a direction, in sizes of its parameters
+_SHARE = 0.15  # of an eigenvector: below it a parameter has no part in the direction
+STILL = 0.01  # rad: a joint that moves less has not moved
+
+
+@dataclass(frozen=True, eq=False)
+class Identifiability:
+    """Directions that are not determined, in words, and whether each parameter is (Q,)."""
+
+    sentences: tuple[str, ...]
+    determined: tuple[bool, ...]
+    covariance: FloatArray
+
+
+def examine(names: Sequence[str], values: FloatArray, S: FloatArray, moved: FloatArray) -> Identifiability:
+    """Examine the information S (Q, Q) on parameters `values` (Q,); `moved` (2,) is each joint's travel in rad."""
+    size = sizes(names, values)
+    eigenvalues, vectors, lost = _spectrum(S, size)
+    null = vectors[:, lost]
+    part = np.sqrt(np.sum(null**2, axis=1))
+    determined = tuple(bool(share < _SHARE) for share in part)
+    kept = vectors[:, ~lost]
+    inverse = (kept / np.maximum(eigenvalues[~lost], 1e-300)) @ kept.T
+    return Identifiability(tuple(_sentences(names, null, size, moved)), determined, inverse * np.outer(size, size))
+
+
+def open_directions(names: Sequence[str], values: FloatArray, S: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Directions (Q, m) of the parameters over their sizes that S leaves open, orthonormal, and the sizes (Q,)."""
+    size = sizes(names, values)
+    _, vectors, lost = _spectrum(S, size)
+    return vectors[:, lost], size
+
+
+def _spectrum(S: FloatArray, size: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Eigenvalues and vectors of the information on the parameters over their sizes, and which count as nothing."""
+    scaled = S * np.outer(size, size)
+    eigenvalues, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
+    return eigenvalues, vectors, eigenvalues < max(1 / _UNDETERMINED**2, 1e-14 * float(eigenvalues[-1]))
+
+
+def sizes(names: Sequence[str], values: FloatArray) -> FloatArray:
+    """Size (Q,) of each parameter: the largest value of its class."""
+    by_name = dict(zip(names, np.abs(values).tolist(), strict=True))
+    size = {}
+    for members in _CLASSES:
+        largest = max((by_name[name] for name in members if name in by_name), default=0.0)
+        for name in members:
+            size[name] = max(largest, _LEAST.get(members[0], 1e-6))
+    return np.array([size[name] for name in names])
+
+
+def _sentences(names: Sequence[str], null: FloatArray, size: FloatArray, moved: FloatArray) -> list[str]:
+    if null.shape[1] == 0:
+        return []
+    reason = _reason(moved)
+    sentences = []
+    for group in _groups(null):
+        part = null[group]
+        together = [names[row] for row in group]
+        free = int(np.linalg.matrix_rank(part, tol=_SHARE))
+        if free >= len(group):
+            sentences += [f"{name} is not determined{reason}" for name in together]
+        elif len(group) == 2:
+            relation = _relation(part[:, int(np.argmax(np.linalg.norm(part, axis=0)))] * size[group])
+            sentences.append(f"{together[0]} and {together[1]} only {relation}{reason}")
+        else:
+            listed = ", ".join(together[:-1]) + f" and {together[-1]}"
+            count = len(group) - free
+            sentences.append(f"{listed} only in {count} combination{'s' * (count > 1)}{reason}")
+    return sentences
+
+
+def _groups(null: FloatArray) -> list[list[int]]:
+    """Rows that share an undetermined direction."""
+    projector = null @ null.T
+    rest = [row for row in range(null.shape[0]) if np.sqrt(projector[row, row]) >= _SHARE]
+    groups: list[list[int]] = []
+    while rest:
+        group, queue = [], [rest.pop(0)]
+        while queue:
+            row = queue.pop()
+            group.append(row)
+            linked = [other for other in rest if abs(projector[row, other]) >= _SHARE**2]
+            rest = [other for other in rest if other not in linked]
+            queue += linked
+        groups.append(sorted(group))
+    return groups
+
+
+def _relation(direction: FloatArray) -> str:
+    """What is determined of two parameters whose undetermined direction is given in their own units."""
+    ratio = direction[1] / direction[0]
+    if abs(ratio + 1) < 0.15:
+        return "as a sum"
+    if abs(ratio - 1) < 0.15:
+        return "as a difference"
+    return f"as {-ratio:.3g} times the first plus the second"
+
+
+def _reason(moved: FloatArray) -> str:
+    still = [str(joint + 1) for joint in range(2) if moved[joint] < STILL]
+    if len(still) == 2:
+        return ": neither joint moved"
+    return f": joint {still[0]} never moved" if still else ""
+
+
+SCALES = (1, 16, 64)
+_LAGS = 10
+P_VALUE = 1e-3
+_FAINT = 0.02  # root mean square of the correlations that does not matter
+_TAILS = 6.0  # standard errors of the kurtosis
+_HEAVY = 1.0  # excess kurtosis that matters
+
+
+@dataclass(frozen=True, eq=False)
+class Correlations:
+    """Sums over innovations: counts (3,), lag products (3, 2, 1 + lags) by scale, fourth powers (2,)."""
+
+    count: FloatArray
+    products: FloatArray
+    fourth: FloatArray
+
+    def __add__(self, other: Correlations) -> Correlations:
+        return Correlations(self.count + other.count, self.products + other.products, self.fourth + other.fourth)
+
+
+@dataclass(frozen=True, eq=False)
+class Whiteness:
+    """The test's outcome by joint (2,): p-value, lag-one correlation, excess kurtosis; and the verdict."""
+
+    p_value: FloatArray
+    lag1: FloatArray
+    kurtosis: FloatArray
+    joint_white: tuple[bool, bool]
+
+    @property
+    def white(self) -> bool:
+        """Whether both joints' innovations pass."""
+        return all(self.joint_white)
+
+
+def correlations(w: FloatArray) -> Correlations:
+    """Sums for the innovations w (2, n) of one piece."""
+    counts, products = [], []
+    for scale in SCALES:
+        whole = w.shape[1] // scale
+        x = w if scale == 1 else w[:, : whole * scale].reshape(2, whole, scale).sum(axis=2) / np.sqrt(scale)
+        counts.append(float(whole))
+        products.append([_lag_products(row) for row in x])
+    return Correlations(np.array(counts), np.array(products), np.sum(w**4, axis=1))
+
+
+def _lag_products(x: FloatArray) -> FloatArray:
+    return np.array([x[lag:] @ x[: x.size - lag] if lag < x.size else 0.0 for lag in range(_LAGS + 1)])
+
+
+def judge(sums: Correlations) -> Whiteness:
+    """Test the innovations whose sums are given."""
+    power = np.maximum(sums.products[:, :, :1], 1e-300)
+    rho = sums.products[:, :, 1:] / power
+    n = sums.count[:, None, None]
+    lags = np.arange(1, _LAGS + 1)
+    tested = lags < n / 4
+    statistic = np.sum(np.where(tested, n * (n + 2) * rho**2 / np.maximum(n - lags, 1), 0.0), axis=2)
+    p = chdtrc(np.maximum(tested.sum(axis=2), 1), statistic)
+    # In a long log the least colour is significant; one this faint does not move an error bar.
+    faint = np.sqrt(np.mean(rho**2, axis=2)) < _FAINT
+    p_value = np.minimum(1.0, len(SCALES) * np.where(faint, 1.0, p).min(axis=0))
+    variance = power[0, :, 0] / sums.count[0]
+    kurtosis = sums.fourth / sums.count[0] / variance**2 - 3
+    heavy = (kurtosis > _HEAVY) & (kurtosis > _TAILS * np.sqrt(24 / sums.count[0]))
+    white = [bool(p_value[joint] >= P_VALUE and not heavy[joint]) for joint in range(2)]
+    return Whiteness(p_value, rho[0, :, 0], kurtosis, (white[0], white[1]))

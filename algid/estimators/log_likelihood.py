@@ -1,0 +1,207 @@
+"""What one log tells at given coefficients: its training set, its passes, its noise levels.
+
+A pass linearises every piece of a log, whitens it, and adds up information and scores by stretch. Between the
+passes of the training stay the pieces' trajectories and the log's noise levels, which is the state kept here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.estimators.combine import BlockSums, LogInformation
+from algid.estimators.identifiability import Correlations, correlations
+from algid.estimators.noise import (
+    VarianceScore,
+    change_told,
+    first_guess,
+    floored,
+    newton_step,
+    quantum,
+    variance_score,
+)
+from algid.estimators.parametrisation import Shared
+from algid.estimators.weak import Source
+from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
+from algid.signals.differences import POINTS, Stencil
+from algid.signals.filters import smoothed
+from algid.signals.segments import Segment, pieces
+
+PIECE_SAMPLES = 16384
+_TRAINED = 4  # pieces of a log in the training set, up to twice as many
+_SHORTEST = 8 * POINTS  # samples: shorter pieces tell nothing
+_STRETCH = 64  # samples over which scores are summed
+_SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
+_FINEST = 1e-10  # relative noise that no sensor undercuts, and floating point can still weigh
+_EXCESS = 10.0  # torque error beyond the sensor's noise that tells unmodelled dynamics
+_NEGLIGIBLE = 1e-3  # torque error relative to the torque that no one need worry about
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What one pass over pieces of a log gives."""
+
+    information: LogInformation
+    noise_score: VarianceScore | None
+    innovations: Correlations
+
+
+class LogEvidence:
+    """One log: its source, the pieces it trains on, and their trajectories and noise levels so far.
+
+    Parameters
+    ----------
+    source : callable that gives a fresh pass over the log's segments
+    loaded : bool
+    shared : Shared
+    stencil : callable
+        The stencil for samples `dt` s apart at coefficients c (q,).
+    known : NoiseLevels or None
+        Noise levels that are not to be estimated.
+
+    `kept` is empty where the log has no piece long enough.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        loaded: bool,
+        shared: Shared,
+        stencil: Callable[[float, FloatArray], Stencil],
+        known: NoiseLevels | None,
+    ) -> None:
+        self.loaded = loaded
+        self._source = source
+        self._shared = shared
+        self._stencil = stencil
+        self._known = known
+        self.kept, self.whole = _training_set(source())
+        if self.kept:
+            self._start()
+
+    def _start(self) -> None:
+        self._trajectories = [_first_trajectory(piece) for piece in self.kept]
+        self._floor = _floor(self.kept)
+        guess = _guessed_noise(self.kept, self._floor)
+        self.noise = self._known or guess
+        self._sensor = guess.tau
+        self._least = _NEGLIGIBLE * np.max([np.sqrt(np.mean(piece.tau**2, axis=1)) for piece in self.kept], axis=0)
+
+    @property
+    def trained(self) -> int:
+        """Samples of the training set."""
+        return sum(map(len, self.kept))
+
+    @property
+    def refuted(self) -> bool:
+        """Whether the torque's error is no white noise: far above what neighbouring samples differ by."""
+        return bool(np.any(self.noise.tau > np.maximum(_EXCESS * self._sensor, self._least)))
+
+    def train(self, c: FloatArray) -> Outcome:
+        """Linearise the training set at the coefficients `c`; keeps the trajectories found."""
+        stretches, scores = (BlockSums(), BlockSums()), []
+        innovations: list[Correlations] = []
+        for seed, (piece, theta) in enumerate(zip(self.kept, self._trajectories, strict=True)):
+            linear = self._linearise(c, theta, piece)
+            _collect(linear, stretches, innovations)
+            multiplier = linear.solve_transposed(linear.columns[-1:])[0]
+            self._trajectories[seed] = trajectory(piece, linear, multiplier, self.noise)
+            if self._known is None:
+                scores.append(variance_score(linear, len(piece), seed))
+        score = sum(scores[1:], scores[0]) if scores else None
+        return Outcome(_information(self.loaded, c, stretches), score, added(innovations))
+
+    def run(self, c: FloatArray) -> Outcome:
+        """Pass over the whole log at the coefficients `c`, settling each piece's trajectory by itself."""
+        stretches = (BlockSums(), BlockSums())
+        innovations: list[Correlations] = []
+        for piece in pieces(self._source(), PIECE_SAMPLES):
+            if len(piece) < _SHORTEST:
+                continue
+            first = self._linearise(c, _first_trajectory(piece), piece)
+            multiplier = first.solve_transposed(first.columns[-1:])[0]
+            theta = trajectory(piece, first, multiplier, self.noise)
+            _collect(self._linearise(c, theta, piece), stretches, innovations)
+        return Outcome(_information(self.loaded, c, stretches), None, added(innovations))
+
+    def improve_noise(self, outcome: Outcome) -> float:
+        """Better noise levels from a training pass; the largest change of a log variance in its deviations."""
+        if outcome.noise_score is None:
+            return 0.0
+        S, _ = outcome.information.total
+        better = floored(newton_step(self.noise, outcome.noise_score, S), self._floor)
+        told = change_told(self.noise, better, outcome.noise_score)
+        self.noise = better
+        return told
+
+    def _linearise(self, c: FloatArray, theta: FloatArray, piece: Segment) -> Linearised:
+        shared = self._shared
+        columns, stencil = c[: len(shared.model.names)], self._stencil(piece.dt, c)
+        return linearise(shared.model, columns, theta, piece, stencil, self.noise, shared.delay)
+
+
+def _training_set(segments: Iterable[Segment]) -> tuple[list[Segment], bool]:
+    """Evenly spread pieces of a log, and whether they are all of it."""
+    kept: list[Segment] = []
+    stride = 1
+    whole = True
+    usable = (piece for piece in pieces(segments, PIECE_SAMPLES) if len(piece) >= _SHORTEST)
+    for index, piece in enumerate(usable):
+        if index % stride:
+            continue
+        kept.append(_copied(piece))
+        if len(kept) > 2 * _TRAINED:
+            kept, stride, whole = kept[::2], 2 * stride, False
+    return kept, whole
+
+
+def _copied(piece: Segment) -> Segment:
+    """The piece without hold on the block it was cut from."""
+    return replace(piece, theta=piece.theta.copy(), tau=piece.tau.copy(), omega=None)
+
+
+def _first_trajectory(piece: Segment) -> FloatArray:
+    return smoothed(piece.theta, piece.dt, min(_SMOOTHING, 0.1 / piece.dt))
+
+
+def _guessed_noise(kept: Sequence[Segment], floor: NoiseLevels) -> NoiseLevels:
+    guesses = [first_guess(piece.theta, piece.tau) for piece in kept]
+    guess = NoiseLevels(
+        np.median([level.theta for level in guesses], axis=0), np.median([level.tau for level in guesses], axis=0)
+    )
+    return floored(guess, floor)
+
+
+def _floor(kept: Sequence[Segment]) -> NoiseLevels:
+    """What the digitisation of angles and torques alone contributes: step / √12, and floating point's own."""
+    theta = np.concatenate([piece.theta for piece in kept[:2]], axis=1)
+    tau = np.concatenate([piece.tau for piece in kept[:2]], axis=1)
+    least_theta = np.maximum(quantum(theta) / np.sqrt(12), _FINEST * np.abs(theta).max() + 1e-300)
+    least_tau = np.maximum(quantum(tau) / np.sqrt(12), 10 * _FINEST * np.abs(tau).max() + 1e-300)
+    return NoiseLevels(least_theta, least_tau)
+
+
+def _collect(linear: Linearised, stretches: tuple[BlockSums, BlockSums], innovations: list[Correlations]) -> None:
+    """Add a piece's information and score, by stretches, and the sums over its innovations."""
+    Z, w = linear.columns[:-1], linear.columns[-1]
+    rows = 2 * _STRETCH
+    count = -(-w.size // rows)
+    padded = np.zeros((Z.shape[0] + 1, count * rows))
+    padded[:, : w.size] = linear.columns
+    parts = padded.reshape(-1, count, rows).swapaxes(0, 1)
+    gram = parts @ parts.swapaxes(1, 2)
+    stretches[0].add(gram[:, :-1, :-1])
+    stretches[1].add(gram[:, :-1, -1])
+    innovations.append(correlations(np.ascontiguousarray(w.reshape(-1, 2).T)))
+
+
+def _information(loaded: bool, c: FloatArray, stretches: tuple[BlockSums, BlockSums]) -> LogInformation:
+    return LogInformation(loaded, c, stretches[0].values(), stretches[1].values())
+
+
+def added(innovations: Sequence[Correlations]) -> Correlations:
+    """The sums of several passes."""
+    return sum(innovations[1:], innovations[0])

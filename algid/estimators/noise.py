@@ -1,0 +1,161 @@
+"""Noise levels from the data: restricted maximum likelihood of variance components.
+
+The covariance of the whitened torque residual is V = Σ V_i, one component for the angle noise and one for the
+torque noise of each joint. With λ = V⁻¹e the derivative of the restricted likelihood by log σ_i² is
+
+    ½ (λᵀ V_i λ − tr(V⁻¹ V_i) + tr(S⁻¹ Yᵀ V⁻¹ V_i V⁻¹ Y))
+
+whose traces, the degrees of freedom of a component, are taken with random signs (Hutchinson 1989). The average
+information ½ λᵀ V_i V⁻¹ V_j λ (Gilmour, Thompson & Cullis 1995) makes a Newton step of it.
+
+=========  ==========================================  ==============
+symbol     name                                        shape
+=========  ==========================================  ==============
+component  order: angle 1, angle 2, torque 1, torque 2  (4,)
+=========  ==========================================  ==============
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.estimators.combine import scaled_pinv
+from algid.estimators.whitening import Linearised, NoiseLevels, adjoint, forward
+
+_DIFFERENCE = 6  # order of the difference that leaves only noise of a smooth signal
+_PROBES = 8
+_LARGEST_STEP = 2.0  # in log σ²
+_SMALLEST = 1e-12  # relative to the signal: below it floating point is the noise
+
+
+@dataclass(frozen=True, eq=False)
+class VarianceScore:
+    """Sums over pieces: λᵀV_iλ (4,), traces (4,), average information (4, 4), YᵀV⁻¹V_iV⁻¹Y (4, q, q)."""
+
+    power: FloatArray
+    trace: FloatArray
+    average: FloatArray
+    absorbed: FloatArray
+
+    def __add__(self, other: VarianceScore) -> VarianceScore:
+        return VarianceScore(
+            self.power + other.power,
+            self.trace + other.trace,
+            self.average + other.average,
+            self.absorbed + other.absorbed,
+        )
+
+
+def first_guess(theta: FloatArray, tau: FloatArray) -> NoiseLevels:
+    """White noise of angles (2, N) and torques (2, N) told by their sixth differences."""
+    return NoiseLevels(_white_noise(theta), _white_noise(tau))
+
+
+def _white_noise(signal: FloatArray) -> FloatArray:
+    difference = np.diff(signal, _DIFFERENCE, axis=1)
+    # The median of squares, so that steps in the signal do not count as noise.
+    median = np.median(np.abs(difference), axis=1) / 0.6745
+    mean = np.sqrt(np.mean(difference**2, axis=1))
+    spread = np.where(median > 0, median, mean)
+    size = np.abs(signal).max(axis=1) + 1e-300
+    return np.maximum(spread / np.sqrt(comb(2 * _DIFFERENCE, _DIFFERENCE)), _SMALLEST * size)
+
+
+def quantum(signal: FloatArray) -> FloatArray:
+    """Step (m,) of the encoder behind each row of a signal (m, N): 0 where its values lie on no grid."""
+    return np.array([_step(row) for row in signal])
+
+
+def _step(values: FloatArray) -> float:
+    steps = np.abs(np.diff(values))
+    steps = steps[steps > 1e-9 * (np.abs(values).max() + 1e-300)]
+    if steps.size < 8:
+        return 0.0
+    smallest = float(steps.min())
+    near = steps[steps < 50 * smallest]
+    if near.size < 8:
+        return 0.0
+    step = float(np.sum(near) / np.sum(np.round(near / smallest)))
+    off_grid = np.abs(near / step - np.round(near / step))
+    return step if off_grid.max() < 0.02 else 0.0
+
+
+def variance_score(linear: Linearised, length: int, seed: int) -> VarianceScore:
+    """Contribution of one linearised piece of `length` angle samples."""
+    H, first = linear.H, linear.first
+    rows = linear.columns.shape[1]
+    multipliers = linear.solve_transposed(linear.columns)
+    residual = _by_joint(multipliers[-1])
+    back = adjoint(H, residual, first, length)
+    power = np.concatenate([np.sum(back**2, axis=1), np.sum(residual**2, axis=1)])
+    directions = np.stack(
+        [forward(H, _only(back, 0), first), forward(H, _only(back, 1), first), _only(residual, 0), _only(residual, 1)]
+    )
+    whitened = linear.solve(_by_row(directions))
+    return VarianceScore(
+        power,
+        _traces(linear, length, rows, seed),
+        0.5 * whitened @ whitened.T,
+        _absorbed(multipliers[:-1], H, first, length),
+    )
+
+
+def _traces(linear: Linearised, length: int, rows: int, seed: int) -> FloatArray:
+    signs = np.random.default_rng(seed)
+    probes = np.empty((_PROBES, 4, 2, rows // 2))
+    for probe in range(_PROBES):
+        z_tau = signs.choice([-1.0, 1.0], (2, rows // 2))
+        z_theta = signs.choice([-1.0, 1.0], (2, length))
+        for joint in range(2):
+            probes[probe, joint] = forward(linear.H, _only(z_theta, joint), linear.first)
+            probes[probe, 2 + joint] = _only(z_tau, joint)
+    whitened = linear.solve(_by_row(probes.reshape(-1, 2, rows // 2)))
+    return np.sum(whitened**2, axis=1).reshape(_PROBES, 4).mean(axis=0)
+
+
+def _absorbed(multipliers: FloatArray, H: FloatArray, first: int, length: int) -> FloatArray:
+    joints = np.stack([_by_joint(row) for row in multipliers])
+    backs = np.stack([adjoint(H, joint, first, length) for joint in joints])
+    parts = [backs[:, 0], backs[:, 1], joints[:, 0], joints[:, 1]]
+    return np.stack([part @ part.T for part in parts])
+
+
+def _by_joint(row: FloatArray) -> FloatArray:
+    return np.ascontiguousarray(row.reshape(-1, 2).T)
+
+
+def _by_row(joints: FloatArray) -> FloatArray:
+    """(m, 2, n) as rows (m, 2 n) of sample and joint."""
+    return np.ascontiguousarray(joints.swapaxes(1, 2)).reshape(joints.shape[0], -1)
+
+
+def _only(signal: FloatArray, joint: int) -> FloatArray:
+    kept = np.zeros_like(signal)
+    kept[joint] = signal[joint]
+    return kept
+
+
+def newton_step(noise: NoiseLevels, score: VarianceScore, S: FloatArray) -> NoiseLevels:
+    """Better noise levels; S (q, q) is the information on the coefficients, whose freedom is not the noise's."""
+    inverse = scaled_pinv(S)
+    freedom = score.trace - np.einsum("xy,ixy->i", inverse, score.absorbed)
+    gradient = 0.5 * (score.power - freedom)
+    curvature = score.average + np.diag(0.05 * np.maximum(np.diag(score.average), 1.0))
+    step = np.clip(np.linalg.solve(curvature, gradient), -_LARGEST_STEP, _LARGEST_STEP)
+    factor = np.exp(0.5 * step)
+    return NoiseLevels(noise.theta * factor[:2], noise.tau * factor[2:])
+
+
+def change_told(before: NoiseLevels, after: NoiseLevels, score: VarianceScore) -> float:
+    """Largest change of a log variance, in its own standard deviations."""
+    ratio = np.concatenate([after.theta / before.theta, after.tau / before.tau])
+    return float(np.max(np.abs(2 * np.log(ratio)) * np.sqrt(np.diag(score.average))))
+
+
+def floored(noise: NoiseLevels, floor: NoiseLevels) -> NoiseLevels:
+    """Levels no smaller than `floor`."""
+    return NoiseLevels(np.maximum(noise.theta, floor.theta), np.maximum(noise.tau, floor.tau))

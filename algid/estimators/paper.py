@@ -1,0 +1,364 @@
+"""Columns of the paper's linear systems: Páez-García et al. 2023, eq. (3), (4) and (5).
+
+======  ========================================  ============  ==========
+symbol  name                                      shape         unit
+======  ========================================  ============  ==========
+t       time since the window's start             (n,)          s
+theta   joint angles θ1, θ2                       (2, ..., n)   rad
+omega   joint velocities θ̇1, θ̇2                   (2, ..., n)   rad/s
+tau     joint torques τ1, τ2                      (2, ..., n)   N m
+======  ========================================  ============  ==========
+
+Each equation is t² times a row of eq. (1), integrated twice from the window's start; t² removes the initial
+conditions. The angles enter linear terms as differences to their first value, which changes nothing (those
+terms vanish for a constant) and keeps digits.
+
+Many small linear systems at once, scaled, each with its condition number.
+
+The paper's two stages on windows: stage 1 (eq. 3), k7 (eq. 4), stage 2 (eq. 5) and the payload.
+
+Every series is (..., n) like the windows it is computed from, in the units of `algid.arm`, and NaN where the
+system is singular or less than ε has passed since the window's start.
+
+The paper's method over a whole log: stages on windows, in blocks, and one estimate from each series.
+
+A series' estimate is the median over its settled samples, the last 0.2 s of each window; with several windows,
+the median of the windows' medians. An estimate that wanders by more than its own size has status weak.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from itertools import chain
+
+import numpy as np
+from numpy.typing import NDArray
+
+from algid.arm import FloatArray
+from algid.signals.differences import integral, nested_integral
+from algid.signals.segments import Segment, pieces
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """What multiplies each unknown after t² and two integrations, each (..., n); and the torque's own integral.
+
+    `inertia1` and `inertia2` multiply θ̈1 and θ̈2, `viscous1` and `viscous2` θ̇1 and θ̇2.
+    """
+
+    inertia1: FloatArray
+    coupling1: FloatArray
+    inertia2: FloatArray
+    viscous1: FloatArray
+    gravity1: FloatArray
+    gravity12: FloatArray
+    torque1: FloatArray
+    coupling2: FloatArray
+    viscous2: FloatArray
+    torque2: FloatArray
+
+    def first_joint(self) -> FloatArray:
+        """The coefficients (6, ..., n) of x_r = [k5+k3, k1, k3, k6, k4, k2] in eq. (3)."""
+        return np.stack([self.inertia1, self.coupling1, self.inertia2, self.viscous1, self.gravity1, self.gravity12])
+
+
+def columns(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> Columns:
+    """The integrals of eq. (3) and (4) over windows that start at the first sample: see `Columns`."""
+    t = dt * np.arange(theta.shape[-1], dtype=np.float64)
+    omega1, omega2 = omega
+    c2, s2 = np.cos(theta[1]), np.sin(theta[1])
+    moved = theta - theta[..., :1]
+    return Columns(
+        inertia1=_of_acceleration(moved[0], t, dt),
+        coupling1=_of_derivative(c2 * (2 * omega1 + omega2), t, dt),
+        inertia2=_of_acceleration(moved[1], t, dt),
+        viscous1=_of_derivative(moved[0], t, dt),
+        gravity1=nested_integral(t**2 * np.cos(theta[0]), dt, 2),
+        gravity12=nested_integral(t**2 * np.cos(theta[0] + theta[1]), dt, 2),
+        torque1=nested_integral(t**2 * tau[0], dt, 2),
+        coupling2=_of_derivative(c2 * omega1, t, dt) + nested_integral(t**2 * s2 * omega1 * (omega1 + omega2), dt, 2),
+        viscous2=_of_derivative(moved[1], t, dt),
+        torque2=nested_integral(t**2 * tau[1], dt, 2),
+    )
+
+
+def _of_acceleration(angle: FloatArray, t: FloatArray, dt: float) -> FloatArray:
+    """∫^(2) t² θ̈ = t² θ − 4 ∫ t θ + 2 ∫^(2) θ."""
+    return t**2 * angle + integral(2 * integral(angle, dt) - 4 * t * angle, dt)
+
+
+def _of_derivative(signal: FloatArray, t: FloatArray, dt: float) -> FloatArray:
+    """∫^(2) t² ḟ = ∫ t² f − 2 ∫^(2) t f."""
+    return integral(t**2 * signal - 2 * integral(t * signal, dt), dt)
+
+
+def stack_rows(first: FloatArray, dt: float, rows: int) -> FloatArray:
+    """Rows (rows, ..., n): the first row, then each the integral of the one before (P_r and P_m's build)."""
+    stacked = np.empty((rows, *first.shape))
+    stacked[0] = first
+    for row in range(1, rows):
+        stacked[row] = integral(stacked[row - 1], dt)
+    return stacked
+
+
+# A relative change of 1e-12, the rounding of nested sums, then moves the estimate by less than one percent.
+LARGEST_CONDITION = 1e10
+
+
+@dataclass(frozen=True, eq=False)
+class Solutions:
+    """Solutions (u, ...) of systems of u unknowns, NaN where singular, and their condition numbers (...)."""
+
+    x: FloatArray
+    condition: FloatArray
+
+
+def solve_scaled(matrix: FloatArray, rhs: FloatArray) -> Solutions:
+    """Solve P x = q at every sample.
+
+    Parameters
+    ----------
+    matrix : (u, u, ...) float64
+        P, rows first. The rows and then the columns are scaled to a largest entry of one.
+    rhs : (u, ...) float64
+        q.
+
+    Returns
+    -------
+    Solutions
+        The condition number is that of the scaled matrix in the 1-norm; past `LARGEST_CONDITION` the system
+        counts as singular and its solution is NaN.
+    """
+    p = np.moveaxis(matrix, (0, 1), (-2, -1))
+    q = np.moveaxis(rhs, 0, -1)[..., None]
+    row = _scale(np.abs(p).max(axis=-1, keepdims=True))
+    p = p * row
+    column = _scale(np.abs(p).max(axis=-2, keepdims=True))
+    p = p * column
+    inverse, regular = _inverse(p)
+    with np.errstate(over="ignore", invalid="ignore"):  # next to singular: caught by the condition number
+        scaled = inverse @ (q * row)
+        scaled += inverse @ (q * row - p @ scaled)
+        condition = np.where(regular, _norm1(p) * _norm1(inverse), np.inf)
+    x = np.where((condition <= LARGEST_CONDITION)[..., None, None], scaled * column.mT, np.nan)
+    return Solutions(x=np.moveaxis(x[..., 0], -1, 0), condition=condition)
+
+
+def _scale(largest: FloatArray) -> FloatArray:
+    return 1 / np.where(largest > 0, largest, 1.0)
+
+
+def _norm1(matrix: FloatArray) -> FloatArray:
+    norms: FloatArray = np.abs(matrix).sum(axis=-2).max(axis=-1)
+    return norms
+
+
+def _inverse(p: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Inverses (..., u, u) and where they exist; LAPACK refuses a whole batch for one singular matrix."""
+    regular = np.asarray((p != 0).any(axis=-1).all(axis=-1))  # windows start with rows of zeros
+    try:
+        return _inverse_where(p, regular), regular
+    except np.linalg.LinAlgError:
+        regular = np.asarray(np.linalg.slogdet(p).sign != 0)  # the same factors, the same zero pivots
+        return _inverse_where(p, regular), regular
+
+
+def _inverse_where(p: FloatArray, regular: NDArray[np.bool_]) -> FloatArray:
+    return np.linalg.inv(p if regular.all() else np.where(regular[..., None, None], p, np.eye(p.shape[-1])))
+
+
+EPSILON = 0.2  # s: the estimates are arbitrary before (the paper's ε)
+
+STAGE1_NAMES = ("k5+k3", "k1", "k3", "k6", "k4", "k2")
+STAGE2_NAMES = ("k5+k3+z1+z2", "k1+z3", "k3+z2", "k4+z4", "k2+z5")
+
+
+@dataclass(frozen=True, eq=False)
+class Stage1:
+    """Series of k1 … k7 (7, ..., n), and the condition numbers of the 6×6 system and of k7's equation."""
+
+    k: FloatArray
+    condition: FloatArray
+    k7_condition: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Stage2:
+    """Series of the five loaded constants x_m (5, ..., n), l1 (m) and m_p (kg), and the condition number."""
+
+    x: FloatArray
+    l1: FloatArray
+    m_p: FloatArray
+    condition: FloatArray
+
+
+def stage1(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> Stage1:
+    """Constants of the arm without payload from windows of angles, velocities and torques (2, ..., n)."""
+    terms = columns(theta, omega, tau, dt)
+    solution = _late(_solve_first_joint(terms, dt), dt)
+    k5_k3, k1, k3, k6, k4, k2 = solution.x
+    known = k3 * (terms.inertia1 + terms.inertia2) + k1 * terms.coupling2 + k2 * terms.gravity12
+    k7, k7_condition = _single_unknown(terms.viscous2, terms.torque2 - known)
+    return Stage1(
+        k=np.stack([k1, k2, k3, k4, k5_k3 - k3, k6, k7]),
+        condition=solution.condition,
+        k7_condition=k7_condition,
+    )
+
+
+def _solve_first_joint(terms: Columns, dt: float) -> Solutions:
+    """x_r of P_r x_r = q_r: eq. (3) and five more integrals of it."""
+    rows = stack_rows(np.concatenate([terms.first_joint(), terms.torque1[None]]), dt, 6)
+    return solve_scaled(rows[:, :-1], rows[:, -1])
+
+
+def _late(solution: Solutions, dt: float) -> Solutions:
+    """The solution with NaN in the first ε of each window."""
+    x = solution.x.copy()
+    x[..., : _arbitrary(dt)] = np.nan
+    return Solutions(x=x, condition=solution.condition)
+
+
+def _arbitrary(dt: float) -> int:
+    """Samples before ε."""
+    return int(np.ceil(EPSILON / dt - 1e-6))
+
+
+def _single_unknown(coefficient: FloatArray, rhs: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Solve a x = b; a is a difference of integrals, and vanishes beside the largest it has been when singular."""
+    largest = np.maximum.accumulate(np.abs(coefficient), axis=-1)
+    size = np.abs(coefficient)
+    condition = np.divide(largest, size, out=np.full_like(size, np.inf), where=size > 0)
+    regular = condition <= LARGEST_CONDITION
+    return np.divide(rhs, coefficient, out=np.full_like(rhs, np.nan), where=regular), condition
+
+
+def stage2(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float, k: FloatArray, gravity: float) -> Stage2:
+    """Constants of the loaded arm and the payload, given k1 … k7 (7,) of the arm and g in m/s²."""
+    terms = columns(theta, omega, tau, dt)
+    unknown = np.stack([terms.inertia1, terms.coupling1, terms.inertia2, terms.gravity1, terms.gravity12])
+    rest = terms.torque1 - k[5] * terms.viscous1
+    rows = stack_rows(np.concatenate([unknown, rest[None]]), dt, 5)
+    solution = _late(solve_scaled(rows[:, :-1], rows[:, -1]), dt)
+    l1, m_p = payload(solution.x, k, gravity)
+    return Stage2(x=solution.x, l1=l1, m_p=m_p, condition=solution.condition)
+
+
+def payload(x: FloatArray, k: FloatArray, gravity: float) -> tuple[FloatArray, FloatArray]:
+    """l1 = z1 g / z4 in m and m_p = z1 / l1² in kg from x_m (5, ...) and k (7,): the paper's route."""
+    z2 = x[2] - k[2]
+    z4 = x[3] - k[3]
+    z1 = x[0] - k[4] - k[2] - z2
+    with np.errstate(divide="ignore", invalid="ignore"):  # no payload: 0/0 is NaN, which says it
+        l1 = z1 * gravity / z4
+        m_p = z1 / l1**2
+    return l1, m_p
+
+
+SETTLED = 0.2  # s at the end of each window
+SHORTEST = EPSILON + SETTLED  # s
+BLOCK_SAMPLES = 16384  # bounds the memory: some 3 kB a sample
+
+STAGE1_SERIES = ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "k5+k3", "condition", "k7_condition")
+STAGE2_SERIES = (*STAGE2_NAMES, "l1", "m_p", "condition")
+
+Stage = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """Estimates (s, n) of one window, its times `t` (n,) in s, and how many samples at its end are settled."""
+
+    t: FloatArray
+    values: FloatArray
+    settled: int
+
+
+def stage1_series(source: Iterable[Segment], window: float) -> Iterator[Series]:
+    """`STAGE1_SERIES` of a log of the arm without payload, by windows of `window` s; segments need velocities."""
+
+    def stage(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> FloatArray:
+        found = stage1(theta, omega, tau, dt)
+        total = found.k[4] + found.k[2]
+        return np.concatenate([found.k, [total, found.condition, found.k7_condition]])
+
+    return _windows(source, window, stage)
+
+
+def stage2_series(source: Iterable[Segment], window: float, k: FloatArray, gravity: float) -> Iterator[Series]:
+    """`STAGE2_SERIES` of a log of the arm with payload, given its constants k1 … k7 (7,) without."""
+
+    def stage(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> FloatArray:
+        found = stage2(theta, omega, tau, dt, k, gravity)
+        return np.concatenate([found.x, [found.l1, found.m_p, found.condition]])
+
+    return _windows(source, window, stage)
+
+
+def _windows(source: Iterable[Segment], window: float, stage: Stage) -> Iterator[Series]:
+    moving = iter(source)
+    first = next(moving, None)
+    if first is None:
+        return
+    rows = max(round(window / first.dt), 8)
+    for batch in _batches(pieces(chain([first], moving), rows)):
+        dt = batch[0].dt
+        theta, tau = (np.stack([getattr(window, name) for window in batch], axis=1) for name in ("theta", "tau"))
+        omega = np.stack([window.omega for window in batch if window.omega is not None], axis=1)
+        values = stage(theta, omega, tau, dt)
+        for index, piece in enumerate(batch):
+            yield Series(t=piece.t, values=values[:, index], settled=round(SETTLED / dt))
+
+
+def _batches(windows: Iterable[Segment]) -> Iterator[list[Segment]]:
+    """Neighbouring windows of one length, as many as a block holds; windows too short to integrate are left out."""
+    batch: list[Segment] = []
+    for window in windows:
+        if len(window) < 8:
+            continue
+        full = len(window) * (len(batch) + 1) > BLOCK_SAMPLES
+        if batch and (full or len(batch[0]) != len(window)):
+            yield batch
+            batch = []
+        batch.append(window)
+    if batch:
+        yield batch
+
+
+class Summary:
+    """Gathers the windows' settled medians; `estimates` is what the series come to."""
+
+    def __init__(self, size: int) -> None:
+        self._quartiles: list[FloatArray] = []
+        self._size = size
+
+    def add(self, series: Series) -> None:
+        """Take in one window; samples that are NaN (singular, before ε) do not count."""
+        settled = series.values[:, -series.settled :]
+        quartiles = np.full((3, self._size), np.nan)
+        some = np.isfinite(settled).any(axis=1)
+        if some.any():
+            usable = settled[some]
+            quantile = np.nanquantile if np.isnan(usable).any() else np.quantile  # the former goes row by row
+            quartiles[:, some] = quantile(usable, [0.25, 0.5, 0.75], axis=1)
+        self._quartiles.append(quartiles)
+
+    def estimates(self) -> tuple[FloatArray, FloatArray]:
+        """Estimates (s,) and how far they wander (s,), half the distance of the quartiles; NaN where none."""
+        if not self._quartiles:
+            return np.full(self._size, np.nan), np.full(self._size, np.nan)
+        low, middle, high = np.stack(self._quartiles, axis=-1)
+        estimate, wander = np.full(self._size, np.nan), np.full(self._size, np.nan)
+        some = np.isfinite(middle).any(axis=1)
+        estimate[some] = np.nanmedian(middle[some], axis=1)
+        within = np.nanmedian(high[some] - low[some], axis=1)
+        if some.any():
+            between = np.subtract(*np.nanquantile(middle[some], [0.75, 0.25], axis=1))
+            wander[some] = 0.5 * np.maximum(within, between)
+        return estimate, wander
+
+
+def wanders(estimate: FloatArray, wander: FloatArray) -> NDArray[np.bool_]:
+    """Where an estimate is not to be trusted: there is none, or it wanders by more than its own size."""
+    return ~(wander <= np.abs(estimate))

@@ -1,0 +1,193 @@
+"""Torque predicted on logs, and how good the prediction is.
+
+Angles and torques pass the same zero-phase Butterworth filter, at `_PER_CUTOFF` samples a period of its cutoff,
+to which a sharper filter without phase takes the log first. Velocities and accelerations are those of the
+filtered angles; both ends of every stretch, where a zero-phase filter rings, are dropped.
+
+======  ==============================================================  ===============  ======
+symbol  name                                                            shape            unit
+======  ==============================================================  ===============  ======
+X       filtered regressor of each joint, its torque last               (2, q + 1, n)    mixed
+gram    X Xᵀ by joint: the residual of any c is (−c, 1) gram (−c, 1)ᵀ   (2, q+1, q+1)    mixed
+======  ==============================================================  ===============  ======
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.estimators.combine import combine
+from algid.estimators.fit import Fit
+from algid.estimators.weak import Source
+from algid.model import Model, Motion, regressor
+from algid.signals.filters import butterworth, correlate, smoother
+from algid.signals.segments import Cutter, Segment
+
+_PIECE_SECONDS = 60.0
+_PER_CUTOFF = 12.5
+_SHARPER = 5.0  # cutoffs: bandwidth of the first filter, whose stop band begins before its images matter
+_SLOPE = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / 12  # of fourth order (Fornberg 1988)
+_BEND = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / 12
+
+Shift = float | Callable[[float], float]
+
+
+@dataclass(frozen=True)
+class PredictionFilter:
+    """Zero-phase Butterworth filter of `order` and `cutoff` Hz; `dropped` s are left out at each end."""
+
+    order: int = 3
+    cutoff: float = 5.0
+    dropped: float = 0.3
+
+    def __str__(self) -> str:
+        return f"zero-phase Butterworth, order {self.order}, {self.cutoff:g} Hz, {self.dropped:g} s dropped at each end"
+
+
+@dataclass(frozen=True, eq=False)
+class PredictionScore:
+    """Sums by joint (2,): samples, squared residuals, torque, squared torque."""
+
+    count: float = 0.0
+    residual: FloatArray = field(default_factory=lambda: np.zeros(2))
+    torque: FloatArray = field(default_factory=lambda: np.zeros(2))
+    square: FloatArray = field(default_factory=lambda: np.zeros(2))
+
+    def __add__(self, other: PredictionScore) -> PredictionScore:
+        return PredictionScore(
+            self.count + other.count,
+            self.residual + other.residual,
+            self.torque + other.torque,
+            self.square + other.square,
+        )
+
+    @property
+    def rmse(self) -> FloatArray:
+        """Root mean square of the residual (2,) in N m."""
+        return np.sqrt(self.residual / max(self.count, 1.0))
+
+    @property
+    def nrmse(self) -> FloatArray:
+        """RMSE over the torque's root mean square (2,)."""
+        return np.sqrt(self.residual / np.maximum(self.square, 1e-300))
+
+    @property
+    def r2(self) -> FloatArray:
+        """Share of the torque's variance that is predicted (2,)."""
+        spread = self.square - self.torque**2 / max(self.count, 1.0)
+        return 1 - self.residual / np.maximum(spread, 1e-300)
+
+
+class PredictionSums:
+    """What scores any coefficients on a log, gathered segment by segment.
+
+    Parameters
+    ----------
+    model : Model
+    shift : float, s, or a callable that gives it for the time between samples
+        After how long a logged torque acts: hold and delay together.
+    by : PredictionFilter
+    """
+
+    def __init__(self, model: Model, shift: Shift = 0.0, by: PredictionFilter | None = None) -> None:
+        self._model = model
+        self._shift = shift
+        self._by = by or PredictionFilter()
+        self._cutter: Cutter | None = None
+        size = len(model.names) + 1
+        self._count, self._torque, self._gram = 0, np.zeros(2), np.zeros((2, size, size))
+
+    def push(self, segment: Segment) -> None:
+        """Take in the next segment of the log."""
+        self._cutter = self._cutter or Cutter(max(1, round(_PIECE_SECONDS / segment.dt)))
+        for piece in self._cutter.push(segment):
+            self._add(piece)
+
+    def finish(self) -> None:
+        """Take in what is left at the end of the log."""
+        for piece in self._cutter.finish() if self._cutter else ():
+            self._add(piece)
+
+    def score(self, c: FloatArray) -> PredictionScore:
+        """How well the coefficients `c` (q,) predict the torque."""
+        v = np.append(-c, 1.0)
+        residual = np.maximum(np.einsum("x,axy,y->a", v, self._gram, v), 0.0)
+        return PredictionScore(float(self._count), residual, self._torque, self._gram[:, -1, -1])
+
+    def _add(self, piece: Segment) -> None:
+        shift = self._shift(piece.dt) if callable(self._shift) else self._shift
+        X = _filtered(self._model, piece, shift, self._by)
+        self._count += X.shape[2]
+        self._torque = self._torque + X[:, -1].sum(axis=1)
+        self._gram += X @ X.swapaxes(1, 2)
+
+
+def _filtered(model: Model, piece: Segment, shift: float, by: PredictionFilter) -> FloatArray:
+    """X (2, q + 1, n) of a piece: see the module's table."""
+    signals, dt = _decimated(piece, by)
+    edge = round(by.dropped / dt)
+    if signals.shape[1] <= max(2 * edge + 2, 6 * (by.order + 1)):
+        return np.zeros((2, len(model.names) + 1, 0))
+    signals = butterworth(signals, dt, min(by.cutoff, 0.45 / dt), by.order)
+    Y = regressor(model, _motion(signals[:2], dt))
+    place = np.arange(edge, signals.shape[1] - edge) + shift / dt
+    whole = np.clip(np.floor(place).astype(np.int64), 0, signals.shape[1] - 2)
+    Y = Y[:, :, whole] + (place - whole) * (Y[:, :, whole + 1] - Y[:, :, whole])
+    return np.concatenate([Y, signals[2:, None, edge : signals.shape[1] - edge]], axis=1)
+
+
+def _decimated(piece: Segment, by: PredictionFilter) -> tuple[FloatArray, float]:
+    """Angles and torques (4, n) at the rate that the filter asks for, and the time between them in s."""
+    step = int(1 / (_PER_CUTOFF * by.cutoff * piece.dt))
+    signals = np.concatenate([piece.theta, piece.tau])
+    kernel = smoother(piece.dt, _SHARPER * by.cutoff)
+    if step < 2 or signals.shape[1] < kernel.size:
+        return signals, piece.dt
+    return correlate(signals, kernel, step), step * piece.dt
+
+
+def _motion(theta: FloatArray, dt: float) -> Motion:
+    """Motion with derivatives by five points; the two samples at each end repeat their neighbour's."""
+    inner, n = theta.shape[1] - 4, theta.shape[1]
+    omega, alpha = (
+        sum(weight * theta[:, place : place + inner] for place, weight in enumerate(weights))
+        for weights in (_SLOPE / dt, _BEND / dt**2)
+    )
+    place = np.clip(np.arange(n) - 2, 0, inner - 1)
+    return Motion(theta, np.asarray(omega)[:, place], np.asarray(alpha)[:, place])
+
+
+def score(
+    model: Model, c: FloatArray, segments: Iterable[Segment], shift: Shift = 0.0, by: PredictionFilter | None = None
+) -> PredictionScore:
+    """How well the coefficients `c` (q,) predict a log's torque; see `PredictionSums`."""
+    sums = PredictionSums(model, shift, by)
+    for segment in segments:
+        sums.push(segment)
+    sums.finish()
+    return sums.score(c)
+
+
+def cross_validate(
+    fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source] = (), shift: float = 0.0
+) -> PredictionScore | None:
+    """Score of each log predicted from all the others; None where a kind of log has only one.
+
+    The other logs' parameters follow from their quadratic likelihoods, without a further pass; only the
+    prediction reads the logs again.
+    """
+    sources = [*unloaded, *loaded]
+    if len(sources) != len(fit.logs) or len(unloaded) == 1 or len(loaded) == 1:
+        return None
+    total = PredictionScore()
+    columns = len(fit.shared.model.names)
+    for place, (source, log) in enumerate(zip(sources, fit.logs, strict=True)):
+        others = [other for number, other in enumerate(fit.logs) if number != place]
+        beta, _, _ = combine(fit.shared, others, fit.values, fit.prior)
+        c = fit.shared.coefficients(beta, log.loaded)
+        total += score(fit.shared.model, c[:columns], source(), shift + float(c[columns:].sum()))
+    return total

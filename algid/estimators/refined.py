@@ -1,0 +1,256 @@
+"""The refined estimator: errors-in-variables maximum likelihood over any number of logs.
+
+It starts from the weak estimate. On a training set, whole short logs or evenly spread pieces of long ones, it
+alternates Gauss-Newton steps for the shared parameters, for every piece's trajectory and for the noise levels.
+Where pieces were left out, one pass over everything at the trained values and one more step make the estimate
+efficient (Le Cam's one-step estimator): the start is already within its own error bars.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.estimators.combine import Prior, combine
+from algid.estimators.fit import Fit, conclude
+from algid.estimators.identifiability import judge, open_directions
+from algid.estimators.log_likelihood import LogEvidence, Outcome, added
+from algid.estimators.parametrisation import Shared
+from algid.estimators.weak import Source, WeakSettings
+from algid.estimators.weak import fit as weak_fit
+from algid.estimators.whitening import NoiseLevels
+from algid.model import Model
+from algid.progress import Told
+from algid.signals.differences import Stencil
+
+_STEPS = 20
+_NOISE_STEPS = 12  # then the noise levels stay, so that the rest can settle
+_REFUTED = (
+    "the torque's error is far larger and slower than its sensor's noise (unmodelled dynamics): the likelihood of "
+    "white noise does not hold, and the weak estimate with robust intervals stands in its place"
+)
+_SETTLED = 0.02  # change of every parameter in its standard deviations
+_NOISE_SETTLED = 0.2  # change of every log variance in its standard deviations
+_FAR = 3.0  # standard deviations of the training set beyond which the last step is repeated
+_PASSES = 4
+_ANCHOR = 1e-3  # of a parameter's size: how firmly a direction without information is held
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedSettings:
+    """Settings of the refined estimator.
+
+    Parameters
+    ----------
+    model : Model
+    hold : "foh" or "zoh"
+        Whether the torque moved evenly from sample to sample, or was held from each sample to the next.
+    delay : float, s
+        After how long a logged torque acts; where the estimate of it starts with `estimate_delay`.
+    estimate_delay : bool
+    noise : NoiseLevels or None
+        Known noise levels; None estimates them log by log.
+    lengths : dict
+        Known link lengths "l1", "l2" in m.
+    prior : Prior or None
+        What an earlier result knows of the arm; unloaded logs are not needed then.
+    weak : WeakSettings
+        Window and bandwidth of the weak estimate that it starts from.
+    """
+
+    model: Model = field(default_factory=Model)
+    hold: Literal["foh", "zoh"] = "foh"
+    delay: float = 0.0
+    estimate_delay: bool = False
+    noise: NoiseLevels | None = None
+    lengths: dict[str, float] = field(default_factory=dict)
+    prior: Prior | None = None
+    weak: WeakSettings = field(default_factory=WeakSettings)
+
+    def shift(self, dt: float) -> float:
+        """Time in s by which the hold delays a torque."""
+        return 0.5 * dt if self.hold == "zoh" else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Training:
+    """How the alternation ended: whether it settled, or the data refuted white torque noise."""
+
+    beta: FloatArray
+    outcomes: list[Outcome]
+    iterations: int
+    settled: bool = False
+    refuted: bool = False
+
+
+def fit(
+    unloaded: Sequence[Source],
+    loaded: Sequence[Source] = (),
+    settings: RefinedSettings | None = None,
+    told: Told | None = None,
+) -> Fit:
+    """Most likely parameters of the arm, and of its payload where there are loaded logs.
+
+    Parameters
+    ----------
+    unloaded, loaded : sequences of callables
+        Each gives a fresh iterable of `Segment`, the stretches of one log in time; it is called several times.
+    settings : RefinedSettings
+    told : callable
+        Called with each step of the training and how many samples of how many it has gone over.
+
+    Returns
+    -------
+    Fit
+        With `converged` false and the weak estimate in its place where the iteration failed.
+
+    Raises
+    ------
+    ValueError
+        If there is no log, or no log long enough, or a known noise level is not positive.
+    """
+    settings = settings or RefinedSettings()
+    _check_noise(settings.noise)
+    start = weak_fit(unloaded, loaded, _weak_settings(settings), settings.lengths, settings.prior)
+    shared = start.shared
+    settings, prior = replace(settings, prior=_anchored(start)), settings.prior
+    logs = [*_opened(unloaded, False, shared, settings), *_opened(loaded, True, shared, settings)]
+    try:
+        training = _train(shared, logs, start.values, settings, told)
+        if training.refuted:
+            return replace(start, note=_REFUTED, iterations=training.iterations)
+        if not training.settled or not np.all(np.isfinite(training.beta)):
+            return _not_converged(start, training.iterations)
+        beta, outcomes = training.beta, training.outcomes
+        if not all(log.whole for log in logs):
+            beta, outcomes = _finish(shared, logs, beta, settings)
+    except np.linalg.LinAlgError:
+        return _not_converged(start, 0)
+    whiteness = judge(added([outcome.innovations for outcome in outcomes]))
+    informations = [outcome.information for outcome in outcomes]
+    coloured = not whiteness.white
+    fitted = conclude(
+        "refined",
+        shared,
+        informations,
+        beta,
+        start.moved,
+        prior,
+        coloured=coloured,
+        samples=int(_count(outcomes)),
+    )
+    noise = tuple(log.noise for log in logs)
+    fitted = _no_surer(fitted, start)
+    return replace(fitted, noise=noise, whiteness=whiteness, iterations=training.iterations)
+
+
+def _no_surer(fitted: Fit, start: Fit) -> Fit:
+    """The fit without what the weak estimate leaves open: a joint at rest trembles in noise, which is no motion."""
+    pairs = zip(fitted.status, start.status, strict=True)
+    status = tuple(first if second == "OK" else second for first, second in pairs)
+    return replace(
+        fitted, status=status, unidentifiable=tuple(dict.fromkeys(fitted.unidentifiable + start.unidentifiable))
+    )
+
+
+def _anchored(start: Fit) -> Prior | None:
+    """The prior, and an anchor on every direction that the weak estimate leaves open.
+
+    There the trajectories and the parameters would chase each other for ever, in nothing but noise.
+    """
+    _, S, _ = combine(start.shared, start.logs, start.values, start.prior)
+    null, size = open_directions(start.names, start.values, S)
+    if null.shape[1] == 0:
+        return start.prior
+    along = null.T @ (start.values / size)
+    mean = start.values + size * (null @ (np.clip(along, -1, 1) - along))
+    precision = (null @ null.T) / np.outer(size, size) / _ANCHOR**2
+    if start.prior is not None:
+        places = [start.names.index(name) for name in start.prior.names]
+        precision[np.ix_(places, places)] += start.prior.precision
+        mean[places] = start.prior.mean
+    return Prior(start.names, mean, precision)
+
+
+def _check_noise(noise: NoiseLevels | None) -> None:
+    if noise is not None and not (np.all(noise.theta > 0) and np.all(noise.tau > 0)):
+        raise ValueError(f"known noise levels must be positive, got {noise.theta} rad and {noise.tau} N m")
+
+
+def _opened(
+    sources: Sequence[Source], loaded: bool, shared: Shared, settings: RefinedSettings
+) -> Iterator[LogEvidence]:
+    def stencil(dt: float, c: FloatArray) -> Stencil:
+        return Stencil(dt, settings.shift(dt) + (float(c[-1]) if shared.delay else settings.delay))
+
+    for source in sources:
+        log = LogEvidence(source, loaded, shared, stencil, settings.noise)
+        if log.kept:
+            yield log
+
+
+def _not_converged(start: Fit, iterations: int) -> Fit:
+    status = tuple("NOT_CONVERGED" if word == "OK" else word for word in start.status)
+    return replace(start, status=status, converged=False, iterations=iterations)
+
+
+def _weak_settings(settings: RefinedSettings) -> WeakSettings:
+    return replace(
+        settings.weak,
+        model=settings.model,
+        hold=settings.hold,
+        delay=settings.delay,
+        estimate_delay=settings.estimate_delay,
+    )
+
+
+def _train(
+    shared: Shared, logs: Sequence[LogEvidence], beta: FloatArray, settings: RefinedSettings, tell: Told | None
+) -> _Training:
+    total = sum(log.trained for log in logs)
+    for iteration in range(1, _STEPS + 1):
+        outcomes: list[Outcome] = []
+        done = 0
+        for log in logs:
+            outcomes.append(log.train(shared.coefficients(beta, log.loaded)))
+            done += log.trained
+            if tell is not None:
+                tell(f"fitting, step {iteration}", done, total)
+        better, S, _ = combine(shared, [outcome.information for outcome in outcomes], beta, settings.prior)
+        free = settings.noise is None and iteration <= _NOISE_STEPS
+        told = max(map(LogEvidence.improve_noise, logs, outcomes)) if free else 0.0
+        moved = _distance(better - beta, S)
+        beta = better
+        if settings.noise is None and any(log.refuted for log in logs):
+            return _Training(beta, outcomes, iteration, refuted=True)
+        if iteration > 1 and moved < _SETTLED and told < _NOISE_SETTLED:
+            return _Training(beta, outcomes, iteration, settled=True)
+    return _Training(beta, outcomes, _STEPS)
+
+
+def _finish(
+    shared: Shared, logs: Sequence[LogEvidence], beta: FloatArray, settings: RefinedSettings
+) -> tuple[FloatArray, list[Outcome]]:
+    """Passes over whole logs until the step is one that a single Gauss-Newton step can make."""
+    for _ in range(_PASSES):
+        outcomes = [log.run(shared.coefficients(beta, log.loaded)) for log in logs]
+        better, S, _ = combine(shared, [outcome.information for outcome in outcomes], beta, settings.prior)
+        share = sum(log.trained for log in logs)
+        far = _distance(better - beta, S) * np.sqrt(share / max(share, _count(outcomes)))
+        beta = better
+        if far < _FAR * np.sqrt(beta.size):
+            break
+    return beta, outcomes
+
+
+def _distance(step: FloatArray, S: FloatArray) -> float:
+    """Length of a step in standard deviations."""
+    return float(np.sqrt(np.maximum(step @ S @ step, 0.0)))
+
+
+def _count(outcomes: Sequence[Outcome]) -> float:
+    return float(sum(outcome.innovations.count[0] for outcome in outcomes))

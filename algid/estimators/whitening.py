@@ -1,0 +1,159 @@
+"""Errors in variables, linearised and whitened: the heart of the refined estimator.
+
+Angles and torques are both measured with noise: θ_m = θ + ε, τ_m = f(θ, θ̇, θ̈; c) + η. Linearised at a
+trajectory near the truth, the torque residual
+
+    e = τ_m − f(θ0; c) − G (θ_m − θ0) = η − G ε + Y δc
+
+has the covariance Σ_τ + G Σ_θ Gᵀ. The stencil makes G, hence that matrix, banded: one Cholesky factor
+L Lᵀ = V whitens everything. Minimising over the trajectory as well as over c, the Schur complement of the
+normal equations, is the same as weighting e by V⁻¹ (Woodbury), so S = (L⁻¹Y)ᵀ(L⁻¹Y) is the information on
+c and the innovations w = L⁻¹e are white with unit variance wherever the model holds.
+
+======  ====================================================  =======================  ======
+symbol  name                                                  shape                    unit
+======  ====================================================  =======================  ======
+H       dτ/dθ along the stencil, times σ_θ / σ_τ              (2, 2, POINTS, n)        1
+V       I + H Hᵀ, covariance of e / σ_τ, lower band           (2 POINTS, 2 n)          1
+Z       L⁻¹ of the columns of [Y, e] / σ_τ                    (q + 1, 2 n)             mixed
+======  ====================================================  =======================  ======
+
+Rows run (sample, joint): joint 1 and joint 2 of a sample are neighbours.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import lapack
+
+from algid.arm import FloatArray
+from algid.model import Model, Motion, partials, regressor
+from algid.signals.differences import POINTS, Stencil
+from algid.signals.segments import Segment
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseLevels:
+    """Standard deviations of the white noise on the angles (2,) in rad and on the torques (2,) in N m."""
+
+    theta: FloatArray
+    tau: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """One piece of log, linearised and whitened: see the module's table.
+
+    `factor` holds L as LAPACK's lower band; `first` is the angle sample of the first stencil's first point.
+    """
+
+    columns: FloatArray
+    factor: FloatArray
+    H: FloatArray
+    first: int
+    residual: FloatArray
+
+    def solve(self, columns: FloatArray) -> FloatArray:
+        """L⁻¹ of columns (m, 2 n)."""
+        return _triangular(self.factor, columns, "N")
+
+    def solve_transposed(self, columns: FloatArray) -> FloatArray:
+        """L⁻ᵀ of columns (m, 2 n)."""
+        return _triangular(self.factor, columns, "T")
+
+
+def _triangular(factor: FloatArray, columns: FloatArray, transposed: str) -> FloatArray:
+    solution, info = lapack.dtbtrs(factor, columns.T, uplo="L", trans=transposed)
+    if info != 0:
+        raise np.linalg.LinAlgError(f"banded substitution failed with info {info}")
+    return solution.T
+
+
+def linearise(
+    model: Model,
+    c: FloatArray,
+    theta0: FloatArray,
+    piece: Segment,
+    stencil: Stencil,
+    noise: NoiseLevels,
+    delay: bool = False,
+) -> Linearised:
+    """Linearise a piece at the trajectory `theta0` (2, N) and the coefficients `c` (q,), and whiten it.
+
+    With `delay` the last column is the derivative of the torque by the stencil's shift.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the covariance is not positive definite in floating point.
+    """
+    length = theta0.shape[1]
+    torques, first = stencil.torques(length), stencil.first(length)
+    motion = Motion(*stencil.differences(theta0))
+    Y = regressor(model, motion)
+    P = partials(model, c, motion)
+    torque = np.einsum("aqn,q->an", Y, c)
+    G = along_stencil(P, stencil.weights)
+    error = piece.tau[:, torques] - torque - forward(G, piece.theta - theta0, first)
+    H = G * (noise.theta[None, :, None, None] / noise.tau[:, None, None, None])
+    factor = covariance_factor(H)
+    extra = [np.gradient(torque, stencil.dt, axis=1)[None]] if delay else []
+    rows = np.concatenate([Y.swapaxes(0, 1), *extra, error[None]])
+    rows = np.ascontiguousarray((rows / noise.tau[None, :, None]).swapaxes(1, 2))
+    columns = _triangular(factor, rows.reshape(rows.shape[0], -1), "N")
+    return Linearised(columns, factor, H, first, error)
+
+
+def along_stencil(P: FloatArray, weights: FloatArray) -> FloatArray:
+    """G (2, 2, POINTS, n): derivative of each torque by each angle its stencil touches."""
+    n = P.shape[-1]
+    G = weights.T @ P.reshape(3, 4 * n)
+    return np.ascontiguousarray(G.reshape(POINTS, 2, 2, n).transpose(1, 2, 0, 3))
+
+
+def forward(G: FloatArray, x: FloatArray, first: int) -> FloatArray:
+    """G x (2, n) of angle changes x (2, N)."""
+    n = G.shape[-1]
+    result = np.zeros((2, n))
+    for point in range(POINTS):
+        result += np.einsum("abn,bn->an", G[:, :, point], x[:, first + point : first + point + n])
+    return result
+
+
+def adjoint(G: FloatArray, y: FloatArray, first: int, length: int) -> FloatArray:
+    """Gᵀ y (2, N) of torques y (2, n)."""
+    n = G.shape[-1]
+    result = np.zeros((2, length))
+    for point in range(POINTS):
+        result[:, first + point : first + point + n] += np.einsum("abn,an->bn", G[:, :, point], y)
+    return result
+
+
+def covariance_factor(H: FloatArray) -> FloatArray:
+    """Cholesky factor of I + H Hᵀ as LAPACK's lower band (2 POINTS, 2 n)."""
+    n = H.shape[-1]
+    band = np.zeros((n, 2, 2 * POINTS))
+    for lag in range(POINTS):
+        block = np.zeros((2, 2, n - lag))
+        for point in range(POINTS - lag):
+            early, late = H[:, :, lag + point, : n - lag], H[:, :, point, lag:]
+            for b in range(2):
+                block += early[:, None, b] * late[None, :, b]
+        for a in range(2):
+            for other in range(2):
+                below = 2 * lag + other - a
+                if below >= 0:
+                    band[: n - lag, a, below] = block[a, other].T
+    band[:, :, 0] += 1.0
+    factor, info = lapack.dpbtrf(band.reshape(2 * n, -1).T, lower=1, overwrite_ab=1)
+    if info != 0:
+        raise np.linalg.LinAlgError(f"the covariance of the torque residual is not positive definite (row {info})")
+    return factor
+
+
+def trajectory(piece: Segment, linear: Linearised, multiplier: FloatArray, noise: NoiseLevels) -> FloatArray:
+    """Most likely angles (2, N) given the multipliers V⁻¹e (2 n,)."""
+    y = np.ascontiguousarray(multiplier.reshape(-1, 2).T)
+    return piece.theta + noise.theta[:, None] * adjoint(linear.H, y, linear.first, piece.theta.shape[1])

@@ -1,0 +1,175 @@
+"""Files appear whole or not at all.
+
+TOML files checked against a pydantic model, with errors that name file, place and remedy.
+
+A result folder appears whole or not at all.
+"""
+
+from __future__ import annotations
+
+import glob
+import os
+import reprlib
+import shutil
+import sys
+import tempfile
+import time
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from algid.errors import OutputError, SettingError
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """Give a temporary name beside `path` to write to; it becomes `path` when the block ends well.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be made or written to.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        os.close(handle)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot write there ({error.strerror}); choose another folder with -o") from error
+    temporary = Path(name)
+    try:
+        yield temporary
+        temporary.chmod(0o666 & ~_umask())
+        temporary.replace(path)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot write ({error.strerror}); choose another folder with -o") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel, ValidationError
+
+ModelT = TypeVar("ModelT", bound="BaseModel")
+
+
+def read_toml(path: Path, model: type[ModelT]) -> ModelT:
+    """Read `path` as a `model`.
+
+    Raises
+    ------
+    SettingError
+        If the file is missing, is not TOML, or does not fit the model (the first misfit is named).
+    """
+    from pydantic import ValidationError
+
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SettingError(f"{path}: cannot read it ({error.strerror}); check the name") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise SettingError(f"{path}: not TOML ({error}); mend that line") from error
+    try:
+        return model.model_validate(content)
+    except ValidationError as error:
+        raise SettingError(f"{path}: {first_misfit(error)}") from error
+
+
+def first_misfit(error: ValidationError) -> str:
+    """Where a pydantic model was not met, what was expected and what was found, in one line."""
+    first, *others = error.errors(include_url=False, include_context=False)
+    place = ".".join(str(part) for part in first["loc"]) or "top level"
+    more = f" (and {len(others)} more)" if others else ""
+    return f"{place}: {first['msg'].lower()}, found {reprlib.repr(first['input']):.60}{more}"
+
+
+FRESH = 60.0  # s; a folder may be younger than the hold on it
+
+
+def result_folder(first_log: str, parent: Path) -> Path:
+    """Where the result of a log goes: `parent/STEM.algid`."""
+    return parent / f"{Path(first_log).stem or 'log'}.algid"
+
+
+def refuse_existing(folder: Path, force: bool) -> None:
+    """Raises `OutputError` where `folder` exists and is not to be replaced."""
+    if folder.exists() and not force:
+        raise OutputError(f"{folder}: exists already; choose another folder with -o, or replace it with --force")
+
+
+@contextmanager
+def whole_folder(folder: Path, force: bool) -> Iterator[Path]:
+    """Give a temporary folder to write to; it becomes `folder` when the block ends well.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be made or written to, or exists and `force` is not set.
+    """
+    refuse_existing(folder, force)
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot write there ({error.strerror}); choose another folder with -o") from error
+    try:
+        temporary.chmod(0o755)
+        with _held(temporary, strictly=False):
+            yield temporary
+        _swap(temporary, folder)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot write ({error.strerror}); choose another folder with -o") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _swap(temporary: Path, folder: Path) -> None:
+    if not folder.exists():
+        temporary.rename(folder)
+        return
+    aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}.old.", dir=folder.parent))
+    folder.rename(aside / folder.name)
+    temporary.rename(folder)
+    shutil.rmtree(aside, ignore_errors=True)
+
+
+def remove_stale(folder: Path) -> None:
+    """Remove what runs that were killed have left of `folder` half-written: such of which no process holds."""
+    for found in folder.parent.glob(f".{glob.escape(folder.name)}.*"):
+        with suppress(OSError):
+            aside = found.name.startswith(f".{folder.name}.old.")
+            if aside and not folder.exists():  # it may be all that is left of a result
+                continue
+            if time.time() - found.stat().st_mtime > FRESH:
+                with _held(found, strictly=True):
+                    shutil.rmtree(found, ignore_errors=True)
+
+
+@contextmanager
+def _held(folder: Path, strictly: bool) -> Iterator[None]:
+    """Hold a folder; the system lets go of it however this process ends.
+
+    Not every file system can: raises `OSError` there, or where another process holds it, if asked to be strict.
+    """
+    if sys.platform == "win32":
+        if strictly:
+            raise OSError("folders cannot be held")
+        yield
+        return
+    import fcntl
+
+    handle = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        with nullcontext() if strictly else suppress(OSError):
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    finally:
+        os.close(handle)

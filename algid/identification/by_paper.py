@@ -1,0 +1,133 @@
+"""The paper's method from logs to the parts of a result."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from algid.arm import CONSTANT_NAMES, CONSTANT_UNITS, FloatArray
+from algid.errors import LogError
+from algid.estimators.paper import (
+    SHORTEST,
+    STAGE1_SERIES,
+    STAGE2_NAMES,
+    STAGE2_SERIES,
+    Series,
+    Summary,
+    stage1_series,
+    stage2_series,
+    wanders,
+)
+from algid.identification.series import series_blocks, write_columns
+from algid.identification.source import LogSource
+from algid.identification.summary import Outcome
+from algid.identification.velocities import with_velocities
+from algid.results import Estimate, Status
+from algid.settings import Settings
+from algid.table4 import UNITS, finite, unloaded_rows
+
+STAGE1_WINDOW = 2.0  # s
+STAGE1_FILE = "estimates.parquet"
+STAGE2_FILE = "loaded.parquet"
+
+
+def run_paper(
+    unloaded: LogSource | None,
+    loaded: LogSource | None,
+    settings: Settings,
+    known: FloatArray | None = None,
+    folder: Path | None = None,
+) -> Outcome:
+    """Stage 1 on `unloaded`, or the `known` constants (7,); stage 2 on `loaded`; series into `folder`.
+
+    Raises
+    ------
+    LogError
+        If a log is shorter than the estimates need to settle, or lacks velocities that were asked for.
+    """
+    parameters: dict[str, Estimate] = {}
+    rows: dict[str, float] = {}
+    k = known
+    if unloaded is not None:
+        values, usable = _estimate(unloaded, settings, None, folder)
+        k = values[: len(CONSTANT_NAMES)]
+        parameters = _named(CONSTANT_NAMES, CONSTANT_UNITS, values, usable)
+        if usable.all():
+            rows |= unloaded_rows(k)
+    if loaded is None or k is None or not np.isfinite(k).all():
+        return Outcome(parameters, _weak(STAGE2_NAMES, loaded), _weak(("m_p", "l1"), loaded), rows)
+    values, usable = _estimate(loaded, settings, k, folder)
+    names = (*STAGE2_NAMES, "l1", "m_p")
+    named = _named(names, {**UNITS, "l1": "m"}, values, usable)
+    rows |= {name: estimate.estimate for name, estimate in named.items() if estimate.estimate is not None}
+    return Outcome(
+        parameters,
+        {name: named[name] for name in STAGE2_NAMES},
+        {name: named[name] for name in ("m_p", "l1")},
+        {name: value for name, value in rows.items() if name in UNITS},
+    )
+
+
+def _estimate(
+    source: LogSource, settings: Settings, k: FloatArray | None, folder: Path | None
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Estimates from one log's series and which of them can be used; writes the series on the way."""
+    names = STAGE1_SERIES if k is None else STAGE2_SERIES
+    summary = Summary(len(names))
+    series = _series(source, settings, k)
+    watched = _watched(series, summary)
+    if folder is None:
+        for _ in watched:
+            pass
+    else:
+        path = folder / (STAGE1_FILE if k is None else STAGE2_FILE)
+        write_columns(path, _written(watched, names), [source.start_ns])
+    if source.summary().duration < SHORTEST - 1e-9:
+        raise LogError(
+            f"{source.name}: {source.summary().duration:.3g} s long; the paper's method needs {SHORTEST:g} s at least "
+            "to settle; record longer"
+        )
+    estimate, wander = summary.estimates()
+    return estimate, ~wanders(estimate, wander)
+
+
+def _series(source: LogSource, settings: Settings, k: FloatArray | None) -> Iterator[Series]:
+    window = settings.window if settings.window is not None and settings.estimator == "paper" else STAGE1_WINDOW
+    moving = with_velocities(source, settings, luenberger=settings.luenberger or settings.estimator != "paper")
+    if k is None:
+        return stage1_series(moving, window)
+    return stage2_series(moving, window, k, settings.gravity)
+
+
+def _watched(series: Iterable[Series], summary: Summary) -> Iterator[Series]:
+    for window in series:
+        summary.add(window)
+        yield window
+
+
+def _written(series: Iterable[Series], names: Sequence[str]) -> Iterator[dict[str, FloatArray]]:
+    """Columns for the file; the sum k5+k3 is Table 4's and follows from the others."""
+    for block in series_blocks(series, names):
+        yield {name: column for name, column in block.items() if name != "k5+k3"}
+
+
+def _named(
+    names: Sequence[str], units: dict[str, str], values: FloatArray, usable: NDArray[np.bool_]
+) -> dict[str, Estimate]:
+    return {
+        name: Estimate(estimate=finite(value), unit=units[name])
+        if good
+        else Estimate(estimate=None, unit=units[name], status=Status.WEAK_EXCITATION)
+        for name, value, good in zip(names, values, usable, strict=False)
+    }
+
+
+def _weak(names: Sequence[str], loaded: LogSource | None) -> dict[str, Estimate]:
+    """No estimates where a loaded log was given but stage 1 failed."""
+    if loaded is None:
+        return {}
+    units = {**UNITS, "l1": "m"}
+    return {name: Estimate(estimate=None, unit=units[name], status=Status.WEAK_EXCITATION) for name in names}

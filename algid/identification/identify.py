@@ -1,0 +1,229 @@
+"""Identify an arm and its payload from logs: the one way in for the command line, batches and notebooks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from algid.arm import CONSTANT_NAMES, FloatArray
+from algid.errors import LogError, ResultError, SettingError
+from algid.estimators.paper import SHORTEST
+from algid.files import remove_stale, result_folder, whole_folder
+from algid.identification.by_paper import run_paper
+from algid.identification.series import write_fit_series
+from algid.identification.source import LogLike, LogSource, Passes, sources_of
+from algid.identification.summary import Outcome, result_of
+from algid.progress import Told
+from algid.results import Result, read_result, write_result
+from algid.runtime import one_blas_thread
+from algid.settings import Settings
+
+if TYPE_CHECKING:
+    from algid.profile import Profile
+
+SERIES_SECONDS = 600.0  # the paper's convergence series is drawn beside other estimators up to this length of log
+
+
+@dataclass(frozen=True)
+class Earlier:
+    """A result to start from, and what to call it where it is wrong: its file, or its log."""
+
+    result: Result
+    file: str
+
+    @classmethod
+    def of(cls, parameters: Result | Path | None) -> Earlier | None:
+        """The result itself, or that of a file."""
+        if parameters is None or isinstance(parameters, Result):
+            return None if parameters is None else cls(parameters, parameters.log.path)
+        return cls(read_result(parameters), str(parameters))
+
+
+def identify(
+    unloaded: LogLike | Iterable[LogLike] | None,
+    loaded: LogLike | Iterable[LogLike] | None = None,
+    settings: Settings | None = None,
+    *,
+    parameters: Result | Path | None = None,
+    profile: Profile | None = None,
+    out: Path | None = None,
+    name: str | None = None,
+    force: bool = False,
+    report: bool = True,
+    export: bool = False,
+    command: str | None = None,
+    shared_library: bool = False,
+    told: Told | None = None,
+) -> Result:
+    """Identify the constants k1 … k7 of an arm and, from loaded logs, its tip payload.
+
+    Parameters
+    ----------
+    unloaded, loaded : path or `Log`, or several
+        Logs of the arm without and with the payload.
+    settings : Settings
+    parameters : Result or path of one
+        An arm identified before; then no unloaded log is needed.
+    profile : Profile
+        What the logs' names, units and signs mean.
+    out : Path
+        Folder to write into; None writes nothing.
+    name : str
+        Of the result folder, ``NAME.algid``; the stem of the first log by default.
+    force : bool
+        Replace a result that is there.
+    report : bool
+        Write time series and pages beside ``result.json``.
+    export : bool
+        Write ``estimates.mcap`` beside them: see `algid.report.export`.
+    command : str
+        The command line behind the call, for the result.
+    shared_library : bool
+        Put the pages' plotting library once beside the result folders instead of into each page.
+    told : callable
+        Called with the stage and how many samples of how many it has gone over, as the work goes on.
+
+    Raises
+    ------
+    AlgidError
+        If a log cannot be used, or nothing can be written.
+    ValueError
+        If there is neither an unloaded log nor `parameters`.
+    """
+    settings = settings or Settings()
+    earlier = Earlier.of(parameters)
+    bare = sources_of(unloaded, "unloaded", profile, settings.gravity)
+    burdened = sources_of(loaded, "loaded", profile, settings.gravity)
+    if not bare and (earlier is None or not burdened):
+        raise ValueError("an unloaded log is needed, or parameters and a loaded log")
+    if settings.cross_validate and (len(bare) == 1 or len(burdened) == 1):
+        kind = "unloaded" if len(bare) == 1 else "loaded"
+        raise SettingError(f"--cross-validate: expected two {kind} logs or more, found one; give more, or leave it out")
+    passes = Passes(told, [*bare, *burdened])
+    if out is None:
+        return _identify(bare, burdened, settings, earlier, None, report, passes)
+    folder = result_folder((bare + burdened)[0].name, out) if name is None else out / f"{name}.algid"
+    if name is None:  # a batch sweeps its whole output once
+        remove_stale(folder)
+    with whole_folder(folder, force) as temporary:
+        result = _identify(bare, burdened, settings, earlier, temporary, report, passes)
+        if command is not None:
+            result = result.model_copy(update={"settings": result.settings | {"command": command}})
+        write_result(result, temporary / "result.json")
+        if report:
+            _write_pages(temporary, result, shared_library, told)
+        if export:
+            _export(temporary, told)
+    return result
+
+
+def _identify(
+    bare: Sequence[LogSource],
+    burdened: Sequence[LogSource],
+    settings: Settings,
+    earlier: Earlier | None,
+    folder: Path | None,
+    report: bool,
+    passes: Passes,
+) -> Result:
+    with one_blas_thread():
+        if settings.estimator == "paper":
+            return _by_the_paper(bare, burdened, settings, earlier, folder)
+        return _by_likelihood(bare, burdened, settings, earlier, folder if report else None, passes)
+
+
+def _by_the_paper(
+    bare: Sequence[LogSource],
+    burdened: Sequence[LogSource],
+    settings: Settings,
+    earlier: Earlier | None,
+    folder: Path | None,
+) -> Result:
+    if len(bare) > 1 or len(burdened) > 1:
+        raise LogError(
+            f"{(bare if len(bare) > 1 else burdened)[1].name}: the paper's method takes one log of each kind; "
+            "give one, or use --estimator refined or weak"
+        )
+    first, second = _firsts(bare, burdened)
+    known = None if earlier is None else known_constants(earlier)
+    return result_of(run_paper(first, second, settings, known, folder), settings, [*bare, *burdened])
+
+
+def _by_likelihood(
+    bare: Sequence[LogSource],
+    burdened: Sequence[LogSource],
+    settings: Settings,
+    earlier: Earlier | None,
+    folder: Path | None,
+    passes: Passes,
+) -> Result:
+    from algid.identification.by_likelihood import prior_of, run_fit
+    from algid.identification.summary import outcome_of
+
+    prior = None if earlier is None else prior_of(earlier.result, settings, earlier.file)
+    logs = [*bare, *burdened]
+    fit = run_fit(bare, burdened, settings, prior, passes.told)
+    passes.begin("prediction", logs)
+    outcome = outcome_of(fit, bare, burdened, settings)
+    if folder is not None:
+        passes.begin("series", logs)
+        write_fit_series(folder, fit, logs, settings)
+        if settings.estimator == "refined":
+            outcome = _with_the_papers(outcome, bare, burdened, settings, folder, passes)
+    return result_of(outcome, settings, logs)
+
+
+def _with_the_papers(
+    outcome: Outcome,
+    bare: Sequence[LogSource],
+    burdened: Sequence[LogSource],
+    settings: Settings,
+    folder: Path,
+    passes: Passes,
+) -> Outcome:
+    """The paper's convergence series of the first log of each kind, and its route to the payload."""
+    first, second = _firsts(bare, burdened)
+    logs = [log for log in (first, second) if log is not None]
+    durations = [log.summary().duration for log in logs]
+    if first is None or settings.gravity == 0 or min(durations) < SHORTEST or max(durations) > SERIES_SECONDS:
+        return outcome
+    passes.begin("series", logs)
+    return replace(outcome, paper_payload=run_paper(first, second, settings, None, folder).payload)
+
+
+def _firsts(bare: Sequence[LogSource], burdened: Sequence[LogSource]) -> tuple[LogSource | None, LogSource | None]:
+    return bare[0] if bare else None, burdened[0] if burdened else None
+
+
+def _write_pages(folder: Path, result: Result, shared_library: bool, told: Told | None) -> None:
+    from algid.report import markdown, write_report
+
+    if told is not None:
+        told("report", 0, 0)
+
+    (folder / "report.md").write_text(markdown(result), encoding="utf-8")
+    write_report(folder, shared_library, told)
+
+
+def _export(folder: Path, told: Told | None) -> None:
+    from algid.report import export_mcap
+
+    export_mcap(folder, told)
+
+
+def known_constants(earlier: Earlier) -> FloatArray:
+    """k1 … k7 (7,) of an earlier result.
+
+    Raises
+    ------
+    ResultError
+        If one of them has no estimate.
+    """
+    values = [found.estimate if (found := earlier.result.parameters.get(name)) else None for name in CONSTANT_NAMES]
+    if any(value is None for value in values):
+        raise ResultError(f"{earlier.file}: the result lacks a constant; identify the arm from a better log first")
+    return np.array(values, dtype=np.float64)

@@ -1,0 +1,152 @@
+"""The torque that a model predicts along a log, for the eye: two derivatives of angles as sharp as noise allows.
+
+Time series of a result folder, written block by block.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.estimators.fit import Fit
+from algid.estimators.noise import first_guess
+from algid.estimators.paper import Series
+from algid.identification.source import LogSource
+from algid.model import Model, Motion, regressor
+from algid.settings import Settings
+from algid.signals.filters import half_length, smoothed
+from algid.signals.segments import Segment, pieces
+
+PREDICTED_ROWS = 1 << 17
+NOISE_SHARE = 0.05  # of the torque's RMS: what the angles' noise may add to the prediction
+LOWEST, HIGHEST = 4.0, 40.0  # Hz
+
+
+def torque_blocks(
+    logs: Sequence[LogSource], model: Model, coefficients: Mapping[str, FloatArray], shifts: Sequence[float]
+) -> Iterator[dict[str, FloatArray]]:
+    """Motion, measured and predicted torque of every log; by role its coefficients, by log the torque's delay in s.
+
+    Angles are smoothed without phase; the prediction is NaN where the smoother reaches past a stretch's end.
+    """
+    for number, (log, shift) in enumerate(zip(logs, shifts, strict=True)):
+        for piece in pieces(log.segments(), PREDICTED_ROWS):
+            yield {
+                "log": np.full(len(piece), number, dtype=np.int32),
+                **_torques(piece, model, coefficients[log.role], shift),
+            }
+
+
+def _torques(piece: Segment, model: Model, c: FloatArray, shift: float) -> dict[str, FloatArray]:
+    if len(piece) < 16:
+        return _prediction_columns(piece, np.full_like(piece.theta, np.nan), np.full_like(piece.theta, np.nan))
+    bandwidth = _bandwidth(piece, model, c)
+    theta = smoothed(piece.theta, piece.dt, bandwidth)
+    omega = np.gradient(theta, piece.dt, axis=1)
+    motion = Motion(theta, omega, np.gradient(omega, piece.dt, axis=1))
+    predicted = np.einsum("aqn,q->an", regressor(model, motion), c)
+    predicted = np.stack([np.interp(piece.t + shift, piece.t, row) for row in predicted])
+    reach = min(half_length(piece.dt, bandwidth), len(piece) // 2)
+    predicted[:, :reach] = predicted[:, len(piece) - reach :] = np.nan
+    return _prediction_columns(piece, omega, predicted)
+
+
+def _prediction_columns(piece: Segment, omega: FloatArray, predicted: FloatArray) -> dict[str, FloatArray]:
+    columns = {"theta": piece.theta, "omega": omega, "tau": piece.tau}
+    flat = {f"{name}{joint + 1}": value[joint] for name, value in columns.items() for joint in range(2)}
+    return {"t": piece.t, **flat, "tau1_predicted": predicted[0], "tau2_predicted": predicted[1]}
+
+
+def _bandwidth(piece: Segment, model: Model, c: FloatArray) -> float:
+    """Hz below which the angles' noise, twice differentiated, adds at most `NOISE_SHARE` of the torque.
+
+    White noise σ_θ sampled at dt has σ_θ √(2 dt B/5) (2π B)² of acceleration below B; inertia makes it torque.
+    """
+    full = dict(zip(model.names, c, strict=True))
+    inertia = np.abs([full["k5"] + full["k3"] + 2 * full["k1"], full["k3"]])
+    allowed = NOISE_SHARE * np.sqrt(np.mean(piece.tau**2, axis=1))
+    noise = inertia * first_guess(piece.theta, piece.tau).theta * np.sqrt(0.4 * piece.dt) * (2 * np.pi) ** 2
+    sharpest = (allowed / np.maximum(noise, 1e-300)) ** 0.4
+    return float(np.clip(sharpest.min(), LOWEST, min(HIGHEST, 0.1 / piece.dt)))
+
+
+START_KEY = b"start_ns"
+ROWS = 1 << 17
+
+
+def write_columns(path: Path, blocks: Iterable[Mapping[str, FloatArray]], start_ns: Sequence[int]) -> None:
+    """Write blocks of flat columns as one Parquet file, with each log's first stamp in its metadata."""
+    import pyarrow
+    import pyarrow.parquet
+
+    writer: pyarrow.parquet.ParquetWriter | None = None
+    try:
+        for block in blocks:
+            table = pyarrow.table(dict(block))
+            if writer is None:
+                schema = table.schema.with_metadata({START_KEY: json.dumps(list(start_ns))})
+                # floats of an estimate hardly ever repeat: a dictionary would only cost time
+                writer = pyarrow.parquet.ParquetWriter(path, schema, compression="zstd", use_dictionary=False)
+            writer.write_table(table.cast(writer.schema))
+    finally:
+        if writer is not None:
+            writer.close()
+
+
+def series_blocks(series: Iterable[Series], names: Sequence[str]) -> Iterator[dict[str, FloatArray]]:
+    """Windows of estimates gathered into blocks of columns, `t` first; a window's values are (s, n)."""
+    gathered: list[Series] = []
+    for window in series:
+        gathered.append(window)
+        if sum(part.t.size for part in gathered) >= ROWS:
+            yield _columns(gathered, names)
+            gathered = []
+    if gathered:
+        yield _columns(gathered, names)
+
+
+def _columns(windows: Sequence[Series], names: Sequence[str]) -> dict[str, FloatArray]:
+    values = np.concatenate([window.values for window in windows], axis=1)
+    return {"t": np.concatenate([window.t for window in windows]), **dict(zip(names, values, strict=True))}
+
+
+def information_blocks(fit: Fit, durations: Sequence[float]) -> Iterator[dict[str, FloatArray]]:
+    """Information on each shared parameter by second of each log, in 1 / unit²."""
+    for number, (log, duration) in enumerate(zip(fit.logs, durations, strict=True)):
+        jacobian = fit.shared.jacobian(fit.values, log.loaded)
+        gains = np.einsum("ap,bac,cp->pb", jacobian, log.S, jacobian, optimize=True)
+        t = np.arange(gains.shape[1]) * duration / gains.shape[1]
+        second = np.floor(t)
+        starts = np.flatnonzero(np.diff(second, prepend=-1.0))
+        summed = np.add.reduceat(gains, starts, axis=1)
+        yield {
+            "log": np.full(starts.size, number, dtype=np.int32),
+            "t": second[starts],
+            **dict(zip(fit.names, summed, strict=True)),
+        }
+
+
+def write_fit_series(folder: Path, fit: Fit, logs: Sequence[LogSource], settings: Settings) -> None:
+    """Write `torque.parquet` and `information.parquet` of a fit."""
+    summaries, starts = [log.summary() for log in logs], [log.start_ns for log in logs]
+    shifts = [torque_shift(settings, fit, 1 / summary.rate) for summary in summaries]
+    coefficients: dict[str, FloatArray] = {role: torque_coefficients(fit, role) for role in {log.role for log in logs}}
+    torques = torque_blocks(logs, fit.shared.model, coefficients, shifts)
+    write_columns(folder / "torque.parquet", torques, starts)
+    durations = [summary.duration for summary in summaries]
+    write_columns(folder / "information.parquet", information_blocks(fit, durations), starts)
+
+
+def torque_coefficients(fit: Fit, role: str) -> FloatArray:
+    """Coefficients of the model's columns for a log of that role."""
+    return fit.shared.coefficients(fit.values, role == "loaded")[: len(fit.shared.model.names)]
+
+
+def torque_shift(settings: Settings, fit: Fit, dt: float) -> float:
+    """Time in s after which a logged torque acts, with the delay of the fit where it has one."""
+    found = float(fit.values[fit.names.index("delay")]) if "delay" in fit.names else None
+    return settings.torque_shift(dt, found)

@@ -1,0 +1,294 @@
+"""What an estimator found, and the result made of it.
+
+A fit as a result holds it: estimates with intervals, Table 4's rows, diagnostics, warnings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import PurePath
+
+import numpy as np
+
+from algid import __version__, results
+from algid.arm import CONSTANT_NAMES, FloatArray
+from algid.estimators.diagnostics import broken_bounds, payload_distance, term_worths
+from algid.estimators.fit import Fit
+from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
+from algid.estimators.prediction import PredictionFilter, PredictionScore, cross_validate, score
+from algid.identification.series import torque_coefficients, torque_shift
+from algid.identification.source import LogSource
+from algid.log import Truth
+from algid.model import UNITS
+from algid.results import Estimate, Result, Status
+from algid.settings import Settings
+from algid.table4 import LOADED_ROWS, UNLOADED_ROWS, finite, paper_errors, table4, true_parameters, true_rows
+from algid.table4 import UNITS as TABLE_UNITS
+
+NAMED = 3  # logs that a warning names beside the first
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """Estimates by name, Table 4's rows with their standard deviations, and what else the estimator knows."""
+
+    parameters: dict[str, Estimate]
+    loaded: dict[str, Estimate]
+    payload: dict[str, Estimate]
+    rows: Mapping[str, float]
+    estimator: str | None = None
+    """Whose estimates these are, where not those of the estimator asked for."""
+    stds: Mapping[str, float] = field(default_factory=dict)
+    paper_payload: dict[str, Estimate] = field(default_factory=dict)
+    fit: results.Fit | None = None
+    warnings: list[str] = field(default_factory=list)
+
+
+def result_of(outcome: Outcome, settings: Settings, logs: Sequence[LogSource]) -> Result:
+    """The result of `outcome` on `logs`, the first log first."""
+    truth, payload = _truth(logs)
+    first, *others = [log.summary() for log in logs]
+    return Result(
+        version=__version__,
+        estimator=outcome.estimator or settings.estimator,
+        parameters=outcome.parameters,
+        loaded=outcome.loaded,
+        payload=outcome.payload,
+        paper_payload=outcome.paper_payload,
+        table4=table4(outcome.rows, outcome.stds, true_rows(truth, payload), paper_errors(truth)),
+        truth=true_parameters(truth, payload),
+        fit=outcome.fit,
+        settings=settings.as_json(),
+        log=first,
+        more_logs=others,
+        data_lost=any(notice.lossy for log in logs for notice in log.notices),
+        warnings=[*_notices(logs), *_contradictions(logs), *outcome.warnings],
+    )
+
+
+def _truth(logs: Sequence[LogSource]) -> tuple[Truth | None, float | None]:
+    """The truth behind the first log, and the payload of the first loaded one in kg."""
+    first = logs[0].origin.truth
+    loaded = [log.origin.truth for log in logs if log.role == "loaded"]
+    return first, loaded[0].payload if loaded and loaded[0] is not None else None
+
+
+def _notices(logs: Sequence[LogSource]) -> list[str]:
+    """What was noticed in the logs: each loss, and of the rest the first of each kind."""
+    told = [f"{log.name}: {notice.text}" for log in logs for notice in log.notices if notice.lossy]
+    alike: dict[str, list[tuple[str, str]]] = {}
+    for log in logs:
+        for notice in log.notices:
+            if not notice.lossy:
+                alike.setdefault(notice.code, []).append((log.name, notice.text))
+    return [*told, *(_one_for_all(found) for found in alike.values())]
+
+
+def _one_for_all(found: Sequence[tuple[str, str]]) -> str:
+    (name, text), *others = found
+    names = list(dict.fromkeys(PurePath(other).name for other, _ in others if other != name))
+    if not names:
+        return f"{name}: {text}" + (f" (and {len(others)} more of the kind)" if others else "")
+    more = ", …" if len(names) > NAMED else ""
+    return (
+        f"{name}: {text}; likewise in {len(names)} other log{'s' * (len(names) > 1)} ({', '.join(names[:NAMED])}{more})"
+    )
+
+
+def _contradictions(logs: Sequence[LogSource]) -> list[str]:
+    """Synthetic logs that say they come from different arms."""
+    first = logs[0].origin.truth
+    strangers = [log.name for log in logs if first and log.origin.truth and log.origin.truth.arm != first.arm]
+    return [f"{name}: its metadata name another arm than {logs[0].name}" for name in strangers]
+
+
+FAR_APART = 5.0  # standard deviations past which two logs are not of one arm
+
+
+def outcome_of(fit: Fit, unloaded: Sequence[LogSource], loaded: Sequence[LogSource], settings: Settings) -> Outcome:
+    """The fit as a result holds it."""
+    found = _estimates(fit)
+    payload = {name: found.pop(name) for name in PAYLOAD_PARAMETERS if name in found}
+    rows, stds = table_rows(fit)
+    summary = fit_summary(fit, unloaded, loaded, settings)
+    units = {**TABLE_UNITS, "l1": "m", "l2": "m"}
+    return Outcome(
+        parameters=found,
+        loaded={name: _row_estimate(rows, stds, name, fit, units[name]) for name in LOADED_ROWS} if loaded else {},
+        payload=payload,
+        rows=rows,
+        estimator=fit.estimator,
+        stds=stds,
+        fit=summary,
+        warnings=[*fit_warnings(fit), *_not_crossed(summary, settings)],
+    )
+
+
+def _not_crossed(summary: results.Fit, settings: Settings) -> Iterator[str]:
+    if settings.cross_validate and summary.cross_validation is None:
+        yield "no cross-validation: a log is too short to be fitted, or to be judged"
+
+
+def _row_estimate(rows: dict[str, float], stds: dict[str, float], name: str, fit: Fit, unit: str) -> Estimate:
+    if name not in rows:
+        return estimate(np.nan, np.inf, (-np.inf, np.inf), unit, "NOT_IDENTIFIABLE")
+    half = fit.quantile * stds[name]
+    status = "OK" if fit.converged else "NOT_CONVERGED"
+    return estimate(rows[name], stds[name], (rows[name] - half, rows[name] + half), unit, status)
+
+
+def _estimates(fit: Fit) -> dict[str, Estimate]:
+    """The shared parameters by name; a constant that the model has no column for is not identifiable."""
+    found = {
+        name: estimate(value, std, (low, high), UNITS[name], status)
+        for name, value, std, (low, high), status in zip(
+            fit.names, fit.values, fit.std, fit.ci95, fit.status, strict=True
+        )
+    }
+    absent = {
+        name: estimate(np.nan, np.inf, (-np.inf, np.inf), UNITS[name], "NOT_IDENTIFIABLE") for name in CONSTANT_NAMES
+    }
+    return {**absent, **found}
+
+
+def estimate(value: float, std: float, interval: tuple[float, float], unit: str, status: str) -> Estimate:
+    """One estimate; without a value where the logs do not determine it, its interval then unbounded."""
+    determined = status != "NOT_IDENTIFIABLE"
+    return Estimate(
+        estimate=finite(value) if determined else None,
+        std=finite(std) if determined else None,
+        ci95=(finite(interval[0]), finite(interval[1])) if determined else (None, None),
+        unit=unit,
+        status=Status(status),
+    )
+
+
+def table_rows(fit: Fit) -> tuple[dict[str, float], dict[str, float]]:
+    """Table 4's rows and their standard deviations; none of a parameter that is not identifiable."""
+    rows: dict[str, float] = {}
+    stds: dict[str, float] = {}
+    lost = {name for name, status in zip(fit.names, fit.status, strict=True) if status == "NOT_IDENTIFIABLE"}
+    for loaded in (False, True):
+        if loaded and not fit.shared.payload:
+            continue
+        jacobian = fit.shared.jacobian(fit.values, loaded)
+        place = {name: number for number, name in enumerate(fit.shared.log_names)}
+        weights = _row_weights(place, LOADED_ROWS if loaded else UNLOADED_ROWS)
+        coefficients = fit.shared.coefficients(fit.values, loaded)
+        for name, weight in weights.items():
+            spread = fit.spread(weight @ jacobian)
+            if np.isfinite(spread) and name not in lost:
+                rows[name], stds[name] = float(weight @ coefficients), spread
+    if fit.shared.payload and np.isfinite(fit.std[fit.names.index("m_p")]):
+        rows["m_p"] = float(fit.values[fit.names.index("m_p")])
+        stds["m_p"] = float(fit.std[fit.names.index("m_p")])
+    return rows, stds
+
+
+def _row_weights(place: dict[str, int], names: Sequence[str]) -> dict[str, FloatArray]:
+    """Each row of Table 4 as a sum of a log's coefficients, in the order that both halves of the table share."""
+    sums = (("k5", "k3"), ("k1",), ("k3",), ("k6",), ("k4",), ("k2",))
+    ordered = sums if len(names) == len(sums) else tuple(constant for constant in sums if constant != ("k6",))
+    weights: dict[str, FloatArray] = {}
+    for name, constants in zip(names, ordered, strict=True):
+        if all(constant in place for constant in constants):
+            weight = np.zeros(len(place))
+            weight[[place[constant] for constant in constants]] = 1.0
+            weights[name] = weight
+    return weights
+
+
+def fit_summary(
+    fit: Fit, unloaded: Sequence[LogSource], loaded: Sequence[LogSource], settings: Settings
+) -> results.Fit:
+    """The statistical part of a result."""
+    logs = [*unloaded, *loaded]
+    shift = torque_shift(settings, fit, 1 / logs[0].summary().rate)
+    worths = term_worths(fit)
+    crossed = None
+    if settings.cross_validate:
+        crossed = cross_validate(fit, [log.segments for log in unloaded], [log.segments for log in loaded], shift)
+    return results.Fit(
+        noise=_noise(fit),
+        covariance_names=list(fit.names),
+        covariance=[[finite(value) for value in row] for row in _open_covariance(fit)],
+        intervals=fit.intervals,
+        iterations=fit.iterations,
+        converged=fit.converged,
+        whiteness=_whiteness(fit),
+        unidentifiable=list(fit.unidentifiable),
+        terms=[results.TermCriterion(term=w.term, delta_bic=w.delta_bic, kept=w.earned) for w in worths],
+        broken_bounds=[
+            results.Bound(bound=b.bound, value=b.value, distance_sigma=b.distance) for b in broken_bounds(fit)
+        ],
+        residual=prediction(_residual(fit, logs, settings)),
+        cross_validation=None if crossed is None else prediction(crossed),
+    )
+
+
+def _open_covariance(fit: Fit) -> FloatArray:
+    """The covariance, infinite where a parameter is not identifiable."""
+    covariance = fit.covariance.copy()
+    unknown = np.isinf(fit.std)
+    covariance[unknown, :] = np.inf
+    covariance[:, unknown] = np.inf
+    return covariance
+
+
+def _noise(fit: Fit) -> dict[str, float]:
+    if not fit.noise:
+        return {}
+    theta = np.sqrt(np.mean([level.theta**2 for level in fit.noise], axis=0))
+    tau = np.sqrt(np.mean([level.tau**2 for level in fit.noise], axis=0))
+    names = ("theta1", "theta2", "tau1", "tau2")
+    return {name: float(value) for name, value in zip(names, (*theta, *tau), strict=True)}
+
+
+def _whiteness(fit: Fit) -> dict[str, results.Whiteness]:
+    if fit.whiteness is None:
+        return {}
+    return {
+        f"tau{joint + 1}": results.Whiteness(
+            white=fit.whiteness.joint_white[joint],
+            p_value=finite(float(fit.whiteness.p_value[joint])),
+            lag1_correlation=float(fit.whiteness.lag1[joint]),
+        )
+        for joint in range(2)
+    }
+
+
+def _residual(fit: Fit, logs: Sequence[LogSource], settings: Settings) -> PredictionScore:
+    total = PredictionScore()
+    for log in logs:
+        c = torque_coefficients(fit, log.role)
+        gathered, shift = log.prediction, torque_shift(settings, fit, 1 / log.summary().rate)
+        total += gathered.score(c) if gathered else score(fit.shared.model, c, log.segments(), shift)
+    return total
+
+
+def prediction(found: PredictionScore) -> results.TorquePrediction | None:
+    """As the result holds it; None where every log was too short to judge."""
+    if found.count == 0:
+        return None
+    rmse, nrmse, r2 = ([float(value) for value in pair] for pair in (found.rmse, found.nrmse, found.r2))
+    return results.TorquePrediction(
+        rmse=(rmse[0], rmse[1]), nrmse=(nrmse[0], nrmse[1]), r2=(r2[0], r2[1]), filter=str(PredictionFilter())
+    )
+
+
+def fit_warnings(fit: Fit) -> Iterator[str]:
+    """What a user should know about a fit."""
+    if fit.note:
+        yield fit.note
+    if not fit.converged:
+        yield "the refined estimator did not converge; the weak estimate is reported instead"
+    yield from fit.unidentifiable
+    if fit.shared.model.gravity == 0:
+        yield "without gravity k2 and k4 have no effect and the payload has no weight: give --l1 or --l2 to tell it"
+    for bound in broken_bounds(fit):
+        distance = "" if bound.distance is None else f", {bound.distance:.1f} standard deviations beyond"
+        yield f"the estimates break {bound.bound}: {bound.value:.4g}{distance}"
+    apart = payload_distance(fit)
+    if apart is not None and apart > FAR_APART:
+        yield f"the loaded and the unloaded logs are {apart:.1f} standard deviations from belonging to one arm"

@@ -1,0 +1,74 @@
+"""How well a result predicts the torque of logs that it was not made from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from algid.arm import FloatArray, payload_constants, with_payload
+from algid.errors import ResultError
+from algid.estimators.prediction import PredictionScore, score
+from algid.identification.by_likelihood import model_of
+from algid.identification.source import LogSource, Role
+from algid.identification.summary import prediction
+from algid.model import Model
+from algid.results import Result, TorquePrediction
+from algid.settings import Settings
+
+
+@dataclass(frozen=True)
+class Validation:
+    """The prediction of each log, None where it is too short to judge, and of all together."""
+
+    logs: dict[str, TorquePrediction | None]
+    total: TorquePrediction | None
+
+
+def validate(result: Result, logs: Sequence[LogSource], name: str) -> Validation:
+    """Predict the torque of `logs` by the estimates of `result`, whose file is called `name`.
+
+    Raises
+    ------
+    ResultError
+        If a parameter that the prediction needs has no estimate.
+    """
+    settings = settings_of(result)
+    model = model_of(settings)
+    found: dict[str, TorquePrediction | None] = {}
+    total, delay = PredictionScore(), result.parameters.get("delay")
+    for log in logs:
+        shift = settings.torque_shift(1 / log.summary().rate, None if delay is None else delay.estimate)
+        one = score(model, torque_constants(result, model, log.role, name), log.segments(), shift)
+        found[log.name] = prediction(one)
+        total += one
+    return Validation(found, prediction(total))
+
+
+def settings_of(result: Result) -> Settings:
+    """The settings behind a result, as far as they decide its model."""
+    names = ("gravity", "friction", "torque_offset", "rotor_inertia", "torque_hold", "delay")
+    return Settings(**{name: result.settings[name] for name in names if name in result.settings})
+
+
+def torque_constants(result: Result, model: Model, role: Role, file: str) -> FloatArray:
+    """Coefficients of the model's columns for a log of that role, from the result of that file.
+
+    Raises
+    ------
+    ResultError
+        If one of them has no estimate.
+    """
+    values = {name: found.estimate for name, found in {**result.parameters, **result.payload}.items()}
+    wanted = [*model.names, *(("m_p", "l1", "l2") if role == "loaded" else ())]
+    values |= {name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None}
+    missing = next((name for name in wanted if values.get(name) is None), None)
+    if missing is not None:
+        raise ResultError(f"{file}: the result has no {missing}; identify it from logs that tell it")
+    known = {name: float(value) for name, value in values.items() if value is not None}
+    if role == "loaded":
+        z = payload_constants(known["m_p"], known["l1"], known["l2"], model.gravity)
+        k = with_payload(np.array([known.get(f"k{number}", 0.0) for number in range(1, 8)]), z)
+        known |= {f"k{number + 1}": float(value) for number, value in enumerate(k)}
+    return np.array([known[name] for name in model.names])

@@ -1,0 +1,106 @@
+"""Segments with the joint velocities that the settings ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.errors import LogError
+from algid.identification.source import LogSource
+from algid.settings import Settings
+from algid.signals.filters import correlate, differentiator, half_length
+from algid.signals.observers import LuenbergerObserver
+from algid.signals.segments import Segment, append
+
+
+def with_velocities(source: LogSource, settings: Settings, *, luenberger: bool) -> Iterator[Segment]:
+    """Segments of a log with measured velocities, the paper's observer's, or the zero-phase differentiator's.
+
+    Raises
+    ------
+    LogError
+        If measured velocities are asked for and the log has none.
+    """
+    if settings.velocity == "measured":
+        return _measured(source)
+    if luenberger:
+        return _observed(source, settings)
+    return _differentiated(source, settings)
+
+
+def _measured(source: LogSource) -> Iterator[Segment]:
+    for segment in source.segments():
+        if segment.omega is None:
+            raise LogError(
+                f"{source.name}: expected velocities omega1, omega2 for --velocity measured, found none; "
+                "leave the flag out to observe them"
+            )
+        yield segment
+
+
+def _observed(source: LogSource, settings: Settings) -> Iterator[Segment]:
+    observer: LuenbergerObserver | None = None
+    for segment in source.segments():
+        observer = observer or LuenbergerObserver(segment.dt, settings.poles)
+        if not segment.continues:
+            observer.reset()
+        yield replace(segment, omega=observer.velocities(segment.theta))
+
+
+def _differentiated(source: LogSource, settings: Settings) -> Iterator[Segment]:
+    filters: _Differentiator | None = None
+    for segment in source.segments():
+        if filters is not None and not segment.continues:
+            yield from filters.finish()
+            filters = None
+        filters = filters or _Differentiator(segment.dt, settings.bandwidth)
+        yield from filters.push(segment)
+    if filters is not None:
+        yield from filters.finish()
+
+
+class _Differentiator:
+    """The zero-phase differentiator on one stretch that comes in parts; its ends go on by point reflection."""
+
+    def __init__(self, dt: float, bandwidth: float) -> None:
+        self._kernel = differentiator(dt, bandwidth)
+        self._reach = half_length(dt, bandwidth)
+        self._angles: FloatArray | None = None  # what the next outputs rest on
+        self._waiting: Segment | None = None  # samples whose velocity is still open
+
+    def push(self, segment: Segment) -> Iterator[Segment]:
+        """Take in a part; give out the samples whose neighbourhood is now complete."""
+        self._waiting = segment if self._waiting is None else append(self._waiting, segment)
+        if self._angles is None:
+            if len(self._waiting) <= self._reach:
+                return
+            head = self._waiting.theta
+            self._angles = np.concatenate([2 * head[:, :1] - head[:, self._reach : 0 : -1], head], axis=1)
+        else:
+            self._angles = np.concatenate([self._angles, segment.theta], axis=1)
+        yield from self._ready()
+
+    def finish(self) -> Iterator[Segment]:
+        """Give out the rest, at the end of the stretch."""
+        assert self._waiting is not None
+        if self._angles is None:
+            slope = np.gradient(self._waiting.theta, self._waiting.dt, axis=1) if len(self._waiting) > 1 else None
+            yield replace(self._waiting, omega=np.zeros_like(self._waiting.theta) if slope is None else slope)
+            return
+        tail = self._angles[:, -self._reach - 1 :]
+        self._angles = np.concatenate([self._angles, 2 * tail[:, -1:] - tail[:, -2::-1]], axis=1)
+        yield from self._ready()
+
+    def _ready(self) -> Iterator[Segment]:
+        assert self._angles is not None
+        assert self._waiting is not None
+        if self._angles.shape[1] <= 2 * self._reach:
+            return
+        omega = correlate(self._angles, self._kernel)
+        count = omega.shape[1]
+        yield replace(self._waiting.part(0, count), omega=omega)
+        self._waiting = self._waiting.part(count, len(self._waiting))
+        self._angles = self._angles[:, -2 * self._reach :]

@@ -1,0 +1,317 @@
+"""ROS 2 message definitions as recorders store them: one text, every nested type behind a line of ``=``.
+
+ROS 2 message definitions in IDL, as rosidl makes them: modules, structures, sequences, arrays, typedefs.
+
+What rosidl never makes (unions, enumerations, optional members, lists of lists) is refused.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+PRIMITIVES = {
+    "bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
+    "int32": "i4", "uint32": "u4", "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8",
+}  # fmt: skip
+_FIELD = re.compile(
+    r"^(?P<type>[A-Za-z][\w/]*)(?P<bound><=\d+)?(?P<array>\[(?P<size>(<=)?\d*)\])?\s+(?P<name>[A-Za-z]\w*)\s*(?P<rest>.*)$"
+)
+_MOST_FIELDS = 4096
+_DEEPEST = 32
+
+
+class DefinitionError(Exception):
+    """A definition that cannot be understood."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field: the name of its type and how often it stands there (None: once, -1: a sequence)."""
+
+    name: str
+    type: str
+    count: int | None
+
+
+Types = dict[str, tuple[Field, ...]]
+
+
+def parse_msg(root: str, text: str) -> Types:
+    """Fields by type name, `root` under its full name.
+
+    Raises
+    ------
+    DefinitionError
+        If a line cannot be read, a nested type is missing, or types contain each other.
+    """
+    sections = re.split(r"^=+[ \t]*\r?$", text, flags=re.MULTILINE)
+    types = {root: _fields(root, sections[0])}
+    for section in sections[1:]:
+        head, _, body = section.strip().partition("\n")
+        found = re.match(r"^MSG:\s*(\S+)$", head.strip())
+        if found is None:
+            raise DefinitionError(f"{root}: expected 'MSG: package/Type', found {head[:60]!r}")
+        types[found[1]] = _fields(found[1], body)
+    resolved = {name: tuple(_resolved(field, name, types) for field in fields) for name, fields in types.items()}
+    check_depth(root, resolved)
+    return resolved
+
+
+def _fields(name: str, text: str) -> tuple[Field, ...]:
+    fields = [found for line in text.splitlines() if (found := _field(name, line)) is not None]
+    if len(fields) > _MOST_FIELDS:
+        raise DefinitionError(f"{name}: {len(fields)} fields")
+    # an empty structure takes one byte, since IDL has none
+    return tuple(fields) or (Field("structure_needs_at_least_one_member", "uint8", None),)
+
+
+def _field(name: str, line: str) -> Field | None:
+    text = line.split("#", 1)[0].strip()
+    if not text:
+        return None
+    found = _FIELD.match(text)
+    if found is None:
+        raise DefinitionError(f"{name}: cannot read the line {line.strip()[:60]!r}")
+    if found["rest"].startswith("="):
+        return None  # a constant
+    size = found["size"]
+    count = None if found["array"] is None else int(size) if size.isdigit() else -1
+    return Field(found["name"], found["type"], count)
+
+
+def _resolved(field: Field, owner: str, types: Types) -> Field:
+    if field.type in PRIMITIVES or field.type in ("string", "wstring"):
+        return field
+    package = owner.split("/")[0]
+    short = {
+        "time": "builtin_interfaces/Time",
+        "duration": "builtin_interfaces/Duration",
+        "Header": "std_msgs/Header",
+    }
+    wanted = field.type if "/" in field.type else f"{package}/{field.type}"
+    for name in (wanted, wanted.replace("/msg/", "/"), _with_msg(wanted), short.get(field.type, wanted)):
+        if name in types:
+            return Field(field.name, name, field.count)
+    raise DefinitionError(f"{owner}: the type {field.type!r} of {field.name!r} is not defined")
+
+
+def _with_msg(name: str) -> str:
+    package, _, rest = name.partition("/")
+    return f"{package}/msg/{rest}"
+
+
+def check_depth(root: str, types: Types) -> None:
+    """Refuse types that contain each other, or go too deep.
+
+    Raises
+    ------
+    DefinitionError
+    """
+    _height(root, types, {}, 0)
+
+
+def _height(name: str, types: Types, known: dict[str, int], above: int) -> int:
+    """Types below one another under `name`; each is looked at once, however often it is used."""
+    if name not in known and above <= _DEEPEST:
+        below = (_height(field.type, types, known, above + 1) for field in types[name] if field.type in types)
+        known[name] = 1 + max(below, default=0)
+    if above + known.get(name, 1) > _DEEPEST:
+        raise DefinitionError(f"{name}: types nested more than {_DEEPEST} deep")
+    return known[name]
+
+
+_SECTION = re.compile(r"^=+[ \t]*\r?\nIDL:[^\n]*\n", re.MULTILINE)
+_TOKEN = re.compile(
+    r'\s+|//[^\n]*|/\*.*?\*/|\#[^\n]*|(?P<token>"(?:[^"\\]|\\.)*"|(?:::)?[A-Za-z_]\w*(?:::\w+)*|\d[\w.]*|.)',
+    re.DOTALL,
+)
+_NUMBERS = {
+    "boolean": "bool", "octet": "byte", "short": "int16", "unsigned short": "uint16", "long": "int32",
+    "unsigned long": "uint32", "long long": "int64", "unsigned long long": "uint64", "float": "float32",
+    "double": "float64",
+}  # fmt: skip
+_LONGER = frozenset(
+    " ".join(words[: size + 1]) for words in (name.split() for name in _NUMBERS) for size in range(1, len(words))
+)
+"""Names of numbers that go on behind a blank: ``unsigned long`` and ``unsigned long long``."""
+_TEXTS = ("string", "wstring")
+_DEEPEST_IDL = 32
+
+
+def parse_idl(root: str, text: str) -> Types:
+    """Fields by type name, `root` (``package/msg/Type``) among them.
+
+    Raises
+    ------
+    DefinitionError
+        If the text cannot be read, a type is missing, or types contain each other.
+    """
+    found = _Definitions()
+    for section in _SECTION.split(text):
+        _Parser(root, [*_tokens(section)], found).definitions(())
+    if root not in found.structures:
+        raise DefinitionError(f"{root}: not defined; found {', '.join([*found.structures][:8]) or 'no structure'}")
+    types = {
+        owner: tuple(found.resolved(owner, name, spec) for name, spec in members)
+        for owner, members in found.structures.items()
+    }
+    check_depth(root, types)
+    return types
+
+
+def _tokens(text: str) -> Iterator[str]:
+    return (found["token"] for found in _TOKEN.finditer(text) if found["token"])
+
+
+@dataclass(frozen=True)
+class _Spec:
+    """A type as the text names it, from within a scope; its count as in `Field`."""
+
+    name: str
+    scope: tuple[str, ...]
+    count: int | None = None
+
+    def candidates(self) -> list[str]:
+        """Names it may mean, parts joined by ``/``, the innermost first."""
+        name = self.name.removeprefix("::").replace("::", "/")
+        outermost = len(self.scope) if self.name.startswith("::") else 0
+        return ["/".join((*self.scope[: len(self.scope) - up], name)) for up in range(outermost, len(self.scope) + 1)]
+
+
+@dataclass
+class _Definitions:
+    """Members of structures, and typedefs, by name."""
+
+    structures: dict[str, list[tuple[str, _Spec]]] = field(default_factory=dict)
+    typedefs: dict[str, _Spec] = field(default_factory=dict)
+
+    def resolved(self, owner: str, name: str, spec: _Spec) -> Field:
+        """The member `name` of `owner` with its type's full name."""
+        for _ in range(_DEEPEST_IDL):
+            if spec.name in PRIMITIVES or spec.name in _TEXTS:
+                return Field(name, spec.name, spec.count)
+            meant = next((one for one in spec.candidates() if one in self.structures or one in self.typedefs), None)
+            if meant is None:
+                raise DefinitionError(f"{owner}: the type {spec.name!r} of {name!r} is not defined")
+            if meant in self.structures:
+                return Field(name, meant, spec.count)
+            alias = self.typedefs[meant]
+            if alias.count is not None and spec.count is not None:
+                raise DefinitionError(f"{owner}: {name!r} is a list of lists")
+            spec = _Spec(alias.name, alias.scope, alias.count if spec.count is None else spec.count)
+        raise DefinitionError(f"{owner}: typedefs of {name!r} nested more than {_DEEPEST_IDL} deep")
+
+
+@dataclass
+class _Parser:
+    """Reads the tokens of one section."""
+
+    root: str
+    tokens: list[str]
+    found: _Definitions
+    place: int = 0
+
+    def definitions(self, scope: tuple[str, ...]) -> None:
+        """Definitions up to the end, or to the brace that closes a module."""
+        if len(scope) > _DEEPEST_IDL:
+            raise DefinitionError(f"{self.root}: modules nested more than {_DEEPEST_IDL} deep")
+        while self.place < len(self.tokens) and not (scope and self.tokens[self.place] == "}"):
+            self._annotations()
+            self._definition(self._next(), scope)
+
+    def _definition(self, kind: str, scope: tuple[str, ...]) -> None:
+        if kind == "module":
+            name = self._next()
+            self._expect("{")
+            self.definitions((*scope, name))
+            self._expect("}", ";")
+        elif kind == "struct":
+            self._structure(scope)
+        elif kind == "typedef":
+            self.found.typedefs |= {"/".join((*scope, name)): spec for name, spec in self._declared(scope)}
+        elif kind == "const":
+            while self._next() != ";":
+                pass
+        else:
+            raise DefinitionError(f"{self.root}: {kind[:40]!r} where module, struct, typedef or const was expected")
+
+    def _structure(self, scope: tuple[str, ...]) -> None:
+        name, members = self._next(), []
+        self._expect("{")
+        while self.tokens[self.place : self.place + 1] != ["}"]:
+            self._annotations()
+            members += self._declared(scope)
+        self._expect("}", ";")
+        if not members:  # rosidl gives an empty message one byte
+            raise DefinitionError(f"{self.root}: the structure {name[:40]!r} has no member")
+        self.found.structures["/".join((*scope, name))] = members
+
+    def _declared(self, scope: tuple[str, ...]) -> list[tuple[str, _Spec]]:
+        """A type and the names declared to be of it."""
+        kind, listed = self._type()
+        declared = []
+        while True:
+            name, count, token = self._next(), listed, self._next()
+            if token == "[":
+                if count is not None:
+                    raise DefinitionError(f"{self.root}: {name!r} is a list of lists")
+                count = self._number("]")
+                token = self._next()
+            declared.append((name, _Spec(kind, scope, count)))
+            if token == ";":
+                return declared
+            if token != ",":
+                raise DefinitionError(f"{self.root}: {token[:40]!r} behind {name!r}; expected ',' or ';'")
+
+    def _type(self) -> tuple[str, int | None]:
+        """The name of a type, and -1 for a sequence of it."""
+        name = self._next()
+        if name == "sequence":
+            self._expect("<")
+            inner, listed = self._type()
+            if listed is not None:
+                raise DefinitionError(f"{self.root}: a sequence of sequences")
+            if self._taken(","):
+                self._number(">")
+            else:
+                self._expect(">")
+            return inner, -1
+        if name in _TEXTS and self._taken("<"):
+            self._number(">")
+        while f"{name} {self.tokens[self.place] if self.place < len(self.tokens) else ''}" in _LONGER:
+            name = f"{name} {self._next()}"
+        return _NUMBERS.get(name, name), None
+
+    def _annotations(self) -> None:
+        """Skip what is noted of the next definition."""
+        while self._taken("@"):
+            if (name := self._next()) == "optional":
+                raise DefinitionError(f"{self.root}: @{name} members are not what ROS 2 writes")
+            depth = 1 if self._taken("(") else 0
+            while depth:
+                depth += {"(": 1, ")": -1}.get(self._next(), 0)
+
+    def _number(self, end: str) -> int:
+        token = self._next()
+        if not token.isdecimal() or int(token[:10]) == 0:
+            raise DefinitionError(f"{self.root}: {token[:40]!r} where a length was expected")
+        self._expect(end)
+        return int(token[:10])
+
+    def _taken(self, token: str) -> bool:
+        taken = self.tokens[self.place : self.place + 1] == [token]
+        self.place += taken
+        return taken
+
+    def _expect(self, *tokens: str) -> None:
+        for token in tokens:
+            if (found := self._next()) != token:
+                raise DefinitionError(f"{self.root}: {found[:40]!r} where {token!r} was expected")
+
+    def _next(self) -> str:
+        if self.place == len(self.tokens):
+            raise DefinitionError(f"{self.root}: the definition breaks off")
+        self.place += 1
+        return self.tokens[self.place - 1]

@@ -1,0 +1,109 @@
+"""JSON messages: parsed one by one, since their numbers stand at no fixed place."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from algid.readers.mcap.columnar import MOST_PARTS, Fields, MisfitError, Numbers, Shape
+from algid.readers.mcap.messages import Messages
+
+
+def walk(payload: bytes) -> Shape:
+    """The shape of one message: the paths of its numbers and lists of strings, without places.
+
+    Raises
+    ------
+    MisfitError
+        If the message is no JSON object.
+    """
+    shape = Shape()
+    _walk(_object(payload), "", shape)
+    return shape
+
+
+def _object(payload: bytes) -> dict[str, Any]:
+    try:
+        found = json.loads(payload)
+    except (ValueError, RecursionError) as error:
+        raise MisfitError(f"a message that is no JSON ({type(error).__name__})") from error
+    if not isinstance(found, dict):
+        raise MisfitError("a JSON message that is no object")
+    return found
+
+
+def _walk(value: Any, path: str, shape: Shape) -> None:
+    if len(shape.numbers) > MOST_PARTS:
+        raise MisfitError(f"a message of more than {MOST_PARTS} parts")
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            _walk(inner, f"{path}.{key}" if path else str(key), shape)
+    elif isinstance(value, list):
+        if value and all(isinstance(one, str) for one in value):
+            shape.texts[path] = tuple(value)
+        for index, inner in enumerate(value[:MOST_PARTS]):
+            _walk(inner, f"{path}[{index}]", shape)
+    elif isinstance(value, (int, float)) and not isinstance(value, bool):
+        shape.numbers[path] = Numbers(0, "json")
+
+
+@dataclass
+class JsonDecoder:
+    """Reads the wanted numbers out of JSON messages: the `Decoder` of this encoding."""
+
+    wanted: Mapping[str, str]
+    needed: frozenset[str]
+    skipped: int = 0
+
+    def columns(self, messages: Messages) -> tuple[NDArray[np.bool_], Fields]:
+        """Which messages hold what is needed (N,), and the numbers of those, by name.
+
+        Raises
+        ------
+        MisfitError
+            If a message is no JSON object.
+        """
+        held = np.zeros(len(messages), np.bool_)
+        rows: list[list[Any]] = []
+        for row, (start, size) in enumerate(zip(messages.starts, messages.sizes, strict=True)):
+            found = _object(messages.content[start : start + size].tobytes())
+            values = [_value(found, path) for path in self.wanted.values()]
+            held[row] = all(
+                value is not None or name not in self.needed for name, value in zip(self.wanted, values, strict=True)
+            )
+            if held[row]:
+                rows.append(values)
+        self.skipped += int(held.size - np.count_nonzero(held))
+        return held, {name: _column([row[place] for row in rows]) for place, name in enumerate(self.wanted)}
+
+
+def _column(values: list[Any]) -> NDArray[np.generic]:
+    whole = bool(values) and all(isinstance(value, int) and abs(value) < 2**63 for value in values)
+    if whole:
+        return np.array(values, np.int64)
+    return np.array([np.nan if value is None else float(value) for value in values], np.float64)
+
+
+def _value(found: Any, path: str) -> Any:
+    """The number at a path as in `Shape.find`, or None."""
+    parent: Any = None
+    for part in re.findall(r"\[[^\]]*\]|[^.\[\]]+", path):
+        if not part.startswith("["):
+            parent, found = found, found.get(part) if isinstance(found, dict) else None
+            continue
+        index = _place(parent, part[1:-1])
+        if index is None and part[1:-1].isdigit():
+            index = int(part[1:-1])
+        found = found[index] if isinstance(found, list) and index is not None and index < len(found) else None
+    return found if isinstance(found, (int, float)) and not isinstance(found, bool) else None
+
+
+def _place(parent: Any, name: str) -> int | None:
+    lists = [one for one in parent.values() if isinstance(one, list)] if isinstance(parent, dict) else []
+    return next((one.index(name) for one in lists if name in one), None)

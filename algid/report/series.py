@@ -1,0 +1,305 @@
+"""What the figures need of a convergence series, gathered in one pass of bounded memory.
+
+What the figures need of `torque.parquet`, gathered in one pass of bounded memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from algid.arm import FloatArray
+from algid.progress import Told
+from algid.report.reduce import (
+    Block,
+    MinMax,
+    Share,
+    Thinned,
+    blocks,
+    broken_at_gaps,
+    bucket_size,
+    by_log,
+    columns_of,
+    row_count,
+)
+from algid.signals.filters import Spectrum, stretch_length
+
+EPSILON = 0.2  # s: the paper's ε
+WINDOW = 2.0  # s: after which the paper's integrals restart, unless its own settings say otherwise
+LARGEST_CONDITION = 1e10  # beyond, the paper's stages call a system singular
+SERIES_POINTS = 2_000
+STRETCHES = 400
+SAMPLES = 20_000
+MIDDLES = 500
+NOT_SERIES = ("t", "condition", "k7_condition")
+
+Series = tuple[FloatArray, FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class SeriesLog:
+    """Series by name: `lines` by their extremes, `samples` for their size, `middles` their running medians.
+
+    `singular` is the share of samples that have no estimate, after ε, because the system was singular;
+    `condition` is the condition number, infinite ones left out. `start`, `end` and `window` are in s.
+    """
+
+    start: float
+    end: float
+    window: float
+    coarse: bool
+    lines: dict[str, Series]
+    samples: dict[str, FloatArray]
+    middles: dict[str, Series]
+    singular: dict[str, Series]
+    condition: Series | None
+
+    @property
+    def windows(self) -> list[float]:
+        """When each window starts, in s."""
+        return [float(begin) for begin in np.arange(self.start, self.end, self.window)]
+
+    @property
+    def any_singular(self) -> bool:
+        """Whether any series has a singular stretch."""
+        return any(bool(share.any()) for _, share in self.singular.values())
+
+
+def read_series(path: Path, settings: Mapping[str, Any]) -> SeriesLog:
+    """Read `path`: a column ``t``, a column a series, perhaps ``condition``. Raises `ResultError`."""
+    columns = columns_of(path)
+    gathering = _SeriesGathering([name for name in columns if name not in NOT_SERIES], row_count(path), settings)
+    wanted = ["t", *gathering.names, *(name for name in ("condition", "k7_condition") if name in columns)]
+    for block in blocks(path, wanted):
+        gathering.take(block)
+    return gathering.result("condition" in columns)
+
+
+class _SeriesGathering:
+    def __init__(self, names: list[str], total: int, settings: Mapping[str, Any]) -> None:
+        self.names = names
+        self._total = total
+        self._window = _positive(settings.get("window"), WINDOW) if settings.get("estimator") == "paper" else WINDOW
+        self._start: float | None = None
+        self._end = 0.0
+        self._size = bucket_size(total, SERIES_POINTS)
+        self._lines = {name: MinMax(self._size) for name in names}
+        self._singular = {name: Share(max(total // STRETCHES, 1)) for name in names}
+        self._condition = MinMax(self._size)
+        self._samples = Thinned(total // SAMPLES)
+
+    def take(self, block: Block) -> None:
+        """Add the next block."""
+        t = block["t"]
+        self._start = float(t[0]) if self._start is None else self._start
+        self._end = float(t[-1])
+        since = t - self._start
+        # stamps are multiples of the period but for rounding, which must not move a window's first sample
+        late = np.mod(since + 1e-9, self._window) >= EPSILON
+        for name in self.names:
+            self._lines[name].feed(t, block[name])
+            self._singular[name].feed(t, late & np.isnan(block[name]) & _ill(block, name))
+        if "condition" in block:
+            self._condition.feed(t, np.where(np.isfinite(block["condition"]), block["condition"], np.nan))
+        self._samples.feed(np.stack([t, *(block[name] for name in self.names)]))
+
+    def result(self, with_condition: bool) -> SeriesLog:
+        """What was gathered."""
+        start = self._start or 0.0
+        samples = self._samples.result(1 + len(self.names))
+        named = dict(zip(self.names, samples[1:], strict=True))
+        period = (self._end - start) / max(self._total - 1, 1)
+        return SeriesLog(
+            start=start,
+            end=self._end,
+            window=self._window,
+            coarse=self._size * period >= EPSILON,
+            lines={name: line.result() for name, line in self._lines.items()},
+            samples=named,
+            middles={name: _medians(samples[0], values) for name, values in named.items()},
+            singular={name: share.result() for name, share in self._singular.items()},
+            condition=self._condition.result() if with_condition else None,
+        )
+
+
+def _ill(block: Block, name: str) -> NDArray[np.bool_]:
+    """Where the system of that series is singular; everywhere where the file does not tell."""
+    conditions = ["condition", *(["k7_condition"] if name == "k7" else [])]
+    known = [~(block[condition] <= LARGEST_CONDITION) for condition in conditions if condition in block]
+    return np.logical_or.reduce(known) if known else np.ones(block["t"].size, dtype=bool)
+
+
+def _medians(x: FloatArray, y: FloatArray) -> Series:
+    """Medians of the finite samples in `MIDDLES` stretches, NaN where there are none."""
+    size = max(x.size // MIDDLES, 1)
+    whole = x.size - x.size % size
+    stretches = np.sort(y[:whole].reshape(-1, size), axis=1)  # NaN goes last
+    finite = np.isfinite(stretches).sum(axis=1)
+    middle = stretches[np.arange(finite.size), np.maximum(finite - 1, 0) // 2]
+    return x[:whole:size], middle
+
+
+def _positive(value: object, otherwise: float) -> float:
+    usable = isinstance(value, int | float) and not isinstance(value, bool) and value > 0
+    return float(value) if usable else otherwise  # type: ignore[arg-type]
+
+
+COLUMNS = ("log", "t", "theta1", "theta2", "omega1", "omega2", "tau1", "tau2", "tau1_predicted", "tau2_predicted")
+SERIES = ("tau1", "tau2", "tau1_predicted", "tau2_predicted", "residual1", "residual2")
+POINTS = 3_600  # a series; twice what a wide screen can show
+DOTS = 3_000
+LONGEST_GAP = 5  # sampling periods; longer breaks the line
+
+
+@dataclass
+class LogRange:
+    """What one log spans: its times in s, its samples, its largest gap in s, its sampling period in s."""
+
+    first: float
+    last: float
+    samples: int = 0
+    largest_gap: float = 0.0
+    gaps: int = 0
+    period: float = float("nan")
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last sample in s."""
+        return self.last - self.first
+
+
+@dataclass
+class TorqueLog:
+    """Reduced series by log and name, samples of the motion, extremes, spectra of torque and residual.
+
+    `motion` is (4, m): θ1, θ2, θ̇1, θ̇2; `extremes` maps a column to its smallest and largest value;
+    `density` (4, n) belongs to τ1, τ2 and the residuals; `rms` and `residual_rms` are in N m a joint.
+    `worst` gives the log and the time in s of each joint's largest residual; `reduced` tells whether a
+    series holds fewer samples than the log.
+    """
+
+    ranges: dict[int, LogRange]
+    series: dict[int, dict[str, tuple[FloatArray, FloatArray]]]
+    motion: FloatArray
+    extremes: dict[str, tuple[float, float]]
+    frequency: FloatArray
+    density: FloatArray
+    autocorrelation: FloatArray
+    independent: int
+    rms: tuple[float, float]
+    residual_rms: tuple[float, float]
+    unpredicted: int
+    worst: dict[int, tuple[int, float]]
+    reduced: bool
+
+
+def read_torque(path: Path, told: Told | None = None) -> TorqueLog:
+    """Read `path`, telling how far. Raises `ResultError` where it cannot be read or lacks a column."""
+    total = row_count(path)
+    gathering = _Gathering(total)
+    for log, block in by_log(blocks(path, COLUMNS)):
+        gathering.take(log, block)
+        if told is not None:
+            told("report", sum(span.samples for span in gathering.ranges.values()), total)
+    return gathering.result()
+
+
+@dataclass
+class _Gathering:
+    total: int
+    ranges: dict[int, LogRange] = field(default_factory=dict)
+    reducers: dict[int, dict[str, MinMax]] = field(default_factory=dict)
+    extremes: dict[str, tuple[float, float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.size = bucket_size(self.total, POINTS)
+        self.motion = Thinned(self.total // DOTS)
+        self.spectrum: Spectrum | None = None
+        self.dt = float("nan")
+        self.squares = np.zeros(4)
+        self.counts = np.zeros(4)
+        self.worst: dict[int, tuple[float, int, float]] = {}
+
+    def take(self, log: int, block: Block) -> None:
+        """Add the next block of the log of that number."""
+        block |= {f"residual{j}": block[f"tau{j}"] - block[f"tau{j}_predicted"] for j in (1, 2)}
+        follows = self._range(log, block["t"])
+        reducers = self.reducers.setdefault(log, {name: MinMax(self.size) for name in SERIES})
+        for name, reducer in reducers.items():
+            reducer.feed(block["t"], block[name])
+        self.motion.feed(np.stack([block[name] for name in ("theta1", "theta2", "omega1", "omega2")]))
+        self._widen(block)
+        self._find_worst(log, block)
+        self._sum(block)
+        self._transform(log, block, follows)
+
+    def _range(self, log: int, t: FloatArray) -> bool:
+        """Extend the log's range; whether the block follows what was there."""
+        follows = log in self.ranges
+        span = self.ranges.setdefault(log, LogRange(float(t[0]), float(t[0])))
+        steps = np.diff(t, prepend=span.last if follows else t[0])
+        if np.isnan(span.period) and t.size > 1:
+            span.period = float(np.median(np.diff(t)))
+        span.samples += t.size
+        span.last = float(t[-1])
+        span.largest_gap = max(span.largest_gap, float(steps.max()))
+        span.gaps += int(np.count_nonzero(steps > LONGEST_GAP * span.period))
+        return follows
+
+    def _widen(self, block: Block) -> None:
+        for name in (*COLUMNS[2:], "residual1", "residual2"):
+            low, high = float(np.fmin.reduce(block[name])), float(np.fmax.reduce(block[name]))
+            old = self.extremes.get(name, (low, high))
+            self.extremes[name] = float(np.fmin(low, old[0])), float(np.fmax(high, old[1]))
+
+    def _find_worst(self, log: int, block: Block) -> None:
+        for joint in (1, 2):
+            size = np.nan_to_num(np.abs(block[f"residual{joint}"]), nan=-1.0)
+            place = int(size.argmax())
+            if size[place] >= 0 and size[place] > self.worst.get(joint, (-1.0, 0, 0.0))[0]:
+                self.worst[joint] = (float(size[place]), log, float(block["t"][place]))
+
+    def _sum(self, block: Block) -> None:
+        for place, name in enumerate(("tau1", "tau2", "residual1", "residual2")):
+            finite = block[name][np.isfinite(block[name])]
+            self.squares[place] += finite @ finite
+            self.counts[place] += finite.size
+
+    def _transform(self, log: int, block: Block, follows: bool) -> None:
+        period = self.ranges[log].period
+        if self.spectrum is None:
+            self.spectrum, self.dt = Spectrum(4, stretch_length(self.total)), period
+        if not follows:
+            self.spectrum.cut()
+        if abs(period - self.dt) <= 0.01 * self.dt:  # a log of another rate has another spectrum
+            self.spectrum.feed(np.stack([block[n] for n in ("tau1", "tau2", "residual1", "residual2")]))
+
+    def result(self) -> TorqueLog:
+        """What was gathered."""
+        spectrum = self.spectrum or Spectrum(4, 128)
+        frequency, density = spectrum.density(self.dt)
+        rms = np.sqrt(self.squares / np.maximum(self.counts, 1))
+        return TorqueLog(
+            ranges=self.ranges,
+            series={log: {name: self._series(log, name) for name in SERIES} for log in self.reducers},
+            motion=self.motion.result(4),
+            extremes=self.extremes,
+            frequency=frequency,
+            density=density if spectrum.stretches else density[:, :0],
+            autocorrelation=spectrum.autocorrelation()[2:],
+            independent=spectrum.stretches * stretch_length(self.total),
+            rms=(float(rms[0]), float(rms[1])),
+            residual_rms=(float(rms[2]), float(rms[3])),
+            unpredicted=int(self.counts[0] - self.counts[2]),
+            worst={joint: (log, moment) for joint, (_, log, moment) in self.worst.items()},
+            reduced=self.size > 2,
+        )
+
+    def _series(self, log: int, name: str) -> tuple[FloatArray, FloatArray]:
+        x, y = self.reducers[log][name].result()
+        return broken_at_gaps(x, y, LONGEST_GAP * self.size * self.ranges[log].period)

@@ -1,0 +1,214 @@
+"""What short cells of a log tell of the payload: sums over whitened rows that are linear in it.
+
+Errors in variables are whitened as in `algid.estimators.whitening`, so that the rows' noise is white whatever the
+angles' noise does to neighbouring torques. With the payload's column g = Y d, d what one kilogram at the tip adds
+to the constants (Table 2), a row reads e = g m_p + noise.
+
+======  ==========================================  =========
+symbol  name                                        shape
+======  ==========================================  =========
+A       Σ g², information on m_p                    (C,)
+B       Σ g e, so that m_p = ΣB / ΣA                (C,)
+S       Σ g Y, how constants' errors enter          (C, q)
+E       Σ e²                                        (C,)
+Q       Σ of the whitened torques squared           (C,)
+======  ==========================================  =========
+
+The arm that a result describes, for tracking what it carries.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from algid.arm import FloatArray, payload_constants
+from algid.errors import ResultError
+from algid.estimators.noise import first_guess
+from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
+from algid.identification.by_likelihood import model_of, prior_of
+from algid.model import Model
+from algid.results import Result
+from algid.settings import Settings
+from algid.signals.differences import POINTS, Stencil
+from algid.signals.filters import smoothed
+from algid.signals.segments import Segment, pieces
+
+CELL = 0.02  # s
+_PIECE_SAMPLES = 16384
+_SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
+_PAYLOAD_OF = {"k5": 0, "k3": 1, "k1": 2, "k4": 3, "k2": 4}  # which of z1 … z5 adds to which constant
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """The arm that carries the payload: its model, coefficients k (q,), link lengths in m, and noise levels."""
+
+    model: Model
+    k: FloatArray
+    l1: float
+    l2: float
+    noise: NoiseLevels
+    shift: float = 0.0
+
+    @property
+    def unit(self) -> FloatArray:
+        """d (q,): what a payload of 1 kg adds to the coefficients."""
+        return self.added(payload_constants(1.0, self.l1, self.l2, self.model.gravity))
+
+    @property
+    def bare(self) -> float:
+        """Mass in kg that at the tip has the inertia k3 of link 2 about joint 2."""
+        return abs(float(self.k[self.model.names.index("k3")])) / self.l2**2
+
+    def added(self, z: FloatArray) -> FloatArray:
+        """Payload constants z (5,) as changes of the coefficients (q,)."""
+        return np.array([z[_PAYLOAD_OF[name]] if name in _PAYLOAD_OF else 0.0 for name in self.model.names])
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Sums by cell: see the table above; `start` and `end` (C,) are times in s, `rows` (C,) counts."""
+
+    start: FloatArray
+    end: FloatArray
+    A: FloatArray
+    B: FloatArray
+    S: FloatArray
+    E: FloatArray
+    Q: FloatArray
+    rows: FloatArray
+
+    def __len__(self) -> int:
+        return int(self.start.size)
+
+    def part(self, first: int, last: int) -> Cells:
+        """Cells `first` to `last` - 1."""
+        return Cells(*(getattr(self, name)[first:last] for name in self.__dataclass_fields__))
+
+    @property
+    def mass(self) -> float:
+        """The payload in kg that fits all cells best."""
+        return float(self.B.sum() / max(self.A.sum(), 1e-300))
+
+    def sensitivity(self, arm: Arm, mass: float | FloatArray) -> FloatArray:
+        """T (C, q + 2): how the scores of a payload of `mass` kg, one or (C,), shift with constants, l1 and l2."""
+        g, l1, l2 = arm.model.gravity, arm.l1, arm.l2
+        by_l1 = self.S @ arm.added(np.array([2 * l1, 0.0, l2, g, 0.0]))
+        by_l2 = self.S @ arm.added(np.array([0.0, 2 * l2, l1, 0.0, g]))
+        return np.column_stack([self.S, mass * by_l1, mass * by_l2])
+
+    def squares(self, mass: float | FloatArray) -> FloatArray:
+        """Σ (e − g m_p)² (C,): what a payload of `mass` kg, one or (C,), leaves."""
+        return np.asarray(self.E - 2 * mass * self.B + mass**2 * self.A)
+
+
+def joined(parts: Sequence[Cells]) -> Cells:
+    """Cells one after another."""
+    return Cells(*(np.concatenate([getattr(part, name) for part in parts]) for name in Cells.__dataclass_fields__))
+
+
+def cells_of(segments: Iterable[Segment], arm: Arm, mass: float, settle: int = 1) -> list[Cells]:
+    """Cells of each piece of a log, linearised at a payload of `mass` kg and, `settle` times, at its trajectory."""
+    long_enough = (piece for piece in pieces(segments, _PIECE_SAMPLES) if len(piece) >= 3 * POINTS)
+    return [_cells(piece, arm, mass, settle) for piece in long_enough]
+
+
+def _cells(piece: Segment, arm: Arm, mass: float, settle: int) -> Cells:
+    c = arm.k + mass * arm.unit
+    stencil = Stencil(piece.dt, arm.shift)
+    theta = smoothed(piece.theta, piece.dt, min(_SMOOTHING, 0.1 / piece.dt))
+    linear = linearise(arm.model, c, theta, piece, stencil, arm.noise)
+    for _ in range(settle):
+        multiplier = linear.solve_transposed(linear.columns[-1:])[0]
+        theta = trajectory(piece, linear, multiplier, arm.noise)
+        linear = linearise(arm.model, c, theta, piece, stencil, arm.noise)
+    return _sums(linear, piece, stencil, arm, mass)
+
+
+def _sums(linear: Linearised, piece: Segment, stencil: Stencil, arm: Arm, mass: float) -> Cells:
+    Y, e = linear.columns[:-1], linear.columns[-1]
+    g = arm.unit @ Y
+    e = e + mass * g
+    torque = e + arm.k @ Y
+    step = max(1, round(CELL / piece.dt))
+    count = e.size // (2 * step)
+
+    def by_cell(rows: FloatArray) -> FloatArray:
+        return rows[..., : count * 2 * step].reshape(*rows.shape[:-1], count, 2 * step).sum(axis=-1)
+
+    first = piece.start + piece.dt * (stencil.torques(len(piece)).start + step * np.arange(count))
+    return Cells(
+        first,
+        first + step * piece.dt,
+        by_cell(g * g),
+        by_cell(g * e),
+        by_cell(g * Y).T,
+        by_cell(e * e),
+        by_cell(torque * torque),
+        np.full(count, 2.0 * step),
+    )
+
+
+def arm_of(result: Result, first: Segment, l1: float | None = None, l2: float | None = None) -> tuple[Arm, FloatArray]:
+    """The arm of a result with link lengths from it or given, and the covariance (q + 2, q + 2) of both.
+
+    Noise levels are the result's; where it has none, the log's first stretch tells them.
+
+    Raises
+    ------
+    ResultError
+        If the result leaves a constant or a link length open.
+    """
+    if result.fit is None:
+        raise ResultError(
+            f"{result.log.path}: the result of --estimator {result.estimator} has no error bars; "
+            "identify with --estimator refined or weak"
+        )
+    told = {name: result.settings.get(name) for name in ("friction", "torque_offset", "rotor_inertia", "gravity")}
+    settings = Settings(**{name: value for name, value in told.items() if value is not None})
+    prior = prior_of(result, settings)
+    names = [*prior.names, *(n for n, given in (("l1", l1), ("l2", l2)) if given is None and _free(result, n))]
+    places = [result.fit.covariance_names.index(name) for name in names]
+    rows = [(*prior.names, "l1", "l2").index(name) for name in names]
+    covariance = np.zeros((len(prior.names) + 2,) * 2)
+    covariance[np.ix_(rows, rows)] = np.array(result.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
+    known = Arm(
+        model_of(settings),
+        prior.mean,
+        _length(result, "l1", l1),
+        _length(result, "l2", l2),
+        _noise(result, first),
+        _shift(result, first.dt),
+    )
+    return known, covariance
+
+
+def _length(result: Result, name: str, given: float | None) -> float:
+    known = [given, result.settings.get(name), result.payload[name].estimate if name in result.payload else None]
+    found = next((value for value in known if value is not None), None)
+    if found is None:
+        raise ResultError(f"{result.log.path}: its result has no {name}; give the link's length with --{name}")
+    return float(found)
+
+
+def _free(result: Result, name: str) -> bool:
+    return result.fit is not None and name in result.fit.covariance_names
+
+
+def _noise(result: Result, first: Segment) -> NoiseLevels:
+    noise = {} if result.fit is None else result.fit.noise
+    if not all(noise.get(name, 0) > 0 for name in ("theta1", "theta2", "tau1", "tau2")):
+        return first_guess(first.theta, first.tau)
+    return NoiseLevels(np.array([noise["theta1"], noise["theta2"]]), np.array([noise["tau1"], noise["tau2"]]))
+
+
+def _shift(result: Result, dt: float) -> float:
+    """After how long a logged torque acts: the hold's half sample and the delay, in s."""
+    delay = result.settings.get("delay") or 0.0
+    if delay == "estimate":
+        found = result.parameters.get("delay")
+        delay = 0.0 if found is None or found.estimate is None else found.estimate
+    return float(delay) + (0.5 * dt if result.settings.get("torque_hold") == "zoh" else 0.0)

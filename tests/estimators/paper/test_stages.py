@@ -1,0 +1,97 @@
+"""The paper's two stages on simulated motions, whose constants they were not built on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from algid.arm import with_payload
+from algid.estimators.paper import EPSILON, STAGE1_SERIES, Summary, solve_scaled, stage1, stage1_series, stage2, wanders
+from algid.signals.segments import Segment
+from algid.synth.cases import Case, load_case
+from algid.synth.excitation import no_torque, wide_multi_sine
+from algid.synth.simulator import Motion, simulate
+
+DT = 1e-3
+T = DT * np.arange(1001)
+
+
+def motion(case: Case, payload: float = 0.0) -> Motion:
+    k = with_payload(case.arm.constants(), case.arm.payload_constants(payload))
+    torque = case.torque
+    assert torque is not None
+    return simulate(k, torque, T)
+
+
+@pytest.fixture(scope="module", params=["case1", "case2"])
+def case(request: pytest.FixtureRequest) -> Case:
+    return load_case(request.param)
+
+
+def test_exact_velocities_give_every_row_within_a_thousandth_of_a_percent(case: Case) -> None:
+    k = case.arm.constants()
+    bare = motion(case)
+    found = stage1(bare.theta, bare.omega, bare.tau, DT)
+    np.testing.assert_allclose(found.k[:, -1], k, rtol=1e-5)
+    loaded_k = with_payload(k, case.arm.payload_constants(case.payload))
+    loaded = motion(case, case.payload)
+    second = stage2(loaded.theta, loaded.omega, loaded.tau, DT, found.k[:, -1], case.arm.g)
+    k1, k2, k3, k4, k5, _, _ = loaded_k
+    np.testing.assert_allclose(second.x[:, -1], [k5 + k3, k1, k3, k4, k2], rtol=1e-5)
+    assert second.m_p[-1] == pytest.approx(case.payload, rel=1e-5)
+    assert second.l1[-1] == pytest.approx(case.arm.l1, rel=1e-5)
+
+
+def test_estimates_are_absent_before_epsilon(case: Case) -> None:
+    bare = motion(case)
+    found = stage1(bare.theta, bare.omega, bare.tau, DT)
+    before = T < EPSILON - 1e-9
+    assert np.isnan(found.k[:, before]).all()
+    assert np.isfinite(found.k[:, ~before]).mean() > 0.9
+
+
+def test_initial_conditions_do_not_matter() -> None:
+    case = load_case("case1")
+    k = case.arm.constants()
+    moving = simulate(k, wide_multi_sine(case.arm), T, np.array([0.4, -1.0]), np.array([2.0, -3.0]))
+    found = stage1(moving.theta, moving.omega, moving.tau, DT)
+    np.testing.assert_allclose(found.k[:, -1], k, rtol=1e-3)  # fast motion at 1 kHz: the integrals' own error
+
+
+def test_an_arm_that_hangs_still_is_singular_everywhere() -> None:
+    k = load_case("case1").arm.constants()
+    still = simulate(k, no_torque, T)
+    with np.errstate(invalid="raise"):
+        found = stage1(still.theta, np.zeros_like(still.omega), still.tau, DT)
+    assert np.isnan(found.k).all()
+
+
+def test_noise_alone_wanders() -> None:
+    draw = np.random.default_rng(0)
+    shape = (2, 4001)
+    still = Segment(0.0, DT, draw.normal(0, 1e-3, shape), draw.normal(0, 1e-2, shape), draw.normal(0, 0.1, shape))
+    summary = Summary(len(STAGE1_SERIES))
+    for series in stage1_series([still], 2.0):
+        summary.add(series)
+    assert wanders(*summary.estimates())[:7].any()
+
+
+def test_systems_of_any_scale_are_solved_alike() -> None:
+    draw = np.random.default_rng(5)
+    matrix, x = draw.normal(size=(6, 6, 40)), draw.normal(size=(6, 40))
+    rows, columns = 10.0 ** draw.integers(-9, 9, 6), 10.0 ** draw.integers(-9, 9, 6)
+    scaled = matrix * rows[:, None, None] * columns[None, :, None]
+    rhs = rows[:, None] * np.einsum("ijn,jn->in", matrix, x)
+    found = solve_scaled(scaled, rhs)
+    np.testing.assert_allclose(found.x * columns[:, None], x, rtol=1e-10)  # condition numbers to 1e3, times rounding
+    expected = np.linalg.cond(np.moveaxis(matrix, -1, 0))
+    assert np.all(found.condition < 200 * expected)
+
+
+def test_singular_systems_are_told_apart() -> None:
+    matrix = np.repeat(np.eye(3)[..., None], 2, axis=2)
+    matrix[2, 2, 1] = 0.0
+    found = solve_scaled(matrix, np.ones((3, 2)))
+    np.testing.assert_array_equal(found.x[:, 0], 1.0)
+    assert np.isnan(found.x[:, 1]).all()
+    assert np.isinf(found.condition[1])

@@ -1,0 +1,110 @@
+"""Physical bounds, worth of terms, payload of another arm, prediction."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from algid.estimators import refined, weak
+from algid.estimators.combine import MOST_BLOCKS, BlockSums, long_run_variance
+from algid.estimators.diagnostics import broken_bounds, constrained, payload_distance, term_worths
+from algid.estimators.identifiability import examine
+from algid.estimators.prediction import cross_validate, score
+from algid.estimators.weak import Source, WeakSettings
+from algid.model import Model
+
+from .conftest import Bench
+
+
+def test_bounds_hold_for_a_real_arm_and_name_what_breaks(bench: Bench) -> None:
+    fit = weak.fit([lambda: [bench.log(sigma=1e-3)]])
+    assert broken_bounds(fit) == []
+    assert constrained(fit) is fit
+    values = fit.values.copy()
+    values[5] = -0.01
+    broken = broken_bounds(replace(fit, values=values))
+    assert [bound.bound for bound in broken] == ["k6 >= 0"]
+    assert broken[0].distance == pytest.approx(0.01 / fit.std[5])
+
+
+def test_constrained_estimates_obey_the_bounds(bench: Bench) -> None:
+    log = bench.log(sigma=1e-3)
+    log = replace(log, tau=log.tau - np.array([[0.3], [0.0]]) * bench.bare.omega)  # less than no friction
+    free = weak.fit([lambda: [log]])
+    assert [bound.bound for bound in broken_bounds(free)] == ["k6 >= 0"]
+    bound = constrained(free)
+    assert broken_bounds(bound) == []
+    assert bound.values[5] == pytest.approx(0.0, abs=1e-4)
+
+
+def test_only_terms_that_are_there_earn_their_place(bench: Bench) -> None:
+    log = bench.log(sigma=1e-3)
+    log = replace(log, tau=log.tau + 0.1 * np.tanh(bench.bare.omega / 0.2))
+    fit = weak.fit([lambda: [log]], settings=WeakSettings(model=Model(coulomb=True, rotor=True)))
+    worths = {worth.term: worth for worth in term_worths(fit)}
+    assert worths["coulomb"].earned
+    assert not worths["rotor"].earned
+
+
+def test_a_loaded_log_from_another_arm_is_told(bench: Bench) -> None:
+    bare, burdened = bench.log(sigma=1e-3), bench.log(True, 1e-3)
+    alike = payload_distance(refined.fit([lambda: [bare]], [lambda: [burdened]]))
+    other = replace(burdened, tau=burdened.tau + np.array([[0.05], [0.05]]) * bench.burdened.omega)
+    apart = payload_distance(refined.fit([lambda: [bare]], [lambda: [other]]))
+    assert alike is not None
+    assert apart is not None
+    assert alike < 3
+    assert apart > 6
+
+
+def test_prediction_of_an_exact_log_leaves_only_the_filter(bench: Bench) -> None:
+    found = score(Model(), bench.arm.constants(), [bench.log()])
+    assert np.all(found.nrmse < 0.1)  # a 5 Hz filter before a nonlinear model
+    assert np.all(found.r2 > 0.99)
+    wrong = score(Model(), 1.3 * bench.arm.constants(), [bench.log()])
+    assert np.all(wrong.rmse > 3 * found.rmse)
+
+
+def test_cross_validation_leaves_each_log_out(bench: Bench) -> None:
+    sources: list[Source] = [partial(list, [bench.log(sigma=1e-3, seed=seed)]) for seed in range(3)]
+    fit = weak.fit(sources)
+    found = cross_validate(fit, sources)
+    assert found is not None
+    others = [sources[:place] + sources[place + 1 :] for place in range(3)]
+    by_hand = [
+        score(Model(), weak.fit(rest).values, source()).residual for rest, source in zip(others, sources, strict=True)
+    ]
+    assert np.allclose(
+        found.residual, np.sum(by_hand, axis=0), rtol=1e-3
+    )  # the weights of the joints are each fit's own
+    assert cross_validate(weak.fit(sources[:1]), sources[:1]) is None
+
+
+def test_directions_without_information_are_put_in_words() -> None:
+    S = 1e8 * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0], [0.0, 1.0, 1.0]])
+    known = examine(("k1", "k3", "k5"), np.array([0.02, 0.05, 0.04]), S, np.array([1.0, 0.001]))
+    assert known.sentences == ("k3 and k5 only as a sum: joint 2 never moved",)
+    assert known.determined == (True, False, False)
+
+
+def test_block_sums_stay_bounded_and_lose_nothing() -> None:
+    sums, total = BlockSums(), 0.0
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        block = rng.standard_normal((701, 2))
+        sums.add(block)
+        total = total + block.sum(axis=0)
+    assert sums.values().shape[0] <= 2 * MOST_BLOCKS + 1
+    assert np.allclose(sums.values().sum(axis=0), total)
+
+
+def test_long_run_variance_of_an_autoregression() -> None:
+    rng = np.random.default_rng(0)
+    noise = rng.standard_normal((20000, 1))
+    scores = np.zeros_like(noise)
+    for step in range(1, noise.size):
+        scores[step] = 0.6 * scores[step - 1] + noise[step]
+    variance, lags = long_run_variance(scores)
+    assert lags > 5
+    assert variance[0, 0] / noise.size == pytest.approx(1 / (1 - 0.6) ** 2, rel=0.15)  # spectrum at zero

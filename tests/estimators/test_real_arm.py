@@ -1,0 +1,58 @@
+"""A real double pendulum predicts its own runs, each left out in turn."""
+
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from scipy.interpolate import CubicSpline
+
+from algid.estimators import refined, weak
+from algid.estimators.diagnostics import term_worths
+from algid.estimators.prediction import cross_validate
+from algid.estimators.refined import RefinedSettings
+from algid.estimators.weak import Source, WeakSettings
+from algid.model import Model
+from algid.signals.segments import Segment
+
+RUNS = Path(__file__).parents[3] / "shared" / "data" / "dfki" / "C1_sysid"
+PUBLISHED = (0.159, 0.114)  # N m, of the parameters published with the data
+
+pytestmark = pytest.mark.skipif(not RUNS.is_dir(), reason="the recorded runs are not beside this repository")
+
+
+@pytest.fixture(scope="module")
+def sources() -> list[Source]:
+    logs = [_run(path) for path in sorted(RUNS.glob("*.csv"))]
+    return [lambda log=log: [log] for log in logs]  # type: ignore[misc]
+
+
+def _run(path: Path) -> Segment:
+    table = pl.read_csv(path)
+    t = table["time"].to_numpy()
+    keep = np.append(True, np.diff(t) > 0)
+    signals = np.stack([table[name].to_numpy() for name in ("pos_meas1", "pos_meas2", "tau_meas1", "tau_meas2")])
+    signals[0] -= np.pi / 2
+    dt = float(np.median(np.diff(t[keep])))
+    even = CubicSpline(t[keep], signals[:, keep], axis=1)(np.arange(t[0], t[-1], dt))
+    return Segment(0.0, dt, even[:2], even[2:])
+
+
+def test_prediction_beats_the_published_parameters(sources: list[Source]) -> None:
+    fit = refined.fit(sources, settings=RefinedSettings(model=Model(coulomb=True, rotor=True)))
+    assert fit.note is not None  # an arm's torque error is no white noise
+    assert fit.unidentifiable == ()
+    found = cross_validate(fit, sources)
+    assert found is not None
+    assert np.all(found.rmse < PUBLISHED)
+
+
+def test_the_differentiators_bandwidth_does_not_move_k2(sources: list[Source]) -> None:
+    model = Model(coulomb=True, rotor=True)
+    narrow, wide = (weak.fit(sources, settings=WeakSettings(model, bandwidth=hertz)) for hertz in (10.0, 30.0))
+    assert abs(narrow.values[1] - wide.values[1]) < wide.std[1]
+
+
+def test_friction_earns_its_place_and_the_offset_does_not(sources: list[Source]) -> None:
+    fit = weak.fit(sources, settings=WeakSettings(Model(coulomb=True, offset=True, rotor=True)))
+    assert {worth.term: worth.earned for worth in term_worths(fit)} == {"coulomb": True, "offset": False, "rotor": True}

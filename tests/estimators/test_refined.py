@@ -1,0 +1,170 @@
+from dataclasses import replace
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from algid.arm import inverse_dynamics
+from algid.estimators import log_likelihood as evidence
+from algid.estimators import refined
+from algid.estimators.combine import Prior
+from algid.estimators.refined import RefinedSettings
+from algid.estimators.whitening import NoiseLevels
+from algid.model import Model
+from algid.signals.segments import Segment
+from algid.synth.cases import load_case
+from algid.synth.excitation import SampledTorque
+from algid.synth.simulator import simulate
+
+from .conftest import DT, Bench
+
+
+def test_exact_logs_leave_a_hundredth_of_the_papers_error(bench: Bench) -> None:
+    fit = refined.fit([lambda: [bench.log()]], [lambda: [bench.log(loaded=True)]])
+    assert fit.converged
+    # The smallest error of Table 4 is 0.005 %.
+    assert np.allclose(fit.values, bench.truth, rtol=0.5e-6)
+
+
+def test_noise_levels_and_error_bars_are_honest(bench: Bench) -> None:
+    logs = [(bench.log(False, 1e-3, seed), bench.log(True, 1e-3, seed)) for seed in range(5)]
+    fits = [refined.fit([partial(list, [bare])], [partial(list, [burdened])]) for bare, burdened in logs]
+    levels = np.array([[level.theta, level.tau / 10] for fit in fits for level in fit.noise or ()])
+    standard_error = levels.std(axis=0, ddof=1) / np.sqrt(levels.shape[0])
+    assert np.all(np.abs(levels.mean(axis=0) - 1e-3) < 4 * standard_error)
+    assert np.allclose(levels[:, 0], 1e-3, rtol=0.05)  # thousands of degrees of freedom a log
+    z = np.array([(fit.values - bench.truth) / fit.std for fit in fits])
+    assert 0.6 < np.sqrt(np.mean(z**2)) < 1.4  # 50 correlated ratios
+    assert all(fit.intervals == "likelihood" and fit.estimator == "refined" for fit in fits)
+
+
+def test_known_noise_levels_are_kept(bench: Bench) -> None:
+    known = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
+    fit = refined.fit([lambda: [bench.log(sigma=1e-3)]], settings=RefinedSettings(noise=known))
+    assert fit.noise == (known,)
+
+
+def test_noise_levels_of_zero_are_refused(bench: Bench) -> None:
+    with pytest.raises(ValueError, match="positive"):
+        refined.fit([lambda: [bench.log()]], settings=RefinedSettings(noise=NoiseLevels(np.zeros(2), np.ones(2))))
+
+
+def test_known_lengths_sharpen_the_payload(bench: Bench) -> None:
+    sources = [lambda: [bench.log(sigma=1e-3)]], [lambda: [bench.log(True, 1e-3)]]
+    free = refined.fit(*sources)
+    known = refined.fit(*sources, RefinedSettings(lengths={"l1": bench.arm.l1, "l2": bench.arm.l2}))
+    assert known.names[-1] == "m_p"
+    assert known.std[7] < 0.6 * free.std[7]
+    assert abs(known.values[7] - bench.payload) < 4 * known.std[7]
+
+
+def test_a_loaded_log_alone_with_an_earlier_result(bench: Bench) -> None:
+    before = refined.fit([lambda: [bench.log(sigma=1e-3)]])
+    prior = Prior.of(before.names, before.values, before.covariance)
+    together = refined.fit([lambda: [bench.log(sigma=1e-3)]], [lambda: [bench.log(True, 1e-3)]])
+    after = refined.fit([], [lambda: [bench.log(True, 1e-3)]], RefinedSettings(prior=prior))
+    assert np.allclose(after.values, together.values, atol=0.3 * together.std.min() + 0.3 * together.std)
+    assert np.allclose(after.std, together.std, rtol=0.1)
+
+
+def test_a_delay_is_recovered_with_its_error_bar(bench: Bench) -> None:
+    log = bench.log(sigma=1e-4)
+    late = replace(log, theta=log.theta[:, :-5], tau=log.tau[:, 5:], omega=None)
+    fit = refined.fit([lambda: [late]], settings=RefinedSettings(estimate_delay=True))
+    assert fit.names[-1] == "delay"
+    assert abs(fit.values[-1] - 5e-3) < 1e-4
+    assert abs(fit.values[-1] - 5e-3) < 4 * fit.std[-1]
+    assert np.allclose(fit.values[5:7], bench.truth[5:7], rtol=1e-3)
+
+
+def test_a_held_torque_does_not_bias_friction(bench: Bench) -> None:
+    t, k = np.arange(1501) * DT, bench.arm.constants()
+    torque = SampledTorque(t, bench.bare.tau[:, :1501], "zoh")
+    log = Segment(0.0, DT, simulate(k, torque, t).theta, torque.tau)
+    held = refined.fit([lambda: [log]], settings=RefinedSettings(hold="zoh")).values
+    assert np.allclose(held[5:7], k[5:7], rtol=5e-4)
+    smooth = refined.fit([lambda: [log]]).values
+    assert np.abs(smooth[5:7] / k[5:7] - 1).max() > 2e-3  # what half a sample does
+
+
+def test_an_encoder_sets_the_floor(bench: Bench) -> None:
+    step = 2 * np.pi / 4096
+    log = bench.log(sigma=1e-4)
+    coarse = replace(log, theta=np.round(bench.bare.theta / step) * step)
+    fit = refined.fit([lambda: [coarse]])
+    assert fit.noise is not None
+    assert np.allclose(fit.noise[0].theta, step / np.sqrt(12), rtol=0.1)
+
+
+def test_coloured_residuals_get_robust_intervals(bench: Bench) -> None:
+    log = bench.log(sigma=1e-3)
+    rng = np.random.default_rng(0)
+    slow = np.cumsum(rng.standard_normal(log.tau.shape), axis=1)
+    slow = 0.01 * (slow - slow.mean(axis=1, keepdims=True)) / slow.std(axis=1, keepdims=True)
+    fit = refined.fit([lambda: [replace(log, tau=log.tau + slow)]])
+    assert fit.intervals == "sandwich"
+
+
+def test_unmodelled_dynamics_hand_back_the_weak_estimate(bench: Bench) -> None:
+    log = bench.log(sigma=1e-4)
+    slow = 0.3 * np.sign(np.sin(2 * np.pi * 1.3 * bench.bare.t))
+    fit = refined.fit([lambda: [replace(log, tau=log.tau + slow)]])
+    assert fit.estimator == "weak"
+    assert fit.note is not None
+    assert fit.intervals == "sandwich"
+
+
+def test_a_joint_that_never_moved_is_named() -> None:
+    t = np.arange(3001) * DT
+    rng = np.random.default_rng(0)
+    theta = np.stack([np.sin(3 * t), np.zeros_like(t)]) + 1e-4 * rng.standard_normal((2, t.size))
+    tau = np.stack([np.cos(3 * t), 0.3 * np.cos(3 * t)])
+    fit = refined.fit([lambda: [Segment(0.0, DT, theta, tau)]])
+    assert "NOT_IDENTIFIABLE" in fit.status
+    assert any("joint 2 never moved" in sentence for sentence in fit.unidentifiable)
+    assert np.isinf(fit.std[[status == "NOT_IDENTIFIABLE" for status in fit.status]]).all()
+
+
+def test_a_horizontal_arm_has_five_constants(bench: Bench) -> None:
+    k = bench.arm.constants() * [1, 0, 1, 0, 1, 1, 1]
+    t = np.arange(1501) * DT
+    motion = simulate(k, lambda now: np.stack([np.sin(9 * now), 0.6 * np.cos(14 * now)]), t)
+    fit = refined.fit(
+        [lambda: [Segment(0.0, DT, motion.theta, motion.tau)]], settings=RefinedSettings(model=Model(gravity=0))
+    )
+    assert fit.names == ("k1", "k3", "k5", "k6", "k7")
+    assert np.allclose(fit.values, k[[0, 2, 4, 5, 6]], rtol=1e-4)
+
+
+def test_long_logs_take_one_more_pass_and_agree(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    log = bench.log(sigma=1e-3)
+    monkeypatch.setattr(evidence, "PIECE_SAMPLES", 500)
+    whole = refined.fit([lambda: [log]])
+    monkeypatch.setattr(evidence, "_TRAINED", 2)
+    parts = refined.fit([lambda: [log]])
+    assert np.allclose(whole.values, parts.values, atol=0.2 * whole.std.min() + 0.2 * whole.std)
+
+
+def test_blocks_of_any_size_give_the_same_estimate(bench: Bench) -> None:
+    log = bench.log(sigma=1e-3)
+    cut = [log.part(first, last) for first, last in pairwise([0, 17, 1200, 1201, 3500, len(log)])]
+    whole = refined.fit([lambda: [log]])
+    assert np.array_equal(refined.fit([lambda: cut]).values, whole.values)
+
+
+def test_a_joint_at_rest_leaves_its_friction_open_and_the_rest_known() -> None:
+    k = load_case("case1").arm.constants()
+    rng = np.random.default_rng(0)
+    t = 1e-3 * np.arange(5001)
+    theta = np.stack([np.sin(4 * t) + 0.5 * np.sin(9 * t), np.full_like(t, 0.3)])
+    omega = np.stack([4 * np.cos(4 * t) + 4.5 * np.cos(9 * t), np.zeros_like(t)])
+    alpha = np.stack([-16 * np.sin(4 * t) - 40.5 * np.sin(9 * t), np.zeros_like(t)])
+    tau = inverse_dynamics(k, theta, omega, alpha)
+    noise = rng.standard_normal((2, *theta.shape))
+    noisy = Segment(0.0, 1e-3, theta + 1e-4 * noise[0], tau + 1e-3 * noise[1])
+    found = refined.fit([lambda: [noisy]])
+    assert found.converged
+    assert found.status == ("OK",) * 6 + ("NOT_IDENTIFIABLE",)
+    assert found.unidentifiable == ("k7 is not determined: joint 2 never moved",)
+    assert np.all(np.abs(found.values[:6] - k[:6]) < 4.5 * found.std[:6])

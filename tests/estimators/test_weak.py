@@ -1,0 +1,74 @@
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from algid.estimators import weak
+from algid.estimators import weak as normal
+from algid.estimators.weak import WeakSettings
+from algid.model import Model
+from algid.signals.segments import Segment
+
+from .conftest import Bench
+
+
+def _cut(log: Segment, *edges: int) -> list[Segment]:
+    ends = [0, *edges, len(log)]
+    return [log.part(first, last) for first, last in pairwise(ends)]
+
+
+def test_exact_logs_give_the_constants_and_the_payload(bench: Bench) -> None:
+    fit = weak.fit([lambda: [bench.log()]], [lambda: [bench.log(loaded=True)]])
+    assert fit.names == ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "m_p", "l1", "l2")
+    assert np.allclose(fit.values, bench.truth, rtol=1e-4)  # the differentiator's ripple
+    assert set(fit.status) == {"OK"}
+
+
+def test_recorded_velocities_serve_as_well(bench: Bench) -> None:
+    fit = weak.fit([lambda: [bench.log()]], settings=WeakSettings(bandwidth=None))
+    assert np.allclose(fit.values, bench.truth[:7], rtol=1e-6)  # quadrature alone
+    without = replace(bench.log(), omega=None)
+    with pytest.raises(ValueError, match="no velocities"):
+        weak.fit([lambda: [without]], settings=WeakSettings(bandwidth=None))
+
+
+def test_blocks_of_any_size_give_the_same_normal_equations(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(normal, "PIECE_SAMPLES", 1111)
+    log = bench.log(sigma=1e-3)
+    whole = normal.normal_equations(lambda: [log], WeakSettings(window=0.2))
+    cut = normal.normal_equations(lambda: _cut(log, 17, 1200, 1201, 3500), WeakSettings(window=0.2))
+    assert whole is not None
+    assert cut is not None
+    assert np.array_equal(whole.gram, cut.gram)
+    monkeypatch.setattr(normal, "PIECE_SAMPLES", 16384)
+    single = normal.normal_equations(lambda: [log], WeakSettings(window=0.2))
+    assert single is not None
+    assert single.rows == whole.rows  # no window is lost between pieces
+    assert np.allclose(single.gram.sum(axis=0), whole.gram.sum(axis=0), rtol=1e-11)
+
+
+def test_errors_stay_within_the_error_bars(bench: Bench) -> None:
+    fits = [weak.fit([lambda seed=seed: [bench.log(sigma=1e-3, seed=seed)]]) for seed in range(20)]  # type: ignore[misc]
+    z = np.array([(fit.values - bench.truth[:7]) / fit.std for fit in fits])
+    assert 0.6 < np.sqrt(np.mean(z**2)) < 1.5  # 140 correlated ratios
+
+
+def test_a_gap_starts_new_windows(bench: Bench) -> None:
+    log = bench.log()
+    first, second = log.part(0, 1800), replace(log.part(2300, 4001), continues=False)
+    fit = weak.fit([lambda: [first, second]])
+    assert np.allclose(fit.values, bench.truth[:7], rtol=1e-3)
+
+
+def test_further_columns_are_told_from_those_of_the_arm(bench: Bench) -> None:
+    log = bench.log()
+    friction = 0.2 * np.tanh(bench.bare.omega / 0.2)
+    log = replace(log, tau=log.tau + friction + np.array([[0.03], [-0.05]]))
+    fit = weak.fit([lambda: [log]], settings=WeakSettings(model=Model(coulomb=True, offset=True)))
+    assert np.allclose(fit.values[7:], [0.2, 0.2, 0.03, -0.05], atol=2e-3)
+
+
+def test_too_short_a_log_is_refused(bench: Bench) -> None:
+    with pytest.raises(ValueError, match="long enough"):
+        weak.fit([lambda: [bench.log().part(0, 12)]])

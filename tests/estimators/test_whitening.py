@@ -1,0 +1,74 @@
+"""The banded dual form against the dense textbook problem: angles and parameters eliminated together."""
+
+import numpy as np
+
+from algid.estimators.whitening import NoiseLevels, adjoint, covariance_factor, forward, linearise, trajectory
+from algid.model import Model
+from algid.signals.differences import POINTS, Stencil
+from algid.signals.segments import Segment
+
+from .conftest import Bench
+
+NOISE = NoiseLevels(np.array([1e-3, 2e-3]), np.array([1e-2, 2e-2]))
+
+
+def _dense(H: np.ndarray, first: int, length: int) -> np.ndarray:
+    n = H.shape[-1]
+    matrix = np.zeros((n, 2, length, 2))
+    for row in range(n):
+        for point in range(POINTS):
+            matrix[row, :, first + row + point] += H[:, :, point, row]
+    return matrix.reshape(2 * n, 2 * length)
+
+
+def test_products_and_factor_agree_with_dense_algebra() -> None:
+    rng = np.random.default_rng(0)
+    H = rng.standard_normal((2, 2, POINTS, 20))
+    dense = _dense(H, 2, 30)
+    x, y = rng.standard_normal((2, 30)), rng.standard_normal((2, 20))
+    assert np.allclose(forward(H, x, 2).T.ravel(), dense @ x.T.ravel())
+    assert np.allclose(adjoint(H, y, 2, 30).T.ravel(), dense.T @ y.T.ravel())
+    band = covariance_factor(H)
+    L = _lower(band, 40)
+    assert np.allclose(L @ L.T, np.eye(40) + dense @ dense.T)
+
+
+def test_information_is_the_schur_complement_of_the_normal_equations(bench: Bench) -> None:
+    log = bench.log(sigma=1e-3)
+    piece = Segment(0.0, log.dt, log.theta[:, 1000:1120], log.tau[:, 1000:1120])
+    k, theta0 = bench.arm.constants(), bench.bare.theta[:, 1000:1120]
+    linear = linearise(Model(), k, theta0, piece, Stencil(log.dt), NOISE)
+    S = linear.columns[:-1] @ linear.columns[:-1].T
+    g = linear.columns[:-1] @ linear.columns[-1]
+    # Dense: angles' changes x (in σ_θ) and dk from [I 0; H Y] [x; dk] = [θ_m − θ0; τ_m − f], all in σ.
+    H = _dense(linear.H, linear.first, 120)
+    unwhitened = _lower(linear.factor, H.shape[0]) @ linear.columns.T
+    Y = unwhitened[:, :-1]
+    covariance = np.eye(H.shape[0]) + H @ H.T
+    reference = Y.T @ np.linalg.solve(covariance, Y)
+    scale = np.sqrt(np.outer(np.diag(reference), np.diag(reference)))
+    rounding = np.linalg.cond(covariance) * np.finfo(float).eps  # what a dense solution resolves: 5e-9 here
+    assert np.max(np.abs(S - reference) / scale) < rounding
+    normal = np.block([[np.eye(240) + H.T @ H, H.T @ Y], [Y.T @ H, Y.T @ Y]])
+    schur = normal[240:, 240:] - normal[240:, :240] @ np.linalg.solve(normal[:240, :240], normal[:240, 240:])
+    assert np.allclose(S, schur, rtol=1e-6)
+    # linearise() takes the angles' change out of its residual; the dense problem has it as rows of its own.
+    moved = ((piece.theta - theta0) / NOISE.theta[:, None]).T.ravel()
+    residual = np.concatenate([moved, unwhitened[:, -1] + H @ moved])
+    right = np.concatenate([np.eye(240), H]).T @ residual
+    both = np.concatenate([right, np.concatenate([np.zeros((240, 7)), Y]).T @ residual])
+    dense = np.linalg.solve(normal, both)
+    assert np.allclose(dense[240:], np.linalg.solve(S, g), rtol=1e-5)
+
+
+def _lower(factor: np.ndarray, size: int) -> np.ndarray:
+    return np.asarray(sum(np.diag(factor[below, : size - below], -below) for below in range(2 * POINTS)))
+
+
+def test_the_trajectory_moves_towards_the_truth(bench: Bench) -> None:
+    log = bench.log(sigma=1e-3)
+    levels = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
+    linear = linearise(Model(), bench.arm.constants(), bench.bare.theta, log, Stencil(log.dt), levels)
+    found = trajectory(log, linear, linear.solve_transposed(linear.columns[-1:])[0], levels)
+    assert np.std(found - bench.bare.theta) < 0.4 * 1e-3  # a fraction of the measured noise is left
+    assert abs(np.std(linear.columns[-1]) - 1) < 0.05  # white with unit variance; 8000 innovations

@@ -1,0 +1,207 @@
+"""Whole identifications: logs in, a result and its folder out."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import polars as pl
+import pytest
+
+import algid
+from algid.errors import LogError, OutputError, ResultError, SettingError
+from algid.identification.identify import identify
+from algid.log import Log
+from algid.results import Status, read_result, result_schema
+from algid.settings import Settings
+from algid.synth.sensors import Sensors
+
+PAPER = Settings(estimator="paper")
+
+
+@pytest.fixture(scope="module")
+def wide() -> tuple[Log, Log]:
+    return algid.synthesise("case1", duration=3.0, excitation="wide")
+
+
+@pytest.fixture(scope="module")
+def noisy() -> tuple[Log, Log]:
+    sensors = Sensors(position_noise=1e-3, torque_noise=1e-2, seed=3)
+    return algid.synthesise("case1", duration=5.0, excitation="wide", sensors=sensors)
+
+
+def test_paper_observer_and_poles_stay_within_the_paper_s_own_bound() -> None:
+    for case in ("case1", "case2"):
+        result = identify(*algid.synthesise(case), PAPER)
+        errors = {row.parameter: row.error_percent for row in result.table4}
+        assert len(errors) == 12
+        assert all(error is not None and error <= 0.6826 for error in errors.values()), errors
+
+
+@pytest.mark.parametrize("estimator", ["paper", "weak", "refined"])
+def test_exact_logs_give_the_arm_and_the_payload(estimator: str, wide: tuple[Log, Log]) -> None:
+    settings = Settings(estimator=estimator, velocity="measured" if estimator == "paper" else "observer")  # type: ignore[arg-type]
+    result = identify(*wide, settings)
+    limit = {"paper": 0.1, "weak": 0.5, "refined": 1e-4}[estimator]  # percent; fast motion at 1 kHz
+    assert result.complete
+    assert all(row.error_percent is not None and row.error_percent < limit for row in result.table4), result.table4
+
+
+def test_noise_lies_within_the_intervals(noisy: tuple[Log, Log]) -> None:
+    result = identify(*noisy)
+    assert result.fit is not None
+    assert result.fit.converged
+    truth = dict(zip(result.parameters, algid.Arm.constants(noisy[0].origin.truth.arm), strict=False))  # type: ignore[union-attr]
+    for name, true in truth.items():
+        found = result.parameters[name]
+        assert found.estimate is not None
+        assert found.std is not None
+        assert abs(found.estimate - true) < 4.5 * found.std  # 7 draws of a normal: 1 in 20,000
+
+
+def test_folder_holds_schema_valid_result_and_flat_series(tmp_path: Path, wide: tuple[Log, Log]) -> None:
+    result = identify(*wide, PAPER, out=tmp_path)
+    folder = tmp_path / "case1-unloaded.algid"
+    content = json.loads((folder / "result.json").read_text())
+    jsonschema.validate(content, result_schema())
+    assert content["schema_version"] == 1
+    assert read_result(folder) == result
+    series = pl.read_parquet(folder / "estimates.parquet")
+    assert series.columns[0] == "t"
+    assert set(series.columns) >= {f"k{i}" for i in range(1, 8)} | {"condition", "k7_condition"}
+    assert all(kind == pl.Float64 for kind in series.dtypes)
+    assert series.height == len(wide[0])
+    assert pl.read_parquet(folder / "loaded.parquet").columns[-3:] == ["l1", "m_p", "condition"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["case1-unloaded.algid"]
+
+
+def test_result_is_refused_twice_and_replaced_by_force(tmp_path: Path, wide: tuple[Log, Log]) -> None:
+    identify(wide[0], None, PAPER, out=tmp_path, report=False)
+    with pytest.raises(OutputError, match="--force"):
+        identify(wide[0], None, PAPER, out=tmp_path, report=False)
+    identify(wide[0], None, PAPER, out=tmp_path, report=False, force=True)
+
+
+def test_failure_leaves_nothing_behind(tmp_path: Path, wide: tuple[Log, Log]) -> None:
+    with pytest.raises(LogError, match="record longer"):
+        identify(wide[0].part(0, 300), None, PAPER, out=tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("estimator", ["paper", "refined"])
+def test_loaded_log_alone_with_parameters(estimator: str, noisy: tuple[Log, Log], wide: tuple[Log, Log]) -> None:
+    logs = wide if estimator == "paper" else noisy
+    settings = Settings(estimator=estimator)  # type: ignore[arg-type]
+    arm = identify(logs[0], None, settings)
+    both = identify(*logs, settings)
+    alone = identify(None, logs[1], settings, parameters=arm)
+    one, other = alone.payload["m_p"], both.payload["m_p"]
+    assert one.estimate == pytest.approx(other.estimate, rel=1e-9 if estimator == "paper" else 1e-3)
+
+
+def test_swapped_logs_are_refused(wide: tuple[Log, Log]) -> None:
+    with pytest.raises(LogError, match="swap the logs"):
+        identify(wide[1], wide[0], PAPER)
+
+
+def test_logs_of_two_arms_are_told() -> None:
+    first, _ = algid.synthesise("case1", duration=2.0, excitation="wide")
+    _, second = algid.synthesise("case2", duration=2.0, excitation="wide")
+    result = identify(first, second)
+    assert any("another arm" in warning for warning in result.warnings)
+    assert any("standard deviations from belonging to one arm" in warning for warning in result.warnings)
+
+
+def test_weak_excitation_is_a_status_not_a_number() -> None:
+    sensors = Sensors(position_noise=1e-4, torque_noise=1e-3)
+    still, _ = algid.synthesise("case1", duration=3.0, excitation="none", sensors=sensors)
+    result = identify(still, None, PAPER)
+    weak = [found for found in result.parameters.values() if found.status is Status.WEAK_EXCITATION]
+    assert weak
+    assert all(found.estimate is None for found in weak)
+    assert not result.complete
+
+
+def test_weak_excitation_by_likelihood_names_what_is_missing() -> None:
+    sensors = Sensors(position_noise=1e-4, torque_noise=1e-3)
+    still, _ = algid.synthesise("case1", duration=3.0, excitation="none", sensors=sensors)
+    result = identify(still)
+    assert any(found.status is Status.NOT_IDENTIFIABLE for found in result.parameters.values())
+    assert result.fit is not None
+    assert result.fit.unidentifiable
+
+
+def test_settings_that_the_paper_lacks_are_refused() -> None:
+    with pytest.raises(SettingError, match="--friction"):
+        Settings(estimator="paper", friction="coulomb")
+    with pytest.raises(SettingError, match="window"):
+        Settings(window=-1.0)
+
+
+def test_other_schema_versions_are_refused(tmp_path: Path, wide: tuple[Log, Log]) -> None:
+    identify(wide[0], None, PAPER, out=tmp_path, report=False)
+    file = tmp_path / "case1-unloaded.algid" / "result.json"
+    file.write_text(file.read_text().replace('"schema_version": 1', '"schema_version": 7'))
+    with pytest.raises(ResultError, match="expected 1, found 7"):
+        read_result(file)
+
+
+def test_blocks_change_no_estimate(tmp_path: Path, wide: tuple[Log, Log], monkeypatch: pytest.MonkeyPatch) -> None:
+    algid.write_log(tmp_path / "log.parquet", wide[0], truth=wide[0].origin.truth)
+    whole = identify(wide[0], None, Settings(estimator="weak"))
+    from algid.readers.assemble import TableReader
+
+    blocks = TableReader.blocks
+    monkeypatch.setattr(TableReader, "blocks", lambda self, rows=0: blocks(self, 700))  # noqa: ARG005
+    parts = identify(tmp_path / "log.parquet", None, Settings(estimator="weak"))
+    for name, found in whole.parameters.items():
+        assert parts.parameters[name].estimate == pytest.approx(found.estimate, rel=1e-12)
+
+
+def test_real_arm_is_identified(shared_data: Path) -> None:
+    logs = sorted((shared_data / "dfki" / "C1_sysid").glob("*.csv"))[:3]
+    from algid.profile import Profile, with_settings
+
+    settings = Settings(friction="coulomb", torque_offset=True)
+    result = identify(logs, None, settings, profile=with_settings(Profile(), {"zero": "hanging"}))
+    assert result.fit is not None
+    assert result.fit.residual is not None
+    # the parameters published with the data predict all ten runs to 0.159 and 0.114 N m
+    assert np.all(np.array(result.fit.residual.rmse) < (0.159, 0.114))
+
+
+def test_a_joint_that_stands_still_is_a_status(wide: tuple[Log, Log], tmp_path: Path) -> None:
+    still = replace(wide[0], theta=np.stack([wide[0].theta[0], np.zeros(len(wide[0]))]))
+    held = replace(wide[0], theta=np.full_like(wide[0].theta, -1.5), omega=None)
+    for number, log in enumerate((still, held)):
+        for settings in (Settings(), PAPER):
+            result = identify(log, None, settings, out=tmp_path / f"{number}{settings.estimator}")
+            assert not result.complete
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("gravity", -9.81), ("gravity", np.nan), ("delay", np.inf), ("l1", np.inf), ("window", np.nan)]
+)
+def test_numbers_without_a_meaning_are_refused(name: str, value: float) -> None:
+    with pytest.raises(SettingError, match=f"{name}: expected"):
+        replace(Settings(), **{name: value})  # type: ignore[arg-type]
+
+
+def test_a_result_names_the_estimator_whose_numbers_it_holds(shared_data: Path) -> None:
+    from algid.profile import Profile, with_settings
+    from algid.report.verdict import verdict
+
+    logs = sorted((shared_data / "dfki" / "C1_sysid").glob("*.csv"))
+    profile = with_settings(Profile(), {"zero": "hanging"})
+    result = identify(logs[:3], None, Settings(friction="coulomb"), profile=profile)
+    weak = identify(logs[:3], None, Settings(friction="coulomb", estimator="weak"), profile=profile)
+    assert result.estimator == "weak"
+    assert result.settings["estimator"] == "refined"
+    assert result.parameters == weak.parameters
+    assert "by the weak estimator in place of the refined one" in verdict(result).sentence
+    jitter = [warning for warning in result.warnings if "JITTER" in warning]
+    assert len(jitter) == 1
+    assert f"likewise in 1 other log ({logs[1].name})" in jitter[0]

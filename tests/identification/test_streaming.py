@@ -1,0 +1,72 @@
+"""A log read in blocks gives the estimates of the log read whole."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+import algid
+from algid.arm import FloatArray
+from algid.identification.by_likelihood import run_fit
+from algid.identification.by_paper import run_paper
+from algid.identification.source import LogSource
+from algid.identification.summary import outcome_of, result_of
+from algid.log import Log, Origin
+from algid.results import Result
+from algid.settings import Settings
+from algid.synth.sensors import Sensors
+
+SETTINGS = {
+    "weak": Settings(estimator="weak"),
+    "weak, observer": Settings(estimator="weak", observer="luenberger"),
+    "refined": Settings(estimator="refined"),
+    "paper": Settings(estimator="paper"),
+    "paper, zero phase": Settings(estimator="paper", observer="zero-phase"),
+}
+
+
+class Chopped(LogSource):
+    """A log that comes in blocks of `rows` samples."""
+
+    def __init__(self, log: Log, rows: int) -> None:
+        self._rows = rows
+        super().__init__(log, "unloaded")
+
+    def _open(self) -> tuple[Origin, Callable[[], Iterator[Log]]]:
+        log, rows = self._log, self._rows
+        assert isinstance(log, Log)
+        return log.origin, lambda: (log.part(first, min(first + rows, len(log))) for first in range(0, len(log), rows))
+
+
+@pytest.fixture(scope="module")
+def uneven() -> Log:
+    """Jitter, lost samples and a gap; long enough that the refined estimator leaves pieces out of its training."""
+    sensors = Sensors(position_noise=1e-4, torque_noise=1e-2, jitter=1e-5, drop=1e-3, seed=1)
+    first, _ = algid.synthesise("case1", duration=8.0, excitation="wide", sensors=sensors)
+    stamps = np.concatenate([first.stamp_ns + 8_500_000_000 * n for n in range(20)])
+    return Log(stamps, np.tile(first.theta, 20), np.tile(first.tau, 20), first.origin)
+
+
+def estimates(log: LogSource, settings: Settings) -> tuple[FloatArray, Result]:
+    if settings.estimator == "paper":
+        result = result_of(run_paper(log, None, settings), settings, [log])
+        return np.array([one.estimate for one in result.parameters.values()], dtype=np.float64), result
+    fit = run_fit([log], [], settings, None)
+    assert fit.converged
+    return np.concatenate([fit.values, fit.std]), result_of(outcome_of(fit, [log], [], settings), settings, [log])
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_blocks_do_not_show_in_the_estimates(name: str, uneven: Log) -> None:
+    settings = SETTINGS[name]
+    whole, result = estimates(Chopped(uneven, len(uneven)), settings)
+    for rows in (4097, 60_000):
+        cut, streamed = estimates(Chopped(uneven, rows), settings)
+        np.testing.assert_allclose(cut, whole, rtol=1e-12)
+        assert streamed.log == result.log
+        if result.fit is not None and result.fit.residual is not None:
+            assert streamed.fit is not None
+            assert streamed.fit.residual is not None
+            np.testing.assert_allclose(streamed.fit.residual.rmse, result.fit.residual.rmse, rtol=1e-10)
