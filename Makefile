@@ -3,11 +3,12 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: help setup demo test test-slow check lint format types pytest pipelines clean
+.PHONY: help setup demo test test-slow test-processor check lint format types pytest pipelines clean
 
 help:
 	@echo "make demo       synthesise, identify and print Table 4 beside the paper's"
 	@echo "make test       set up and run the tests"
+	@echo "make test-processor  the numerical tests as another processor rounds"
 	@echo "make test-slow  the statistics: coverage of intervals and the like, some minutes"
 	@echo "make check      format, lint, types, tests: what every commit passes"
 	@echo "make pipelines  both cases through every format, failing when a reported error grows"
@@ -24,6 +25,13 @@ test: setup
 
 test-slow: setup
 	$(BIN)/python -m pytest -m slow
+
+# Sums in another order, as another processor takes them: OpenBLAS's kernels for AVX-512 where there is AVX-512, else
+# those for SSE; NumPy without AVX2 and AVX-512.
+test-processor: setup
+	OPENBLAS_CORETYPE=$$(grep -q avx512f /proc/cpuinfo && echo SkylakeX || echo Nehalem) \
+	NPY_DISABLE_CPU_FEATURES="X86_V3 X86_V4 AVX512_ICL AVX512_SPR" \
+	$(BIN)/python -m pytest tests/estimators tests/identification tests/signals tests/synth tests/track tests/test_arm.py
 
 check: setup
 	$(BIN)/ruff format --check .

@@ -49,22 +49,28 @@ def uneven() -> Log:
     return Log(stamps, np.tile(first.theta, 20), np.tile(first.tau, 20), first.origin)
 
 
-def estimates(log: LogSource, settings: Settings) -> tuple[FloatArray, Result]:
+def estimates(log: LogSource, settings: Settings) -> tuple[FloatArray, FloatArray, Result]:
+    """Estimates, by how much sums of another order may move them, and the whole result."""
     if settings.estimator == "paper":
         result = result_of(run_paper(log, None, settings), settings, [log])
-        return np.array([one.estimate for one in result.parameters.values()], dtype=np.float64), result
+        values = np.array([one.estimate for one in result.parameters.values()], dtype=np.float64)
+        return values, 1e-9 * np.abs(values), result  # condition numbers to 1e6, times rounding
     fit = run_fit([log], [], settings, None)
     assert fit.converged
-    return np.concatenate([fit.values, fit.std]), result_of(outcome_of(fit, [log], [], settings), settings, [log])
+    # A window or sample lost at a seam moves an estimate by 1e-4 of its deviation or more; rounding, times the
+    # condition of the normal equations, by 1e-9 of it.
+    room = np.concatenate([fit.std, fit.std]) * 1e-7
+    result = result_of(outcome_of(fit, [log], [], settings), settings, [log])
+    return np.concatenate([fit.values, fit.std]), room, result
 
 
 @pytest.mark.parametrize("name", SETTINGS)
 def test_blocks_do_not_show_in_the_estimates(name: str, uneven: Log) -> None:
     settings = SETTINGS[name]
-    whole, result = estimates(Chopped(uneven, len(uneven)), settings)
+    whole, room, result = estimates(Chopped(uneven, len(uneven)), settings)
     for rows in (4097, 60_000):
-        cut, streamed = estimates(Chopped(uneven, rows), settings)
-        np.testing.assert_allclose(cut, whole, rtol=1e-12)
+        cut, _, streamed = estimates(Chopped(uneven, rows), settings)
+        assert np.all(np.abs(cut - whole) < room)
         assert streamed.log == result.log
         if result.fit is not None and result.fit.residual is not None:
             assert streamed.fit is not None
