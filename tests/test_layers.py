@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import subprocess
 import sys
 from pathlib import Path
@@ -10,66 +9,135 @@ from pathlib import Path
 import pytest
 
 import algid
+from tests.layers import PURE, Room, breaches, cycles, imported, room
 
 ROOT = Path(algid.__file__).parent
-FLOORS = {
-    "cli": 4,
-    "batch": 3,
-    "fleet": 3,
-    "track": 3,
-    "identification": 2,
-    "api": 2,
-    "table4": 2,
-    "check": 2,
-    "inspection": 1,
-    "readers": 1,
-    "writers": 1,
-    "signals": 0,
-    "estimators": 1,
-    "report": 1,
-    "synth": 1,
+TABLE: dict[str, Room] = {  # lower rooms first
+    "errors": room(),
+    "progress": room(),
+    "ros2": room(),
+    "runtime": room(packages="threadpoolctl"),
+    "arm": room(packages="numpy", library=PURE),
+    "model": room("arm", "numpy", PURE),
+    "log": room("arm", "numpy"),
+    "signals": room("arm log", "numpy scipy", PURE),
+    "estimators": room("arm model progress signals", "numpy scipy", PURE),
+    "files": room("errors", "pydantic"),
+    "stores": room("errors files", "pyarrow"),
+    "profile": room("errors files", "pydantic"),
+    "settings": room("errors signals"),
+    "results": room("errors files", "pydantic"),
+    "synth": room("arm errors files log progress", "numpy pydantic scipy"),
+    "table4": room("arm log results synth", "numpy"),
+    "writers": room("errors files log ros2", "mcap numpy polars pyarrow"),
+    "readers": room("arm errors log profile runtime", "lz4 mcap numpy polars pyarrow rosbags zstandard"),
+    "inspection": room("arm errors log profile readers", "numpy"),
+    "report": room(
+        "arm errors files progress results ros2 signals", "mcap numpy plotly polars pyarrow rich"
+    ),
+    "check": room("errors files results", "pydantic"),
+    "identification": room(
+        "arm errors estimators files inspection log model profile progress readers report results runtime settings "
+        "signals table4",
+        "numpy pyarrow",
+    ),
+    "api": room("identification log synth"),
+    "batch": room(
+        "errors identification profile readers results runtime settings stores", "distributed mcap polars pyarrow"
+    ),
+    "track": room(
+        "arm errors estimators files identification model profile report results runtime settings signals",
+        "mcap numpy plotly polars pyarrow",
+    ),
+    "fleet": room("errors files progress report", "numpy plotly polars scipy"),
+    "cli": room(
+        "batch check errors files fleet identification inspection log profile progress readers report results runtime "
+        "settings signals stores synth track writers",
+        "rich typer",
+    ),
+}  # fmt: skip
+
+
+def sources() -> dict[str, str]:
+    """The text of every module of algid by its name."""
+    found = {}
+    for path in sorted(ROOT.rglob("*.py")):
+        parts = ("algid", *path.relative_to(ROOT).with_suffix("").parts)
+        found[".".join(parts).removesuffix(".__init__")] = path.read_text(encoding="utf-8")
+    return found
+
+
+def test_imports_follow_the_table() -> None:
+    assert list(breaches(sources(), TABLE)) == []
+
+
+def test_no_arrow_points_up() -> None:
+    assert cycles(TABLE) == []
+
+
+def test_the_table_allows_nothing_that_nobody_needs() -> None:
+    used: dict[str, set[str]] = {name: set() for name in TABLE}
+    for module, text in sources().items():
+        own = module.split(".")[1] if "." in module else ""
+        used.get(own, set()).update(
+            name.split(".")[1] if name.startswith("algid.") else name.split(".")[0]
+            for name in imported(module, text, sources())
+        )
+    spare = {name: (one.rooms | one.packages) - used[name] for name, one in TABLE.items()}
+    assert {name: more for name, more in spare.items() if more} == {}
+
+
+HOUSE = {
+    "algid": "def __getattr__(name): ...",
+    "algid.arm": "import numpy",
+    "algid.estimators": "",
+    "algid.estimators.weak": "from algid.arm import FloatArray",
+    "algid.synth": "",
+    "algid.synth.run": "from algid.arm import Arm",
+    "algid.cli": "",
+    "algid.cli.app": "from algid.estimators import weak",
 }
-MATHEMATICS = ("estimators", "signals", "arm.py", "model.py", "synth/simulator.py", "synth/excitation.py")
+FLOORS = {
+    "arm": room(packages="numpy", library=PURE),
+    "estimators": room("arm", "numpy scipy", PURE),
+    "synth": room("arm", "numpy"),
+    "cli": room("arm estimators synth", "typer"),
+}
 
 
-def modules(*places: str) -> list[Path]:
-    paths = [ROOT / place for place in places] if places else [ROOT]
-    return [file for path in paths for file in ([path] if path.is_file() else sorted(path.rglob("*.py")))]
+def test_a_sound_house_is_let_stand() -> None:
+    assert list(breaches(HOUSE, FLOORS)) == []
 
 
-def imported(path: Path) -> set[str]:
-    names = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names.add(node.module)
-    return names
+@pytest.mark.parametrize(
+    ("module", "line"),
+    [
+        pytest.param("algid.arm", "import algid.cli.app", id="upwards"),
+        pytest.param("algid.arm", "from algid import cli", id="upwards, as a name of the package"),
+        pytest.param("algid.arm", "from .cli import app", id="upwards, relative"),
+        pytest.param("algid.estimators.weak", "from ..cli.app import main", id="upwards, relative to a folder"),
+        pytest.param("algid.arm", "def f():\n    from algid.cli import app", id="upwards, in a function"),
+        pytest.param(
+            "algid.arm", "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import algid.cli", id="for types"
+        ),
+        pytest.param("algid.arm", "import importlib\nimportlib.import_module('algid.cli')", id="by its name as text"),
+        pytest.param("algid.arm", "__import__('algid.cli')", id="by the function behind import"),
+        pytest.param("algid.synth.run", "import importlib\nimportlib.import_module(name)", id="a computed name"),
+        pytest.param("algid.synth.run", "from algid.estimators.weak import fit", id="the simulator, an estimator"),
+        pytest.param("algid.synth.run", "from algid import identify", id="the simulator, through the package"),
+        pytest.param("algid.synth.run", "import algid\nalgid.identify()", id="the package whole"),
+        pytest.param("algid.estimators.weak", "import polars", id="mathematics, tables"),
+        pytest.param("algid.estimators.weak", "from pathlib import Path", id="mathematics, files"),
+        pytest.param("algid.estimators.weak", "def f():\n    import os.path", id="mathematics, files, in a function"),
+        pytest.param("algid.attic.box", "", id="a room without a place"),
+    ],
+)
+def test_a_breach_is_seen(module: str, line: str) -> None:
+    assert list(breaches({**HOUSE, module: line}, FLOORS))
 
 
-def floor(parts: tuple[str, ...]) -> int:
-    return FLOORS.get(parts[0], 0) if parts else 0
-
-
-@pytest.mark.parametrize("path", modules(), ids=lambda path: str(path.relative_to(ROOT)))
-def test_imports_point_down(path: Path) -> None:
-    own = path.relative_to(ROOT).with_suffix("").parts
-    if own in (("__init__",), ("__main__",)):
-        return
-    for name in imported(path):
-        if name.startswith("algid.") and not name.startswith("algid." + own[0]):
-            assert floor(tuple(name.split(".")[1:])) <= floor(own), f"{path} must not import {name}"
-
-
-@pytest.mark.parametrize("path", modules(*MATHEMATICS), ids=lambda path: str(path.relative_to(ROOT)))
-def test_mathematics_needs_numpy_and_scipy_only(path: Path) -> None:
-    allowed = {"numpy", "scipy", "algid", *sys.stdlib_module_names}
-    assert {name.split(".")[0] for name in imported(path)} <= allowed
-
-
-@pytest.mark.parametrize("path", modules("synth"), ids=lambda path: path.name)
-def test_the_simulator_knows_nothing_of_identification(path: Path) -> None:
-    assert not any(name.startswith(("algid.estimators", "algid.identification")) for name in imported(path))
+def test_a_circle_of_rooms_is_seen() -> None:
+    assert cycles({"arm": room("cli"), "cli": room("arm")}) == ["arm -> cli"]
 
 
 def test_importing_algid_loads_nothing_heavy() -> None:
