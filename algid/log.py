@@ -22,8 +22,8 @@ from __future__ import annotations
 import json
 import zlib
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +61,68 @@ class Notice:
     lossy: bool = False
 
 
+Teller = Literal["flag", "profile", "names", "order"]
+
+
+@dataclass(frozen=True)
+class ChannelReading:
+    """How one channel was read: algid's value is `factor` times the recorded one, plus `offset`.
+
+    `unit` is that of the recorded values; `told` by a flag or a profile, by the channel's own name, or not at all
+    ("assumed"). `offset` is in rad, N m or rad/s.
+    """
+
+    source: str
+    unit: str
+    told: Literal["flag", "profile", "names", "assumed"] = "assumed"
+    factor: float = 1.0
+    offset: float = 0.0
+
+    @property
+    def sign(self) -> int:
+        """Whether the recorded values count the other way round (-1)."""
+        return -1 if self.factor < 0 else 1
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Everything that a reader decided, or was told, about a log: how to read it the same way again.
+
+    Parameters
+    ----------
+    channels : by canonical name how each channel was read
+    joints : names of joint 1 and joint 2 in the log, where it has names
+    joints_told : 'flag', 'profile', 'names' or 'order'
+        Who said which joint is the first: the user, the joints' own names, or only their order in the log.
+    topics : topics that were read, the one that sets the time first
+    clock : 'header', 'log' (the recorder's times) or 'column'
+        'header' stands for the messages' own stamps, unless they turn out to stand still.
+    time_unit : unit of the times, None where it is told by the values only
+    zero, second_angle : as in a profile
+    unwrap : whether each joint's jumps by a turn were made continuous
+    start, end : float, s
+        Where the log was cut, in time since its first sample.
+    accepted : codes of the checks that may not refuse the log
+    """
+
+    channels: Mapping[str, ChannelReading] = field(default_factory=dict)
+    joints: tuple[str, str] | None = None
+    joints_told: Teller | None = None
+    topics: tuple[str, ...] = ()
+    clock: str | None = None
+    time_unit: str | None = None
+    zero: str = "horizontal"
+    second_angle: str = "relative"
+    unwrap: tuple[bool, bool] = (False, False)
+    start: float | None = None
+    end: float | None = None
+    accepted: tuple[str, ...] = ()
+
+    def told(self, name: str) -> bool:
+        """Whether the user said the unit of the canonical channel `name`."""
+        return name in self.channels and self.channels[name].told in ("flag", "profile")
+
+
 @dataclass(frozen=True)
 class Origin:
     """Where a log came from: its file, format, each channel's source, and a synthetic log's truth."""
@@ -69,6 +131,7 @@ class Origin:
     format: str
     mapping: dict[str, str]
     truth: Truth | None = None
+    reading: Reading = Reading()
 
 
 @dataclass(frozen=True, eq=False)

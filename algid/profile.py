@@ -7,17 +7,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError
 
 from algid.errors import SettingError
 from algid.files import first_misfit, read_toml
+from algid.units import unit_of
 
-AngleUnit = Literal["rad", "deg", "rev", "counts"]
-VelocityUnit = Literal["rad", "deg", "rev", "counts", "rpm"]
-TorqueUnit = Literal["N m", "mN m", "A", "mA"]
-TimeUnit = Literal["s", "ms", "us", "ns"]
+
+def _usual(unit: object) -> object:
+    """A unit in algid's writing: ``Nm`` means ``N m``."""
+    return (unit_of(unit) or unit) if isinstance(unit, str) else unit
+
+
+AngleUnit = Annotated[Literal["rad", "mrad", "deg", "rev", "counts"], BeforeValidator(_usual)]
+VelocityUnit = Annotated[Literal["rad", "mrad", "deg", "rev", "counts", "rpm"], BeforeValidator(_usual)]
+TorqueUnit = Annotated[
+    Literal["N m", "mN m", "N cm", "kN m", "kgf m", "kgf cm", "lbf ft", "lbf in", "ozf in", "A", "mA"],
+    BeforeValidator(_usual),
+]
+TimeUnit = Annotated[Literal["s", "ms", "us", "ns"], BeforeValidator(_usual)]
 
 
 class _Strict(BaseModel):
@@ -77,6 +87,12 @@ class Profile(_Strict):
     omega1: Velocity = Velocity()
     omega2: Velocity = Velocity()
 
+    _flags: frozenset[str] = PrivateAttr(frozenset())
+
+    def told_by(self, setting: str) -> Literal["flag", "profile"]:
+        """Who set `setting`, such as ``joints`` or ``tau1.unit``: a flag beats the file."""
+        return "flag" if setting in self._flags else "profile"
+
     def channel(self, name: str) -> Angle | Velocity | Torque:
         """The profile of the canonical channel `name`."""
         found: Angle | Velocity | Torque = getattr(self, name)
@@ -95,9 +111,15 @@ def with_settings(profile: Profile, settings: Mapping[str, Any]) -> Profile:
     for name, value in settings.items():
         merged[name] = {**merged.get(name, {}), **value} if isinstance(value, Mapping) else value
     try:
-        return Profile.model_validate(merged)
+        found = Profile.model_validate(merged)
     except ValidationError as error:
         raise SettingError(f"setting {first_misfit(error)}") from error
+    found._flags = profile._flags | {place for name, value in settings.items() for place in _places(name, value)}
+    return found
+
+
+def _places(name: str, value: object) -> list[str]:
+    return [f"{name}.{inner}" for inner in value] if isinstance(value, Mapping) else [name]
 
 
 def load_profile(path: Path) -> Profile:

@@ -63,7 +63,8 @@ def _open_bag(path: Path, profile: Profile | None) -> TableReader:
         from algid.readers.bag import open_bag
 
         return open_bag(path, profile, bag.notices)
-    return replace(open_mcap(bag.paths, profile), notices=bag.notices)
+    reader = open_mcap(bag.paths, profile)
+    return replace(reader, notices=(*bag.notices, *reader.notices))
 
 
 def read_log(path: str | Path, profile: Profile | None = None) -> Log:

@@ -1,25 +1,24 @@
-"""From a format's tables to blocks of a log: the part that every reader shares.
-
-
-
-Angles that jump by a turn, made continuous across the blocks of a log.
-"""
+"""From a format's tables to blocks of a log: the part that every reader shares."""
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from algid.arm import FloatArray
 from algid.errors import LogError
 from algid.log import Log, Notice, Origin
-from algid.readers.convert import ROWS, Conversion, Gatherer, Room
+from algid.readers.convert import ROWS, Conversion, Gatherer, Room, channel_readings
 from algid.readers.order import Sorter
 from algid.readers.table import BLOCK_ROWS, Table, cut
+
+if TYPE_CHECKING:
+    from algid.profile import Profile
 
 _LARGEST = 1e100
 """Beyond this a value is no angle and no torque, and its square would overflow."""
@@ -32,7 +31,6 @@ class TableReader:
     origin: Origin
     tables: Callable[[int], Iterator[Table]]
     conversion: Conversion
-    unwrap: tuple[bool, bool] = (False, False)
     notices: tuple[Notice, ...] = ()
     rows: int = 0
     """Samples to expect, 0 where the file does not tell."""
@@ -60,7 +58,7 @@ class TableReader:
 
     def _gathered(self, most: int) -> Iterator[Log]:
         """Logs of at most `most` samples, each converted from small tables straight into its arrays."""
-        unwrapper = Unwrapper(self.unwrap)
+        unwrapper = Unwrapper(self.origin.reading.unwrap)
         gatherer: Gatherer | None = None
         notices: tuple[Notice, ...] = ()
         for table, said in self._samples(min(ROWS, most)):
@@ -120,6 +118,48 @@ class TableReader:
                 f"expected a finite number below {_LARGEST:g} in size, found {values[row]}; "
                 "cut that part out or name another source"
             )
+
+
+def reader_of(
+    origin: Origin,
+    tables: Callable[[int], Iterator[Table]],
+    profile: Profile | None,
+    stated: Mapping[str, str],
+    notices: tuple[Notice, ...] = (),
+    rows: int = 0,
+) -> TableReader:
+    """A reader of `tables` as a profile says.
+
+    Parameters
+    ----------
+    origin : Origin
+        Its reading holds what the format's reader has decided: joints, topics, clock, unit of time.
+    tables : callable
+        Gives tables of at most so many rows.
+    profile : Profile, optional
+    stated : mapping
+        By canonical channel the unit that the file's own names state.
+    notices, rows : as of `TableReader`
+
+    Raises
+    ------
+    LogError
+        If a torque is in amperes without a torque constant, or an angle in counts without counts a turn.
+    """
+    if profile is None:
+        from algid.profile import Profile
+
+        profile = Profile()
+    channels = channel_readings(origin.path, origin.mapping, profile, stated)
+    reading = replace(
+        origin.reading,
+        channels=channels,
+        zero=profile.zero,
+        second_angle=profile.second_angle,
+        unwrap=(profile.theta1.unwrap, profile.theta2.unwrap),
+    )
+    units = Conversion(channels, hanging=profile.zero == "hanging", absolute=profile.second_angle == "absolute")
+    return TableReader(replace(origin, reading=reading), tables, units, notices, rows)
 
 
 _TURN = 2 * math.pi

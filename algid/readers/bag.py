@@ -8,15 +8,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from algid.errors import LogError
-from algid.log import Notice, Origin
-from algid.readers.assemble import TableReader
-from algid.readers.convert import conversion
-from algid.readers.mcap.topic import in_order
+from algid.log import Notice, Origin, Reading, Teller
+from algid.readers.assemble import TableReader, reader_of
+from algid.readers.joints import along_the_arm, order_notice
 from algid.readers.table import JOINT_CHANNELS, VELOCITIES, Table
 
 if TYPE_CHECKING:
@@ -45,10 +44,10 @@ def open_bag(path: Path, profile: Profile | None = None, notices: tuple[Notice, 
     velocity = bag.velocity and (profile is None or profile.velocity)
     names = JOINT_CHANNELS + (VELOCITIES if velocity else ())
     mapping = {name: f"{bag.topic}: {_FIELDS[name[:-1]]}[{bag.joint(name)}]" for name in names}
-    origin = Origin(str(path), "bag", {**mapping, "t": f"{bag.topic}: header.stamp"})
-    unwrap = (profile.theta1.unwrap, profile.theta2.unwrap) if profile else (False, False)
-    units = conversion(str(path), profile, {})
-    return TableReader(origin, lambda rows: bag.tables(names, rows), units, unwrap, notices)
+    told: Teller = profile.told_by("joints") if profile and profile.joints else bag.told
+    reading = Reading(joints=bag.joints, joints_told=told, topics=(str(bag.topic),), clock="header")
+    origin = Origin(str(path), "bag", {**mapping, "t": f"{bag.topic}: header.stamp"}, None, reading)
+    return reader_of(origin, lambda rows: bag.tables(names, rows), profile, {}, (*notices, *bag.notices))
 
 
 @dataclass
@@ -59,6 +58,8 @@ class _Bag:
     topic: str | None
     joints: tuple[str, str] | None
     velocity: bool = field(default=False)
+    told: Literal["names", "order"] = field(default="names")
+    notices: tuple[Notice, ...] = field(default=())
 
     def joint(self, channel: str) -> str:
         return (self.joints or ("", ""))[int(channel[-1]) - 1]
@@ -70,7 +71,10 @@ class _Bag:
             names = list(message.name)
             fits = set(self.joints) <= set(names) if self.joints else len(names) == 2
             if fits and len(message.position) == len(message.effort) == len(names):
-                self.topic, self.joints = topic, self.joints or in_order(names)
+                self.topic = topic
+                if self.joints is None:
+                    self.joints, self.told = along_the_arm(names)
+                    self.notices = order_notice(names, self.joints, self.told)
                 self.velocity = len(message.velocity) == len(names)
                 return
             seen.add(f"{topic!r} with {len(names)} joints")

@@ -1,10 +1,7 @@
-"""The columns of a flat log, chosen by a profile and by their names.
+"""The columns of a flat log, chosen by a profile and by their names, and the tables made of them.
 
-From the numbers of a time column to int64 nanoseconds.
-
-float64 seconds since 1970 resolve 0.24 µs, so whole and fractional seconds are converted apart.
-
-From data frames with canonical names to tables: what CSV and Parquet share.
+What every flat format shares. float64 seconds since 1970 resolve 0.24 µs, so whole and fractional seconds are
+converted apart.
 """
 
 from __future__ import annotations
@@ -17,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.errors import LogError
-from algid.log import IntArray, Notice, Origin, add, word_sum
-from algid.readers.assemble import TableReader
-from algid.readers.convert import conversion
-from algid.readers.names import COMMANDED, CURRENTS, choose, take_apart
+from algid.log import IntArray, Notice, Origin, Reading, Teller, Truth, add, word_sum
+from algid.readers.assemble import TableReader, reader_of
+from algid.readers.joints import along_the_arm, order_notice
+from algid.readers.names import COMMANDED, CURRENTS, Choice, choose, take_apart
 from algid.readers.table import CHANNELS, JOINT_CHANNELS, VELOCITIES, Table
+from algid.units import NANOSECONDS
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -39,18 +37,28 @@ class Columns:
     time_unit: str | None
     notices: tuple[Notice, ...] = ()
     time_told: bool = False
+    joints: tuple[str, str] | None = None
+    joints_told: Teller | None = None
 
     def reader(
         self,
-        origin: Origin,
+        path: str,
+        kind: str,
+        truth: Truth | None,
         tables: Callable[[int], Iterator[Table]],
         profile: Profile | None,
         rows: int,
     ) -> TableReader:
-        """A reader of these columns out of `tables`; `rows` samples are to be expected."""
-        unwrap = (profile.theta1.unwrap, profile.theta2.unwrap) if profile else (False, False)
-        units = conversion(origin.path, profile, self.units)
-        return TableReader(origin, tables, units, unwrap, self.notices, rows)
+        """A reader of these columns out of `tables`; `rows` samples are to be expected.
+
+        Raises
+        ------
+        LogError
+            As `reader_of`.
+        """
+        decided = Reading(joints=self.joints, joints_told=self.joints_told, clock="column", time_unit=self.time_unit)
+        origin = Origin(path, kind, dict(self.sources), truth, decided)
+        return reader_of(origin, tables, profile, self.units, self.notices, rows)
 
 
 def assign(path: str, available: Sequence[str], profile: Profile | None) -> Columns:
@@ -64,8 +72,9 @@ def assign(path: str, available: Sequence[str], profile: Profile | None) -> Colu
     try:
         choice = choose(available, profile.joints if profile else None)
     except LookupError as error:
-        raise LogError(f'{path}: {error}; choose two with joints = ["…", "…"] in a profile') from error
-    sources = dict(choice.columns) | _named(path, available, profile)
+        raise LogError(f'{path}: {error}; choose two with --joints NAME,NAME (profile: joints = ["…", "…"])') from error
+    named = _named(path, available, profile)
+    sources = dict(choice.columns) | named
     if (profile and not profile.velocity) or not all(name in sources for name in VELOCITIES):
         sources = {name: column for name, column in sources.items() if name not in VELOCITIES}
     missing = [name for name in ("t", *JOINT_CHANNELS) if name not in sources]
@@ -79,7 +88,30 @@ def assign(path: str, available: Sequence[str], profile: Profile | None) -> Colu
     told = (profile.time_unit if profile else None) or units.get("t")
     if all(sources[name] == name for name in ("t", *JOINT_CHANNELS)):
         units.setdefault("t", "s")  # algid's own names mean algid's own units
-    return Columns(sources, units, told or units.get("t"), _notices(sources), time_told=told is not None)
+    joints, by, said = _joints(choice, named, profile)
+    return Columns(
+        sources,
+        units,
+        told or units.get("t"),
+        (*_notices(sources), *said),
+        time_told=told is not None,
+        joints=joints,
+        joints_told=by,
+    )
+
+
+def _joints(
+    choice: Choice, named: Mapping[str, str], profile: Profile | None
+) -> tuple[tuple[str, str] | None, Teller, tuple[Notice, ...]]:
+    """The joints, who said which is the first, and what to tell of it."""
+    if profile is not None and profile.joints is not None:
+        return profile.joints, profile.told_by("joints"), ()
+    if all(name in named for name in JOINT_CHANNELS):
+        return None, "profile", ()
+    if choice.joints is None:
+        return None, "names", ()
+    chosen, told = along_the_arm(choice.joints)
+    return chosen, told, order_notice(choice.joints, chosen, told)
 
 
 def check_written(path: str, available: Sequence[str], sums: Mapping[str, int]) -> None:
@@ -126,8 +158,6 @@ def _listed(available: Sequence[str]) -> str:
     return ", ".join(names) + (f" and {len(available) - 16} more" if len(available) > 16 else "")
 
 
-NANOSECONDS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
-"""Nanoseconds in one unit of time."""
 _EPOCH = (("s", 1e8, 1e11), ("ms", 1e11, 1e14), ("us", 1e14, 1e17), ("ns", 1e17, 1e20))
 _LARGEST = 9.2e18
 _STEPS = (("s", 0.2), ("ms", 50.0), ("us", 50_000.0))

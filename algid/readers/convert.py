@@ -14,8 +14,12 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.errors import LogError
-from algid.log import IntArray
-from algid.readers.table import JOINT_CHANNELS, VELOCITIES, Table
+from algid.log import ChannelReading, IntArray
+from algid.readers.table import CHANNELS, JOINT_CHANNELS, VELOCITIES, Table
+from algid.units import CURRENT, TORQUE, VELOCITY
+
+if TYPE_CHECKING:
+    from algid.profile import Angle, Profile, Torque, Velocity
 
 ROWS = 1 << 16
 """Rows a table: few enough to stay in a core's cache between decoding and copying."""
@@ -85,21 +89,11 @@ class Gatherer:
         return self._room.part(0, self._used)
 
 
-if TYPE_CHECKING:
-    from algid.profile import Profile
-
-_TURN = 2 * math.pi
-_ANGLE = {"rad": 1.0, "deg": math.pi / 180, "rev": _TURN, "rpm": _TURN / 60}
-_TORQUE = {"N m": 1.0, "mN m": 1e-3}
-_CURRENT = {"A": 1.0, "mA": 1e-3}
-
-
 @dataclass(frozen=True)
 class Conversion:
     """Value · factor + offset for each channel of a table, then the zero and the reference of the angles."""
 
-    factors: Mapping[str, float]
-    offsets: Mapping[str, float]
+    channels: Mapping[str, ChannelReading]
     hanging: bool = False
     absolute: bool = False
 
@@ -119,49 +113,53 @@ class Conversion:
 
     def _joint_pair(self, table: Table, names: Sequence[str], both: FloatArray) -> None:
         for row, name in zip(both, names, strict=True):
-            if self.factors[name] == 1:
+            channel = self.channels[name]
+            if channel.factor == 1:
                 row[:] = table.columns[name]
             else:
-                np.multiply(table.columns[name], self.factors[name], out=row)
-            if self.offsets[name]:
-                row += self.offsets[name]
+                np.multiply(table.columns[name], channel.factor, out=row)
+            if channel.offset:
+                row += channel.offset
 
 
-def conversion(path: str, profile: Profile | None, told: Mapping[str, str]) -> Conversion:
-    """The conversion that a profile asks for; `told` are units that the file's own names state.
+def channel_readings(
+    path: str, mapping: Mapping[str, str], profile: Profile, stated: Mapping[str, str]
+) -> dict[str, ChannelReading]:
+    """How each channel in `mapping` is to be read; `stated` are units that the file's own names state.
 
     Raises
     ------
     LogError
         If a torque is in amperes without a torque constant, or counts without counts a turn.
     """
-    names = (*JOINT_CHANNELS, *VELOCITIES)
-    factors = {name: _factor(path, name, profile, told.get(name)) for name in names}
-    if profile is None:
-        return Conversion(factors, dict.fromkeys(names, 0.0))
-    offsets = {name: profile.channel(name).offset for name in names}
-    for joint in (0, 1):
-        offsets[names[joint]] += profile.offsets[joint]
-    return Conversion(factors, offsets, hanging=profile.zero == "hanging", absolute=profile.second_angle == "absolute")
+    return {
+        name: _channel_reading(path, name, mapping[name], profile, stated.get(name))
+        for name in CHANNELS
+        if name in mapping
+    }
 
 
-def _factor(path: str, name: str, profile: Profile | None, told: str | None) -> float:
-    channel = profile.channel(name) if profile else None
-    unit = (channel.unit if channel else None) or told or ("N m" if name.startswith("tau") else "rad")
-    sign = channel.sign * profile.signs[int(name[-1]) - 1] if channel and profile else 1
-    if unit in _CURRENT:
+def _channel_reading(path: str, name: str, source: str, profile: Profile, stated: str | None) -> ChannelReading:
+    channel, joint = profile.channel(name), int(name[-1]) - 1
+    unit = channel.unit or stated or ("N m" if name.startswith("tau") else "rad")
+    told = profile.told_by(f"{name}.unit") if channel.unit else "names" if stated else "assumed"
+    sign = channel.sign * profile.signs[joint]
+    offset = channel.offset + (profile.offsets[joint] if name.startswith("theta") else 0.0)
+    return ChannelReading(source, unit, told, sign * _factor(path, name, channel, unit), offset)
+
+
+def _factor(path: str, name: str, channel: Angle | Velocity | Torque, unit: str) -> float:
+    if unit in CURRENT:
         constant = getattr(channel, "torque_constant", None)
         if constant is None:
             raise LogError(
                 f"{path}: {name} is a current; torque in N m needs the motor's torque constant: set "
                 f'unit = "A", torque_constant (N m/A) and gear_ratio of [{name}] in a profile'
             )
-        return sign * _CURRENT[unit] * constant * float(getattr(channel, "gear_ratio", 1.0))
+        return CURRENT[unit] * float(constant) * float(getattr(channel, "gear_ratio", 1.0))
     if unit == "counts":
         counts = getattr(channel, "counts", None)
         if counts is None:
             raise LogError(f"{path}: {name} in encoder counts needs counts a turn: set counts of [{name}]")
-        return sign * _TURN / float(counts)
-    if name.startswith("tau"):
-        return sign * _TORQUE[unit]
-    return sign * _ANGLE[unit]
+        return 2 * math.pi / float(counts)
+    return TORQUE[unit] if name.startswith("tau") else VELOCITY[unit]

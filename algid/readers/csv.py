@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from algid.errors import LogError
-from algid.log import Companion, Origin, loads
+from algid.log import Companion, loads
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign, check_written, tables
 from algid.readers.dialect import Dialect, detect
@@ -44,9 +44,9 @@ def open_csv(path: Path, profile: Profile | None = None, kind: str = "csv") -> T
     companion = _companion(path)
     check_written(str(path), dialect.columns, companion.sums if companion else {})
     columns = assign(str(path), dialect.columns, profile)
-    origin = Origin(str(path), "csv", dict(columns.sources), companion.truth if companion else None)
     source = _Text(path, kind, dialect, columns, companion.sums if companion else {})
-    return columns.reader(origin, source.tables, profile, _rows(path, kind, head))
+    truth = companion.truth if companion else None
+    return columns.reader(str(path), "csv", truth, source.tables, profile, _rows(path, kind, head))
 
 
 def head_bytes(path: Path, kind: str) -> bytes:

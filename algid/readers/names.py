@@ -11,6 +11,9 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from algid.readers.joints import along_the_arm
+from algid.units import unit_of
+
 STEMS: dict[str, tuple[str, ...]] = {
     "theta": (
         *("theta", "theta_meas", "pos_meas", "q_meas", "position_measured", "measured_position", "actual_q"),
@@ -68,15 +71,6 @@ TIMES = (
     *("seconds", "secs", "sec", "elapsed", "elapsed_time", "log_time", "header.stamp", "header/stamp"),
     *("milliseconds", "millis", "microseconds", "micros", "nanoseconds", "nanos"),
 )
-UNITS = {
-    "deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "rad": "rad", "radian": "rad",
-    "radians": "rad", "rev": "rev", "turns": "rev", "deg/s": "deg", "rad/s": "rad", "rads": "rad",
-    "rpm": "rpm",
-    "nm": "N m", "n.m": "N m", "n*m": "N m", "n m": "N m", "n·m": "N m", "mnm": "mN m", "a": "A", "amp": "A",
-    "s": "s", "sec": "s", "secs": "s", "seconds": "s", "ms": "ms", "msec": "ms", "millis": "ms", "milliseconds": "ms",
-    "us": "us", "µs": "us", "μs": "us", "usec": "us", "micros": "us", "microseconds": "us",
-    "ns": "ns", "nsec": "ns", "nanos": "ns", "nanoseconds": "ns",
-}  # fmt: skip
 _BRACKET_UNIT = re.compile(r"^(.*\S)\s*[\[(]\s*([^\[\]()]*[^\[\]()\d\s][^\[\]()]*)\s*[\])]$")
 _SUFFIX_UNIT = re.compile(
     r"^(.*[^_\W])_(deg|rad|rev|nm|mnm|rpm|s|secs?|seconds|[mun]s(?:ec)?|millis|micros|nanos|(?:milli|micro|nano)seconds)$"
@@ -109,11 +103,11 @@ def take_apart(column: str) -> Name:
     unit = None
     for pattern in (_BRACKET_UNIT, _SUFFIX_UNIT):
         found = pattern.match(text)
-        if found and found[2].strip() in UNITS:
-            text, unit = found[1].strip(), UNITS[found[2].strip()]
+        if found and (known := unit_of(found[2])):
+            text, unit = found[1].strip(), known
             break
-    if text in TIMES and text in UNITS:  # "millis" says its unit itself
-        unit = UNITS[text]
+    if text in TIMES and (known := unit_of(text)):  # "millis" says its unit itself
+        unit = known
     if found := re.match(r"^(.*)/([^/]+)/(position|velocity|effort)$", text):
         return Name(found[3], f"{found[1]}/{found[2]}", unit)
     if found := re.match(r"^.*/(position|velocity|effort)[.\[/](\d+)\]?$", text):
@@ -150,7 +144,15 @@ def choose(columns: Iterable[str], joints: tuple[str, str] | None = None) -> Cho
         chosen["t"] = time
     chosen = _of_one_pair(chosen, parts)
     units = {channel: unit for channel, column in chosen.items() if (unit := parts[column].unit)}
-    return Choice(chosen, units)
+    return Choice(chosen, units, _named_joints(chosen, parts))
+
+
+def _named_joints(chosen: dict[str, str], parts: dict[str, Name]) -> tuple[str, str] | None:
+    """The joints' own names as they stand in the log; None where they are numbers, or none was found."""
+    places = list(parts)
+    pair = sorted((chosen[name] for name in ("theta1", "theta2") if name in chosen), key=places.index)
+    names = [(parts[column].joint or "").rsplit("/", 1)[-1] for column in pair]
+    return (names[0], names[1]) if len(names) == 2 and not all(name.isdigit() for name in names) else None
 
 
 def _pair(parts: dict[str, Name], stems: tuple[str, ...], joints: tuple[str, str] | None) -> tuple[str, str] | None:
@@ -159,8 +161,7 @@ def _pair(parts: dict[str, Name], stems: tuple[str, ...], joints: tuple[str, str
         if joints and (wanted := _wanted(by_joint, joints)):
             return wanted
         if len(by_joint) == 2 and not joints:
-            first, second = sorted(by_joint, key=_joint_order) if _numbered(by_joint) else list(by_joint)
-            return by_joint[first], by_joint[second]
+            return _in_order(by_joint)
         if len(by_joint) > 2 and not joints:
             raise LookupError(f"{stem!r} stands there for {len(by_joint)} joints: {', '.join(list(by_joint)[:8])}")
     return None
@@ -189,12 +190,11 @@ def _wanted(by_joint: dict[str, str], joints: tuple[str, str]) -> tuple[str, str
     return found[0], found[1]
 
 
-def _numbered(by_joint: dict[str, str]) -> bool:
-    return all(joint.isdigit() for joint in by_joint)
-
-
-def _joint_order(joint: str) -> int:
-    return int(joint)
+def _in_order(by_joint: dict[str, str]) -> tuple[str, str]:
+    """The columns of two joints, from the base outwards where their names tell."""
+    short = {joint.rsplit("/", 1)[-1]: column for joint, column in by_joint.items()}
+    (first, second), _ = along_the_arm(list(short if len(short) == 2 else by_joint))
+    return (short[first], short[second]) if len(short) == 2 else (by_joint[first], by_joint[second])
 
 
 def _time(parts: dict[str, Name]) -> str | None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from algid.errors import LogError
-from algid.log import CANONICAL_COLUMNS, KEY, Companion, Notice, Origin, loads
+from algid.log import CANONICAL_COLUMNS, KEY, Companion, Notice, loads
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign, check_written, tables
 from algid.readers.table import Table
@@ -46,9 +46,8 @@ def open_parquet(path: Path, profile: Profile | None = None) -> TableReader:
     if companion is None and "stamp_ns" in schema and set(CANONICAL_COLUMNS) <= schema.keys():
         columns = replace(columns, notices=(*columns.notices, _NO_SUMS))
     _check_types(path, columns, available, schema)
-    origin = Origin(str(path), "parquet", dict(columns.sources), companion.truth if companion else None)
     source = _Groups(path, columns, available, schema, companion.sums if companion else {})
-    return columns.reader(origin, source.tables, profile, rows)
+    return columns.reader(str(path), "parquet", companion.truth if companion else None, source.tables, profile, rows)
 
 
 def schema_of(path: Path) -> dict[str, pl.DataType]:

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 from algid.errors import LogError
 from algid.log import Origin, Truth, loads
 from algid.readers.align import Series, aligned
-from algid.readers.assemble import TableReader
-from algid.readers.convert import conversion
+from algid.readers.assemble import TableReader, reader_of
 from algid.readers.mcap.catalogue import Catalogue, catalogue, truth_text
 from algid.readers.mcap.framing import DamagedError, File
 from algid.readers.mcap.topic import Topic
@@ -40,7 +39,7 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
         truth = _truth(paths[0], found)
         rows = wanted.topics[0].count(found)
     name = str(paths[0] if len(paths) == 1 else paths[0].parent)
-    origin = Origin(name, "mcap", wanted.mapping, truth)
+    origin = Origin(name, "mcap", wanted.mapping, truth, wanted.reading)
 
     def tables(rows: int) -> Iterator[Table]:
         main, *others = wanted.topics
@@ -48,8 +47,7 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
             return _read(paths, main, rows)
         return aligned(_read(paths, main, rows), [_series(name, paths, other) for other in others])
 
-    unwrap = (profile.theta1.unwrap, profile.theta2.unwrap) if profile else (False, False)
-    return TableReader(origin, tables, conversion(name, profile, {}), unwrap, (), rows)
+    return reader_of(origin, tables, profile, {}, wanted.notices, rows)
 
 
 def _read(paths: Sequence[Path], topic: Topic, rows: int) -> Iterator[Table]:

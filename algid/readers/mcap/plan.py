@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from algid.errors import LogError
+from algid.log import Notice, Reading
+from algid.readers.joints import along_the_arm, order_notice
 from algid.readers.mcap.catalogue import Catalogue, channels_of, schema_name
 from algid.readers.mcap.codec import walk_for
 from algid.readers.mcap.columnar import MisfitError, Shape
@@ -17,7 +19,7 @@ from algid.readers.mcap.topic import (
     JOINT_STATE,
     Fields,
     Topic,
-    in_order,
+    has_names,
     joint_fields,
     joint_names,
     stamp_paths,
@@ -37,10 +39,12 @@ class NothingFoundError(LogError):
 
 @dataclass(frozen=True)
 class Plan:
-    """The topics to read, the main one first, and what to tell of where each channel comes from."""
+    """The topics to read, the main one first, where each channel comes from, and what was decided."""
 
     topics: tuple[Topic, ...]
     mapping: dict[str, str]
+    reading: Reading
+    notices: tuple[Notice, ...]
 
 
 def plan(file: File, found: Catalogue, profile: Profile | None) -> Plan:
@@ -54,11 +58,13 @@ def plan(file: File, found: Catalogue, profile: Profile | None) -> Plan:
     named = _named(profile)
     usual = _usual_topic(file, found, profile) if len(named) < len(JOINT_CHANNELS) else None
     sources: dict[str, tuple[str, str]] = {}
+    reading = Reading(joints_told="profile")
+    notices: tuple[Notice, ...] = ()
     if usual is not None:
-        name, paths = usual
-        sources = {channel: (name, path) for channel, path in paths.items()}
+        sources = {channel: (usual.topic, path) for channel, path in usual.paths.items()}
+        reading, notices = _joints_reading(usual, profile)
     for channel, (topic, path) in named.items():
-        home = topic or (usual[0] if usual else None) or (profile.topic if profile else None)
+        home = topic or (usual.topic if usual else None) or (profile.topic if profile else None)
         if home is None:
             raise LogError(f"{file.path}: the profile takes {channel} from {path!r} without a topic; name one")
         sources[channel] = (home, path)
@@ -69,7 +75,17 @@ def plan(file: File, found: Catalogue, profile: Profile | None) -> Plan:
     topics = tuple(_topic(file, found, home, sources, profile) for home in homes)
     clock = topics[0].fields.stamp if topics[0].clock != "log" else None
     mapping["t"] = f"{homes[0]}: {clock[0].rpartition('.')[0]}" if clock else "log time"
-    return Plan(topics, mapping)
+    reading = replace(reading, topics=tuple(homes), clock="header" if clock else "log")
+    return Plan(topics, mapping, reading, notices)
+
+
+def _joints_reading(usual: _Usual, profile: Profile | None) -> tuple[Reading, tuple[Notice, ...]]:
+    """Who said which joint is the first, and what to tell of it."""
+    if profile is not None and profile.joints is not None:
+        return Reading(joints=profile.joints, joints_told=profile.told_by("joints")), ()
+    joints, told = along_the_arm(usual.joints)
+    said = order_notice(usual.joints, joints, told) if usual.named else ()
+    return Reading(joints=joints, joints_told=told), said
 
 
 def _named(profile: Profile | None) -> dict[str, tuple[str | None, str]]:
@@ -97,24 +113,35 @@ def _topic(
     return Topic(name, _topic_type(found, name), Fields(paths, stamp), clock)
 
 
-def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> tuple[str, dict[str, str]] | None:
-    """The one topic with joint states, and its fields."""
+@dataclass(frozen=True)
+class _Usual:
+    """A topic with joint states: its two joints as they stand there, whether they have names, and its fields."""
+
+    topic: str
+    joints: tuple[str, str]
+    named: bool
+    paths: dict[str, str]
+
+
+def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> _Usual | None:
+    """The one topic with joint states."""
     names = [profile.topic] if profile and profile.topic else _candidates(found)
-    fitting: dict[str, dict[str, str]] = {}
+    fitting: dict[str, _Usual] = {}
     many: dict[str, list[str]] = {}
     for name in names:
         for shape in _shapes(file, found, name):
             joints = joint_names(shape)
             chosen = _joints(joints, profile)
             if chosen:
-                fitting[name] = joint_fields(shape, chosen)
+                there = (joints[0], joints[1]) if len(joints) == 2 else chosen
+                fitting[name] = _Usual(name, there, has_names(shape), joint_fields(shape, chosen))
                 break
             if len(joints) > 2:
                 many[name] = joints
     if _USUAL in fitting:
-        return _USUAL, fitting[_USUAL]
+        return fitting[_USUAL]
     if len(fitting) == 1:
-        return next(iter(fitting.items()))
+        return next(iter(fitting.values()))
     if fitting:
         raise LogError(f"{file.path}: joint states on {', '.join(fitting)}; choose with topic = … in a profile")
     if many:
@@ -132,7 +159,7 @@ def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> tuple
 def _joints(names: list[str], profile: Profile | None) -> tuple[str, str] | None:
     if profile is not None and profile.joints is not None:
         return profile.joints if set(profile.joints) <= set(names) else None
-    return in_order(names) if len(names) == 2 else None
+    return along_the_arm(names)[0] if len(names) == 2 else None
 
 
 def _candidates(found: Catalogue) -> list[str]:

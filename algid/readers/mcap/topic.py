@@ -49,9 +49,18 @@ def stamp_paths(shape: Shape) -> tuple[str, str] | None:
 
 def joint_names(shape: Shape) -> list[str]:
     """The joints that a message of this shape has both a position and an effort for."""
-    lists = [texts for path, texts in shape.texts.items() if path in ("name", "names", "joint_names")]
-    names = [str(place) for place in range(64)] if not lists or not any(lists) else list(lists[0])
+    names = _names(shape) or tuple(str(place) for place in range(64))
     return [name for name in names if _paths(shape, name, "theta") and _paths(shape, name, "tau")]
+
+
+def has_names(shape: Shape) -> bool:
+    """Whether messages of this shape name their joints."""
+    return bool(_names(shape))
+
+
+def _names(shape: Shape) -> tuple[str, ...]:
+    lists = [texts for path, texts in shape.texts.items() if path in ("name", "names", "joint_names")]
+    return lists[0] if lists else ()
 
 
 def joint_fields(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:
@@ -65,15 +74,6 @@ def joint_fields(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:
     if not all(name in found for name in VELOCITIES):
         found = {name: path for name, path in found.items() if name not in VELOCITIES}
     return found
-
-
-def in_order(names: list[str]) -> tuple[str, str]:
-    """Two joints in their order along the arm: by the number at their names' ends, else as they stand."""
-    first, second = names
-    digits = [name[len(name.rstrip("0123456789")) :] for name in names]
-    if all(digits) and first.rstrip("0123456789") == second.rstrip("0123456789") and int(digits[0]) > int(digits[1]):
-        return second, first
-    return first, second
 
 
 def _paths(shape: Shape, joint: str, quantity: str) -> str | None:

@@ -1,0 +1,124 @@
+"""Which joint is the first: by the names, by the user, or by the order in the log, and that it is said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from algid.log import Log
+from algid.profile import Profile, with_settings
+from algid.readers import read_log
+from algid.readers.joints import along_the_arm
+from tests.readers.logs import EPOCH_NS
+from tests.readers.mcaps import joint_state, write_mcap
+
+IN_ORDER = [
+    *(
+        ("shoulder", "elbow"),
+        ("joint1", "joint2"),
+        ("joint_9", "joint_10"),
+        ("J1", "j2"),
+        ("arm_1_joint", "arm_2_joint"),
+    ),
+    *(("base_joint", "arm_joint"), ("shoulder_lift_joint", "elbow_joint"), ("leftShoulder", "leftElbow")),
+    *(("proximal", "distal"), ("hip", "knee"), ("a", "b"), ("joint_a", "joint_b"), ("upper_arm", "forearm")),
+    *(("left_shoulder", "left_elbow"), ("elbow", "wrist_1"), ("first", "second"), ("axis02", "axis3"), ("root", "x")),
+    *(("1", "2"), ("inner_link", "outer_link"), ("thigh", "shank"), ("boom", "stick"), ("waist", "shoulder")),
+]
+UNKNOWN = [("left", "right"), ("q", "x"), ("alpha_joint", "omega_joint"), ("joint1", "arm2"), ("elbow_1", "elbow_x")]
+
+
+@pytest.mark.parametrize("names", IN_ORDER)
+def test_names_tell_the_order(names: tuple[str, str]) -> None:
+    assert along_the_arm(names) == (names, "names")
+    assert along_the_arm(names[::-1]) == (names, "names")
+
+
+@pytest.mark.parametrize("names", UNKNOWN)
+def test_names_that_do_not_tell_leave_the_order_as_it_is(names: tuple[str, str]) -> None:
+    assert along_the_arm(names) == (names, "order")
+    assert along_the_arm(names[::-1]) == (names[::-1], "order")
+
+
+def states(path: Path, names: tuple[str, str]) -> Path:
+    """Ten messages; the first joint of the list stands at 1 rad under 10 N m, the second at 2 under 20."""
+    stamps = [EPOCH_NS + step * 1_000_000 for step in range(10)]
+    messages = [
+        ("/joint_states", stamp, joint_state(stamp, names, [1, 2 + step], [0, 0], [10, 20]).done())
+        for step, stamp in enumerate(stamps)
+    ]
+    write_mcap(path, messages)
+    return path
+
+
+def told(log: Log) -> list[str]:
+    return [one.text for one in log.notices if one.code == "JOINT_ORDER"]
+
+
+def test_joint_states_in_alphabetical_order_are_put_along_the_arm(tmp_path: Path) -> None:
+    log = read_log(states(tmp_path / "log.mcap", ("elbow", "shoulder")))
+    assert log.theta[1].tolist() == [1.0] * 10
+    assert log.tau[:, 0].tolist() == [20, 10]
+    assert log.origin.mapping["theta1"] == "/joint_states: position[shoulder]"
+    reading = log.origin.reading
+    assert (reading.joints, reading.joints_told) == (("shoulder", "elbow"), "names")
+    (text,) = told(log)
+    assert "--joints elbow,shoulder" in text
+    assert 'joints = ["elbow", "shoulder"]' in text
+
+
+def test_joints_in_order_are_not_spoken_of(tmp_path: Path) -> None:
+    log = read_log(states(tmp_path / "log.mcap", ("shoulder", "elbow")))
+    assert told(log) == []
+    assert log.origin.reading.joints_told == "names"
+
+
+def test_joints_whose_names_do_not_tell_stay_and_are_told(tmp_path: Path) -> None:
+    path = states(tmp_path / "log.mcap", ("left", "right"))
+    log = read_log(path)
+    assert log.tau[:, 0].tolist() == [10, 20]
+    assert log.origin.reading.joints_told == "order"
+    (text,) = told(log)
+    assert "--joints right,left" in text
+    swapped = read_log(path, with_settings(Profile(), {"joints": ["right", "left"]}))
+    assert swapped.tau[:, 0].tolist() == [20, 10]
+    assert (swapped.origin.reading.joints_told, told(swapped)) == ("flag", [])
+    profile = Profile.model_validate({"joints": ["right", "left"]})
+    assert read_log(path, profile).origin.reading.joints_told == "profile"
+
+
+@pytest.mark.parametrize("names", [("elbow", "shoulder"), ("left", "right")])
+def test_columns_of_named_joints(names: tuple[str, str], tmp_path: Path) -> None:
+    columns = [f"/js/{name}/{field}" for name in names for field in ("position", "effort")]
+    rows = "\n".join(f"{step * 1e-3},1,10,2,20" for step in range(5))
+    (tmp_path / "log.csv").write_text(",".join(["time", *columns]) + "\n" + rows + "\n")
+    log = read_log(tmp_path / "log.csv")
+    known = names[0] == "elbow"
+    assert log.tau[:, 0].tolist() == ([20, 10] if known else [10, 20])
+    assert log.origin.reading.joints_told == ("names" if known else "order")
+    assert len(told(log)) == 1
+    plain = read_log(tmp_path / "log.csv", with_settings(Profile(), {"joints": list(names)}))
+    assert plain.tau[:, 0].tolist() == [10, 20]
+    assert told(plain) == []
+
+
+def test_everything_a_reader_was_told_is_in_the_origin(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("ms,q1_deg,q2_deg,tau1,tau2\n1,10,20,30,40\n2,10,20,30,40\n")
+    settings = {"zero": "hanging", "time": "ms", "time_unit": "ms", "tau1": {"unit": "mN m", "sign": -1}}
+    profile = with_settings(Profile.model_validate(settings), {"tau2": {"unit": "Nm"}, "offsets": [0.5, 0]})
+    log = read_log(tmp_path / "log.csv", profile)
+    reading = log.origin.reading
+    assert (reading.zero, reading.second_angle, reading.time_unit, reading.clock) == (
+        "hanging",
+        "relative",
+        "ms",
+        "column",
+    )
+    assert [reading.channels[name].unit for name in ("theta1", "tau1", "tau2")] == ["deg", "mN m", "N m"]
+    assert [reading.channels[name].told for name in ("theta1", "tau1", "tau2")] == ["names", "profile", "flag"]
+    assert [reading.channels[name].sign for name in ("tau1", "tau2")] == [-1, 1]
+    for name, row, value in (("theta1", log.theta[0] + np.pi / 2, 10), ("tau1", log.tau[0], 30)):
+        channel = reading.channels[name]
+        assert np.allclose(row, channel.factor * value + channel.offset, rtol=1e-14)
