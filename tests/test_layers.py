@@ -17,6 +17,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "progress": room(),
     "ros2": room(),
     "runtime": room(packages="threadpoolctl"),
+    "units": room(),
     "arm": room(packages="numpy", library=PURE),
     "model": room("arm", "numpy", PURE),
     "log": room("arm", "numpy"),
@@ -24,13 +25,13 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "estimators": room("arm model progress signals", "numpy scipy", PURE),
     "files": room("errors", "pydantic"),
     "stores": room("errors files", "pyarrow"),
-    "profile": room("errors files", "pydantic"),
+    "profile": room("errors files units", "pydantic"),
     "settings": room("errors signals"),
     "results": room("errors files", "pydantic"),
     "synth": room("arm errors files log progress", "numpy pydantic scipy"),
     "table4": room("arm log results synth", "numpy"),
     "writers": room("errors files log ros2", "mcap numpy polars pyarrow"),
-    "readers": room("arm errors log profile runtime", "lz4 mcap numpy polars pyarrow rosbags zstandard"),
+    "readers": room("arm errors log profile runtime units", "lz4 mcap numpy polars pyarrow rosbags zstandard"),
     "inspection": room("arm errors log profile readers", "numpy"),
     "report": room(
         "arm errors files progress results ros2 signals", "mcap numpy plotly polars pyarrow rich"
@@ -47,9 +48,9 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "track": room(
         "arm errors estimators files identification model profile report results runtime settings signals",
-        "mcap numpy plotly polars pyarrow",
+        "mcap numpy polars pyarrow",
     ),
-    "fleet": room("errors files progress report", "numpy plotly polars scipy"),
+    "fleet": room("errors files progress report", "numpy polars scipy"),
     "cli": room(
         "batch check errors files fleet identification inspection log profile progress readers report results runtime "
         "settings signals stores synth track writers",

@@ -22,8 +22,6 @@ MOST_PANELS = 12
 
 def fleet_html(history: History) -> str:
     """The page's text."""
-    from plotly.offline import get_plotlyjs
-
     figures = _figures(history)
     facts = f"{history.robots:,} robots · {history.logs:,} logs"
     body = [
@@ -34,7 +32,7 @@ def fleet_html(history: History) -> str:
         table_html(finding_table(history)),
         "</main>",
     ]
-    return document("Fleet", "\n".join(body), script_json(drawing(figures)), get_plotlyjs())
+    return document("Fleet", "\n".join(body), script_json(drawing(figures)))
 
 
 def drift_table(history: History) -> Table:

@@ -18,6 +18,7 @@ from algid.progress import Told
 from algid.report.figures.base import Figure, Missing
 from algid.report.gallery import gallery
 from algid.report.html import TEMPLATE, escaped, figure_html, panel_id, script_json, table_html
+from algid.report.library import library
 from algid.report.table import Table
 from algid.report.tables import (
     estimate_tables,
@@ -56,14 +57,11 @@ def write_report(folder: Path, shared_library: bool = False, told: Told | None =
     OutputError
         If the page cannot be written.
     """
-    from plotly.offline import get_plotlyjs
-
     result = read_result(folder)
-    library = get_plotlyjs()
     page = folder / "report.html"
     if shared_library:
-        _write_once(folder.parent / LIBRARY, library)
-    text = page_html(folder, result, None if shared_library else library, told)
+        _write_once(folder.parent / LIBRARY, library().script)
+    text = page_html(folder, result, shared_library, told)
     with whole_file(page) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return page
@@ -76,8 +74,8 @@ def _write_once(path: Path, text: str) -> None:
             temporary.write_bytes(content)
 
 
-def page_html(folder: Path, result: Result, library: str | None, told: Told | None = None) -> str:
-    """The page's text; without `library` it asks for the one beside the folder."""
+def page_html(folder: Path, result: Result, shared_library: bool = False, told: Told | None = None) -> str:
+    """The page's text; with `shared_library` it asks for the library beside the folder."""
     torque, figures = gallery(folder, result, told)
     judged = verdict(result)
     body = [
@@ -93,17 +91,21 @@ def page_html(folder: Path, result: Result, library: str | None, told: Told | No
         f"<footer>Made by algid {escaped(result.version)} from {escaped(str(folder.name))}/result.json.</footer>",
         '<noscript><p class="missing">The figures need JavaScript; all numbers stand without it.</p></noscript>',
     ]
-    return document(file_name(result.log.path), "\n".join(body), script_json(drawing(figures)), library)
+    return document(file_name(result.log.path), "\n".join(body), script_json(drawing(figures)), shared_library)
 
 
-def document(title: str, body: str, data: str, library: str | None) -> str:
-    """A whole page out of its body and its figures' data; without `library` it asks for the one beside the folder."""
+def document(title: str, body: str, data: str, shared_library: bool = False) -> str:
+    """A whole page out of its body and its figures' data.
+
+    It carries the plotting library, packed; with `shared_library` it asks for the one beside the folder.
+    """
     script, style = _asset("report.js"), _asset("report.css")
-    if library is None:
+    if shared_library:
         nonce = hashlib.sha256((body + data).encode()).hexdigest()  # nobody who writes the body can foretell it
         source, tag = f"'nonce-{nonce}'", f'<script nonce="{nonce}" src="../{LIBRARY}"></script>'
     else:
-        source, tag = _hash(library), f"<script>{library}</script>"
+        own = library()
+        source, tag = _hash(own.script), f'<script type="text/plain" id="library">{own.packed}</script>'
     policy = (
         f"default-src 'none'; script-src {source} {_hash(script)}; style-src 'unsafe-inline'; "
         "img-src data: blob:; base-uri 'none'; form-action 'none'"

@@ -23,8 +23,6 @@ from algid.track.tables import change_table, fit_table, provenance_tables, quali
 
 def page_html(result: TrackResult) -> str:
     """The page's text: one file that opens offline."""
-    from plotly.offline import get_plotlyjs
-
     drawn = figures(result)
     name = file_name(result.log.path)
     seconds, rate = significant(result.log.duration, 4), significant(result.log.rate, 4)
@@ -43,7 +41,7 @@ def page_html(result: TrackResult) -> str:
         f"<footer>Made by algid {escaped(result.version)}.</footer>",
         '<noscript><p class="missing">The figures need JavaScript; all numbers stand without it.</p></noscript>',
     ]
-    return document(name, "\n".join(body), script_json(drawing(drawn)), get_plotlyjs())
+    return document(name, "\n".join(body), script_json(drawing(drawn)))
 
 
 def _warnings(result: TrackResult) -> str:

@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import base64
+import gzip
+import hashlib
 import json
 import re
 import shutil
@@ -20,9 +23,12 @@ from algid.report import write_report
 from algid.report.figures.base import Figure, Missing
 from algid.report.gallery import gallery
 from algid.report.html import escaped, script_json
+from algid.report.library import library
 from algid.report.series import read_torque
 from algid.results import Estimate, Result, read_result, write_result
 from tests.report.folders import HOSTILE, hostile
+
+BUNDLE = Path(str(resources.files("algid.report"))) / "assets/plotly.min.js.gz"
 
 
 @pytest.fixture
@@ -226,3 +232,17 @@ def _luminance(colour: FloatArray) -> float:
 
 def test_the_result_is_read_from_the_folder(folder: Path) -> None:
     assert read_result(folder).log.path.endswith("case1-unloaded.mcap")
+
+
+def test_the_library_in_a_page_is_the_one_that_was_built_for_it(folder: Path) -> None:
+    own = library()
+    assert gzip.decompress(base64.b64decode(own.packed)).decode() == own.script
+    page = write_report(folder).read_text(encoding="utf-8")
+    assert own.packed in page
+    digest = base64.b64encode(hashlib.sha256(own.script.encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}'" in page
+
+
+@pytest.mark.skipif(not BUNDLE.is_file(), reason="built without npm: pages carry the whole of plotly")
+def test_a_page_is_light(folder: Path) -> None:
+    assert write_report(folder).stat().st_size <= 1_500_000

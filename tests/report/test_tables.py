@@ -100,7 +100,7 @@ def test_cross_validation_stands_beside_the_residual_in_every_format(result: Res
     expected = ["each log by the others", "1", "0.250", "50.0", "0.75000"]
     assert expected in from_terminal(terminal(changed), "Torque prediction")
     assert expected in from_markdown(markdown(changed))
-    assert expected in from_html(page_html(case_folder, changed, None))
+    assert expected in from_html(page_html(case_folder, changed))
 
 
 def test_the_error_belongs_to_the_estimate_beside_it(result: Result) -> None:
