@@ -1,21 +1,25 @@
-"""The torque of an arm with drives: eq. (1) and the columns that real joints add.
+"""The torque of an arm with real drives: eq. (1) and the terms that real joints add.
 
-======  ==========================================  =========  =========
-symbol  name                                        shape      unit
-======  ==========================================  =========  =========
-c       coefficients of the columns switched on     (q,)       `UNITS`
-Y       regressor, τ = Y c                          (2, q, N)
-f1, f2  Coulomb friction of the joints              scalars    N m
-o1, o2  torque offsets                              scalars    N m
-j2      rotor inertia of joint 2, at the joint      scalar     kg m^2
-======  ==========================================  =========  =========
+======  ==========================================================  =========  =========
+symbol  name                                                        shape      unit
+======  ==========================================================  =========  =========
+c       coefficients of the columns switched on                     (q,)       `UNITS`
+Y       regressor, τ = Y c                                          (2, q, N)
+J       sensitivity, ∂τ/∂c                                          (2, q, N)
+P       partials, ∂τ/∂θ, ∂τ/∂θ̇ and ∂τ/∂θ̈                           (3, 2, 2, N)
+L       load of a joint: inertia, Coriolis and gravity of eq. (1)   (2, N)     N m
+ω_s     `coulomb_speed`, the width of Coulomb friction              scalar     rad/s
+ω_S     `stribeck_speed`, the speed at which Stribeck's has gone    scalar     rad/s
+======  ==========================================================  =========  =========
 
-The rotor of joint 1 adds to k5 alone, which is why it has no column. Coulomb friction follows
-tanh(ω / ω_s) instead of sign(ω), so that a velocity error near standstill does not flip a whole sample.
+Every term is listed in `TERMS` with its equation. All its coefficients are zero on an arm without it. The rotor
+of joint 1 adds to k5 alone, which is why it has no column. Friction follows tanh(ω / ω_s) instead of sign(ω), so
+that a velocity error near standstill does not flip a whole sample.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -23,63 +27,110 @@ import numpy as np
 
 from algid.arm import CONSTANT_NAMES, CONSTANT_UNITS, FloatArray
 
-COULOMB_NAMES = ("f1", "f2")
-OFFSET_NAMES = ("o1", "o2")
-ROTOR_NAMES = ("j2",)
-COLUMN_NAMES = CONSTANT_NAMES + COULOMB_NAMES + OFFSET_NAMES + ROTOR_NAMES
+
+@dataclass(frozen=True)
+class Term:
+    """A term of the torque beside eq. (1).
+
+    Parameters
+    ----------
+    names : names of its coefficients
+    unit : str, of each
+    equation : str, what it adds to the torque of joint i
+    title : str, in words
+    needs : str or None
+        A term without which it has no meaning.
+    """
+
+    names: tuple[str, ...]
+    unit: str
+    equation: str
+    title: str
+    needs: str | None = None
+
+
+TERMS = {
+    "coulomb": Term(("f1", "f2"), "N m", "f_i tanh(ω_i / ω_s)", "Coulomb friction"),
+    "offset": Term(("o1", "o2"), "N m", "o_i", "torque offsets"),
+    "rotor": Term(("j2",), "kg m^2", "j2 θ̈_2 (joint 2)", "rotor inertia of joint 2"),
+    "stribeck": Term(
+        ("s1", "s2"), "N m", "s_i tanh(ω_i / ω_s) exp(-(ω_i / ω_S)²)", "Stribeck friction", needs="coulomb"
+    ),
+    "asymmetry": Term(("a1", "a2"), "N m", "a_i tanh²(ω_i / ω_s)", "asymmetric Coulomb friction", needs="coulomb"),
+    "load": Term(("e1", "e2"), "1", "e_i |L_i| tanh(ω_i / ω_s)", "friction in proportion to the joint's load"),
+    "gain": Term(("gain2",), "1", "τ_2 times 1 + gain2", "torque gain of joint 2 over that of joint 1, less 1"),
+    "zero": Term(("zero1", "zero2"), "rad", "θ_i + zero_i in place of θ_i", "zero offsets of the angles"),
+    "lag": Term(("lag",), "s", "-lag dτ_log/dt: the logged torque lags behind", "first-order low-pass of the torque"),
+}
+COLUMN_NAMES = CONSTANT_NAMES + tuple(name for term in TERMS.values() for name in term.names)
 UNITS = {
     **CONSTANT_UNITS,
-    "f1": "N m",
-    "f2": "N m",
-    "o1": "N m",
-    "o2": "N m",
-    "j2": "kg m^2",
+    **{name: term.unit for term in TERMS.values() for name in term.names},
     "delay": "s",
     "m_p": "kg",
     "l1": "m",
     "l2": "m",
 }
+_WITH_GRAVITY = ("k2", "k4", "zero1")
+_RIGID = ("k1", "k2", "k3", "k4", "k5")
 
 
 @dataclass(frozen=True)
 class Model:
-    """Which columns the torque has beside eq. (1).
+    """Which terms the torque has beside eq. (1).
 
     Parameters
     ----------
-    coulomb, offset, rotor : bool
-        Columns f1, f2; o1, o2; j2.
+    terms : names in `TERMS`, in any order
     gravity : float, m/s^2
-        0 for an arm that moves in a horizontal plane: k2 and k4 have no column then.
+        0 for an arm that moves in a horizontal plane: k2, k4 and zero1 have no column then.
     coulomb_speed : float, rad/s
         ω_s: speed at which Coulomb friction has reached three quarters of its value.
+    stribeck_speed : float, rad/s
+        ω_S: speed at which a third of Stribeck's additional friction is left.
+
+    Raises
+    ------
+    ValueError
+        If a term is not in `TERMS`.
     """
 
-    coulomb: bool = False
-    offset: bool = False
-    rotor: bool = False
+    terms: tuple[str, ...] = ()
     gravity: float = 9.81
     coulomb_speed: float = 0.2
+    stribeck_speed: float = 0.3
+
+    def __post_init__(self) -> None:
+        unknown = [term for term in self.terms if term not in TERMS]
+        if unknown:
+            raise ValueError(f"terms: expected some of {', '.join(TERMS)}, got {unknown[0]!r}")
+        object.__setattr__(self, "terms", tuple(term for term in TERMS if term in self.terms))
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the columns in their order."""
-        names = [name for name in CONSTANT_NAMES if self.gravity != 0 or name not in ("k2", "k4")]
-        names += COULOMB_NAMES if self.coulomb else ()
-        names += OFFSET_NAMES if self.offset else ()
-        names += ROTOR_NAMES if self.rotor else ()
-        return tuple(names)
+        names = [*CONSTANT_NAMES, *(name for term in self.terms for name in TERMS[term].names)]
+        return tuple(name for name in names if self.gravity != 0 or name not in _WITH_GRAVITY)
 
     @cached_property
     def columns(self) -> list[int]:
         """Where each column stands in `COLUMN_NAMES`."""
         return [COLUMN_NAMES.index(name) for name in self.names]
 
+    @property
+    def linear(self) -> bool:
+        """Whether the torque is linear in the coefficients, so that the regressor needs none."""
+        return not {"load", "gain", "zero"} & set(self.terms)
+
     def expand(self, c: FloatArray) -> FloatArray:
-        """Coefficients of all `COLUMN_NAMES` (12,): zero where a column is switched off."""
+        """Coefficients of all `COLUMN_NAMES`: zero where a column is switched off."""
         full = np.zeros(len(COLUMN_NAMES))
         full[self.columns] = c
         return full
+
+    def values(self, c: FloatArray) -> dict[str, float]:
+        """Coefficients of all `COLUMN_NAMES` by name: zero where a column is switched off."""
+        return dict(zip(COLUMN_NAMES, self.expand(c).tolist(), strict=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +147,10 @@ class Motion:
         (s1, s2), (c1, c2) = sine_cosine(self.theta)
         return s1, c1, s2, c2, s1 * c2 + c1 * s2, c1 * c2 - s1 * s2
 
+    def turned(self, by: FloatArray) -> Motion:
+        """The motion with `by` (2,) rad added to its angles."""
+        return Motion(self.theta + by[:, None], self.omega, self.alpha) if np.any(by) else self
+
 
 def sine_cosine(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Sine and cosine of angles, each in the shape of `theta`, through one tangent of the half angle.
@@ -109,36 +164,128 @@ def sine_cosine(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
     return 2 * half * scale, (1 - square) * scale
 
 
-def regressor(model: Model, motion: Motion) -> FloatArray:
-    """Y (2, q, N) with τ = Y c: eq. (1) and the model's further columns."""
+def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> FloatArray:
+    """Y (2, q, N) with τ = Y c: eq. (1) and the model's terms.
+
+    Friction by load, the gain and the zero offsets make the torque bilinear in c: Y is taken at `c` then, with
+    the load and the angles that c gives, joint 2's rows times its gain, and nothing in the columns of gain2, zero1
+    and zero2. The column of the lag, which is no function of the motion at one instant, is nothing too.
+
+    Raises
+    ------
+    ValueError
+        If the model is not linear and `c` is not given.
+    """
+    value = _values(model, c)
+    motion = motion.turned(_zeros(value))
+    Y = np.zeros((2, len(model.names), motion.theta.shape[1]))
+    column = {name: Y[:, place] for place, name in enumerate(model.names)}
+    _fill_eq1(column, motion)
+    if "rotor" in model.terms:
+        column["j2"][1] = motion.alpha[1]
+    if "offset" in model.terms:
+        column["o1"][0] = column["o2"][1] = 1.0
+    for name, friction in friction_columns(model, motion.omega).items():
+        for joint in range(2):
+            column[f"{name}{joint + 1}"][joint] = friction[joint]
+    if "load" in model.terms:
+        dissipated = np.abs(_load(model, Y, value)) * _sign(model, motion.omega)
+        column["e1"][0], column["e2"][1] = dissipated
+    Y[1] *= 1 + value["gain2"]
+    return Y
+
+
+def _fill_eq1(column: Mapping[str, FloatArray], motion: Motion) -> None:
     _, c1, s2, c2, _, c12 = motion.trigonometry
     omega1, omega2 = motion.omega
     alpha1, alpha2 = motion.alpha
-    Y = np.zeros((2, len(model.names), c1.size))
-    column = {name: Y[:, place] for place, name in enumerate(model.names)}
     column["k1"][0] = c2 * (2 * alpha1 + alpha2) - s2 * (2 * omega1 + omega2) * omega2
     column["k1"][1] = c2 * alpha1 + s2 * omega1**2
     column["k3"][:] = alpha1 + alpha2
     column["k5"][0] = alpha1
     column["k6"][0] = omega1
     column["k7"][1] = omega2
-    if model.gravity != 0:
+    if "k2" in column:
         column["k2"][:] = c12
         column["k4"][0] = c1
-    if model.coulomb:
-        friction = np.tanh(motion.omega / model.coulomb_speed)
-        column["f1"][0], column["f2"][1] = friction
-    if model.offset:
-        column["o1"][0] = 1.0
-        column["o2"][1] = 1.0
-    if model.rotor:
-        column["j2"][1] = alpha2
-    return Y
+
+
+def friction_columns(model: Model, omega: FloatArray) -> dict[str, FloatArray]:
+    """Columns (2, N) of the friction that a joint's own velocity (2, N) decides, by the coefficients' letter."""
+    if not {"coulomb", "stribeck", "asymmetry"} & set(model.terms):
+        return {}
+    sign = _sign(model, omega)
+    found = {}
+    if "coulomb" in model.terms:
+        found["f"] = sign
+    if "stribeck" in model.terms:
+        found["s"] = sign * np.exp(-((omega / model.stribeck_speed) ** 2))
+    if "asymmetry" in model.terms:
+        found["a"] = sign**2
+    return found
+
+
+def torque(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
+    """Torque τ (2, N) in N m; without the lag, which needs the torque at other instants too."""
+    return np.einsum("aqn,q->an", regressor(model, motion, c), c)
+
+
+def sensitivity(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
+    """J (2, q, N), the derivative of the torque by the coefficients; nothing in the column of the lag.
+
+    The regressor where the torque is linear in c. Else, with sgn L and t = tanh(ω / ω_s),
+
+        ∂τ_i/∂k_j = Y_ij (1 + e_i t_i sgn L_i)        j = 1 … 5
+        ∂τ_2/∂gain2 = τ_2 / (1 + gain2)
+        ∂τ_i/∂zero_j = ∂τ_i/∂θ_j
+    """
+    J = regressor(model, motion, c)
+    if model.linear:
+        return J
+    value = model.values(c)
+    place = {name: number for number, name in enumerate(model.names)}
+    if "gain" in model.terms:
+        J[1, place["gain2"]] = J[1].T @ c / (1 + value["gain2"])
+    if "zero" in model.terms:
+        slope = partials(model, c, motion)[0]
+        for joint in range(2):
+            if f"zero{joint + 1}" in place:
+                J[:, place[f"zero{joint + 1}"]] = slope[:, joint]
+    if "load" in model.terms:
+        turned = motion.turned(_zeros(value))
+        rigid = [place[name] for name in _RIGID if name in place]
+        e = np.array([value["e1"], value["e2"]])
+        # The gain scales joint 2's load, which leaves its sign.
+        share = e[:, None] * _sign(model, turned.omega) * np.sign(_load(model, J, value))
+        J[:, rigid] *= 1 + share[:, None]
+    return J
 
 
 def partials(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
     """Derivatives (3, 2, 2, N) of the torque: order of θ's derivative, torque of joint, angle of joint."""
-    k1, k2, k3, k4, k5, k6, k7, f1, f2, _, _, j2 = model.expand(c)
+    value = model.values(c)
+    motion = motion.turned(_zeros(value))
+    P = _rigid_partials(value, motion)
+    if "load" in model.terms:
+        _, velocity, _ = P
+        Y = np.zeros((2, len(model.names), motion.theta.shape[1]))
+        _fill_eq1({name: Y[:, place] for place, name in enumerate(model.names)}, motion)
+        load, sign = _load(model, Y, value), _sign(model, motion.omega)
+        e = np.array([[value["e1"]], [value["e2"]]])
+        P *= 1 + (e * sign * np.sign(load))[:, None]
+        for joint in range(2):
+            velocity[joint, joint] += (e * np.abs(load) * (1 - sign**2) / model.coulomb_speed)[joint]
+    P[2, 1, 1] += value["j2"]
+    slope = friction_slope(model, value, motion.omega)
+    P[1, 0, 0] += slope[0]
+    P[1, 1, 1] += slope[1]
+    P[:, 1] *= 1 + value["gain2"]
+    return P
+
+
+def _rigid_partials(value: dict[str, float], motion: Motion) -> FloatArray:
+    """`partials` of inertia, Coriolis and gravity."""
+    k1, k2, k3, k4, k5 = (value[name] for name in _RIGID)
     s1, _, s2, c2, s12, _ = motion.trigonometry
     omega1, omega2 = motion.omega
     alpha1, alpha2 = motion.alpha
@@ -149,15 +296,53 @@ def partials(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
     position[0, 1] = -k1_s2 * (2 * alpha1 + alpha2) - k1_c2 * (2 * omega1 + omega2) * omega2 - k2_s12
     position[1, 0] = -k2_s12
     position[1, 1] = k1_c2 * omega1**2 - k1_s2 * alpha1 - k2_s12
-    velocity[0, 0] = k6 - 2 * k1_s2 * omega2
+    velocity[0, 0] = -2 * k1_s2 * omega2
     velocity[0, 1] = -2 * k1_s2 * (omega1 + omega2)
     velocity[1, 0] = 2 * k1_s2 * omega1
-    velocity[1, 1] = k7
+    velocity[1, 1] = 0.0
     acceleration[0, 0] = k5 + k3 + 2 * k1_c2
     acceleration[0, 1] = acceleration[1, 0] = k3 + k1_c2
-    acceleration[1, 1] = k3 + j2
-    if model.coulomb:
-        slope = (1 - np.tanh(motion.omega / model.coulomb_speed) ** 2) / model.coulomb_speed
-        velocity[0, 0] += f1 * slope[0]
-        velocity[1, 1] += f2 * slope[1]
+    acceleration[1, 1] = k3
     return P
+
+
+def friction_slope(model: Model, value: dict[str, float], omega: FloatArray) -> FloatArray:
+    """Derivative (2, N) by its velocity of the friction that a joint's own velocity (2, N) decides."""
+
+    def both(letter: str) -> FloatArray:
+        return np.array([[value[f"{letter}1"]], [value[f"{letter}2"]]])
+
+    viscous = np.array([[value["k6"]], [value["k7"]]])
+    if not {"coulomb", "stribeck", "asymmetry"} & set(model.terms):
+        return np.broadcast_to(viscous, omega.shape)
+    sign = _sign(model, omega)
+    steep = (1 - sign**2) / model.coulomb_speed
+    slope = viscous + (both("f") + 2 * both("a") * sign) * steep
+    if "stribeck" in model.terms:
+        fading = np.exp(-((omega / model.stribeck_speed) ** 2))
+        slope = slope + both("s") * fading * (steep - 2 * omega / model.stribeck_speed**2 * sign)
+    return slope
+
+
+def _sign(model: Model, omega: FloatArray) -> FloatArray:
+    """The smooth sign tanh(ω / ω_s) of velocities."""
+    return np.tanh(omega / model.coulomb_speed)
+
+
+def _load(model: Model, Y: FloatArray, value: dict[str, float]) -> FloatArray:
+    """L (2, N), from the columns of eq. (1) in Y."""
+    rigid = [place for place, name in enumerate(model.names) if name in _RIGID]
+    k = np.array([value[model.names[place]] for place in rigid])
+    return np.einsum("aqn,q->an", Y[:, rigid], k)
+
+
+def _values(model: Model, c: FloatArray | None) -> dict[str, float]:
+    if c is not None:
+        return model.values(c)
+    if not model.linear:
+        raise ValueError(f"the regressor of {', '.join(model.terms)} depends on the coefficients, got none")
+    return dict.fromkeys(COLUMN_NAMES, 0.0)
+
+
+def _zeros(value: dict[str, float]) -> FloatArray:
+    return np.array([value["zero1"], value["zero2"]])

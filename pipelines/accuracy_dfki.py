@@ -39,11 +39,11 @@ def evaluate(folder: Path) -> list[dict[str, Any]]:
     sources: list[Source] = [lambda log=log: [log] for log in runs]  # type: ignore[misc]
     rows: list[dict[str, Any]] = []
     for terms in (
-        {"coulomb": True, "offset": True},
-        {"coulomb": True, "offset": True, "rotor": True},
-        {"coulomb": True, "rotor": True},
+        ("coulomb", "offset"),
+        ("coulomb", "offset", "rotor"),
+        ("coulomb", "rotor"),
     ):
-        model = Model(**terms)
+        model = Model(terms)
         fit = refined.fit(sources, settings=refined.RefinedSettings(model=model))
         score = cross_validate(fit, sources)
         assert score is not None
@@ -55,7 +55,7 @@ def evaluate(folder: Path) -> list[dict[str, Any]]:
 
 
 def _bandwidth(sources: list[Source]) -> dict[str, Any]:
-    model = Model(coulomb=True, rotor=True)
+    model = Model(("coulomb", "rotor"))
     fits = [weak.fit(sources, settings=weak.WeakSettings(model=model, bandwidth=hertz)) for hertz in (10.0, 30.0)]
     change = abs(fits[1].values[1] - fits[0].values[1]) / fits[1].std[1]
     return {"what": "change of k2 from 10 Hz to 30 Hz of bandwidth, σ", "value": float(change), "asked": 1.0}

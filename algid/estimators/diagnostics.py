@@ -24,7 +24,7 @@ from algid.estimators.combine import LogInformation, Prior, combine, likelihood,
 from algid.estimators.fit import Fit
 from algid.estimators.identifiability import sizes
 from algid.estimators.parametrisation import Shared
-from algid.model import COULOMB_NAMES, OFFSET_NAMES, ROTOR_NAMES
+from algid.model import TERMS
 
 _NOT_NEGATIVE = ("k6", "k7", "f1", "f2", "j2", "m_p", "l1", "l2")
 _NUDGE = 1e-6  # of a parameter's size: step of the differences, and distance kept from a bound
@@ -57,8 +57,8 @@ def bounds(shared: Shared) -> dict[str, Callable[[FloatArray], float]]:
 
 def _mass(shared: Shared, beta: FloatArray) -> tuple[float, float, float]:
     """M22 and the determinant of M at θ2 = 0 and π."""
-    full = shared.model.expand(beta[: len(shared.model.names)])
-    k1, k3, k5, j2 = full[0], full[2], full[4], full[11]
+    value = shared.model.values(beta[: len(shared.model.names)])
+    k1, k3, k5, j2 = (value[name] for name in ("k1", "k3", "k5", "j2"))
     det = [(k5 + k3 + 2 * k1 * c) * (k3 + j2) - (k3 + k1 * c) ** 2 for c in (1.0, -1.0)]
     return float(k3 + j2), float(det[0]), float(det[1])
 
@@ -130,7 +130,7 @@ def _failed(status: Sequence[str]) -> tuple[Literal["OK", "NOT_IDENTIFIABLE", "N
     return tuple("NOT_CONVERGED" if word == "OK" else "NOT_IDENTIFIABLE" for word in status)
 
 
-TERMS = {"coulomb": COULOMB_NAMES, "offset": OFFSET_NAMES, "rotor": ROTOR_NAMES, "delay": ("delay",)}
+_OPTIONAL = {**{term: content.names for term, content in TERMS.items()}, "delay": ("delay",)}
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ class TermWorth:
 def term_worths(fit: Fit) -> list[TermWorth]:
     """Worth of each optional term of a fit's model."""
     worths = []
-    for term, names in TERMS.items():
+    for term, names in _OPTIONAL.items():
         places = [fit.names.index(name) for name in names if name in fit.names]
         if not places:
             continue

@@ -26,12 +26,26 @@ _CLASSES = (
     ("k1", "k3", "k5", "j2"),
     ("k2", "k4"),
     ("k6", "k7"),
-    ("f1", "f2", "o1", "o2"),
-    ("delay",),
+    ("f1", "f2", "o1", "o2", "s1", "s2", "a1", "a2"),
+    ("e1", "e2"),
+    ("gain2",),
+    ("zero1", "zero2"),
+    ("delay", "lag"),
     ("m_p",),
     ("l1", "l2"),
 )
-_LEAST = {"k6": 1e-6, "f1": 1e-6, "delay": 1e-3, "m_p": 1e-3, "l1": 1e-2, "k2": 1e-4, "k1": 1e-6}
+_LEAST = {
+    "k6": 1e-6,
+    "f1": 1e-6,
+    "e1": 1e-2,
+    "gain2": 1e-2,
+    "zero1": 1e-2,
+    "delay": 1e-3,
+    "m_p": 1e-3,
+    "l1": 1e-2,
+    "k2": 1e-4,
+    "k1": 1e-6,
+}
 _UNDETERMINED = 0.5  # standard deviation of a direction, in sizes of its parameters
 _SHARE = 0.15  # of an eigenvector: below it a parameter has no part in the direction
 STILL = 0.01  # rad: a joint that moves less has not moved

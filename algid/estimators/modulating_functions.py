@@ -27,7 +27,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from algid.arm import FloatArray
-from algid.model import Model, sine_cosine
+from algid.model import Model, Motion, friction_columns, sine_cosine, torque
 from algid.signals.filters import correlate, differentiator, half_length
 from algid.signals.segments import Segment
 
@@ -102,47 +102,95 @@ class Windows:
             result += parts[:, part : part + wanted, part]
         return result
 
-    def equations(self, model: Model, piece: Segment, delay: bool) -> FloatArray:
-        """X (2, q + 1, R), or (2, q + 2, R) with a column for a change of `shift`; R = 0 for a short piece."""
+    def equations(self, model: Model, piece: Segment, delay: bool, at: FloatArray | None = None) -> FloatArray:
+        """X (2, q + 1, R), or (2, q + 2, R) with a column for a change of `shift`; R = 0 for a short piece.
+
+        Where the torque is bilinear in the coefficients, X is linearised at the coefficients `at` (q,) so that
+        least squares on it gives better ones; without `at` the columns of gain2, zero1, zero2, e1, e2 are nothing.
+        The load is that of `at` (a fixed point, not a derivative): least squares settles in a few rounds.
+        """
         size = len(model.names) + delay + 1
         margin = self.margin
         if (len(piece) - 2 * margin) // self.step < OVERLAP:
             return np.zeros((2, size, 0))
-        inner = slice(margin, len(piece) - margin)
-        theta = piece.theta[:, inner]
+        value = model.values(np.zeros(len(model.names)) if at is None else at)
         tau = piece.tau[:, margin - self.whole : len(piece) - margin - self.whole]
-        weight, slope, bend = self._plain
+        theta = piece.theta[:, margin : len(piece) - margin] + np.array([[value["zero1"]], [value["zero2"]]])
         omega = self._velocity(piece)
+        columns = self._columns(model, theta, omega)
+        if "load" in model.terms and at is not None:
+            e1, e2 = self.moments(self._dissipated(model, at, theta, omega), self._plain[0])
+            columns |= {"e1": (e1, np.zeros_like(e1)), "e2": (np.zeros_like(e2), e2)}
+        if "zero" in model.terms and at is not None:
+            columns |= self._turned(value, theta, omega)
+        X = np.zeros((2, size, (len(piece) - 2 * margin) // self.step - OVERLAP + 1))
+        for place, name in enumerate(model.names):
+            X[0, place], X[1, place] = columns.get(name, (0.0, 0.0))
+        X[1] *= 1 + value["gain2"]
+        X[:, -1] = self.moments(tau, self._shifted[0])
+        if at is not None:
+            _linearise_bilinear(X, model, at, value["gain2"])
+        tau_slope = self.moments(tau, self._shifted[1]) if delay or "lag" in model.terms else 0.0
+        if "lag" in model.terms:
+            X[:, model.names.index("lag")] = tau_slope
+        if delay:
+            X[:, -2] = -tau_slope
+        return X
+
+    def _columns(self, model: Model, theta: FloatArray, omega: FloatArray) -> dict[str, tuple[FloatArray, FloatArray]]:
+        """Moments of both joints by coefficient: of eq. (1) and of all terms that are linear."""
+        weight, slope, bend = self._plain
         (s1, s2), (c1, c2) = sine_cosine(theta)
         momentum = c2 * omega[0]
         centripetal = omega[0] * (omega[0] + omega[1]) * s2
         theta_slope1, theta_slope2, momentum_slope = self.moments(np.stack([*theta, momentum]), slope)
         theta_bend1, theta_bend2, s2_bend = self.moments(np.stack([*theta, s2]), bend)
-        weighed = [centripetal, c1, c1 * c2 - s1 * s2]
-        if model.coulomb:
-            weighed += list(np.tanh(omega / model.coulomb_speed))
-        centripetal_, c1_, c12_, *friction = self.moments(np.stack(weighed), weight)
-        X = np.zeros((2, size, c1_.size))
-        column = {name: X[:, place] for place, name in enumerate(model.names)}
-        column["k1"][0] = s2_bend - 2 * momentum_slope
-        column["k1"][1] = centripetal_ - momentum_slope
-        column["k3"][:] = theta_bend1 + theta_bend2
-        column["k5"][0] = theta_bend1
-        column["k6"][0] = -theta_slope1
-        column["k7"][1] = -theta_slope2
-        if model.gravity != 0:
-            column["k2"][:] = c12_
-            column["k4"][0] = c1_
-        if model.coulomb:
-            column["f1"][0], column["f2"][1] = friction
-        if model.offset:
-            column["o1"][0] = column["o2"][1] = 1.0
-        if model.rotor:
-            column["j2"][1] = theta_bend2
-        if delay:
-            X[:, -2] = -self.moments(tau, self._shifted[1])
-        X[:, -1] = self.moments(tau, self._shifted[0])
-        return X
+        friction = friction_columns(model, omega)
+        weighed = np.concatenate([np.stack([centripetal, c1, c1 * c2 - s1 * s2]), *friction.values()])
+        centripetal_, c1_, c12_, *rubbed = self.moments(weighed, weight)
+        nought, one = np.zeros_like(c1_), np.ones_like(c1_)
+        found = {
+            "k1": (s2_bend - 2 * momentum_slope, centripetal_ - momentum_slope),
+            "k2": (c12_, c12_),
+            "k3": (theta_bend1 + theta_bend2,) * 2,
+            "k4": (c1_, nought),
+            "k5": (theta_bend1, nought),
+            "k6": (-theta_slope1, nought),
+            "k7": (nought, -theta_slope2),
+            "o1": (one, nought),
+            "o2": (nought, one),
+            "j2": (nought, theta_bend2),
+        }
+        for place, letter in enumerate(friction):
+            found[f"{letter}1"] = (rubbed[2 * place], nought)
+            found[f"{letter}2"] = (nought, rubbed[2 * place + 1])
+        return found
+
+    def _dissipated(self, model: Model, c: FloatArray, theta: FloatArray, omega: FloatArray) -> FloatArray:
+        """|L| tanh(ω / ω_s) (2, N) of the load that the coefficients `c` give."""
+        rigid = Model(gravity=model.gravity)
+        k = c[: len(rigid.names)].copy()
+        k[-2:] = 0.0  # k6, k7: friction is no load
+        load = torque(rigid, k, Motion(theta, omega, np.gradient(omega, self.dt, axis=1)))
+        dissipated: FloatArray = np.abs(load) * np.tanh(omega / model.coulomb_speed)
+        return dissipated
+
+    def _turned(
+        self, value: dict[str, float], theta: FloatArray, omega: FloatArray
+    ) -> dict[str, tuple[FloatArray, FloatArray]]:
+        """Derivatives of both joints' moments by zero1 and zero2."""
+        weight, slope, bend = self._plain
+        k1, k2, k4 = value["k1"], value["k2"], value["k4"]
+        (s1, s2), (c1, c2) = sine_cosine(theta)
+        s1_, s12_, turned_ = self.moments(
+            np.stack([s1, s1 * c2 + c1 * s2, omega[0] * (omega[0] + omega[1]) * c2]), weight
+        )
+        (momentum_slope,) = self.moments((s2 * omega[0])[None], slope)
+        (c2_bend,) = self.moments(c2[None], bend)
+        return {
+            "zero1": (-k4 * s1_ - k2 * s12_, -k2 * s12_),
+            "zero2": (k1 * (c2_bend + 2 * momentum_slope) - k2 * s12_, k1 * (momentum_slope + turned_) - k2 * s12_),
+        }
 
     def _velocity(self, piece: Segment) -> FloatArray:
         inner = slice(self.margin, len(piece) - self.margin)
@@ -153,3 +201,18 @@ class Windows:
         reach = half_length(self.dt, self.bandwidth)
         kernel = differentiator(self.dt, self.bandwidth)
         return correlate(piece.theta[:, self.margin - reach : len(piece) - self.margin + reach], kernel)
+
+
+def _linearise_bilinear(X: FloatArray, model: Model, at: FloatArray, gain2: float) -> None:
+    """Complete X, made at `at`, by the column of the gain, and the torque by what the linearisation at `at` adds.
+
+    With Y the regressor at c0 and J the derivative there, τ = Y c0 + J (c - c0) is J c = τ + (J - Y) c0; J and Y
+    differ in the columns of gain2, zero1 and zero2 alone.
+    """
+    place = {name: number for number, name in enumerate(model.names)}
+    angles = [place[name] for name in ("zero1", "zero2") if name in place]
+    if "gain" in model.terms:
+        linear = np.array([0.0 if number in angles else value for number, value in enumerate(at)])
+        X[1, place["gain2"]] = X[1, : len(at)].T @ linear / (1 + gain2)
+        angles.append(place["gain2"])
+    X[:, -1] += np.einsum("j,ajr->ar", at[angles], X[:, angles])

@@ -185,7 +185,8 @@ def _opened(
     sources: Sequence[Source], loaded: bool, shared: Shared, settings: RefinedSettings
 ) -> Iterator[LogEvidence]:
     def stencil(dt: float, c: FloatArray) -> Stencil:
-        return Stencil(dt, settings.shift(dt) + (float(c[-1]) if shared.delay else settings.delay))
+        delay = float(c[-1]) if shared.delay else settings.delay
+        return Stencil(dt, settings.shift(dt) + delay - shared.model.values(c[: len(shared.model.names)])["lag"])
 
     for source in sources:
         log = LogEvidence(source, loaded, shared, stencil, settings.noise)

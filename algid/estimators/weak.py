@@ -73,18 +73,21 @@ class Normal:
     moved: FloatArray
 
 
-def normal_equations(source: Source, settings: WeakSettings) -> Normal | None:
+def normal_equations(source: Source, settings: WeakSettings, at: FloatArray | None = None) -> Normal | None:
     """Normal equations of one log; None where it is too short for a window.
 
-    A log without a stretch of four windows gets windows of a quarter of its longest stretch.
+    A log without a stretch of four windows gets windows of a quarter of its longest stretch. Terms that are not
+    linear are linearised at the coefficients `at` (q,).
     """
-    found, longest = _pass(source(), settings, settings.window)
+    found, longest = _pass(source(), settings, settings.window, at)
     if longest < 4 * settings.window and longest > 0:
-        found, _ = _pass(source(), settings, longest / 4)
+        found, _ = _pass(source(), settings, longest / 4, at)
     return found
 
 
-def _pass(segments: Iterable[Segment], settings: WeakSettings, window: float) -> tuple[Normal | None, float]:
+def _pass(
+    segments: Iterable[Segment], settings: WeakSettings, window: float, at: FloatArray | None
+) -> tuple[Normal | None, float]:
     """Normal equations with windows of a given length, and the longest piece of the log in s."""
     sums = BlockSums()
     samples = rows = 0
@@ -96,7 +99,7 @@ def _pass(segments: Iterable[Segment], settings: WeakSettings, window: float) ->
         samples += fresh
         low = np.minimum(low, piece.theta.min(axis=1))
         high = np.maximum(high, piece.theta.max(axis=1))
-        X = windows.equations(settings.model, piece, settings.estimate_delay)
+        X = windows.equations(settings.model, piece, settings.estimate_delay, at)
         rows += X.shape[2]
         if X.shape[2]:
             sums.add(_grams(X))
@@ -230,8 +233,10 @@ def _fitted(shared: Shared, start: FloatArray, loaded: LogInformation) -> tuple[
 
 __all__ = ["Source", "WeakSettings", "fit"]
 
-_DELAY_PASSES = 4
+_PASSES = 8
 _DELAY_SETTLED = 0.02  # samples
+_SETTLED = 1e-4  # of e1, e2, gain2, zero1, zero2: 1 or rad
+_ITERATED = ("e1", "e2", "gain2", "zero1", "zero2")
 
 
 def fit(
@@ -247,7 +252,7 @@ def fit(
     ----------
     unloaded, loaded : sequences of callables
         Each gives a fresh iterable of `Segment`, the stretches of one log in time. It is called once, and a few
-        times more where a delay is estimated.
+        times more where a delay is estimated or the model is not linear.
     settings : WeakSettings
     lengths : dict
         Known link lengths "l1", "l2" in m.
@@ -261,25 +266,53 @@ def fit(
     """
     settings = settings or WeakSettings()
     shared = Shared(settings.model, settings.estimate_delay, bool(loaded), dict(lengths or {}))
-    for _ in range(_DELAY_PASSES):
-        bare = _normals(unloaded, settings)
-        burdened = _normals(loaded, settings)
+    at: tuple[FloatArray | None, FloatArray | None] = (None, None)
+    for _ in range(_PASSES):
+        bare = _normals(unloaded, settings, at[0])
+        burdened = _normals(loaded, settings, at[1])
         beta, logs = _start(shared, bare, burdened, prior)
-        if not shared.delay:
-            break
-        place = len(settings.model.names)
-        change = float(beta[place])
-        settings = replace(settings, delay=settings.delay + change)
-        beta[place] = settings.delay
-        logs = [_with_delay(log, place, settings.delay - change) for log in logs]
-        if abs(change) < _DELAY_SETTLED * max(normal.dt for normal in bare + burdened):
+        change = 0.0
+        if shared.delay:
+            place = len(settings.model.names)
+            change = float(beta[place])
+            logs = [_with_delay(log, place, settings.delay) for log in logs]
+            settings = replace(settings, delay=settings.delay + change)
+            beta = beta.copy()
+            beta[place] = settings.delay
+        before, at = at, _linearisation(shared, beta, logs)
+        if abs(change) < _DELAY_SETTLED * max(normal.dt for normal in bare + burdened) and _settled(shared, before, at):
             break
     moved = np.max([normal.moved for normal in bare + burdened], axis=0)
     return replace(conclude("weak", shared, logs, beta, moved, prior, coloured=True), moved=moved)
 
 
-def _normals(sources: Sequence[Source], settings: WeakSettings) -> list[Normal]:
-    found = [normal_equations(source, settings) for source in sources]
+def _linearisation(
+    shared: Shared, beta: FloatArray, logs: Sequence[LogInformation]
+) -> tuple[FloatArray | None, FloatArray | None]:
+    """Coefficients of the model's columns at which the next pass linearises unloaded and loaded logs."""
+    if shared.model.linear:
+        return None, None
+    count = len(shared.model.names)
+    found = [next((log.c0[:count] for log in logs if log.loaded is loaded), None) for loaded in (False, True)]
+    return (beta[:count] if found[0] is None else found[0]), found[1]
+
+
+def _settled(
+    shared: Shared,
+    before: tuple[FloatArray | None, FloatArray | None],
+    after: tuple[FloatArray | None, FloatArray | None],
+) -> bool:
+    if shared.model.linear:
+        return True
+    places = [shared.model.names.index(name) for name in _ITERATED if name in shared.model.names]
+    return all(
+        new is None or (old is not None and bool(np.all(np.abs(new - old)[places] < _SETTLED)))
+        for old, new in zip(before, after, strict=True)
+    )
+
+
+def _normals(sources: Sequence[Source], settings: WeakSettings, at: FloatArray | None) -> list[Normal]:
+    found = [normal_equations(source, settings, at) for source in sources]
     return [normal for normal in found if normal is not None]
 
 

@@ -29,7 +29,7 @@ import numpy as np
 from scipy.linalg import lapack
 
 from algid.arm import FloatArray
-from algid.model import Model, Motion, partials, regressor
+from algid.model import Model, Motion, partials, sensitivity, torque
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.segments import Segment
 
@@ -82,7 +82,9 @@ def linearise(
 ) -> Linearised:
     """Linearise a piece at the trajectory `theta0` (2, N) and the coefficients `c` (q,), and whiten it.
 
-    With `delay` the last column is the derivative of the torque by the stencil's shift.
+    With `delay` the last column is the derivative of the torque by the stencil's shift. A lag of the torque is
+    taken from that shift by the caller; what the low-pass does beyond that is done here, to the torque and its
+    derivatives by c, while H counts the shift alone.
 
     Raises
     ------
@@ -92,18 +94,57 @@ def linearise(
     length = theta0.shape[1]
     torques, first = stencil.torques(length), stencil.first(length)
     motion = Motion(*stencil.differences(theta0))
-    Y = regressor(model, motion)
-    P = partials(model, c, motion)
-    torque = np.einsum("aqn,q->an", Y, c)
-    G = along_stencil(P, stencil.weights)
-    error = piece.tau[:, torques] - torque - forward(G, piece.theta - theta0, first)
+    J = sensitivity(model, c, motion)
+    modelled = torque(model, c, motion)
+    if "lag" in model.terms:
+        place = model.names.index("lag")
+        J, modelled = (low_passed(signal, stencil.dt, float(c[place])) for signal in (J, modelled))
+        J[:, place] = -np.gradient(modelled, stencil.dt, axis=1)
+    G = along_stencil(partials(model, c, motion), stencil.weights)
+    error = piece.tau[:, torques] - modelled - forward(G, piece.theta - theta0, first)
     H = G * (noise.theta[None, :, None, None] / noise.tau[:, None, None, None])
     factor = covariance_factor(H)
-    extra = [np.gradient(torque, stencil.dt, axis=1)[None]] if delay else []
-    rows = np.concatenate([Y.swapaxes(0, 1), *extra, error[None]])
+    extra = [np.gradient(modelled, stencil.dt, axis=1)[None]] if delay else []
+    rows = np.concatenate([J.swapaxes(0, 1), *extra, error[None]])
     rows = np.ascontiguousarray((rows / noise.tau[None, :, None]).swapaxes(1, 2))
     columns = _triangular(factor, rows.reshape(rows.shape[0], -1), "N")
     return Linearised(columns, factor, H, first, error)
+
+
+def low_passed(signal: FloatArray, dt: float, lag: float) -> FloatArray:
+    """Signals (..., n), sampled `lag` s ago, after a first-order low-pass of time constant `lag` s.
+
+    The response is exp(s lag) / (1 + s lag), so that a slow signal passes unchanged and in time. A negative lag is
+    the mirror image, which runs from the end of the signal to its start. Both ends continue by point reflection.
+    """
+    if abs(lag) < 1e-6 * dt:
+        return signal.copy()
+    if lag < 0:
+        return low_passed(signal[..., ::-1], dt, -lag)[..., ::-1]
+    from scipy.signal import lfilter
+
+    n = signal.shape[-1]
+    reach = min(n - 1, 2 + int(12 * lag / dt))
+    before = 2 * signal[..., :1] - signal[..., reach:0:-1]
+    after = 2 * signal[..., -1:] - signal[..., -2 : -reach - 2 : -1]
+    extended = np.concatenate([before, signal, after], axis=-1)
+    # Exact for a signal that is straight between its samples.
+    decay = np.exp(-dt / lag)
+    mean = (1 - decay) * lag / dt
+    passed = lfilter([1 - mean, mean - decay], [1, -decay], extended - extended[..., :1], axis=-1) + extended[..., :1]
+    whole = int(lag / dt)
+    rest = lag / dt - whole
+    start = reach + whole
+    # Lagrange's cubic through the four samples around the time wanted.
+    weights = (
+        -rest * (rest - 1) * (rest - 2) / 6,
+        (rest + 1) * (rest - 1) * (rest - 2) / 2,
+        -(rest + 1) * rest * (rest - 2) / 2,
+        (rest + 1) * rest * (rest - 1) / 6,
+    )
+    return np.asarray(
+        sum(weight * passed[..., start + point : start + point + n] for point, weight in enumerate(weights, -1))
+    )
 
 
 def along_stencil(P: FloatArray, weights: FloatArray) -> FloatArray:

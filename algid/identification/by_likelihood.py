@@ -56,12 +56,12 @@ def run_fit(
 
 def model_of(settings: Settings) -> Model:
     """The columns that the settings switch on."""
-    return Model(
-        coulomb=settings.friction == "coulomb",
-        offset=settings.torque_offset,
-        rotor=settings.rotor_inertia,
-        gravity=settings.gravity,
-    )
+    wanted = {
+        "coulomb": settings.friction == "coulomb",
+        "offset": settings.torque_offset,
+        "rotor": settings.rotor_inertia,
+    }
+    return Model(tuple(term for term, asked in wanted.items() if asked), settings.gravity)
 
 
 def _weak_settings(settings: Settings) -> weak.WeakSettings:

@@ -41,7 +41,7 @@ def test_constrained_estimates_obey_the_bounds(bench: Bench) -> None:
 def test_only_terms_that_are_there_earn_their_place(bench: Bench) -> None:
     log = bench.log(sigma=1e-3)
     log = replace(log, tau=log.tau + 0.1 * np.tanh(bench.bare.omega / 0.2))
-    fit = weak.fit([lambda: [log]], settings=WeakSettings(model=Model(coulomb=True, rotor=True)))
+    fit = weak.fit([lambda: [log]], settings=WeakSettings(model=Model(("coulomb", "rotor"))))
     worths = {worth.term: worth for worth in term_worths(fit)}
     assert worths["coulomb"].earned
     assert not worths["rotor"].earned

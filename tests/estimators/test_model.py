@@ -1,27 +1,117 @@
 import math
 
 import numpy as np
+import pytest
+import sympy as sp
 
 from algid import arm
-from algid.model import Model, Motion, partials, regressor, sine_cosine
+from algid.model import TERMS, UNITS, Model, Motion, partials, regressor, sensitivity, sine_cosine, torque
 
-FULL = Model(coulomb=True, offset=True, rotor=True, coulomb_speed=0.5)
-C = np.array([0.03, 1.4, 0.05, 1.9, 0.06, 0.1, 0.2, 0.25, 0.15, 0.01, -0.02, 0.003])
+FULL = Model(tuple(TERMS), coulomb_speed=0.5, stribeck_speed=0.8)
+VALUES = {
+    **dict(zip(("k1", "k2", "k3", "k4", "k5", "k6", "k7"), (0.03, 1.4, 0.05, 1.9, 0.06, 0.1, 0.2), strict=True)),
+    "f1": 0.25,
+    "f2": 0.15,
+    "o1": 0.01,
+    "o2": -0.02,
+    "j2": 0.003,
+    "s1": 0.05,
+    "s2": 0.04,
+    "a1": 0.02,
+    "a2": -0.03,
+    "e1": 0.05,
+    "e2": 0.08,
+    "gain2": 0.06,
+    "zero1": 0.02,
+    "zero2": -0.03,
+    "lag": 0.0,
+}
+C = np.array([VALUES[name] for name in FULL.names])
 
 
 def _motion(seed: int = 0) -> Motion:
     rng = np.random.default_rng(seed)
-    return Motion(rng.uniform(-3, 3, (2, 50)), rng.uniform(-5, 5, (2, 50)), rng.uniform(-40, 40, (2, 50)))
+    return Motion(rng.uniform(-3, 3, (2, 50)), rng.uniform(-2, 2, (2, 50)), rng.uniform(-40, 40, (2, 50)))
 
 
-def _torque(motion: Motion) -> np.ndarray:
-    return np.einsum("aqn,q->an", regressor(FULL, motion), C)
+def _by_hand() -> sp.Matrix:
+    """The torque of every term, Lagrange's equations done by SymPy, in the symbols of `VALUES` and of the motion."""
+    t = sp.Symbol("t")
+    angles = [sp.Function(f"q{joint}")(t) for joint in (1, 2)]
+    speeds = [angle.diff(t) for angle in angles]
+    value = {name: sp.Symbol(name) for name in VALUES}
+    q1, q2 = angles[0] + value["zero1"], angles[1] + value["zero2"]
+    k1, k2, k3, k4, k5 = (value[f"k{number}"] for number in range(1, 6))
+    kinetic = ((k5 + k3 + 2 * k1 * sp.cos(q2)) * speeds[0] ** 2 + k3 * speeds[1] ** 2) / 2
+    kinetic += (k3 + k1 * sp.cos(q2)) * speeds[0] * speeds[1]
+    potential = k4 * sp.sin(q1) + k2 * sp.sin(q1 + q2)
+    lagrangian = kinetic - potential
+    torques = []
+    for joint, (angle, speed) in enumerate(zip(angles, speeds, strict=True), 1):
+        load = lagrangian.diff(speed).diff(t) - lagrangian.diff(angle)
+        sign = sp.tanh(speed / sp.Symbol("ws"))
+        friction = value[f"k{joint + 5}"] * speed + value[f"f{joint}"] * sign + value[f"a{joint}"] * sign**2
+        friction += value[f"s{joint}"] * sign * sp.exp(-((speed / sp.Symbol("wS")) ** 2))
+        friction += value[f"e{joint}"] * sp.sqrt(load**2) * sign
+        torques.append(load + friction + value[f"o{joint}"])
+    torques[1] = (torques[1] + value["j2"] * speeds[1].diff(t)) * (1 + value["gain2"])
+    plain = [
+        (angle.diff(t, order), sp.Symbol(f"{letter}{joint}"))
+        for order, letter in ((2, "alpha"), (1, "omega"), (0, "theta"))
+        for joint, angle in enumerate(angles, 1)
+    ]
+    return sp.Matrix([torque.doit().subs(plain) for torque in torques])
+
+
+def _function(expression: sp.Matrix, motion: Motion) -> np.ndarray:
+    signals = {
+        f"{letter}{j + 1}": x[j]
+        for letter, x in vars(motion).items()
+        if letter in ("theta", "omega", "alpha")
+        for j in range(2)
+    }
+    known = {**VALUES, "ws": FULL.coulomb_speed, "wS": FULL.stribeck_speed, **signals}
+    names = sorted(map(str, expression.free_symbols))
+    rows = [sp.lambdify(names, entry, "numpy")(*(known[name] for name in names)) for entry in expression]
+    return np.array([np.broadcast_to(row, motion.theta.shape[1:]) for row in rows]).reshape(*expression.shape, -1)
+
+
+def test_the_torque_of_every_term_is_that_of_sympy() -> None:
+    expected = _function(_by_hand(), _motion())[:, 0]
+    assert np.allclose(torque(FULL, C, _motion()), expected, rtol=1e-12, atol=1e-12)  # rounding
+
+
+def test_the_sensitivity_of_every_term_is_that_of_sympy() -> None:
+    slopes = _by_hand().jacobian([sp.Symbol(name) for name in FULL.names if name != "lag"])
+    expected = _function(slopes, _motion())
+    ours = np.delete(sensitivity(FULL, C, _motion()), FULL.names.index("lag"), axis=1)
+    assert np.allclose(ours, expected, rtol=1e-11, atol=1e-11)  # rounding
+
+
+def test_the_regressor_gives_the_torque_and_is_its_slope_where_the_torque_is_linear() -> None:
+    linear = Model(("coulomb", "stribeck", "asymmetry", "offset", "rotor"))
+    c = np.array([VALUES[name] for name in linear.names])
+    assert linear.linear
+    assert not FULL.linear
+    assert np.array_equal(regressor(linear, _motion()), sensitivity(linear, c, _motion()))
+    assert np.allclose(np.einsum("aqn,q->an", regressor(FULL, _motion(), C), C), torque(FULL, C, _motion()))
+    with pytest.raises(ValueError, match=r"load, gain, zero.* depends on the coefficients"):
+        regressor(FULL, _motion())
 
 
 def test_plain_columns_are_those_of_the_arm() -> None:
     motion = _motion()
     ours = regressor(Model(), motion)
     assert np.allclose(ours, arm.regressor(motion.theta, motion.omega, motion.alpha), atol=1e-13)  # rounding
+
+
+def test_terms_are_named_in_one_order_and_unknown_ones_refused() -> None:
+    assert Model(("rotor", "coulomb")) == Model(("coulomb", "rotor"))
+    assert Model(("rotor", "coulomb")).names[-3:] == ("f1", "f2", "j2")
+    assert all(name in UNITS for name in FULL.names)
+    assert all(term.needs is None or term.needs in TERMS for term in TERMS.values())
+    with pytest.raises(ValueError, match="got 'backlash'"):
+        Model(("coulomb", "backlash"))
 
 
 def test_sine_and_cosine_are_exact_at_every_angle() -> None:
@@ -35,9 +125,11 @@ def test_sine_and_cosine_are_exact_at_every_angle() -> None:
     assert np.max(np.abs(cosine - [math.cos(angle) for angle in theta])) <= unit
 
 
-def test_partials_are_the_slopes_of_the_torque() -> None:
+@pytest.mark.parametrize("model", [FULL, *(Model((term,)) for term in TERMS)], ids=lambda model: "+".join(model.terms))
+def test_partials_are_the_slopes_of_the_torque(model: Model) -> None:
     motion, step = _motion(), 1e-6
-    slopes = partials(FULL, C, motion)
+    c = np.array([VALUES[name] for name in model.names])
+    slopes = partials(model, c, motion)
     for order in range(3):
         for joint in range(2):
             signals = [motion.theta, motion.omega, motion.alpha]
@@ -45,12 +137,12 @@ def test_partials_are_the_slopes_of_the_torque() -> None:
             move[joint] = step
             ahead = [s + move * (place == order) for place, s in enumerate(signals)]
             behind = [s - move * (place == order) for place, s in enumerate(signals)]
-            expected = (_torque(Motion(*ahead)) - _torque(Motion(*behind))) / (2 * step)
+            expected = (torque(model, c, Motion(*ahead)) - torque(model, c, Motion(*behind))) / (2 * step)
             assert np.allclose(slopes[order, :, joint], expected, atol=1e-6)  # central differences
 
 
 def test_a_horizontal_arm_has_no_gravity_columns() -> None:
-    model = Model(gravity=0.0)
-    assert model.names == ("k1", "k3", "k5", "k6", "k7")
-    assert regressor(model, _motion()).shape == (2, 5, 50)
-    assert model.expand(np.ones(5))[[1, 3]].tolist() == [0.0, 0.0]
+    model = Model(("zero",), gravity=0.0)
+    assert model.names == ("k1", "k3", "k5", "k6", "k7", "zero2")
+    assert regressor(model, _motion(), np.zeros(6)).shape == (2, 6, 50)
+    assert model.expand(np.ones(6))[[1, 3]].tolist() == [0.0, 0.0]

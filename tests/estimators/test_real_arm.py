@@ -39,7 +39,7 @@ def _run(path: Path) -> Segment:
 
 
 def test_prediction_beats_the_published_parameters(sources: list[Source]) -> None:
-    fit = refined.fit(sources, settings=RefinedSettings(model=Model(coulomb=True, rotor=True)))
+    fit = refined.fit(sources, settings=RefinedSettings(model=Model(("coulomb", "rotor"))))
     assert fit.note is not None  # an arm's torque error is no white noise
     assert fit.unidentifiable == ()
     found = cross_validate(fit, sources)
@@ -48,11 +48,11 @@ def test_prediction_beats_the_published_parameters(sources: list[Source]) -> Non
 
 
 def test_the_differentiators_bandwidth_does_not_move_k2(sources: list[Source]) -> None:
-    model = Model(coulomb=True, rotor=True)
+    model = Model(("coulomb", "rotor"))
     narrow, wide = (weak.fit(sources, settings=WeakSettings(model, bandwidth=hertz)) for hertz in (10.0, 30.0))
     assert abs(narrow.values[1] - wide.values[1]) < wide.std[1]
 
 
 def test_friction_earns_its_place_and_the_offset_does_not(sources: list[Source]) -> None:
-    fit = weak.fit(sources, settings=WeakSettings(Model(coulomb=True, offset=True, rotor=True)))
+    fit = weak.fit(sources, settings=WeakSettings(Model(("coulomb", "offset", "rotor"))))
     assert {worth.term: worth.earned for worth in term_worths(fit)} == {"coulomb": True, "offset": False, "rotor": True}

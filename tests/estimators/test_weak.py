@@ -65,7 +65,7 @@ def test_further_columns_are_told_from_those_of_the_arm(bench: Bench) -> None:
     log = bench.log()
     friction = 0.2 * np.tanh(bench.bare.omega / 0.2)
     log = replace(log, tau=log.tau + friction + np.array([[0.03], [-0.05]]))
-    fit = weak.fit([lambda: [log]], settings=WeakSettings(model=Model(coulomb=True, offset=True)))
+    fit = weak.fit([lambda: [log]], settings=WeakSettings(model=Model(("coulomb", "offset"))))
     assert np.allclose(fit.values[7:], [0.2, 0.2, 0.03, -0.05], atol=2e-3)
 
 
