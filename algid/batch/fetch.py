@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 from algid.errors import AlgidError, LogError
 from algid.identification.source import Staged
 from algid.readers.mcap import framing
-from algid.readers.mcap.catalogue import catalogue, channels_of
+from algid.readers.mcap.catalogue import between, catalogue, channels_of
 from algid.readers.mcap.framing import DamagedError, File
 from algid.readers.mcap.load import spans_of
 from algid.stores import copying, fetched
@@ -216,7 +216,7 @@ def _wanted_of_mcap(part: Partial, profile: Profile | None) -> list[Range]:
 
 
 def _read_by_catalogue(part: Partial) -> list[Range]:
-    """Where the catalogue looks beyond the summary: heads of message indexes, and metadata."""
+    """Where the catalogue looks beyond the summary: heads of message indexes, metadata, what lies between."""
     from mcap import records
 
     (start,) = struct.unpack("<Q", part.read(part.size - _MCAP_END + 9, 8))
@@ -224,17 +224,18 @@ def _read_by_catalogue(part: Partial) -> list[Range]:
     if not 0 < start < end or end - start > _LARGEST_END:
         raise UnforeseenError("no summary")
     part.fetch([(start, part.size)])
-    content, wanted = part.read(start, end - start), []
+    content, wanted, chunks = part.read(start, end - start), [], []
     for record in framing.walk_bytes(content, 0, len(content)):
         body = content[record.start : record.end]
         if record.code == framing.CHUNK_INDEX:
-            offsets = framing.parse(records.ChunkIndex, body).message_index_offsets.values()
-            wanted += [(offset, offset + _INDEX_HEAD) for offset in offsets]
+            chunks.append(framing.parse(records.ChunkIndex, body))
+            wanted += [(offset, offset + _INDEX_HEAD) for offset in chunks[-1].message_index_offsets.values()]
         elif record.code == _METADATA_INDEX:
             place = framing.parse(records.MetadataIndex, body)
             if place.length <= framing.SMALL_RECORD:
                 wanted.append((place.offset, place.offset + place.length))
-    return wanted
+    chunks.sort(key=lambda chunk: chunk.chunk_start_offset)
+    return [*wanted, *((first, last) for first, last in between(chunks, start) if last - first <= SMALL)]
 
 
 def _wanted_of_parquet(part: Partial, profile: Profile | None) -> list[Range]:

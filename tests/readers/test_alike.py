@@ -6,7 +6,7 @@ import struct
 
 import numpy as np
 
-from algid.readers.mcap.messages import alike, find
+from algid.readers.mcap.messages import alike, records_in
 
 
 def message(number: int, size: int, code: int = 5) -> bytes:
@@ -21,7 +21,7 @@ def found(content: bytes) -> list[int] | None:
 def test_equal_messages_are_found_at_once_and_rightly() -> None:
     content = b"".join(message(number, 40) for number in range(5))
     assert found(content) == [71 * number for number in range(5)]
-    messages = find(content, b"", {1})
+    messages = records_in(content).of({1})
     assert messages.log_ns.tolist() == [0, 10, 20, 30, 40]
     assert set(messages.sizes.tolist()) == {40}
 
@@ -32,4 +32,4 @@ def test_anything_else_is_left_to_the_walk() -> None:
     assert found(message(0, 40)[:-1]) is None
     assert found(b"") is None
     mixed = message(0, 40) + message(1, 41) + message(2, 39)
-    assert find(mixed, b"", {1}).sizes.tolist() == [40, 41, 39]
+    assert records_in(mixed).of({1}).sizes.tolist() == [40, 41, 39]

@@ -399,3 +399,77 @@ def test_nan_in_a_message_is_refused(tmp_path: Path) -> None:
     write_mcap(tmp_path / "log.mcap", messages)
     with pytest.raises(LogError, match=r"tau2 .*effort\[joint2\].* sample 1"):
         read_log(tmp_path / "log.mcap")
+
+
+def chunks_of(path: Path) -> list[Any]:
+    """The chunk indexes of a file as the `mcap` package reads them."""
+    with path.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    return list(summary.chunk_indexes)
+
+
+@pytest.mark.parametrize("chunked", [True, False])
+@pytest.mark.parametrize("length", [0, 3, 1 << 20, 1 << 63, (1 << 64) - 1])
+def test_behind_a_broken_record_the_next_whole_one_is_found(length: int, chunked: bool, tmp_path: Path) -> None:
+    log = noise_log(2000, start_ns=EPOCH_NS)
+    path = tmp_path / "log.mcap"
+    options: dict[str, Any] = {} if chunked else NO_INDEX
+    write_mcap(path, messages_of(log), use_chunking=chunked, **options)
+    content = bytearray(path.read_bytes())
+    if chunked:
+        place = chunks_of(path)[len(chunks_of(path)) // 2].chunk_start_offset
+        content[-8:] = b"no magic"
+    else:
+        size = len(messages_of(log)[1000][2])
+        place = content.rindex(
+            struct.pack("<BQ", 5, 22 + size), 0, content.index(struct.pack("<d", log.theta[0, 1000]))
+        )
+    struct.pack_into("<Q", content, place + 1, length)
+    path.write_bytes(content)
+    found = read_log(path)
+    lost = len(log) - len(found)
+    assert 1 <= lost <= (40 if chunked else 8)
+    assert np.isin(found.theta, log.theta).all()
+    assert found.stamp_ns[0] == log.stamp_ns[0]
+    assert found.stamp_ns[-1] == log.stamp_ns[-1]
+    assert any(notice.lossy and f"byte {place}" in notice.text for notice in found.notices)
+
+
+def test_a_chunk_that_claims_to_go_on_yields_its_messages_and_those_behind_it(tmp_path: Path) -> None:
+    log = noise_log(2000, start_ns=EPOCH_NS)
+    path = tmp_path / "log.mcap"
+    write_mcap(path, messages_of(log), compression=CompressionType.NONE)
+    content = bytearray(path.read_bytes())
+    chunk = chunks_of(path)[3]
+    more = len(content)  # both lengths lie, and agree with one another
+    struct.pack_into("<Q", content, chunk.chunk_start_offset + 1, chunk.chunk_length - 9 + more)
+    (size,) = struct.unpack_from("<Q", content, chunk.chunk_start_offset + 9 + 32)
+    struct.pack_into("<Q", content, chunk.chunk_start_offset + 9 + 32, size + more)
+    content[-8:] = b"no magic"
+    path.write_bytes(content)
+    found = read_log(path)
+    assert same(found, log)
+    assert any(notice.code == "BROKEN_RECORD" and notice.lossy for notice in found.notices)
+
+
+def test_a_file_cut_between_two_records_is_called_cut(tmp_path: Path) -> None:
+    log = noise_log(2000, start_ns=EPOCH_NS)
+    path = tmp_path / "log.mcap"
+    write_mcap(path, messages_of(log))
+    chunk = chunks_of(path)[5]
+    path.write_bytes(path.read_bytes()[: chunk.chunk_start_offset])
+    found = read_log(path)
+    assert same(found, log.part(0, len(found)))
+    assert any(notice.code == "CUT_OFF" and notice.lossy for notice in found.notices)
+
+
+def test_messages_of_a_damaged_chunk_are_counted_by_its_index(tmp_path: Path) -> None:
+    log = noise_log(2000, start_ns=EPOCH_NS)
+    path = tmp_path / "log.mcap"
+    write_mcap(path, messages_of(log), compression=CompressionType.NONE, use_statistics=False)
+    content = bytearray(path.read_bytes())
+    content[content.index(struct.pack("<d", log.theta[0, 1000]))] ^= 1
+    path.write_bytes(content)
+    found = read_log(path)
+    assert any(f"{len(log) - len(found)} messages are missing" in notice.text for notice in found.notices)

@@ -1,26 +1,32 @@
 """What an MCAP file holds and where: from its summary where that can be trusted, else by walking through it.
 
-The summary is trusted when its CRC, the counts of its statistics and the message indexes agree. Everything
-else, a file cut off for one, is walked from its start, record by record.
+The summary is trusted when its CRC, the counts of its statistics and the message indexes agree, and when nothing
+but other records lies between the chunks that it lists. Everything else, a file cut off for one, is walked from its
+start, record by record and past what is broken.
 """
 
 from __future__ import annotations
 
 import struct
 import zlib
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from algid.log import Notice
+from algid.log import KEY, Notice
 from algid.readers.mcap import framing
-from algid.readers.mcap.framing import BrokenOffError, DamagedError, File, parse, unpack, unpack_torn
-from algid.readers.mcap.messages import alike
+from algid.readers.mcap.framing import DamagedError, File, claimed, parse, unpack, unpack_torn
+from algid.readers.mcap.messages import records_in
+from algid.readers.mcap.salvage import Gap, salvaged
 
 _FOOTER_SIZE = 9 + 20 + 8
 _LARGEST_SUMMARY = 1 << 28
+_MOST_INDEXES = 2_000_000
+_MOST_SPANS = 500_000
 _SPAN = 1 << 23
+_LOOSE, _TORN = -1, -2
 
 
 @dataclass(frozen=True)
@@ -42,7 +48,8 @@ class Span:
 class Catalogue:
     """Schemas and channels by id, spans in file order, messages by channel where counted.
 
-    `damage` names the places where bytes were met that are not what the format says.
+    `damage` names the places where bytes were met that are not what the format says. `redefined` says from which
+    byte on an id no longer means what it meant before.
     """
 
     schemas: dict[int, Any] = field(default_factory=dict)
@@ -51,8 +58,43 @@ class Catalogue:
     counts: dict[int, int] | None = None
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     notices: list[Notice] = field(default_factory=list)
-    walked: bool = False
     damage: list[str] = field(default_factory=list)
+    redefined: dict[int, int] = field(default_factory=dict)
+
+    def define(self, code: int, content: bytes) -> None:
+        """Take in the content of a schema's or a channel's record; the first of an id holds.
+
+        Raises
+        ------
+        DamagedError
+            If the record cannot be read.
+        RedefinedError
+            If its id has another meaning already.
+        """
+        one = self.checked(code, content)
+        (self.schemas if code == framing.SCHEMA else self.channels).setdefault(one.id, one)
+
+    def checked(self, code: int, content: bytes) -> Any:
+        """A schema or a channel as its record says, that has no other meaning yet: see `define`."""
+        from mcap import records
+
+        kind, known = (records.Schema, self.schemas) if code == framing.SCHEMA else (records.Channel, self.channels)
+        one = parse(kind, content)
+        if known.get(one.id, one) != one:
+            changed = [one.id] if code == framing.CHANNEL else self._channels_of_schema(one.id)
+            raise RedefinedError(f"{kind.__name__.lower()} {one.id} is defined anew and differently", changed)
+        return one
+
+    def _channels_of_schema(self, number: int) -> list[int]:
+        return [channel.id for channel in self.channels.values() if channel.schema_id == number]
+
+
+class RedefinedError(DamagedError):
+    """A record that gives an id another meaning; `channels` are those concerned."""
+
+    def __init__(self, text: str, channels: Iterable[int]) -> None:
+        super().__init__(text)
+        self.channels = tuple(channels)
 
 
 def catalogue(file: File) -> Catalogue:
@@ -77,6 +119,36 @@ def catalogue(file: File) -> Catalogue:
 def _from_summary(file: File) -> Catalogue | None:
     from mcap import records
 
+    place = _summary(file)
+    if place is None:
+        return None
+    content = file.read(*place)
+    found, statistics, chunks, metadata = Catalogue(), None, [], []
+    for record in framing.walk_bytes(content, 0, len(content)):
+        body = content[record.start : record.end]
+        if record.code in (framing.SCHEMA, framing.CHANNEL):
+            found.define(record.code, body)
+        elif record.code == framing.CHUNK_INDEX:
+            chunks.append(parse(records.ChunkIndex, body))
+        elif record.code == framing.STATISTICS:
+            statistics = parse(records.Statistics, body)
+        elif record.code == framing.METADATA_INDEX:
+            metadata.append(parse(records.MetadataIndex, body))
+    if statistics is None or not chunks or not found.channels:
+        return None
+    chunks.sort(key=lambda one: one.chunk_start_offset)
+    found.counts = dict(statistics.channel_message_counts)
+    found.spans = [_chunk_span(file, chunk) for chunk in chunks]
+    _check_counts(file, chunks, statistics)
+    _check_between(file, chunks, place[0])
+    for one in metadata:
+        if one.name == KEY and KEY not in found.metadata:
+            _keep_metadata(file, framing.Record(framing.METADATA, one.offset + 9, one.length - 9), found)
+    return found
+
+
+def _summary(file: File) -> tuple[int, int] | None:
+    """First byte and length of the summary, None where the footer names none; its checksum is verified."""
     tail = file.read(max(0, file.size - _FOOTER_SIZE), min(_FOOTER_SIZE, file.size))
     if len(tail) < _FOOTER_SIZE or tail[-8:] != framing.MAGIC:
         raise DamagedError("the file has no end: it was cut off")
@@ -88,35 +160,9 @@ def _from_summary(file: File) -> Catalogue | None:
         return None
     if not 8 <= start <= end or end - start > _LARGEST_SUMMARY:
         raise DamagedError(f"its footer claims a summary at byte {start}")
-    content = file.read(start, end - start)
-    if crc and zlib.crc32(tail[:25], zlib.crc32(content)) != crc:
+    if crc and zlib.crc32(tail[:25], zlib.crc32(file.read(start, end - start))) != crc:
         raise DamagedError("its checksum is wrong")
-    found, statistics, chunks, metadata = Catalogue(), None, [], []
-    for record in framing.walk_bytes(content, 0, len(content)):
-        body = content[record.start : record.end]
-        if record.code == framing.SCHEMA:
-            schema = parse(records.Schema, body)
-            found.schemas[schema.id] = schema
-        elif record.code == framing.CHANNEL:
-            channel = parse(records.Channel, body)
-            found.channels[channel.id] = channel
-        elif record.code == framing.CHUNK_INDEX:
-            chunks.append(parse(records.ChunkIndex, body))
-        elif record.code == framing.STATISTICS:
-            statistics = parse(records.Statistics, body)
-        elif record.code == 0x0D:
-            metadata.append(parse(records.MetadataIndex, body))
-    if statistics is None or not chunks or not found.channels:
-        return None
-    found.counts = dict(statistics.channel_message_counts)
-    found.spans = [_chunk_span(file, chunk) for chunk in sorted(chunks, key=lambda one: one.chunk_start_offset)]
-    _check_counts(file, chunks, statistics)
-    for place in metadata:
-        _keep_metadata(file, framing.Record(framing.METADATA, place.offset + 9, place.length - 9), found)
-        if place.name not in found.metadata:
-            text = f"the metadata record {place.name!r} is damaged and was left out"
-            found.notices.append(Notice("DAMAGED_RECORD", text))
-    return found
+    return start, end - start
 
 
 def _chunk_span(file: File, chunk: Any) -> Span:
@@ -133,6 +179,8 @@ def _check_counts(file: File, chunks: list[Any], statistics: Any) -> None:
         raise DamagedError(f"it lists {len(chunks)} of {statistics.chunk_count} chunks")
     if any(not chunk.message_index_length for chunk in chunks):
         return
+    if sum(len(chunk.message_index_offsets) for chunk in chunks) > _MOST_INDEXES:
+        raise DamagedError(f"it claims more than {_MOST_INDEXES} message indexes")
     listed: dict[int, int] = {}
     for chunk in chunks:
         for channel, offset in chunk.message_index_offsets.items():
@@ -145,90 +193,141 @@ def _check_counts(file: File, chunks: list[Any], statistics: Any) -> None:
         raise DamagedError("its indexes and its statistics count different numbers of messages")
 
 
+def between(chunks: list[Any], end: int) -> list[tuple[int, int]]:
+    """Bytes [start, end) around chunks in file order, up to the summary at `end`: neither these nor their indexes."""
+    ends = [chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length for chunk in chunks]
+    starts = [chunk.chunk_start_offset for chunk in chunks]
+    return [pair for pair in zip([len(framing.MAGIC), *ends], [*starts, end], strict=True) if pair[0] != pair[1]]
+
+
+def _check_between(file: File, chunks: list[Any], end: int) -> None:
+    """Chunks must not overlap, and no message or chunk stand beside those that are listed."""
+    for first, last in between(chunks, end):
+        if first > last:
+            raise DamagedError(f"its chunks overlap at byte {last}")
+        for record in framing.walk(file, first, last):
+            if record.code in (framing.CHUNK, framing.MESSAGE):
+                raise DamagedError(f"it does not list what stands at byte {record.start - 9}")
+
+
 def _walked(file: File) -> Catalogue:
     """Everything there is up to the end, or to where the file breaks off."""
-    found = Catalogue(walked=True)
-    spans: list[list[Any]] = []
-    loose: list[int] | None = None
-    end = 8
+    found, spans = Catalogue(), _Spans()
+    gaps: list[Gap] = []
+    ended = None
     try:
-        for record in framing.walk(file, 8, file.size):
-            if record.code == framing.DATA_END:
-                end = file.size
-                break
-            if record.code == framing.MESSAGE:
-                if loose is None or loose[1] != record.start - 9 or record.end - loose[0] > _SPAN:
-                    loose = [record.start - 9, record.end]
-                    spans.append([loose, None])
-                loose[1] = record.end
-            else:
-                _place(file, record, found, spans)
-            end = record.end
+        for record in salvaged(file, len(framing.MAGIC)):
+            if isinstance(record, Gap):
+                gaps.append(record)
+                spans.add_torn(record)
+            elif record.code == framing.DATA_END:
+                ended = record.start
+            elif record.code in (framing.SCHEMA, framing.CHANNEL) and record.length <= framing.SMALL_RECORD:
+                _define(found, record.code, file.read(record.start, record.length), record.start)
+            elif record.code == framing.METADATA:
+                _keep_metadata(file, record, found)
+            elif spans.add(record):
+                ended = None  # data behind the end of the data: there was none
     except DamagedError as error:
-        last = error.record if isinstance(error, BrokenOffError) else None
-        torn = [Span(last.start, file.size - last.start, torn=True)] if last and last.code == framing.CHUNK else []
-        told = "chunk, read as far as it goes" if torn else "record and were left out"
-        text = f"the file breaks off: its last {file.size - end} bytes are an unfinished {told}"
-        found.notices.append(Notice("CUT_OFF", text, lossy=True))
-        found.damage.append(f"it breaks off at byte {end}")
-    else:
-        torn = []
-        if end != file.size:
-            text = "the file breaks off behind its last whole record"
-            found.notices.append(Notice("CUT_OFF", text, lossy=True))
-    found.spans = [_span(*span) for span in spans] + torn
-    _inner_channels(file, found)
+        gaps.append(Gap(file.size, file.size))
+        found.damage.append(str(error))
+    found.notices += _missing(file, gaps, ended, found)
+    found.spans = [_looked_into(file, span, found) for span in spans.all()]
     return found
 
 
-def _span(place: list[int], index: int | None) -> Span:
-    if index is None:
-        return Span(place[0], place[1] - place[0], loose=True)
-    return Span(place[0], place[1], index)
+@dataclass
+class _Spans:
+    """Gathers spans out of the records of a file, in their order."""
+
+    _places: list[list[int]] = field(default_factory=list)
+    """Start and length, and the length of a chunk's index, _LOOSE or _TORN."""
+
+    def add(self, record: framing.Record) -> bool:
+        """Take in a record; whether it holds data."""
+        last = self._places[-1] if self._places else [0, 0, 0]
+        if record.code == framing.CHUNK:
+            self._append(record.start, record.length, 0)
+        elif record.code == framing.MESSAGE:
+            if last[2] == _LOOSE and last[0] + last[1] == record.start - 9 and last[1] < _SPAN:
+                last[1] += record.length + 9
+            else:
+                self._append(record.start - 9, record.length + 9, _LOOSE)
+        elif record.code == framing.MESSAGE_INDEX and last[2] >= 0 and sum(last) == record.start - 9:
+            last[2] += record.length + 9
+        return record.code in (framing.CHUNK, framing.MESSAGE)
+
+    def add_torn(self, gap: Gap) -> None:
+        """Take in what there is of a chunk that breaks off."""
+        if gap.torn is not None:
+            self._append(gap.torn.start, gap.end - gap.torn.start, _TORN)
+
+    def _append(self, start: int, length: int, kind: int) -> None:
+        if len(self._places) == _MOST_SPANS:
+            raise DamagedError(f"more than {_MOST_SPANS} chunks, or messages apart from each other")
+        self._places.append([start, length, kind])
+
+    def all(self) -> list[Span]:
+        """The spans so far."""
+        return [
+            Span(start, length, max(0, kind), loose=kind == _LOOSE, torn=kind == _TORN)
+            for start, length, kind in self._places
+        ]
 
 
-def _place(file: File, record: framing.Record, found: Catalogue, spans: list[list[Any]]) -> None:
-    if record.code == framing.CHUNK:
-        spans.append([[record.start, record.length], 0])
-    elif record.code == framing.MESSAGE_INDEX and spans and spans[-1][1] is not None:
-        spans[-1][1] += record.length + 9
-    elif record.code in (framing.SCHEMA, framing.CHANNEL) and record.length <= framing.SMALL_RECORD:
-        _define(record.code, file.read(record.start, record.length), found)
-    elif record.code == framing.METADATA:
-        _keep_metadata(file, record, found)
+def _missing(file: File, gaps: list[Gap], ended: int | None, found: Catalogue) -> list[Notice]:
+    """What to tell of gaps in the data, and of a file that breaks off; `ended` is where the data end, if they do."""
+    inside = [gap for gap in gaps if ended is None or gap.start < ended]
+    last = inside.pop() if inside and inside[-1].end == file.size else None
+    said = []
+    if inside:
+        size = sum(gap.end - gap.start for gap in inside)
+        text = f"{size} bytes in {len(inside)} places, the first at byte {inside[0].start}, are no whole records"
+        said.append(Notice("BROKEN_RECORD", text, lossy=True))
+        found.damage += [f"no record at byte {gap.start}" for gap in inside]
+    if last is not None:
+        told = "chunk, read as far as it goes" if last.torn else "record and were left out"
+        text = f"the file breaks off: its last {last.end - last.start} bytes are an unfinished {told}"
+        said.append(Notice("CUT_OFF", text, lossy=True))
+        found.damage.append(f"it breaks off at byte {last.start}")
+    elif ended is None:
+        said.append(Notice("CUT_OFF", "the file breaks off behind its last whole record", lossy=True))
+    return said
 
 
-def _define(code: int, content: bytes, found: Catalogue) -> None:
-    """Take in a schema or a channel; the first of an id holds, as in every other reader."""
-    from mcap import records
-
+def _define(found: Catalogue, code: int, content: bytes, place: int) -> None:
+    """Take in a schema or a channel; from `place` on nothing is read of what it gives another meaning."""
     try:
-        if code == framing.SCHEMA:
-            schema = parse(records.Schema, content)
-            found.schemas.setdefault(schema.id, schema)
-        else:
-            channel = parse(records.Channel, content)
-            found.channels.setdefault(channel.id, channel)
+        found.define(code, content)
+    except RedefinedError as error:
+        for channel in error.channels:
+            found.redefined.setdefault(channel, place)
     except DamagedError as error:
         found.notices.append(Notice("DAMAGED_RECORD", f"{error}; left out", lossy=True))
         found.damage.append(str(error))
 
 
-def _inner_channels(file: File, found: Catalogue) -> None:
-    """Schemas and channels that stand within chunks; damaged chunks are told of when they are read."""
-    for span in found.spans:
+def _looked_into(file: File, span: Span, found: Catalogue) -> Span:
+    """The span with the channels of its messages; definitions that stand within a chunk are taken in.
+
+    Damaged chunks are told of when they are read.
+    """
+    try:
+        content = file.read(span.start, span.length + span.index_length)
         if span.loose:
-            continue
-        try:
-            packed = file.read(span.start, span.length)
-            content = unpack_torn(packed)[0] if span.torn else unpack(packed)
-            if alike(np.frombuffer(content, np.uint8)) is not None:
-                continue
-            for record in framing.walk_bytes(content, 0, len(content)):
-                if record.code in (framing.SCHEMA, framing.CHANNEL):
-                    _define(record.code, bytes(content[record.start : record.end]), found)
-        except DamagedError as error:
-            found.damage.append(f"{error} (at byte {span.start})")
+            records = records_in(content)
+        else:
+            chunk = content[: span.length]
+            file.unpacks(claimed(chunk))
+            unpacked = unpack_torn(chunk)[0] if span.torn else unpack(chunk)
+            records = records_in(unpacked, content[span.length :])
+        for code, body in records.others:
+            if code in (framing.SCHEMA, framing.CHANNEL):
+                _define(found, code, body, span.start)
+        return replace(span, channels=frozenset(np.unique(records.channels).tolist()))
+    except DamagedError as error:
+        found.damage.append(f"{error} (at byte {span.start})")
+    return span
 
 
 def _keep_metadata(file: File, record: framing.Record, found: Catalogue) -> None:
@@ -238,25 +337,31 @@ def _keep_metadata(file: File, record: framing.Record, found: Catalogue) -> None
         return
     try:
         metadata = parse(records.Metadata, file.read(record.start, record.length))
-        found.metadata[metadata.name] = metadata.metadata
+        found.metadata.setdefault(metadata.name, metadata.metadata)
     except DamagedError as error:
         found.notices.append(Notice("DAMAGED_RECORD", f"{error}; left out"))
 
 
 def truth_text(found: Catalogue) -> str | None:
     """The JSON text of the metadata record "algid", None without one, empty where the record is damaged."""
-    from algid.log import KEY
-
     return found.metadata[KEY].get(KEY, "") if KEY in found.metadata else None
 
 
 def channels_of(found: Catalogue, topic: str, type_name: str) -> frozenset[int]:
-    """Ids of the channels that carry a topic with messages of one type."""
-    return frozenset(
-        number
-        for number, channel in found.channels.items()
-        if channel.topic == topic and schema_name(found, channel) == type_name
-    )
+    """Ids of the channels that carry a topic with messages of one type, defined and encoded as by the first of them."""
+    return kinds(found).get((topic, type_name), frozenset())
+
+
+def kinds(found: Catalogue) -> dict[tuple[str, str], frozenset[int]]:
+    """By topic and type the ids of its channels whose messages are defined and encoded as those of the first."""
+    groups: dict[tuple[str, str], tuple[Any, list[int]]] = {}
+    for number, channel in sorted(found.channels.items()):
+        schema = found.schemas.get(channel.schema_id)
+        meaning = (channel.message_encoding, schema and (schema.encoding, schema.data))
+        first, numbers = groups.setdefault((channel.topic, schema_name(found, channel)), (meaning, []))
+        if first == meaning:
+            numbers.append(number)
+    return {name: frozenset(numbers) for name, (_, numbers) in groups.items()}
 
 
 def schema_name(found: Catalogue, channel: Any) -> str:

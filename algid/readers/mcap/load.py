@@ -8,9 +8,10 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 
 from algid.log import Notice
-from algid.readers.mcap.catalogue import Catalogue, Span
-from algid.readers.mcap.framing import DamagedError, File, has_checksum, unpack, unpack_torn
-from algid.readers.mcap.messages import Messages, find
+from algid.readers.mcap import framing
+from algid.readers.mcap.catalogue import Catalogue, RedefinedError, Span
+from algid.readers.mcap.framing import DamagedError, File, claimed, has_checksum, unpack, unpack_torn
+from algid.readers.mcap.messages import Messages, Records, entries, records_in
 from algid.runtime import executor
 
 _AHEAD = 3
@@ -27,6 +28,8 @@ class Batch:
     reason: str = ""
     torn: tuple[int, int] | None = None
     """Bytes of a torn chunk's records, unpacked: what is there, and what there should be."""
+    lost: int = 0
+    """Messages that the index of a damaged chunk lists, where it has one."""
 
 
 def spans_of(catalogue: Catalogue, channels: frozenset[int]) -> list[Span]:
@@ -43,7 +46,7 @@ def batches(file: File, catalogue: Catalogue, channels: frozenset[int]) -> Itera
                 ahead = _AHEAD if span.length <= _AHEAD_BYTES else 0
                 while len(waiting) > ahead:
                     yield waiting.popleft().result()
-                waiting.append(pool.submit(_load, file, span, channels))
+                waiting.append(pool.submit(_load, file, catalogue, span, channels))
             while waiting:
                 yield waiting.popleft().result()
         finally:
@@ -51,19 +54,37 @@ def batches(file: File, catalogue: Catalogue, channels: frozenset[int]) -> Itera
                 future.cancel()
 
 
-def _load(file: File, span: Span, channels: frozenset[int]) -> Batch:
+def _load(file: File, catalogue: Catalogue, span: Span, channels: frozenset[int]) -> Batch:
+    content = b""
     try:
         content = file.read(span.start, span.length + span.index_length)
-        if span.loose:
-            return Batch(find(content, b"", channels), checked=False)
-        if span.torn:
-            records, size = unpack_torn(content)
-            torn = (len(records), size) if len(records) < size else None
-            return Batch(find(records, b"", channels), torn is not None or has_checksum(content), torn=torn)
         chunk, index = content[: span.length], content[span.length :]
-        return Batch(find(unpack(chunk), index, channels), has_checksum(chunk))
+        if span.loose:
+            records, torn = records_in(chunk), None
+        else:
+            file.unpacks(claimed(chunk))
+            unpacked, torn = unpack_torn(chunk) if span.torn else (unpack(chunk), None)
+            records = records_in(unpacked, index)
+        _check_meaning(catalogue, span, records, channels)
     except DamagedError as error:
-        return Batch(None, checked=True, reason=f"{error} (at byte {span.start})")
+        lost = sum(places.size for channel, places in entries(content[span.length :]) if channel in channels)
+        return Batch(None, checked=True, reason=f"{error} (at byte {span.start})", lost=lost)
+    whole = torn is None or torn == len(records.content)
+    checked = not span.loose and (has_checksum(chunk) or not whole)
+    return Batch(records.of(channels), checked, torn=None if whole else (len(records.content), torn or 0))
+
+
+def _check_meaning(catalogue: Catalogue, span: Span, records: Records, channels: frozenset[int]) -> None:
+    """No message is read behind a record that gives its channel another meaning."""
+    for code, content in records.others:
+        if code in (framing.SCHEMA, framing.CHANNEL):
+            try:
+                catalogue.checked(code, content)
+            except RedefinedError as error:
+                for channel in error.channels:
+                    catalogue.redefined.setdefault(channel, span.start)
+    if any(catalogue.redefined.get(channel, span.start + 1) <= span.start for channel in channels):
+        raise DamagedError("a channel or its schema is defined anew and differently")
 
 
 @dataclass
@@ -74,12 +95,14 @@ class Account:
     reason: str = ""
     unchecked: bool = False
     found: int = 0
+    lost: int = 0
     torn: str = ""
 
     def add(self, batch: Batch) -> None:
         """Count one batch."""
         if batch.messages is None:
             self.spans += 1
+            self.lost += batch.lost
             self.reason = self.reason or batch.reason
         else:
             self.found += len(batch.messages)
@@ -91,12 +114,13 @@ class Account:
         """What to say; `counted` is how many messages the statistics promise."""
         said = []
         if self.spans:
-            told = f"{self.spans} chunks are damaged and were left out; the first: {self.reason}"
-            missing = f"; {counted - self.found} messages are missing" if counted is not None else ""
-            said.append(Notice("DAMAGED_CHUNK", told + missing, lossy=True))
+            missing = self.lost if counted is None else counted - self.found
+            text = f"{self.spans} chunks are damaged and were left out; the first: {self.reason}"
+            counting = f"; {missing} messages are missing" if missing else ""
+            said.append(Notice("DAMAGED_CHUNK", text + counting, lossy=True))
         elif counted is not None and counted != self.found:
-            told = f"the file counts {counted} messages and holds {self.found}"
-            said.append(Notice("MISSING_MESSAGES", told, lossy=True))
+            text = f"the file counts {counted} messages and holds {self.found}"
+            said.append(Notice("MISSING_MESSAGES", text, lossy=True))
         if self.torn:
             said.append(Notice("TORN_CHUNK", self.torn, lossy=True))
         if self.unchecked:

@@ -7,6 +7,7 @@ in between, tile the chunk without a gap. Otherwise the records are walked one b
 from __future__ import annotations
 
 import struct
+from array import array
 from collections.abc import Collection
 from dataclasses import dataclass
 
@@ -35,17 +36,49 @@ class Messages:
         return int(self.starts.size)
 
 
-def find(content: bytes, index: bytes, wanted: Collection[int]) -> Messages:
-    """Messages of the channels `wanted` in unpacked records, in file order.
+@dataclass(frozen=True, eq=False)
+class Records:
+    """Unpacked bytes (N,), the offsets of their message records (M,), and the others: code and content of each."""
+
+    content: NDArray[np.uint8]
+    offsets: IntArray
+    others: tuple[tuple[int, bytes], ...] = ()
+
+    @property
+    def channels(self) -> NDArray[np.generic]:
+        """The channel of each message (M,)."""
+        return gather(self.content, self.offsets + 9, "<u2")
+
+    def of(self, wanted: Collection[int]) -> Messages:
+        """The messages of the channels `wanted`, in file order.
+
+        Raises
+        ------
+        DamagedError
+            If a message is shorter than its head.
+        """
+        offsets = self.offsets
+        if offsets.size == 0:
+            return Messages(self.content, offsets, offsets, offsets)
+        lengths = gather(self.content, offsets + 1, "<u8").astype(np.int64)
+        if lengths.min() < HEAD - 9:
+            raise DamagedError("a message is shorter than its head")
+        channels = self.channels
+        ours = np.isin(channels, list(wanted)) if len(wanted) > 1 else channels == next(iter(wanted), -1)
+        if not ours.all():
+            offsets, lengths = offsets[ours], lengths[ours]
+        log_ns = gather(self.content, offsets + 15, "<i8").astype(np.int64, copy=False)
+        return Messages(self.content, offsets + HEAD, lengths - (HEAD - 9), log_ns)
+
+
+def records_in(content: bytes, index: bytes = b"") -> Records:
+    """The records within unpacked bytes.
 
     Parameters
     ----------
     content : bytes
-        Unpacked records.
     index : bytes
         The message index records that stand behind the chunk, or nothing.
-    wanted : collection of int
-        Channel ids.
 
     Raises
     ------
@@ -53,29 +86,20 @@ def find(content: bytes, index: bytes, wanted: Collection[int]) -> Messages:
         If the records do not tile the bytes.
     """
     octets = np.frombuffer(content, np.uint8)
-    records = _indexed(octets, content, index)
-    if records is None:
-        records = alike(octets)
-    if records is None:
-        records = np.array(
-            [
-                record.start - 9
-                for record in framing.walk_bytes(content, 0, len(content))
-                if record.code == framing.MESSAGE
-            ],
-            np.int64,
-        )
-    if records.size == 0:
-        return Messages(octets, records, records, records)
-    lengths = gather(octets, records + 1, "<u8").astype(np.int64)
-    if lengths.min() < HEAD - 9:
-        raise DamagedError("a message is shorter than its head")
-    channels = gather(octets, records + 9, "<u2")
-    ours = np.isin(channels, list(wanted)) if len(wanted) > 1 else channels == next(iter(wanted))
-    if not ours.all():
-        records, lengths = records[ours], lengths[ours]
-    log_ns = gather(octets, records + 15, "<i8").astype(np.int64, copy=False)
-    return Messages(octets, records + HEAD, lengths - (HEAD - 9), log_ns)
+    found = _indexed(octets, content, index)
+    if found is None and (same := alike(octets)) is not None:
+        found = Records(octets, same)
+    return found or _walked(octets, content)
+
+
+def _walked(octets: NDArray[np.uint8], content: bytes) -> Records:
+    offsets, others = array("q"), []
+    for record in framing.walk_bytes(content, 0, len(content)):
+        if record.code == framing.MESSAGE:
+            offsets.append(record.start - 9)
+        else:
+            others.append((record.code, content[record.start : record.end]))
+    return Records(octets, np.frombuffer(offsets, np.int64) if offsets else np.empty(0, np.int64), tuple(others))
 
 
 def alike(octets: NDArray[np.uint8]) -> IntArray | None:
@@ -97,9 +121,9 @@ def gather(octets: NDArray[np.uint8], places: IntArray, kind: str) -> NDArray[np
     return window[places]
 
 
-def _indexed(octets: NDArray[np.uint8], content: bytes, index: bytes) -> IntArray | None:
-    """Offsets of all message records, sorted; None where the index does not fit the records."""
-    listed = _entries(index)
+def _indexed(octets: NDArray[np.uint8], content: bytes, index: bytes) -> Records | None:
+    """The records as a message index tells them; None where it does not fit them."""
+    listed = entries(index)
     if not listed:
         return None
     records = np.concatenate([offsets for _, offsets in listed])
@@ -107,18 +131,28 @@ def _indexed(octets: NDArray[np.uint8], content: bytes, index: bytes) -> IntArra
         records.sort(kind="stable")
     if records.size == 0 or records[0] < 0 or records[-1] > octets.size - HEAD:
         return None
-    if not np.all(octets[records] == framing.MESSAGE):
+    lengths = gather(octets, records + 1, "<u8")
+    if not np.all(octets[records] == framing.MESSAGE) or lengths.max() > octets.size:
         return None
-    ends = records + 9 + gather(octets, records + 1, "<u8").astype(np.int64)
+    ends = records + 9 + lengths.astype(np.int64)
     gaps = np.flatnonzero(ends[:-1] != records[1:])
     if gaps.size > _MOST_GAPS:
         return None
     borders = [(0, int(records[0])), *((int(ends[gap]), int(records[gap + 1])) for gap in gaps)]
     borders.append((int(ends[-1]), len(content)))
-    return records if all(_no_message(content, *border) for border in borders) else None
+    others: list[tuple[int, bytes]] = []
+    try:
+        for start, end in borders:
+            if start > end:
+                return None
+            between = framing.walk_bytes(content, start, end)
+            others += [(record.code, content[record.start : record.end]) for record in between]
+    except DamagedError:
+        return None
+    return None if any(code == framing.MESSAGE for code, _ in others) else Records(octets, records, tuple(others))
 
 
-def _entries(index: bytes) -> list[tuple[int, IntArray]]:
+def entries(index: bytes) -> list[tuple[int, IntArray]]:
     """Channel and offsets of each message index record; nothing where they are damaged."""
     found = []
     try:
@@ -131,13 +165,3 @@ def _entries(index: bytes) -> list[tuple[int, IntArray]]:
     except (DamagedError, struct.error):
         return []
     return found
-
-
-def _no_message(content: bytes, start: int, end: int) -> bool:
-    """Whether only whole records that are no messages stand between two offsets."""
-    if start > end:
-        return False
-    try:
-        return all(record.code != framing.MESSAGE for record in framing.walk_bytes(content, start, end))
-    except DamagedError:
-        return False
