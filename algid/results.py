@@ -21,13 +21,18 @@ SCHEMA_VERSION: Literal[1] = 1
 
 
 class Status(StrEnum):
-    """How far an estimate can be trusted."""
+    """How far an estimate can be trusted.
+
+    IMPLAUSIBLE: the estimates together break a bound of physics by more than three standard deviations, or predict
+    the torque worse than a constant does.
+    """
 
     OK = "OK"
     WEAK_EXCITATION = "WEAK_EXCITATION"
     SINGULAR = "SINGULAR"
     NOT_IDENTIFIABLE = "NOT_IDENTIFIABLE"
     NOT_CONVERGED = "NOT_CONVERGED"
+    IMPLAUSIBLE = "IMPLAUSIBLE"
 
 
 class _Model(BaseModel):
@@ -135,8 +140,19 @@ class Fit(_Model):
         return self
 
 
+class Cause(_Model):
+    """What probably lies behind a poor result, in a clause, and the flags to identify again with, if any mend it."""
+
+    cause: str
+    flags: list[str] = []
+
+
 class Result(_Model):
-    """The outcome of one identification; `truth` holds what a synthetic log was made with, by parameter."""
+    """The outcome of one identification.
+
+    `truth` holds what a synthetic log was made with, by parameter; `causes` what probably lies behind a poor
+    result, the most likely one first.
+    """
 
     schema_version: Literal[1] = SCHEMA_VERSION
     version: str
@@ -153,6 +169,7 @@ class Result(_Model):
     more_logs: list[LogSummary] = []
     data_lost: bool = False
     warnings: list[str] = []
+    causes: list[Cause] = []
 
     @property
     def logs(self) -> list[LogSummary]:

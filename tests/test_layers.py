@@ -44,7 +44,8 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "api": room("identification log synth"),
     "batch": room(
-        "errors identification profile readers results runtime settings stores", "distributed mcap polars pyarrow"
+        "errors identification profile readers report results runtime settings stores",
+        "distributed mcap polars pyarrow",
     ),
     "track": room(
         "arm errors estimators files identification model profile report results runtime settings signals",

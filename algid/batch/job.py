@@ -17,6 +17,7 @@ from algid.batch.records import End, Input, Record, estimates_of, stat_of
 from algid.errors import AlgidError
 from algid.identification.identify import identify
 from algid.identification.source import Staged, sha256_of
+from algid.report.verdict import verdict
 from algid.results import Result
 from algid.runtime import keep_freed, keep_to_one_core
 from algid.settings import Settings
@@ -112,10 +113,11 @@ def _here(paths: Sequence[str], folder: Path, profile: Profile | None) -> list[s
 
 
 def _of_result(result: Result) -> dict[str, Any]:
-    good = result.complete and not result.data_lost
+    judged = verdict(result)
+    good = result.complete and not result.data_lost and judged.level != "failed"
     return {
         "status": End.OK if good else End.INCOMPLETE,
-        "reason": "" if good else _what_lacks(result),
+        "reason": "" if good else judged.sentence if judged.level == "failed" else _what_lacks(result),
         "start_ns": result.log.start_ns,
         "log_seconds": sum(log.duration for log in result.logs),
         "estimator": result.estimator,

@@ -36,7 +36,7 @@ def identify(
 ) -> None:
     """Identify an arm's constants k1 … k7 and, with loaded logs, its payload; write LOG.algid.
 
-    Exit code 3 tells that a parameter could not be identified or that samples were lost.
+    Exit code 3 tells that a parameter could not be identified, that samples were lost, or that the result failed.
 
     Example: algid identify run-unloaded.mcap --loaded run-loaded.mcap -o results
     """
@@ -45,6 +45,7 @@ def identify(
     from algid.errors import SettingError
     from algid.identification.identify import identify as run
     from algid.report.progress import progress
+    from algid.report.verdict import verdict
     from algid.runtime import keep_freed
 
     if export is not None and not report:
@@ -70,7 +71,7 @@ def identify(
         _tell(result, out)
     if not quiet:
         print_result(result, output)
-    if not result.complete or result.data_lost:
+    if not result.complete or result.data_lost or verdict(result).level == "failed":
         raise typer.Exit(EXIT_INCOMPLETE)
 
 

@@ -35,7 +35,7 @@ def track(
 ) -> None:
     """Find when the payload changed and what each stretch weighs; write LOG.track.
 
-    Exit code 3 tells that a stretch could not be weighed or that samples were lost.
+    Exit code 3 tells that a stretch could not be weighed, that samples were lost, or that the track failed.
 
     Example: algid track picking.mcap --parameters case1-unloaded.algid -o tracks
     """
@@ -45,6 +45,7 @@ def track(
     from algid.report.progress import progress
     from algid.track.page import track_folder, write_track
     from algid.track.run import track_log
+    from algid.track.tables import verdict
 
     folder = track_folder(str(log), out)
     refuse_existing(folder, force)
@@ -58,7 +59,7 @@ def track(
     if not quiet:
         _print(result, form)
         typer.echo(f"wrote {folder}", err=True)
-    if not result.complete or result.data_lost:
+    if not result.complete or result.data_lost or verdict(result).level == "failed":
         raise typer.Exit(EXIT_INCOMPLETE)
 
 

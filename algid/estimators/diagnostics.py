@@ -27,7 +27,8 @@ from algid.estimators.parametrisation import Shared
 from algid.model import TERMS
 
 _NOT_NEGATIVE = ("k6", "k7", "f1", "f2", "j2", "m_p", "l1", "l2")
-_NUDGE = 1e-6  # of a parameter's size: step of the differences, and distance kept from a bound
+_NUDGE = 1e-6  # of a parameter's size: step of the differences
+_INSIDE = (1e-6, 1e-5, 1e-4, 1e-3)  # of a parameter's size: distance kept from a bound, until the solver keeps it
 
 
 @dataclass(frozen=True)
@@ -87,9 +88,11 @@ def constrained(fit: Fit) -> Fit:
     """The most likely parameters within the bounds; the fit itself where it breaks none.
 
     Standard deviations stay those of the free fit: a bound that holds says nothing about the other parameters'
-    noise. Status NOT_CONVERGED where no point within the bounds was found.
+    noise. The note names the bounds that had to be enforced, or that no point could be found within: then the free
+    estimates stand, with status NOT_CONVERGED.
     """
-    if not broken_bounds(fit):
+    enforced = broken_bounds(fit)
+    if not enforced:
         return fit
     from scipy.optimize import minimize
 
@@ -101,27 +104,51 @@ def constrained(fit: Fit) -> Fit:
         value, gradient, _ = likelihood(fit.shared, fit.logs, fit.values + scale * x, fit.prior)
         return -value, -gradient * scale
 
-    demands = [
-        {"type": "ineq", "fun": _demand(bound, fit.values, scale, size)} for bound in bounds(fit.shared).values()
-    ]
-    solution = minimize(
-        cost, np.zeros(scale.size), jac=True, method="SLSQP", constraints=demands, options={"maxiter": 500}
+    x, disobeyed = np.zeros(scale.size), enforced
+    for inside in _INSIDE:
+        demands = [
+            {"type": "ineq", "fun": _demand(bound, fit.values, scale, size, inside)}
+            for bound in bounds(fit.shared).values()
+        ]
+        unit = 1 + abs(cost(x)[0])  # the solver's tolerances are absolute
+
+        def scaled(x: FloatArray, unit: float = unit) -> tuple[float, FloatArray]:
+            value, slope = cost(x)
+            return value / unit, slope / unit
+
+        options = {"maxiter": 500, "ftol": 1e-12}
+        solution = minimize(scaled, x, jac=True, method="SLSQP", constraints=demands, options=options)
+        if not np.all(np.isfinite(solution.x)):
+            break
+        x = solution.x
+        moved = replace(fit, values=fit.values + scale * x)
+        disobeyed = broken_bounds(moved)
+        if not disobeyed:
+            note = f"--constrain enforces {_named(enforced)}, which the logs contradict"
+            return replace(moved, note=_noted(fit, note))
+    note = f"--constrain cannot obey {_named(disobeyed)}: no estimates within the bounds were found"
+    return replace(fit, converged=False, status=_failed(fit.status), note=_noted(fit, note))
+
+
+def _named(bounds: Sequence[BrokenBound]) -> str:
+    told = (
+        b.bound if b.distance is None else f"{b.bound} ({b.distance:.2g} standard deviations beyond)" for b in bounds
     )
-    values = fit.values + scale * solution.x
-    moved = replace(fit, values=values)
-    if broken_bounds(moved):
-        return replace(fit, converged=False, status=_failed(fit.status))
-    return moved
+    return ", ".join(told)
+
+
+def _noted(fit: Fit, note: str) -> str:
+    return note if fit.note is None else f"{fit.note}; {note}"
 
 
 def _demand(
-    bound: Callable[[FloatArray], float], start: FloatArray, scale: FloatArray, size: FloatArray
+    bound: Callable[[FloatArray], float], start: FloatArray, scale: FloatArray, size: FloatArray, inside: float
 ) -> Callable[[FloatArray], float]:
-    """The bound in the solver's coordinates, in units of its own slope, a hair inside."""
+    """The bound in the solver's coordinates, in units of its own slope, kept `inside` of it."""
     slope = float(np.linalg.norm(_slope(bound, start, size) * size)) or 1.0
 
     def demand(x: FloatArray) -> float:
-        return bound(start + scale * x) / slope - _NUDGE
+        return bound(start + scale * x) / slope - inside
 
     return demand
 

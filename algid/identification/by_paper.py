@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.arm import CONSTANT_NAMES, CONSTANT_UNITS, FloatArray
+from algid.arm import CONSTANT_NAMES, CONSTANT_UNITS, FloatArray, mass_matrix
 from algid.errors import LogError
 from algid.estimators.paper import (
     SHORTEST,
@@ -23,7 +23,7 @@ from algid.estimators.paper import (
 )
 from algid.identification.series import series_blocks, write_columns
 from algid.identification.source import LogSource
-from algid.identification.summary import Outcome
+from algid.identification.summary import FAR_BEYOND, Outcome, distrusted
 from algid.identification.velocities import with_velocities
 from algid.results import Estimate, Status
 from algid.settings import Settings
@@ -52,16 +52,20 @@ def run_paper(
     rows: dict[str, float] = {}
     k = known
     if unloaded is not None:
-        values, usable = _estimate(unloaded, settings, None, folder)
+        values, wander, usable = _estimate(unloaded, settings, None, folder)
         k = values[: len(CONSTANT_NAMES)]
         parameters = _named(CONSTANT_NAMES, CONSTANT_UNITS, values, usable)
+        if _is_no_arm(np.where(usable[: k.size], k, np.nan), wander):
+            parameters = distrusted(parameters)
         if usable.all():
             rows |= unloaded_rows(k)
     if loaded is None or k is None or not np.isfinite(k).all():
         return Outcome(parameters, _weak(STAGE2_NAMES, loaded), _weak(("m_p", "l1"), loaded), rows)
-    values, usable = _estimate(loaded, settings, k, folder)
+    values, wander, usable = _estimate(loaded, settings, k, folder)
     names = (*STAGE2_NAMES, "l1", "m_p")
     named = _named(names, {**UNITS, "l1": "m"}, values, usable)
+    if np.any((values + FAR_BEYOND * wander)[[names.index("l1"), names.index("m_p")]] < 0):
+        named = distrusted(named)
     rows |= {name: estimate.estimate for name, estimate in named.items() if estimate.estimate is not None}
     return Outcome(
         parameters,
@@ -73,8 +77,8 @@ def run_paper(
 
 def _estimate(
     source: LogSource, settings: Settings, k: FloatArray | None, folder: Path | None
-) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Estimates from one log's series and which of them can be used; writes the series on the way."""
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Estimates from one log's series, how far they wander, and which can be used; writes the series on the way."""
     names = STAGE1_SERIES if k is None else STAGE2_SERIES
     summary = Summary(len(names))
     series = _series(source, settings, k)
@@ -91,7 +95,15 @@ def _estimate(
             "to settle; record longer"
         )
     estimate, wander = summary.estimates()
-    return estimate, ~wanders(estimate, wander)
+    return estimate, wander, ~wanders(estimate, wander)
+
+
+def _is_no_arm(k: FloatArray, wander: FloatArray) -> bool:
+    """Whether no arm has these constants (7,), NaN where unknown: friction far below zero, or no positive mass."""
+    if np.any((k + FAR_BEYOND * wander[: k.size])[[5, 6]] < 0):
+        return True
+    m11, m12, m22 = mass_matrix(k, np.array([[0.0, 0.0], [0.0, np.pi]]))
+    return bool(np.any(m22 <= 0) or np.any(m11 * m22 - m12**2 <= 0))
 
 
 def _series(source: LogSource, settings: Settings, k: FloatArray | None) -> Iterator[Series]:

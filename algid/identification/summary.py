@@ -21,12 +21,16 @@ from algid.identification.series import torque_coefficients, torque_shift
 from algid.identification.source import LogSource
 from algid.log import Truth
 from algid.model import UNITS
-from algid.results import Estimate, Result, Status
+from algid.results import Cause, Estimate, Result, Status
 from algid.settings import Settings
 from algid.table4 import LOADED_ROWS, UNLOADED_ROWS, finite, paper_errors, table4, true_parameters, true_rows
 from algid.table4 import UNITS as TABLE_UNITS
 
 NAMED = 3  # logs that a warning names beside the first
+SUSPICIOUS = ("FLIPPED_SIGN", "WRONG_ZERO", "GRAVITY_COMPENSATED", "STUCK_SENSOR")
+"""Named checks that say why estimates would be wrong."""
+FAR_BEYOND = 3.0  # standard deviations past a bound of physics that chance does not explain
+NEAR_CONSTANT = 0.1  # of the torque's RMS: a residual this small passes, however little there was to explain
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +47,8 @@ class Outcome:
     paper_payload: dict[str, Estimate] = field(default_factory=dict)
     fit: results.Fit | None = None
     warnings: list[str] = field(default_factory=list)
+    causes: list[Cause] = field(default_factory=list)
+    """What probably lies behind a poor result, the most likely first."""
 
 
 def result_of(outcome: Outcome, settings: Settings, logs: Sequence[LogSource]) -> Result:
@@ -64,7 +70,14 @@ def result_of(outcome: Outcome, settings: Settings, logs: Sequence[LogSource]) -
         more_logs=others,
         data_lost=any(notice.lossy for log in logs for notice in log.notices),
         warnings=[*_notices(logs), *_contradictions(logs), *outcome.warnings],
+        causes=[*outcome.causes, *_suspicions(logs)],
     )
+
+
+def _suspicions(logs: Sequence[LogSource]) -> list[Cause]:
+    """What the named checks saw that spoils estimates, each code once."""
+    seen = {notice.code: notice.text for log in reversed(logs) for notice in log.notices if notice.code in SUSPICIOUS}
+    return [Cause(cause=text.removeprefix(f"{code}: ")) for code, text in seen.items()]
 
 
 def _truth(logs: Sequence[LogSource]) -> tuple[Truth | None, float | None]:
@@ -113,9 +126,12 @@ def outcome_of(fit: Fit, unloaded: Sequence[LogSource], loaded: Sequence[LogSour
     rows, stds = table_rows(fit)
     summary = fit_summary(fit, unloaded, loaded, settings)
     units = {**TABLE_UNITS, "l1": "m", "l2": "m"}
+    combined = {name: _row_estimate(rows, stds, name, fit, units[name]) for name in LOADED_ROWS} if loaded else {}
+    if is_implausible(summary):
+        found, combined, payload = (distrusted(group) for group in (found, combined, payload))
     return Outcome(
         parameters=found,
-        loaded={name: _row_estimate(rows, stds, name, fit, units[name]) for name in LOADED_ROWS} if loaded else {},
+        loaded=combined,
         payload=payload,
         rows=rows,
         estimator=fit.estimator,
@@ -123,6 +139,29 @@ def outcome_of(fit: Fit, unloaded: Sequence[LogSource], loaded: Sequence[LogSour
         fit=summary,
         warnings=[*fit_warnings(fit), *_not_crossed(summary, settings)],
     )
+
+
+def is_implausible(summary: results.Fit) -> bool:
+    """Whether physics or the torque contradict a fit.
+
+    Its estimates come from one solution: where one of them breaks a bound by more than chance explains, or a joint's
+    torque is predicted worse than its mean would, none can be trusted. A torque that hardly varies leaves R² nothing
+    to explain; there the residual has to be a tenth of the torque at least.
+    """
+    if any(bound.distance_sigma is not None and bound.distance_sigma > FAR_BEYOND for bound in summary.broken_bounds):
+        return True
+    judged = summary.cross_validation or summary.residual
+    if judged is None:
+        return False
+    return any(r2 < 0 and nrmse > NEAR_CONSTANT for r2, nrmse in zip(judged.r2, judged.nrmse, strict=True))
+
+
+def distrusted(group: Mapping[str, Estimate]) -> dict[str, Estimate]:
+    """The estimates with no status OK left."""
+    return {
+        name: found.model_copy(update={"status": Status.IMPLAUSIBLE}) if found.status is Status.OK else found
+        for name, found in group.items()
+    }
 
 
 def _not_crossed(summary: results.Fit, settings: Settings) -> Iterator[str]:
@@ -281,7 +320,7 @@ def fit_warnings(fit: Fit) -> Iterator[str]:
     """What a user should know about a fit."""
     if fit.note:
         yield fit.note
-    if not fit.converged:
+    if not fit.converged and not (fit.note or "").startswith("--constrain"):
         yield "the refined estimator did not converge; the weak estimate is reported instead"
     yield from fit.unidentifiable
     if fit.shared.model.gravity == 0:

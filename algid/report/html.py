@@ -79,6 +79,8 @@ def _cells(columns: Iterable[Column], row: tuple[str, ...]) -> str:
 def _cell(column: Column, text: str) -> str:
     if column.kind == "name":
         return f'<th scope="row">{escaped(text)}</th>'
+    if column.kind == "doubtful status":
+        return f'<td class="status">{escaped(text)}</td>'
     if column.kind == "status":
         return f'<td class="status{" ok" if text == Status.OK.value else ""}">{escaped(text)}</td>'
     main = " estimate" if column.heading == "Estimate" else ""

@@ -36,6 +36,8 @@ def document(title: str, judged: Verdict, tables: Sequence[Table], summary: str,
         "",
         f"{LEVEL_SIGNS[judged.level]} **{word}**{escaped(judged.sentence.removeprefix(word))}",
         "",
+        *([f"Likely cause: {escaped(judged.cause)}", ""] if judged.cause else []),
+        *(["Run first:", "", *_code(judged.command), ""] if judged.command else []),
         *(f"- {escaped(reason)}" for reason in judged.reasons),
     ]
     folded = [f"<details><summary>{summary}</summary>", "", *map(markdown_table, details), "</details>"]
@@ -63,6 +65,12 @@ def markdown_table(table: Table) -> str:
 def escaped(text: str) -> str:
     """`text` so that Markdown shows it as it is: no markup, no HTML, no mention of anybody."""
     return _SPECIAL.sub(r"\\\1", text)
+
+
+def _code(text: str) -> list[str]:
+    """A block of code that no row of backticks in `text` can end."""
+    fence = "`" * max(3, 1 + max((len(run) for run in re.findall("`+", text)), default=0))
+    return [f"{fence}sh", text, fence]
 
 
 def _line(cells: list[str]) -> str:

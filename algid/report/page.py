@@ -169,8 +169,14 @@ def banner(judged: Verdict) -> str:
     return (
         f'<div class="verdict {judged.level}"><span class="sign" aria-hidden="true">{SIGNS[judged.level]}</span>'
         f"<div><p><strong>{word}</strong>{escaped(judged.sentence.removeprefix(word))}</p>"
-        f"{reasons and f'<ul>{reasons}</ul>'}</div></div>"
+        f"{_first(judged)}{reasons and f'<ul>{reasons}</ul>'}</div></div>"
     )
+
+
+def _first(judged: Verdict) -> str:
+    """The likely cause and the command to run first."""
+    cause = f'<p class="cause">Likely cause: {escaped(judged.cause)}</p>' if judged.cause else ""
+    return cause + (f'<p class="cause">Run first: <code>{escaped(judged.command)}</code></p>' if judged.command else "")
 
 
 def contents(figures: Sequence[Figure | Missing]) -> str:

@@ -7,12 +7,15 @@ from typing import Literal
 
 from algid.report.text import ABSENT
 
-Kind = Literal["name", "number", "text", "status"]
+Kind = Literal["name", "number", "text", "status", "doubtful status"]
 
 
 @dataclass(frozen=True)
 class Column:
-    """Heading of a column and what it holds; a narrow terminal does without it, the highest `rank` first."""
+    """Heading of a column and what it holds; a narrow terminal does without it, the highest `rank` first.
+
+    A doubtful status belongs to a result that failed: not even OK is shown as good.
+    """
 
     heading: str
     kind: Kind
@@ -32,6 +35,11 @@ class Table:
         """This table less the columns that hold nothing."""
         kept = [i for i, _ in enumerate(self.columns) if any(row[i] not in (ABSENT, "") for row in self.rows)]
         return self.only(kept)
+
+    def doubted(self) -> Table:
+        """This table as part of a result that failed."""
+        kinds = [replace(c, kind="doubtful status") if c.kind == "status" else c for c in self.columns]
+        return replace(self, columns=tuple(kinds))
 
     def narrower(self) -> Table | None:
         """This table less the column that is missed least; None where all are needed."""

@@ -13,7 +13,7 @@ from typing import Any
 from algid.report.series import TorqueLog
 from algid.report.table import Column, Table
 from algid.report.text import ABSENT, digits_of, file_name, interval, percent, resolved, significant, unit_text, visible
-from algid.report.verdict import replaced_estimator
+from algid.report.verdict import replaced_estimator, verdict
 from algid.results import Estimate, LogSummary, Result, Table4Row, TorquePrediction
 
 LONGEST_VALUE = 4_000  # characters: a command that names many logs is there to be copied
@@ -223,6 +223,8 @@ def estimate_tables(result: Result) -> list[Table]:
         rows = tuple(map(_table4_row, known))
         note = "Names and order of the paper's Table 4; Paper % is the error it reports."
         tables.append(Table("Table 4", TABLE4_COLUMNS, rows, note).without_empty())
+    if verdict(result).level == "failed":
+        tables = [table.doubted() for table in tables]
     prediction = _prediction(result)
     return [*tables, prediction] if prediction.rows else tables
 

@@ -31,6 +31,9 @@ def print_verdict(judged: Verdict, console: Console) -> None:
 
     word = LEVEL_WORDS[judged.level]
     console.print(Text.assemble((word, LEVEL_STYLES[judged.level]), judged.sentence.removeprefix(word)))
+    for heading, text in (("Likely cause: ", judged.cause), ("Run first:    ", judged.command)):
+        if text:
+            console.print(Text.assemble((heading, "bold"), text), soft_wrap=heading.startswith("Run"))
     if judged.reasons:
         console.print(_points(judged.reasons))
 
@@ -88,6 +91,8 @@ def rich_table(table: Table) -> RichTable:
 
 
 def _style(kind: str, cell: str) -> str:
+    if kind == "doubtful status":
+        return "bold red"
     if kind == "status":
         return "green" if cell == Status.OK.value else "bold yellow"
     return "bold" if kind == "name" else ""

@@ -1,14 +1,15 @@
-"""Whether to trust a result: one sentence, and the reasons behind it."""
+"""Whether to trust a result: a headline, the likely cause with the command to run first, then the reasons."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import shlex
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from algid.report.text import joined, significant, visible
-from algid.results import Estimate, Fit, Result, Status, TorquePrediction
+from algid.results import Bound, Estimate, Fit, Result, Status, TorquePrediction
 
 Level = Literal["good", "reservations", "failed"]
 
@@ -18,33 +19,90 @@ LEAST_USABLE = 0.5  # share of the parameters that must have an estimate
 LARGEST_SPREAD = 0.1  # a standard deviation beyond a tenth of the estimate says little more than its size
 FAR_FROM_TRUTH = 4.0  # σ; by chance one estimate in 16,000
 
+LONGEST_COMMAND = 4_000  # characters: a command is there to be copied
+
 LEVEL_WORDS: dict[Level, str] = {"good": "Good", "reservations": "With reservations", "failed": "Failed"}
 STATUS_WORDS = {
     Status.WEAK_EXCITATION: "too weakly excited",
     Status.SINGULAR: "singular",
     Status.NOT_IDENTIFIABLE: "not identifiable",
     Status.NOT_CONVERGED: "not converged",
+    Status.IMPLAUSIBLE: "implausible",
 }
+BREAKS = "the estimates break"
+UNKNOWN_CAUSE = (
+    "angles, signs, units or the order of the joints are not what algid took them for, or the logs are of another arm"
+)
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """How far to trust a result, in one sentence; `reasons` are the reservations, each a clause."""
+    """How far to trust a result, in one sentence.
+
+    `cause` is a clause that says what probably lies behind a poor result, `command` what to run first to find out
+    or to mend it; `reasons` are the reservations, each a clause.
+    """
 
     level: Level
     sentence: str
     reasons: tuple[str, ...] = ()
+    cause: str | None = None
+    command: str | None = None
 
 
 def verdict(result: Result) -> Verdict:
     """Judge `result` by its statuses, its intervals, its residual and its warnings."""
     failure = _failure(result)
-    reasons = tuple(_reasons(result))
+    reasons = tuple(reason for reason in _reasons(result) if reason != failure)
+    cause, command = _cause(result, failed=failure is not None)
     if failure is not None:
-        return Verdict("failed", f"Failed: {failure}; do not use these numbers.", reasons)
+        return Verdict("failed", f"Failed: {failure}; do not use these numbers.", reasons, cause, command)
     if reasons:
-        return Verdict("reservations", _reserved(result, reasons), reasons)
+        return Verdict("reservations", _reserved(result, reasons), reasons, cause, command)
     return Verdict("good", f"Good: {'; '.join(_praise(result))}.")
+
+
+def _cause(result: Result, *, failed: bool) -> tuple[str | None, str | None]:
+    """What probably lies behind a poor result, and the command to run first."""
+    if result.causes:
+        first = result.causes[0]
+        return visible(first.cause), again(result, first.flags) if first.flags else _inspect(result)
+    if failed and (_is_implausible(result) or next(_unexplained(_prediction(result.fit), WORST_R2), None)):
+        return UNKNOWN_CAUSE, _inspect(result)
+    return None, None
+
+
+def _inspect(result: Result) -> str:
+    return visible(shlex.join(["algid", "inspect", result.log.path]), LONGEST_COMMAND)
+
+
+def again(result: Result, flags: Sequence[str]) -> str:
+    """The command that identifies again with `flags`, over the result that is there."""
+    logs = [log.path for log in result.logs if log.role == "unloaded"]
+    loaded = [word for log in result.logs if log.role == "loaded" for word in ("--loaded", log.path)]
+    made = result.settings.get("command")
+    words = shlex.split(made) if isinstance(made, str) else ["algid", "identify", *logs, *loaded]
+    force = [] if "--force" in words else ["--force"]
+    return visible(shlex.join([*words, *flags, *force]), LONGEST_COMMAND)
+
+
+def _is_implausible(result: Result) -> bool:
+    return any(found.status is Status.IMPLAUSIBLE for found in result.estimates.values())
+
+
+def _contradiction(result: Result) -> str:
+    """Why the statuses are IMPLAUSIBLE."""
+    bounds = [] if result.fit is None else result.fit.broken_bounds
+    worst = max(bounds, key=lambda bound: bound.distance_sigma or 0.0, default=None)
+    poor = next(_unexplained(_prediction(result.fit), 0.0), None)
+    if poor is not None and (worst is None or not worst.distance_sigma):
+        return poor
+    return "physics forbids these estimates" if worst is None else f"{BREAKS} {_beyond(worst)}"
+
+
+def _beyond(bound: Bound) -> str:
+    far = bound.distance_sigma
+    return visible(bound.bound) + ("" if far is None else f" by {significant(far, 2)} standard deviations")
 
 
 def _failure(result: Result) -> str | None:
@@ -52,6 +110,8 @@ def _failure(result: Result) -> str | None:
         return f"the estimator did not converge in {result.fit.iterations} iterations"
     if any(found.status is Status.NOT_CONVERGED for found in result.estimates.values()):
         return "the estimator did not converge"
+    if _is_implausible(result):
+        return _contradiction(result)
     if not any(_usable(found) for found in result.estimates.values()):
         words = sorted({STATUS_WORDS.get(found.status, "absent") for found in result.estimates.values()})
         return f"no parameter could be identified ({joined(words)})"
@@ -127,12 +187,16 @@ def _reasons(result: Result) -> Iterator[str]:
     if result.fit is not None:
         yield from _fit_reasons(result.fit, " ".join(result.warnings))
     yield from _far_from_truth(result)
-    told = {f"{name} is not determined" for name, found in result.estimates.items() if not _usable(found)}
+    told = {f"{name} is not determined" for name, found in result.estimates.items() if found.estimate is None}
+    told |= {warning for warning in result.warnings if _is_implausible(result) and warning.startswith(BREAKS)}
     yield from (f"algid warns: {visible(warning)}" for warning in result.warnings if warning not in told)
 
 
 def _bad_statuses(result: Result) -> Iterator[str]:
+    """What each status but IMPLAUSIBLE says, which is the headline's."""
     for status, words in STATUS_WORDS.items():
+        if status is Status.IMPLAUSIBLE:
+            continue
         names = [visible(name) for name, found in result.estimates.items() if found.status is status]
         if names:
             yield f"{joined(names)} {'is' if len(names) == 1 else 'are'} {words}"
@@ -148,8 +212,7 @@ def _wide_intervals(result: Result) -> Iterator[str]:
 def _fit_reasons(fit: Fit, told: str) -> Iterator[str]:
     """What the fit holds against itself, less what the warnings have told."""
     yield from (visible(direction) for direction in fit.unidentifiable if direction not in told)
-    bounds = [bound.bound for bound in fit.broken_bounds if bound.bound not in told]
-    yield from (f"the estimates break the bound {visible(bound)}" for bound in bounds)
+    yield from (f"{BREAKS} {_beyond(bound)}" for bound in fit.broken_bounds if bound.bound not in told)
     coloured = [visible(name) for name, test in fit.whiteness.items() if not test.white]
     if coloured and fit.intervals == "likelihood":
         yield f"the residual of {joined(coloured)} is not white, though the intervals take it to be"
@@ -158,7 +221,9 @@ def _fit_reasons(fit: Fit, told: str) -> Iterator[str]:
 
 def _unexplained(prediction: TorquePrediction | None, least: float) -> Iterator[str]:
     for joint, r2 in enumerate(prediction.r2 if prediction else (), start=1):
-        if r2 < least:
+        if r2 < 0:
+            yield f"the model predicts the torque of joint {joint} worse than its mean does"
+        elif r2 < least:
             yield f"the model explains only {max(100 * r2, 0):.0f} % of the torque of joint {joint}"
 
 

@@ -35,7 +35,8 @@ def stretch_table(result: TrackResult) -> Table:
         _row(place, stretch, status.value, result.truth(stretch))
         for place, (stretch, status) in enumerate(zip(result.track.stretches, result.statuses, strict=True), start=1)
     )
-    return Table("Payload by stretch", COLUMNS, rows).without_empty()
+    table = Table("Payload by stretch", COLUMNS, rows).without_empty()
+    return table.doubted() if verdict(result).level == "failed" else table
 
 
 def _row(place: int, stretch: Stretch, status: str, truth: float | None) -> tuple[str, ...]:

@@ -190,6 +190,18 @@ def test_weak_excitation_ends_with_three(tmp_path: Path) -> None:
     assert "WEAK_EXCITATION" in found.out
 
 
+def test_a_failed_result_ends_with_three_and_says_what_to_run(logs: Path, tmp_path: Path) -> None:
+    table = pl.read_csv(logs / "case1-unloaded.csv").with_columns(-pl.col("theta2")).drop("omega1", "omega2")
+    table.write_csv(tmp_path / "wrong.csv")
+    found = Outcome("identify", tmp_path / "wrong.csv", "-o", tmp_path, "--estimator", "weak", "--no-report")
+    assert found.code == 3
+    lines = found.out.splitlines()
+    assert lines[0].startswith("Failed: ")
+    assert any(line.startswith("Likely cause: ") for line in lines[1:4])
+    assert f"Run first:    algid inspect {tmp_path / 'wrong.csv'}" in lines
+    assert " OK " not in found.out
+
+
 def test_replayed_torque_gives_the_same_motion(logs: Path, tmp_path: Path) -> None:
     replayed = Outcome(
         "synth", "case1", "--torque", logs / "case1-unloaded.csv", "--torque-hold", "foh", "--format", "csv",

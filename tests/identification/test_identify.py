@@ -12,6 +12,7 @@ import polars as pl
 import pytest
 
 import algid
+from algid import results
 from algid.errors import LogError, OutputError, ResultError, SettingError
 from algid.identification.identify import identify
 from algid.log import Log
@@ -205,3 +206,55 @@ def test_a_result_names_the_estimator_whose_numbers_it_holds(shared_data: Path) 
     jitter = [warning for warning in result.warnings if "JITTER" in warning]
     assert len(jitter) == 1
     assert f"likewise in 1 other log ({logs[1].name})" in jitter[0]
+
+
+def flipped(log: Log) -> Log:
+    """The log with joint 2 counted the other way round: no arm moves so."""
+    return replace(log, theta=log.theta * np.array([[1], [-1]]), omega=None)
+
+
+@pytest.mark.parametrize("estimator", ["weak", "paper"])
+def test_an_impossible_arm_has_no_status_ok(estimator: str, noisy: tuple[Log, Log], wide: tuple[Log, Log]) -> None:
+    from algid.report.verdict import verdict
+
+    log = (noisy if estimator == "weak" else wide)[0]
+    result = identify(flipped(log), None, Settings(estimator=estimator))  # type: ignore[arg-type]
+    assert result.parameters["k7"].estimate is not None
+    assert result.parameters["k7"].estimate < 0
+    statuses = {found.status for found in result.estimates.values()}
+    assert Status.IMPLAUSIBLE in statuses
+    assert Status.OK not in statuses
+    assert not result.complete
+    assert verdict(result).level == "failed"
+
+
+@pytest.mark.parametrize("change", ["joint 2 flipped", "torque flipped"])
+def test_constrain_obeys_every_bound(change: str, noisy: tuple[Log, Log]) -> None:
+    logs = [flipped(log) if change == "joint 2 flipped" else replace(log, tau=-log.tau) for log in noisy]
+    settings = Settings(estimator="weak", constrain=True, friction="coulomb", rotor_inertia=True)
+    result = identify(logs[0], logs[1], settings)
+    found = {name: e.estimate for name, e in result.estimates.items() if e.estimate is not None}
+    assert all(found[name] >= 0 for name in ("k6", "k7", "f1", "f2", "j2", "m_p", "l1", "l2") if name in found)
+    m22 = found["k3"] + found["j2"]
+    for cosine in (1, -1):  # eq. (2) with the rotor in M22: positive definite wherever joint 2 stands
+        m11, m12 = found["k5"] + found["k3"] + 2 * found["k1"] * cosine, found["k3"] + found["k1"] * cosine
+        assert np.all(np.linalg.eigvalsh([[m11, m12], [m12, m22]]) > 0)
+    assert any("--constrain enforces" in warning for warning in result.warnings)
+
+
+def test_a_bound_broken_by_chance_is_no_failure() -> None:
+    from algid.identification.summary import is_implausible
+
+    def fit(sigma: float | None, r2: float, nrmse: float) -> results.Fit:
+        predicted = results.TorquePrediction(rmse=(1, 1), nrmse=(0.1, nrmse), r2=(0.9, r2), filter="none")
+        bounds = [results.Bound(bound="k6 >= 0", value=-1, distance_sigma=sigma)]
+        return results.Fit(
+            noise={}, covariance_names=[], covariance=[], intervals="sandwich", iterations=0, converged=True,
+            broken_bounds=bounds, residual=predicted,
+        )  # fmt: skip
+
+    assert not is_implausible(fit(2.9, 0.9, 0.3))
+    assert not is_implausible(fit(None, 0.9, 0.3))
+    assert is_implausible(fit(3.1, 0.9, 0.3))
+    assert is_implausible(fit(1.0, -0.01, 0.9))
+    assert not is_implausible(fit(1.0, -0.01, 0.05))  # the torque hardly varies: there is nothing to explain

@@ -1,9 +1,13 @@
 from __future__ import annotations
 
 import pytest
+from rich.console import Console
 
+from algid.report import markdown, print_table
+from algid.report.html import table_html
+from algid.report.tables import estimate_tables
 from algid.report.verdict import verdict
-from algid.results import Bound, Estimate, Result, Status, TorquePrediction, Whiteness
+from algid.results import Bound, Cause, Estimate, Result, Status, TorquePrediction, Whiteness
 from tests.report.folders import estimate
 
 
@@ -129,3 +133,43 @@ def test_many_estimates_far_from_the_truth_are_one_reason(result: Result) -> Non
     assert len(reasons) == 1
     assert reasons[0].startswith("k1 (")
     assert reasons[0].endswith(" σ) lie far from the truth")
+
+
+def implausible(result: Result, **changes: object) -> Result:
+    """The result with no status OK left, as identification leaves it where physics or torque contradict a fit."""
+    groups = {
+        group: {name: e.model_copy(update={"status": Status.IMPLAUSIBLE}) for name, e in getattr(result, group).items()}
+        for group in ("parameters", "loaded", "payload")
+    }
+    return with_fit(result, **changes).model_copy(update=groups)
+
+
+def test_broken_physics_failed_and_the_likely_cause_leads(result: Result) -> None:
+    broken = [Bound(bound="k7 >= 0", value=-0.3, distance_sigma=43.0)]
+    found = verdict(implausible(result, broken_bounds=broken))
+    assert found.level == "failed"
+    assert found.sentence.startswith("Failed: the estimates break k7 >= 0 by 43 standard deviations")
+    assert found.cause is not None
+    assert "signs" in found.cause
+    assert found.command == f"algid inspect {result.log.path}"
+    assert not any("implausible" in reason or "k7" in reason for reason in found.reasons)
+
+
+def test_a_known_cause_comes_with_the_command_that_mends_it(result: Result) -> None:
+    cause = Cause(cause="θ1 is measured from hanging", flags=["--zero", "hanging"])
+    told = result.model_copy(update={"causes": [cause], "settings": {"command": "algid identify 'a b.csv' -o out"}})
+    found = verdict(implausible(told))
+    assert found.cause == "θ1 is measured from hanging"
+    assert found.command == "algid identify 'a b.csv' -o out --zero hanging --force"
+
+
+def test_nothing_of_a_failed_result_is_green(result: Result) -> None:
+    console = Console(width=120, force_terminal=True, color_system="standard")
+    poor = TorquePrediction(rmse=(1, 1), nrmse=(1, 1), r2=(0.14, 0.48), filter="none")
+    failed = with_fit(result, residual=poor)
+    for shown, green in ((result, True), (failed, False)):
+        with console.capture() as printed:
+            print_table(shown, console)
+        assert ("\x1b[32mOK" in printed.get()) is green
+        assert ('class="status ok"' in "".join(map(table_html, estimate_tables(shown)))) is green
+    assert "✅" not in markdown(failed)
