@@ -1,0 +1,70 @@
+"""`algid guide`: the manual, in the terminal."""
+
+from __future__ import annotations
+
+import sys
+from enum import StrEnum
+from importlib import resources
+from typing import Annotated
+
+import typer
+
+
+class Topic(StrEnum):
+    """The pages of the guide."""
+
+    START = "start"
+    ARM = "arm"
+    LOGS = "logs"
+    MOTION = "motion"
+    REPORT = "report"
+    WARNINGS = "warnings"
+    ESTIMATORS = "estimators"
+    PAYLOAD = "payload"
+    BATCH = "batch"
+    PYTHON = "python"
+    MEASURED = "measured"
+    CONTRIBUTING = "contributing"
+
+
+SUMMARIES = {
+    Topic.START: "a first result from a real log",
+    Topic.ARM: "the drawing, the equation of motion, what each constant is",
+    Topic.LOGS: "formats, names, units, signs: a recipe for each awkward log",
+    Topic.MOTION: "which motion to record",
+    Topic.REPORT: "the report, figure by figure",
+    Topic.WARNINGS: "every warning and status: meaning, cause, what to do",
+    Topic.ESTIMATORS: "the estimators, the torque's terms, and what they assume",
+    Topic.PAYLOAD: "payloads, lengths, payload in time",
+    Topic.BATCH: "thousands of logs, fleets, clusters",
+    Topic.PYTHON: "the Python API",
+    Topic.MEASURED: "what was measured, with the command that measures it",
+    Topic.CONTRIBUTING: "the house and its rules",
+}
+
+
+def guide(
+    topic: Annotated[Topic | None, typer.Argument(help="One of the topics; the list of them without.")] = None,
+) -> None:
+    """Read the guide in the terminal.
+
+    Example: algid guide start
+    """
+    text = _contents() if topic is None else text_of(topic)
+    if not sys.stdout.isatty():
+        print(text, end="")
+        return
+    from rich.console import Console
+    from rich.markdown import Markdown
+
+    Console(width=min(Console().width, 120)).print(Markdown(text))
+
+
+def text_of(topic: str) -> str:
+    """A topic's Markdown."""
+    return (resources.files("algid") / "guide" / f"{topic}.md").read_text(encoding="utf-8")
+
+
+def _contents() -> str:
+    rows = "".join(f"| `algid guide {name}` | {words} |\n" for name, words in SUMMARIES.items())
+    return f"# The guide\n\n| | |\n|---|---|\n{rows}"
