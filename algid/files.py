@@ -1,26 +1,29 @@
-"""Files appear whole or not at all.
+"""Files and folders appear whole or not at all, and what killed processes leave is removed.
 
-TOML files checked against a pydantic model, with errors that name file, place and remedy.
-
-A result folder appears whole or not at all.
+TOML files are checked against a pydantic model, with errors that name file, place and remedy.
 """
 
 from __future__ import annotations
 
+import fcntl
 import glob
 import os
 import reprlib
 import shutil
-import sys
 import tempfile
 import time
 import tomllib
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from algid.errors import OutputError, SettingError
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel, ValidationError
+
+ModelT = TypeVar("ModelT", bound="BaseModel")
 
 
 @contextmanager
@@ -55,12 +58,6 @@ def _umask() -> int:
     return mask
 
 
-if TYPE_CHECKING:
-    from pydantic import BaseModel, ValidationError
-
-ModelT = TypeVar("ModelT", bound="BaseModel")
-
-
 def read_toml(path: Path, model: type[ModelT]) -> ModelT:
     """Read `path` as a `model`.
 
@@ -92,6 +89,8 @@ def first_misfit(error: ValidationError) -> str:
 
 
 FRESH = 60.0  # s; a folder may be younger than the hold on it
+TEMPORARY = "algid-"
+"""What everything that algid puts into the system's temporary folder starts with."""
 
 
 def result_folder(first_log: str, parent: Path) -> Path:
@@ -144,32 +143,56 @@ def _swap(temporary: Path, folder: Path) -> None:
 def remove_stale(folder: Path) -> None:
     """Remove what runs that were killed have left of `folder` half-written: such of which no process holds."""
     for found in folder.parent.glob(f".{glob.escape(folder.name)}.*"):
-        with suppress(OSError):
-            aside = found.name.startswith(f".{folder.name}.old.")
-            if aside and not folder.exists():  # it may be all that is left of a result
-                continue
-            if time.time() - found.stat().st_mtime > FRESH:
-                with _held(found, strictly=True):
-                    shutil.rmtree(found, ignore_errors=True)
+        aside = found.name.startswith(f".{folder.name}.old.")
+        if not aside or folder.exists():  # else it may be all that is left of a result
+            _remove_unheld(found)
 
 
 @contextmanager
-def _held(folder: Path, strictly: bool) -> Iterator[None]:
-    """Hold a folder; the system lets go of it however this process ends.
+def temporary_folder() -> Iterator[Path]:
+    """A folder for what is needed for a while; those of processes that were killed are removed on the way.
+
+    Raises
+    ------
+    OutputError
+        If none can be made.
+    """
+    place = Path(tempfile.gettempdir())
+    for found in place.glob(f"{TEMPORARY}*"):
+        _remove_unheld(found)
+    try:
+        folder = Path(tempfile.mkdtemp(prefix=TEMPORARY, dir=place))
+    except OSError as error:
+        raise OutputError(f"{place}: cannot write there ({error.strerror}); name another folder in TMPDIR") from error
+    try:
+        with _held(folder, strictly=False):
+            yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _remove_unheld(found: Path) -> None:
+    """Remove a file or folder that is this user's, not fresh, and held by no process."""
+    with suppress(OSError):
+        seen = found.lstat()
+        if seen.st_uid == os.getuid() and time.time() - seen.st_mtime > FRESH:
+            with _held(found, strictly=True):
+                shutil.rmtree(found) if found.is_dir() else found.unlink()
+
+
+@contextmanager
+def _held(place: Path, strictly: bool) -> Iterator[None]:
+    """Hold a file or folder; the system lets go of it however this process ends.
 
     Not every file system can: raises `OSError` there, or where another process holds it, if asked to be strict.
     """
-    if sys.platform == "win32":
-        if strictly:
-            raise OSError("folders cannot be held")
-        yield
-        return
-    import fcntl
-
-    handle = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
+    handle = os.open(place, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
     try:
-        with nullcontext() if strictly else suppress(OSError):
+        try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            if strictly:
+                raise
         yield
     finally:
         os.close(handle)

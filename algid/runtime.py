@@ -59,6 +59,14 @@ def keep_freed() -> None:
     mallopt(_TRIM_THRESHOLD, KEPT)
 
 
+def cores() -> int:
+    """Processors that this process may use; those of the machine where the system does not say."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # macOS
+        return os.cpu_count() or 1
+
+
 T = TypeVar("T")
 
 _has_other_cores = True

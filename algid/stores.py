@@ -1,18 +1,21 @@
-"""Where files live: folders of this machine, and object stores behind s3://, gs:// and az://.
+"""Where files live: a folder of this machine, or a prefix of an object store behind s3://, gs:// or az://.
 
-An object appears whole or not at all, as a file does through `algid.files.whole_file`.
+Files appear whole or not at all: on this machine through `algid.files.whole_file`, in object stores by their nature.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from algid.errors import LogError, OutputError
 from algid.files import whole_file
+
+if TYPE_CHECKING:
+    from pyarrow.fs import FileSystem
 
 SCHEMES = ("s3://", "gs://", "az://")
 
@@ -22,59 +25,23 @@ def is_url(path: str) -> bool:
     return path.startswith(SCHEMES)
 
 
-class Store(Protocol):
-    """Files by their names below one root."""
-
-    def read(self, name: str) -> bytes | None:
-        """The content, or None where there is no such file."""
-
-    def write(self, name: str, content: bytes) -> None:
-        """Write the whole file. Raises `OutputError`."""
-
-    def names(self, under: str) -> list[str]:
-        """Names of the files below the folder `under`, sorted."""
-
-    def exists(self, name: str) -> bool:
-        """Whether there is such a file."""
-
-
 @dataclass(frozen=True)
-class FolderStore:
-    """A folder of this machine."""
+class Store:
+    """Files by their names below one root.
 
-    root: Path
+    Parameters
+    ----------
+    filesystem : pyarrow's
+    root : path within it
+    folder : the same root, where it is a folder of this machine
+    """
 
-    def read(self, name: str) -> bytes | None:
-        """The content, or None where there is no such file."""
-        try:
-            return (self.root / name).read_bytes()
-        except FileNotFoundError:
-            return None
-
-    def write(self, name: str, content: bytes) -> None:
-        """Write the whole file. Raises `OutputError`."""
-        with whole_file(self.root / name) as temporary:
-            temporary.write_bytes(content)
-
-    def names(self, under: str) -> list[str]:
-        """Names of the files below the folder `under`, sorted; hidden ones are left out."""
-        files = (path for path in (self.root / under).rglob("*") if path.is_file() and not path.name.startswith("."))
-        return sorted(path.relative_to(self.root).as_posix() for path in files)
-
-    def exists(self, name: str) -> bool:
-        """Whether there is such a file."""
-        return (self.root / name).is_file()
-
-
-@dataclass(frozen=True)
-class ObjectStore:
-    """A prefix of an object store, through pyarrow."""
-
-    filesystem: Any
+    filesystem: FileSystem
     root: str
+    folder: Path | None = None
 
     def read(self, name: str) -> bytes | None:
-        """The content, or None where there is no such object."""
+        """The content, or None where there is no such file."""
         try:
             with self.filesystem.open_input_file(f"{self.root}/{name}") as stream:
                 return bytes(stream.readall())
@@ -82,33 +49,31 @@ class ObjectStore:
             return None
 
     def write(self, name: str, content: bytes) -> None:
-        """Write the whole object. Raises `OutputError`."""
+        """Write the whole file. Raises `OutputError`."""
+        if self.folder is not None:
+            with whole_file(self.folder / name) as temporary:
+                temporary.write_bytes(content)
+            return
         try:
             with self.filesystem.open_output_stream(f"{self.root}/{name}") as stream:
                 stream.write(content)
         except OSError as error:
             raise OutputError(
-                f"{self.root}/{name}: cannot write there ({_told_by(error)}); check rights and name"
+                f"{self.root}/{name}: cannot write there ({_first_line(error)}); check rights and name"
             ) from error
 
     def names(self, under: str) -> list[str]:
-        """Names of the objects below `under`, sorted."""
+        """Names of the files below the folder `under`, sorted; hidden ones are left out."""
         from pyarrow.fs import FileSelector, FileType
 
         place = f"{self.root}/{under}".rstrip("/")
         found = self.filesystem.get_file_info(FileSelector(place, recursive=True, allow_not_found=True))
-        return sorted(info.path.removeprefix(f"{self.root}/") for info in found if info.type == FileType.File)
+        files = (info for info in found if info.type == FileType.File and not info.base_name.startswith("."))
+        return sorted(info.path.removeprefix(f"{self.root}/") for info in files)
 
     def exists(self, name: str) -> bool:
-        """Whether there is such an object."""
-        from pyarrow.fs import FileType
-
-        return bool(self.filesystem.get_file_info(f"{self.root}/{name}").type == FileType.File)
-
-    def remove(self, name: str) -> None:
-        """Remove an object, if it is there."""
-        with suppress(FileNotFoundError):
-            self.filesystem.delete_file(f"{self.root}/{name}")
+        """Whether there is such a file."""
+        return bool(self.filesystem.get_file_info(f"{self.root}/{name}").is_file)
 
 
 def open_store(place: str) -> Store:
@@ -119,13 +84,15 @@ def open_store(place: str) -> Store:
     OutputError
         If the URL cannot be understood or reached.
     """
-    if not is_url(place):
-        return FolderStore(Path(place))
-    filesystem, root = connect(place)
-    return ObjectStore(filesystem, root)
+    from pyarrow.fs import LocalFileSystem
+
+    if is_url(place):
+        return Store(*connect(place))
+    folder = Path(place).absolute()
+    return Store(LocalFileSystem(), folder.as_posix().rstrip("/"), folder)
 
 
-def connect(url: str) -> tuple[Any, str]:
+def connect(url: str) -> tuple[FileSystem, str]:
     """pyarrow's file system behind a URL, and the path within it.
 
     Raises
@@ -139,22 +106,21 @@ def connect(url: str) -> tuple[Any, str]:
     try:
         filesystem, path = FileSystem.from_uri(url.replace("az://", "abfs://", 1))
     except (pa.ArrowException, OSError, ValueError) as error:
-        raise OutputError(f"{url}: the object store cannot be reached ({_told_by(error)}); check the URL") from error
+        raise OutputError(f"{url}: the object store cannot be reached ({_first_line(error)}); check the URL") from error
     return filesystem, path.rstrip("/")
 
 
 def list_urls(url: str) -> list[tuple[str, str]]:
     """Objects at or below a URL: each one's URL, and its name below it."""
-    filesystem, root = connect(url)
-    scheme, _, query = url.partition("://")[0], *url.partition("?")[1:]
-    tail = f"?{query}" if query else ""
-    store = ObjectStore(filesystem, root)
-    below = [(f"{scheme}://{root}/{name}{tail}", name) for name in store.names("")]
-    return below or [(url, root.rpartition("/")[2])]
+    store = Store(*connect(url))
+    base, mark, query = url.partition("?")
+    scheme = base.partition("://")[0]
+    below = [(f"{scheme}://{store.root}/{name}{mark}{query}", name) for name in store.names("")]
+    return below or [(url, store.root.rpartition("/")[2])]
 
 
-def _told_by(error: BaseException) -> str:
-    """The first line of what an object store's client says."""
+def _first_line(error: BaseException) -> str:
+    """Of what an object store's client says."""
     return str(error).split("\n", maxsplit=1)[0][:200]
 
 
@@ -166,8 +132,8 @@ def object_stat(url: str) -> tuple[int, int]:
 
 
 @contextmanager
-def copying(url: str, folder: Path) -> Iterator[tuple[Any, str, Path]]:
-    """The file system and path of an object, and where in `folder` its copy goes, under its own name.
+def reading(url: str) -> Iterator[tuple[Any, str]]:
+    """The file system and path of an object.
 
     Raises
     ------
@@ -175,26 +141,10 @@ def copying(url: str, folder: Path) -> Iterator[tuple[Any, str, Path]]:
         If the object cannot be read within the block.
     """
     filesystem, path = connect(url)
-    folder.mkdir(parents=True, exist_ok=True)
     try:
-        yield filesystem, path, folder / path.rpartition("/")[2]
+        yield filesystem, path
     except OSError as error:
-        raise LogError(f"{url}: it cannot be read ({_told_by(error)}); check name and rights") from error
-
-
-def fetched(url: str, folder: Path) -> Path:
-    """A copy of an object in `folder`, under its own name.
-
-    Raises
-    ------
-    LogError
-        If there is no such object, or it cannot be read.
-    """
-    from pyarrow.fs import LocalFileSystem, copy_files
-
-    with copying(url, folder) as (filesystem, path, copy):
-        copy_files(path, str(copy), source_filesystem=filesystem, destination_filesystem=LocalFileSystem())
-    return copy
+        raise LogError(f"{url}: it cannot be read ({_first_line(error)}); check name and rights") from error
 
 
 def put_folder(store: Store, name: str, folder: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import struct
+import uuid
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -23,10 +24,15 @@ from algid.writers.mcap import payloads
 
 @dataclass
 class Served:
-    """The query behind an S3 URL, and the bytes that each answer to a GET had."""
+    """A bucket of its own, the query behind an S3 URL, and the bytes that each answer to a GET had."""
 
+    bucket: str
     query: str
     answers: list[int] = field(default_factory=list)
+
+    def url(self, name: str) -> str:
+        """The URL of an object or of a prefix."""
+        return f"s3://{self.bucket}/{name}{self.query}"
 
     def counting(self, app: Callable[..., Iterable[bytes]]) -> Callable[..., Iterable[bytes]]:
         """The application, its answers counted."""
@@ -42,7 +48,7 @@ class Served:
 
 @contextmanager
 def s3(monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
-    """A server with a bucket ``lab``; skips where moto is absent."""
+    """A server with a bucket that no other test sees (moto keeps them for the process); skips where moto is absent."""
     server = pytest.importorskip("moto.server", reason="moto is absent")
     for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
         monkeypatch.setenv(name, "testing")
@@ -53,11 +59,15 @@ def s3(monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
     running = server.ThreadedMotoServer(ip_address="127.0.0.1", port=port, verbose=False)
     running.start()
     place = quote(f"127.0.0.1:{port}")
-    served = Served(f"?scheme=http&endpoint_override={place}&region=us-east-1&allow_bucket_creation=true")
+    served = Served(
+        f"lab-{uuid.uuid4().hex}", f"?scheme=http&endpoint_override={place}&region=us-east-1&allow_bucket_creation=true"
+    )
     running._server.app = served.counting(running._server.app)
-    connect(f"s3://lab/{served.query}")[0].create_dir("lab")
-    yield served
-    running.stop()
+    try:
+        connect(served.url(""))[0].create_dir(served.bucket)
+        yield served
+    finally:
+        running.stop()
 
 
 def with_cameras(path: Path, log: Log, images: int, size: int = 1 << 20, every: int = 250) -> None:

@@ -44,7 +44,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "api": room("identification log synth"),
     "batch": room(
-        "errors identification profile readers report results runtime settings stores",
+        "errors files identification profile readers report results runtime settings stores",
         "distributed mcap polars pyarrow",
     ),
     "track": room(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,66 +9,93 @@ import polars as pl
 import pytest
 
 import algid
-from algid.batch import lock
 from algid.batch.jobs import jobs_of
-from algid.batch.plan import Recipe
 from algid.batch.records import End
-from algid.batch.run import Batch
-from algid.errors import OutputError
+from algid.batch.run import Batch, Recipe
+from algid.errors import LogError, OutputError
 from algid.settings import Settings
-from algid.stores import open_store
+from algid.stores import list_urls, object_stat, open_store, reading
 from algid.synth.sensors import Sensors
 from tests.batch.test_run import Here
-from tests.objects import s3
+from tests.objects import Served, s3
 
 
 @pytest.fixture
-def bucket(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
-    with s3(monkeypatch) as served:
-        yield served.query
+def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
+    with s3(monkeypatch) as running:
+        yield running
 
 
-def test_a_batch_reads_and_writes_objects(bucket: str, tmp_path: Path) -> None:
+def test_a_batch_reads_and_writes_objects(served: Served, tmp_path: Path) -> None:
     unloaded, _ = algid.synthesise("case1", duration=1.5, excitation="wide", sensors=Sensors(1e-4, 1e-3))
     algid.write_log(tmp_path / "a.mcap", unloaded)
-    store = open_store(f"s3://lab/logs{bucket}")
+    store = open_store(served.url("logs"))
     store.write("r1/a.mcap", (tmp_path / "a.mcap").read_bytes())
     store.write("bad.csv", b"junk")
-    out = f"s3://lab/out{bucket}"
+    out = served.url("out")
     recipe = Recipe(out, Settings(estimator="weak"), lambda _file: None, report=False)
-    jobs = jobs_of([f"s3://lab/logs{bucket}"], out)
+    jobs = jobs_of([served.url("logs")], out)
     ended = Batch(open_store(out), recipe, Here(), 1, lambda _progress: None).run(jobs)
     assert [(record.job.name, record.status) for record in ended.records] == [("bad", End.FAILED), ("r1/a", End.OK)]
     assert Batch(open_store(out), recipe, Here(), 1, lambda _progress: None).run(jobs).ran == 0
     (tmp_path / "result.json").write_bytes(open_store(out).read("r1/a.algid/result.json") or b"")
-    assert algid.read_result(tmp_path / "result.json").log.path.startswith("s3://lab/logs/r1/a.mcap")
+    assert algid.read_result(tmp_path / "result.json").log.path.startswith(f"s3://{served.bucket}/logs/r1/a.mcap")
     (tmp_path / "jobs.parquet").write_bytes(open_store(out).read("jobs.parquet") or b"")
     assert pl.read_parquet(tmp_path / "jobs.parquet")["status"].to_list() == ["failed", "ok"]
 
 
-def test_a_batch_of_another_machine_holds_an_output_until_it_is_stale(
-    bucket: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    out = f"s3://lab/held{bucket}"
-    monkeypatch.setattr(lock, "SETTLE", 0.0)
-    with lock.locked(out):
-        content = json.loads(open_store(out).read(lock.LOCK) or b"")
-        with pytest.raises(OutputError, match="another batch is at work"), lock.locked(out):
-            pass
-    assert open_store(out).read(lock.LOCK) is None
-    elsewhere = content | {"host": "elsewhere", "owner": "other"}
-    open_store(out).write(lock.LOCK, json.dumps(elsewhere).encode())
-    with pytest.raises(OutputError, match=r"a batch on elsewhere .* was at work there"), lock.locked(out):
-        pass
-    open_store(out).write(lock.LOCK, json.dumps(elsewhere | {"time": content["time"] - lock.STALE}).encode())
-    with lock.locked(out):
-        assert b"elsewhere" not in (open_store(out).read(lock.LOCK) or b"")
+@pytest.fixture(params=["folder", "objects"])
+def place(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    """An empty place of each kind."""
+    if request.param == "folder":
+        return str(tmp_path / "out")
+    served: Served = request.getfixturevalue("served")
+    return served.url("out")
 
 
-def test_a_batch_that_overwrites_the_lock_at_the_same_time_wins(bucket: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    out = f"s3://lab/raced{bucket}"
-    rival = {"owner": "other", "host": "elsewhere", "process": 1, "time": time.time()}
-    monkeypatch.setattr(time, "sleep", lambda _seconds: open_store(out).write(lock.LOCK, json.dumps(rival).encode()))
-    with pytest.raises(OutputError, match="a batch on elsewhere"), lock.locked(out):
-        pass
-    assert json.loads(open_store(out).read(lock.LOCK) or b"") == rival
+def test_every_store_reads_what_it_wrote(place: str) -> None:
+    store = open_store(place)
+    assert (store.read("a/b"), store.exists("a/b"), store.names("a"), store.names("")) == (None, False, [], [])
+    for name in ("a/b", "a/c/d", "a/.hidden", "e"):
+        store.write(name, name.encode())
+    store.write("e", b"again")
+    assert store.read("e") == b"again"
+    assert store.read("a/.hidden") == b"a/.hidden"
+    assert (store.exists("a/b"), store.exists("a"), store.exists("a/absent")) == (True, False, False)
+    assert store.names("a") == ["a/b", "a/c/d"]
+    assert store.names("") == ["a/b", "a/c/d", "e"]
+
+
+def test_a_place_that_cannot_be_written_is_told(tmp_path: Path, served: Served) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="cannot write there"):
+        open_store(str(tmp_path / "file")).write("below", b"")
+    with pytest.raises(OutputError, match="check the URL"):
+        open_store("s3://lab/?bogus=1")
+    elsewhere = f"s3://{served.bucket}-absent/out{served.query.replace('&allow_bucket_creation=true', '')}"
+    with pytest.raises(OutputError, match="cannot write there"):
+        open_store(elsewhere).write("a", b"")
+
+
+def test_objects_below_a_url_and_one_that_is_not_there(served: Served) -> None:
+    open_store(served.url("logs")).write("r1/a.csv", b"123")
+    assert list_urls(served.url("logs")) == [(served.url("logs/r1/a.csv"), "r1/a.csv")]
+    assert list_urls(served.url("logs/r1/a.csv")) == [(served.url("logs/r1/a.csv"), "a.csv")]
+    assert object_stat(served.url("logs/r1/a.csv"))[0] == 3
+    assert object_stat(served.url("logs/absent")) == (0, 0)
+    with pytest.raises(LogError, match="check name and rights"), reading(served.url("absent")) as (filesystem, path):
+        filesystem.open_input_file(path)
+
+
+def test_a_changed_object_is_done_again(served: Served, tmp_path: Path) -> None:
+    store, out = open_store(served.url("logs")), str(tmp_path / "out")
+    store.write("bad.csv", b"junk")
+    jobs = jobs_of([served.url("logs")], out)
+    recipe = Recipe(out, Settings(estimator="weak"), lambda _file: None, report=False)
+
+    def ran() -> int:
+        return Batch(open_store(out), recipe, Here(), 1, lambda _progress: None).run(jobs).ran
+
+    assert (ran(), ran()) == (1, 0)
+    store.write("bad.csv", b"more junk")
+    assert (ran(), ran()) == (1, 0)

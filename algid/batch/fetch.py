@@ -1,13 +1,9 @@
-"""An object of which some parts are had: a sparse file of its size that holds them at their own places.
-
-Readers of files read it as they read the whole. What was not fetched are zeros, which no MCAP or Parquet
-reader takes for data.
-
-Logs out of an object store onto this machine: of MCAP and Parquet what is needed, of everything else the whole.
+"""Logs out of an object store onto this machine: of MCAP and Parquet what is needed, of everything else the whole.
 
 The format's own reader says what it needs. What it finds where is told by a few small parts of the object: the
-summary and the heads of the message indexes of an MCAP file, the footer of a Parquet file. A file without them, or
-one that is needed nearly as a whole, is fetched as a whole; its hash is known then.
+summary and the heads of the message indexes of an MCAP file, the footer of a Parquet file. What is fetched of an
+object lies in a sparse file of its size, at its own places; the rest are zeros, which no MCAP or Parquet reader takes
+for data. An object without such parts, or of which nearly all is needed, is fetched whole; its hash is known then.
 """
 
 from __future__ import annotations
@@ -29,15 +25,26 @@ from algid.readers.mcap import framing
 from algid.readers.mcap.catalogue import between, catalogue, channels_of
 from algid.readers.mcap.framing import DamagedError, File
 from algid.readers.mcap.load import spans_of
-from algid.stores import copying, fetched
+from algid.stores import reading
+
+if TYPE_CHECKING:
+    from algid.profile import Profile
 
 Range = tuple[int, int]
 """First byte, and the one behind the last."""
 
 GAP = 1 << 16
 """Bytes between two ranges that are fetched along, to save a request."""
+SMALL = 1 << 20
+"""Bytes of an object that one request brings about as soon as its parts."""
+NEARLY_ALL = 0.9
 _PIECE = 1 << 23
 _REQUESTS = 8
+_TAIL = 1 << 16
+_MCAP_END = 37  # footer record and magic
+_LARGEST_END = 1 << 28
+_INDEX_HEAD = 15  # bytes of a message index record that name its channel and size
+_METADATA_INDEX = 0x0D
 
 
 class UnforeseenError(Exception):
@@ -138,19 +145,6 @@ def _pieces(ranges: Iterable[Range]) -> Iterator[Range]:
             yield place, min(place + _PIECE, end)
 
 
-if TYPE_CHECKING:
-    from algid.profile import Profile
-
-SMALL = 1 << 20
-"""Bytes of an object that one request brings about as soon as its parts."""
-NEARLY_ALL = 0.9
-_TAIL = 1 << 16
-_MCAP_END = 37  # footer record and magic
-_LARGEST_END = 1 << 28
-_INDEX_HEAD = 15  # bytes of a message index record that name its channel and size
-_METADATA_INDEX = 0x0D
-
-
 def staged(url: str, folder: Path, profile: Profile | None = None) -> Staged:
     """A copy of a log in `folder`, of the whole or of what identification with `profile` reads.
 
@@ -159,15 +153,18 @@ def staged(url: str, folder: Path, profile: Profile | None = None) -> Staged:
     LogError
         If there is no such object, or it cannot be read.
     """
-    with (
-        copying(url, folder) as (filesystem, path, copy),
-        filesystem.open_input_file(path) as source,
-    ):
-        if source.size() >= SMALL:
-            with Partial(copy, source=source) as part, naming({copy: url}):
-                if _fetched_in_part(part, profile):
-                    return Staged(copy, url, whole=False)
-    return Staged(fetched(url, folder), url)
+    from pyarrow.fs import LocalFileSystem, copy_files
+
+    with reading(url) as (filesystem, path):
+        folder.mkdir(parents=True, exist_ok=True)
+        copy = folder / path.rpartition("/")[2]
+        with filesystem.open_input_file(path) as source:
+            if source.size() >= SMALL:
+                with Partial(copy, source=source) as part, naming({copy: url}):
+                    if _fetched_in_part(part, profile):
+                        return Staged(copy, url, whole=False)
+        copy_files(path, str(copy), source_filesystem=filesystem, destination_filesystem=LocalFileSystem())
+    return Staged(copy, url)
 
 
 @contextmanager

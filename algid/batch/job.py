@@ -1,11 +1,11 @@
-"""What a worker does with one job: identify, and tell how it ended. No log's fault leaves this file."""
+"""What a worker does with one job: identify, and say how it ended. No exception leaves this file."""
 
 from __future__ import annotations
 
 import errno
-import tempfile
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,8 @@ from algid import __version__
 from algid.batch.fetch import naming, staged
 from algid.batch.jobs import Job
 from algid.batch.records import End, Input, Record, estimates_of, stat_of
-from algid.errors import AlgidError
+from algid.errors import chain_of, text_of
+from algid.files import temporary_folder
 from algid.identification.identify import identify
 from algid.identification.source import Staged, sha256_of
 from algid.report.verdict import verdict
@@ -29,8 +30,11 @@ if TYPE_CHECKING:
 NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 
 
-class DiskFullError(Exception):
+@dataclass(frozen=True)
+class DiskFull:
     """There is no space left where results go: no job's fault, and reason to stop."""
+
+    reason: str
 
 
 @dataclass(frozen=True)
@@ -46,46 +50,56 @@ class Task:
     report: bool
 
 
-def run_task(task: Task) -> Record:
+def run_task(task: Task) -> Record | DiskFull:
     """Identify one job and write its result folder.
 
-    Raises
-    ------
-    DiskFullError
-        If there is no space left.
+    Whatever is raised on the way is the job's end: libraries panic by exceptions of any base.
     """
     keep_freed()
     keep_to_one_core()
     start = time.perf_counter()
-    inputs = tuple(stat_of(path) for path in (*task.job.logs, *task.job.loaded))
+    inputs = inputs_of(task.job)
     try:
-        ended = _of_result(_identified(task))
-        known = ended.pop("sha256")
-        inputs = tuple(replace(one, sha256=known.get(one.path)) for one in inputs)
-    except (AlgidError, ValueError, ArithmeticError, LookupError, TypeError, OSError, MemoryError) as error:
-        if _no_space(error):
-            raise DiskFullError(str(error)) from error
-        ended = {"status": End.FAILED, "reason": _reason(error)}
-        inputs = tuple(_hashed(one) for one in inputs)
-    return ended_record(task, inputs, seconds=time.perf_counter() - start, **ended)
-
-
-def ended_record(task: Task, inputs: tuple[Input, ...], **ended: Any) -> Record:
-    """The record of a task that ended so."""
-    return Record(
-        job=task.job,
-        basis=task.basis,
-        inputs=inputs,
-        settings=task.settings.as_json(),
-        version=__version__,
-        **ended,
+        result = _identified(task)
+    except BaseException as error:
+        if any(map(_no_space, chain_of(error))):
+            return DiskFull(text_of(error))
+        inputs = tuple(map(_hashed, inputs))
+        return failed_record(task, _reason(error), inputs=inputs, seconds=time.perf_counter() - start)
+    judged = verdict(result)
+    good = result.complete and not result.data_lost and judged.level != "failed"
+    hashes = {log.path: log.sha256 for log in result.logs}
+    return _record(
+        task,
+        inputs=tuple(replace(one, sha256=hashes.get(one.path)) for one in inputs),
+        status=End.OK if good else End.INCOMPLETE,
+        reason="" if good else judged.sentence if judged.level == "failed" else _what_lacks(result),
+        seconds=time.perf_counter() - start,
+        start_ns=result.log.start_ns,
+        log_seconds=sum(log.duration for log in result.logs),
+        estimator=result.estimator,
+        estimates=estimates_of(result),
     )
+
+
+def failed_record(task: Task, reason: str, status: End = End.FAILED, **known: Any) -> Record:
+    """The record of a task without result; `known` are other fields of it."""
+    return _record(task, status=status, reason=reason, **{"inputs": inputs_of(task.job), **known})
+
+
+def _record(task: Task, **known: Any) -> Record:
+    return Record(job=task.job, basis=task.basis, settings=task.settings.as_json(), version=__version__, **known)
+
+
+def inputs_of(job: Job) -> tuple[Input, ...]:
+    """The job's logs as they are now, not hashed."""
+    return tuple(stat_of(path) for path in (*job.logs, *job.loaded))
 
 
 def _identified(task: Task) -> Result:
     """Identify; what lies in an object store is fetched before and put there after."""
-    with tempfile.TemporaryDirectory(prefix="algid-") as temporary:
-        stage = Path(temporary)
+    paths = (*task.job.logs, *task.job.loaded, task.out)
+    with temporary_folder() if any(map(is_url, paths)) else nullcontext(Path()) as stage:
         place = (stage if is_url(task.out) else Path(task.out)) / task.job.name
         logs = _here(task.job.logs, stage / "logs", task.profile)
         loaded = _here(task.job.loaded, stage / "loaded", task.profile)
@@ -112,20 +126,6 @@ def _here(paths: Sequence[str], folder: Path, profile: Profile | None) -> list[s
     return [staged(path, folder / str(n), profile) if is_url(path) else path for n, path in enumerate(paths)]
 
 
-def _of_result(result: Result) -> dict[str, Any]:
-    judged = verdict(result)
-    good = result.complete and not result.data_lost and judged.level != "failed"
-    return {
-        "status": End.OK if good else End.INCOMPLETE,
-        "reason": "" if good else judged.sentence if judged.level == "failed" else _what_lacks(result),
-        "start_ns": result.log.start_ns,
-        "log_seconds": sum(log.duration for log in result.logs),
-        "estimator": result.estimator,
-        "estimates": estimates_of(result),
-        "sha256": {log.path: log.sha256 for log in result.logs},
-    }
-
-
 def _what_lacks(result: Result) -> str:
     lacking = [f"{name} {e.status.value}" for name, e in result.estimates.items() if e.status.value != "OK"]
     return "; ".join([*(["samples were lost"] if result.data_lost else []), *lacking])
@@ -133,10 +133,8 @@ def _what_lacks(result: Result) -> str:
 
 def _hashed(one: Input) -> Input:
     """With its sha256, where it can be had."""
-    if is_url(one.path):
-        return one
     try:
-        return replace(one, sha256=sha256_of(Path(one.path)))
+        return one if is_url(one.path) else replace(one, sha256=sha256_of(Path(one.path)))
     except OSError:
         return one
 
@@ -144,16 +142,11 @@ def _hashed(one: Input) -> Input:
 def _reason(error: BaseException) -> str:
     if isinstance(error, MemoryError):
         return "it needs more memory than a worker has; raise --memory-limit"
-    text = str(error) if isinstance(error, AlgidError) else f"{type(error).__name__}: {error}"
-    return text[:2000]
+    return text_of(error)
 
 
-def _no_space(error: BaseException | None) -> bool:
-    while error is not None:
-        if (isinstance(error, OSError) and error.errno in NO_SPACE) or "No space left on device" in str(error):
-            return True
-        error = error.__cause__ or error.__context__
-    return False
+def _no_space(error: BaseException) -> bool:
+    return (isinstance(error, OSError) and error.errno in NO_SPACE) or "No space left on device" in text_of(error)
 
 
 def basis_of(settings: Mapping[str, Any], profile: Profile | None, parameters: Result | None, report: bool) -> str:

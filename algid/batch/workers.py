@@ -1,26 +1,42 @@
-"""Worker processes that may die: each has a thread here that knows which call it runs.
+"""Workers that may die, hang or fail in any way without harm to each other: processes here, or a Dask cluster's.
 
-`concurrent.futures.ProcessPoolExecutor` gives up as a whole when one process dies, without telling whose call
-killed it. Here the one call fails with `WorkerDiedError`, and a new process takes the dead one's place.
+Each worker is a `concurrent.futures.ProcessPoolExecutor` of one process, tended by a thread here that knows which call
+it runs: such a pool gives up as a whole when a process of it dies, without telling whose call killed it. Calls and
+answers travel as bytes that are packed and unpacked here, so that what cannot be pickled fails its own call alone.
 """
 
 from __future__ import annotations
 
+import ctypes
+import hashlib
 import multiprocessing
 import os
+import pickle
 import signal
+import socket
+import tempfile
 import threading
-from collections.abc import Callable
-from concurrent.futures import Executor, Future
-from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack, contextmanager
+from multiprocessing import connection
+from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
+from algid.errors import SettingError, text_of
+from algid.files import temporary_folder
+
 # One thread a worker: more would fight for the same cores.
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "POLARS_MAX_THREADS", "ARROW_NUM_THREADS")
-
-_Call = tuple["Future[Any]", Callable[..., Any], tuple[Any, ...], dict[str, Any]]
+TOO_LONG = "it took longer than {:g} s; raise --timeout, and run it again with --retry-failed"
+CONNECT_SECONDS = 10
+LOOK_EVERY = 0.1  # s
+MOST_DEATHS = 2  # the scheduler gives a task up at the next one
+LAST_SECONDS = 5.0  # s that a job on a cluster has to end once it is interrupted
 
 
 class WorkerDiedError(Exception):
@@ -31,16 +47,32 @@ class WorkerDiedError(Exception):
         self.how, self.kills = how, kills
 
 
-class Processes(Executor):
-    """Calls run in `workers` fresh Python processes, each bounded to `memory_limit` bytes of data."""
+class CallFailedError(Exception):
+    """A call raised an exception, took too long, or cannot travel: what is known of it, in words."""
 
-    def __init__(self, workers: int, memory_limit: int | None = None) -> None:
-        self._calls: SimpleQueue[_Call | None] = SimpleQueue()
-        self._memory_limit = memory_limit
-        self._context = multiprocessing.get_context("spawn")
-        self._running: set[BaseProcess] = set()
-        self._starting = threading.Lock()
-        self._killed = False
+
+class Workers(Executor):
+    """Calls run in fresh Python processes.
+
+    Parameters
+    ----------
+    workers : how many processes
+    memory_limit : bytes of data that each of them may use; None for any
+    timeout : s that a call may take; None for any
+
+    Notes
+    -----
+    A future fails with `WorkerDiedError` where its call's process dies, and with `CallFailedError` where the call
+    raises or takes longer than `timeout`: its process is ended then, and another takes its place.
+    """
+
+    def __init__(self, workers: int, memory_limit: int | None = None, timeout: float | None = None) -> None:
+        self._calls: SimpleQueue[tuple[Future[Any], bytes] | None] = SimpleQueue()
+        self._memory_limit, self._timeout = memory_limit, timeout
+        self._running: set[_Worker] = set()
+        self._ended = threading.Event()
+        self._resources = ExitStack()
+        self._temporary = self._resources.enter_context(temporary_folder())
         self._threads = [threading.Thread(target=self._tend, daemon=True) for _ in range(workers)]
         for thread in self._threads:
             thread.start()
@@ -48,12 +80,15 @@ class Processes(Executor):
     @property
     def pids(self) -> list[int]:
         """Process numbers of the workers that run."""
-        return [process.pid for process in list(self._running) if process.pid is not None]
+        return [worker.process.pid for worker in list(self._running) if worker.process.pid is not None]
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Run ``fn(*args, **kwargs)`` in a worker; the future fails with `WorkerDiedError` where that dies."""
+        """Run ``fn(*args, **kwargs)`` in a worker."""
         future: Future[Any] = Future()
-        self._calls.put((future, fn, args, kwargs))
+        try:
+            self._calls.put((future, pickle.dumps((fn, args, kwargs))))
+        except Exception as error:  # pickling runs the arguments' own code
+            future.set_exception(CallFailedError(text_of(error)))
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
@@ -61,64 +96,81 @@ class Processes(Executor):
         for _ in self._threads:
             self._calls.put(None)
         if cancel_futures:
-            self._killed = True
-            for process in list(self._running):
-                process.kill()
+            self._ended.set()
+            for worker in list(self._running):
+                worker.process.kill()
         if wait:
             for thread in self._threads:
                 thread.join()
+            self._resources.close()
 
     def _tend(self) -> None:
-        """Feed one worker, and replace it when it dies."""
-        worker: tuple[BaseProcess, Connection] | None = None
+        """Feed one worker, and replace it when it is gone."""
+        worker: _Worker | None = None
         while (call := self._calls.get()) is not None:
-            future, *work = call
-            if self._killed or not future.set_running_or_notify_cancel():
+            future, packed = call
+            if self._ended.is_set() or not future.set_running_or_notify_cancel():
                 continue
-            worker = worker or self._start()
-            if not _answered(worker, future, work):
-                self._end(worker)
+            try:
+                worker = worker or self._started()
+                future.set_result(worker.answer(packed, self._timeout))
+            except (CallFailedError, WorkerDiedError, OSError) as error:  # OSError: no process could be started
+                future.set_exception(error)
+            if worker is not None and worker.gone:
+                self._running.discard(worker)
                 worker = None
         if worker is not None:
-            self._end(worker)
+            worker.end()
+            self._running.discard(worker)
 
-    def _start(self) -> tuple[BaseProcess, Connection]:
-        ours, theirs = self._context.Pipe()
-        process = self._context.Process(target=_serve, args=(theirs, self._memory_limit), daemon=True)
-        with self._starting:  # a child inherits the environment of the moment it starts
-            before = {name: os.environ.get(name) for name in THREADS}
-            os.environ.update(dict.fromkeys(THREADS, "1"))
-            try:
-                process.start()
-            finally:
-                for name, value in before.items():
-                    os.environ.pop(name) if value is None else os.environ.update({name: value})
-        theirs.close()
-        self._running.add(process)
-        return process, ours
-
-    def _end(self, worker: tuple[BaseProcess, Connection]) -> None:
-        process, ours = worker
-        ours.close()
-        process.join()
-        self._running.discard(process)
+    def _started(self) -> _Worker:
+        worker = _Worker(self._memory_limit, self._temporary)
+        self._running.add(worker)
+        if self._ended.is_set():  # it was not yet there to be killed
+            worker.process.kill()
+        return worker
 
 
-def _answered(worker: tuple[BaseProcess, Connection], future: Future[Any], work: list[Any]) -> bool:
-    """Whether the worker has done its work and lives."""
-    process, ours = worker
-    try:
-        ours.send(work)
-        good, answer = ours.recv()
-    except (EOFError, OSError):
-        process.join()
-        future.set_exception(WorkerDiedError(_how(process.exitcode)))
-        return False
-    if good:
-        future.set_result(answer)
-    else:
-        future.set_exception(answer)
-    return True
+class _Worker:
+    """A pool of one process, and that process."""
+
+    def __init__(self, memory_limit: int | None, temporary: Path) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._pool = ProcessPoolExecutor(1, context, _prepare, (memory_limit, temporary))
+        self.gone = False
+        try:
+            pid = self._pool.submit(os.getpid).result()
+            self.process = next(process for process in multiprocessing.active_children() if process.pid == pid)
+        except (BrokenProcessPool, StopIteration) as error:
+            self._pool.shutdown()
+            raise WorkerDiedError("the worker ended before it began") from error
+
+    def answer(self, packed: bytes, timeout: float | None) -> Any:
+        """What the call gives.
+
+        Raises
+        ------
+        CallFailedError
+            If the call raises, or takes longer than `timeout`: the worker is gone then.
+        WorkerDiedError
+            If the worker dies.
+        """
+        try:
+            coming = self._pool.submit(_answered, packed)
+            if coming not in wait([coming], timeout).done:
+                self.process.kill()
+                self.end()
+                raise CallFailedError(TOO_LONG.format(timeout))
+            return _unpacked(coming.result())
+        except BrokenProcessPool as error:
+            self.end()
+            raise WorkerDiedError(_how(self.process.exitcode)) from error
+
+    def end(self) -> None:
+        """Let the process end, and wait for it."""
+        self.gone = True
+        self._pool.shutdown()
+        self.process.join()
 
 
 def _how(code: int | None) -> str:
@@ -127,34 +179,42 @@ def _how(code: int | None) -> str:
     return f"the worker was ended by {signal.Signals(-code).name}"
 
 
-def _serve(calls: Connection, memory_limit: int | None) -> None:
-    """A worker's life: calls in, answers out, until the other end is closed."""
+def _prepare(memory_limit: int | None, temporary: Path) -> None:
+    """The start of a worker's life."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    os.environ.update(dict.fromkeys(THREADS, "1"))  # before anything loads numpy
+    tempfile.tempdir = str(temporary)  # the parent removes it, however this process ends
     threading.Thread(target=_die_with_parent, daemon=True).start()
     if memory_limit is not None:
         _bound_memory(memory_limit)
-    while True:
-        try:
-            fn, args, kwargs = calls.recv()
-        except (EOFError, OSError):
-            return
-        calls.send(_outcome(fn, args, kwargs))
 
 
-def _outcome(fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> tuple[bool, Any]:
+def _answered(packed: bytes) -> bytes:
+    """Run a call; whatever it raises becomes words, and the worker lives on."""
     try:
-        return True, fn(*args, **kwargs)
-    except Exception as error:
-        error.__traceback__ = None
-        return False, error
+        fn, args, kwargs = pickle.loads(packed)
+        return pickle.dumps((True, fn(*args, **kwargs)))
+    except BaseException as error:
+        return pickle.dumps((False, text_of(error)))
+
+
+def _unpacked(packed: bytes) -> Any:
+    """What `_answered` gave. Raises `CallFailedError`."""
+    try:
+        good, answer = pickle.loads(packed)
+    except Exception as error:  # unpickling runs the answer's own code
+        raise CallFailedError(text_of(error)) from error
+    if not good:
+        raise CallFailedError(answer)
+    return answer
 
 
 def _die_with_parent() -> None:
     """An orphan would go on writing beside the batch that is started next."""
     parent = multiprocessing.parent_process()
     if parent is not None:
-        wait([parent.sentinel])
+        connection.wait([parent.sentinel])
         os._exit(1)
 
 
@@ -168,3 +228,85 @@ def _bound_memory(limit: int) -> None:
     # Data, not address space: allocators and threads reserve far more addresses than they use.
     _, hard = resource.getrlimit(resource.RLIMIT_DATA)
     resource.setrlimit(resource.RLIMIT_DATA, (limit if hard == resource.RLIM_INFINITY else min(limit, hard), hard))
+
+
+@contextmanager
+def cluster(address: str, out: str, timeout: float | None = None) -> Iterator[tuple[Executor, int]]:
+    """The workers of a Dask cluster behind the interface of the local ones, and how many jobs to hand out at once.
+
+    Waits for jobs of an earlier batch on `out` that was killed: their threads cannot be stopped from outside.
+
+    Raises
+    ------
+    SettingError
+        If ``algid[dask]`` is not installed, nothing answers at `address`, or it has no workers.
+    """
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise SettingError("--scheduler: Dask is not installed; pip install 'algid[dask]'") from error
+    try:
+        client: Any = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)  # type: ignore[no-untyped-call]
+    except (OSError, ValueError) as error:
+        raise SettingError(f"--scheduler {address}: no scheduler answers ({error}); start dask scheduler") from error
+    with client:
+        threads = sum(client.nthreads().values())
+        if not threads:
+            raise SettingError(f"--scheduler {address}: it has no workers; start dask worker {address}")
+        prefix = f"algid-{hashlib.sha256(out.encode()).hexdigest()[:16]}-"
+        while any(client.run(_at_work, prefix).values()):
+            time.sleep(LOOK_EVERY)
+        yield _Cluster(client, prefix, timeout), 2 * threads
+
+
+def _at_work(prefix: str, dask_worker: Any) -> bool:
+    """Whether a worker, this function runs on it, has a call in hand whose key starts so."""
+    return any(str(task.key).startswith(prefix) for task in dask_worker.state.all_running_tasks)
+
+
+class _Cluster(Executor):
+    """Calls run on the cluster; they fail as those of `Workers` do."""
+
+    def __init__(self, client: Any, prefix: str, timeout: float | None) -> None:
+        self._client, self._prefix, self._timeout = client, prefix, timeout
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Run ``fn(*args, **kwargs)`` on a worker; one that dies has the call run elsewhere."""
+        answer: Future[Any] = Future()
+        answer.set_running_or_notify_cancel()
+        packed = pickle.dumps((fn, args, kwargs))
+        remote = self._client.submit(answered_within, packed, self._timeout, key=self._prefix + uuid.uuid4().hex)
+        remote.add_done_callback(lambda done: _settle(answer, done))
+        return answer
+
+
+def _settle(answer: Future[Any], remote: Any) -> None:
+    from distributed.client import FutureCancelledError
+    from distributed.scheduler import KilledWorker
+
+    try:
+        answer.set_result(_unpacked(remote.result()))
+    except KilledWorker as error:
+        answer.set_exception(WorkerDiedError(str(error).split("\n", maxsplit=1)[0], kills=MOST_DEATHS + 1))
+    except (FutureCancelledError, Exception) as error:
+        answer.set_exception(error)
+
+
+def answered_within(packed: bytes, timeout: float | None) -> bytes:
+    """`_answered` in a thread of its own, which is interrupted after `timeout` and, if it goes on, given up.
+
+    A thread of Python cannot be ended from outside; an exception reaches it between two of its own instructions.
+    """
+    answers: SimpleQueue[bytes] = SimpleQueue()
+    thread = threading.Thread(target=lambda: answers.put(_answered(packed)), daemon=True)
+    thread.start()
+    thread.join(timeout)
+    if thread.is_alive():
+        assert timeout is not None
+        reason = TOO_LONG.format(timeout)
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident or 0), ctypes.py_object(SystemExit))
+        thread.join(LAST_SECONDS)
+        if thread.is_alive():
+            reason += f"; it still runs on {socket.gethostname()}, process {os.getpid()}: restart that worker"
+        return pickle.dumps((False, reason))
+    return answers.get()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -39,6 +38,9 @@ def batch(
     memory_limit: Annotated[
         str | None, typer.Option(help="Memory of each worker, like 2GB; a job that needs more fails alone.")
     ] = None,
+    timeout: Annotated[
+        float, typer.Option(help="Seconds that a job may take; one that takes longer fails alone.", min=1e-3)
+    ] = 3600.0,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Run jobs again that have failed.")] = False,
     watch: Annotated[bool, typer.Option("--watch", help="Go on, and take logs as they arrive.")] = False,
     report: Annotated[bool, typer.Option(help="Write pages and time series beside each result.json.")] = True,
@@ -47,13 +49,13 @@ def batch(
     """Identify many logs: a result folder a job and OUT/jobs.parquet; what is done already is not done again.
 
     X-unloaded.* and X-loaded.* are one job X. Exit code 1 tells that jobs failed or the batch was cut short, 3
-    that a result lacks a parameter or samples. The first Ctrl-C lets running jobs end, the second one stops them.
+    that a result lacks a parameter or samples, 130 that it was stopped: Ctrl-C ends it at once, and what was running
+    is done by the next run.
 
     Example: algid batch logs/ -o results --workers 2
     """
     from algid.batch.lock import locked
-    from algid.batch.plan import Recipe
-    from algid.batch.run import Batch, stopped_by_signals, sweep
+    from algid.batch.run import Batch, Recipe, stopped_by_signals, sweep
     from algid.results import read_result
     from algid.stores import open_store
 
@@ -65,8 +67,11 @@ def batch(
     store = open_store(out)
     with locked(out):
         sweep(store)
-        with _executor(out, scheduler, workers, memory_limit) as (executor, slots), _progress(quiet) as told:
-            running = Batch(store, recipe, executor, slots, told)
+        with (
+            _workers(out, scheduler, workers, memory_limit, timeout) as (executor, slots),
+            _progress(quiet) as progress,
+        ):
+            running = Batch(store, recipe, executor, slots, progress)
             with stopped_by_signals(running.stop):
                 ended = _watch(running, sources, out, alone, retry_failed) if watch else running.run(jobs, retry_failed)
         sweep(store)
@@ -91,23 +96,22 @@ def _profiles(choice: Choice) -> Callable[[str | None], Profile | None]:
 
 
 @contextmanager
-def _executor(
-    out: str, scheduler: str | None, workers: int | None, memory_limit: str | None
+def _workers(
+    out: str, scheduler: str | None, workers: int | None, memory_limit: str | None, timeout: float
 ) -> Iterator[tuple[Executor, int]]:
     """The workers, and how many jobs to hand out at once; they end with the block."""
-    from algid.batch.workers import Processes
+    from algid.batch.workers import Workers, cluster
     from algid.errors import SettingError
+    from algid.runtime import cores
 
     if scheduler is not None:
         if workers is not None or memory_limit is not None:
             raise SettingError("--scheduler: workers and their memory are the cluster's; set them where it is started")
-        from algid.batch.cluster import cluster
-
-        with cluster(scheduler, out) as found:
+        with cluster(scheduler, out, timeout) as found:
             yield found
         return
-    count = workers or len(os.sched_getaffinity(0))
-    executor = Processes(count, None if memory_limit is None else _bytes(memory_limit))
+    count = workers or cores()
+    executor = Workers(count, None if memory_limit is None else _bytes(memory_limit), timeout)
     try:
         yield executor, 2 * count
     finally:
@@ -131,17 +135,17 @@ def _bytes(text: str) -> int:
 
 @contextmanager
 def _progress(quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """Tells of each job that ends: a line that is written over on a terminal, nothing elsewhere."""
+    """A line for each job that ends, written over the last one; nothing where standard error is no terminal."""
     if quiet or not sys.stderr.isatty():
         yield lambda _progress: None
         return
 
-    def told(progress: Progress) -> None:
+    def show(progress: Progress) -> None:
         text = f"{progress.done}/{progress.total} {progress.last.job.name[:50]}: {progress.last.status.value}"
         print(f"\r\x1b[2K{text}", end="", file=sys.stderr, flush=True)
 
     try:
-        yield told
+        yield show
     finally:
         print("\r\x1b[2K", end="", file=sys.stderr, flush=True)
 
@@ -179,8 +183,8 @@ def _conclude(ended: Ended, stopped: bool, out: str, quiet: bool) -> None:
         for record in failed:
             typer.echo(f"{visible(record.job.name)}: {record.status.value}: {visible(record.reason)}")
         counts = {end: sum(record.status is end for record in ended.records) for end in End}
-        told = ", ".join(f"{count} {end.value}" for end, count in counts.items() if count)
-        typer.echo(f"{told or 'nothing done'}; {ended.ran} run now, {ended.left} left; {out}/jobs.parquet")
+        summary = ", ".join(f"{count} {end.value}" for end, count in counts.items() if count)
+        typer.echo(f"{summary or 'nothing done'}; {ended.ran} run now, {ended.left} left; {out}/jobs.parquet")
     if ended.full is not None:
         typer.echo(f"algid: {ended.full}; make room and run again: what is finished is kept", err=True)
     if stopped and ended.full is None:

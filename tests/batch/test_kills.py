@@ -10,7 +10,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -36,9 +36,24 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def _start(logs: Path, out: Path, *flags: str) -> subprocess.Popen[str]:
+# The command, and in each of its workers a reader that never ends on what is named so.
+HANGING = """
+import algid.readers as readers
+opened = readers.open_log
+def open_log(path, *more):
+    while "hangs" in str(path):
+        pass
+    return opened(path, *more)
+readers.open_log = open_log
+if __name__ == "__main__":
+    from algid.cli import main
+    main()
+"""
+
+
+def _start(logs: Path, out: Path, *flags: str, program: Sequence[str] = ("-m", "algid")) -> subprocess.Popen[str]:
     where = flags or ("--workers", "2")
-    command = [sys.executable, "-m", "algid", "batch", str(logs), "-o", str(out), "--no-report", *where]
+    command = [sys.executable, *program, "batch", str(logs), "-o", str(out), "--no-report", *where]
     root = str(Path(__file__).parents[2])
     return subprocess.Popen(
         command,
@@ -51,7 +66,7 @@ def _start(logs: Path, out: Path, *flags: str) -> subprocess.Popen[str]:
 
 def _digest(out: Path) -> dict[str, str]:
     files = {str(p.relative_to(out)): hashlib.sha256(p.read_bytes()).hexdigest() for p in out.rglob("result.json")}
-    left = [str(p) for p in out.rglob(".*") if p.name not in (".jobs", ".lock")]
+    left = [str(p) for p in out.rglob(".*") if p.name != ".jobs"]
     return files | {"left": str(left), "jobs": pl.read_parquet(out / "jobs.parquet").drop("seconds").write_json()}
 
 
@@ -80,16 +95,40 @@ def test_a_batch_killed_again_and_again_ends_as_an_undisturbed_one(logs: Path, t
     assert _digest(tmp_path / "out") == _digest(tmp_path / "whole")
 
 
-def test_ctrl_c_ends_without_a_traceback_and_keeps_what_is_finished(logs: Path, tmp_path: Path) -> None:
-    running = _start(logs, tmp_path / "out")
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+def test_a_stop_ends_at_once_even_where_a_job_hangs_and_keeps_what_is_finished(
+    logs: Path, tmp_path: Path, sent: signal.Signals
+) -> None:
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "logs/d0-unloaded.mcap").symlink_to(logs / "d0-unloaded.mcap")
+    (tmp_path / "logs/hangs.csv").write_text("t,theta1,theta2,tau1,tau2\n")
+    script = tmp_path / "hanging.py"
+    script.write_text(HANGING)
+    running = _start(tmp_path / "logs", tmp_path / "out", "--workers", "2", program=[str(script)])
     _wait_for_records(tmp_path / "out", 1)
-    running.send_signal(signal.SIGINT)
-    told, errors = running.communicate()
-    table = pl.read_parquet(tmp_path / "out/jobs.parquet")
-    assert errors == ""
-    assert running.returncode == 130
-    assert f"{table.height} ok" in told
-    assert set(table["status"]) == {"ok"}
+    running.send_signal(sent)
+    told, errors = running.communicate(timeout=60)
+    assert (running.returncode, errors) == (130, "")
+    assert "1 ok; 1 run now, 1 left" in told
+    assert pl.read_parquet(tmp_path / "out/jobs.parquet")["job"].to_list() == ["d0"]
+    assert not [path for path in (tmp_path / "out").rglob(".*") if path.name != ".jobs"]
+
+
+def test_a_job_past_its_time_fails_until_its_log_changes(tmp_path: Path) -> None:
+    log, out = tmp_path / "logs/hangs.csv", tmp_path / "out"
+    log.parent.mkdir()
+    log.write_text("t,theta1,theta2,tau1,tau2\n")
+    script = tmp_path / "hanging.py"
+    script.write_text(HANGING)
+    running = _start(log.parent, out, "--workers", "1", "--timeout", "0.5", program=[str(script)])
+    told, errors = running.communicate(timeout=120)
+    assert (running.returncode, errors) == (1, "")
+    assert told.startswith("hangs: failed: it took longer than 0.5 s; raise --timeout, and run it again with --retry-")
+    for text, ran in (("t,theta1,theta2,tau1,tau2\n", 0), ("t,theta1,theta2,tau1,tau3\n", 1)):  # equally long
+        if log.read_text() != text:
+            log.write_text(text)
+        told, _ = _start(log.parent, out, "--workers", "1").communicate()
+        assert f"1 failed; {ran} run now, 0 left" in told
 
 
 @pytest.fixture
@@ -123,7 +162,7 @@ def test_a_full_disk_stops_a_batch_that_ends_as_undisturbed_once_there_is_room(
     finished = [path.parent.stem for path in out.rglob("result.json")]
     assert 0 < len(finished) < JOBS
     assert "failed" not in told
-    assert not [path for path in out.rglob(".*") if path.name not in (".jobs", ".lock")]
+    assert not [path for path in out.rglob(".*") if path.name != ".jobs"]
     assert _mounts("-o", "remount,size=16m", str(small_disk))
     second = _start(logs, out)
     told, errors = second.communicate()

@@ -17,14 +17,13 @@ import pytest
 import algid
 from algid.batch.jobs import jobs_of
 from algid.batch.lock import locked
-from algid.batch.plan import Recipe
 from algid.batch.records import End
-from algid.batch.run import Batch, Ended, Settling, sweep
+from algid.batch.run import Batch, Ended, Recipe, Settling, sweep
 from algid.batch.workers import WorkerDiedError
 from algid.errors import OutputError
 from algid.identification.identify import identify
 from algid.settings import Settings
-from algid.stores import FolderStore
+from algid.stores import open_store
 from algid.synth.sensors import Sensors
 
 
@@ -68,7 +67,7 @@ RECIPE = Recipe("", Settings(estimator="weak"), lambda _file: None, report=False
 
 def _run(logs: Path, executor: Executor | None = None, recipe: Recipe = RECIPE, **more: bool) -> Ended:
     out = logs.parent / "out"
-    store = FolderStore(out)
+    store = open_store(str(out))
     batch = Batch(store, replace(recipe, out=str(out)), executor or Here(), 1, lambda _progress: None)
     return batch.run(jobs_of([str(logs)], str(out)), **more)
 
@@ -152,7 +151,7 @@ def test_an_interrupted_batch_ends_as_an_undisturbed_one(logs: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         _run(logs, Here(vanish))
     (logs.parent / "out/r1/.b.algid.tmp").mkdir()
-    sweep(FolderStore(logs.parent / "out"))
+    sweep(open_store(str(logs.parent / "out")))
     _run(logs)
     assert _digest(logs.parent / "out") == undisturbed
     assert not list((logs.parent / "out").rglob(".b.algid*"))
@@ -175,7 +174,7 @@ def test_a_full_disk_stops_the_batch_and_keeps_what_is_finished(logs: Path, monk
 
 def test_a_stopped_batch_hands_out_no_more_jobs(logs: Path) -> None:
     out = logs.parent / "out"
-    store = FolderStore(out)
+    store = open_store(str(out))
     batch = Batch(store, replace(RECIPE, out=str(out)), Here(), 1, lambda _progress: batch.stop.set())
     ended = batch.run(jobs_of([str(logs)], str(out)))
     assert (ended.ran, ended.left) == (1, 2)

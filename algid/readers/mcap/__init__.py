@@ -35,6 +35,8 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
         try:
             wanted = plan(file, found, profile)
         except NothingFoundError as error:
+            if not found.damage:
+                raise
             raise _blamed(paths[0], found, error) from error
         truth = _truth(paths[0], found)
         rows = wanted.topics[0].count(found)
@@ -82,10 +84,8 @@ def opened(path: Path) -> Iterator[tuple[File, Catalogue]]:
 
 
 def _blamed(path: Path, found: Catalogue, error: LogError) -> LogError:
-    """The error, with the damage to the file first where there is any."""
+    """The error, with the damage to the file first."""
     places = list(dict.fromkeys(found.damage))
-    if not places:
-        return error
     where = "; ".join(places[:3]) + (f"; {len(places) - 3} more" if len(places) > 3 else "")
     left = str(error).removeprefix(f"{path}: ")
     return LogError(f"{path}: the MCAP file is damaged ({where}); copy it again; in what is left: {left}")
