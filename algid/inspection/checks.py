@@ -16,6 +16,7 @@ SPIKES                no       single samples far off their neighbours
 SATURATED_EFFORT      no       a torque clipped at its limit
 GAPS                  no       samples are missing
 JITTER                no       uneven stamps
+NEAR_STAMPS           no       samples that stand all but on top of one another
 GRAVITY_COMPENSATED   no       torques do not carry the arm's weight
 FLIPPED_SIGN          no       gravity pulls upwards: a sign is wrong
 WRONG_ZERO            no       gravity pulls sideways: θ1 is not from the horizontal
@@ -33,7 +34,8 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.errors import LogError
 from algid.inspection.dynamics import DynamicFigures, dynamic_figures
-from algid.log import IntArray, Log, Notice
+from algid.log import Log, Notice, join
+from algid.signals.spacing import NEAR, near_stamps, spaced
 
 GAP_PERIODS = 2.5
 """A step this many periods long is a gap: a jittering clock stays below, two lost samples lie above."""
@@ -101,14 +103,16 @@ def saturated_share(values: FloatArray) -> float:
     return float(np.count_nonzero(inner) / values.size)
 
 
-def clock_figures(stamp_ns: IntArray) -> ClockFigures:
-    """Figures of stamps (N,), two at least."""
+def clock_figures(log: Log) -> ClockFigures:
+    """Figures of a log's stamps, two at least; gaps and jitter are those left once clusters are in their place."""
+    period, stamp_ns = log.period, log.stamp_ns
+    if near_stamps(stamp_ns, period):
+        stamp_ns = join(spaced([log], period)).stamp_ns
     steps = np.diff(stamp_ns).astype(np.float64) * 1e-9
-    period = float(np.median(steps))
     gaps = steps > GAP_PERIODS * period
     return ClockFigures(
-        rows=int(stamp_ns.size),
-        duration=float(stamp_ns[-1] - stamp_ns[0]) * 1e-9,
+        rows=len(log),
+        duration=log.duration,
         rate=1 / period,
         jitter=float(np.std(steps[~gaps])),
         gaps=int(np.count_nonzero(gaps)),
@@ -256,7 +260,14 @@ def _spikes(log: Log) -> Iterator[Finding]:
 
 
 def _clock(log: Log) -> Iterator[Finding]:
-    clock = clock_figures(log.stamp_ns)
+    clock = clock_figures(log)
+    near = near_stamps(log.stamp_ns, log.period)
+    if near:
+        text = (
+            f"{near} samples follow the one before by less than {NEAR:g} of a period of {1e3 / clock.rate:.4g} ms, as "
+            "receipt times do: late ones go back to the period they are missing from, the mean stands for the others"
+        )
+        yield Finding("NEAR_STAMPS", text)
     if clock.gaps:
         text = f"{clock.gaps} gaps, the longest {clock.longest_gap:.4g} s; no window spans one"
         yield Finding("GAPS", text)

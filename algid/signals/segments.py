@@ -1,7 +1,8 @@
 """Uniform stretches of a log: what every estimator works on.
 
 A log is cut where samples are missing for long and put on a uniform time base where its stamps jitter, by the
-cubic through the four recorded samples around each instant. What comes out does not depend on the blocks in
+cubic through the four recorded samples around each instant, once samples that stand all but on top of one another
+are where they belong (`algid.signals.spacing`). What comes out does not depend on the blocks in
 which the log was read.
 """
 
@@ -14,7 +15,8 @@ from itertools import pairwise
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.log import IntArray, Log, join
+from algid.log import IntArray, Log, join, usual_period
+from algid.signals.spacing import spaced
 
 PERIOD_SAMPLES = 4096  # the first samples, from which the period is taken
 LONGEST_GAP = 5.0  # periods: a longer gap cuts the log
@@ -75,9 +77,9 @@ def segments(blocks: Iterable[Log]) -> Iterator[Segment]:
     head = _first_samples(source)
     if head is None:
         return
-    dt = _mean_period(head.stamp_ns)
+    dt = _mean_period(join(spaced([head], usual_period(head.stamp_ns[:PERIOD_SAMPLES]))).stamp_ns)
     sampler = _Sampler(int(head.stamp_ns[0]), dt)
-    for block in _chain(head, source):
+    for block in spaced(_chain(head, source), dt):
         yield from sampler.push(block)
     yield from sampler.finish()
 
@@ -102,8 +104,9 @@ def _chain(head: Log, rest: Iterator[Log]) -> Iterator[Log]:
 def _mean_period(stamp_ns: IntArray) -> float:
     """Mean time between neighbouring samples in s, over the first samples and without gaps."""
     steps = np.diff(stamp_ns[:PERIOD_SAMPLES]).astype(np.float64)
-    near = steps[np.abs(steps - np.median(steps)) <= 0.5 * np.median(steps)]
-    return float(near.mean()) * 1e-9
+    period = usual_period(stamp_ns[:PERIOD_SAMPLES])
+    near = steps[np.abs(steps - 1e9 * period) <= 0.5e9 * period]
+    return float(near.mean()) * 1e-9 if 2 * near.size > steps.size else period
 
 
 class _Sampler:
@@ -118,6 +121,7 @@ class _Sampler:
 
     def push(self, block: Log) -> Iterator[Segment]:
         if self._pending is None:
+            self._anchor = float(self._time(block)[0])
             yield from self._settle(block)
             return
         yield from self._settle(join([self._pending, block.part(0, _BRIDGE)]))

@@ -1,0 +1,131 @@
+"""Samples that stand all but on top of one another, put where they belong before anything is interpolated.
+
+Receipt times come in clusters: a sample is sent twice, or is late and arrives with its successor, or a buffer is
+emptied at once. Two nodes a microsecond apart make any polynomial through them steep by their noise over that
+microsecond. A cluster is a run of samples each nearer to the one before than `NEAR` periods. Where as many periods
+lack samples before a cluster as it has samples, and the angles move on through it as they did over those periods,
+its samples are late: each goes back to its own period. Otherwise they are one instant, and their mean stands for
+them.
+
+=======  ====================================  =========
+name     meaning                               shape
+=======  ====================================  =========
+first    first sample of each cluster          (C,)
+size     samples of each cluster               (C,)
+=======  ====================================  =========
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from algid.arm import FloatArray
+from algid.log import IntArray, Log, join
+
+NEAR = 0.3
+"""Periods: nodes of a cubic this far apart still carry noise of at most twice one sample's."""
+
+
+def spaced(blocks: Iterable[Log], period: float) -> Iterator[Log]:
+    """The log that comes in `blocks`, without samples nearer than `NEAR` of a `period` in s.
+
+    What comes out does not depend on how the blocks were cut. Blocks without clusters pass as they are.
+    """
+    near_ns = NEAR * period * 1e9
+    held: Log | None = None  # the last cluster, which may go on in the next block
+    before: Log | None = None  # the sample before it
+    for block in blocks:
+        if not len(block):
+            continue
+        rest = block
+        if held is not None:
+            far = np.flatnonzero(np.diff(block.stamp_ns, prepend=held.stamp_ns[-1]) >= near_ns)
+            if not far.size:
+                held = join([held, block])
+                continue
+            held = join([held, block.part(0, int(far[0]))]) if far[0] else held
+            yield _settled(held, before, period)
+            before, rest = held.part(len(held) - 1, len(held)), block.part(int(far[0]), len(block))
+        far = np.flatnonzero(np.diff(rest.stamp_ns) >= near_ns)
+        last = int(far[-1]) + 1 if far.size else 0
+        if last:
+            yield _settled(rest.part(0, last), before, period)
+            before = rest.part(last - 1, last)
+        held = rest.part(last, len(rest))
+    if held is not None:
+        yield _settled(held, before, period)
+
+
+def near_stamps(stamp_ns: IntArray, period: float) -> int:
+    """How many samples of a log (N,) follow the one before by less than `NEAR` of a `period` in s."""
+    return int(np.count_nonzero(np.diff(stamp_ns) < NEAR * period * 1e9))
+
+
+def _settled(log: Log, before: Log | None, period: float) -> Log:
+    """Whole clusters with every sample in its place; `before` is the sample before the first of them."""
+    far = np.diff(log.stamp_ns) >= NEAR * period * 1e9
+    if np.all(far):
+        return log
+    first = np.concatenate([[0], np.flatnonzero(far) + 1])
+    size = np.diff(first, append=len(log))
+    if before is None and size[0] > 1:  # nothing tells whether the log's first samples are late: the last one is not
+        return _settled(log.part(int(size[0]) - 1, len(log)), None, period)
+    known = log if before is None else join([before, log])
+    shift = len(known) - len(log)
+    late = _late(known, first + shift, size, period)
+    stamps = log.stamp_ns.copy()
+    for cluster in np.flatnonzero(late):
+        start, own = int(first[cluster]), int(size[cluster])
+        last_ns = known.stamp_ns[start + shift - 1]
+        regular = last_ns + np.rint(np.arange(1, own + 1) * period * 1e9).astype(np.int64)
+        stamps[start : start + own] = np.minimum(regular, stamps[start : start + own])
+    return _merged(replace(log, stamp_ns=stamps), _starts(first, size, late))
+
+
+def _late(log: Log, first: IntArray, size: IntArray, period: float) -> NDArray[np.bool_]:
+    """Which clusters (C,) are of samples that belong to the periods before them."""
+    late = np.zeros(first.size, np.bool_)
+    for cluster in np.flatnonzero(size > 1):
+        start, own = int(first[cluster]), int(size[cluster])
+        if start == 0:
+            continue
+        times = (log.stamp_ns[start - 1 : start + own] - log.stamp_ns[start - 1]) * 1e-9
+        if round(times[-1] / period) == own:
+            late[cluster] = _moves_on(log.theta[:, start - 1 : start + own], times)
+    return late
+
+
+def _moves_on(theta: FloatArray, times: FloatArray) -> bool:
+    """Whether angles (2, m + 1) lie nearer to a line at equal steps than to a line at their `times` (m + 1,)."""
+    travel = theta[:, -1:] - theta[:, :1]
+    even = np.arange(times.size) / (times.size - 1)
+    off = [float(np.sum((theta - theta[:, :1] - travel * place) ** 2)) for place in (even, times / times[-1])]
+    return off[0] <= off[1]
+
+
+def _starts(first: IntArray, size: IntArray, late: NDArray[np.bool_]) -> IntArray:
+    """Where the samples begin that stay: each cluster's first one, and every one of a late cluster."""
+    within = np.arange(int(size.sum())) - np.repeat(first, size)
+    return np.flatnonzero((within == 0) | np.repeat(late, size))
+
+
+def _merged(log: Log, starts: IntArray) -> Log:
+    """The mean of the samples from each start to the next."""
+    counts = np.diff(starts, append=len(log))
+
+    def mean(rows: FloatArray) -> FloatArray:
+        return np.asarray(np.add.reduceat(rows, starts, axis=-1) / counts)
+
+    origin_ns = log.stamp_ns[0]
+    return replace(
+        log,
+        # floor, since rounding to even would depend on where the block begins
+        stamp_ns=origin_ns + np.floor(mean((log.stamp_ns - origin_ns).astype(np.float64)) + 0.5).astype(np.int64),
+        theta=mean(log.theta),
+        tau=mean(log.tau),
+        omega=None if log.omega is None else mean(log.omega),
+    )

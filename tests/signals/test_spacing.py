@@ -1,0 +1,164 @@
+"""Samples nearly on top of one another: late ones go back to their period, repeated ones count once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from algid.arm import FloatArray
+from algid.identification.identify import identify
+from algid.inspection.checks import examine
+from algid.log import Log, Origin, join, usual_period
+from algid.signals.segments import segments
+from algid.signals.spacing import spaced
+from algid.synth.cases import load_case
+from algid.synth.excitation import wide_multi_sine
+from algid.synth.simulator import HANGING, simulate
+
+PERIOD = 1e-3
+ROWS = 4000
+RANDOM = np.random.default_rng(8)
+
+
+def moving(t: FloatArray) -> FloatArray:
+    """Angles (2, N) in closed form: up to 6 rad/s, so that a sample one period late is 6e-3 rad off."""
+    return np.stack([2 * np.sin(3 * t), np.cos(2 * t)])
+
+
+def log_of(t: FloatArray, stamps: FloatArray) -> Log:
+    """The motion at times `t` (N,) in s, recorded with other stamps."""
+    stamp_ns = np.rint(stamps * 1e9).astype(np.int64)
+    assert np.all(np.diff(stamp_ns) > 0)
+    return Log(stamp_ns, moving(t), 5 * moving(t + 1), Origin("log", "test", {}))
+
+
+def regular() -> FloatArray:
+    return np.arange(ROWS) * PERIOD
+
+
+def some(count: int) -> FloatArray:
+    """Places that are no neighbours."""
+    return np.sort(RANDOM.choice(np.arange(10, ROWS - 20, 20), count, replace=False))
+
+
+def late_pairs() -> tuple[FloatArray, FloatArray]:
+    t, stamps, places = regular(), regular(), some(100)
+    stamps[places] = t[places + 1] - 2e-6
+    return t, stamps
+
+
+def bursts() -> tuple[FloatArray, FloatArray]:
+    t, stamps = regular(), regular()
+    for place in some(60):
+        size = int(RANDOM.integers(3, 15))
+        stamps[place : place + size] = t[place + size] - 2e-6 * np.arange(size, 0, -1)
+    return t, stamps
+
+
+def batches() -> tuple[FloatArray, FloatArray]:
+    t, stamps = regular(), regular()
+    for place in range(0, ROWS, 10):
+        stamps[place : place + 10] = t[place + 9] + 2e-6 * np.arange(10)
+    return t, stamps
+
+
+def repeated() -> tuple[FloatArray, FloatArray]:
+    t = np.sort(np.concatenate([regular(), regular()[some(100)] + 2e-6]))
+    return t, t
+
+
+def half_a_period() -> tuple[FloatArray, FloatArray]:
+    t = regular()
+    t[1:-1] += RANDOM.uniform(-0.5, 0.5, ROWS - 2) * PERIOD
+    t = np.unique(np.rint(t * 1e9)) * 1e-9
+    return t, t
+
+
+KINDS: list[Callable[[], tuple[FloatArray, FloatArray]]] = [late_pairs, bursts, batches, repeated, half_a_period]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_motion_is_recovered(kind: Callable[[], tuple[FloatArray, FloatArray]]) -> None:
+    log = log_of(*kind())
+    (whole,) = _whole(segments([log]))
+    start, dt, theta = whole
+    # the time base may be a little slower where every tenth sample is merged with a neighbour
+    assert dt == pytest.approx(PERIOD, rel=0.03 if kind is half_a_period else 1e-3)
+    t = log.stamp_ns[0] * 1e-9 + start + dt * np.arange(theta.shape[1])
+    # a cluster's samples are right to its own length in time, 20 µs at 6 rad/s, a cubic between to far less
+    assert np.abs(theta - moving(t))[:, 20:].max() < (2e-4 if kind is batches else 1.3e-5)
+
+
+def _whole(parts: object) -> list[tuple[float, float, FloatArray]]:
+    found = list(parts)  # type: ignore[call-overload]
+    assert all(part.continues for part in found[1:])
+    return [(found[0].start, found[0].dt, np.concatenate([part.theta for part in found], axis=1))]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("rows", [1, 7, 1000])
+def test_blocks_make_no_difference(kind: Callable[[], tuple[FloatArray, FloatArray]], rows: int) -> None:
+    log = log_of(*kind())
+    whole = join(spaced([log], PERIOD))
+    parts = join(spaced([log.part(first, first + rows) for first in range(0, len(log), rows)], PERIOD))
+    assert parts.stamp_ns.tolist() == whole.stamp_ns.tolist()
+    assert np.array_equal(parts.theta, whole.theta)
+    assert np.array_equal(parts.tau, whole.tau)
+
+
+def test_logs_without_clusters_pass_as_they_are() -> None:
+    log = log_of(regular(), regular())
+    (*whole, last) = spaced([log], PERIOD)
+    assert sum(map(len, whole)) + len(last) == ROWS
+    assert np.shares_memory(whole[0].theta, log.theta)
+
+
+def test_the_period_of_bursts_is_their_mean_pace() -> None:
+    assert usual_period(np.rint(batches()[1] * 1e9).astype(np.int64)) == pytest.approx(PERIOD, rel=0.01)
+    assert usual_period(np.rint(regular() * 1e9).astype(np.int64)) == pytest.approx(PERIOD, rel=1e-12)
+
+
+def test_how_many_are_near_is_told() -> None:
+    (found,) = [one for one in examine(log_of(*late_pairs())) if one.code == "NEAR_STAMPS"]
+    assert found.text.startswith("100 samples follow the one before")
+    assert not found.refuse
+    assert "GAPS" not in [one.code for one in examine(log_of(*bursts()))]
+
+
+def simulated(extra: FloatArray, late: FloatArray) -> Log:
+    """Four seconds of the first case with noise; `extra` samples follow 2 µs after theirs, `late` come one too late."""
+    case = load_case("case1")
+    t = regular()
+    times = np.unique(np.concatenate([t, t[extra] + 2e-6]))
+    motion = simulate(case.arm.constants(), wide_multi_sine(case.arm), times, HANGING, np.zeros(2))
+    noise = np.random.default_rng(3).standard_normal((2, 2, ROWS)) * np.array([3e-4, 1e-2])[:, None, None]
+    own = np.searchsorted(times, t)
+    theta, tau = motion.theta, motion.tau
+    theta[:, own] += noise[0]
+    tau[:, own] += noise[1]
+    more = np.setdiff1d(np.arange(times.size), own)
+    theta[:, more] += 3e-4 * np.random.default_rng(4).standard_normal((2, more.size))
+    tau[:, more] += 1e-2 * np.random.default_rng(5).standard_normal((2, more.size))
+    stamps = times.copy()
+    stamps[own[late]] = t[late + 1] - 2e-6
+    return Log(np.rint(stamps * 1e9).astype(np.int64), theta, tau, Origin("log", "test", {}))
+
+
+def test_pairs_two_microseconds_apart_leave_the_estimates_alone() -> None:
+    nothing = np.array([], np.int64)
+    four = np.array([500, 1400, 2300, 3700])
+    clean, *others = (
+        identify(simulated(*pairs), report=False) for pairs in ((nothing, nothing), (four, nothing), (nothing, four))
+    )
+    for found in others:
+        assert found.estimator == clean.estimator
+        assert any("NEAR_STAMPS" in warning for warning in found.warnings)
+        for name, wanted in clean.parameters.items():
+            estimate = found.parameters[name]
+            if wanted.estimate is not None and wanted.std:
+                assert estimate.estimate is not None
+                assert estimate.std is not None
+                assert abs(estimate.estimate - wanted.estimate) < estimate.std
+                assert estimate.std < 1.1 * wanted.std
