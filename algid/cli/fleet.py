@@ -2,36 +2,65 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from algid.cli.report import ResultFormat
+
+if TYPE_CHECKING:
+    from algid.fleet.history import History
+
+MOST_ROBOTS = 40  # on a terminal, where nothing was found of them
+
 
 def fleet(
-    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder of algid batch, with its jobs.parquet.")],
+    batch: Annotated[Path, typer.Argument(metavar="BATCH", help="Folder of algid batch, with its jobs.parquet.")],
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder to write to; BATCH by default.")] = None,
+    form: Annotated[ResultFormat, typer.Option("--format", help="What to print.")] = ResultFormat.TABLE,
 ) -> None:
     """Tell which robots' parameters drift, and which logs stand out; write fleet.parquet, findings.parquet, fleet.html.
 
-    Robots come from the manifest or from the logs' folders, times from the manifest or from the logs' stamps.
+    Robots come from the manifest or from the logs' folders, times from the manifest or from the logs' stamps; robots
+    whose logs have no date are looked at for outliers and wrong labels.
 
     Example: algid fleet results
     """
-    from rich.console import Console
-
     from algid.fleet.history import history_of, write_history
-    from algid.fleet.page import drift_table, finding_table
     from algid.report.progress import progress
-    from algid.report.terminal import print_one
 
-    with progress("parameters") as told:
-        history = history_of(out / "jobs.parquet", told)
-        written = write_history(history, out)
-    console = Console()
-    for table in (drift_table(history), finding_table(history)):
-        if table.rows:
-            print_one(table, console)
-            console.print()
-    typer.echo(f"{history.robots} robots, {history.logs} logs: {history.drifts.height} drifts found")
+    with progress("parameters") as followed:
+        history = history_of(batch / "jobs.parquet", followed)
+        written = write_history(history, batch if out is None else out)
+    _print(history, form)
     for path in written:
         typer.echo(f"wrote {path}", err=True)
+
+
+def _print(history: History, form: ResultFormat) -> None:
+    from rich.console import Console
+
+    from algid.fleet.page import drift_table, finding_table, robot_table
+    from algid.report.markdown import markdown_table
+    from algid.report.terminal import print_one
+    from algid.report.text import counted
+
+    if form is ResultFormat.JSON:
+        typer.echo(json.dumps(history.as_dict(), indent=2, allow_nan=False))
+        return
+    tables = [table for table in (drift_table(history), finding_table(history)) if table.rows]
+    if history.robots <= MOST_ROBOTS:
+        tables.append(robot_table(history))
+    found = f"{counted(history.drifts.height, 'drift')} and {counted(history.findings.height, 'finding')}"
+    summary = f"{counted(history.robots, 'robot')}, {counted(history.logs, 'log')}: {found}"
+    if form is ResultFormat.MARKDOWN:
+        typer.echo("\n".join([*map(markdown_table, tables), *history.untested, summary]))
+        return
+    console = Console(highlight=False)
+    for table in tables:
+        print_one(table, console)
+        console.print()
+    for sentence in (*history.untested, summary):
+        console.print(sentence, markup=False)

@@ -1,4 +1,4 @@
-"""Slopes of parameters over time, by weighted regression on windows of each robot's history.
+"""A fleet's history from ``jobs.parquet``: slopes of parameters over time, and single logs that stand out.
 
 ======  ============================================  =========
 symbol  name                                          unit
@@ -12,23 +12,21 @@ A window is `SPAN` months long and ends with each month, so that a year holds tw
 slope's error is the one that the intervals give, or the larger one that the scatter about the line shows; its t
 test alarms below `ALPHA`. With seven parameters that is 12 × 7 × 0.001 = 0.084 false alarms a robot-year where
 estimates scatter independently. Sums of a month's moments add up to a window's: the cost is O(N).
-
-Single logs that stand out: outliers of a robot's history, and payloads that are not what their labels say.
-
-`algid fleet`: from ``jobs.parquet`` to ``fleet.parquet``, ``findings.parquet`` and ``fleet.html``.
 """
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from algid.errors import ResultError
 from algid.files import whole_file
 from algid.progress import Told
+from algid.report.text import counted
 
 if TYPE_CHECKING:
     import polars as pl
@@ -38,11 +36,15 @@ SPAN = 3
 ALPHA = 1e-3
 FEWEST = 8  # logs in a window that is tested
 PARAMETERS = ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "f1", "f2", "o1", "o2", "j2")
+FEWEST_PEERS = 3  # logs of a robot, among which one can be told from the others
+OUTLYING = 6.0  # robust standard deviations
+MISLABELLED = 5.0  # standard deviations: one false alarm in 1.7 million logs
+_MAD = 1.4826  # from the median of absolute deviations to a standard deviation
 _SUMS = ("w", "wt", "wtt", "wy", "wty", "wyy", "n")
 
 
 def read_jobs(path: Path) -> pl.DataFrame:
-    """The finished jobs of ``jobs.parquet`` that have a robot and a time; ``t`` is in months, ``month`` whole.
+    """The finished jobs of ``jobs.parquet``; ``t`` is in months, ``month`` whole, both null without a time.
 
     Raises
     ------
@@ -57,16 +59,14 @@ def read_jobs(path: Path) -> pl.DataFrame:
         wanted += [n for p in PARAMETERS if p in names and f"{p}_std" in names for n in (p, f"{p}_std")]
         jobs = pl.read_parquet(path, columns=wanted)
     except (OSError, pl.exceptions.PolarsError) as error:
-        told = str(error).split("\n", maxsplit=1)[0]
-        raise ResultError(f"{path}: cannot read it ({told}); expected jobs.parquet of algid batch") from error
+        reason = str(error).split("\n", maxsplit=1)[0]
+        raise ResultError(f"{path}: cannot read it ({reason}); expected jobs.parquet of algid batch") from error
     missing = {"job", "robot", "time", "status"} - set(names)
     if missing:
         raise ResultError(f"{path}: no column {', '.join(sorted(missing))}; expected jobs.parquet of algid batch")
-    kept = jobs.filter(
-        pl.col("robot").is_not_null() & pl.col("time").is_not_null() & pl.col("status").is_in(["ok", "incomplete"])
-    )
     months = (pl.col("time") - pl.col("time").min().over("robot")).dt.total_seconds() / (86400 * MONTH_DAYS)
-    return kept.with_columns(months.alias("t")).with_columns(pl.col("t").floor().cast(pl.Int32).alias("month"))
+    finished = jobs.filter(pl.col("status").is_in(["ok", "incomplete"]))
+    return finished.with_columns(months.alias("t")).with_columns(pl.col("t").floor().cast(pl.Int32).alias("month"))
 
 
 def parameters_in(jobs: pl.DataFrame) -> list[str]:
@@ -82,7 +82,7 @@ def windows(jobs: pl.DataFrame, parameter: str) -> pl.DataFrame:
     """
     import polars as pl
 
-    known = jobs.filter((pl.col(f"{parameter}_std") > 0) & pl.col(parameter).is_finite())
+    known = jobs.filter(pl.col("time").is_not_null() & (pl.col(f"{parameter}_std") > 0) & pl.col(parameter).is_finite())
     known = known.with_columns(pl.col(parameter).mean().over("robot").alias("centre"))
     w, t, y = 1 / pl.col(f"{parameter}_std") ** 2, pl.col("t"), pl.col(parameter) - pl.col("centre")
     months = known.group_by("robot", "month", maintain_order=False).agg(
@@ -129,14 +129,6 @@ def _regressed(summed: pl.DataFrame, parameter: str) -> pl.DataFrame:
     )
 
 
-if TYPE_CHECKING:
-    import polars as pl
-
-OUTLYING = 6.0  # robust standard deviations
-MISLABELLED = 5.0  # standard deviations: one false alarm in 1.7 million logs
-_MAD = 1.4826  # from the median of absolute deviations to a standard deviation
-
-
 def outliers(jobs: pl.DataFrame) -> pl.DataFrame:
     """Estimates far from their robot's median, in the larger of their own and the history's scatter.
 
@@ -161,19 +153,27 @@ def _far(jobs: pl.DataFrame, name: str) -> pl.DataFrame:
 
 
 def mislabelled(jobs: pl.DataFrame) -> pl.DataFrame:
-    """Payloads that differ from ``label_payload`` (kg) by more than their intervals explain; columns as `outliers`."""
+    """Payloads that differ from ``label_payload`` (kg) by more than their intervals explain; columns as `outliers`.
+
+    Where a robot's payloads scatter about each other by more than their intervals say, that scatter counts. Medians
+    are the lower ones, so that of two logs the one that agrees with its label shows how well they can.
+    """
     import polars as pl
 
     if not {"label_payload", "m_p", "m_p_std"} <= set(jobs.columns) or jobs["label_payload"].dtype != pl.Float64:
         return _nothing(jobs)
-    told = jobs.filter((pl.col("m_p_std") > 0) & pl.col("label_payload").is_not_null()).with_columns(
+    labelled = jobs.filter((pl.col("m_p_std") > 0) & pl.col("label_payload").is_not_null()).with_columns(
         pl.col("label_payload").alias("expected"),
         ((pl.col("m_p") - pl.col("label_payload")) / pl.col("m_p_std")).alias("sigmas"),
     )
-    centred = (pl.col("sigmas") - pl.col("sigmas").median().over("robot")).abs()
-    scatter = (_MAD * centred.median().over("robot")).clip(lower_bound=1.0)
-    wrong = told.with_columns(pl.col("sigmas") / scatter).filter(pl.col("sigmas").abs() > MISLABELLED)
+    centred = (pl.col("sigmas") - _lower_median(pl.col("sigmas")).over("robot")).abs()
+    scatter = (_MAD * _lower_median(centred).over("robot")).clip(lower_bound=1.0)
+    wrong = labelled.with_columns(pl.col("sigmas") / scatter).filter(pl.col("sigmas").abs() > MISLABELLED)
     return _as_findings(wrong, "payload", "m_p")
+
+
+def _lower_median(values: pl.Expr) -> pl.Expr:
+    return values.quantile(0.5, interpolation="lower")
 
 
 def _as_findings(rows: pl.DataFrame, kind: str, name: str) -> pl.DataFrame:
@@ -198,18 +198,32 @@ def _nothing(jobs: pl.DataFrame) -> pl.DataFrame:
     return _as_findings(empty, "payload", "nothing").with_columns(parameter=pl.lit("m_p"))
 
 
-if TYPE_CHECKING:
-    import polars as pl
-
-
 @dataclass(frozen=True, eq=False)
 class History:
-    """A fleet's history: windows (`algid.fleet.history`), findings (`algid.fleet.history`), and what they rest on."""
+    """A fleet's history.
+
+    Parameters
+    ----------
+    windows : as `windows` gives them, of all parameters
+    findings : as `outliers` and `mislabelled` give them
+    roster : a row a robot: robot, logs, undated, first and last (times), tested (for drift, any parameter)
+    nameless : logs that name no robot, and are left out
+    """
 
     windows: pl.DataFrame
     findings: pl.DataFrame
-    robots: int
-    logs: int
+    roster: pl.DataFrame
+    nameless: int = 0
+
+    @property
+    def robots(self) -> int:
+        """How many there are."""
+        return self.roster.height
+
+    @property
+    def logs(self) -> int:
+        """How many there are, of all robots."""
+        return int(self.roster["logs"].sum())
 
     @property
     def drifts(self) -> pl.DataFrame:
@@ -219,42 +233,86 @@ class History:
         found = self.windows.filter("drift").sort("month").group_by("robot", "parameter").last()
         return found.sort(pl.col("p"), "robot", "parameter")
 
+    @property
+    def untested(self) -> list[str]:
+        """What was not looked for, and why: a sentence each."""
+        import polars as pl
 
-def history_of(path: Path, told: Told | None = None) -> History:
-    """The history in ``jobs.parquet`` at `path`; `told` hears how many parameters have been followed.
+        undated = int(self.roster["undated"].sum())
+        steady = self.roster.filter(~pl.col("tested")).height
+        alone = self.roster.filter(pl.col("logs") < FEWEST_PEERS).height
+        why = {
+            f"{counted(self.nameless, 'log')} left out for want of a robot: give each robot's logs their own folder, "
+            "or name robots in a manifest.": self.nameless,
+            f"No drift was looked for in {counted(undated, 'log')} without a date: stamps count from 1970, or a "
+            "manifest tells the time.": undated,
+            f"Drift was not tested for {counted(steady, 'robot')}: fewer than {FEWEST} dated logs within {SPAN} "
+            "months.": steady,
+            f"Outliers were not tested for {counted(alone, 'robot')}: fewer than {FEWEST_PEERS} logs.": alone,
+        }
+        return [sentence for sentence, count in why.items() if count]
+
+    def as_dict(self) -> dict[str, Any]:
+        """What was found, in JSON's own types."""
+        frames = {"robots": self.roster, "drifts": self.drifts, "findings": self.findings}
+        rows = {name: json.loads(frame.fill_nan(None).write_json()) for name, frame in frames.items()}
+        return {**rows, "untested": self.untested}
+
+
+def history_of(path: Path, progress: Told | None = None) -> History:
+    """The history in ``jobs.parquet`` at `path`; `progress` hears how many parameters have been followed.
 
     Raises
     ------
     ResultError
-        If it cannot be read, or no finished job has both a robot and a time.
+        If it cannot be read, or no finished job has both a robot and parameters.
     """
     import polars as pl
 
-    jobs = read_jobs(path)
-    names = parameters_in(jobs)
-    if not jobs.height or not names:
-        raise ResultError(f"{path}: no finished job has a robot, a time and parameters; name them in a manifest")
+    finished = read_jobs(path)
+    names = parameters_in(finished)
+    jobs = finished.filter(pl.col("robot").is_not_null())
+    if not finished.height or not names:
+        raise ResultError(f"{path}: no job has given parameters; see its column reason, and run algid batch again")
+    if not jobs.height:
+        raise ResultError(
+            f"{path}: none of {counted(finished.height, 'finished job')} has a robot; give each robot's logs a folder "
+            "of their own, or name robots in a manifest, and run algid batch again"
+        )
     followed = []
     for place, name in enumerate(names):
-        if told is not None:
-            told("following", place, len(names))
+        if progress is not None:
+            progress("following", place, len(names))
         followed.append(windows(jobs, name))
     history = pl.concat(followed)
-    findings = pl.concat([mislabelled(jobs), outliers(jobs)]).sort(
-        "kind", "robot", "time", "parameter", descending=False
+    findings = pl.concat([mislabelled(jobs), outliers(jobs)]).sort("kind", "robot", "time", "parameter")
+    return History(history, findings, _roster(jobs, history), finished.height - jobs.height)
+
+
+def _roster(jobs: pl.DataFrame, history: pl.DataFrame) -> pl.DataFrame:
+    import polars as pl
+
+    tested = history.filter(pl.col("p").is_not_nan())["robot"].unique().implode()
+    return (
+        jobs.group_by("robot")
+        .agg(
+            pl.len().alias("logs"),
+            pl.col("time").null_count().alias("undated"),
+            pl.col("time").min().alias("first"),
+            pl.col("time").max().alias("last"),
+        )
+        .with_columns(tested=pl.col("robot").is_in(tested))
+        .sort("robot")
     )
-    return History(history, findings, jobs["robot"].n_unique(), jobs.height)
 
 
 def write_history(history: History, out: Path) -> list[Path]:
     """Write ``fleet.parquet``, ``findings.parquet`` and ``fleet.html`` into `out`. Raises `OutputError`."""
     from algid.fleet.page import fleet_html
 
-    written = []
     for name, frame in (("fleet.parquet", history.windows), ("findings.parquet", history.findings)):
         with whole_file(out / name) as temporary:
             frame.write_parquet(temporary)
-        written.append(out / name)
     with whole_file(out / "fleet.html") as temporary:
         temporary.write_text(fleet_html(history), encoding="utf-8")
-    return [*written, out / "fleet.html"]
+    return [out / name for name in ("fleet.parquet", "findings.parquet", "fleet.html")]

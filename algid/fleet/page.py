@@ -11,7 +11,7 @@ from algid.report.figures.base import Figure, Panel, axis, label
 from algid.report.html import escaped, figure_html, script_json, table_html
 from algid.report.page import document, drawing
 from algid.report.table import Column, Table
-from algid.report.text import significant, visible
+from algid.report.text import ABSENT, counted, joined, significant, visible
 
 if TYPE_CHECKING:
     from algid.fleet.history import History
@@ -23,25 +23,64 @@ MOST_PANELS = 12
 def fleet_html(history: History) -> str:
     """The page's text."""
     figures = _figures(history)
-    facts = f"{history.robots:,} robots · {history.logs:,} logs"
+    facts = f"{counted(history.robots, 'robot')} · {counted(history.logs, 'log')}"
     body = [
         f'<header><p class="kicker">algid · a fleet\'s history</p><h1>Fleet</h1><p class="facts">{escaped(facts)}</p>',
-        '</header>\n<main id="numbers">',
-        table_html(drift_table(history)),
+        "</header>",
+        *(f'<p class="facts">{escaped(sentence)}</p>' for sentence in history.untested),
+        '<main id="numbers">',
+        *(table_html(table) for table in (drift_table(history), finding_table(history)) if table.rows),
         *map(figure_html, figures),
-        table_html(finding_table(history)),
+        table_html(robot_table(history)),
         "</main>",
     ]
     return document("Fleet", "\n".join(body), script_json(drawing(figures)))
 
 
+def robot_table(history: History) -> Table:
+    """Every robot: its logs, their dates, and what was found of it."""
+    import polars as pl
+
+    drifting = dict(history.drifts.group_by("robot").agg(pl.col("parameter").sort()).iter_rows())
+    standing_out = dict(history.findings.group_by("robot").agg(pl.col("job").n_unique()).iter_rows())
+    columns = (
+        Column("Robot", "name"),
+        Column("Logs", "number"),
+        Column("From", "text", rank=2),
+        Column("To", "text", rank=1),
+        Column("Drift", "text"),
+        Column("Logs that stand out", "number"),
+    )
+    shown = history.roster.head(MOST_ROWS)
+    rows = tuple(
+        (
+            visible(row["robot"]),
+            str(row["logs"]),
+            *(ABSENT if row[end] is None else row[end].date().isoformat() for end in ("first", "last")),
+            joined(drifting.get(row["robot"], [])) or ("none" if row["tested"] else "not tested"),
+            str(standing_out.get(row["robot"], 0)),
+        )
+        for row in shown.iter_rows(named=True)
+    )
+    note = "" if shown.height == history.robots else f"{history.robots:,} robots; the first {shown.height} are shown."
+    return Table("Robots", columns, rows, note)
+
+
 def drift_table(history: History) -> Table:
     """Parameters that drift, the clearest first."""
-    columns = ("Robot", "Parameter", "Until", "Logs", "Mean", "Slope, % a month", "95 % interval", "p")
-    kinds = ("name", "text", "text", "number", "number", "number", "number", "number")
+    columns = (
+        Column("Robot", "name"),
+        Column("Parameter", "text"),
+        Column("Until", "text", rank=1),
+        Column("Logs", "number", rank=2),
+        Column("Mean", "number", rank=3),
+        Column("Slope, % a month", "number"),
+        Column("95 % interval", "number"),
+        Column("p", "number", rank=4),
+    )
     rows = tuple(_drift_row(row) for row in history.drifts.head(MOST_ROWS).iter_rows(named=True))
     note = f"{history.drifts.height} found. A slope over {SPAN} months is told from none at p < {ALPHA:g}."
-    return Table("Drift", tuple(map(Column, columns, kinds)), rows, note)  # type: ignore[arg-type]
+    return Table("Drift", columns, rows, note)
 
 
 def _drift_row(row: dict[str, Any]) -> tuple[str, ...]:
@@ -63,8 +102,15 @@ def finding_table(history: History) -> Table:
     """Payloads unlike their labels, and outliers, the farthest first."""
     import polars as pl
 
-    columns = ("Job", "Robot", "What", "Parameter", "Value", "Expected", "σ away")
-    kinds = ("name", "text", "text", "text", "number", "number", "number")
+    columns = (
+        Column("Job", "name"),
+        Column("Robot", "text", rank=1),
+        Column("What", "text"),
+        Column("Parameter", "text"),
+        Column("Value", "number"),
+        Column("Expected", "number"),
+        Column("σ away", "number"),
+    )
     worst = history.findings.sort(pl.col("sigmas").abs(), descending=True).head(MOST_ROWS)
     rows = tuple(
         (
@@ -79,7 +125,7 @@ def finding_table(history: History) -> Table:
         for row in worst.iter_rows(named=True)
     )
     note = f"{history.findings.height} found; the farthest {len(rows)} are shown."
-    return Table("Logs that stand out", tuple(map(Column, columns, kinds)), rows, note)  # type: ignore[arg-type]
+    return Table("Logs that stand out", columns, rows, note)
 
 
 def _figures(history: History) -> list[Figure]:

@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from scipy.stats import linregress
 
 from algid.errors import ResultError
 from algid.fleet.history import History, history_of, write_history
+from algid.fleet.page import robot_table
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 NAMES = tuple(f"k{n}" for n in range(1, 8))
@@ -75,6 +77,81 @@ def test_outliers_and_wrong_labels_are_told(tmp_path: Path) -> None:
     assert findings.select("kind", "job", "parameter").rows() == [("outlier", "j7", "k3"), ("payload", "j40", "m_p")]
 
 
+def _payloads(values: list[float], std: float = 0.001) -> pl.DataFrame:
+    jobs = _jobs(1, len(values), seed=6)
+    return jobs.with_columns(m_p=pl.Series(values), m_p_std=pl.lit(std), label_payload=pl.lit(0.5))
+
+
+@pytest.mark.parametrize(
+    ("values", "wrong"),
+    [
+        ([0.9], ["j0"]),
+        ([0.5001, 0.9], ["j1"]),
+        ([0.9, 0.5001], ["j0"]),
+        ([0.1, 0.4999], ["j0"]),
+        ([0.5001, 0.9, 0.4995], ["j1"]),
+        ([0.5001, 0.9, 0.4995, 0.5005], ["j1"]),
+        ([0.9, 0.9002], ["j0", "j1"]),
+        ([0.504, 0.496], []),
+        ([0.5, 0.47, 0.53, 0.48, 0.52, 0.51], []),  # their own scatter is what they are judged by
+    ],
+)
+def test_a_wrong_label_is_found_however_few_the_logs(values: list[float], wrong: list[str], tmp_path: Path) -> None:
+    findings = _history(_payloads(values), tmp_path).findings
+    assert findings.filter(pl.col("kind") == "payload")["job"].to_list() == wrong
+
+
+def test_the_scatter_about_the_line_widens_its_error(tmp_path: Path) -> None:
+    last = _history(_jobs(1, 60, seed=7, scatter=4.0), tmp_path).windows.filter(parameter="k2").row(-1, named=True)
+    jobs = pl.read_parquet(tmp_path / "jobs.parquet")
+    t = np.arange(60) / 30.4375
+    found = linregress(t, jobs["k2"].to_numpy())  # its error is the scatter's, which is four times the intervals'
+    assert last["slope_std"] == pytest.approx(found.stderr, rel=1e-9)
+    assert last["p"] == pytest.approx(found.pvalue, rel=1e-6)
+    calm = _history(_jobs(1, 60, seed=7, scatter=0.25), tmp_path).windows.filter(parameter="k2").row(-1, named=True)
+    assert calm["slope_std"] == pytest.approx(0.005 / np.sqrt(np.sum((t - t.mean()) ** 2)), rel=1e-9)
+
+
+def test_a_window_holds_three_months(tmp_path: Path) -> None:
+    history = _history(_jobs(1, 200, seed=8), tmp_path)
+    months = np.floor(np.arange(200) / 30.4375)
+    expected = [int(np.sum((months > month - 3) & (months <= month))) for month in range(7)]
+    assert history.windows.filter(parameter="k1").sort("month")["logs"].to_list() == expected
+
+
+def test_what_was_not_tested_is_said_and_its_robots_are_shown(tmp_path: Path) -> None:
+    few = _jobs(1, 7, seed=9)
+    assert _history(few, tmp_path).untested == [
+        "Drift was not tested for 1 robot: fewer than 8 dated logs within 3 months."
+    ]
+    assert _history(_jobs(1, 8, seed=9), tmp_path).untested == []
+    undated = _jobs(2, 2, seed=9).with_columns(time=pl.lit(None, dtype=pl.Datetime("us", "UTC")))
+    nameless = _jobs(1, 1, seed=9).with_columns(robot=pl.lit(None, dtype=pl.String))
+    history = _history(pl.concat([undated, nameless]), tmp_path)
+    assert (history.robots, history.logs, history.nameless) == (2, 4, 1)
+    assert [sentence.split(":")[0] for sentence in history.untested] == [
+        "1 log left out for want of a robot",
+        "No drift was looked for in 4 logs without a date",
+        "Drift was not tested for 2 robots",
+        "Outliers were not tested for 2 robots",
+    ]
+    write_history(history, tmp_path)
+    page = (tmp_path / "fleet.html").read_text()
+    assert "2 robots · 4 logs" in page
+    assert "for want of a robot" in page
+    assert [row[0] for row in robot_table(history).rows] == ["r0", "r1"]
+    assert {row[4] for row in robot_table(history).rows} == {"not tested"}
+    assert all(f">{robot}<" in page for robot in ("r0", "r1"))
+
+
+def test_a_robot_is_shown_with_what_was_found_of_it(tmp_path: Path) -> None:
+    jobs = _jobs(2, 92, seed=1, growth=0.05)
+    history = _history(jobs.with_columns(m_p=pl.lit(0.4), m_p_std=pl.lit(0.001), label_payload=pl.lit(0.5)), tmp_path)
+    first = dict(zip((c.heading for c in robot_table(history).columns), robot_table(history).rows[0], strict=True))
+    found = {"Robot": "r0", "Logs": "92", "From": "2026-01-01", "To": "2026-04-02", "Drift": "k6"}
+    assert first == found | {"Logs that stand out": "92"}
+
+
 def test_the_page_escapes_names_and_asks_no_host(tmp_path: Path) -> None:
     jobs = _jobs(1, 92, seed=1, growth=0.05).with_columns(robot=pl.lit("<script>alert(1)</script>"))
     write_history(_history(jobs, tmp_path), tmp_path)
@@ -87,7 +164,7 @@ def test_the_page_escapes_names_and_asks_no_host(tmp_path: Path) -> None:
 
 
 def test_a_table_without_robots_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ResultError, match="no finished job has a robot"):
+    with pytest.raises(ResultError, match="none of 3 finished jobs has a robot; give each robot's logs a folder"):
         _history(_jobs(1, 3, seed=1).with_columns(robot=pl.lit(None, dtype=pl.String)), tmp_path)
     with pytest.raises(ResultError, match="cannot read it"):
         history_of(tmp_path / "absent.parquet")

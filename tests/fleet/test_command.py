@@ -1,0 +1,78 @@
+"""`algid fleet` as its users call it, on what `algid batch` writes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import polars as pl
+import pytest
+from typer.testing import CliRunner
+
+from algid.batch.jobs import Job
+from algid.batch.records import End, Record, write_jobs
+from algid.cli.app import app
+from algid.errors import ResultError
+from algid.stores import open_store
+
+
+def _batch(folder: Path, robots: int = 2, logs: int = 10, start_ns: int = 1_700_000_000 * 10**9) -> Path:
+    """A batch whose first robot's k6 doubles within its logs, one a day."""
+    records = [
+        Record(
+            Job(f"r{robot}/{day}", ("a.csv",), robot=f"r{robot}", labels={"payload": 0.5}),
+            End.OK, "", "", (), {}, "", 1.0, start_ns + day * 86_400 * 10**9, 10.0, "refined",
+            {
+                "k1": (1.0, 0.01, "OK"),
+                "k6": (1.0 + (day / logs if robot == 0 else 0.0), 0.01, "OK"),
+                "m_p": (0.5 if robot or day else 0.9, 0.001, "OK"),
+            },
+        )
+        for robot in range(robots)
+        for day in range(logs)
+    ]  # fmt: skip
+    write_jobs(open_store(str(folder)), records)
+    return folder
+
+
+def test_drift_and_findings_are_printed_and_written(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["fleet", str(_batch(tmp_path)), "-o", str(tmp_path / "page")])
+    assert done.exit_code == 0, done.output
+    assert "2 robots, 20 logs: 1 drift and 1 finding" in done.stdout
+    assert "payload unlike its label" in done.stdout
+    assert "wrote" in done.stderr
+    assert {path.name for path in (tmp_path / "page").iterdir()} == {"fleet.parquet", "findings.parquet", "fleet.html"}
+    assert pl.read_parquet(tmp_path / "page/fleet.parquet").height == 4
+
+
+def test_json_and_markdown_say_the_same(tmp_path: Path) -> None:
+    _batch(tmp_path)
+    content = json.loads(CliRunner().invoke(app, ["fleet", str(tmp_path), "--format", "json"]).stdout)
+    assert [(row["robot"], row["logs"], row["tested"]) for row in content["robots"]] == [
+        ("r0", 10, True),
+        ("r1", 10, True),
+    ]
+    assert [(row["robot"], row["parameter"]) for row in content["drifts"]] == [("r0", "k6")]
+    assert [(row["job"], row["kind"], row["expected"]) for row in content["findings"]] == [("r0/0", "payload", 0.5)]
+    assert content["untested"] == []
+    text = CliRunner().invoke(app, ["fleet", str(tmp_path), "--format", "markdown"]).stdout
+    assert "| r0 | k6 |" in text
+    assert "2 robots, 20 logs: 1 drift and 1 finding" in text
+
+
+def test_logs_whose_stamps_have_no_date_still_show_their_robots(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["fleet", str(_batch(tmp_path, robots=1, logs=2, start_ns=0))])
+    assert done.exit_code == 0, done.output
+    assert "No drift was looked for in 2 logs without a date" in " ".join(done.stdout.split())
+    assert "1 robot, 2 logs: 0 drifts and 1 finding" in done.stdout
+    assert "not tested" in done.stdout
+
+
+def test_what_is_no_batch_is_refused(tmp_path: Path) -> None:
+    pl.DataFrame({"a": [1]}).write_parquet(tmp_path / "jobs.parquet")
+    done = CliRunner().invoke(app, ["fleet", str(tmp_path)])
+    assert isinstance(done.exception, ResultError)
+    assert "no column job, robot, status, time; expected jobs.parquet of algid batch" in str(done.exception)
+    write_jobs(open_store(str(tmp_path)), [])
+    with pytest.raises(ResultError, match="no job has given parameters"):
+        CliRunner().invoke(app, ["fleet", str(tmp_path)], catch_exceptions=False)
