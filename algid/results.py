@@ -111,7 +111,7 @@ class TorquePrediction(_Model):
     filter: str
 
 
-class Fit(_Model):
+class FitSummary(_Model):
     """What a statistical estimator knows beside the estimates.
 
     `noise` holds the standard deviations theta1, theta2 (rad), tau1, tau2 (N m); `covariance` belongs to
@@ -133,7 +133,7 @@ class Fit(_Model):
     cross_validation: TorquePrediction | None = None
 
     @model_validator(mode="after")
-    def _covariance_is_square(self) -> Fit:
+    def _covariance_is_square(self) -> FitSummary:
         size = len(self.covariance_names)
         if [len(row) for row in self.covariance] != [size] * size:
             raise ValueError(f"covariance should have {size} rows of {size} numbers, as covariance_names")
@@ -163,7 +163,7 @@ class Result(_Model):
     paper_payload: dict[str, Estimate] = {}
     table4: list[Table4Row] = []
     truth: dict[str, float] = {}
-    fit: Fit | None = None
+    fit: FitSummary | None = None
     settings: dict[str, Any]
     log: LogSummary
     more_logs: list[LogSummary] = []

@@ -1,15 +1,48 @@
-"""Everything that decides an identification, as one value that travels into its result."""
+"""Everything that decides an identification, as one value that travels into its result.
+
+The command line derives its options from the fields: what one is called, what it may be, and its help stand here only.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Literal
 
 from algid.errors import SettingError
-from algid.signals.observers import PAPER_POLES
 
 Estimator = Literal["refined", "weak", "paper"]
+
+
+def flag(name: str) -> str:
+    """The command line's option of a setting."""
+    return "--" + name.replace("_", "-")
+
+
+def _delay(text: str) -> float | Literal["estimate"]:
+    if text == "estimate":
+        return "estimate"
+    try:
+        return float(text)
+    except ValueError:
+        raise SettingError(f"--delay: expected seconds or 'estimate', found {text!r}") from None
+
+
+def _poles(text: str) -> tuple[complex, ...]:
+    """Six poles out of text; complex ones like -80+20j."""
+    from algid.signals.observers import observer_gain
+
+    like = "give six like -80,-390,-391,-392,-393,-394"
+    try:
+        poles = tuple(complex(part.strip()) for part in text.split(","))
+    except ValueError:
+        raise SettingError(f"--poles {text}: expected numbers between commas; {like}") from None
+    try:
+        observer_gain(poles)
+    except ValueError as error:
+        raise SettingError(f"--poles {text}: {error}; {like}") from None
+    return tuple(pole.real if pole.imag == 0 else pole for pole in poles)
 
 
 @dataclass(frozen=True)
@@ -23,7 +56,8 @@ class Settings:
         Where joint velocities come from. The refined estimator needs none.
     observer : 'luenberger' (eq. 6), 'zero-phase', or None
         None takes the paper's observer for the paper's method and the zero-phase differentiator otherwise.
-    poles : six complex, rad/s, three a joint
+    poles : six complex, rad/s, three a joint, or None
+        Of the paper's observer; None takes the paper's.
     window : float, s, or None
         After how long the paper's integrals restart (2 s), or the length of the weak form's windows (0.4 s).
     bandwidth : float, Hz, of the zero-phase differentiator
@@ -35,36 +69,73 @@ class Settings:
     l1, l2 : float, m, link lengths where known
     constrain : bool, solve within the physical bounds
     cross_validate : bool, leave each log out in turn
+
+    Raises
+    ------
+    SettingError
+        If a number has no meaning, or the paper's method lacks what is set.
     """
 
-    estimator: Estimator = "refined"
-    velocity: Literal["observer", "measured"] = "observer"
-    observer: Literal["luenberger", "zero-phase"] | None = None
-    poles: tuple[complex, ...] = PAPER_POLES
-    window: float | None = None
-    bandwidth: float = 60.0
-    gravity: float = 9.81
-    friction: Literal["viscous", "coulomb"] = "viscous"
-    torque_offset: bool = False
-    rotor_inertia: bool = False
-    torque_hold: Literal["foh", "zoh"] = "foh"
-    delay: float | Literal["estimate"] = 0.0
-    l1: float | None = None
-    l2: float | None = None
-    constrain: bool = False
-    cross_validate: bool = False
+    estimator: Estimator = field(default="refined", metadata={"help": "How to estimate."})
+    velocity: Literal["observer", "measured"] = field(
+        default="observer", metadata={"help": "Observe velocities, or use the log's own."}
+    )
+    observer: Literal["luenberger", "zero-phase"] | None = field(
+        default=None, metadata={"help": "The paper's observer, or the zero-phase differentiator."}
+    )
+    poles: tuple[complex, ...] | None = field(
+        default=None,
+        metadata={"help": "Six poles of the paper's observer, rad/s, three a joint, like -80,-390,….", "parse": _poles},
+    )
+    window: float | None = field(
+        default=None,
+        metadata={"help": "Window, s: the paper's integrals restart after it (2), or the weak form's (0.4)."},
+    )
+    bandwidth: float = field(default=60.0, metadata={"help": "Of the zero-phase differentiator, Hz."})
+    gravity: float = field(default=9.81, metadata={"help": "m/s²; 0 for an arm that moves in a horizontal plane."})
+    friction: Literal["viscous", "coulomb"] = field(
+        default="viscous", metadata={"help": "Viscous, or viscous and Coulomb."}
+    )
+    torque_offset: bool = field(default=False, metadata={"help": "Estimate an offset of each torque."})
+    rotor_inertia: bool = field(default=False, metadata={"help": "Estimate joint 2's rotor inertia."})
+    torque_hold: Literal["foh", "zoh"] = field(
+        default="foh", metadata={"help": "Torque between samples: ramped or held."}
+    )
+    delay: float | Literal["estimate"] = field(
+        default=0.0, metadata={"help": "From torque to angle, s, or 'estimate'.", "parse": _delay}
+    )
+    l1: float | None = field(default=None, metadata={"help": "Length of link 1, m, where known."})
+    l2: float | None = field(default=None, metadata={"help": "Length of link 2, m, where known."})
+    constrain: bool = field(default=False, metadata={"help": "Solve within the physical bounds."})
+    cross_validate: bool = field(
+        default=False, metadata={"help": "Predict each log from the others and report how well."}
+    )
 
     def __post_init__(self) -> None:
         for name, low in (("window", 0.0), ("bandwidth", 0.0), ("l1", 0.0), ("l2", 0.0)):
             value = getattr(self, name)
             if value is not None and not low < value < math.inf:
-                raise SettingError(f"{name}: expected a number above {low:g}, found {value:g}")
+                raise SettingError(f"{flag(name)}: expected a number above {low:g}, found {value:g}")
         if not 0.0 <= self.gravity < math.inf:
-            raise SettingError(f"gravity: expected a number of 0 or more, found {self.gravity:g}")
+            raise SettingError(f"--gravity: expected a number of 0 or more, found {self.gravity:g}")
         if self.delay != "estimate" and not math.isfinite(self.delay):
-            raise SettingError(f"delay: expected seconds or 'estimate', found {self.delay:g}")
+            raise SettingError(f"--delay: expected seconds or 'estimate', found {self.delay:g}")
         if self.estimator == "paper":
             self._refuse_what_the_paper_lacks()
+
+    @classmethod
+    def of(cls, content: Mapping[str, Any]) -> Settings:
+        """The settings in a result's `settings`, which hold more than these; defaults where it lacks one.
+
+        Raises
+        ------
+        SettingError
+            As for a new one.
+        """
+        known = {f.name: content[f.name] for f in fields(cls) if f.name in content}
+        if known.get("poles") is not None:
+            known["poles"] = tuple(complex(pole) if isinstance(pole, str) else float(pole) for pole in known["poles"])
+        return cls(**known)
 
     @property
     def luenberger(self) -> bool:
@@ -84,16 +155,18 @@ class Settings:
         return hold + (0.0 if self.delay == "estimate" else self.delay)
 
     def as_json(self) -> dict[str, Any]:
-        """For `result.json`; complex poles as text."""
-        content = asdict(self)
-        content["poles"] = [pole.real if complex(pole).imag == 0 else str(pole) for pole in map(complex, self.poles)]
-        return content
+        """For `result.json`; complex poles as text, the paper's where none are set."""
+        from algid.signals.observers import PAPER_POLES
+
+        poles = map(complex, self.poles or PAPER_POLES)
+        return asdict(self) | {"poles": [pole.real if pole.imag == 0 else str(pole) for pole in poles]}
 
     def _refuse_what_the_paper_lacks(self) -> None:
         ours = {f.name: f.default for f in fields(self)}
         for name in ("friction", "torque_offset", "rotor_inertia", "delay", "l1", "l2", "constrain", "cross_validate"):
             if getattr(self, name) != ours[name]:
-                flag = "--" + name.replace("_", "-")
-                raise SettingError(f"{flag}: the paper's method has no such term; use --estimator refined or weak")
+                raise SettingError(
+                    f"{flag(name)}: the paper's method has no such term; use --estimator refined or weak"
+                )
         if self.gravity == 0:
             raise SettingError("--gravity 0: the paper's payload needs gravity; use --estimator refined or weak")

@@ -54,7 +54,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "fleet": room("errors files progress report", "numpy polars scipy"),
     "cli": room(
         "batch check errors files fleet identification inspection log profile progress readers report results runtime "
-        "settings signals stores synth track writers",
+        "settings stores synth track writers",
         "rich typer",
     ),
 }  # fmt: skip

@@ -28,7 +28,7 @@ def validate(
 
     Example: algid validate run1-unloaded.algid run2-unloaded.mcap --max-nrmse 0.3
     """
-    from algid.identification.source import LogSource, Passes
+    from algid.identification.source import Survey, open_sources
     from algid.identification.validate import validate as judge
     from algid.report.progress import progress
     from algid.results import read_result
@@ -36,11 +36,11 @@ def validate(
     meaning = choice.profile()
     known = read_result(result)
     gravity = float(known.settings.get("gravity", 9.81))
-    sources = [LogSource(log, "unloaded", meaning, gravity) for log in logs]
-    sources += [LogSource(log, "loaded", meaning, gravity) for log in loaded or []]
+    sources = open_sources(logs, "unloaded", meaning, gravity) + open_sources(loaded, "loaded", meaning, gravity)
     with progress("samples") as told:
-        Passes(told, sources).begin("prediction", sources)
-        found = judge(known, sources, str(result))
+        survey = Survey(sources, told)
+        survey.begin("prediction")
+        found = judge(known, survey, str(result))
     for name, one in {**found.logs, "all logs": found.total}.items():
         print(_line(name, one))
     if found.total is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -14,44 +14,51 @@ from algid.estimators.combine import Prior
 from algid.estimators.diagnostics import constrained
 from algid.estimators.fit import Fit
 from algid.estimators.prediction import PredictionSums
-from algid.identification.source import LogSource
+from algid.identification.source import LogSource, Survey
 from algid.identification.velocities import with_velocities
 from algid.model import Model
-from algid.progress import Told
 from algid.results import Result
 from algid.runtime import beside
 from algid.settings import Settings
 from algid.signals.segments import Segment
 
 Pass = Callable[[], Iterable[Segment]]
+Predictions = Mapping[LogSource, PredictionSums]
+"""What scores a prediction of a log by any coefficients."""
 
 
-def run_fit(
-    unloaded: Sequence[LogSource],
-    loaded: Sequence[LogSource],
-    settings: Settings,
-    prior: Prior | None,
-    told: Told | None = None,
-) -> Fit:
-    """Fit the settings' estimator to logs, telling the refined one's steps.
+def run_fit(survey: Survey, settings: Settings, prior: Prior | None) -> tuple[Fit, Predictions]:
+    """Fit the settings' estimator to logs.
+
+    Parameters
+    ----------
+    survey : Survey
+        Of the logs; its `told` is told the refined estimator's steps too.
+    settings : Settings
+    prior : Prior
+        What is known of the arm beforehand.
+
+    Returns
+    -------
+    The fit, and the sums that score its prediction of each log, where a pass of the estimator could gather them.
 
     Raises
     ------
     LogError
         If no log is long enough.
     """
-    for log in (*unloaded, *loaded):
-        log.prediction = None  # of another fit's settings
-    weak_settings, sources = _weak_settings(settings), (_passes(unloaded, settings), _passes(loaded, settings))
+    sums: dict[LogSource, PredictionSums] = {}
+    weak_settings = _weak_settings(settings)
+    unloaded, loaded = (_passes(survey, logs, settings, sums) for logs in (survey.unloaded, survey.loaded))
     try:
         if settings.estimator == "weak":
-            fit = weak.fit(*sources, weak_settings, settings.lengths, prior)
+            fit = weak.fit(unloaded, loaded, weak_settings, settings.lengths, prior)
         else:
-            fit = refined.fit(*sources, _refined_settings(settings, weak_settings, prior), told)
+            fit = refined.fit(unloaded, loaded, _refined_settings(settings, weak_settings, prior), survey.told)
     except ValueError as error:
-        names = ", ".join(log.name for log in (*unloaded, *loaded))
+        names = ", ".join(log.name for log in survey.logs)
         raise LogError(f"{names}: {error}; record longer") from error
-    return constrained(fit) if settings.constrain else fit
+    return constrained(fit) if settings.constrain else fit, sums
 
 
 def model_of(settings: Settings) -> Model:
@@ -90,26 +97,33 @@ def _refined_settings(
     )
 
 
-def _passes(logs: Sequence[LogSource], settings: Settings) -> list[Pass]:
+def _passes(
+    survey: Survey, logs: Sequence[LogSource], settings: Settings, sums: dict[LogSource, PredictionSums]
+) -> list[Pass]:
     """A callable a log that gives a fresh pass, with velocities only where they are not observed on the way."""
     own = settings.velocity == "measured" or settings.luenberger
     passes: list[Pass] = [
-        partial(with_velocities, log, settings, luenberger=settings.luenberger) if own else log.segments for log in logs
+        partial(with_velocities, survey, log, settings, luenberger=settings.luenberger)
+        if own
+        else partial(survey.segments, log)
+        for log in logs
     ]
     if settings.delay == "estimate":  # what the prediction is scored by depends on it
         return passes
-    return [partial(_watched, log, moving, settings) for log, moving in zip(logs, passes, strict=True)]
+    return [partial(_watched, log, moving, settings, sums) for log, moving in zip(logs, passes, strict=True)]
 
 
-def _watched(log: LogSource, moving: Pass, settings: Settings) -> Iterator[Segment]:
+def _watched(
+    log: LogSource, moving: Pass, settings: Settings, sums: dict[LogSource, PredictionSums]
+) -> Iterator[Segment]:
     """A pass that also gathers, once, what the prediction will be scored by."""
-    if log.prediction is not None:
+    if log in sums:
         yield from moving()
         return
-    sums = PredictionSums(model_of(settings), settings.torque_shift)
-    yield from beside(moving(), sums.push)
-    sums.finish()
-    log.prediction = sums
+    gathered = PredictionSums(model_of(settings), settings.torque_shift)
+    yield from beside(moving(), gathered.push)
+    gathered.finish()
+    sums[log] = gathered
 
 
 def prior_of(result: Result, settings: Settings, file: str | None = None) -> Prior:

@@ -22,7 +22,7 @@ from algid.estimators.paper import (
     wanders,
 )
 from algid.identification.series import series_blocks, write_columns
-from algid.identification.source import LogSource
+from algid.identification.source import LogSource, Survey
 from algid.identification.summary import FAR_BEYOND, Outcome, distrusted
 from algid.identification.velocities import with_velocities
 from algid.results import Estimate, Status
@@ -35,6 +35,7 @@ STAGE2_FILE = "loaded.parquet"
 
 
 def run_paper(
+    survey: Survey,
     unloaded: LogSource | None,
     loaded: LogSource | None,
     settings: Settings,
@@ -52,7 +53,7 @@ def run_paper(
     rows: dict[str, float] = {}
     k = known
     if unloaded is not None:
-        values, wander, usable = _estimate(unloaded, settings, None, folder)
+        values, wander, usable = _estimate(survey, unloaded, settings, None, folder)
         k = values[: len(CONSTANT_NAMES)]
         parameters = _named(CONSTANT_NAMES, CONSTANT_UNITS, values, usable)
         if _is_no_arm(np.where(usable[: k.size], k, np.nan), wander):
@@ -61,7 +62,7 @@ def run_paper(
             rows |= unloaded_rows(k)
     if loaded is None or k is None or not np.isfinite(k).all():
         return Outcome(parameters, _weak(STAGE2_NAMES, loaded), _weak(("m_p", "l1"), loaded), rows)
-    values, wander, usable = _estimate(loaded, settings, k, folder)
+    values, wander, usable = _estimate(survey, loaded, settings, k, folder)
     names = (*STAGE2_NAMES, "l1", "m_p")
     named = _named(names, {**UNITS, "l1": "m"}, values, usable)
     if np.any((values + FAR_BEYOND * wander)[[names.index("l1"), names.index("m_p")]] < 0):
@@ -76,22 +77,23 @@ def run_paper(
 
 
 def _estimate(
-    source: LogSource, settings: Settings, k: FloatArray | None, folder: Path | None
+    survey: Survey, log: LogSource, settings: Settings, k: FloatArray | None, folder: Path | None
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
     """Estimates from one log's series, how far they wander, and which can be used; writes the series on the way."""
     names = STAGE1_SERIES if k is None else STAGE2_SERIES
     summary = Summary(len(names))
-    series = _series(source, settings, k)
+    series = _series(survey, log, settings, k)
     watched = _watched(series, summary)
     if folder is None:
         for _ in watched:
             pass
     else:
         path = folder / (STAGE1_FILE if k is None else STAGE2_FILE)
-        write_columns(path, _written(watched, names), [source.start_ns])
-    if source.summary().duration < SHORTEST - 1e-9:
+        write_columns(path, _written(watched, names), [survey.seen(log).first_ns])
+    duration = survey.summary(log).duration
+    if duration < SHORTEST - 1e-9:
         raise LogError(
-            f"{source.name}: {source.summary().duration:.3g} s long; the paper's method needs {SHORTEST:g} s at least "
+            f"{log.name}: {duration:.3g} s long; the paper's method needs {SHORTEST:g} s at least "
             "to settle; record longer"
         )
     estimate, wander = summary.estimates()
@@ -106,9 +108,9 @@ def _is_no_arm(k: FloatArray, wander: FloatArray) -> bool:
     return bool(np.any(m22 <= 0) or np.any(m11 * m22 - m12**2 <= 0))
 
 
-def _series(source: LogSource, settings: Settings, k: FloatArray | None) -> Iterator[Series]:
+def _series(survey: Survey, log: LogSource, settings: Settings, k: FloatArray | None) -> Iterator[Series]:
     window = settings.window if settings.window is not None and settings.estimator == "paper" else STAGE1_WINDOW
-    moving = with_velocities(source, settings, luenberger=settings.luenberger or settings.estimator != "paper")
+    moving = with_velocities(survey, log, settings, luenberger=settings.luenberger or settings.estimator != "paper")
     if k is None:
         return stage1_series(moving, window)
     return stage2_series(moving, window, k, settings.gravity)

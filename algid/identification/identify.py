@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ from algid.estimators.paper import SHORTEST
 from algid.files import remove_stale, result_folder, whole_folder
 from algid.identification.by_paper import run_paper
 from algid.identification.series import write_fit_series
-from algid.identification.source import LogLike, LogSource, Passes, sources_of
+from algid.identification.source import LogLike, LogSource, Survey, open_sources
 from algid.identification.summary import Outcome, result_of
 from algid.progress import Told
 from algid.results import Result, read_result, write_result
@@ -96,21 +96,23 @@ def identify(
     """
     settings = settings or Settings()
     earlier = Earlier.of(parameters)
-    bare = sources_of(unloaded, "unloaded", profile, settings.gravity)
-    burdened = sources_of(loaded, "loaded", profile, settings.gravity)
-    if not bare and (earlier is None or not burdened):
+    sources = [
+        *open_sources(unloaded, "unloaded", profile, settings.gravity),
+        *open_sources(loaded, "loaded", profile, settings.gravity),
+    ]
+    survey = Survey(sources, told)
+    if not survey.unloaded and (earlier is None or not survey.loaded):
         raise ValueError("an unloaded log is needed, or parameters and a loaded log")
-    if settings.cross_validate and (len(bare) == 1 or len(burdened) == 1):
-        kind = "unloaded" if len(bare) == 1 else "loaded"
+    if settings.cross_validate and (len(survey.unloaded) == 1 or len(survey.loaded) == 1):
+        kind = "unloaded" if len(survey.unloaded) == 1 else "loaded"
         raise SettingError(f"--cross-validate: expected two {kind} logs or more, found one; give more, or leave it out")
-    passes = Passes(told, [*bare, *burdened])
     if out is None:
-        return _identify(bare, burdened, settings, earlier, None, report, passes)
-    folder = result_folder((bare + burdened)[0].name, out) if name is None else out / f"{name}.algid"
+        return _identify(survey, settings, earlier, None, report)
+    folder = result_folder(sources[0].name, out) if name is None else out / f"{name}.algid"
     if name is None:  # a batch sweeps its whole output once
         remove_stale(folder)
     with whole_folder(folder, force) as temporary:
-        result = _identify(bare, burdened, settings, earlier, temporary, report, passes)
+        result = _identify(survey, settings, earlier, temporary, report)
         if command is not None:
             result = result.model_copy(update={"settings": result.settings | {"command": command}})
         write_result(result, temporary / "result.json")
@@ -121,82 +123,54 @@ def identify(
     return result
 
 
-def _identify(
-    bare: Sequence[LogSource],
-    burdened: Sequence[LogSource],
-    settings: Settings,
-    earlier: Earlier | None,
-    folder: Path | None,
-    report: bool,
-    passes: Passes,
-) -> Result:
+def _identify(survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None, report: bool) -> Result:
     with one_blas_thread():
         if settings.estimator == "paper":
-            return _by_the_paper(bare, burdened, settings, earlier, folder)
-        return _by_likelihood(bare, burdened, settings, earlier, folder if report else None, passes)
+            return _by_the_paper(survey, settings, earlier, folder)
+        return _by_likelihood(survey, settings, earlier, folder if report else None)
 
 
-def _by_the_paper(
-    bare: Sequence[LogSource],
-    burdened: Sequence[LogSource],
-    settings: Settings,
-    earlier: Earlier | None,
-    folder: Path | None,
-) -> Result:
-    if len(bare) > 1 or len(burdened) > 1:
-        raise LogError(
-            f"{(bare if len(bare) > 1 else burdened)[1].name}: the paper's method takes one log of each kind; "
-            "give one, or use --estimator refined or weak"
-        )
-    first, second = _firsts(bare, burdened)
+def _by_the_paper(survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None) -> Result:
+    for logs in (survey.unloaded, survey.loaded):
+        if len(logs) > 1:
+            raise LogError(
+                f"{logs[1].name}: the paper's method takes one log of each kind; "
+                "give one, or use --estimator refined or weak"
+            )
     known = None if earlier is None else known_constants(earlier)
-    return result_of(run_paper(first, second, settings, known, folder), settings, [*bare, *burdened])
+    return result_of(run_paper(survey, *_firsts(survey), settings, known, folder), settings, survey)
 
 
-def _by_likelihood(
-    bare: Sequence[LogSource],
-    burdened: Sequence[LogSource],
-    settings: Settings,
-    earlier: Earlier | None,
-    folder: Path | None,
-    passes: Passes,
-) -> Result:
+def _by_likelihood(survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None) -> Result:
     from algid.identification.by_likelihood import prior_of, run_fit
     from algid.identification.summary import outcome_of
 
     prior = None if earlier is None else prior_of(earlier.result, settings, earlier.file)
-    logs = [*bare, *burdened]
-    fit = run_fit(bare, burdened, settings, prior, passes.told)
-    passes.begin("prediction", logs)
-    outcome = outcome_of(fit, bare, burdened, settings)
+    fit, predictions = run_fit(survey, settings, prior)
+    survey.begin("prediction")
+    outcome = outcome_of(fit, predictions, survey, settings)
     if folder is not None:
-        passes.begin("series", logs)
-        write_fit_series(folder, fit, logs, settings)
+        survey.begin("series")
+        write_fit_series(folder, fit, survey, settings)
         if settings.estimator == "refined":
-            outcome = _with_the_papers(outcome, bare, burdened, settings, folder, passes)
-    return result_of(outcome, settings, logs)
+            outcome = _with_the_papers(outcome, survey, settings, folder)
+    return result_of(outcome, settings, survey)
 
 
-def _with_the_papers(
-    outcome: Outcome,
-    bare: Sequence[LogSource],
-    burdened: Sequence[LogSource],
-    settings: Settings,
-    folder: Path,
-    passes: Passes,
-) -> Outcome:
+def _with_the_papers(outcome: Outcome, survey: Survey, settings: Settings, folder: Path) -> Outcome:
     """The paper's convergence series of the first log of each kind, and its route to the payload."""
-    first, second = _firsts(bare, burdened)
+    first, second = _firsts(survey)
     logs = [log for log in (first, second) if log is not None]
-    durations = [log.summary().duration for log in logs]
+    durations = [survey.summary(log).duration for log in logs]
     if first is None or settings.gravity == 0 or min(durations) < SHORTEST or max(durations) > SERIES_SECONDS:
         return outcome
-    passes.begin("series", logs)
-    return replace(outcome, paper_payload=run_paper(first, second, settings, None, folder).payload)
+    survey.begin("series", logs)
+    return replace(outcome, paper_payload=run_paper(survey, first, second, settings, None, folder).payload)
 
 
-def _firsts(bare: Sequence[LogSource], burdened: Sequence[LogSource]) -> tuple[LogSource | None, LogSource | None]:
-    return bare[0] if bare else None, burdened[0] if burdened else None
+def _firsts(survey: Survey) -> tuple[LogSource | None, LogSource | None]:
+    unloaded, loaded = survey.unloaded, survey.loaded
+    return unloaded[0] if unloaded else None, loaded[0] if loaded else None
 
 
 def _write_pages(folder: Path, result: Result, shared_library: bool, told: Told | None) -> None:

@@ -15,7 +15,7 @@ from algid.arm import FloatArray
 from algid.estimators.fit import Fit
 from algid.estimators.noise import first_guess
 from algid.estimators.paper import Series
-from algid.identification.source import LogSource
+from algid.identification.source import Survey
 from algid.model import Model, Motion, regressor
 from algid.settings import Settings
 from algid.signals.filters import half_length, smoothed
@@ -27,14 +27,14 @@ LOWEST, HIGHEST = 4.0, 40.0  # Hz
 
 
 def torque_blocks(
-    logs: Sequence[LogSource], model: Model, coefficients: Mapping[str, FloatArray], shifts: Sequence[float]
+    survey: Survey, model: Model, coefficients: Mapping[str, FloatArray], shifts: Sequence[float]
 ) -> Iterator[dict[str, FloatArray]]:
     """Motion, measured and predicted torque of every log; by role its coefficients, by log the torque's delay in s.
 
     Angles are smoothed without phase; the prediction is NaN where the smoother reaches past a stretch's end.
     """
-    for number, (log, shift) in enumerate(zip(logs, shifts, strict=True)):
-        for piece in pieces(log.segments(), PREDICTED_ROWS):
+    for number, (log, shift) in enumerate(zip(survey.logs, shifts, strict=True)):
+        for piece in pieces(survey.segments(log), PREDICTED_ROWS):
             yield {
                 "log": np.full(len(piece), number, dtype=np.int32),
                 **_torques(piece, model, coefficients[log.role], shift),
@@ -130,12 +130,15 @@ def information_blocks(fit: Fit, durations: Sequence[float]) -> Iterator[dict[st
         }
 
 
-def write_fit_series(folder: Path, fit: Fit, logs: Sequence[LogSource], settings: Settings) -> None:
+def write_fit_series(folder: Path, fit: Fit, survey: Survey, settings: Settings) -> None:
     """Write `torque.parquet` and `information.parquet` of a fit."""
-    summaries, starts = [log.summary() for log in logs], [log.start_ns for log in logs]
+    summaries = [survey.summary(log) for log in survey.logs]
+    starts = [summary.start_ns for summary in summaries]
     shifts = [torque_shift(settings, fit, 1 / summary.rate) for summary in summaries]
-    coefficients: dict[str, FloatArray] = {role: torque_coefficients(fit, role) for role in {log.role for log in logs}}
-    torques = torque_blocks(logs, fit.shared.model, coefficients, shifts)
+    coefficients: dict[str, FloatArray] = {
+        role: torque_coefficients(fit, role) for role in {log.role for log in survey.logs}
+    }
+    torques = torque_blocks(survey, fit.shared.model, coefficients, shifts)
     write_columns(folder / "torque.parquet", torques, starts)
     durations = [summary.duration for summary in summaries]
     write_columns(folder / "information.parquet", information_blocks(fit, durations), starts)

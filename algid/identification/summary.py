@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import PurePath
 
 import numpy as np
@@ -17,9 +18,10 @@ from algid.estimators.diagnostics import broken_bounds, payload_distance, term_w
 from algid.estimators.fit import Fit
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
 from algid.estimators.prediction import PredictionFilter, PredictionScore, cross_validate, score
+from algid.identification.by_likelihood import Predictions
 from algid.identification.series import torque_coefficients, torque_shift
-from algid.identification.source import LogSource
-from algid.log import Truth
+from algid.identification.source import LogSource, Survey
+from algid.log import Notice, Truth
 from algid.model import UNITS
 from algid.results import Cause, Estimate, Result, Status
 from algid.settings import Settings
@@ -45,16 +47,17 @@ class Outcome:
     """Whose estimates these are, where not those of the estimator asked for."""
     stds: Mapping[str, float] = field(default_factory=dict)
     paper_payload: dict[str, Estimate] = field(default_factory=dict)
-    fit: results.Fit | None = None
+    fit: results.FitSummary | None = None
     warnings: list[str] = field(default_factory=list)
     causes: list[Cause] = field(default_factory=list)
     """What probably lies behind a poor result, the most likely first."""
 
 
-def result_of(outcome: Outcome, settings: Settings, logs: Sequence[LogSource]) -> Result:
-    """The result of `outcome` on `logs`, the first log first."""
-    truth, payload = _truth(logs)
-    first, *others = [log.summary() for log in logs]
+def result_of(outcome: Outcome, settings: Settings, survey: Survey) -> Result:
+    """The result of `outcome` on a survey's logs, the first log first."""
+    truth, payload = _truth(survey.logs)
+    first, *others = [survey.summary(log) for log in survey.logs]
+    notices = [(log.name, notice) for log in survey.logs for notice in survey.seen(log).notices]
     return Result(
         version=__version__,
         estimator=outcome.estimator or settings.estimator,
@@ -68,15 +71,15 @@ def result_of(outcome: Outcome, settings: Settings, logs: Sequence[LogSource]) -
         settings=settings.as_json(),
         log=first,
         more_logs=others,
-        data_lost=any(notice.lossy for log in logs for notice in log.notices),
-        warnings=[*_notices(logs), *_contradictions(logs), *outcome.warnings],
-        causes=[*outcome.causes, *_suspicions(logs)],
+        data_lost=any(notice.lossy for _, notice in notices),
+        warnings=[*_notices(notices), *_contradictions(survey.logs), *outcome.warnings],
+        causes=[*outcome.causes, *_suspicions(notices)],
     )
 
 
-def _suspicions(logs: Sequence[LogSource]) -> list[Cause]:
+def _suspicions(notices: Sequence[tuple[str, Notice]]) -> list[Cause]:
     """What the named checks saw that spoils estimates, each code once."""
-    seen = {notice.code: notice.text for log in reversed(logs) for notice in log.notices if notice.code in SUSPICIOUS}
+    seen = {notice.code: notice.text for _, notice in reversed(notices) if notice.code in SUSPICIOUS}
     return [Cause(cause=text.removeprefix(f"{code}: ")) for code, text in seen.items()]
 
 
@@ -87,15 +90,14 @@ def _truth(logs: Sequence[LogSource]) -> tuple[Truth | None, float | None]:
     return first, loaded[0].payload if loaded and loaded[0] is not None else None
 
 
-def _notices(logs: Sequence[LogSource]) -> list[str]:
-    """What was noticed in the logs: each loss, and of the rest the first of each kind."""
-    told = [f"{log.name}: {notice.text}" for log in logs for notice in log.notices if notice.lossy]
+def _notices(notices: Sequence[tuple[str, Notice]]) -> list[str]:
+    """What was noticed in the logs, by their names: each loss, and of the rest the first of each kind."""
+    losses = [f"{name}: {notice.text}" for name, notice in notices if notice.lossy]
     alike: dict[str, list[tuple[str, str]]] = {}
-    for log in logs:
-        for notice in log.notices:
-            if not notice.lossy:
-                alike.setdefault(notice.code, []).append((log.name, notice.text))
-    return [*told, *(_one_for_all(found) for found in alike.values())]
+    for name, notice in notices:
+        if not notice.lossy:
+            alike.setdefault(notice.code, []).append((name, notice.text))
+    return [*losses, *(_one_for_all(found) for found in alike.values())]
 
 
 def _one_for_all(found: Sequence[tuple[str, str]]) -> str:
@@ -119,14 +121,16 @@ def _contradictions(logs: Sequence[LogSource]) -> list[str]:
 FAR_APART = 5.0  # standard deviations past which two logs are not of one arm
 
 
-def outcome_of(fit: Fit, unloaded: Sequence[LogSource], loaded: Sequence[LogSource], settings: Settings) -> Outcome:
+def outcome_of(fit: Fit, predictions: Predictions, survey: Survey, settings: Settings) -> Outcome:
     """The fit as a result holds it."""
     found = _estimates(fit)
     payload = {name: found.pop(name) for name in PAYLOAD_PARAMETERS if name in found}
     rows, stds = table_rows(fit)
-    summary = fit_summary(fit, unloaded, loaded, settings)
+    summary = fit_summary(fit, predictions, survey, settings)
     units = {**TABLE_UNITS, "l1": "m", "l2": "m"}
-    combined = {name: _row_estimate(rows, stds, name, fit, units[name]) for name in LOADED_ROWS} if loaded else {}
+    combined = (
+        {name: _row_estimate(rows, stds, name, fit, units[name]) for name in LOADED_ROWS} if survey.loaded else {}
+    )
     if is_implausible(summary):
         found, combined, payload = (distrusted(group) for group in (found, combined, payload))
     return Outcome(
@@ -141,7 +145,7 @@ def outcome_of(fit: Fit, unloaded: Sequence[LogSource], loaded: Sequence[LogSour
     )
 
 
-def is_implausible(summary: results.Fit) -> bool:
+def is_implausible(summary: results.FitSummary) -> bool:
     """Whether physics or the torque contradict a fit.
 
     Its estimates come from one solution: where one of them breaks a bound by more than chance explains, or a joint's
@@ -164,7 +168,7 @@ def distrusted(group: Mapping[str, Estimate]) -> dict[str, Estimate]:
     }
 
 
-def _not_crossed(summary: results.Fit, settings: Settings) -> Iterator[str]:
+def _not_crossed(summary: results.FitSummary, settings: Settings) -> Iterator[str]:
     if settings.cross_validate and summary.cross_validation is None:
         yield "no cross-validation: a log is too short to be fitted, or to be judged"
 
@@ -238,17 +242,17 @@ def _row_weights(place: dict[str, int], names: Sequence[str]) -> dict[str, Float
     return weights
 
 
-def fit_summary(
-    fit: Fit, unloaded: Sequence[LogSource], loaded: Sequence[LogSource], settings: Settings
-) -> results.Fit:
+def fit_summary(fit: Fit, predictions: Predictions, survey: Survey, settings: Settings) -> results.FitSummary:
     """The statistical part of a result."""
-    logs = [*unloaded, *loaded]
-    shift = torque_shift(settings, fit, 1 / logs[0].summary().rate)
+    shift = torque_shift(settings, fit, 1 / survey.summary(survey.logs[0]).rate)
     worths = term_worths(fit)
     crossed = None
     if settings.cross_validate:
-        crossed = cross_validate(fit, [log.segments for log in unloaded], [log.segments for log in loaded], shift)
-    return results.Fit(
+        unloaded, loaded = (
+            [partial(survey.segments, log) for log in logs] for logs in (survey.unloaded, survey.loaded)
+        )
+        crossed = cross_validate(fit, unloaded, loaded, shift)
+    return results.FitSummary(
         noise=_noise(fit),
         covariance_names=list(fit.names),
         covariance=[[finite(value) for value in row] for row in _open_covariance(fit)],
@@ -261,7 +265,7 @@ def fit_summary(
         broken_bounds=[
             results.Bound(bound=b.bound, value=b.value, distance_sigma=b.distance) for b in broken_bounds(fit)
         ],
-        residual=prediction(_residual(fit, logs, settings)),
+        residual=prediction(_residual(fit, predictions, survey, settings)),
         cross_validation=None if crossed is None else prediction(crossed),
     )
 
@@ -297,12 +301,15 @@ def _whiteness(fit: Fit) -> dict[str, results.Whiteness]:
     }
 
 
-def _residual(fit: Fit, logs: Sequence[LogSource], settings: Settings) -> PredictionScore:
+def _residual(fit: Fit, predictions: Predictions, survey: Survey, settings: Settings) -> PredictionScore:
     total = PredictionScore()
-    for log in logs:
+    for log in survey.logs:
         c = torque_coefficients(fit, log.role)
-        gathered, shift = log.prediction, torque_shift(settings, fit, 1 / log.summary().rate)
-        total += gathered.score(c) if gathered else score(fit.shared.model, c, log.segments(), shift)
+        if log in predictions:
+            total += predictions[log].score(c)
+        else:
+            shift = torque_shift(settings, fit, 1 / survey.summary(log).rate)
+            total += score(fit.shared.model, c, survey.segments(log), shift)
     return total
 
 

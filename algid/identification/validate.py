@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +10,7 @@ from algid.arm import FloatArray, payload_constants, with_payload
 from algid.errors import ResultError
 from algid.estimators.prediction import PredictionScore, score
 from algid.identification.by_likelihood import model_of
-from algid.identification.source import LogSource, Role
+from algid.identification.source import Role, Survey
 from algid.identification.summary import prediction
 from algid.model import Model
 from algid.results import Result, TorquePrediction
@@ -26,30 +25,24 @@ class Validation:
     total: TorquePrediction | None
 
 
-def validate(result: Result, logs: Sequence[LogSource], name: str) -> Validation:
-    """Predict the torque of `logs` by the estimates of `result`, whose file is called `name`.
+def validate(result: Result, survey: Survey, name: str) -> Validation:
+    """Predict the torque of a survey's logs by the estimates of `result`, whose file is called `name`.
 
     Raises
     ------
     ResultError
         If a parameter that the prediction needs has no estimate.
     """
-    settings = settings_of(result)
+    settings = Settings.of(result.settings)
     model = model_of(settings)
     found: dict[str, TorquePrediction | None] = {}
     total, delay = PredictionScore(), result.parameters.get("delay")
-    for log in logs:
-        shift = settings.torque_shift(1 / log.summary().rate, None if delay is None else delay.estimate)
-        one = score(model, torque_constants(result, model, log.role, name), log.segments(), shift)
+    for log in survey.logs:
+        shift = settings.torque_shift(1 / survey.summary(log).rate, None if delay is None else delay.estimate)
+        one = score(model, torque_constants(result, model, log.role, name), survey.segments(log), shift)
         found[log.name] = prediction(one)
         total += one
     return Validation(found, prediction(total))
-
-
-def settings_of(result: Result) -> Settings:
-    """The settings behind a result, as far as they decide its model."""
-    names = ("gravity", "friction", "torque_offset", "rotor_inertia", "torque_hold", "delay")
-    return Settings(**{name: result.settings[name] for name in names if name in result.settings})
 
 
 def torque_constants(result: Result, model: Model, role: Role, file: str) -> FloatArray:

@@ -9,14 +9,14 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.errors import LogError
-from algid.identification.source import LogSource
+from algid.identification.source import LogSource, Survey
 from algid.settings import Settings
 from algid.signals.filters import correlate, differentiator, half_length
-from algid.signals.observers import LuenbergerObserver
+from algid.signals.observers import PAPER_POLES, LuenbergerObserver
 from algid.signals.segments import Segment, append
 
 
-def with_velocities(source: LogSource, settings: Settings, *, luenberger: bool) -> Iterator[Segment]:
+def with_velocities(survey: Survey, log: LogSource, settings: Settings, *, luenberger: bool) -> Iterator[Segment]:
     """Segments of a log with measured velocities, the paper's observer's, or the zero-phase differentiator's.
 
     Raises
@@ -25,34 +25,34 @@ def with_velocities(source: LogSource, settings: Settings, *, luenberger: bool) 
         If measured velocities are asked for and the log has none.
     """
     if settings.velocity == "measured":
-        return _measured(source)
+        return _measured(survey.segments(log), log.name)
     if luenberger:
-        return _observed(source, settings)
-    return _differentiated(source, settings)
+        return _observed(survey.segments(log), settings)
+    return _differentiated(survey.segments(log), settings)
 
 
-def _measured(source: LogSource) -> Iterator[Segment]:
-    for segment in source.segments():
+def _measured(segments: Iterator[Segment], name: str) -> Iterator[Segment]:
+    for segment in segments:
         if segment.omega is None:
             raise LogError(
-                f"{source.name}: expected velocities omega1, omega2 for --velocity measured, found none; "
+                f"{name}: expected velocities omega1, omega2 for --velocity measured, found none; "
                 "leave the flag out to observe them"
             )
         yield segment
 
 
-def _observed(source: LogSource, settings: Settings) -> Iterator[Segment]:
+def _observed(segments: Iterator[Segment], settings: Settings) -> Iterator[Segment]:
     observer: LuenbergerObserver | None = None
-    for segment in source.segments():
-        observer = observer or LuenbergerObserver(segment.dt, settings.poles)
+    for segment in segments:
+        observer = observer or LuenbergerObserver(segment.dt, settings.poles or PAPER_POLES)
         if not segment.continues:
             observer.reset()
         yield replace(segment, omega=observer.velocities(segment.theta))
 
 
-def _differentiated(source: LogSource, settings: Settings) -> Iterator[Segment]:
+def _differentiated(segments: Iterator[Segment], settings: Settings) -> Iterator[Segment]:
     filters: _Differentiator | None = None
-    for segment in source.segments():
+    for segment in segments:
         if filters is not None and not segment.continues:
             yield from filters.finish()
             filters = None

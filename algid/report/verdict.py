@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from algid.report.text import joined, significant, visible
-from algid.results import Bound, Estimate, Fit, Result, Status, TorquePrediction
+from algid.results import Bound, Estimate, FitSummary, Result, Status, TorquePrediction
 
 Level = Literal["good", "reservations", "failed"]
 
@@ -177,7 +177,7 @@ def _spread(found: Estimate) -> float:
     return found.std / abs(found.estimate) if found.estimate else math.inf
 
 
-def _prediction(fit: Fit | None) -> TorquePrediction | None:
+def _prediction(fit: FitSummary | None) -> TorquePrediction | None:
     return None if fit is None else fit.cross_validation or fit.residual
 
 
@@ -209,7 +209,7 @@ def _wide_intervals(result: Result) -> Iterator[str]:
         yield f"the standard deviation of {joined(shown)} is large"
 
 
-def _fit_reasons(fit: Fit, told: str) -> Iterator[str]:
+def _fit_reasons(fit: FitSummary, told: str) -> Iterator[str]:
     """What the fit holds against itself, less what the warnings have told."""
     yield from (visible(direction) for direction in fit.unidentifiable if direction not in told)
     yield from (f"{BREAKS} {_beyond(bound)}" for bound in fit.broken_bounds if bound.bound not in told)

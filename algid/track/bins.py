@@ -167,8 +167,7 @@ def arm_of(result: Result, first: Segment, l1: float | None = None, l2: float | 
             f"{result.log.path}: the result of --estimator {result.estimator} has no error bars; "
             "identify with --estimator refined or weak"
         )
-    told = {name: result.settings.get(name) for name in ("friction", "torque_offset", "rotor_inertia", "gravity")}
-    settings = Settings(**{name: value for name, value in told.items() if value is not None})
+    settings = Settings.of(result.settings)
     prior = prior_of(result, settings)
     names = [*prior.names, *(n for n, given in (("l1", l1), ("l2", l2)) if given is None and _free(result, n))]
     places = [result.fit.covariance_names.index(name) for name in names]

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from algid import __version__
 from algid.errors import LogError
-from algid.identification.source import LogLike, LogSource
+from algid.identification.source import LogLike, Survey, open_source
 from algid.report.verdict import verdict
 from algid.results import read_result
 from algid.runtime import one_blas_thread
@@ -52,29 +53,30 @@ def track_log(
         If the result cannot be read, or leaves a constant or a link length open.
     """
     result = read_result(parameters)
-    source = LogSource(log, "loaded", profile, result.settings.get("gravity", 9.81), changing=True)
-    first = next(source.segments(), None)
+    source = open_source(log, "loaded", profile, result.settings.get("gravity", 9.81), changing=True)
+    survey = Survey([source])
+    first = next(survey.segments(source), None)
     if first is None:
         raise LogError(f"{source.name}: it holds no samples; record longer")
     arm, covariance = arm_of(result, first, l1, l2)
     try:
         with one_blas_thread():
-            found = track(source.segments, arm, covariance)
+            found = track(partial(survey.segments, source), arm, covariance)
     except ValueError as error:
         raise LogError(f"{source.name}: {error}; record longer") from error
-    truth = source.origin.truth
+    truth, notices = source.origin.truth, survey.seen(source).notices
     judged = verdict(result)
     return TrackResult(
         track=found,
-        log=source.summary(),
+        log=survey.summary(source),
         arm=str(parameters),
         arm_sha256=_sha256(parameters),
         arm_sentence=None if judged.level == "good" else judged.sentence,
         settings={"l1": arm.l1, "l2": arm.l2, "gravity": arm.model.gravity, **(settings or {})},
         version=__version__,
         schedule=None if truth is None else truth.schedule or ((0.0, truth.payload),),
-        warnings=tuple(notice.text for notice in source.notices),
-        data_lost=any(notice.lossy for notice in source.notices),
+        warnings=tuple(notice.text for notice in notices),
+        data_lost=any(notice.lossy for notice in notices),
     )
 
 

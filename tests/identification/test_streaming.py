@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,9 +11,9 @@ import algid
 from algid.arm import FloatArray
 from algid.identification.by_likelihood import run_fit
 from algid.identification.by_paper import run_paper
-from algid.identification.source import LogSource
+from algid.identification.source import LogSource, Survey, open_source
 from algid.identification.summary import outcome_of, result_of
-from algid.log import Log, Origin
+from algid.log import Log
 from algid.results import Result
 from algid.settings import Settings
 from algid.synth.sensors import Sensors
@@ -27,17 +27,11 @@ SETTINGS = {
 }
 
 
-class Chopped(LogSource):
+def chopped(log: Log, rows: int) -> LogSource:
     """A log that comes in blocks of `rows` samples."""
-
-    def __init__(self, log: Log, rows: int) -> None:
-        self._rows = rows
-        super().__init__(log, "unloaded")
-
-    def _open(self) -> tuple[Origin, Callable[[], Iterator[Log]]]:
-        log, rows = self._log, self._rows
-        assert isinstance(log, Log)
-        return log.origin, lambda: (log.part(first, min(first + rows, len(log))) for first in range(0, len(log), rows))
+    starts = range(0, len(log), rows)
+    blocks = lambda: (log.part(first, min(first + rows, len(log))) for first in starts)  # noqa: E731
+    return replace(open_source(log, "unloaded"), blocks=blocks, promised=0)
 
 
 @pytest.fixture(scope="module")
@@ -51,25 +45,26 @@ def uneven() -> Log:
 
 def estimates(log: LogSource, settings: Settings) -> tuple[FloatArray, FloatArray, Result]:
     """Estimates, by how much sums of another order may move them, and the whole result."""
+    survey = Survey([log])
     if settings.estimator == "paper":
-        result = result_of(run_paper(log, None, settings), settings, [log])
+        result = result_of(run_paper(survey, log, None, settings), settings, survey)
         values = np.array([one.estimate for one in result.parameters.values()], dtype=np.float64)
         return values, 1e-9 * np.abs(values), result  # condition numbers to 1e6, times rounding
-    fit = run_fit([log], [], settings, None)
+    fit, predictions = run_fit(survey, settings, None)
     assert fit.converged
     # A window or sample lost at a seam moves an estimate by 1e-4 of its deviation or more; rounding, times the
     # condition of the normal equations, by 1e-9 of it.
     room = np.concatenate([fit.std, fit.std]) * 1e-7
-    result = result_of(outcome_of(fit, [log], [], settings), settings, [log])
+    result = result_of(outcome_of(fit, predictions, survey, settings), settings, survey)
     return np.concatenate([fit.values, fit.std]), room, result
 
 
 @pytest.mark.parametrize("name", SETTINGS)
 def test_blocks_do_not_show_in_the_estimates(name: str, uneven: Log) -> None:
     settings = SETTINGS[name]
-    whole, room, result = estimates(Chopped(uneven, len(uneven)), settings)
+    whole, room, result = estimates(chopped(uneven, len(uneven)), settings)
     for rows in (4097, 60_000):
-        cut, _, streamed = estimates(Chopped(uneven, rows), settings)
+        cut, _, streamed = estimates(chopped(uneven, rows), settings)
         assert np.all(np.abs(cut - whole) < room)
         assert streamed.log == result.log
         if result.fit is not None and result.fit.residual is not None:

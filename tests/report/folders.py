@@ -16,7 +16,7 @@ from algid.arm import CONSTANT_NAMES, CONSTANT_UNITS, FloatArray, forward_dynami
 from algid.estimators.paper import STAGE2_NAMES, stage1, stage2
 from algid.results import (
     Estimate,
-    Fit,
+    FitSummary,
     LogSummary,
     Result,
     Status,
@@ -100,7 +100,7 @@ def _result(case: Case, k: FloatArray, covariance: FloatArray, unloaded: Recordi
         },
         paper_payload={"m_p": Estimate(estimate=case.payload * 1.004, unit="kg")},
         table4=_table4(case, parameters, truth),
-        fit=Fit(
+        fit=FitSummary(
             noise={"theta1": 1e-4, "theta2": 1e-4, "tau1": NOISE, "tau2": NOISE},
             covariance_names=list(CONSTANT_NAMES),
             covariance=covariance.tolist(),

@@ -1,0 +1,47 @@
+"""One place for what decides an identification: fields, options and what a result remembers are the same."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields
+
+import pytest
+from typer.main import get_command
+
+from algid.cli.app import app
+from algid.cli.settings import Choice
+from algid.errors import SettingError
+from algid.settings import Settings, flag
+
+
+def test_every_setting_is_an_option_with_its_default_and_help() -> None:
+    for command in ("identify", "batch"):
+        options = {option.name: option for option in get_command(app).commands[command].params}  # type: ignore[attr-defined]
+        for field in fields(Settings):
+            assert options[field.name].opts == [flag(field.name)]
+            assert options[field.name].help == field.metadata["help"]
+        defaults = {field.name: options[field.name].default for field in fields(Settings)}
+        assert Choice(defaults, None, {}).settings() == Settings()
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        Settings(),
+        Settings(estimator="paper", poles=(-50 + 20j, -50 - 20j, -60.0, -80.0, -90.0, -100.0), window=1.5),
+        Settings(friction="coulomb", delay="estimate", torque_hold="zoh", l1=0.3, cross_validate=True),
+    ],
+)
+def test_a_result_gives_its_settings_back(settings: Settings) -> None:
+    content = json.loads(json.dumps(settings.as_json() | {"command": "algid identify x.csv"}))
+    found = Settings.of(content)
+    assert found.as_json() == settings.as_json()
+    if settings.poles is not None:
+        assert found == settings
+
+
+def test_text_of_an_option_that_means_nothing_names_the_option() -> None:
+    defaults = {field.name: field.default for field in fields(Settings)}
+    for name, text in (("delay", "soon"), ("poles", "1,2,3"), ("poles", "a,b")):
+        with pytest.raises(SettingError, match=f"^{flag(name)}"):
+            Choice(defaults | {"delay": "0", name: text}, None, {}).settings()
