@@ -8,7 +8,7 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
-from algid.readers.mcap.columnar import MOST_PARTS, MisfitError, Numbers, Shape
+from algid.readers.mcap.columnar import MisfitError, Numbers, Shape
 from algid.readers.mcap.definitions import PRIMITIVES, Field, Types
 
 _ENDINGS = {0: ">", 1: "<"}
@@ -24,12 +24,9 @@ class _Walk:
     shape: Shape
     order: str = "<"
     place: int = _HEAD
-    parts: int = 0
 
     def structure(self, name: str, prefix: str) -> None:
-        self.parts += 1
-        if self.parts > MOST_PARTS:
-            raise MisfitError(f"a message of more than {MOST_PARTS} parts")
+        self.shape.count(1 + len(self.types[name]))
         for field in self.types[name]:
             self.field(field, f"{prefix}{field.name}")
 
@@ -41,7 +38,8 @@ class _Walk:
         if field.type in PRIMITIVES:
             self.numbers(field.type, path, count)
         elif field.type in ("string", "wstring"):
-            self.shape.texts[path] = tuple(self.text(field.type) for _ in range(self.possible(count, 4)))
+            self.shape.count(self.possible(count, 4))
+            self.shape.texts[path] = tuple(self.text(field.type) for _ in range(count))
         else:
             for index in range(self.possible(count, 1)):
                 self.one(field.type, f"{path}[{index}]")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from algid.errors import LogError
 from algid.readers.mcap import cdr, protobuf
 from algid.readers.mcap import json as jsontext
-from algid.readers.mcap.columnar import Decoder, Fields, MisfitError, Walk
+from algid.readers.mcap.columnar import Decoder, Fields, Walk
 from algid.readers.mcap.definitions import DefinitionError, parse_idl, parse_msg
 from algid.readers.mcap.messages import Messages
 
@@ -19,13 +19,22 @@ _DEFINITIONS = {"ros2msg": parse_msg, "ros2idl": parse_idl}
 
 
 class Decodes(Protocol):
-    """Reads wanted numbers out of batches of messages; counts those that lack a needed one."""
+    """Reads wanted numbers out of batches of messages.
+
+    Counts the messages that lack a needed one, and those that do not fit their schema, with why the first does not.
+    """
 
     @property
     def wanted(self) -> Mapping[str, str]: ...
 
     @property
     def skipped(self) -> int: ...
+
+    @property
+    def misfits(self) -> int: ...
+
+    @property
+    def misfit(self) -> str: ...
 
     def columns(self, messages: Messages) -> tuple[NDArray[np.bool_], Fields]:
         """Which messages hold what is needed (N,), and the numbers of those, by name."""
@@ -47,9 +56,9 @@ def walk_for(path: str, channel: Any, schema: Any) -> Walk:
             types = _DEFINITIONS[encoding[1]](schema.name, schema.data.decode("utf-8", errors="replace"))
             return lambda payload: cdr.walk(payload, schema.name, types)
         if encoding == ("protobuf", "protobuf"):
-            messages = protobuf.parse(schema.data)
+            messages = protobuf.parse(schema.name, schema.data)
             return lambda payload: protobuf.walk(payload, schema.name, messages)
-    except (DefinitionError, MisfitError) as error:
+    except DefinitionError as error:
         raise LogError(f"{place}: the message definition cannot be read: {error}") from error
     if encoding[0] == "json":
         return jsontext.walk
@@ -59,8 +68,10 @@ def walk_for(path: str, channel: Any, schema: Any) -> Walk:
     )
 
 
-def decoder_for(path: str, channel: Any, schema: Any, wanted: Mapping[str, str]) -> Decodes:
-    """What reads the numbers `wanted`, by name a path each, out of a channel's messages.
+def decoder_for(
+    path: str, channel: Any, schema: Any, wanted: Mapping[str, str], works: Callable[[int], bool]
+) -> Decodes:
+    """What reads the numbers `wanted`, by name a path each, out of a channel's messages; `works` as in `Decoder`.
 
     Raises
     ------
@@ -70,4 +81,4 @@ def decoder_for(path: str, channel: Any, schema: Any, wanted: Mapping[str, str])
     walk = walk_for(path, channel, schema)
     if channel.message_encoding == "json":
         return jsontext.JsonDecoder(wanted, frozenset(wanted))
-    return Decoder(walk, wanted, frozenset(wanted))
+    return Decoder(walk, wanted, frozenset(wanted), works)

@@ -9,7 +9,7 @@ Columns out of messages: one scalar walk for each layout, NumPy for every messag
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,12 +18,23 @@ from numpy.typing import NDArray
 from algid.log import IntArray
 from algid.readers.mcap.messages import Messages
 
-MOST_PARTS = 20_000
-"""Structures a message may be made of; an image is one."""
+MOST_PARTS = 100_000
+"""Fields, structures and strings a message may be made of; a list of numbers is one."""
+LARGEST_MESSAGE = 1 << 24
+"""Bytes; a joint state has some hundred."""
+_REPEATED = -1
+"""The place of a name that stands in a list twice."""
+_WORK_A_WALK, _WORK_A_SIZE = 200, 20
+_MOST_WORDS = 1 << 22
+"""Words that all remembered layouts may fix together."""
 
 
 class MisfitError(Exception):
     """A message that is not what its schema says."""
+
+
+class ExcessError(Exception):
+    """Messages that ask for more work than any recorder's."""
 
 
 @dataclass(frozen=True)
@@ -39,13 +50,28 @@ class Numbers:
 
 @dataclass
 class Shape:
-    """What a walk over a message found. Ranges in `fixed` are [start, end); `joints` are bits to mask."""
+    """What a walk over a message found. Ranges in `fixed` are [start, end)."""
 
     numbers: dict[str, Numbers] = field(default_factory=dict)
     texts: dict[str, tuple[str, ...]] = field(default_factory=dict)
     fixed: list[tuple[int, int]] = field(default_factory=list)
     flags: list[int] = field(default_factory=list)
     """Bytes of which only the highest bit is fixed: those of a varint."""
+    absent: Callable[[str], bool] = lambda _: False
+    """Whether a path is that of a number which the message leaves out because it is zero."""
+    parts: int = 0
+
+    def count(self, parts: int = 1) -> None:
+        """Note so many parts more: fields, structures, strings.
+
+        Raises
+        ------
+        MisfitError
+            If they are more than `MOST_PARTS`.
+        """
+        self.parts += parts
+        if self.parts > MOST_PARTS:
+            raise MisfitError(f"a message of more than {MOST_PARTS} parts")
 
     def fix(self, start: int, end: int) -> None:
         """Note that the bytes [start, end) fix the shape."""
@@ -53,8 +79,6 @@ class Shape:
             self.fixed[-1] = (self.fixed[-1][0], end)
         else:
             self.fixed.append((start, end))
-        if len(self.fixed) + len(self.numbers) > MOST_PARTS:
-            raise MisfitError(f"a message of more than {MOST_PARTS} parts")
 
     def find(self, path: str) -> Numbers | None:
         """The number at a path such as ``wrench.torque.z``, ``data[1]`` or ``position[elbow]``, or None.
@@ -67,9 +91,9 @@ class Shape:
         if place in self.numbers:
             found = self.numbers[place]
             return found if found.count == 1 else None
-        array = re.fullmatch(r"(.*)\[(\d+)\]", place)
+        array = re.fullmatch(r"(.*)\[(\d{1,9})\]", place)
         if array is None or array[1] not in self.numbers:
-            return None
+            return Numbers(0, "zero") if self.absent(place) else None
         found, index = self.numbers[array[1]], int(array[2])
         if index >= found.count or found.kind[0] not in "<>|":
             return None
@@ -83,7 +107,7 @@ class Shape:
                 done += part
                 continue
             index = self._index(done, part[1:-1])  # a name first: joints may be called "1" and "2"
-            if index is None and not part[1:-1].isdigit():
+            if index == _REPEATED or (index is None and not part[1:-1].isdigit()):
                 return None
             done += part if index is None else f"[{index}]"
         return done
@@ -92,7 +116,7 @@ class Shape:
         parent = array.rpartition(".")[0]
         for path, texts in self.texts.items():
             if path.rpartition(".")[0] == parent and name in texts:
-                return texts.index(name)
+                return texts.index(name) if texts.count(name) == 1 else _REPEATED
         return None
 
 
@@ -116,11 +140,14 @@ class Layout:
     values: NDArray[np.uint64]
     fields: Mapping[str, Numbers] | None
 
-    def matches(self, table: NDArray[np.uint64]) -> NDArray[np.bool_]:
-        """Which of the messages (N, words) have this layout."""
-        fits = np.ones(table.shape[0], np.bool_)
+    def matches(self, table: NDArray[np.uint64], rows: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Which of the rows (R,) of messages (N, words) have this layout."""
+        fits = np.ones(rows.size, np.bool_)
+        whole = rows.size == table.shape[0]
         for word, mask, value in zip(self.words, self.masks, self.values, strict=True):
-            fits &= (table[:, word] & mask) == value
+            fits &= ((table[:, word] if whole else table[rows, word]) & mask) == value
+            if not fits.any():
+                break
         return fits
 
     def read(self, table: NDArray[np.uint64]) -> Fields:
@@ -156,66 +183,105 @@ class Decoder:
         By name the path of a number.
     needed : frozenset of str
         A message without one of these is skipped and counted.
+    works : callable
+        Counts steps of some microsecond; False where these are too many.
     """
 
     walk: Walk
     wanted: Mapping[str, str]
     needed: frozenset[str]
+    works: Callable[[int], bool]
     skipped: int = 0
+    misfits: int = 0
+    misfit: str = ""
     _known: dict[int, list[Layout]] = field(default_factory=dict)
+    _words: int = 0
 
     def columns(self, messages: Messages) -> tuple[NDArray[np.bool_], Fields]:
         """Which messages hold what is needed (N,), and the numbers of those, by name.
 
+        Messages that do not fit their schema are left out and counted.
+
         Raises
         ------
-        MisfitError
-            If a message does not fit its schema.
+        ExcessError
+            If the messages ask for more work than any honest ones.
         """
         held = np.zeros(len(messages), np.bool_)
+        misfits = self.misfits
         parts: list[tuple[NDArray[np.intp], Fields]] = []
-        sizes = _distinct(messages.sizes)
-        for size in sizes:
-            rows = np.arange(len(messages)) if len(sizes) == 1 else np.flatnonzero(messages.sizes == size)
+        for size, rows in _by_size(messages.sizes):
+            self._spend(_WORK_A_SIZE)
             for chosen, fields in self._of_one_size(messages, size, rows):
                 held[chosen] = True
                 parts.append((chosen, fields))
-        self.skipped += int(held.size - np.count_nonzero(held))
+        self.skipped += int(held.size - np.count_nonzero(held)) - (self.misfits - misfits)
         return held, _in_order(held, parts)
 
     def _of_one_size(
         self, messages: Messages, size: int, rows: NDArray[np.intp]
-    ) -> list[tuple[NDArray[np.intp], Fields]]:
+    ) -> Iterator[tuple[NDArray[np.intp], Fields]]:
+        if size > LARGEST_MESSAGE:
+            self.misfits += rows.size
+            self.misfit = self.misfit or f"messages of {size} bytes"
+            return
         lead = _lead(size)
         table = _gathered(messages, size + lead, messages.starts[rows] - lead)
         known = self._known.setdefault(size, [])
-        parts, tried = [], 0
-        while rows.size:
-            if tried == len(known):
-                known.append(self._new(messages, int(rows[0])))
-            fits = known[tried].matches(table)
-            if fits.any():
-                if known[tried].fields is not None:
-                    chosen = slice(None) if fits.all() else fits
-                    parts.append((rows[chosen], known[tried].read(table[chosen])))
-                rows, table = rows[~fits], table[~fits]
+        left, tried = np.arange(rows.size), 0
+        while left.size:
+            one = known[tried] if tried < len(known) else self._new(messages, int(rows[left[0]]))
+            if one is None:
+                left = left[1:]
+                continue
+            if tried == len(known) and not self._remembers(one, known):
+                if one.fields is not None:
+                    yield rows[left[:1]], one.read(table[left[:1]])
+                left = left[1:]  # one by one from here: what is remembered must not grow with the file
+                continue
+            fits = one.matches(table, left)
             tried += 1
-            if tried > MOST_LAYOUTS:
-                known.pop()  # one by one from here: the list must not grow with the file
-                tried -= 1
-        return parts
+            if one.fields is not None and fits.any():
+                whole = fits.all() and left.size == rows.size
+                yield (rows, one.read(table)) if whole else (rows[left[fits]], one.read(table[left[fits]]))
+            left = left[~fits]
 
-    def _new(self, messages: Messages, row: int) -> Layout:
+    def _remembers(self, one: Layout, known: list[Layout]) -> bool:
+        """Take a layout in among the `known` ones of its size, where there is room."""
+        if len(known) == MOST_LAYOUTS or self._words > _MOST_WORDS:
+            return False
+        known.append(one)
+        self._words += one.words.size
+        return True
+
+    def _new(self, messages: Messages, row: int) -> Layout | None:
+        """The layout of a message, None where it does not fit its schema."""
         start = int(messages.starts[row])
         payload = messages.content[start : start + int(messages.sizes[row])].tobytes()
-        return layout(payload, self.walk(payload), self.wanted, self.needed)
+        try:
+            shape = self.walk(payload)
+        except MisfitError as error:
+            self.misfits += 1
+            self.misfit = self.misfit or str(error)
+            self._spend(_WORK_A_WALK)
+            return None
+        self._spend(_WORK_A_WALK + shape.parts)
+        return layout(payload, shape, self.wanted, self.needed)
+
+    def _spend(self, steps: int) -> None:
+        if not self.works(steps):
+            raise ExcessError("messages of so many layouts that no recorder writes them")
 
 
-def _distinct(sizes: IntArray) -> list[int]:
-    """The sizes that there are; mostly one."""
+def _by_size(sizes: IntArray) -> Iterator[tuple[int, NDArray[np.intp]]]:
+    """Each size that there is, mostly one, and the messages that have it."""
     if sizes.size and np.all(sizes == sizes[0]):
-        return [int(sizes[0])]
-    return np.unique(sizes).tolist()
+        yield int(sizes[0]), np.arange(sizes.size)
+        return
+    order = np.argsort(sizes, kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(sizes[order])) + 1):
+        if rows.size:
+            yield int(sizes[rows[0]]), rows
 
 
 def _lead(size: int) -> int:

@@ -1,8 +1,11 @@
 """ROS 2 message definitions as recorders store them: one text, every nested type behind a line of ``=``.
 
-ROS 2 message definitions in IDL, as rosidl makes them: modules, structures, sequences, arrays, typedefs.
+Either .msg text, or IDL as rosidl makes it: modules, structures, sequences, arrays, typedefs. What rosidl never makes
+(unions, enumerations, optional members, lists of lists) is refused.
 
-What rosidl never makes (unions, enumerations, optional members, lists of lists) is refused.
+Both are read by hand. rosbags' parser, the oracle of the tests, stops at the ``#include`` that every IDL file of rosidl
+begins with; it takes 200 ms for the IDL of JointState where this one takes 0.3 ms, and 1 ms for its .msg text where
+this one takes 0.05 ms; and modules nested a hundred times end it in a RecursionError.
 """
 
 from __future__ import annotations
@@ -20,6 +23,9 @@ _FIELD = re.compile(
 )
 _MOST_FIELDS = 4096
 _DEEPEST = 32
+_LONGEST = 1 << 20
+_LONGEST_NUMBER = 10
+"""Digits of a length: 32 bits have so many."""
 
 
 class DefinitionError(Exception):
@@ -46,6 +52,7 @@ def parse_msg(root: str, text: str) -> Types:
     DefinitionError
         If a line cannot be read, a nested type is missing, or types contain each other.
     """
+    _check_length(root, text)
     sections = re.split(r"^=+[ \t]*\r?$", text, flags=re.MULTILINE)
     types = {root: _fields(root, sections[0])}
     for section in sections[1:]:
@@ -57,6 +64,11 @@ def parse_msg(root: str, text: str) -> Types:
     resolved = {name: tuple(_resolved(field, name, types) for field in fields) for name, fields in types.items()}
     check_depth(root, resolved)
     return resolved
+
+
+def _check_length(root: str, text: str) -> None:
+    if len(text) > _LONGEST:
+        raise DefinitionError(f"{root}: a definition of {len(text)} characters; expected {_LONGEST} at most")
 
 
 def _fields(name: str, text: str) -> tuple[Field, ...]:
@@ -77,6 +89,8 @@ def _field(name: str, line: str) -> Field | None:
     if found["rest"].startswith("="):
         return None  # a constant
     size = found["size"]
+    if size and len(size.removeprefix("<=")) > _LONGEST_NUMBER:
+        raise DefinitionError(f"{name}: a length of {len(size)} digits in the line {line.strip()[:60]!r}")
     count = None if found["array"] is None else int(size) if size.isdigit() else -1
     return Field(found["name"], found["type"], count)
 
@@ -124,7 +138,7 @@ def _height(name: str, types: Types, known: dict[str, int], above: int) -> int:
 
 _SECTION = re.compile(r"^=+[ \t]*\r?\nIDL:[^\n]*\n", re.MULTILINE)
 _TOKEN = re.compile(
-    r'\s+|//[^\n]*|/\*.*?\*/|\#[^\n]*|(?P<token>"(?:[^"\\]|\\.)*"|(?:::)?[A-Za-z_]\w*(?:::\w+)*|\d[\w.]*|.)',
+    r'\s+|//[^\n]*|/\*.*?(?:\*/|\Z)|\#[^\n]*|(?P<token>"(?:[^"\\]|\\.)*"?|(?:::)?[A-Za-z_]\w*(?:::\w+)*|\d[\w.]*|.)',
     re.DOTALL,
 )
 _NUMBERS = {
@@ -148,6 +162,7 @@ def parse_idl(root: str, text: str) -> Types:
     DefinitionError
         If the text cannot be read, a type is missing, or types contain each other.
     """
+    _check_length(root, text)
     found = _Definitions()
     for section in _SECTION.split(text):
         _Parser(root, [*_tokens(section)], found).definitions(())
@@ -270,9 +285,9 @@ class _Parser:
         name = self._next()
         if name == "sequence":
             self._expect("<")
-            inner, listed = self._type()
-            if listed is not None:
+            if self.tokens[self.place : self.place + 1] == ["sequence"]:
                 raise DefinitionError(f"{self.root}: a sequence of sequences")
+            inner, _ = self._type()
             if self._taken(","):
                 self._number(">")
             else:
@@ -295,10 +310,10 @@ class _Parser:
 
     def _number(self, end: str) -> int:
         token = self._next()
-        if not token.isdecimal() or int(token[:10]) == 0:
+        if not token.isdecimal() or len(token) > _LONGEST_NUMBER or int(token) == 0:
             raise DefinitionError(f"{self.root}: {token[:40]!r} where a length was expected")
         self._expect(end)
-        return int(token[:10])
+        return int(token)
 
     def _taken(self, token: str) -> bool:
         taken = self.tokens[self.place : self.place + 1] == [token]

@@ -34,7 +34,7 @@ PEEK = FRAME.size + 80
 """Bytes that tell a record's kind: its frame, and the head of a chunk."""
 _FREE_BYTES, _BYTES_A_BYTE = 384 << 20, 250
 """What a file may unpack to: logs of joints pack 5 to 50 times, logs at rest up to a hundred times."""
-_FREE_WORK, _WORK_A_BYTE = 2_000_000, 1
+_FREE_WORK, _WORK_A_BYTE = 1_500_000, 4
 """What a file may have done message by message, in steps of about a microsecond."""
 SIZES = {
     HEADER: (8, SMALL_RECORD), FOOTER: (20, 20), SCHEMA: (14, SMALL_RECORD), CHANNEL: (16, SMALL_RECORD),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,8 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.readers.mcap.columnar import MOST_PARTS, Fields, MisfitError, Numbers, Shape
+from algid.readers.mcap.columnar import Fields, MisfitError, Numbers, Shape
 from algid.readers.mcap.messages import Messages
+
+_LARGEST = 1 << 20
 
 
 def walk(payload: bytes) -> Shape:
@@ -29,6 +32,8 @@ def walk(payload: bytes) -> Shape:
 
 
 def _object(payload: bytes) -> dict[str, Any]:
+    if len(payload) > _LARGEST:
+        raise MisfitError(f"a JSON message of {len(payload)} bytes; expected {_LARGEST} at most")
     try:
         found = json.loads(payload)
     except (ValueError, RecursionError) as error:
@@ -39,15 +44,14 @@ def _object(payload: bytes) -> dict[str, Any]:
 
 
 def _walk(value: Any, path: str, shape: Shape) -> None:
-    if len(shape.numbers) > MOST_PARTS:
-        raise MisfitError(f"a message of more than {MOST_PARTS} parts")
+    shape.count()
     if isinstance(value, dict):
         for key, inner in value.items():
             _walk(inner, f"{path}.{key}" if path else str(key), shape)
     elif isinstance(value, list):
         if value and all(isinstance(one, str) for one in value):
             shape.texts[path] = tuple(value)
-        for index, inner in enumerate(value[:MOST_PARTS]):
+        for index, inner in enumerate(value):
             _walk(inner, f"{path}[{index}]", shape)
     elif isinstance(value, (int, float)) and not isinstance(value, bool):
         shape.numbers[path] = Numbers(0, "json")
@@ -60,34 +64,44 @@ class JsonDecoder:
     wanted: Mapping[str, str]
     needed: frozenset[str]
     skipped: int = 0
+    misfits: int = 0
+    misfit: str = ""
 
     def columns(self, messages: Messages) -> tuple[NDArray[np.bool_], Fields]:
         """Which messages hold what is needed (N,), and the numbers of those, by name.
 
-        Raises
-        ------
-        MisfitError
-            If a message is no JSON object.
+        Messages that are no JSON object are left out and counted.
         """
+        misfits = self.misfits
         held = np.zeros(len(messages), np.bool_)
         rows: list[list[Any]] = []
         for row, (start, size) in enumerate(zip(messages.starts, messages.sizes, strict=True)):
-            found = _object(messages.content[start : start + size].tobytes())
+            try:
+                found = _object(messages.content[start : start + size].tobytes())
+            except MisfitError as error:
+                self.misfits += 1
+                self.misfit = self.misfit or str(error)
+                continue
             values = [_value(found, path) for path in self.wanted.values()]
             held[row] = all(
                 value is not None or name not in self.needed for name, value in zip(self.wanted, values, strict=True)
             )
             if held[row]:
                 rows.append(values)
-        self.skipped += int(held.size - np.count_nonzero(held))
+        self.skipped += int(held.size - np.count_nonzero(held)) - (self.misfits - misfits)
         return held, {name: _column([row[place] for row in rows]) for place, name in enumerate(self.wanted)}
 
 
 def _column(values: list[Any]) -> NDArray[np.generic]:
     whole = bool(values) and all(isinstance(value, int) and abs(value) < 2**63 for value in values)
-    if whole:
-        return np.array(values, np.int64)
-    return np.array([np.nan if value is None else float(value) for value in values], np.float64)
+    return np.array(values, np.int64) if whole else np.array([_float(value) for value in values], np.float64)
+
+
+def _float(value: float | None) -> float:
+    try:
+        return math.nan if value is None else float(value)
+    except OverflowError:  # an integer of more than 308 digits
+        return math.inf
 
 
 def _value(found: Any, path: str) -> Any:
@@ -105,5 +119,7 @@ def _value(found: Any, path: str) -> Any:
 
 
 def _place(parent: Any, name: str) -> int | None:
+    """Where a name stands in a list beside; behind its end, where nothing is, for one that stands there twice."""
     lists = [one for one in parent.values() if isinstance(one, list)] if isinstance(parent, dict) else []
-    return next((one.index(name) for one in lists if name in one), None)
+    named = next((one for one in lists if name in one), [])
+    return None if not named else named.index(name) if named.count(name) == 1 else len(named)

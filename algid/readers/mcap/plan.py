@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from algid.errors import LogError
 from algid.log import Notice, Reading
 from algid.readers.joints import along_the_arm, order_notice
-from algid.readers.mcap.catalogue import Catalogue, channels_of, schema_name
+from algid.readers.mcap.catalogue import Catalogue, channels_of, kinds, schema_name
 from algid.readers.mcap.codec import walk_for
-from algid.readers.mcap.columnar import MisfitError, Shape
+from algid.readers.mcap.columnar import LARGEST_MESSAGE, MisfitError, Shape
 from algid.readers.mcap.framing import File
 from algid.readers.mcap.load import batches
 from algid.readers.mcap.topic import (
@@ -22,6 +22,7 @@ from algid.readers.mcap.topic import (
     has_names,
     joint_fields,
     joint_names,
+    repeated_name,
     stamp_paths,
 )
 from algid.readers.table import JOINT_CHANNELS, VELOCITIES
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
     from algid.profile import Profile
 
 _SAMPLES = 64
+_MOST_CANDIDATES = 256
+_WORK_A_LETTER = 4
+"""Letters of a definition that are read in a step of work."""
 _USUAL = "/joint_states"
 
 
@@ -99,18 +103,40 @@ def _topic(
     file: File, found: Catalogue, name: str, sources: dict[str, tuple[str, str]], profile: Profile | None
 ) -> Topic:
     paths = {channel: path for channel, (topic, path) in sources.items() if topic == name}
-    shapes = list(_shapes(file, found, name))
-    if not shapes:
+    types = {type_name: _shown(file, found, name, type_name, paths) for type_name in _types(found, name)}
+    types = {type_name: shown for type_name, shown in types.items() if shown.messages}
+    if not types:
         raise NothingFoundError(f"{file.path}: there is no message on topic {name!r}; found {listed(found)}")
-    for channel, path in paths.items():
-        if not any(shape.find(path) for shape in shapes):
-            known = [*shapes[0].numbers][:12]
-            raise LogError(f"{file.path}: messages on {name!r} have no {path!r} for {channel}; found {known}")
+    type_name = min(types, key=lambda one: len(types[one].missing))
+    shown = types[type_name]
+    for channel in shown.missing:
+        raise LogError(
+            f"{file.path}: messages on {name!r} have no {paths[channel]!r} for {channel}; found {shown.known}"
+        )
     clock = profile.clock if profile else None
-    stamp = next((pair for shape in shapes if (pair := stamp_paths(shape))), None)
-    if clock == "header" and stamp is None:
+    if clock == "header" and shown.stamp is None:
         raise LogError(f'{file.path}: messages on {name!r} carry no stamp; set clock = "log" in the profile')
-    return Topic(name, _topic_type(found, name), Fields(paths, stamp), clock)
+    return Topic(name, type_name, Fields(paths, shown.stamp), clock)
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """What the first messages of a topic and type show: the channels they miss, some of their paths, their stamp."""
+
+    messages: int
+    missing: tuple[str, ...]
+    known: list[str]
+    stamp: tuple[str, str] | None
+
+
+def _shown(file: File, found: Catalogue, topic: str, type_name: str, paths: dict[str, str]) -> _Shown:
+    missing, known, stamp, messages = tuple(paths), list[str](), None, 0
+    for shape in _shapes(file, found, topic, type_name):
+        messages += 1
+        missing = tuple(channel for channel in missing if not shape.find(paths[channel]))
+        known = known or [*shape.numbers][:12]
+        stamp = stamp or stamp_paths(shape)
+    return _Shown(messages, missing, known, stamp)
 
 
 @dataclass(frozen=True)
@@ -125,19 +151,24 @@ class _Usual:
 
 def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> _Usual | None:
     """The one topic with joint states."""
-    names = [profile.topic] if profile and profile.topic else _candidates(found)
     fitting: dict[str, _Usual] = {}
     many: dict[str, list[str]] = {}
-    for name in names:
-        for shape in _shapes(file, found, name):
-            joints = joint_names(shape)
-            chosen = _joints(joints, profile)
-            if chosen:
-                there = (joints[0], joints[1]) if len(joints) == 2 else chosen
-                fitting[name] = _Usual(name, there, has_names(shape), joint_fields(shape, chosen))
-                break
-            if len(joints) > 2:
-                many[name] = joints
+    refused: list[LogError] = []
+    for name, type_name in _candidates(file, found, profile):
+        try:
+            for shape in _shapes(file, found, name, type_name):
+                joints = joint_names(shape)
+                chosen = _joints(joints, profile)
+                if chosen:
+                    there = (joints[0], joints[1]) if len(joints) == 2 else chosen
+                    fitting.setdefault(name, _Usual(name, there, has_names(shape), joint_fields(shape, chosen)))
+                    break
+                if repeated := repeated_name(shape):
+                    refused.append(_repeated(file, name, repeated))
+                if len(joints) > 2:
+                    many[name] = joints
+        except LogError as error:  # another topic may still hold the joints
+            refused.append(error)
     if _USUAL in fitting:
         return fitting[_USUAL]
     if len(fitting) == 1:
@@ -148,6 +179,8 @@ def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> _Usua
         name, joints = next(iter(many.items()))
         told = ", ".join(joints[:12])
         raise LogError(f"{file.path}: {name!r} has {len(joints)} joints ({told}); choose two with joints = […]")
+    if refused:
+        raise refused[0]
     if profile is not None and all(profile.channel(name).source for name in JOINT_CHANNELS):
         return None
     wanted = f"the joints {profile.joints}" if profile and profile.joints else "positions and efforts of two joints"
@@ -162,39 +195,74 @@ def _joints(names: list[str], profile: Profile | None) -> tuple[str, str] | None
     return along_the_arm(names)[0] if len(names) == 2 else None
 
 
-def _candidates(found: Catalogue) -> list[str]:
-    names = []
-    for channel in found.channels.values():
-        schema = found.schemas.get(channel.schema_id)
-        known = schema is not None and (schema.name in JOINT_STATE + DYNAMIC_JOINT_STATE or b"effort" in schema.data)
-        if known or channel.message_encoding == "json":
-            names.append(channel.topic)
-    return list(dict.fromkeys(names))
+def _repeated(file: File, topic: str, joint: str) -> LogError:
+    return LogError(
+        f"{file.path}: messages on {topic!r} name the joint {joint!r} twice; name the fields by their places, "
+        'as in source = "position[0]" of [theta1], in a profile'
+    )
 
 
-def _shapes(file: File, found: Catalogue, topic: str) -> Iterator[Shape]:
-    """Shapes of the topic's first messages."""
-    channels = channels_of(found, topic, _topic_type(found, topic))
+def _candidates(file: File, found: Catalogue, profile: Profile | None) -> list[tuple[str, str]]:
+    """Topics, each with a type of its messages, that may hold joint states; a profile's alone, where it names one."""
+    places = kinds(found)
+    if profile and profile.topic:
+        return [place for place in places if place[0] == profile.topic]
+    some = [place for place, numbers in places.items() if _may_hold(found, min(numbers))]
+    if len(some) > _MOST_CANDIDATES:
+        raise LogError(f"{file.path}: {len(some)} topics may hold joint states; choose with topic = … in a profile")
+    return some
+
+
+def _may_hold(found: Catalogue, number: int) -> bool:
+    channel = found.channels[number]
+    schema = found.schemas.get(channel.schema_id)
+    known = schema is not None and (schema.name in JOINT_STATE + DYNAMIC_JOINT_STATE or b"effort" in schema.data)
+    return known or channel.message_encoding == "json"
+
+
+def _types(found: Catalogue, topic: str) -> list[str]:
+    return [type_name for name, type_name in kinds(found) if name == topic]
+
+
+def _shapes(file: File, found: Catalogue, topic: str, type_name: str) -> Iterator[Shape]:
+    """Shapes of the topic's first messages that fit their schema.
+
+    Raises
+    ------
+    LogError
+        If none of them does, or they ask for more work than those of any recorder.
+    """
+    channels = channels_of(found, topic, type_name)
     if not channels:
         return
     channel: Any = found.channels[min(channels)]
-    walk = walk_for(str(file.path), channel, found.schemas.get(channel.schema_id))
+    schema = found.schemas.get(channel.schema_id)
+    _work(file, topic, len(schema.data) // _WORK_A_LETTER if schema else 0)
+    walk = walk_for(str(file.path), channel, schema)
     for batch in batches(file, found, channels):
         messages = batch.messages
         if messages is None:
             found.damage.append(batch.reason)
         if messages is None or not len(messages):
             continue
+        fitting, misfit = 0, None
         for start, size in zip(messages.starts[:_SAMPLES], messages.sizes[:_SAMPLES], strict=True):
             try:
-                yield walk(messages.content[start : start + size].tobytes())
+                shape = walk(messages.content[start : start + min(size, LARGEST_MESSAGE)].tobytes())
             except MisfitError as error:
-                raise LogError(f"{file.path}: topic {topic!r}: {error}; it cannot be read") from error
+                misfit = error
+                continue
+            fitting += 1
+            _work(file, topic, shape.parts)
+            yield shape
+        if misfit and not fitting:
+            raise LogError(f"{file.path}: topic {topic!r}: {misfit}; it cannot be read") from misfit
         return
 
 
-def _topic_type(found: Catalogue, topic: str) -> str:
-    return next((schema_name(found, one) for one in found.channels.values() if one.topic == topic), "")
+def _work(file: File, topic: str, steps: int) -> None:
+    if not file.works(steps):
+        raise LogError(f"{file.path}: topic {topic!r}: messages or definitions of more parts than any recorder's")
 
 
 def listed(found: Catalogue) -> str:

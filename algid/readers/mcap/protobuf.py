@@ -1,21 +1,28 @@
 """Protocol buffers: the shape of one message, and the message types out of a FileDescriptorSet.
 
 A varint's width is fixed by the highest bits of its bytes, so those are the bytes that fix a shape, beside
-keys and lengths. A number that is nought is left out of proto3 messages: it is read as nought.
+keys and lengths. A number that is zero is left out of proto3 messages: it is read as zero.
+
+google.protobuf reads the descriptors. Messages are walked by hand, since it does not tell where in a message a number
+stands: that is what lets a hundred thousand be read at once, 30 times faster than message by message.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
-from algid.readers.mcap.columnar import MOST_PARTS, MisfitError, Numbers, Shape
+from algid.readers.mcap.columnar import MisfitError, Numbers, Shape
+from algid.readers.mcap.definitions import DefinitionError
 
 _FIXED = {1: "<f8", 2: "<f4", 6: "<u8", 7: "<u4", 15: "<i4", 16: "<i8"}
 _VARINTS = {3, 4, 5, 8, 13, 14, 17, 18}
 _ZIGZAG = {17, 18}
 _STRING, _MESSAGE, _BYTES, _REPEATED = 9, 11, 12, 3
 _DEEPEST = 32
+_LONGEST = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -31,64 +38,53 @@ class Field:
 Types = dict[str, dict[int, Field]]
 
 
-def parse(data: bytes) -> Types:
-    """Fields by message type and number, out of a serialised FileDescriptorSet.
+def parse(root: str, data: bytes) -> Types:
+    """Fields by message type and number, of `root` and all it is made of, out of a serialised FileDescriptorSet.
 
     Raises
     ------
-    MisfitError
-        If the bytes are no such set.
+    DefinitionError
+        If the bytes are no such set, or a type is missing.
     """
-    types: Types = {}
-    for number, file in _lengths(data):
-        if number != 1:
-            continue
-        parts = list(_lengths(file))
-        package = next((_name(part) for number, part in parts if number == 2), "")
-        for number, part in parts:
-            if number == 4:
-                _add(types, package, part, 0)
+    from google.protobuf.descriptor_pb2 import FileDescriptorSet
+    from google.protobuf.message import DecodeError
+
+    if len(data) > _LONGEST:
+        raise DefinitionError(f"{root}: a descriptor of {len(data)} bytes; expected {_LONGEST} at most")
+    try:
+        found = {
+            name: message
+            for file in FileDescriptorSet.FromString(data).file
+            for name, message in _messages(file.package, file.message_type)
+        }
+        types: Types = {}
+        waiting = [root]
+        while waiting:
+            name = waiting.pop()
+            if name in types:
+                continue
+            if name not in found:
+                raise DefinitionError(f"{root}: the type {name[:80]!r} is not defined")
+            types[name] = {one.number: _field(one) for one in found[name].field}
+            waiting += [one.message for one in types[name].values() if one.type == _MESSAGE]
+    except (DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise DefinitionError(f"{root}: no set of descriptors ({error})") from error
     return types
 
 
-def _add(types: Types, scope: str, message: bytes, depth: int) -> None:
-    if depth > _DEEPEST:
-        raise MisfitError("message types nested too deep")
-    parts = list(_lengths(message))
-    name = next((_name(part) for number, part in parts if number == 1), "")
-    full = f"{scope}.{name}" if scope else name
-    types[full] = dict(_field(part) for number, part in parts if number == 2)
-    for number, part in parts:
-        if number == 3:
-            _add(types, full, part, depth + 1)
+def _messages(scope: str, messages: Any) -> Iterator[tuple[str, Any]]:
+    for message in messages:
+        name = f"{scope}.{message.name}" if scope else message.name
+        yield name, message
+        yield from _messages(name, message.nested_type)
 
 
-def _field(data: bytes) -> tuple[int, Field]:
-    values: dict[int, int] = {}
-    texts: dict[int, str] = {}
-    for number, wire, start, end, value in _entries(data, 0, len(data)):
-        if wire == 0:
-            values[number] = value
-        elif wire == 2:
-            texts[number] = _name(data[start:end]) if number in (1, 6) else ""
-    field = Field(texts.get(1, ""), values.get(5, 0), texts.get(6, "").lstrip("."), values.get(4) == _REPEATED)
-    return values.get(3, 0), field
-
-
-def _name(data: bytes) -> str:
-    return data.decode("utf-8", errors="replace")
-
-
-def _lengths(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Number and bytes of each length-delimited entry."""
-    for number, wire, start, end, _ in _entries(data, 0, len(data)):
-        if wire == 2:
-            yield number, data[start:end]
+def _field(one: Any) -> Field:
+    return Field(one.name, one.type, one.type_name.lstrip("."), one.label == _REPEATED)
 
 
 def _entries(data: bytes, start: int, end: int) -> Iterator[tuple[int, int, int, int, int]]:
     """Number, wire type, first and last byte, and varint value of each entry of a message."""
-    count = 0
     while start < end:
         key, start = _varint(data, start, end)
         number, wire, value = key >> 3, key & 7, 0
@@ -101,8 +97,7 @@ def _entries(data: bytes, start: int, end: int) -> Iterator[tuple[int, int, int,
             stop = start + (8 if wire == 1 else 4)
         else:
             raise MisfitError(f"a protobuf entry of wire type {wire}")
-        count += 1
-        if stop > end or count > MOST_PARTS:
+        if stop > end:
             raise MisfitError("a protobuf entry that reaches past its message")
         yield number, wire, start, stop, value
         start = stop
@@ -118,30 +113,65 @@ def _varint(data: bytes, start: int, end: int) -> tuple[int, int]:
 
 
 def walk(payload: bytes, root: str, types: Types) -> Shape:
-    """The shape of one message.
+    """The shape of one message of a type among `types`.
 
     Raises
     ------
     MisfitError
         If its bytes do not fit the schema.
     """
-    if root not in types:
-        raise MisfitError(f"no definition of {root!r}")
-    shape = Shape()
-    _walk(payload, 0, len(payload), types, root, "", shape, 0)
+    absent = _Absent(types, root)
+    shape = Shape(absent=absent)
+    _walk(payload, 0, len(payload), root, "", shape, absent, 0)
     return shape
 
 
-def _walk(data: bytes, start: int, end: int, types: Types, kind: str, prefix: str, shape: Shape, depth: int) -> None:
+@dataclass(frozen=True)
+class _Absent:
+    """Which numbers a message leaves out: those of a stamp that is left out itself, too."""
+
+    types: Types
+    root: str
+    lists: dict[str, int] = field(default_factory=dict)
+    """By path of a repeated field how many of it there are."""
+
+    def __call__(self, path: str) -> bool:
+        kind, done = self.root, ""
+        *inner, last = path.split(".")
+        for part in inner:
+            name, index = _indexed(part)
+            found = self._named(kind, name)
+            done += name
+            if found is None or found.type != _MESSAGE or found.repeated != (index is not None):
+                return False
+            if index is not None and index >= self.lists.get(done, 0):
+                return False
+            done += part.removeprefix(name) + "."
+            kind = found.message
+        found = self._named(kind, last)
+        return found is not None and not found.repeated and (found.type in _FIXED or found.type in _VARINTS)
+
+    def _named(self, kind: str, name: str) -> Field | None:
+        return next((one for one in self.types[kind].values() if one.name == name), None)
+
+
+def _indexed(part: str) -> tuple[str, int | None]:
+    found = re.fullmatch(r"(.*)\[(\d{1,9})\]", part)
+    return (found[1], int(found[2])) if found else (part, None)
+
+
+def _walk(data: bytes, start: int, end: int, kind: str, prefix: str, shape: Shape, absent: _Absent, depth: int) -> None:
     if depth > _DEEPEST:
         raise MisfitError("messages nested too deep")
+    fields: Mapping[int, Field] = absent.types[kind]
     seen: dict[str, int] = {}
     texts: dict[str, list[str]] = {}
     last = start
     for number, wire, first, stop, _ in _entries(data, start, end):
-        field = types[kind].get(number)
+        shape.count()
         shape.fix(last, first)
         last = stop
+        field = fields.get(number)
         if field is None:
             if wire == 0:
                 shape.flags.extend(range(first, stop))
@@ -151,18 +181,18 @@ def _walk(data: bytes, start: int, end: int, types: Types, kind: str, prefix: st
         seen[path] = index + 1
         if wire == 2 and field.type == _MESSAGE:
             inner = f"{path}[{index}]." if field.repeated else f"{path}."
-            _walk(data, first, stop, types, field.message, inner, shape, depth + 1)
+            _walk(data, first, stop, field.message, inner, shape, absent, depth + 1)
         elif wire == 2 and field.type == _STRING:
             if field.repeated:
                 shape.fix(first, stop)
-                texts.setdefault(path, []).append(_name(data[first:stop]))
+                texts.setdefault(path, []).append(data[first:stop].decode("utf-8", errors="replace"))
         elif wire == 2 and field.type != _BYTES:
             _packed(data, first, stop, field, path, shape)
         else:
             _number(first, stop, wire, field, f"{path}[{index}]" if field.repeated else path, shape)
     shape.fix(last, end)
     shape.texts |= {path: tuple(found) for path, found in texts.items()}
-    _absent(types, kind, prefix, seen, shape, depth)
+    absent.lists.update(seen)
 
 
 def _number(first: int, stop: int, wire: int, field: Field, path: str, shape: Shape) -> None:
@@ -184,21 +214,10 @@ def _packed(data: bytes, first: int, stop: int, field: Field, path: str, shape: 
     elif field.type in _VARINTS:
         index = 0
         while first < stop:
+            shape.count()
             _, after = _varint(data, first, stop)
             _number(first, after, 0, field, f"{path}[{index}]", shape)
             first, index = after, index + 1
             shape.fix(after, after)
     else:
         raise MisfitError(f"the field {field.name!r} is not encoded as its type says")
-
-
-def _absent(types: Types, kind: str, prefix: str, seen: dict[str, int], shape: Shape, depth: int) -> None:
-    """Numbers that a message leaves out: nought, also those of a stamp that is left out itself."""
-    for field in types[kind].values():
-        path = f"{prefix}{field.name}"
-        if path in seen or field.repeated:
-            continue
-        if field.type in _FIXED or field.type in _VARINTS:
-            shape.numbers[path] = Numbers(0, "zero")
-        elif field.type == _MESSAGE and field.message in types and depth < 4:
-            _absent(types, field.message, f"{path}.", {}, shape, depth + 1)

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from algid.errors import LogError
 from algid.log import IntArray, Notice
-from algid.readers.mcap.catalogue import Catalogue, channels_of
+from algid.readers.mcap.catalogue import Catalogue, channels_of, schema_name
 from algid.readers.mcap.codec import Decodes, decoder_for
-from algid.readers.mcap.columnar import MisfitError, Shape
+from algid.readers.mcap.columnar import ExcessError, Shape
 from algid.readers.mcap.framing import File
 from algid.readers.mcap.load import Account, batches
 from algid.readers.mcap.messages import Messages
@@ -58,9 +58,15 @@ def has_names(shape: Shape) -> bool:
     return bool(_names(shape))
 
 
+def repeated_name(shape: Shape) -> str | None:
+    """A joint that a message of this shape names twice, if any."""
+    names = _names(shape)
+    return next((name for name in names if names.count(name) > 1), None)
+
+
 def _names(shape: Shape) -> tuple[str, ...]:
     lists = [texts for path, texts in shape.texts.items() if path in ("name", "names", "joint_names")]
-    return lists[0] if lists else ()
+    return lists[0][:_MOST_JOINTS] if lists else ()
 
 
 def joint_fields(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:
@@ -85,6 +91,8 @@ def _paths(shape: Shape, joint: str, quantity: str) -> str | None:
 
 
 _STAMP = ("sec", "nanosec")
+_MOST_SECONDS, _MOST_NANOSECONDS = 9.2e9, 9.2e18
+_MOST_JOINTS = 256
 
 
 @dataclass
@@ -113,14 +121,14 @@ class Topic:
         Raises
         ------
         LogError
-            If a message does not fit its schema.
+            If half of the messages do not fit their schema, or their stamps are none.
         """
         channels = channels_of(found, self.name, self.type)
         if not channels:
             told = f"{path}: topic {self.name!r} is not in this file"
             yield Table(np.empty(0, np.int64), {}, (Notice("NO_TOPIC", told, lossy=True),))
             return
-        decoder, account = self._decoder(path, found, channels), Account()
+        decoder, account = self._decoder(path, file, found, channels), Account()
         parts: list[Table] = []
         size = 0
         for batch in batches(file, found, channels):
@@ -128,47 +136,52 @@ class Topic:
             if batch.messages is None or not len(batch.messages):
                 continue
             table = self._table(path, decoder, batch.messages)
+            if decoder.misfits > account.found / 2:
+                raise LogError(f"{path}: topic {self.name!r}: {decoder.misfit}; it cannot be read without guessing")
             parts.append(table)
             size += len(table)
             if size >= rows:
-                yield self._clocked(parts)
+                yield self._clocked(path, parts)
                 parts, size = [], 0
-        last = self._clocked(parts) if parts else Table(np.empty(0, np.int64), {})
+        last = self._clocked(path, parts) if parts else Table(np.empty(0, np.int64), {})
         counted = sum(found.counts.get(channel, 0) for channel in channels) if found.counts else None
-        yield last.noting(*found.notices, *account.notices(counted), *self._skipped(decoder))
+        said = (*account.notices(counted), *self._left_out(decoder), *self._others(found, channels))
+        yield last.noting(*found.notices, *said)
 
     def count(self, found: Catalogue) -> int:
         """Messages that the file's statistics promise, 0 without them."""
         return sum((found.counts or {}).get(channel, 0) for channel in channels_of(found, self.name, self.type))
 
-    def _decoder(self, path: str, found: Catalogue, channels: frozenset[int]) -> Decodes:
+    def _decoder(self, path: str, file: File, found: Catalogue, channels: frozenset[int]) -> Decodes:
         channel: Any = found.channels[min(channels)]
         wanted = dict(self.fields.paths)
         if self.fields.stamp is not None and self.clock != "log":
             wanted |= dict(zip(_STAMP, self.fields.stamp, strict=True))
-        return decoder_for(path, channel, found.schemas.get(channel.schema_id), wanted)
+        return decoder_for(path, channel, found.schemas.get(channel.schema_id), wanted, file.works)
 
     def _table(self, path: str, decoder: Decodes, messages: Messages) -> Table:
         try:
             held, columns = decoder.columns(messages)
-        except MisfitError as error:
-            raise LogError(f"{path}: topic {self.name!r}: {error}; it cannot be read without guessing") from error
+        except ExcessError as error:
+            raise LogError(f"{path}: topic {self.name!r} has {error}; write it anew with fewer") from error
         log_ns = messages.log_ns if held.all() else messages.log_ns[held]
         if not columns:
             columns = {name: np.empty(0) for name in decoder.wanted}
         return Table(log_ns, columns)  # type: ignore[arg-type]
 
-    def _clocked(self, parts: list[Table]) -> Table:
+    def _clocked(self, path: str, parts: list[Table]) -> Table:
         """The tables as one, with the stamps of the chosen clock and float64 columns."""
         table = stack(parts)
         columns = dict(table.columns)
         notices: tuple[Notice, ...] = ()
         stamps = table.stamp_ns
         if _STAMP[0] in columns:
-            header = _nanoseconds(columns.pop(_STAMP[0]), columns.pop(_STAMP[1]))
+            header = self._nanoseconds(path, columns.pop(_STAMP[0]), columns.pop(_STAMP[1]))
             if self._chosen is None and len(table):
                 self._chosen, notices = self._choice(header)
             stamps = header if self._chosen == "header" else stamps
+        if stamps is table.stamp_ns and len(table) and stamps.min() < 0:
+            raise LogError(f"{path}: topic {self.name!r}: a log time of 2^63 ns or more; name the header's clock")
         floats = {name: np.asarray(values, np.float64) for name, values in columns.items()}
         return Table(stamps, floats, table.notices + notices)
 
@@ -178,13 +191,41 @@ class Topic:
         text = f"header stamps of {self.name!r} stand still at {header[0]} ns: the recorder's times are taken"
         return "log", (Notice("LOG_TIME", text),)
 
-    def _skipped(self, decoder: Decodes) -> list[Notice]:
-        if not decoder.skipped:
+    def _nanoseconds(self, path: str, seconds: NDArray[Any], nanoseconds: NDArray[Any]) -> IntArray:
+        """Stamps (N,) of headers in ns."""
+        for values, largest in ((seconds, _MOST_SECONDS), (nanoseconds, _MOST_NANOSECONDS)):
+            wrong = np.flatnonzero(~(np.abs(values.astype(np.float64)) < largest))
+            if wrong.size:
+                raise LogError(
+                    f"{path}: topic {self.name!r}: a header stamp with {values[wrong[0]]} for seconds or nanoseconds; "
+                    'expected whole numbers below 2^63 ns; take the recorder\'s times with clock = "log" in a profile'
+                )
+        whole = np.floor(seconds)
+        rest = nanoseconds + np.rint((seconds - whole) * 1e9) if seconds.dtype.kind == "f" else nanoseconds
+        return whole.astype(np.int64) * 1_000_000_000 + rest.astype(np.int64)
+
+    def _left_out(self, decoder: Decodes) -> list[Notice]:
+        said = []
+        if decoder.skipped:
+            lacking = "velocities too" if any(name in decoder.wanted for name in VELOCITIES) else "both joints"
+            text = f"{decoder.skipped} messages on {self.name!r} do not hold {lacking} and were left out"
+            said.append(Notice("OTHER_MESSAGES", text))
+        if decoder.misfits:
+            text = f"{decoder.misfits} messages on {self.name!r} do not fit their schema; the first: {decoder.misfit}"
+            said.append(Notice("MISFIT_MESSAGES", text, lossy=True))
+        return said
+
+    def _others(self, found: Catalogue, channels: frozenset[int]) -> list[Notice]:
+        """What to say of the topic's messages that are of another type, or encoded or defined in another way."""
+        others = {number for number, channel in found.channels.items() if channel.topic == self.name} - channels
+        if found.counts is None:
+            others = {
+                one for one in others if any(span.channels is None or one in span.channels for span in found.spans)
+            }
+        else:
+            others = {one for one in others if found.counts.get(one)}
+        if not others:
             return []
-        lacking = "velocities too" if any(name in decoder.wanted for name in VELOCITIES) else "both joints"
-        text = f"{decoder.skipped} messages on {self.name!r} do not hold {lacking} and were left out"
-        return [Notice("OTHER_MESSAGES", text)]
-
-
-def _nanoseconds(seconds: NDArray[Any], nanoseconds: NDArray[Any]) -> IntArray:
-    return seconds.astype(np.int64) * 1_000_000_000 + nanoseconds.astype(np.int64)
+        types = ", ".join(sorted({schema_name(found, found.channels[one]) or "no schema" for one in others})[:4])
+        text = f"topic {self.name!r} also carries messages of another type or definition ({types}); they were not read"
+        return [Notice("OTHER_TYPE", text, lossy=True)]

@@ -1,0 +1,296 @@
+"""Hostile schemas and messages: each is read, told or refused in one line, and none takes long or much."""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from google.protobuf import descriptor_pb2
+from mcap.writer import Writer
+
+from algid.errors import LogError
+from algid.log import Log
+from algid.profile import Profile
+from algid.readers import read_log
+from algid.readers.mcap import cdr, protobuf
+from algid.readers.mcap.columnar import Decoder, ExcessError, MisfitError
+from algid.readers.mcap.definitions import DefinitionError, parse_idl, parse_msg
+from algid.readers.mcap.framing import DamagedError, File
+from algid.readers.mcap.messages import records_in
+from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
+from tests.readers.logs import EPOCH_NS, noise_log, same
+from tests.readers.mcaps import joint_state, write_mcap
+from tests.readers.test_mcap import TOPIC, messages_of, protobuf_schema
+
+
+def json_messages(log: Log, **more: Any) -> list[tuple[str, int, bytes]]:
+    """The samples of a log as JSON; what is in `more` by row stands in place of its fields."""
+    messages = []
+    for row, stamp in enumerate(log.stamp_ns.tolist()):
+        content = {
+            "header": {"stamp": {"sec": stamp // 10**9, "nanosec": stamp % 10**9}},
+            "name": ["a1", "a2"],
+            "position": log.theta[:, row].tolist(),
+            "effort": log.tau[:, row].tolist(),
+        }
+        messages.append((TOPIC, stamp, json.dumps(content | more.get(f"row{row}", {})).encode()))
+    return messages
+
+
+def write_json(path: Path, messages: list[tuple[str, int, bytes]]) -> None:
+    write_mcap(path, messages, {TOPIC: ("arm", "jsonschema", b"{}")}, encoding="json")
+
+
+@pytest.mark.parametrize("digits", [20, 400, 5000])
+def test_json_integers_beyond_64_bits_are_no_traceback(digits: int, tmp_path: Path) -> None:
+    log = noise_log(20, start_ns=EPOCH_NS, velocity=False)
+    messages = json_messages(log)
+    messages[7] = (
+        TOPIC,
+        messages[7][1],
+        messages[7][2].replace(b'"position": [', b'"position": [' + b"9" * digits + b", "),
+    )
+    write_json(tmp_path / "log.mcap", messages)
+    if digits > 4300:  # Python refuses to read it: no JSON message
+        found = read_log(tmp_path / "log.mcap")
+        assert len(found) == 19
+        assert any(notice.code == "MISFIT_MESSAGES" and notice.lossy for notice in found.notices)
+    elif digits > 308:
+        with pytest.raises(LogError, match=r"theta1 .* sample 8: expected a finite number"):
+            read_log(tmp_path / "log.mcap")
+    else:
+        assert read_log(tmp_path / "log.mcap").theta[0, 7] == float("9" * digits)
+
+
+@pytest.mark.parametrize("seconds", [float("nan"), float("inf"), 1e300, 10**30])
+def test_seconds_that_are_no_time_late_in_json_are_refused(seconds: float, tmp_path: Path) -> None:
+    log = noise_log(200, start_ns=EPOCH_NS, velocity=False)
+    write_json(tmp_path / "log.mcap", json_messages(log, row150={"header": {"stamp": {"sec": seconds, "nanosec": 0}}}))
+    with pytest.raises(LogError, match=r'header stamp with .* clock = "log" in a profile'):
+        read_log(tmp_path / "log.mcap")
+    assert same(read_log(tmp_path / "log.mcap", Profile(clock="log")), log)
+
+
+def test_seconds_with_a_fraction_are_taken_whole(tmp_path: Path) -> None:
+    log = noise_log(20, start_ns=10**18, velocity=False)
+    stamp = {"header": {"stamp": {"sec": int(log.stamp_ns[3]) // 10**9 + 0.5, "nanosec": 0}}}
+    write_json(tmp_path / "log.mcap", json_messages(log, row3=stamp)[:4])
+    assert read_log(tmp_path / "log.mcap").stamp_ns[-1] == 10**18 + 500_000_000
+
+
+@pytest.mark.parametrize("names", [["a1", "a1"], ["1", "1"]])
+def test_a_joint_named_twice_is_refused_and_read_by_its_place(names: list[str], tmp_path: Path) -> None:
+    log = noise_log(20, start_ns=EPOCH_NS, velocity=False)
+    sources = {
+        f"{name}{joint}": {"source": f"{field}[{joint - 1}]"}
+        for name, field in (("theta", "position"), ("tau", "effort"))
+        for joint in (1, 2)
+    }
+    profile = Profile.model_validate({"topic": TOPIC, **sources})
+    for encoding in ("cdr", "json"):
+        path = tmp_path / f"{encoding}.mcap"
+        if encoding == "json":
+            write_json(path, json_messages(log, **{f"row{row}": {"name": names} for row in range(20)}))
+        else:
+            rows = zip(log.stamp_ns.tolist(), log.theta.T.tolist(), log.tau.T.tolist(), strict=True)
+            write_mcap(path, [(TOPIC, ns, joint_state(ns, names, one, (), other).done()) for ns, one, other in rows])
+        with pytest.raises(LogError, match=rf"joint '{names[0]}' twice.*position\[0\]"):
+            read_log(path)
+        if names[0] == "a1":
+            assert same(read_log(path, profile), log)
+
+
+def test_two_types_on_one_topic_are_told_apart(tmp_path: Path) -> None:
+    log = noise_log(100, start_ns=EPOCH_NS)
+    with (tmp_path / "log.mcap").open("wb") as stream:
+        writer = Writer(stream, chunk_size=2048)
+        writer.start()
+        other = writer.register_channel(
+            TOPIC, "cdr", writer.register_schema("std_msgs/msg/Int8", "ros2msg", b"int8 data")
+        )
+        schema = writer.register_schema(JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode())
+        channel = writer.register_channel(TOPIC, "cdr", schema)
+        for _, stamp, data in messages_of(log):
+            writer.add_message(other, stamp, b"\0\1\0\0\7", stamp)
+            writer.add_message(channel, stamp, data, stamp)
+        writer.finish()  # type: ignore[no-untyped-call]
+    found = read_log(tmp_path / "log.mcap")
+    assert same(found, log)
+    (notice,) = found.notices
+    assert notice.code == "OTHER_TYPE"
+    assert notice.lossy
+    assert "std_msgs/msg/Int8" in notice.text
+
+
+def test_messages_that_do_not_fit_are_left_out_and_counted(tmp_path: Path) -> None:
+    log = noise_log(300, start_ns=EPOCH_NS)
+    messages = messages_of(log)
+    messages[40] = (TOPIC, messages[40][1], messages[40][2][:50])
+    write_mcap(tmp_path / "log.mcap", messages)
+    found = read_log(tmp_path / "log.mcap")
+    assert len(found) == 299
+    (notice,) = found.notices
+    assert notice.lossy
+    assert "1 messages on '/joint_states' do not fit their schema" in notice.text
+    write_mcap(
+        tmp_path / "log.mcap", [(TOPIC, ns, data[: 90 if row else 200]) for row, (_, ns, data) in enumerate(messages)]
+    )
+    with pytest.raises(LogError, match="cannot be read"):
+        read_log(tmp_path / "log.mcap")
+
+
+def test_messages_each_of_another_layout_are_read_as_far_as_a_file_may_ask() -> None:
+    rows = range(2000)
+    names = [["joint1", "joint2", f"{row:06d}"] for row in rows]
+    messages = [joint_state(row, names[row], (row, 1.0, 0.0), (), (1.0, 2.0, 0.0)).done() for row in rows]
+    content = b"".join(struct.pack("<BQHIQQ", 5, 22 + len(one), 1, 0, 0, 0) + one for one in messages)
+    types = parse_msg(JOINT_STATE, JOINT_STATE_DEFINITION)
+    wanted, spent = {"theta1": "position[joint1]"}, [0]
+
+    def works(steps: int) -> bool:
+        spent[0] += steps
+        return spent[0] < 1_000_000
+
+    decoder = Decoder(lambda payload: cdr.walk(payload, JOINT_STATE, types), wanted, frozenset(wanted), works)
+    found = records_in(content).of({1})
+    held, columns = decoder.columns(found)
+    assert held.all()
+    assert columns["theta1"].tolist() == list(rows)
+    assert spent[0] > 2000 * 10
+    with pytest.raises(ExcessError, match="so many layouts"):
+        [decoder.columns(found) for _ in range(4)]
+
+
+def test_what_a_file_may_ask_for_grows_with_its_size(tmp_path: Path) -> None:
+    (tmp_path / "small").write_bytes(b"0")
+    (tmp_path / "large").write_bytes(bytes(1 << 20))
+    with File(tmp_path / "small") as small, File(tmp_path / "large") as large:
+        assert small.works(1_400_000)
+        assert not small.works(200_000)
+        assert large.works(5_000_000)
+        small.unpacks(1 << 28)
+        with pytest.raises(DamagedError, match="claim"):
+            small.unpacks(1 << 28)
+        large.unpacks(1 << 29)
+
+
+def test_countless_topics_are_refused_and_one_can_be_chosen(tmp_path: Path) -> None:
+    log = noise_log(50, start_ns=EPOCH_NS)
+    others = [(f"/t{number}", 0, b"") for number in range(2000)]
+    write_mcap(tmp_path / "log.mcap", messages_of(log) + others)
+    with pytest.raises(LogError, match="2001 topics may hold joint states; choose with topic"):
+        read_log(tmp_path / "log.mcap")
+    assert same(read_log(tmp_path / "log.mcap", Profile(topic=TOPIC)), log)
+
+
+def test_a_definition_that_cannot_be_read_on_another_topic_does_not_matter(tmp_path: Path) -> None:
+    log = noise_log(50, start_ns=EPOCH_NS)
+    schema = {"/bad": ("a/msg/B", "ros2msg", b"float64[" + b"9" * 5000 + b"] effort")}
+    write_mcap(tmp_path / "log.mcap", [("/bad", 1, b"\0\1\0\0"), *messages_of(log)], schema)
+    assert same(read_log(tmp_path / "log.mcap"), log)
+    with pytest.raises(LogError, match="a length of 5000 digits"):
+        read_log(tmp_path / "log.mcap", Profile(topic="/bad"))
+
+
+def test_a_definition_of_lengths_or_quotes_without_end_is_refused() -> None:
+    for text in ("float64[" + "9" * 5000 + "] x", "int8 x\n" * (1 << 18)):
+        with pytest.raises(DefinitionError, match=r"digits|characters"):
+            parse_msg("a/msg/T", text)
+    member = "module a { module msg { struct T { double x"
+    for text in (
+        *('"' * 400_001, "/*" * 400_000, '"\\' * 400_000, "sequence<" * 90_000),
+        *(f"{member}[{'9' * 5000}]; }}; }}; }};", f"{member}; sequence<{'sequence<' * 50_000}"),
+    ):
+        with pytest.raises(DefinitionError):
+            parse_idl("a/msg/T", text)
+
+
+def test_a_structure_of_nothing_is_counted(tmp_path: Path) -> None:
+    fields = "".join(f"float64[0] f{number}\n" for number in range(4000))
+    text = "Zero[] effort\n" + "=" * 80 + f"\nMSG: a/Zero\n{fields}"
+    message = b"\0\1\0\0" + struct.pack("<I", 1 << 19) + bytes(1 << 20)
+    write_mcap(
+        tmp_path / "log.mcap", [("/s", row, message) for row in range(2)], {"/s": ("a/msg/S", "ros2msg", text.encode())}
+    )
+    with pytest.raises(LogError, match="more than 100000 parts"):
+        read_log(tmp_path / "log.mcap")
+
+
+def descriptors(**types: list[tuple[str, str]]) -> bytes:
+    """A descriptor set: by type its fields, each with a name and the type of message it is, empty for a double."""
+    file = descriptor_pb2.FileDescriptorProto(name="a.proto", package="a", syntax="proto3")
+    for name, fields in types.items():
+        message = file.message_type.add(name=name)
+        for number, (field, kind) in enumerate(fields, start=1):
+            message.field.add(name=field, number=number, type=11 if kind else 1, label=1, type_name=kind)
+    return descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString()
+
+
+def test_a_protobuf_type_that_is_missing_is_refused_where_it_is_needed() -> None:
+    data = descriptors(State=[("x", ""), ("other", ".a.Gone")], Fine=[("effort", "")])
+    with pytest.raises(DefinitionError, match=r"type 'a\.Gone' is not defined"):
+        protobuf.parse("a.State", data)
+    assert protobuf.parse("a.Fine", data)["a.Fine"][1].name == "effort"
+    for broken in (data[:-3], b"\xff" * 100):
+        with pytest.raises(DefinitionError):
+            protobuf.parse("a.State", broken)
+
+
+def test_protobuf_types_that_refer_to_themselves_are_followed_by_name_only() -> None:
+    types = protobuf.parse("a.T", descriptors(T=[*((f"f{number}", ".a.T") for number in range(1000)), ("x", "")]))
+    shape = protobuf.walk(b"", "a.T", types)
+    assert shape.find("f1.f2.f3.f4.f5.f6.x") is not None
+    assert shape.find("f1.f2.y") is None
+    assert shape.find("f1") is None
+    deep = b""
+    for _ in range(40):
+        deep = b"\x0a" + bytes([len(deep)]) + deep if len(deep) < 128 else deep
+    with pytest.raises(MisfitError, match="nested too deep"):
+        protobuf.walk(deep, "a.T", types)
+
+
+@pytest.mark.parametrize("damage", ["cut", "wire", "varint", "width"])
+def test_a_protobuf_message_that_is_none_is_left_out(damage: str, tmp_path: Path) -> None:
+    data, state = protobuf_schema()
+    log = noise_log(30, start_ns=10**18, velocity=False)
+    messages = []
+    for row, stamp in enumerate(log.stamp_ns.tolist()):
+        one = state(name=["j1", "j2"], mode=5)
+        one.timestamp.seconds, one.timestamp.nanos = divmod(stamp, 10**9)
+        one.position.extend(log.theta[:, row])
+        one.effort.extend(log.tau[:, row])
+        messages.append(one.SerializeToString())
+    broken = {
+        "cut": messages[9][:-1],
+        "wire": messages[9] + b"\x0f",
+        "varint": messages[9] + b"\x30" + b"\xff" * 11,
+        "width": messages[9] + b"\x1a\x03abc",
+    }
+    messages[9] = broken[damage]
+    rows = [("/arm", stamp, one) for stamp, one in zip(log.stamp_ns.tolist(), messages, strict=True)]
+    write_mcap(tmp_path / "log.mcap", rows, {"/arm": ("arm.State", "protobuf", data)}, encoding="protobuf")
+    found = read_log(tmp_path / "log.mcap")
+    assert np.array_equal(found.stamp_ns, np.delete(log.stamp_ns, 9))
+    assert [notice.code for notice in found.notices if notice.lossy] == ["MISFIT_MESSAGES"]
+
+
+def test_a_protobuf_number_written_in_another_type_is_no_number() -> None:
+    data, _ = protobuf_schema()
+    types = protobuf.parse("arm.State", data)
+    assert protobuf.walk(b"\x30\x07", "arm.State", types).find("mode") is not None
+    assert (
+        protobuf.walk(b"\x78\x07", "arm.State", types).find("mode") is not None
+    )  # an unknown field beside one left out
+    for wrong in (
+        b"\x35\0\0\0\0",
+        b"\x18\x01",
+        b"\x32\x02\x81\x82",
+    ):  # fixed for a varint, a varint for doubles, a broken list
+        with pytest.raises(MisfitError):
+            protobuf.walk(wrong, "arm.State", types)
+    packed = protobuf.walk(b"\x32\x03\x02\x04\x06", "arm.State", types)
+    assert packed.find("mode[2]") is not None
