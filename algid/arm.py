@@ -26,6 +26,21 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.floating[Any]]  # float64 throughout; numpy types its arithmetic no tighter
 
+
+def read_only(array: FloatArray) -> FloatArray:
+    """A view of `array` that cannot be written to: what is handed out stays as it was."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+def keep_arrays(holder: object) -> None:
+    """Make the arrays of a frozen dataclass `read_only`."""
+    for name, value in list(vars(holder).items()):
+        if isinstance(value, np.ndarray):
+            object.__setattr__(holder, name, read_only(value))
+
+
 CONSTANT_NAMES = ("k1", "k2", "k3", "k4", "k5", "k6", "k7")
 CONSTANT_UNITS = {
     "k1": "kg m^2",

@@ -23,7 +23,7 @@ from functools import cached_property
 
 import numpy as np
 
-from algid.arm import FloatArray
+from algid.arm import FloatArray, keep_arrays, read_only
 from algid.estimators.parametrisation import Shared
 
 RANK_TOLERANCE = 1e-13  # relative eigenvalue of the scaled information that counts as nothing
@@ -40,10 +40,13 @@ class LogInformation:
     S: FloatArray
     g: FloatArray
 
+    def __post_init__(self) -> None:
+        keep_arrays(self)
+
     @cached_property
     def total(self) -> tuple[FloatArray, FloatArray]:
         """S (q, q) and g (q,) over the whole log."""
-        return self.S.sum(axis=0), self.g.sum(axis=0)
+        return read_only(self.S.sum(axis=0)), read_only(self.g.sum(axis=0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +56,9 @@ class Prior:
     names: tuple[str, ...]
     mean: FloatArray
     precision: FloatArray
+
+    def __post_init__(self) -> None:
+        keep_arrays(self)
 
     @classmethod
     def of(cls, names: tuple[str, ...], mean: FloatArray, covariance: FloatArray) -> Prior:

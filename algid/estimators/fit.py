@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from scipy.special import stdtrit
 
-from algid.arm import FloatArray
+from algid.arm import FloatArray, keep_arrays, read_only
 from algid.estimators.combine import LogInformation, Prior, combine, sandwich
 from algid.estimators.identifiability import Identifiability, Whiteness, examine, open_directions
 from algid.estimators.parametrisation import Shared
@@ -65,6 +65,9 @@ class Fit:
     note: str | None = None
     moved: FloatArray = field(default_factory=lambda: np.full(2, np.inf))
 
+    def __post_init__(self) -> None:
+        keep_arrays(self)
+
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the shared parameters."""
@@ -74,7 +77,7 @@ class Fit:
     def std(self) -> FloatArray:
         """Standard deviations (Q,): infinite where a parameter is not identifiable."""
         std = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        return np.where([status == "NOT_IDENTIFIABLE" for status in self.status], np.inf, std)
+        return read_only(np.where([status == "NOT_IDENTIFIABLE" for status in self.status], np.inf, std))
 
     @property
     def ci95(self) -> FloatArray:

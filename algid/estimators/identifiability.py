@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from algid.arm import FloatArray
+from algid.arm import FloatArray, keep_arrays
 
 _CLASSES = (
     ("k1", "k3", "k5", "j2"),
@@ -180,6 +180,9 @@ class Whiteness:
     lag1: FloatArray
     kurtosis: FloatArray
     joint_white: tuple[bool, bool]
+
+    def __post_init__(self) -> None:
+        keep_arrays(self)
 
     @property
     def white(self) -> bool:

@@ -37,6 +37,9 @@ _STRETCH = 64  # samples over which scores are summed
 _SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
 _FINEST = 1e-10  # relative noise that no sensor undercuts, and floating point can still weigh
 _EXCESS = 10.0  # torque error beyond the sensor's noise that tells unmodelled dynamics
+_SURE = (
+    0.9  # of what neighbouring torques differ by is noise of the torque: a short log may hide it in its angles' noise
+)
 _NEGLIGIBLE = 1e-3  # torque error relative to the torque that no one need worry about
 
 
@@ -88,6 +91,7 @@ class LogEvidence:
         guess = _guessed_noise(self.kept, self._floor)
         self.noise = self._known or guess
         self._sensor = guess.tau
+        self._floor = replace(self._floor, tau=np.maximum(self._floor.tau, _SURE * guess.tau))
         self._least = _NEGLIGIBLE * np.max([np.sqrt(np.mean(piece.tau**2, axis=1)) for piece in self.kept], axis=0)
 
     @property

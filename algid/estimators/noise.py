@@ -91,16 +91,18 @@ def variance_score(linear: Linearised, length: int, seed: int) -> VarianceScore:
     multipliers = linear.solve_transposed(linear.columns)
     residual = _by_joint(multipliers[-1])
     back = adjoint(H, residual, first, length)
-    power = np.concatenate([np.sum(back**2, axis=1), np.sum(residual**2, axis=1)])
+    smeared = linear.smeared(residual)
+    power = np.concatenate([np.sum(back**2, axis=1), np.sum(smeared**2, axis=1)])
+    torques = linear.smeared(smeared)
     directions = np.stack(
-        [forward(H, _only(back, 0), first), forward(H, _only(back, 1), first), _only(residual, 0), _only(residual, 1)]
+        [forward(H, _only(back, 0), first), forward(H, _only(back, 1), first), _only(torques, 0), _only(torques, 1)]
     )
     whitened = linear.solve(_by_row(directions))
     return VarianceScore(
         power,
         _traces(linear, length, rows, seed),
         0.5 * whitened @ whitened.T,
-        _absorbed(multipliers[:-1], H, first, length),
+        _absorbed(multipliers[:-1], linear, length),
     )
 
 
@@ -112,15 +114,16 @@ def _traces(linear: Linearised, length: int, rows: int, seed: int) -> FloatArray
         z_theta = signs.choice([-1.0, 1.0], (2, length))
         for joint in range(2):
             probes[probe, joint] = forward(linear.H, _only(z_theta, joint), linear.first)
-            probes[probe, 2 + joint] = _only(z_tau, joint)
+            probes[probe, 2 + joint] = linear.smeared(_only(z_tau, joint))
     whitened = linear.solve(_by_row(probes.reshape(-1, 2, rows // 2)))
     return np.sum(whitened**2, axis=1).reshape(_PROBES, 4).mean(axis=0)
 
 
-def _absorbed(multipliers: FloatArray, H: FloatArray, first: int, length: int) -> FloatArray:
+def _absorbed(multipliers: FloatArray, linear: Linearised, length: int) -> FloatArray:
     joints = np.stack([_by_joint(row) for row in multipliers])
-    backs = np.stack([adjoint(H, joint, first, length) for joint in joints])
-    parts = [backs[:, 0], backs[:, 1], joints[:, 0], joints[:, 1]]
+    backs = np.stack([adjoint(linear.H, joint, linear.first, length) for joint in joints])
+    smeared = linear.smeared(joints)
+    parts = [backs[:, 0], backs[:, 1], smeared[:, 0], smeared[:, 1]]
     return np.stack([part @ part.T for part in parts])
 
 

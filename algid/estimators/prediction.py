@@ -116,14 +116,17 @@ class PredictionSums:
         """How well the coefficients `c` (q,) predict the torque."""
         v = np.append(-c, 1.0)
         residual = np.maximum(np.einsum("x,axy,y->a", v, self._gram, v), 0.0)
-        return PredictionScore(float(self._count), residual, self._torque, self._gram[:, -1, -1])
+        return PredictionScore(float(self._count), residual, self._torque.copy(), self._gram[:, -1, -1].copy())
 
     def _add(self, piece: Segment) -> None:
-        shift = self._shift(piece.dt) if callable(self._shift) else self._shift
-        X = _filtered(self._model, piece, shift, self._by)
+        X = _filtered(self._model, piece, _seconds(self._shift, piece.dt), self._by)
         self._count += X.shape[2]
         self._torque = self._torque + X[:, -1].sum(axis=1)
         self._gram += X @ X.swapaxes(1, 2)
+
+
+def _seconds(shift: Shift, dt: float) -> float:
+    return shift(dt) if callable(shift) else shift
 
 
 def _filtered(model: Model, piece: Segment, shift: float, by: PredictionFilter) -> FloatArray:
@@ -173,12 +176,13 @@ def score(
 
 
 def cross_validate(
-    fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source] = (), shift: float = 0.0
+    fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source] = (), shift: Shift = 0.0
 ) -> PredictionScore | None:
     """Score of each log predicted from all the others; None where a kind of log has only one.
 
     The other logs' parameters follow from their quadratic likelihoods, without a further pass; only the
-    prediction reads the logs again.
+    prediction reads the logs again. `shift` is what is known of the time after which a torque acts: a delay that
+    the fit estimates comes on top, each time as the other logs tell it.
     """
     sources = [*unloaded, *loaded]
     if len(sources) != len(fit.logs) or len(unloaded) == 1 or len(loaded) == 1:
@@ -189,5 +193,6 @@ def cross_validate(
         others = [other for number, other in enumerate(fit.logs) if number != place]
         beta, _, _ = combine(fit.shared, others, fit.values, fit.prior)
         c = fit.shared.coefficients(beta, log.loaded)
-        total += score(fit.shared.model, c[:columns], source(), shift + float(c[columns:].sum()))
+        delay = float(c[columns:].sum())
+        total += score(fit.shared.model, c[:columns], source(), lambda dt, delay=delay: _seconds(shift, dt) + delay)  # type: ignore[misc]
     return total

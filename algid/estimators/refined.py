@@ -186,7 +186,8 @@ def _opened(
 ) -> Iterator[LogEvidence]:
     def stencil(dt: float, c: FloatArray) -> Stencil:
         delay = float(c[-1]) if shared.delay else settings.delay
-        return Stencil(dt, settings.shift(dt) + delay - shared.model.values(c[: len(shared.model.names)])["lag"])
+        shift = settings.shift(dt) + delay - shared.model.values(c[: len(shared.model.names)])["lag"]
+        return Stencil(dt, shift, held=settings.hold == "zoh")
 
     for source in sources:
         log = LogEvidence(source, loaded, shared, stencil, settings.noise)

@@ -24,6 +24,7 @@ from algid.estimators.fit import Fit, conclude
 from algid.estimators.modulating_functions import OVERLAP, Windows
 from algid.estimators.parametrisation import Shared
 from algid.model import Model
+from algid.signals.differences import held_torque
 from algid.signals.segments import Segment, pieces
 
 Source = Callable[[], Iterable[Segment]]
@@ -121,7 +122,7 @@ def _overlapping(
             piece = _prefixed(before, piece, windows.overlap + left_over)
         left_over = (len(piece) - 2 * windows.margin) % windows.step
         before = piece
-        yield piece, windows, fresh
+        yield replace(piece, tau=held_torque(piece.tau)) if settings.hold == "zoh" else piece, windows, fresh
 
 
 def _windows(dt: float, settings: WeakSettings, window: float) -> Windows:

@@ -5,16 +5,18 @@ trajectory near the truth, the torque residual
 
     e = τ_m − f(θ0; c) − G (θ_m − θ0) = η − G ε + Y δc
 
-has the covariance Σ_τ + G Σ_θ Gᵀ. The stencil makes G, hence that matrix, banded: one Cholesky factor
-L Lᵀ = V whitens everything. Minimising over the trajectory as well as over c, the Schur complement of the
-normal equations, is the same as weighting e by V⁻¹ (Woodbury), so S = (L⁻¹Y)ᵀ(L⁻¹Y) is the information on
-c and the innovations w = L⁻¹e are white with unit variance wherever the model holds.
+has the covariance Σ_τ + G Σ_θ Gᵀ. The noise η is white, or went through `held_torque`. The stencil makes G,
+hence that matrix, banded: one Cholesky factor L Lᵀ = V whitens everything. Minimising over the trajectory as well
+as over c, the Schur complement of the normal equations, is the same as weighting e by V⁻¹ (Woodbury), so
+S = (L⁻¹Y)ᵀ(L⁻¹Y) is the information on c and the innovations w = L⁻¹e are white with unit variance wherever the
+model holds.
 
 ======  ====================================================  =======================  ======
 symbol  name                                                  shape                    unit
 ======  ====================================================  =======================  ======
 H       dτ/dθ along the stencil, times σ_θ / σ_τ              (2, 2, POINTS, n)        1
-V       I + H Hᵀ, covariance of e / σ_τ, lower band           (2 POINTS, 2 n)          1
+F       I, or `held_torque` where torques are held            (n, n) of each joint     1
+V       F Fᵀ + H Hᵀ, covariance of e / σ_τ, lower band        (2 POINTS, 2 n)          1
 Z       L⁻¹ of the columns of [Y, e] / σ_τ                    (q + 1, 2 n)             mixed
 ======  ====================================================  =======================  ======
 
@@ -28,9 +30,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import lapack
 
-from algid.arm import FloatArray
+from algid.arm import FloatArray, keep_arrays
 from algid.model import Model, Motion, partials, sensitivity, torque
-from algid.signals.differences import POINTS, Stencil
+from algid.signals.differences import HELD, POINTS, Stencil, held_torque
 from algid.signals.segments import Segment
 
 
@@ -41,12 +43,16 @@ class NoiseLevels:
     theta: FloatArray
     tau: FloatArray
 
+    def __post_init__(self) -> None:
+        keep_arrays(self)
+
 
 @dataclass(frozen=True, eq=False)
 class Linearised:
     """One piece of log, linearised and whitened: see the module's table.
 
-    `factor` holds L as LAPACK's lower band; `first` is the angle sample of the first stencil's first point.
+    `factor` holds L as LAPACK's lower band; `first` is the angle sample of the first stencil's first point; `held`
+    tells whether F is `held_torque`.
     """
 
     columns: FloatArray
@@ -54,6 +60,7 @@ class Linearised:
     H: FloatArray
     first: int
     residual: FloatArray
+    held: bool = False
 
     def solve(self, columns: FloatArray) -> FloatArray:
         """L⁻¹ of columns (m, 2 n)."""
@@ -62,6 +69,14 @@ class Linearised:
     def solve_transposed(self, columns: FloatArray) -> FloatArray:
         """L⁻ᵀ of columns (m, 2 n)."""
         return _triangular(self.factor, columns, "T")
+
+    def smeared(self, torques: FloatArray) -> FloatArray:
+        """F of torque noise (..., n)."""
+        if not self.held:
+            return torques
+        padded = np.zeros((*torques.shape[:-1], torques.shape[-1] + 2))
+        padded[..., 1:-1] = torques
+        return held_torque(padded)[..., 1:-1]
 
 
 def _triangular(factor: FloatArray, columns: FloatArray, transposed: str) -> FloatArray:
@@ -101,14 +116,15 @@ def linearise(
         J, modelled = (low_passed(signal, stencil.dt, float(c[place])) for signal in (J, modelled))
         J[:, place] = -np.gradient(modelled, stencil.dt, axis=1)
     G = along_stencil(partials(model, c, motion), stencil.weights)
-    error = piece.tau[:, torques] - modelled - forward(G, piece.theta - theta0, first)
+    measured = held_torque(piece.tau) if stencil.held else piece.tau
+    error = measured[:, torques] - modelled - forward(G, piece.theta - theta0, first)
     H = G * (noise.theta[None, :, None, None] / noise.tau[:, None, None, None])
-    factor = covariance_factor(H)
+    factor = covariance_factor(H, held=stencil.held)
     extra = [np.gradient(modelled, stencil.dt, axis=1)[None]] if delay else []
     rows = np.concatenate([J.swapaxes(0, 1), *extra, error[None]])
     rows = np.ascontiguousarray((rows / noise.tau[None, :, None]).swapaxes(1, 2))
     columns = _triangular(factor, rows.reshape(rows.shape[0], -1), "N")
-    return Linearised(columns, factor, H, first, error)
+    return Linearised(columns, factor, H, first, error, stencil.held)
 
 
 def low_passed(signal: FloatArray, dt: float, lag: float) -> FloatArray:
@@ -172,8 +188,8 @@ def adjoint(G: FloatArray, y: FloatArray, first: int, length: int) -> FloatArray
     return result
 
 
-def covariance_factor(H: FloatArray) -> FloatArray:
-    """Cholesky factor of I + H Hᵀ as LAPACK's lower band (2 POINTS, 2 n)."""
+def covariance_factor(H: FloatArray, *, held: bool = False) -> FloatArray:
+    """Cholesky factor of F Fᵀ + H Hᵀ as LAPACK's lower band (2 POINTS, 2 n)."""
     n = H.shape[-1]
     band = np.zeros((n, 2, 2 * POINTS))
     for lag in range(POINTS):
@@ -187,7 +203,9 @@ def covariance_factor(H: FloatArray) -> FloatArray:
                 below = 2 * lag + other - a
                 if below >= 0:
                     band[: n - lag, a, below] = block[a, other].T
-    band[:, :, 0] += 1.0
+    correlation = np.convolve(HELD, HELD)[2:] if held else np.ones(1)
+    for lag, value in enumerate(correlation):
+        band[:, :, 2 * lag] += value
     factor, info = lapack.dpbtrf(band.reshape(2 * n, -1).T, lower=1, overwrite_ab=1)
     if info != 0:
         raise np.linalg.LinAlgError(f"the covariance of the torque residual is not positive definite (row {info})")

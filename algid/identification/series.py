@@ -6,7 +6,8 @@ Time series of a result folder, written block by block.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -27,17 +28,19 @@ LOWEST, HIGHEST = 4.0, 40.0  # Hz
 
 
 def torque_blocks(
-    survey: Survey, model: Model, coefficients: Mapping[str, FloatArray], shifts: Sequence[float]
+    survey: Survey, model: Model, coefficients: Mapping[str, FloatArray], shift: Callable[[float], float]
 ) -> Iterator[dict[str, FloatArray]]:
-    """Motion, measured and predicted torque of every log; by role its coefficients, by log the torque's delay in s.
+    """Motion, measured and predicted torque of every log; by role its coefficients.
+
+    `shift` gives the time in s after which a logged torque acts, for the time between samples.
 
     Angles are smoothed without phase; the prediction is NaN where the smoother reaches past a stretch's end.
     """
-    for number, (log, shift) in enumerate(zip(survey.logs, shifts, strict=True)):
+    for number, log in enumerate(survey.logs):
         for piece in pieces(survey.segments(log), PREDICTED_ROWS):
             yield {
                 "log": np.full(len(piece), number, dtype=np.int32),
-                **_torques(piece, model, coefficients[log.role], shift),
+                **_torques(piece, model, coefficients[log.role], shift(piece.dt)),
             }
 
 
@@ -134,11 +137,10 @@ def write_fit_series(folder: Path, fit: Fit, survey: Survey, settings: Settings)
     """Write `torque.parquet` and `information.parquet` of a fit."""
     summaries = [survey.summary(log) for log in survey.logs]
     starts = [summary.start_ns for summary in summaries]
-    shifts = [torque_shift(settings, fit, 1 / summary.rate) for summary in summaries]
     coefficients: dict[str, FloatArray] = {
         role: torque_coefficients(fit, role) for role in {log.role for log in survey.logs}
     }
-    torques = torque_blocks(survey, fit.shared.model, coefficients, shifts)
+    torques = torque_blocks(survey, fit.shared.model, coefficients, torque_shift(settings, fit))
     write_columns(folder / "torque.parquet", torques, starts)
     durations = [summary.duration for summary in summaries]
     write_columns(folder / "information.parquet", information_blocks(fit, durations), starts)
@@ -149,7 +151,7 @@ def torque_coefficients(fit: Fit, role: str) -> FloatArray:
     return fit.shared.coefficients(fit.values, role == "loaded")[: len(fit.shared.model.names)]
 
 
-def torque_shift(settings: Settings, fit: Fit, dt: float) -> float:
-    """Time in s after which a logged torque acts, with the delay of the fit where it has one."""
+def torque_shift(settings: Settings, fit: Fit) -> Callable[[float], float]:
+    """Time in s after which a logged torque acts, for the time between samples; with the delay of the fit, if any."""
     found = float(fit.values[fit.names.index("delay")]) if "delay" in fit.names else None
-    return settings.torque_shift(dt, found)
+    return partial(settings.torque_shift, found_delay=found)

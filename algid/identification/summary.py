@@ -244,14 +244,13 @@ def _row_weights(place: dict[str, int], names: Sequence[str]) -> dict[str, Float
 
 def fit_summary(fit: Fit, predictions: Predictions, survey: Survey, settings: Settings) -> results.FitSummary:
     """The statistical part of a result."""
-    shift = torque_shift(settings, fit, 1 / survey.summary(survey.logs[0]).rate)
     worths = term_worths(fit)
     crossed = None
     if settings.cross_validate:
         unloaded, loaded = (
             [partial(survey.segments, log) for log in logs] for logs in (survey.unloaded, survey.loaded)
         )
-        crossed = cross_validate(fit, unloaded, loaded, shift)
+        crossed = cross_validate(fit, unloaded, loaded, settings.torque_shift)
     return results.FitSummary(
         noise=_noise(fit),
         covariance_names=list(fit.names),
@@ -308,8 +307,7 @@ def _residual(fit: Fit, predictions: Predictions, survey: Survey, settings: Sett
         if log in predictions:
             total += predictions[log].score(c)
         else:
-            shift = torque_shift(settings, fit, 1 / survey.summary(log).rate)
-            total += score(fit.shared.model, c, survey.segments(log), shift)
+            total += score(fit.shared.model, c, survey.segments(log), torque_shift(settings, fit))
     return total
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -37,8 +38,8 @@ def validate(result: Result, survey: Survey, name: str) -> Validation:
     model = model_of(settings)
     found: dict[str, TorquePrediction | None] = {}
     total, delay = PredictionScore(), result.parameters.get("delay")
+    shift = partial(settings.torque_shift, found_delay=None if delay is None else delay.estimate)
     for log in survey.logs:
-        shift = settings.torque_shift(1 / survey.summary(log).rate, None if delay is None else delay.estimate)
         one = score(model, torque_constants(result, model, log.role, name), survey.segments(log), shift)
         found[log.name] = prediction(one)
         total += one

@@ -38,10 +38,13 @@ class Stencil:
         Time between samples.
     shift : float, s
         How long after its stamp a torque acts: hold and delay together.
+    held : bool
+        Whether each torque was held until the next: see `held_torque`.
     """
 
     dt: float
     shift: float = 0.0
+    held: bool = False
 
     @cached_property
     def whole(self) -> int:
@@ -77,6 +80,31 @@ class Stencil:
                 if weight != 0.0:
                     result[order] += weight * x[:, first + point : first + point + n]
         return result
+
+
+HELD = np.array([1.0, 22.0, 1.0]) / 24
+"""What a held torque and its neighbours count for: see `held_torque`."""
+
+
+def held_torque(tau: FloatArray) -> FloatArray:
+    """Smooth torque that moves an arm through the same samples as `tau`, held from each sample to the next.
+
+    Parameters
+    ----------
+    tau : (..., N) float64, N m
+
+    Returns
+    -------
+    (..., N) float64, N m, half a sample after the stamps of `tau`; its first and last value are those of `tau`
+
+    Notes
+    -----
+    Under a held torque u the angles obey θ[n+1] − 2 θ[n] + θ[n−1] = dt²/2 (u[n] + u[n−1]) per unit of inertia;
+    under a smooth one a, dt² (a + dt²/12 a″). Hence a = u + dt²/24 u″ half a sample later, with an error O(dt⁴).
+    """
+    result = tau.copy()
+    result[..., 1:-1] = HELD[0] * tau[..., :-2] + HELD[1] * tau[..., 1:-1] + HELD[2] * tau[..., 2:]
+    return result
 
 
 FEWEST_SAMPLES = 4

@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from algid.arm import FloatArray
+from algid.arm import FloatArray, keep_arrays
 from algid.log import IntArray, Log, join, usual_period
 from algid.signals.spacing import spaced
 
@@ -46,6 +46,9 @@ class Segment:
     tau: FloatArray
     omega: FloatArray | None = None
     continues: bool = False
+
+    def __post_init__(self) -> None:
+        keep_arrays(self)
 
     def __len__(self) -> int:
         return int(self.theta.shape[1])

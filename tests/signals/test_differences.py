@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from algid.signals.differences import POINTS, Stencil
+from algid.estimators.whitening import Linearised, covariance_factor
+from algid.signals.differences import POINTS, Stencil, held_torque
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.5e-3, 3.3e-3, -1.2e-3])
@@ -25,3 +26,29 @@ def test_acceleration_converges_with_eighth_order() -> None:
         _, _, bend = stencil.differences(np.stack([np.sin(8 * t), np.cos(8 * t)]))
         errors.append(np.abs(bend[0] + 64 * np.sin(8 * t[stencil.torques(t.size)])).max())
     assert np.log2(errors[0] / errors[1]) == pytest.approx(8, abs=0.1)  # the order claimed
+
+
+def test_a_held_torque_moves_an_inertia_like_the_smooth_one_to_fourth_order() -> None:
+    """θ̈ = u, u held: the samples in closed form, their second derivative half a sample after each stamp."""
+    errors = []
+    for dt in (0.04, 0.02, 0.01):
+        tau = np.sin(5 * dt * np.arange(round(2 / dt)))
+        omega = np.concatenate([[0.0], np.cumsum(tau)]) * dt
+        theta = np.concatenate([[0.0], np.cumsum(omega[:-1] * dt + tau * dt**2 / 2)])[:-1]
+        stencil = Stencil(dt, 0.5 * dt)
+        alpha = stencil.differences(np.stack([theta, theta]))[2, 0]
+        errors.append(np.abs(held_torque(tau)[stencil.torques(tau.size)] - alpha).max())
+    slopes = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert np.allclose(slopes, 4, atol=0.1)
+
+
+def test_noise_behind_a_held_torque_is_whitened() -> None:
+    rng = np.random.default_rng(0)
+    noise = rng.standard_normal((2, 20002))
+    H = np.zeros((2, 2, POINTS, 20000))
+    linear = Linearised(np.empty((0, 40000)), covariance_factor(H, held=True), H, 0, np.empty(0), held=True)
+    white = linear.solve(held_torque(noise)[:, 1:-1].T.reshape(1, -1)).reshape(-1, 2)
+    assert abs(white.var() - 1) < 0.03  # four standard errors of 40,000 squares
+    for joint in white.T:
+        assert abs(joint[1:] @ joint[:-1] / joint.size) < 4.5 / np.sqrt(joint.size)
+    assert abs(held_torque(noise)[0, 2:-1] @ held_torque(noise)[0, 1:-2]) / 20000 > 0.05  # what there was to whiten

@@ -1,0 +1,165 @@
+"""Every kind of estimate, alone and together with the others, against a simulated arm with drives.
+
+The arm is moved here by a Runge-Kutta method of the test's own, all cases side by side; of algid it takes the
+equations of motion without drives, which `tests/test_arm.py` holds against SymPy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+import pytest
+
+from algid.arm import mass_matrix, passive_torque, with_payload
+from algid.estimators import refined, weak
+from algid.estimators.fit import Fit
+from algid.estimators.prediction import cross_validate, score
+from algid.estimators.refined import RefinedSettings
+from algid.estimators.weak import Source, WeakSettings
+from algid.model import Model
+from algid.signals.segments import Segment
+from algid.synth.cases import load_case
+from algid.synth.excitation import wide_multi_sine
+
+DT, DURATION, SUBSTEPS = 2e-3, 5.0, 2
+TERMS = ("", "delay", "hold", "offset", "coulomb", "rotor", "delay hold offset coulomb rotor")
+TRUE = {"f1": 0.15, "f2": 0.08, "o1": 0.05, "o2": -0.03, "j2": 0.01, "delay": 7.5 * DT}
+SIGMA = 1e-4  # rad; ten times as much in N m
+
+
+@dataclass(frozen=True)
+class Case:
+    """What a log's arm and sensors have beside eq. (1), and its angles and torques (2, N) without noise."""
+
+    terms: str
+    theta: np.ndarray
+    tau: np.ndarray
+
+    def log(self, seed: int) -> Segment:
+        noise = np.random.default_rng(seed).standard_normal((2, *self.theta.shape)) * SIGMA
+        return Segment(0.0, DT, self.theta + noise[0], self.tau + 10 * noise[1])
+
+
+def _true(name: str, terms: str) -> float:
+    kind = {"f": "coulomb", "o": "offset", "j": "rotor", "d": "delay"}[name[0]]
+    return TRUE[name] if kind in terms else 0.0
+
+
+@pytest.fixture(scope="module")
+def cases() -> dict[tuple[str, bool], Case]:
+    """Logs by terms and whether a payload is carried, integrated side by side."""
+    jobs = [(terms, loaded) for terms in TERMS for loaded in (False, True)]
+    case = load_case("case1")
+    k = case.arm.constants()
+    loaded_k = with_payload(k, case.arm.payload_constants(case.payload))
+    constants = np.array([loaded_k if loaded else k for _, loaded in jobs]).T
+    f1, f2, o1, o2, j2 = (
+        np.array([_true(name, terms) for terms, _ in jobs]) for name in ("f1", "f2", "o1", "o2", "j2")
+    )
+    torque = wide_multi_sine(case.arm, 5)
+    count = round(DURATION / DT)
+    h = DT / SUBSTEPS
+    # the torque at the start, middle and end of each step: smooth, or held since the sample before
+    steps = np.arange(count * SUBSTEPS)[:, None] * h + np.array([0, 0.5, 1]) * h
+    applied = np.empty((len(steps), 3, 2, len(jobs)))
+    for place, (terms, _) in enumerate(jobs):
+        at = steps - _true("delay", terms)
+        if "hold" in terms:
+            at = np.repeat(np.floor(at[:, 1:2] / DT + 1e-9) * DT, 3, axis=1)
+        applied[..., place] = torque(at.ravel()).reshape(2, *at.shape).transpose(1, 2, 0)
+
+    def rate(x: np.ndarray, tau: np.ndarray) -> np.ndarray:
+        theta, omega = x[:2], x[2:]
+        m11, m12, m22 = mass_matrix(constants, theta)
+        free = tau - passive_torque(constants, theta, omega) - np.stack([o1, o2])
+        free -= np.stack([f1, f2]) * np.tanh(omega / 0.2)
+        determinant = m11 * (m22 + j2) - m12**2
+        alpha = np.stack([(m22 + j2) * free[0] - m12 * free[1], m11 * free[1] - m12 * free[0]]) / determinant
+        return np.concatenate([omega, alpha])
+
+    x = np.repeat(np.array([-np.pi / 2, 0, 0, 0])[:, None], len(jobs), axis=1)
+    theta = np.empty((count, 2, len(jobs)))
+    for step, (start, middle, end) in enumerate(applied):
+        if step % SUBSTEPS == 0:
+            theta[step // SUBSTEPS] = x[:2]
+        a = rate(x, start)
+        b = rate(x + 0.5 * h * a, middle)
+        c = rate(x + 0.5 * h * b, middle)
+        x = x + h / 6 * (a + 2 * b + 2 * c + rate(x + h * c, end))
+    tau = torque(np.arange(count) * DT)
+    return {job: Case(job[0], theta[:, :, place].T, tau) for place, job in enumerate(jobs)}
+
+
+def _fit(estimator: str, terms: str, unloaded: list[Source], loaded: list[Source]) -> Fit:
+    model = Model(coulomb="coulomb" in terms, offset="offset" in terms, rotor="rotor" in terms)
+    hold: Literal["foh", "zoh"] = "zoh" if "hold" in terms else "foh"
+    delay = "delay" in terms
+    if estimator == "weak":
+        return weak.fit(unloaded, loaded, WeakSettings(model, hold=hold, estimate_delay=delay))
+    return refined.fit(unloaded, loaded, RefinedSettings(model, hold=hold, estimate_delay=delay))
+
+
+def _truth(fit: Fit) -> np.ndarray:
+    case = load_case("case1")
+    arm = dict(zip(("k1", "k2", "k3", "k4", "k5", "k6", "k7"), case.arm.constants(), strict=True))
+    known = {**TRUE, **arm, "m_p": case.payload, "l1": case.arm.l1, "l2": case.arm.l2}
+    return np.array([known[name] for name in fit.names])
+
+
+@pytest.mark.parametrize("payload", [False, True])
+@pytest.mark.parametrize("terms", TERMS)
+@pytest.mark.parametrize("estimator", ["weak", "refined"])
+def test_every_kind_of_estimate_is_the_truth_within_its_error(
+    cases: dict[tuple[str, bool], Case], estimator: str, terms: str, payload: bool
+) -> None:
+    unloaded: list[Source] = [lambda seed=seed: [cases[terms, False].log(seed)] for seed in (1, 2)]  # type: ignore[misc]
+    loaded: list[Source] = [lambda: [cases[terms, True].log(3)]] if payload else []
+    fit = _fit(estimator, terms, unloaded, loaded)
+    assert fit.estimator == estimator
+    assert set(fit.status) == {"OK"}
+    truth = _truth(fit)
+    # 20 parameters at most, of Student's t with 100 degrees or more: beyond 5 σ once in 30,000 such fits
+    assert np.all(np.abs(fit.values - truth) < 5 * fit.std)
+    assert np.all(fit.std < 0.05 * np.abs(truth))  # an error bar that says something
+
+
+@pytest.mark.parametrize("estimator", ["weak", "refined"])
+@pytest.mark.parametrize("samples", [10, 25])
+def test_long_delays_are_found_by_both_estimators(
+    cases: dict[tuple[str, bool], Case], estimator: str, samples: int
+) -> None:
+    log = cases["", False].log(1)
+    late = replace(log, theta=log.theta[:, :-samples], tau=log.tau[:, samples:])  # 20 and 50 ms
+    fit = _fit(estimator, "delay", [lambda: [late]], [])
+    assert fit.estimator == estimator
+    assert abs(fit.values[-1] - samples * DT) < 5 * fit.std[-1]
+
+
+def test_cross_validation_counts_a_found_delay_once(cases: dict[tuple[str, bool], Case]) -> None:
+    sources: list[Source] = [lambda seed=seed: [cases["delay", False].log(seed)] for seed in range(3)]  # type: ignore[misc]
+    fit = _fit("weak", "delay", sources, [])
+    found = cross_validate(fit, sources)
+    assert found is not None
+    exact = [score(Model(), _truth(fit)[:7], source(), TRUE["delay"]).residual for source in sources]
+    assert np.allclose(found.residual, np.sum(exact, axis=0), rtol=0.05)
+
+
+def _arrays(thing: object) -> Iterator[np.ndarray]:
+    for value in vars(thing).values():
+        for item in value if isinstance(value, tuple) else (value,):
+            if isinstance(item, np.ndarray):
+                yield item
+            elif hasattr(item, "__dict__") and type(item).__module__.startswith("algid.estimators"):
+                yield from _arrays(item)
+
+
+def test_nothing_that_a_fit_hands_out_can_be_written_to(cases: dict[tuple[str, bool], Case]) -> None:
+    log = cases["", False].log(1)
+    for estimator in ("weak", "refined"):
+        found = list(_arrays(_fit(estimator, "delay", [lambda: [log]], [])))
+        assert len(found) >= 6  # values, covariance, travel; the log's c0, S, g
+        assert not any(array.flags.writeable for array in found)
+    assert not any(array.flags.writeable for array in (log.theta, log.tau, log.part(0, 9).theta))
