@@ -31,7 +31,7 @@ class Fit:
         Which parameters, in which order.
     values : (Q,), in `algid.model.UNITS`
     covariance : (Q, Q)
-        Zero rows where a parameter is not identifiable; see `std`.
+        As wide as the logs leave it where a parameter is not identifiable; see `std`.
     intervals : "likelihood" or "sandwich"
         What `covariance` rests on.
     quantile : float
@@ -95,9 +95,11 @@ class Fit:
         _, S, _ = combine(self.shared, self.logs, self.values, self.prior)
         null, size = open_directions(self.names, self.values, S)
         scaled = share * size
-        if np.linalg.norm(null.T @ scaled) > 1e-3 * np.linalg.norm(scaled):
+        along = null.T @ scaled
+        if np.linalg.norm(along) > 1e-3 * np.linalg.norm(scaled):
             return float("inf")
-        return float(np.sqrt(max(float(share @ self.covariance @ share), 0.0)))
+        told = (scaled - null @ along) / size
+        return float(np.sqrt(max(float(told @ self.covariance @ told), 0.0)))
 
 
 def conclude(

@@ -24,9 +24,8 @@ from algid.arm import FloatArray, keep_arrays
 
 _CLASSES = (
     ("k1", "k3", "k5", "j2"),
-    ("k2", "k4"),
+    ("k2", "k4", "f1", "f2", "o1", "o2", "s1", "s2", "a1", "a2"),
     ("k6", "k7"),
-    ("f1", "f2", "o1", "o2", "s1", "s2", "a1", "a2"),
     ("e1", "e2"),
     ("gain2",),
     ("zero1", "zero2"),
@@ -36,7 +35,6 @@ _CLASSES = (
 )
 _LEAST = {
     "k6": 1e-6,
-    "f1": 1e-6,
     "e1": 1e-2,
     "gain2": 1e-2,
     "zero1": 1e-2,
@@ -47,13 +45,14 @@ _LEAST = {
     "k1": 1e-6,
 }
 _UNDETERMINED = 0.5  # standard deviation of a direction, in sizes of its parameters
+_NOTHING = 1e-14  # of the largest eigenvalue: rounding
 _SHARE = 0.15  # of an eigenvector: below it a parameter has no part in the direction
 STILL = 0.01  # rad: a joint that moves less has not moved
 
 
 @dataclass(frozen=True, eq=False)
 class Identifiability:
-    """Directions that are not determined, in words, and whether each parameter is (Q,)."""
+    """Directions that are not determined, in words, whether each parameter is (Q,), and their covariance (Q, Q)."""
 
     sentences: tuple[str, ...]
     determined: tuple[bool, ...]
@@ -67,8 +66,8 @@ def examine(names: Sequence[str], values: FloatArray, S: FloatArray, moved: Floa
     null = vectors[:, lost]
     part = np.sqrt(np.sum(null**2, axis=1))
     determined = tuple(bool(share < _SHARE) for share in part)
-    kept = vectors[:, ~lost]
-    inverse = (kept / np.maximum(eigenvalues[~lost], 1e-300)) @ kept.T
+    # A direction that the logs hardly tell is as wide here as it is: what it mixes with is that unsure.
+    inverse = (vectors / np.maximum(eigenvalues, _NOTHING * eigenvalues[-1] + 1e-300)) @ vectors.T
     return Identifiability(tuple(_sentences(names, null, size, moved)), determined, inverse * np.outer(size, size))
 
 
@@ -83,7 +82,7 @@ def _spectrum(S: FloatArray, size: FloatArray) -> tuple[FloatArray, FloatArray, 
     """Eigenvalues and vectors of the information on the parameters over their sizes, and which count as nothing."""
     scaled = S * np.outer(size, size)
     eigenvalues, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
-    return eigenvalues, vectors, eigenvalues < max(1 / _UNDETERMINED**2, 1e-14 * float(eigenvalues[-1]))
+    return eigenvalues, vectors, eigenvalues < max(1 / _UNDETERMINED**2, _NOTHING * float(eigenvalues[-1]))
 
 
 def sizes(names: Sequence[str], values: FloatArray) -> FloatArray:

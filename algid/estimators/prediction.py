@@ -1,8 +1,9 @@
 """Torque predicted on logs, and how good the prediction is.
 
-Angles and torques pass the same zero-phase Butterworth filter, at `_PER_CUTOFF` samples a period of its cutoff,
-to which a sharper filter without phase takes the log first. Velocities and accelerations are those of the
-filtered angles; both ends of every stretch, where a zero-phase filter rings, are dropped.
+The motion passes a zero-phase Butterworth filter wide enough for what an arm does, and the model; then what the model
+gives and the measured torque pass a second, narrower one. To filter the motion so narrowly would be another motion:
+the model is not linear in it. Both filters run at `_PER_CUTOFF` samples a period of the first one's cutoff, to which a
+sharper filter without phase takes the log first; both ends of every stretch, where they ring, are dropped.
 
 ======  ==============================================================  ===============  ======
 symbol  name                                                            shape            unit
@@ -29,7 +30,7 @@ from algid.signals.segments import Cutter, Segment
 
 _PIECE_SECONDS = 60.0
 _PER_CUTOFF = 12.5
-_SHARPER = 5.0  # cutoffs: bandwidth of the first filter, whose stop band begins before its images matter
+_SHARPER = 5.0  # cutoffs: bandwidth of the decimating filter, whose stop band begins before its images matter
 _SLOPE = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / 12  # of fourth order (Fornberg 1988)
 _BEND = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / 12
 
@@ -38,14 +39,21 @@ Shift = float | Callable[[float], float]
 
 @dataclass(frozen=True)
 class PredictionFilter:
-    """Zero-phase Butterworth filter of `order` and `cutoff` Hz; `dropped` s are left out at each end."""
+    """Zero-phase Butterworth filters of `order`: of the motion at `motion` Hz, then of the torque at `cutoff` Hz.
+
+    `dropped` s are left out at each end.
+    """
 
     order: int = 3
+    motion: float = 20.0
     cutoff: float = 5.0
     dropped: float = 0.3
 
     def __str__(self) -> str:
-        return f"zero-phase Butterworth, order {self.order}, {self.cutoff:g} Hz, {self.dropped:g} s dropped at each end"
+        return (
+            f"zero-phase Butterworth, order {self.order}: motion {self.motion:g} Hz, then torque {self.cutoff:g} Hz; "
+            f"{self.dropped:g} s dropped at each end"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,19 +143,21 @@ def _filtered(model: Model, piece: Segment, shift: float, by: PredictionFilter) 
     edge = round(by.dropped / dt)
     if signals.shape[1] <= max(2 * edge + 2, 6 * (by.order + 1)):
         return np.zeros((2, len(model.names) + 1, 0))
-    signals = butterworth(signals, dt, min(by.cutoff, 0.45 / dt), by.order)
-    Y = regressor(model, _motion(signals[:2], dt))
-    place = np.arange(edge, signals.shape[1] - edge) + shift / dt
+    theta = butterworth(signals[:2], dt, min(by.motion, 0.45 / dt), by.order)
+    Y = regressor(model, _motion(theta, dt))
+    place = np.arange(signals.shape[1]) + shift / dt
     whole = np.clip(np.floor(place).astype(np.int64), 0, signals.shape[1] - 2)
     Y = Y[:, :, whole] + (place - whole) * (Y[:, :, whole + 1] - Y[:, :, whole])
-    return np.concatenate([Y, signals[2:, None, edge : signals.shape[1] - edge]], axis=1)
+    X = np.concatenate([Y, signals[2:, None]], axis=1)
+    passed = butterworth(X.reshape(-1, X.shape[2]), dt, min(by.cutoff, 0.45 / dt), by.order).reshape(X.shape)
+    return passed[:, :, edge : signals.shape[1] - edge]
 
 
 def _decimated(piece: Segment, by: PredictionFilter) -> tuple[FloatArray, float]:
     """Angles and torques (4, n) at the rate that the filter asks for, and the time between them in s."""
-    step = int(1 / (_PER_CUTOFF * by.cutoff * piece.dt))
+    step = int(1 / (_PER_CUTOFF * by.motion * piece.dt))
     signals = np.concatenate([piece.theta, piece.tau])
-    kernel = smoother(piece.dt, _SHARPER * by.cutoff)
+    kernel = smoother(piece.dt, _SHARPER * by.motion)
     if step < 2 or signals.shape[1] < kernel.size:
         return signals, piece.dt
     return correlate(signals, kernel, step), step * piece.dt

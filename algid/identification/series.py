@@ -16,6 +16,7 @@ from algid.arm import FloatArray
 from algid.estimators.fit import Fit
 from algid.estimators.noise import first_guess
 from algid.estimators.paper import Series
+from algid.estimators.prediction import PredictionFilter
 from algid.identification.source import Survey
 from algid.model import Model, Motion, regressor
 from algid.settings import Settings
@@ -48,10 +49,11 @@ def _torques(piece: Segment, model: Model, c: FloatArray, shift: float) -> dict[
     if len(piece) < 16:
         return _prediction_columns(piece, np.full_like(piece.theta, np.nan), np.full_like(piece.theta, np.nan))
     bandwidth = _bandwidth(piece, model, c)
-    theta = smoothed(piece.theta, piece.dt, bandwidth)
+    # the model is not linear in the motion: what noise forbids to show is taken from its torque, not from its motion
+    theta = smoothed(piece.theta, piece.dt, max(bandwidth, min(PredictionFilter().motion, 0.1 / piece.dt)))
     omega = np.gradient(theta, piece.dt, axis=1)
     motion = Motion(theta, omega, np.gradient(omega, piece.dt, axis=1))
-    predicted = np.einsum("aqn,q->an", regressor(model, motion), c)
+    predicted = smoothed(np.einsum("aqn,q->an", regressor(model, motion), c), piece.dt, bandwidth)
     predicted = np.stack([np.interp(piece.t + shift, piece.t, row) for row in predicted])
     reach = min(half_length(piece.dt, bandwidth), len(piece) // 2)
     predicted[:, :reach] = predicted[:, len(piece) - reach :] = np.nan

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+from algid.arm import inverse_dynamics
 from algid.estimators import refined, weak
 from algid.estimators.combine import MOST_BLOCKS, BlockSums, long_run_variance
 from algid.estimators.diagnostics import broken_bounds, constrained, payload_distance, term_worths
@@ -13,6 +14,8 @@ from algid.estimators.identifiability import examine
 from algid.estimators.prediction import cross_validate, score
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import Model
+from algid.signals.segments import Segment
+from algid.synth.cases import load_case
 
 from .conftest import Bench
 
@@ -58,12 +61,24 @@ def test_a_loaded_log_from_another_arm_is_told(bench: Bench) -> None:
     assert apart > 6
 
 
-def test_prediction_of_an_exact_log_leaves_only_the_filter(bench: Bench) -> None:
+def test_prediction_of_an_exact_log_is_exact(bench: Bench) -> None:
     found = score(Model(), bench.arm.constants(), [bench.log()])
-    assert np.all(found.nrmse < 0.1)  # a 5 Hz filter before a nonlinear model
-    assert np.all(found.r2 > 0.99)
+    assert np.all(found.nrmse < 1e-3)  # what the first filter takes of the motion below 5 Hz, and its derivatives err
     wrong = score(Model(), 1.3 * bench.arm.constants(), [bench.log()])
     assert np.all(wrong.rmse > 3 * found.rmse)
+
+
+def test_a_perfect_fit_of_an_arm_that_turns_round_explains_all_torque() -> None:
+    k = load_case("case1").arm.constants()
+    t = 1e-3 * np.arange(6001)
+    theta = np.stack([40 * t + np.sin(9 * t), 3 * np.sin(14 * t)])  # six turns a second, swings of 2 Hz
+    omega = np.stack([40 + 9 * np.cos(9 * t), 42 * np.cos(14 * t)])
+    alpha = np.stack([-81 * np.sin(9 * t), -588 * np.sin(14 * t)])
+    log = Segment(0.0, 1e-3, theta, inverse_dynamics(k, theta, omega, alpha))
+    assert np.all(score(Model(), k, [log]).r2 > 0.9999)
+    late = replace(log, theta=log.theta[:, :-20], tau=log.tau[:, 20:])  # a torque acts 20 ms after its stamp
+    assert np.all(score(Model(), k, [late], 0.02).r2 > 0.9999)
+    assert np.all(score(Model(), k, [late]).r2 < 0.99)
 
 
 def test_cross_validation_leaves_each_log_out(bench: Bench) -> None:
@@ -86,6 +101,13 @@ def test_directions_without_information_are_put_in_words() -> None:
     known = examine(("k1", "k3", "k5"), np.array([0.02, 0.05, 0.04]), S, np.array([1.0, 0.001]))
     assert known.sentences == ("k3 and k5 only as a sum: joint 2 never moved",)
     assert known.determined == (True, False, False)
+
+
+def test_what_is_hardly_told_widens_what_it_mixes_with() -> None:
+    """Friction with a Coulomb column where there is none: its variance is that of the inverse, nothing dropped."""
+    S = np.array([[4e4, 3.8e4], [3.8e4, 4e4]])
+    known = examine(("k6", "f1"), np.array([0.1, 1e-5]), S, np.array([1.0, 1.0]))
+    assert np.allclose(known.covariance, np.linalg.inv(S), rtol=1e-10)
 
 
 def test_block_sums_stay_bounded_and_lose_nothing() -> None:
