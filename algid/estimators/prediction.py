@@ -99,10 +99,15 @@ class PredictionSums:
     shift : float, s, or a callable that gives it for the time between samples
         After how long a logged torque acts: hold and delay together.
     by : PredictionFilter
+    at : (q,)
+        The coefficients that are to be scored, and no others, where the model is not linear in them.
     """
 
-    def __init__(self, model: Model, shift: Shift = 0.0, by: PredictionFilter | None = None) -> None:
+    def __init__(
+        self, model: Model, shift: Shift = 0.0, by: PredictionFilter | None = None, at: FloatArray | None = None
+    ) -> None:
         self._model = model
+        self._at = at
         self._shift = shift
         self._by = by or PredictionFilter()
         self._cutter: Cutter | None = None
@@ -127,7 +132,10 @@ class PredictionSums:
         return PredictionScore(float(self._count), residual, self._torque.copy(), self._gram[:, -1, -1].copy())
 
     def _add(self, piece: Segment) -> None:
-        X = _filtered(self._model, piece, _seconds(self._shift, piece.dt), self._by)
+        shift = _seconds(self._shift, piece.dt)
+        if self._at is not None:  # a logged torque that lags shows at its stamp what acted before
+            shift -= self._model.values(self._at)["lag"]
+        X = _filtered(self._model, piece, shift, self._by, self._at)
         self._count += X.shape[2]
         self._torque = self._torque + X[:, -1].sum(axis=1)
         self._gram += X @ X.swapaxes(1, 2)
@@ -137,14 +145,14 @@ def _seconds(shift: Shift, dt: float) -> float:
     return shift(dt) if callable(shift) else shift
 
 
-def _filtered(model: Model, piece: Segment, shift: float, by: PredictionFilter) -> FloatArray:
+def _filtered(model: Model, piece: Segment, shift: float, by: PredictionFilter, at: FloatArray | None) -> FloatArray:
     """X (2, q + 1, n) of a piece: see the module's table."""
     signals, dt = _decimated(piece, by)
     edge = round(by.dropped / dt)
     if signals.shape[1] <= max(2 * edge + 2, 6 * (by.order + 1)):
         return np.zeros((2, len(model.names) + 1, 0))
     theta = butterworth(signals[:2], dt, min(by.motion, 0.45 / dt), by.order)
-    Y = regressor(model, _motion(theta, dt))
+    Y = regressor(model, _motion(theta, dt), at)
     place = np.arange(signals.shape[1]) + shift / dt
     whole = np.clip(np.floor(place).astype(np.int64), 0, signals.shape[1] - 2)
     Y = Y[:, :, whole] + (place - whole) * (Y[:, :, whole + 1] - Y[:, :, whole])
@@ -178,7 +186,7 @@ def score(
     model: Model, c: FloatArray, segments: Iterable[Segment], shift: Shift = 0.0, by: PredictionFilter | None = None
 ) -> PredictionScore:
     """How well the coefficients `c` (q,) predict a log's torque; see `PredictionSums`."""
-    sums = PredictionSums(model, shift, by)
+    sums = PredictionSums(model, shift, by, c)
     for segment in segments:
         sums.push(segment)
     sums.finish()

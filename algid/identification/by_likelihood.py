@@ -108,7 +108,8 @@ def _passes(
         else partial(survey.segments, log)
         for log in logs
     ]
-    if settings.delay == "estimate":  # what the prediction is scored by depends on it
+    model = model_of(settings)  # what the prediction is scored by depends on the estimate of some terms
+    if settings.delay == "estimate" or not model.linear or "lag" in model.terms:
         return passes
     return [partial(_watched, log, moving, settings, sums) for log, moving in zip(logs, passes, strict=True)]
 

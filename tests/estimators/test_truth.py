@@ -19,6 +19,7 @@ from algid.estimators.fit import Fit
 from algid.estimators.prediction import cross_validate, score
 from algid.estimators.refined import RefinedSettings
 from algid.estimators.weak import Source, WeakSettings
+from algid.model import TERMS as MODEL_TERMS
 from algid.model import Model
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case
@@ -94,7 +95,7 @@ def cases() -> dict[tuple[str, bool], Case]:
 
 
 def _fit(estimator: str, terms: str, unloaded: list[Source], loaded: list[Source]) -> Fit:
-    model = Model(coulomb="coulomb" in terms, offset="offset" in terms, rotor="rotor" in terms)
+    model = Model(tuple(term for term in terms.split() if term in MODEL_TERMS))
     hold: Literal["foh", "zoh"] = "zoh" if "hold" in terms else "foh"
     delay = "delay" in terms
     if estimator == "weak":
