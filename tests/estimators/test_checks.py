@@ -90,9 +90,8 @@ def test_cross_validation_leaves_each_log_out(bench: Bench) -> None:
     by_hand = [
         score(Model(), weak.fit(rest).values, source()).residual for rest, source in zip(others, sources, strict=True)
     ]
-    assert np.allclose(
-        found.residual, np.sum(by_hand, axis=0), rtol=1e-3
-    )  # the weights of the joints are each fit's own
+    # of noise alone; the weights of the joints are each fit's own
+    assert np.allclose(found.residual, np.sum(by_hand, axis=0), rtol=0.01)
     assert cross_validate(weak.fit(sources[:1]), sources[:1]) is None
 
 
