@@ -30,6 +30,11 @@ TorqueUnit = Annotated[
 TimeUnit = Annotated[Literal["s", "ms", "us", "ns"], BeforeValidator(_usual)]
 
 
+def _parts(text: object) -> object:
+    """The parts of ``one,two``."""
+    return [part.strip() for part in text.split(",")] if isinstance(text, str) else text
+
+
 class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -44,22 +49,30 @@ class Channel(_Strict):
 
 
 class Angle(Channel):
-    """An angle: `offset` in rad is added after unit and sign; `counts` are encoder counts in one turn."""
+    """An angle: `offset` in rad is added after unit and sign; `counts` are encoder counts in one turn.
+
+    `gear_ratio` is how often the encoder turns while the joint turns once: 1 for one at the joint.
+    """
 
     unit: AngleUnit | None = None
     counts: float | None = Field(default=None, gt=0)
+    gear_ratio: float = Field(default=1.0, gt=0)
     unwrap: bool = False
 
 
 class Velocity(Channel):
-    """A velocity: its unit a second (rpm: turns a minute)."""
+    """A velocity: its unit a second (rpm: turns a minute), `gear_ratio` as of an angle."""
 
     unit: VelocityUnit | None = None
     counts: float | None = Field(default=None, gt=0)
+    gear_ratio: float = Field(default=1.0, gt=0)
 
 
 class Torque(Channel):
-    """A torque at the joint: `offset` in N m. Amperes need `torque_constant` in N m/A at the motor."""
+    """A torque: `offset` in N m. Amperes need `torque_constant` in N m/A at the motor.
+
+    `gear_ratio` is how often the motor turns while the joint turns once: 1 for a torque at the joint.
+    """
 
     unit: TorqueUnit | None = None
     torque_constant: float | None = Field(default=None, gt=0)
@@ -67,7 +80,10 @@ class Torque(Channel):
 
 
 class Profile(_Strict):
-    """What a log's names, units and signs mean. Angles become θ1 from the horizontal, θ2 from link 1."""
+    """What a log's names, units and signs mean. Angles become θ1 from the horizontal, θ2 from link 1.
+
+    `start` and `end`, in s since the log's first sample, cut it; `accept` names checks that may warn but not refuse.
+    """
 
     topic: str | None = None
     joints: tuple[str, str] | None = None
@@ -80,6 +96,9 @@ class Profile(_Strict):
     velocity: bool = True
     signs: tuple[Literal[1, -1], Literal[1, -1]] = (1, 1)
     offsets: tuple[float, float] = (0.0, 0.0)
+    start: float | None = Field(default=None, ge=0)
+    end: float | None = Field(default=None, gt=0)
+    accept: Annotated[tuple[str, ...], BeforeValidator(_parts)] = ()
     theta1: Angle = Angle()
     theta2: Angle = Angle()
     tau1: Torque = Torque()

@@ -26,6 +26,9 @@ TorqueUnit = Annotated[str | None, typer.Option(help='"N m", "mN m", A or mA.')]
 Zero = Annotated[str | None, typer.Option(help="Where θ1 is zero: horizontal or hanging.")]
 SecondAngle = Annotated[str | None, typer.Option(help="θ2 is relative (to link 1) or absolute.")]
 Clock = Annotated[str | None, typer.Option(help="Stamps of the messages' header, or of the log.")]
+Start = Annotated[str | None, typer.Option(help="Leave out what comes before, s since the log's first sample.")]
+End = Annotated[str | None, typer.Option(help="Leave out what comes after, s since the log's first sample.")]
+Accept = Annotated[str | None, typer.Option(help="Checks that may warn but not refuse, as CODE,CODE.")]
 
 
 def profile_from(file: Path | None, **flags: str | None) -> Profile | None:
@@ -86,6 +89,9 @@ def _profile(
     zero: Zero = None,
     second_angle: SecondAngle = None,
     clock: Clock = None,
+    start: Start = None,
+    end: End = None,
+    accept: Accept = None,
 ) -> None:
     """The options of a profile."""
 

@@ -26,7 +26,7 @@ WRONG_ZERO            no       gravity pulls sideways: θ1 is not from the horiz
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -140,7 +140,8 @@ def examine(log: Log, *, gravity: float = 9.81) -> tuple[Finding, ...]:
     """Everything that the checks above find in a log; `gravity` 0 for an arm in a horizontal plane."""
     if len(log) < 4:
         return ()
-    found = [*_efforts(log), *_angles(log), *_degrees(log), *_spikes(log), *_clock(log)]
+    every = (*_efforts(log), *_angles(log), *_degrees(log), *_spikes(log), *_clock(log))
+    found = [_yielding(finding, log.origin.reading.accepted) for finding in every]
     if gravity > 0 and not any(finding.refuse for finding in found):
         figures = dynamic_figures(log)
         found += _gravity(figures) if figures is not None else []
@@ -162,6 +163,18 @@ def admit(log: Log, *, gravity: float = 9.81) -> Log:
     return replace(log, notices=log.notices + tuple(Notice(one.code, one.text) for one in found))
 
 
+def _yielding(finding: Finding, accepted: Collection[str]) -> Finding:
+    """A refusal names what overrides it, and becomes a warning where that was said."""
+    if not finding.refuse:
+        return finding
+    if finding.code in accepted:
+        return replace(finding, refuse=False, text=f"{finding.text}; used nevertheless, as accept says")
+    code = finding.code
+    return replace(
+        finding, text=f'{finding.text}; to use it nevertheless: --accept {code} (profile: accept = ["{code}"])'
+    )
+
+
 def _source(log: Log, name: str) -> str:
     source = log.origin.mapping.get(name, name)
     return name if source == name else f"{name} ({source})"
@@ -171,12 +184,13 @@ def _efforts(log: Log) -> Iterator[Finding]:
     for name, tau in zip(("tau1", "tau2"), log.tau, strict=True):
         largest, what = float(np.abs(tau).max()), _source(log, name)
         if largest == 0:
-            yield Finding("EFFORT_ZERO", f"{what} is nought in every sample; name the measured torque", True)
+            text = f"{what} is zero in every sample; name the measured torque: {_other(name)}"
+            yield Finding("EFFORT_ZERO", text, True)
         elif largest < _DENORMAL:
-            text = f"{what} never exceeds {largest:.3g} N m: no torque; name the measured one"
+            text = f"{what} never exceeds {largest:.3g} N m: no torque; name the measured one: {_other(name)}"
             yield Finding("EFFORT_DENORMAL", text, True)
         elif tau.min() == tau.max():
-            text = f"{what} is {tau[0]:.6g} N m in every sample; name the measured torque"
+            text = f"{what} is {tau[0]:.6g} N m in every sample; name the measured torque: {_other(name)}"
             yield Finding("EFFORT_CONSTANT", text, True)
         elif (share := saturated_share(tau)) > 0.01:
             text = f"{what} stands at its limit in {100 * share:.3g} % of the samples"
@@ -191,12 +205,19 @@ def _angles(log: Log) -> Iterator[Finding]:
             continue
         wraps = int(np.count_nonzero(np.abs(np.abs(steps) - _TURN) < 0.1 * _TURN))
         if wraps and _quiet(steps):
-            text = f"{what} jumps by a turn {wraps} times; set unwrap = true of [{name}] in a profile"
+            text = (
+                f"{what} jumps by a turn {wraps} times: --set {name}.unwrap=true (profile: unwrap = true of [{name}])"
+            )
             yield Finding("WRAPPED_ANGLE", text, True)
         frozen = _frozen(steps, log.period)
         if frozen:
             text = f"{what} freezes for {frozen[1]:.3g} s from t = {frozen[0]:.6g} s, then jumps"
             yield Finding("STUCK_SENSOR", text)
+
+
+def _other(name: str) -> str:
+    """How to name another source of a channel."""
+    return f'--set {name}.source=NAME (profile: source = "NAME" of [{name}])'
 
 
 def _quiet(steps: FloatArray) -> bool:
@@ -217,17 +238,29 @@ def _frozen(steps: FloatArray, period: float) -> tuple[float, float] | None:
 
 
 def _degrees(log: Log) -> Iterator[Finding]:
-    hint = 'set unit = "deg" in a profile, or unit = "rad" of what is right'
+    pairs = (("angles", "theta", 180 / math.pi), ("velocities", "omega", math.pi / 180))
     if log.omega is not None and len(log) > 20:
         for joint in (0, 1):
             ratio = _ratio(log, joint)
-            for factor, what in ((180 / math.pi, "angles"), (math.pi / 180, "velocities")):
+            for what, quantity, factor in pairs:
                 if 0.8 < ratio / factor < 1.25:
-                    text = f"{what} of joint {joint + 1} are in degrees by the other signal; {hint}"
-                    yield Finding("DEGREES", text, True)
-    widest = float(np.abs(log.theta).max())
-    if widest > 12 * math.pi and not any(_ratio(log, joint) for joint in (0, 1)):
-        yield Finding("DEGREES", f"angles reach {widest:.4g}: no arm turns that far in rad; {hint}", True)
+                    text = f"{what} of joint {joint + 1} are in degrees by the other signal"
+                    yield _in_degrees(log, f"{quantity}{joint + 1}", text)
+    widest = np.abs(log.theta).max(axis=1)
+    joint = int(np.argmax(widest))
+    if widest[joint] > 12 * math.pi and not any(_ratio(log, one) for one in (0, 1)):
+        yield _in_degrees(log, f"theta{joint + 1}", f"angles reach {widest[joint]:.4g}: few arms turn that far in rad")
+
+
+def _in_degrees(log: Log, name: str, text: str) -> Finding:
+    """Refused, unless the user has said the unit of the channel `name`."""
+    if log.origin.reading.told(name):
+        unit = log.origin.reading.channels[name].unit
+        return Finding("DEGREES", f"{text}; they are taken for {unit} as told")
+    flags = ("--angle-unit deg", "--angle-unit rad")
+    if name.startswith("omega"):
+        flags = (f"--set {name}.unit=deg", f"--set {name}.unit=rad")
+    return Finding("DEGREES", f"{text}: {flags[0]}, or {flags[1]} where it is right (profile: unit of [{name}])", True)
 
 
 def _ratio(log: Log, joint: int) -> float:
@@ -284,17 +317,21 @@ def _gravity(figures: DynamicFigures) -> Iterator[Finding]:
     if figures.seen > 0.15 and figures.gravity_share < 0.01 and weightless:
         text = (
             f"torques carry no weight (gravity explains {100 * figures.gravity_share:.2g} % of them): "
-            "they are gravity-compensated, or the arm moves in a horizontal plane (gravity = 0 in a profile)"
+            "they are gravity-compensated, or the arm moves in a horizontal plane (--gravity 0; profile: gravity = 0)"
         )
         yield Finding("GRAVITY_COMPENSATED", text)
     elif figures.seen < 0.015 or figures.gravity_share < 0.02:
         return  # the motion does not tell where gravity pulls
     elif abs(figures.turn) > 135:
-        text = f"gravity pulls upwards (k4 = {figures.weight1:.3g} N m): the sign of torques or angles is wrong"
+        text = (
+            f"gravity pulls upwards (k4 = {figures.weight1:.3g} N m): the sign of torques or angles is wrong; turn the "
+            "torques round: --set tau1.sign=-1 --set tau2.sign=-1 (profile: sign = -1 of [tau1] and [tau2]), or angles "
+            "and velocities likewise"
+        )
         yield Finding("FLIPPED_SIGN", text)
     elif abs(figures.turn) > 45:
         text = (
-            f"gravity is turned by {figures.turn:.0f} degrees: θ1 is not from the horizontal; "
-            'set zero = "hanging" or an offset in a profile'
+            f"gravity is turned by {figures.turn:.0f} degrees: θ1 is not from the horizontal: --zero hanging "
+            '(profile: zero = "hanging"), or --set theta1.offset=RAD'
         )
         yield Finding("WRONG_ZERO", text)

@@ -79,16 +79,41 @@ class TableReader:
     def _samples(self, rows: int) -> Iterator[tuple[Table, tuple[Notice, ...]]]:
         """Checked and sorted tables that are not empty, with what is to be told of each."""
         notices, total = self.notices, 0
-        for table in cut(Sorter(self.origin.path).run(self._finite(self.tables(rows))), rows):
+        held: tuple[Table, tuple[Notice, ...]] | None = None
+        for table in cut(self._finite(self._within(Sorter(self.origin.path).run(self.tables(rows)))), rows):
             notices += table.notices
             if len(table):
+                if held is not None:
+                    yield held
                 total += len(table)
-                yield table, notices
-                notices = ()
+                held, notices = (table, notices), ()
         if total < 2:
             worst = sorted(notices, key=lambda notice: not notice.lossy)[:1]
             why = "".join(f" ({notice.text})" for notice in worst)
             raise LogError(f"{self.origin.path}: {total} samples; a log needs two at least{why}")
+        if held is not None:  # what the last tables tell, also where they are empty
+            yield held[0], held[1] + notices
+
+    def _within(self, tables: Iterator[Table]) -> Iterator[Table]:
+        """The rows between the `start` and the `end` that the reading says; the last table tells of the cut."""
+        start, end = self.origin.reading.start, self.origin.reading.end
+        if start is None and end is None:
+            yield from tables
+            return
+        first_ns, left_out = None, 0
+        held: Table | None = None
+        for table in tables:
+            if held is not None:
+                yield held
+            if first_ns is None and len(table):
+                first_ns = int(table.stamp_ns[0])
+            since = table.stamp_ns - (first_ns or 0)
+            inside = (since >= 1e9 * (start or 0.0)) & (since <= 1e9 * (math.inf if end is None else end))
+            left_out += len(table) - int(np.count_nonzero(inside))
+            held = table.take(inside)
+        if held is not None:
+            text = f"{left_out} samples before {start or 0:g} s or behind {'the end' if end is None else f'{end:g} s'}"
+            yield held.noting(Notice("CUT", f"{text} were left out, as told"))
 
     def _convert(self, table: Table, room: Room, unwrapper: Unwrapper) -> None:
         room.stamp_ns[:] = table.stamp_ns
@@ -96,12 +121,26 @@ class TableReader:
         unwrapper.run(room.theta)
 
     def _finite(self, tables: Iterator[Table]) -> Iterator[Table]:
-        first = 0
+        """Tables of finite numbers; where a user accepts others, their rows are left out and counted."""
+        first, dropped = 0, 0
+        held: Table | None = None
         for table in tables:
-            for name, values in table.columns.items():
-                self._check(name, values, first)
+            if held is not None:
+                yield held
+            held = table
+            if "NOT_FINITE" in self.origin.reading.accepted:
+                good = np.all([np.abs(values) < _LARGEST for values in table.columns.values()], axis=0)
+                dropped += len(table) - int(np.count_nonzero(good))
+                held = table.take(good)
+            else:
+                for name, values in table.columns.items():
+                    self._check(name, values, first)
             first += len(table)
-            yield table
+        if held is not None and dropped:
+            text = f"{dropped} samples hold a number that is not finite, and were left out"
+            held = held.noting(Notice("NOT_FINITE", text, lossy=True))
+        if held is not None:
+            yield held
 
     def _check(self, name: str, values: FloatArray, first: int) -> None:
         # one pass without an array of its own: a small sum of squares has no large term, and no NaN
@@ -116,7 +155,8 @@ class TableReader:
             raise LogError(
                 f"{self.origin.path}: {name} ({source}) in sample {first + row + 1}: "
                 f"expected a finite number below {_LARGEST:g} in size, found {values[row]}; "
-                "cut that part out or name another source"
+                "cut that part out with --start and --end (profile: start, end), or leave such samples out: "
+                '--accept NOT_FINITE (profile: accept = ["NOT_FINITE"])'
             )
 
 
@@ -157,6 +197,9 @@ def reader_of(
         zero=profile.zero,
         second_angle=profile.second_angle,
         unwrap=(profile.theta1.unwrap, profile.theta2.unwrap),
+        start=profile.start,
+        end=profile.end,
+        accepted=profile.accept,
     )
     units = Conversion(channels, hanging=profile.zero == "hanging", absolute=profile.second_angle == "absolute")
     return TableReader(replace(origin, reading=reading), tables, units, notices, rows)

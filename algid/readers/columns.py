@@ -17,9 +17,9 @@ from algid.errors import LogError
 from algid.log import IntArray, Notice, Origin, Reading, Teller, Truth, add, word_sum
 from algid.readers.assemble import TableReader, reader_of
 from algid.readers.joints import along_the_arm, order_notice
-from algid.readers.names import COMMANDED, CURRENTS, Choice, choose, take_apart
+from algid.readers.names import COMMANDED, CURRENTS, Choice, choose, on_motor_side, take_apart
 from algid.readers.table import CHANNELS, JOINT_CHANNELS, VELOCITIES, Table
-from algid.units import NANOSECONDS
+from algid.units import NANOSECONDS, TORQUE
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -69,35 +69,47 @@ def assign(path: str, available: Sequence[str], profile: Profile | None) -> Colu
     LogError
         If a column is missing, or stands there for more joints than two.
     """
-    try:
-        choice = choose(available, profile.joints if profile else None)
-    except LookupError as error:
-        raise LogError(f'{path}: {error}; choose two with --joints NAME,NAME (profile: joints = ["…", "…"])') from error
     named = _named(path, available, profile)
+    try:
+        choice = choose(available, profile.joints if profile else None, named)
+    except LookupError as error:
+        raise LogError(
+            f"{path}: {error}; choose two with --joints NAME,NAME, or name each column: --set theta1.source=NAME … "
+            '(profile: joints = ["…", "…"], or source of [theta1] …)'
+        ) from error
     sources = dict(choice.columns) | named
     if (profile and not profile.velocity) or not all(name in sources for name in VELOCITIES):
         sources = {name: column for name, column in sources.items() if name not in VELOCITIES}
     missing = [name for name in ("t", *JOINT_CHANNELS) if name not in sources]
     if missing:
-        raise LogError(
-            f"{path}: no column for {', '.join(missing)}; found {_listed(available)}; "
-            "rename the columns or name them in a profile"
-        )
+        flags, lines = " ".join(map(_flag_for, missing)), "; ".join(map(_line_for, missing))
+        told = f"{path}: no column for {', '.join(missing)}; found {_listed(available)}"
+        raise LogError(f"{told}; name them: {flags} (profile: {lines})")
     units = {name: unit for name, unit in choice.units.items() if sources.get(name) == choice.columns[name]}
     units |= _currents(sources)
-    told = (profile.time_unit if profile else None) or units.get("t")
+    foreign = {name: unit for name, unit in choice.foreign.items() if sources.get(name) == choice.columns[name]}
+    said = [*_of_foreign_units(path, sources, foreign, profile), *_of_motors(path, sources, profile)]
+    time_told = (profile.time_unit if profile else None) or units.get("t")
     if all(sources[name] == name for name in ("t", *JOINT_CHANNELS)):
         units.setdefault("t", "s")  # algid's own names mean algid's own units
-    joints, by, said = _joints(choice, named, profile)
+    joints, by, order = _joints(choice, named, profile)
     return Columns(
         sources,
         units,
-        told or units.get("t"),
-        (*_notices(sources), *said),
-        time_told=told is not None,
+        time_told or units.get("t"),
+        (*_notices(sources), *order, *said),
+        time_told=time_told is not None,
         joints=joints,
         joints_told=by,
     )
+
+
+def _flag_for(name: str) -> str:
+    return f"--set {'time' if name == 't' else name + '.source'}=NAME"
+
+
+def _line_for(name: str) -> str:
+    return 'time = "NAME"' if name == "t" else f'source = "NAME" of [{name}]'
 
 
 def _joints(
@@ -151,6 +163,48 @@ def _notices(sources: Mapping[str, str]) -> tuple[Notice, ...]:
         return ()
     text = f"torques are commanded ones ({sources['tau1']}, {sources['tau2']}): no measured torque in the log"
     return (Notice("COMMANDED_TORQUE", text),)
+
+
+def _of_foreign_units(
+    path: str, sources: Mapping[str, str], foreign: Mapping[str, str], profile: Profile | None
+) -> Iterator[Notice]:
+    """What to say of units that no joint's signal has; they are refused unless the user names the right one."""
+    for name, unit in foreign.items():
+        if name not in CHANNELS:
+            continue
+        usual = "N m" if name.startswith("tau") else "rad"
+        told = profile.channel(name).unit if profile else None
+        if told is None:
+            raise LogError(
+                f"{path}: the column {sources[name]!r} for {name} is in {unit!r}, which is no unit of a joint; say its "
+                f'unit if that is wrong: --set {name}.unit="{usual}" (profile: unit = "{usual}" of [{name}])'
+            )
+        text = f"the column {sources[name]!r} for {name} states the unit {unit!r}, and is taken for {told} as told"
+        yield Notice("FOREIGN_UNIT", text)
+
+
+def _of_motors(path: str, sources: Mapping[str, str], profile: Profile | None) -> Iterator[Notice]:
+    """What to say of motors' signals; beside joints' they are refused unless the user tells the gear."""
+    motors = [name for name in JOINT_CHANNELS if on_motor_side(sources[name])]
+    currents = _currents(sources)
+    open_ones = [
+        name
+        for name in motors
+        if name not in currents and not (profile and "gear_ratio" in profile.channel(name).model_fields_set)
+    ]
+    for name in currents:
+        told = profile.channel(name).unit if profile else None
+        if told in TORQUE:
+            text = f"{sources[name]!r} for {name} is a current by its name, and is taken for a torque in {told} as told"
+            yield Notice("CURRENT_AS_TORQUE", text)
+    if not open_ones:
+        return
+    named = ", ".join(f"{name} ({sources[name]})" for name in open_ones)
+    flags, lines = " ".join(f"--set {name}.gear_ratio=N" for name in open_ones), ", ".join(open_ones)
+    mend = f"turns of the motor in one of the joint, 1 for a direct drive: {flags} (profile: gear_ratio of {lines})"
+    if len({name in motors for name in JOINT_CHANNELS}) > 1:
+        raise LogError(f"{path}: {named}: signals of motors beside those of joints; tell the gear, {mend}")
+    yield Notice("MOTOR_SIDE", f"{named}: signals of motors, taken for those of joints; tell the gear, {mend}")
 
 
 def _listed(available: Sequence[str]) -> str:
@@ -273,7 +327,7 @@ def _slow(column: str, stamps: IntArray, unit: str) -> list[Notice]:
     likely = unit_of_step(step / NANOSECONDS[unit])
     text = (
         f"times in {column!r} are taken for {unit}, which makes {1e9 / step:.3g} Hz, too slow for an arm in motion; "
-        f'if they are in {likely}, set time_unit = "{likely}" in a profile'
+        f'if they are in {likely}: --set time_unit={likely} (profile: time_unit = "{likely}")'
     )
     return [Notice("SLOW_CLOCK", text)]
 

@@ -143,9 +143,19 @@ def _channel_reading(path: str, name: str, source: str, profile: Profile, stated
     channel, joint = profile.channel(name), int(name[-1]) - 1
     unit = channel.unit or stated or ("N m" if name.startswith("tau") else "rad")
     told = profile.told_by(f"{name}.unit") if channel.unit else "names" if stated else "assumed"
+    _refuse_unit(path, name, source, unit)
     sign = channel.sign * profile.signs[joint]
     offset = channel.offset + (profile.offsets[joint] if name.startswith("theta") else 0.0)
     return ChannelReading(source, unit, told, sign * _factor(path, name, channel, unit), offset)
+
+
+def _refuse_unit(path: str, name: str, source: str, unit: str) -> None:
+    known = (*TORQUE, *CURRENT) if name.startswith("tau") else (*VELOCITY, "counts")
+    if unit not in known:
+        raise LogError(
+            f"{path}: {name} ({source}) is in {unit!r} by its name; expected one of {', '.join(known)}; say its unit: "
+            f'--set {name}.unit="{known[0]}" (profile: unit = "{known[0]}" of [{name}])'
+        )
 
 
 def _factor(path: str, name: str, channel: Angle | Velocity | Torque, unit: str) -> float:
@@ -153,13 +163,15 @@ def _factor(path: str, name: str, channel: Angle | Velocity | Torque, unit: str)
         constant = getattr(channel, "torque_constant", None)
         if constant is None:
             raise LogError(
-                f"{path}: {name} is a current; torque in N m needs the motor's torque constant: set "
-                f'unit = "A", torque_constant (N m/A) and gear_ratio of [{name}] in a profile'
+                f"{path}: {name} is a current; its torque needs the motor's constant in N m/A: "
+                f"--set {name}.torque_constant=… --set {name}.gear_ratio=… (profile: torque_constant and gear_ratio of "
+                f'[{name}]); if it is a torque after all: --set {name}.unit="N m" (profile: unit = "N m" of [{name}])'
             )
-        return CURRENT[unit] * float(constant) * float(getattr(channel, "gear_ratio", 1.0))
+        return CURRENT[unit] * float(constant) * channel.gear_ratio
     if unit == "counts":
         counts = getattr(channel, "counts", None)
         if counts is None:
-            raise LogError(f"{path}: {name} in encoder counts needs counts a turn: set counts of [{name}]")
-        return 2 * math.pi / float(counts)
-    return TORQUE[unit] if name.startswith("tau") else VELOCITY[unit]
+            mend = f"--set {name}.counts=… (profile: counts of [{name}])"
+            raise LogError(f"{path}: {name} in encoder counts needs counts a turn: {mend}")
+        return 2 * math.pi / float(counts) / channel.gear_ratio
+    return TORQUE[unit] * channel.gear_ratio if name.startswith("tau") else VELOCITY[unit] / channel.gear_ratio

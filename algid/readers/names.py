@@ -8,11 +8,11 @@ commanded angles never.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, field, replace
 
 from algid.readers.joints import along_the_arm
-from algid.units import unit_of
+from algid.units import is_foreign, unit_of
 
 STEMS: dict[str, tuple[str, ...]] = {
     "theta": (
@@ -38,6 +38,7 @@ STEMS: dict[str, tuple[str, ...]] = {
             "torque_cmd",
             "target_torque",
         ),
+        "motor_torque",
         *("actual_current", "current", "currents", "motor_current", "joint_current", "i_q", "iq"),
     ),
 }
@@ -71,9 +72,16 @@ TIMES = (
     *("seconds", "secs", "sec", "elapsed", "elapsed_time", "log_time", "header.stamp", "header/stamp"),
     *("milliseconds", "millis", "microseconds", "micros", "nanoseconds", "nanos"),
 )
+_NO_JOINTS = frozenset(
+    {"cmd", "command", "commanded", "ref", "reference", "des", "desired", "target", "goal", "set", "setpoint", "error"}
+    | {"err", "raw", "max", "min", "limit", "old", "new", "filt", "filtered", "meas", "measured", "actual", "est"}
+)
+"""Words before or behind a stem that name no joint."""
+_MOTOR_SIDE = frozenset({"motor", "rotor", "drive"})
 _BRACKET_UNIT = re.compile(r"^(.*\S)\s*[\[(]\s*([^\[\]()]*[^\[\]()\d\s][^\[\]()]*)\s*[\])]$")
 _SUFFIX_UNIT = re.compile(
-    r"^(.*[^_\W])_(deg|rad|rev|nm|mnm|rpm|s|secs?|seconds|[mun]s(?:ec)?|millis|micros|nanos|(?:milli|micro|nano)seconds)$"
+    r"^(.*[^_\W])_(deg(?:rees?)?|m?rad|rev|turns|counts|ticks|[mk]?nm|ncm|kgf?cm|kgf?m|lbf?ft|lbf?in|ozf?in|ma|rpm|inch(?:es)?|"
+    r"grad|volts?|s|secs?|seconds|[mun]s(?:ec)?|millis|micros|nanos|(?:milli|micro|nano)seconds)$"
 )
 _JOINT_FIRST = re.compile(r"^(?:joint|axis|motor|link|j)[_ ]?(\d{1,3})[_./ ]+(.+)$")
 _JOINT_LAST = re.compile(r"^(.*?[^\W\d])[_./ ]*\[?(\d{1,3})\]?$")
@@ -81,44 +89,61 @@ _JOINT_LAST = re.compile(r"^(.*?[^\W\d])[_./ ]*\[?(\d{1,3})\]?$")
 
 @dataclass(frozen=True)
 class Name:
-    """A column's name taken apart; `joint` is a number as text, or the joint's own name."""
+    """A column's name taken apart; `joint` is a number as text, or the joint's own name.
+
+    `foreign` is a unit that the name states and that no joint's signal has, such as inch.
+    """
 
     stem: str
     joint: str | None
     unit: str | None
+    foreign: str | None = None
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Columns chosen for a log: by canonical channel its column and, where the name tells, its unit."""
+    """Columns chosen for a log: by canonical channel its column and, where the name tells, its unit.
+
+    `joints` are the joints' own names, where they have any; `foreign` units that names state and algid does not know.
+    """
 
     columns: dict[str, str]
     units: dict[str, str]
     joints: tuple[str, str] | None = None
+    foreign: dict[str, str] = field(default_factory=dict)
 
 
 def take_apart(column: str) -> Name:
     """Stem, joint and unit of a column's name; case and blanks do not matter."""
     text = column.strip().strip('"').strip().lower()
-    unit = None
+    unit = foreign = None
     for pattern in (_BRACKET_UNIT, _SUFFIX_UNIT):
         found = pattern.match(text)
-        if found and (known := unit_of(found[2])):
-            text, unit = found[1].strip(), known
+        if found and ((known := unit_of(found[2])) or is_foreign(found[2])):
+            text, unit, foreign = found[1].strip(), known, None if known else found[2]
             break
     if text in TIMES and (known := unit_of(text)):  # "millis" says its unit itself
         unit = known
+    return replace(_stem_and_joint(text), unit=unit, foreign=foreign)
+
+
+def _stem_and_joint(text: str) -> Name:
     if found := re.match(r"^(.*)/([^/]+)/(position|velocity|effort)$", text):
-        return Name(found[3], f"{found[1]}/{found[2]}", unit)
+        return Name(found[3], f"{found[1]}/{found[2]}", None)
     if found := re.match(r"^.*/(position|velocity|effort)[.\[/](\d+)\]?$", text):
-        return Name(found[1], found[2], unit)
+        return Name(found[1], found[2], None)
     for pattern, stem, joint in ((_JOINT_FIRST, 2, 1), (_JOINT_LAST, 1, 2)):
         if found := pattern.match(text):
-            return Name(found[stem].replace(" ", "_").replace(".", "_"), found[joint].lstrip("0") or "0", unit)
-    return Name(text, None, unit)
+            return Name(found[stem].replace(" ", "_").replace(".", "_"), found[joint].lstrip("0") or "0", None)
+    return Name(text, None, None)
 
 
-def choose(columns: Iterable[str], joints: tuple[str, str] | None = None) -> Choice:
+def on_motor_side(column: str) -> bool:
+    """Whether a column's name says that it is the motor's signal, before any gear."""
+    return not _MOTOR_SIDE.isdisjoint(re.findall(r"[a-z]+", column.lower()))
+
+
+def choose(columns: Iterable[str], joints: tuple[str, str] | None = None, named: Collection[str] = ()) -> Choice:
     """Canonical channels found among `columns`; those not found are left out.
 
     Parameters
@@ -126,25 +151,83 @@ def choose(columns: Iterable[str], joints: tuple[str, str] | None = None) -> Cho
     columns : iterable of str
         Every column of the file.
     joints : pair of str, optional
-        The two joints to take where a log has more: numbers, or names as in ``/joint_states/elbow/position``.
+        The two joints to take where a log has more: numbers, or names as in ``/joint_states/elbow/position`` or
+        ``elbow_pos``.
+    named : collection of str
+        Canonical channels whose columns are told: what is chosen for them need not be plain.
 
     Raises
     ------
     LookupError
-        If a quantity stands there for more than two joints and `joints` does not choose.
+        If a quantity stands there for more than two joints and `joints` does not choose, if there are no such
+        joints, or if two columns have one name but for its writing.
     """
     parts = {column: take_apart(column) for column in columns}
+    chosen = _pairs(parts, joints)
+    if "theta1" not in chosen or "tau1" not in chosen:
+        worded = _worded(parts)
+        found = _pairs({**parts, **worded}, joints)
+        names = _named_joints(found, {**parts, **worded})
+        if joints or (names and along_the_arm(names)[1] == "names"):
+            chosen, parts = found, {**parts, **worded}
+        if joints and "theta1" not in {*chosen, *named}:
+            there = _joints_there({**parts, **worded})
+            raise LookupError(f"no columns of the joints {', '.join(joints)}; joints there are: {there}")
+    time = _time(parts)
+    if time:
+        chosen["t"] = time
+    chosen = _of_one_pair(chosen, parts)
+    for channel, column in chosen.items():
+        if channel not in named:
+            _refuse_twin(column, parts)
+    units = {channel: unit for channel, column in chosen.items() if (unit := parts[column].unit)}
+    foreign = {channel: unit for channel, column in chosen.items() if (unit := parts[column].foreign)}
+    return Choice(chosen, units, _named_joints(chosen, parts), foreign)
+
+
+def _pairs(parts: dict[str, Name], joints: tuple[str, str] | None) -> dict[str, str]:
     chosen: dict[str, str] = {}
     for quantity in ("theta", "tau", "omega"):
         pair = _pair(parts, STEMS[quantity], joints)
         if pair:
             chosen |= {f"{quantity}1": pair[0], f"{quantity}2": pair[1]}
-    time = _time(parts)
-    if time:
-        chosen["t"] = time
-    chosen = _of_one_pair(chosen, parts)
-    units = {channel: unit for channel, column in chosen.items() if (unit := parts[column].unit)}
-    return Choice(chosen, units, _named_joints(chosen, parts))
+    return chosen
+
+
+def _worded(parts: dict[str, Name]) -> dict[str, Name]:
+    """Columns named by a joint's own name and a stem, ``shoulder_pos`` or ``torque elbow``, taken apart so."""
+    stems = sorted({stem for known in STEMS.values() for stem in known}, key=len, reverse=True)
+    found = {}
+    for column, name in parts.items():
+        if name.joint is not None or name.stem in stems:
+            continue
+        text = re.sub(r"\W+", "_", name.stem).strip("_")
+        for stem in stems:
+            joint = text.removesuffix(f"_{stem}") if text.endswith(f"_{stem}") else text.removeprefix(f"{stem}_")
+            if joint != text:
+                words = [word for word in joint.split("_") if word not in ("joint", "axis")]
+                if words and _NO_JOINTS.isdisjoint(words):
+                    found[column] = replace(name, stem=stem, joint="_".join(words))
+                break
+    return found
+
+
+def _joints_there(parts: dict[str, Name]) -> str:
+    stems = {stem for known in STEMS.values() for stem in known}
+    names = [name.joint.rsplit("/", 1)[-1] for name in parts.values() if name.joint and name.stem in stems]
+    return ", ".join(list(dict.fromkeys(names))[:16]) or "none that can be told by their names"
+
+
+def _refuse_twin(column: str, parts: dict[str, Name]) -> None:
+    """Raises `LookupError` where another column has the same name but for its writing or its unit."""
+    name = parts[column]
+    twin = next((one for one, other in parts.items() if one != column and _same(name, other)), None)
+    if name.joint is not None and twin is not None:
+        raise LookupError(f"{column!r} and {twin!r} are both {name.stem} of joint {name.joint}")
+
+
+def _same(one: Name, other: Name) -> bool:
+    return (one.stem, one.joint) == (other.stem, other.joint)
 
 
 def _named_joints(chosen: dict[str, str], parts: dict[str, Name]) -> tuple[str, str] | None:

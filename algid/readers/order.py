@@ -66,7 +66,8 @@ class Sorter:
         if repeated > REPEATED_SHARE * fresh.size:
             raise LogError(
                 f"{self._path}: time stands still: {repeated} of {fresh.size} stamps repeat the one before; "
-                "expected increasing stamps; name the right time column or clock in a profile"
+                'expected increasing stamps; name another time: --set time=NAME (profile: time = "NAME"), of messages '
+                '--clock log (profile: clock = "log")'
             )
         self.repeated += repeated
         return table.take(fresh) if repeated else table

@@ -115,7 +115,7 @@ def _topic(
         )
     clock = profile.clock if profile else None
     if clock == "header" and shown.stamp is None:
-        raise LogError(f'{file.path}: messages on {name!r} carry no stamp; set clock = "log" in the profile')
+        raise LogError(f'{file.path}: messages on {name!r} carry no stamp: --clock log (profile: clock = "log")')
     return Topic(name, type_name, Fields(paths, shown.stamp), clock)
 
 
@@ -174,11 +174,15 @@ def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> _Usua
     if len(fitting) == 1:
         return next(iter(fitting.values()))
     if fitting:
-        raise LogError(f"{file.path}: joint states on {', '.join(fitting)}; choose with topic = … in a profile")
+        raise LogError(
+            f'{file.path}: joint states on {", ".join(fitting)}; choose: --topic NAME (profile: topic = "NAME")'
+        )
     if many:
         name, joints = next(iter(many.items()))
         told = ", ".join(joints[:12])
-        raise LogError(f"{file.path}: {name!r} has {len(joints)} joints ({told}); choose two with joints = […]")
+        raise LogError(
+            f"{file.path}: {name!r} has {len(joints)} joints ({told}); choose: --joints A,B (profile: joints = […])"
+        )
     if refused:
         raise refused[0]
     if profile is not None and all(profile.channel(name).source for name in JOINT_CHANNELS):

@@ -1,0 +1,254 @@
+"""Every refusal that a flag overrides: what is refused, the flag that its message names, and the warning that stays.
+
+`REFUSALS` is the table of them. A refusal that is not in it cannot be overridden: the file is missing, damaged, cut
+off, of another format, or changed since algid wrote it.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from algid.errors import LogError
+from algid.inspection.checks import admit
+from algid.log import Log
+from algid.profile import Profile, with_settings
+from algid.readers import read_log
+from algid.writers import write_log
+from tests.inspection.test_checks import moving_log, spoiled
+from tests.readers.logs import EPOCH_NS
+from tests.readers.mcaps import joint_state, write_mcap
+
+FLAGS = {"--joints": "joints", "--topic": "topic", "--clock": "clock", "--accept": "accept", "--zero": "zero"}
+ROWS = 40
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A log that is refused, words of the message, flags that it names, and the code of the warning that stays."""
+
+    make: Callable[[Path], Path]
+    words: str
+    flags: str
+    warning: str | None = None
+
+
+def table(header: str, **columns: Any) -> Callable[[Path], Path]:
+    """A CSV file; columns that are not given move."""
+
+    def make(folder: Path) -> Path:
+        names = header.split(",")
+        t = np.arange(ROWS) * 1e-3
+        rows = [[f"{columns.get(name, np.sin(5 * t + place))[row]:.9g}" for place, name in enumerate(names)]
+                for row in range(ROWS)]  # fmt: skip
+        if names[0] not in columns:
+            for row in range(ROWS):
+                rows[row][0] = f"{t[row]:.6f}"
+        (folder / "log.csv").write_text("\n".join([header, *map(",".join, rows)]) + "\n")
+        return folder / "log.csv"
+
+    return make
+
+
+def found(code: str) -> Callable[[Path], Path]:
+    """The log that a check is for, in a file."""
+
+    def make(folder: Path) -> Path:
+        log = spoiled(code)
+        write_log(folder / "log.parquet", log)
+        return folder / "log.parquet"
+
+    return make
+
+
+def continuous(folder: Path) -> Path:
+    log = moving_log()
+    theta = log.theta.copy()
+    theta[0] += 2 * np.pi * 8
+    write_log(folder / "log.parquet", Log(log.stamp_ns, theta, log.tau, log.origin))
+    return folder / "log.parquet"
+
+
+def moved(values: list[float], stamp: int) -> list[float]:
+    return [one + np.sin(stamp) for one in values]
+
+
+def states(topics: tuple[str, ...], names: tuple[str, ...]) -> Callable[[Path], Path]:
+    def make(folder: Path) -> Path:
+        stamps = [EPOCH_NS + step * 1_000_000 for step in range(ROWS)]
+        values = [0.1 * place for place in range(len(names))]
+        messages = [
+            (topic, stamp, joint_state(stamp, names, moved(values, stamp), [], moved(values, stamp)).done())
+            for stamp in stamps
+            for topic in topics
+        ]
+        write_mcap(folder / "log.mcap", messages)
+        return folder / "log.mcap"
+
+    return make
+
+
+def accepted(code: str) -> Refusal:
+    """A check that may be told to let a log pass."""
+    return Refusal(found(code), code, f"--accept {code}", code)
+
+
+def with_nan() -> Callable[[Path], Path]:
+    broken = np.sin(np.arange(ROWS))
+    broken[7] = np.nan
+    return table("t,q1,q2,tau1,tau2", q2=broken)
+
+
+REFUSALS = {
+    "continuous joints": Refusal(continuous, "DEGREES", "--angle-unit rad", "DEGREES"),
+    "degrees by velocity": Refusal(found("DEGREES"), "DEGREES", "--angle-unit rad", "DEGREES"),
+    "degrees accepted": accepted("DEGREES"),
+    "wrapped": accepted("WRAPPED_ANGLE"),
+    "zero torque": accepted("EFFORT_ZERO"),
+    "denormal torque": accepted("EFFORT_DENORMAL"),
+    "constant torque": accepted("EFFORT_CONSTANT"),
+    "current without its constant": Refusal(
+        table("t,q1,q2,current1,current2"),
+        "torque_constant",
+        "--set tau1.torque_constant=0.1 --set tau2.torque_constant=0.1",
+    ),
+    "current that is a torque": Refusal(
+        table("t,q1,q2,current1,current2"), "unit", '--set tau1.unit="N m" --set tau2.unit="N m"', "CURRENT_AS_TORQUE"
+    ),
+    "counts": Refusal(
+        table("t,q1_counts,q2_counts,tau1,tau2"), "counts a turn", "--set theta1.counts=4096 --set theta2.counts=4096"
+    ),
+    "inches": Refusal(
+        table("t,q1 [inch],q2,tau1,tau2"), "'inch', which is no unit", '--set theta1.unit="rad"', "FOREIGN_UNIT"
+    ),
+    "a torque in degrees": Refusal(table("t,q1,q2,tau1 [deg],tau2"), "expected one of", '--set tau1.unit="N m"'),
+    "motor torques beside joint angles": Refusal(
+        table("t,joint1_pos,joint2_pos,motor1_torque,motor2_torque"),
+        "motors beside",
+        "--set tau1.gear_ratio=1 --set tau2.gear_ratio=1",
+    ),
+    "missing columns": Refusal(table("t,q1,q2,tau1,b"), "no column for tau1, tau2",
+                               "--set tau1.source=tau1 --set tau2.source=b"),
+    "missing time": Refusal(table("when,q1,q2,tau1,tau2"), "no column for t", "--set time=when"),
+    "three joints": Refusal(table("t,q1,q2,q3,tau1,tau2,tau3"), "3 joints", "--joints 1,3"),
+    "joints that are not there": Refusal(table("t,a_pos,b_pos,a_torque,b_torque"), "", "--joints a,b"),
+    "one name twice": Refusal(table("t,q1,q_1,q2,tau1,tau2"), "are both q of joint 1",
+                              "--set theta1.source=q1 --set theta2.source=q2"),
+    "time that stands still": Refusal(
+        table("t,q1,q2,tau1,tau2,time_s", t=np.zeros(ROWS), time_s=np.arange(ROWS) * 1e-3),
+        "time stands still", "--set time=time_s"),
+    "a value that is no number": Refusal(with_nan(), "finite number", "--accept NOT_FINITE", "NOT_FINITE"),
+    "two topics": Refusal(states(("/one", "/two"), ("j1", "j2")), "/one, /two", "--topic /two"),
+    "three joints of a topic": Refusal(states(("/one",), ("j1", "j2", "j3")), "3 joints", "--joints j1,j3"),
+}  # fmt: skip
+
+
+def settings_of(flags: str) -> dict[str, Any]:
+    """Flags of the command line as settings of a profile."""
+    settings: dict[str, Any] = {}
+    for flag, value in re.findall(r'(--[\w-]+) ((?:"[^"]*"|\S)+)', flags):
+        if flag == "--set":
+            key, _, text = value.partition("=")
+            try:
+                new = tomllib.loads(f"{key} = {text}")
+            except tomllib.TOMLDecodeError:
+                new = tomllib.loads(f'{key} = "{text}"')
+            for name, inner in new.items():
+                settings[name] = {**settings.get(name, {}), **inner} if isinstance(inner, dict) else inner
+        elif flag == "--angle-unit":
+            settings |= {name: {"unit": value} for name in ("theta1", "theta2", "omega1", "omega2")}
+        else:
+            settings[FLAGS[flag]] = value.split(",") if flag == "--joints" else value
+    return settings
+
+
+@pytest.mark.parametrize("name", REFUSALS)
+def test_each_refusal_yields_to_the_flag_it_names(name: str, tmp_path: Path) -> None:
+    refusal = REFUSALS[name]
+    path = refusal.make(tmp_path)
+    if refusal.words:
+        with pytest.raises(LogError) as refused:
+            admit(read_log(path))
+        assert refusal.words in str(refused.value)
+        first = re.match(r"--[\w-]+ [\w./]+", refusal.flags)
+        assert first is not None
+        named = first[0].rpartition(" ")[0] if "--set" not in refusal.flags else first[0]
+        assert named in str(refused.value)
+        assert "profile" in str(refused.value)
+        assert "\n" not in str(refused.value)
+    log = admit(read_log(path, with_settings(Profile(), settings_of(refusal.flags))))
+    if refusal.warning:
+        assert refusal.warning in [notice.code for notice in log.notices]
+
+
+def test_joints_that_are_not_there_are_told_from_those_that_are(tmp_path: Path) -> None:
+    path = table("t,shoulder_pos,elbow_pos,shoulder_torque,elbow_torque")(tmp_path)
+    with pytest.raises(LogError, match="joints there are: shoulder, elbow"):
+        read_log(path, Profile(joints=("foo", "bar")))
+    mcap = states(("/one",), ("j1", "j2", "j3"))(tmp_path)
+    with pytest.raises(LogError, match="j1, j2, j3"):
+        read_log(mcap, Profile(joints=("foo", "bar")))
+
+
+def test_columns_named_by_their_joint(tmp_path: Path) -> None:
+    path = table("t,elbow_pos,shoulder_pos,elbow_torque,shoulder_torque")(tmp_path)
+    log = read_log(path)
+    assert log.origin.mapping["theta1"] == "shoulder_pos"
+    assert log.origin.mapping["tau2"] == "elbow_torque"
+    assert log.origin.reading.joints == ("shoulder", "elbow")
+    swapped = read_log(path, Profile(joints=("elbow", "shoulder")))
+    assert swapped.origin.mapping["theta1"] == "elbow_pos"
+
+
+@pytest.mark.parametrize("header", ["t,q1,q2,q_cmd,q_ref,tau1,tau2", "t,max_pos,min_pos,q1,q2,tau1,tau2"])
+def test_words_that_are_no_joints_are_let_be(header: str, tmp_path: Path) -> None:
+    assert read_log(table(header)(tmp_path)).origin.mapping["theta1"] == "q1"
+
+
+def test_signals_of_motors_are_told(tmp_path: Path) -> None:
+    path = table("t,motor1_pos,motor2_pos,motor1_torque,motor2_torque")(tmp_path)
+    (said,) = [one for one in read_log(path).notices if one.code == "MOTOR_SIDE"]
+    assert "--set tau1.gear_ratio=N" in said.text
+    ratios: dict[str, Any] = {name: {"gear_ratio": 4} for name in ("theta1", "theta2", "tau1", "tau2")}
+    geared = read_log(path, Profile.model_validate(ratios))
+    assert np.allclose(geared.tau, 4 * read_log(path).tau)
+    assert np.allclose(geared.theta, read_log(path).theta / 4)
+    assert "MOTOR_SIDE" not in [one.code for one in geared.notices]
+
+
+@pytest.mark.parametrize(
+    ("written", "unit"),
+    [("Nm", "N m"), ("N.m", "N m"), ("mNm", "mN m"), ("Newton-meters", "N m"), ("lb-ft", "lbf ft"), ("N·m", "N m")],
+)
+def test_units_are_known_as_people_write_them(written: str, unit: str) -> None:
+    assert Profile.model_validate({"tau1": {"unit": written}}).tau1.unit == unit
+
+
+def test_units_of_angle_and_time_are_known_as_people_write_them() -> None:
+    profile = Profile.model_validate({"theta1": {"unit": "degrees"}, "time_unit": "milliseconds"})
+    assert (profile.theta1.unit, profile.time_unit) == ("deg", "ms")
+
+
+def test_start_and_end_cut_a_log(tmp_path: Path) -> None:
+    path = with_nan()(tmp_path)
+    log = read_log(path, with_settings(Profile(), {"start": "0.01", "end": "0.02"}))
+    assert log.stamp_ns.tolist() == [step * 1_000_000 for step in range(10, 21)]
+    (said,) = [one for one in log.notices if one.code == "CUT"]
+    assert said.text.startswith("29 samples before 0.01 s or behind 0.02 s")
+    assert (log.origin.reading.start, log.origin.reading.end) == (0.01, 0.02)
+    with pytest.raises(LogError, match="0 samples"):
+        read_log(path, Profile(start=5))
+
+
+def test_samples_without_a_finite_number_are_counted(tmp_path: Path) -> None:
+    log = read_log(with_nan()(tmp_path), Profile(accept=("NOT_FINITE",)))
+    assert len(log) == ROWS - 1
+    (said,) = [one for one in log.notices if one.lossy]
+    assert said.text.startswith("1 samples hold")
