@@ -20,6 +20,7 @@ beside a CSV log.
 from __future__ import annotations
 
 import json
+import math
 import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
@@ -259,12 +260,19 @@ def loads(text: str | bytes) -> Companion:
         sums = {str(name): int(value) for name, value in content["sums"].items()}
         if "arm" not in content:
             return Companion(None, sums)
-        arm = Arm(**{name: float(value) for name, value in content["arm"].items()})
+        arm = Arm(**{name: _finite(value) for name, value in content["arm"].items()})
         case = None if content["case"] is None else str(content["case"])
-        schedule = tuple((float(time), float(mass)) for time, mass in content.get("schedule", ()))
-        return Companion(Truth(arm, float(content["payload"]), case, schedule), sums)
-    except (KeyError, TypeError, AttributeError, RecursionError) as error:
+        schedule = tuple((_finite(time), _finite(mass)) for time, mass in content.get("schedule", ()))
+        return Companion(Truth(arm, _finite(content["payload"]), case, schedule), sums)
+    except (KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         raise ValueError(f"not the truth of a synthetic log: {error!r}") from error
+
+
+def _finite(value: object) -> float:
+    number = float(value)  # type: ignore[arg-type]
+    if not math.isfinite(number):
+        raise ValueError(f"{number} where a number was expected")
+    return number
 
 
 def _checksum(content: dict[str, Any]) -> int:

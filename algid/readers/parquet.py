@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from algid.errors import LogError
 from algid.log import CANONICAL_COLUMNS, KEY, Companion, Notice, loads
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign, check_written, tables
+from algid.readers.footer import FooterError, is_encrypted, page_has_checksum
 from algid.readers.table import Table
 
 if TYPE_CHECKING:
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 _MOST_COLUMNS = 4096
 _LARGEST_FOOTER = 1 << 26
+_PAGE_HEAD = 64
+"""Bytes in which a page's checksum stands, if it has one."""
 _NO_SUMS = Notice("NO_CHECKSUM", "the file has no sums of its values, as algid's have: changes would go unseen")
 
 
@@ -35,12 +38,11 @@ def open_parquet(path: Path, profile: Profile | None = None) -> TableReader:
 
     schema = schema_of(path)
     try:
-        metadata = pl.read_parquet_metadata(path)
+        companion = _companion(path)
         available = _flat_names(path, schema)
         rows = counted_rows(path)
     except (pl.exceptions.PolarsError, OSError, pl.exceptions.PanicException) as error:
         raise _damaged(path, error) from error
-    companion = _companion(path, metadata)
     check_written(str(path), list(available), companion.sums if companion else {})
     columns = assign(str(path), list(available), profile)
     if companion is None and "stamp_ns" in schema and set(CANONICAL_COLUMNS) <= schema.keys():
@@ -62,7 +64,7 @@ def schema_of(path: Path) -> dict[str, pl.DataType]:
 
     _check_footer(path)
     try:
-        return dict(pl.read_parquet_schema(path))
+        return dict(pl.scan_parquet(path, glob=False).collect_schema())
     except (pl.exceptions.PolarsError, OSError, pl.exceptions.PanicException) as error:
         raise _damaged(path, error) from error
 
@@ -72,11 +74,19 @@ def _check_footer(path: Path) -> None:
         size = stream.seek(0, 2)
         stream.seek(max(0, size - 8))
         tail = stream.read(8)
-    length = int.from_bytes(tail[:4], "little")
+        length = int.from_bytes(tail[:4], "little")
+        stream.seek(max(0, size - 8 - length))
+        footer = stream.read(min(length, _LARGEST_FOOTER))
     if tail[4:] != b"PAR1":
         raise LogError(f"{path}: the Parquet file is cut off: its footer is missing, so nothing can be read of it")
     if length + 12 > size or length > _LARGEST_FOOTER:
         raise LogError(f"{path}: the Parquet footer claims {length} bytes of a file of {size}; copy the file again")
+    try:
+        encrypted = is_encrypted(footer)
+    except FooterError as error:
+        raise LogError(f"{path}: the Parquet footer is damaged ({error}); copy the file again") from error
+    if encrypted:
+        raise LogError(f"{path}: the Parquet file holds encrypted columns; write it anew without encryption")
 
 
 def counted_rows(path: Path) -> int:
@@ -124,9 +134,15 @@ def _flat_names(path: Path, schema: Mapping[str, pl.DataType]) -> dict[str, tupl
     return names
 
 
-def _companion(path: Path, metadata: Mapping[str, str]) -> Companion | None:
+def _companion(path: Path) -> Companion | None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     try:
-        return loads(metadata[KEY]) if KEY in metadata else None
+        text = (pq.read_metadata(path).metadata or {}).get(KEY.encode())
+        return None if text is None else loads(text)
+    except pa.ArrowException as error:
+        raise _damaged(path, error) from error
     except ValueError as error:
         raise LogError(f"{path}: the truth in the file's metadata cannot be read ({error})") from error
 
@@ -174,7 +190,22 @@ class _Groups:
             lots = [frame.select(lot).collect_batches(chunk_size=rows) for lot in (numbers[:middle], numbers[middle:])]
             for first, second in zip(*lots, strict=True):
                 yield first.hstack(second)
+            self._check_pages()
         except (pl.exceptions.PolarsError, OSError, ValueError, pl.exceptions.PanicException) as error:
+            raise _damaged(self.path, error) from error
+
+    def _check_pages(self) -> None:
+        """Have the pages' checksums verified, where they have any; polars does not look at them."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        roots = {self.available[source][0] for source in self.columns.sources.values()}
+        try:
+            with pq.ParquetFile(self.path, page_checksum_verification=True, pre_buffer=False) as file:
+                if _has_checksums(self.path, file.metadata, roots):
+                    for _ in file.iter_batches(columns=sorted(roots)):
+                        pass
+        except (pa.ArrowException, OSError, ValueError) as error:
             raise _damaged(self.path, error) from error
 
     def _number(self, name: str, source: str) -> pl.Expr:
@@ -200,6 +231,19 @@ class _Groups:
         if isinstance(self.schema[column], (pl.Datetime, pl.Duration)):
             return replace(self.columns, time_unit="ns", time_told=True)
         return self.columns
+
+
+def _has_checksums(path: Path, metadata: Any, roots: Collection[str]) -> bool:
+    """Whether the first page of a column among `roots` carries a checksum, in any row group."""
+    with path.open("rb") as stream:
+        for group in map(metadata.row_group, range(metadata.num_row_groups)):
+            for pages in map(group.column, range(group.num_columns)):
+                if pages.path_in_schema.split(".")[0] in roots:
+                    offsets = (pages.dictionary_page_offset, pages.data_page_offset)
+                    stream.seek(min(offset for offset in offsets if offset))
+                    if page_has_checksum(stream.read(_PAGE_HEAD)):
+                        return True
+    return False
 
 
 def _damaged(path: Path, error: BaseException) -> LogError:

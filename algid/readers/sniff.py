@@ -6,10 +6,12 @@ Compressed text, piece by piece, in bounded memory.
 from __future__ import annotations
 
 import gzip
-import io
+import os
+import re
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 from algid.errors import LogError
 
@@ -20,6 +22,7 @@ GZIP = b"\x1f\x8b"
 BAG = b"#ROSBAG V"
 SQLITE = b"SQLite format 3\x00"
 _HEAD = 1 << 16
+_EMPTY_LINES = re.compile(rb"\n[\r\n]*\n")
 
 
 def sniff(path: Path) -> str:
@@ -70,8 +73,6 @@ def _by_content(path: Path, head: bytes) -> str:
 
 
 def _compressed(path: Path, name: str) -> str:
-    from algid.readers.sniff import head_of
-
     head = head_of(path, name)
     if head.startswith(MCAP):
         raise LogError(
@@ -97,45 +98,93 @@ def looks_like_text(head: bytes) -> bool:
 
 
 _PIECE = 1 << 24
-_INFLATE_HEAD = 1 << 16
 _LONGEST_LINE = 1 << 16
+_PACKED = 1 << 11
+"""Bytes given to zstd at a time: they unpack to 64 MiB at most, since a block of four bytes makes 128 KiB."""
+_FREE_BYTES, _BYTES_A_BYTE = 256 << 20, 250
+"""What a compressed table may unpack to: rows of numbers pack 3 to 20 times, a log at rest a hundred times."""
 
 
 def pieces(path: Path, name: str, size: int = _PIECE) -> Iterator[bytes]:
-    """Bytes of a "csv" file, unpacked ones of a "csv.zst" or "csv.gz" file, at most `size` at a time.
+    """Bytes of a "csv" file, unpacked ones of a "csv.zst" or "csv.gz" file, `size` at a time or little more.
 
     Raises
     ------
     LogError
-        If the compressed data are damaged or cut off.
+        If the compressed data are damaged, cut off, or unpack to more than any table.
     """
-    import zstandard
-
     try:
         with path.open("rb") as raw:
-            stream: io.BufferedIOBase | zstandard.ZstdDecompressionReader = raw
+            most = _FREE_BYTES + _BYTES_A_BYTE * os.fstat(raw.fileno()).st_size
             if name == "csv.zst":
-                window = zstandard.ZstdDecompressor(max_window_size=1 << 27)
-                stream = window.stream_reader(raw, read_across_frames=True)
+                yield from _bounded(path, _gathered(_zstd(raw), size), most)
             elif name == "csv.gz":
                 stream = gzip.GzipFile(fileobj=raw)
-            while piece := stream.read(size):
-                yield piece
-    except (OSError, EOFError, zlib.error, zstandard.ZstdError) as error:
+                yield from _bounded(path, iter(lambda: stream.read(size), b""), most)
+            else:
+                yield from iter(lambda: raw.read(size), b"")
+    except (OSError, EOFError, zlib.error) as error:
         raise LogError(f"{path}: the compressed data are damaged or cut off ({error}); copy it again") from error
 
 
+def _zstd(raw: BinaryIO) -> Iterator[bytes]:
+    """The unpacked bytes of one zstd frame after another; `EOFError` where the last one breaks off.
+
+    A stream reader of the library takes a cut file for a whole one.
+    """
+    import zstandard
+
+    window = zstandard.ZstdDecompressor(max_window_size=1 << 27)
+    packed = raw.read(_PACKED)
+    try:
+        while packed:
+            frame = window.decompressobj()
+            while not frame.eof:
+                if not packed:
+                    raise EOFError("its last frame breaks off")
+                yield frame.decompress(packed)
+                packed = frame.unused_data or raw.read(_PACKED)
+    except zstandard.ZstdError as error:
+        raise EOFError(str(error)) from error
+
+
+def _gathered(parts: Iterator[bytes], size: int) -> Iterator[bytes]:
+    """The same bytes in pieces of `size` at least, but for the last."""
+    held, length = [], 0
+    for part in parts:
+        held.append(part)
+        length += len(part)
+        if length >= size:
+            yield b"".join(held)
+            held, length = [], 0
+    if length:
+        yield b"".join(held)
+
+
+def _bounded(path: Path, parts: Iterator[bytes], most: int) -> Iterator[bytes]:
+    total = 0
+    for part in parts:
+        total += len(part)
+        if total > most:
+            raise LogError(
+                f"{path}: the compressed data unpack to more than {most} bytes, as no table of their size does; "
+                "if it is one, unpack it first"
+            )
+        yield part
+
+
 def whole_lines(path: Path, name: str) -> Iterator[bytes]:
-    """As `pieces`, in pieces that end with a line.
+    """As `pieces`, in pieces that end with a line; behind the head, which tells the dialect, without empty lines.
 
     Raises
     ------
     LogError
         As `pieces`, and if a line is no table's.
     """
-    rest = b""
+    rest, head = b"", _HEAD
     for piece in pieces(path, name):
-        text = rest + piece
+        text = rest + piece[:head] + _EMPTY_LINES.sub(b"\n", piece[head:])
+        head = max(0, head - len(piece))
         end = text.rfind(b"\n") + 1
         if not end and len(text) > _LONGEST_LINE:
             raise LogError(f"{path}: a line of more than 65,000 characters; expected rows of numbers")
@@ -148,4 +197,4 @@ def whole_lines(path: Path, name: str) -> Iterator[bytes]:
 
 def head_of(path: Path, name: str) -> bytes:
     """The first unpacked bytes, 64 KiB at most."""
-    return next(pieces(path, name, _INFLATE_HEAD), b"")
+    return next(pieces(path, name, _HEAD), b"")[:_HEAD]

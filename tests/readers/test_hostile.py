@@ -2,25 +2,36 @@
 
 from __future__ import annotations
 
+import base64
 import gzip
+import json
+import math
 import os
 import random
 import struct
+import subprocess
+import sys
 import tempfile
 import tracemalloc
 import zlib
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 import zstandard
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pyarrow.parquet import encryption
 
 from algid.errors import LogError
 from algid.readers import read_log
 from algid.readers.mcap.framing import DamagedError, unpack
+from algid.writers import write_log
 from pipelines.mutations import clean_files, clean_log, damage
-from tests.readers.logs import same
+from tests.readers.logs import TRUTH, same
 
 
 @pytest.fixture(scope="module")
@@ -113,3 +124,136 @@ def test_a_finite_number_too_large_is_told_so(tmp_path: Path) -> None:
     path.write_text("t,theta1,theta2,tau1,tau2\n0,0,0,0,0\n1,1e300,0,0,0\n")
     with pytest.raises(LogError, match=r"sample 2: expected a finite number below 1e\+100 in size, found 1e\+300"):
         read_log(path)
+
+
+TABLE = b"t,theta1,theta2,tau1,tau2\n" + b"".join(b"%d,0.%d,1,2.5,-3\n" % (row, row) for row in range(3000))
+
+
+@pytest.mark.parametrize("share", [0.3, 0.9, 0.999])
+def test_compressed_text_that_breaks_off_is_refused(share: float, tmp_path: Path) -> None:
+    for name, packed in (("log.csv.gz", gzip.compress(TABLE)), ("log.csv.zst", zstandard.compress(TABLE))):
+        (tmp_path / name).write_bytes(packed)
+        assert len(read_log(tmp_path / name)) == 3000
+        (tmp_path / name).write_bytes(packed[: int(len(packed) * share)])
+        with pytest.raises(LogError, match="damaged or cut off"):
+            read_log(tmp_path / name)
+
+
+def test_frames_of_zstd_behind_one_another_are_one_table(tmp_path: Path) -> None:
+    (tmp_path / "log.csv.zst").write_bytes(zstandard.compress(TABLE[:5000]) + zstandard.compress(TABLE[5000:]))
+    assert len(read_log(tmp_path / "log.csv.zst")) == 3000
+    (tmp_path / "log.csv.zst").write_bytes(zstandard.compress(TABLE) + b"no frame")
+    with pytest.raises(LogError, match="damaged or cut off"):
+        read_log(tmp_path / "log.csv.zst")
+
+
+@pytest.mark.parametrize("end", [b"\n", b"\r\n"])
+def test_empty_lines_without_end_take_no_memory(end: bytes, tmp_path: Path) -> None:
+    text = TABLE.replace(b"\n", end)
+    packed = zstandard.compress(b"# a log" + end * 3 + text + end * 10_000_000 + b"9999,1,1,1,1" + end)
+    (tmp_path / "log.csv.zst").write_bytes(packed)
+    tracemalloc.start()
+    assert len(read_log(tmp_path / "log.csv.zst")) == 3001
+    assert tracemalloc.get_traced_memory()[1] < 1 << 27
+    tracemalloc.stop()
+
+
+def test_text_that_unpacks_to_more_than_any_table_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("algid.readers.sniff._FREE_BYTES", 1 << 24)
+    stream = zstandard.ZstdCompressor().compressobj()
+    with (tmp_path / "log.csv.zst").open("wb") as file:
+        file.write(stream.compress(TABLE))
+        for _ in range(40):
+            file.write(stream.compress(b"\n" * (1 << 23)))
+        file.write(stream.flush())
+    with pytest.raises(LogError, match="as no table of their size does; if it is one, unpack it first"):
+        read_log(tmp_path / "log.csv.zst")
+
+
+def test_what_is_no_file_is_refused_at_once(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "log.csv")
+    for path in (tmp_path / "log.csv", Path("/dev/zero"), Path("/dev/null")):
+        with pytest.raises(LogError, match="no regular file"):
+            read_log(path)
+
+
+@pytest.mark.parametrize("name", ["col[1]", "a*", "q?", "**", "{a,b}", "~"])
+@pytest.mark.parametrize("kind", ["parquet", "csv"])
+def test_a_path_is_no_pattern(name: str, kind: str, tmp_path: Path) -> None:
+    write_log(tmp_path / f"{name}.{kind}", clean_log(20))
+    for other in ("col1", "ab", "qq", "a", "b"):
+        write_log(tmp_path / f"{other}.{kind}", clean_log(10))
+    assert same(read_log(tmp_path / f"{name}.{kind}"), clean_log(20))
+
+
+def arm_table(rows: int = 2000) -> pa.Table:
+    log = clean_log(rows)
+    columns = {"t": log.t, "theta1": log.theta[0], "theta2": log.theta[1], "tau1": log.tau[0], "tau2": log.tau[1]}
+    return pa.table({name: pa.array(values) for name, values in columns.items()})
+
+
+@pytest.mark.parametrize("options", [{"use_dictionary": False}, {"use_dictionary": True}, {"data_page_version": "2.0"}])
+def test_checksums_of_parquet_pages_are_verified(options: dict[str, Any], tmp_path: Path) -> None:
+    path = tmp_path / "log.parquet"
+    pq.write_table(arm_table(), path, write_page_checksum=True, compression="none", row_group_size=500, **options)
+    assert len(read_log(path)) == 2000
+    content = bytearray(path.read_bytes())
+    content[content.index(struct.pack("<d", clean_log(2000).theta[0, 1234]))] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(LogError, match="CRC checksum verification failed"):
+        read_log(path)
+
+
+class Keys(encryption.KmsClient):  # type: ignore[misc]
+    """Keys that are not secret."""
+
+    def wrap_key(self, key: bytes, _name: str) -> bytes:
+        return base64.b64encode(key)
+
+    def unwrap_key(self, key: bytes, _name: str) -> bytes:
+        return base64.b64decode(key)
+
+
+@pytest.mark.parametrize("plain", [True, False])
+@pytest.mark.parametrize(
+    "keys", [{"column_keys": {"k": ["theta1"]}}, {"column_keys": {"k": ["note"]}}, {"uniform_encryption": True}]
+)
+def test_encrypted_parquet_is_refused_and_ends_no_process(keys: dict[str, Any], plain: bool, tmp_path: Path) -> None:
+    factory = encryption.CryptoFactory(lambda _: Keys())
+    configuration = encryption.EncryptionConfiguration(
+        footer_key="k", plaintext_footer=plain, double_wrapping=False, **keys
+    )
+    properties = factory.file_encryption_properties(encryption.KmsConnectionConfig(), configuration)
+    table = arm_table(50).append_column("note", pa.array(["x"] * 50))
+    with pq.ParquetWriter(tmp_path / "log.parquet", table.schema, encryption_properties=properties) as writer:
+        writer.write_table(table)
+    read = "import sys; from algid.readers import read_log; read_log(sys.argv[1])"
+    done = subprocess.run(
+        [sys.executable, "-c", read, tmp_path / "log.parquet"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1  # not -6, an abort
+    assert "LogError" in done.stderr
+    assert "encrypt" in done.stderr or not plain
+
+
+def test_a_footer_that_is_none_is_refused(tmp_path: Path) -> None:
+    for footer in (
+        b"\x15\x02",
+        b"\xff" * 40,
+        b"\x19\xfc\xff\xff\xff\xff\x0f",
+        b"\x1c" * 100,
+        b"\x1b\x00",
+        b"\x18\xff\xff\x03",
+    ):
+        (tmp_path / "log.parquet").write_bytes(b"PAR1" + footer + len(footer).to_bytes(4, "little") + b"PAR1")
+        with pytest.raises(LogError, match="footer is damaged"):
+            read_log(tmp_path / "log.parquet")
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, 10**400])
+def test_a_truth_that_is_no_number_is_refused(number: float, tmp_path: Path) -> None:
+    content = {"sums": {}, "arm": asdict(TRUTH.arm), "payload": number, "case": None}
+    text = json.dumps({**content, "crc32": zlib.crc32(json.dumps(content, sort_keys=True).encode())})
+    pq.write_table(arm_table().replace_schema_metadata({"algid": text}), tmp_path / "log.parquet")
+    with pytest.raises(LogError, match="truth in the file's metadata cannot be read"):
+        read_log(tmp_path / "log.parquet")
