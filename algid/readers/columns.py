@@ -19,7 +19,7 @@ from algid.readers.assemble import TableReader, reader_of
 from algid.readers.joints import along_the_arm, order_notice
 from algid.readers.names import COMMANDED, CURRENTS, Choice, choose, on_motor_side, take_apart
 from algid.readers.table import CHANNELS, JOINT_CHANNELS, VELOCITIES, Table
-from algid.units import NANOSECONDS, TORQUE
+from algid.units import NANOSECONDS, TORQUE, unit_of
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -61,8 +61,12 @@ class Columns:
         return reader_of(origin, tables, profile, self.units, self.notices, rows)
 
 
-def assign(path: str, available: Sequence[str], profile: Profile | None) -> Columns:
+def assign(
+    path: str, available: Sequence[str], profile: Profile | None, stated: Mapping[str, str] | None = None
+) -> Columns:
     """Choose the columns of a flat log: those a profile names, the rest by their names.
+
+    `stated` are units by column that the file tells elsewhere than in the columns' names.
 
     Raises
     ------
@@ -87,7 +91,10 @@ def assign(path: str, available: Sequence[str], profile: Profile | None) -> Colu
         raise LogError(f"{told}; name them: {flags} (profile: {lines})")
     units = {name: unit for name, unit in choice.units.items() if sources.get(name) == choice.columns[name]}
     units |= _currents(sources)
+    beside = {name: (stated or {})[column] for name, column in sources.items() if column in (stated or {})}
+    units |= {name: known for name, unit in beside.items() if name not in units and (known := unit_of(unit))}
     foreign = {name: unit for name, unit in choice.foreign.items() if sources.get(name) == choice.columns[name]}
+    foreign |= {name: unit for name, unit in beside.items() if unit_of(unit) is None}
     said = [*_of_foreign_units(path, sources, foreign, profile), *_of_motors(path, sources, profile)]
     time_told = (profile.time_unit if profile else None) or units.get("t")
     if all(sources[name] == name for name in ("t", *JOINT_CHANNELS)):
@@ -333,28 +340,28 @@ def _slow(column: str, stamps: IntArray, unit: str) -> list[Notice]:
 
 
 def _complete(path: str, frames: Iterator[pl.DataFrame]) -> Iterator[tuple[pl.DataFrame, tuple[Notice, ...]]]:
-    """Frames without nulls: a last row that breaks off is dropped and told of, any other null refused."""
-    done, held = 0, None
+    """Frames without nulls: rows that lack a value are dropped and told of; the last row may break off."""
+    rows, lost, held = 0, 0, None
     for frame in frames:
         if held is not None:
-            yield _without_null(path, held, done), ()
-            done += held.height
-        held = frame
+            yield held, ()
+        rows += frame.height
+        cut_off = bool(frame.height) and any(value is None for value in frame.row(-1))
+        held = frame.drop_nulls() if any(frame.null_count().row(0)) else frame
+        lost += frame.height - held.height
     if held is None:
         return
-    if held.height and any(value is None for value in held.row(-1)):
-        lost = Notice("CUT_OFF", "the last row breaks off and was dropped", lossy=True)
-        yield _without_null(path, held.head(-1), done), (lost,)
+    if lost == 1 and cut_off:
+        yield held, (Notice("CUT_OFF", "the last row breaks off and was dropped", lossy=True),)
+    elif lost:
+        if lost == rows:
+            raise LogError(
+                f"{path}: no row has a value in every column that is needed; put the signals on common stamps"
+            )
+        text = f"{lost} of {rows} rows lack a value and were dropped"
+        yield held, (Notice("EMPTY_CELLS", text, lossy=True),)
     else:
-        yield _without_null(path, held, done), ()
-
-
-def _without_null(path: str, frame: pl.DataFrame, done: int) -> pl.DataFrame:
-    for name in frame.columns:
-        if frame[name].null_count():
-            row = done + (frame[name].is_null().arg_max() or 0) + 1
-            raise LogError(f"{path}: {name} has no value in row {row}; expected a number in every row")
-    return frame
+        yield held, ()
 
 
 def _verify(path: str, seen: Mapping[str, int], expected: Mapping[str, int]) -> None:

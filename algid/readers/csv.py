@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -43,7 +43,9 @@ def open_csv(path: Path, profile: Profile | None = None, kind: str = "csv") -> T
     dialect = detect(path, head)
     companion = _companion(path)
     check_written(str(path), dialect.columns, companion.sums if companion else {})
-    columns = assign(str(path), dialect.columns, profile)
+    columns = assign(str(path), dialect.columns, profile, dialect.units)
+    if columns.sources["t"] in dialect.dates:
+        columns = replace(columns, time_unit="ns", time_told=True)
     source = _Text(path, kind, dialect, columns, companion.sums if companion else {})
     truth = companion.truth if companion else None
     return columns.reader(str(path), "csv", truth, source.tables, profile, _rows(path, kind, head))
@@ -146,24 +148,27 @@ class _Text:
             missing_columns="insert",
             glob=False,
         )
-        numbers = [self._number(pl.col(place)).alias(name) for name, place in wanted.items()]
+        numbers = [self._number(name, pl.col(place)).alias(name) for name, place in wanted.items()]
         return frame.select(*numbers, pl.col(_EXCESS).is_not_null())
 
     def _type(self, place: int) -> type[pl.DataType]:
         import polars as pl
 
         column = self.dialect.columns[place]
-        if column not in self.columns.sources.values() or self.dialect.padded:
+        if column not in self.columns.sources.values() or self.dialect.padded or column in self.dialect.dates:
             return pl.String
         whole = column == self.columns.sources["t"] and column in self.dialect.whole
         return pl.Int64 if whole else pl.Float64
 
-    def _number(self, cell: pl.Expr) -> pl.Expr:
+    def _number(self, name: str, cell: pl.Expr) -> pl.Expr:
         import polars as pl
 
+        if self.columns.sources[name] in self.dialect.dates:
+            return _nanoseconds(cell.str.strip_chars()) if name == "t" else pl.lit(None, pl.Float64)
         if not self.dialect.padded:
             return cell
         text = cell.str.strip_chars()
+        text = pl.when(text != "").then(text)
         return (text.str.replace(",", ".", literal=True) if self.dialect.decimal_comma else text).cast(pl.Float64)
 
     def _whole(self, frame: pl.DataFrame, done: int) -> pl.DataFrame:
@@ -189,3 +194,12 @@ class _Text:
                 f"{found[1][:40]!r}; mend the file or name another column"
             )
         return f"{self.path}: the table cannot be read past row {done}: {told[:200]}"
+
+
+def _nanoseconds(text: pl.Expr) -> pl.Expr:
+    """Dates with times of day as ns since 1970; UTC where they name no zone."""
+    import polars as pl
+
+    zoned = text.str.replace(" ", "T", literal=True).str.replace(r"Z$", "+00:00")
+    zoned = pl.when(zoned.str.contains(r"[+-]\d{2}:?\d{2}$")).then(zoned).otherwise(zoned + "+00:00")
+    return zoned.str.to_datetime("%Y-%m-%dT%H:%M:%S%.f%z", time_unit="ns", strict=True).dt.timestamp("ns")

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import csv
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from algid.errors import LogError
+from algid.units import is_foreign, unit_of
 
 COMMENTS = ("#", "%", "//")
 _SEPARATORS = (";", "\t", ",", "|")
 _NUMBER = re.compile(r"^[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?$|^[+-]?(nan|inf|infinity)$", re.IGNORECASE)
 _WHOLE = re.compile(r"^[+-]?\d{1,19}$")
+_DATE = re.compile(r"^\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}")
+_MOST_TITLES = 40
 _LONGEST_LINE = 1 << 16
 _MOST_COLUMNS = 4096
 
@@ -36,6 +40,10 @@ class Dialect:
         Columns whose cells are all integers, as far as the first lines tell.
     padded : bool
         Whether blanks stand behind cells.
+    units : mapping
+        By column the unit that a row under the header states.
+    dates : frozenset of str
+        Columns whose cells are dates and times of day (ISO 8601).
     """
 
     columns: tuple[str, ...]
@@ -45,6 +53,8 @@ class Dialect:
     comment: str | None
     whole: frozenset[str]
     padded: bool
+    units: Mapping[str, str] = field(default_factory=dict)
+    dates: frozenset[str] = frozenset()
 
 
 def detect(path: Path, head: bytes) -> Dialect:
@@ -60,6 +70,7 @@ def detect(path: Path, head: bytes) -> Dialect:
     data = [(number, line) for number, line in enumerate(lines) if line.strip() and not _comment(line, comment)]
     if not data:
         raise LogError(f"{path}: no table in the text; expected a header and rows of numbers")
+    data = _below_titles(data)
     number, header = data[0]
     separator = _separator(path, header, [line for _, line in data[1:20]])
     first_row = 1
@@ -69,10 +80,43 @@ def detect(path: Path, head: bytes) -> Dialect:
             0,
         )
     columns = tuple(split(header, separator))
+    units = _units(columns, split(data[first_row][1], separator)) if len(data) > first_row else {}
+    first_row += bool(units)
     if len(data) <= first_row:
         raise LogError(f"{path}: a header and no rows below it; expected rows of numbers")
     number, row = data[first_row]
-    return _checked(path, columns, separator, number, comment, [line for _, line in data[first_row:]], row)
+    found = _checked(path, columns, separator, number, comment, [line for _, line in data[first_row:]], row)
+    return replace(found, units=units)
+
+
+def _below_titles(data: list[tuple[int, str]]) -> list[tuple[int, str]]:
+    """Numbered lines without those above the header, which has as many cells as the rows of numbers under it."""
+    for first in range(min(len(data), _MOST_TITLES)):
+        for separator in (*_SEPARATORS, ""):
+            table = [split(line, separator) for _, line in data[first : first + 5]]
+            rows = table[2:] if len(table) > 2 and _units(table[0], table[1]) else table[1:]
+            # the last line may break off
+            same = len(table[0]) > 1 and all(len(row) == len(table[0]) for row in table[: max(2, len(table) - 1)])
+            if same and rows and _numeric(rows[0]) and not _numeric(table[0]):
+                return data[first:]
+    return data
+
+
+def _numeric(cells: Sequence[str]) -> bool:
+    """Whether half of the cells hold numbers, dates or nothing, and one a number."""
+    numbers = sum(bool(_NUMBER.match(cell)) for cell in cells)
+    return numbers > 0 and 2 * (numbers + sum(not cell or bool(_DATE.match(cell)) for cell in cells)) >= len(cells)
+
+
+def _units(columns: Sequence[str], cells: Sequence[str]) -> dict[str, str]:
+    """By column its unit, if every cell of a row names one or is empty; else nothing."""
+    texts = [cell.strip("[]() ") for cell in cells]
+    known = [bool(text) and (unit_of(text) is not None or is_foreign(text)) for text in texts]
+    if len(cells) != len(columns) or not any(known):
+        return {}
+    if not all(one or text in ("", "-", "1") for one, text in zip(known, texts, strict=True)):
+        return {}
+    return {column: text for column, text, one in zip(columns, texts, known, strict=True) if one}
 
 
 def kinds(path: Path, head: bytes, found: Dialect) -> dict[str, str]:
@@ -159,4 +203,5 @@ def _checked(
     padded = bool(separator) and any(re.search(rf"[ \t]{re.escape(separator)}|[ ]$", row.rstrip("\r")) for row in rows)
     table = [cells for cells in (split(row, separator) for row in rows) if len(cells) == len(columns)]
     whole = frozenset(column for column, *cells in zip(columns, *table, strict=True) if all(map(_WHOLE.match, cells)))
-    return Dialect(columns, separator, comma, skip, comment, whole, padded)
+    dates = frozenset(column for column, *cells in zip(columns, *table, strict=True) if all(map(_DATE.match, cells)))
+    return Dialect(columns, separator, comma, skip, comment, whole, padded, dates=dates)
