@@ -13,10 +13,15 @@ EXIT_INCOMPLETE = 3
 
 def main() -> None:
     """Run algid; the entry point of the console script."""
+    if sys.platform == "win32":
+        print("algid: it runs on Linux and macOS; on Windows, run it in WSL", file=sys.stderr)
+        sys.exit(EXIT_USAGE)
+    from algid.cli.streams import harden_streams
     from algid.runtime import bound_by_environment
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _stop)
+    harden_streams()
     bound_by_environment()  # before anything loads numpy
     from algid.cli.app import app
     from algid.errors import AlgidError
@@ -26,9 +31,6 @@ def main() -> None:
     except AlgidError as error:
         print(f"algid: {_one_line(error)}", file=sys.stderr)
         sys.exit(EXIT_USAGE)
-    except BrokenPipeError:  # the reader of our output has seen enough
-        sys.stderr.close()
-        sys.exit(EXIT_FAILED)
     except _StoppedError:
         print("algid: stopped; nothing half-written is left", file=sys.stderr)
         raise

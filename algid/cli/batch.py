@@ -121,6 +121,8 @@ def _workers(
 def _bytes(text: str) -> int:
     from algid.errors import SettingError
 
+    if sys.platform == "darwin":
+        raise SettingError("--memory-limit: macOS does not bound the memory of a process; leave it out")
     units = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9, "ki": 2**10, "mi": 2**20, "gi": 2**30}
     number = text.strip().lower().removesuffix("b")
     unit = number.lstrip("0123456789.").strip()

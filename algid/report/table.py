@@ -41,6 +41,11 @@ class Table:
         kinds = [replace(c, kind="doubtful status") if c.kind == "status" else c for c in self.columns]
         return replace(self, columns=tuple(kinds))
 
+    @property
+    def most_missed(self) -> bool:
+        """Whether no column is left whose rank is above 1."""
+        return all(column.rank <= 1 for column in self.columns)
+
     def narrower(self) -> Table | None:
         """This table less the column that is missed least; None where all are needed."""
         least = max(range(len(self.columns)), key=lambda i: self.columns[i].rank, default=None)

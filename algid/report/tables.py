@@ -188,14 +188,14 @@ def quality_tables(torque: TorqueLog | None, result: Result) -> list[Table]:
 ESTIMATE_COLUMNS = (
     Column("Parameter", "name"),
     Column("Estimate", "number"),
-    Column("± std", "number"),
-    Column("± std, %", "number", rank=3),
+    Column("± std", "number", rank=2),
+    Column("± std, %", "number", rank=5),
     Column("Unit", "text"),
     Column("Status", "status"),
-    Column("95 % interval", "number", rank=4),
-    Column("Truth", "number", rank=2),
+    Column("95 % interval", "number", rank=1),
+    Column("Truth", "number", rank=4),
     Column("Error %", "number"),
-    Column("Paper %", "number", rank=1),
+    Column("Paper %", "number", rank=3),
 )
 TABLE4_COLUMNS = tuple(
     column for column in ESTIMATE_COLUMNS if column.kind != "status" and "interval" not in column.heading

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from algid.report.table import Table
+from algid.report.table import Column, Table
 from algid.report.tables import estimate_tables
 from algid.report.verdict import LEVEL_WORDS, Level, Verdict, verdict
 from algid.results import Result, Status
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table as RichTable
 
+LONGEST_WORD = 24  # columns; what is longer, like a path, breaks where it must
 LEVEL_STYLES: dict[Level, str] = {"good": "bold green", "reservations": "bold yellow", "failed": "bold red"}
 
 
@@ -53,22 +54,50 @@ def _points(reasons: Sequence[str]) -> RichTable:
 
 def print_one(table: Table, console: Console) -> None:
     """Print one table, less the columns that the console has no room for; no digit is ever cut off."""
+    from rich.cells import cell_len
     from rich.measure import Measurement
     from rich.text import Text
 
-    made = rich_table(table)
-    while Measurement.get(console, console.options.update(width=10_000), made).maximum > console.width:
+    while True:
+        widths = [max(map(cell_len, column)) for column in _columns(table)]
+        wanted = Measurement.get(console, console.options.update(width=10_000), rich_table(table, widths)).maximum
+        room = sum(widths) - max(wanted - console.width, 0)
+        narrowed = _narrowed(widths, list(map(_least, table.columns, _columns(table))), room)
         fewer = table.narrower()
-        if fewer is None:
+        if sum(widths) <= room or fewer is None or (sum(narrowed) <= room and table.most_missed):
             break
-        table, made = fewer, rich_table(fewer)
-    console.print(made)
+        table = fewer
+    console.print(rich_table(table, narrowed))
     if table.note:
         console.print(Text(table.note, "dim"))
 
 
-def rich_table(table: Table) -> RichTable:
-    """`table` as rich sets it."""
+def _columns(table: Table) -> list[tuple[str, ...]]:
+    """What each column holds, its heading first."""
+    return [(column.heading, *cells) for column, *cells in zip(table.columns, *table.rows, strict=True)]
+
+
+def _least(column: Column, cells: tuple[str, ...]) -> int:
+    """The width in which no word of a column breaks, but for those that are too long for any table, and no number."""
+    from rich.cells import cell_len
+
+    words = [min(cell_len(word), LONGEST_WORD) for cell in cells for word in cell.split()]
+    return max([*words, *(map(cell_len, cells[1:]) if column.kind == "number" else ())], default=1)
+
+
+def _narrowed(widths: list[int], least: list[int], room: int) -> list[int]:
+    """Widths that add up to `room`: the widest column gives way first, none below its least."""
+    narrowed = list(widths)
+    while sum(narrowed) > room:
+        wide = [i for i, width in enumerate(narrowed) if width > least[i]]
+        if not wide:
+            break
+        narrowed[max(wide, key=narrowed.__getitem__)] -= 1
+    return narrowed
+
+
+def rich_table(table: Table, widths: Sequence[int]) -> RichTable:
+    """`table` as rich sets it, its columns that wide."""
     from rich import box
     from rich.table import Table as RichTable
     from rich.text import Text
@@ -81,9 +110,9 @@ def rich_table(table: Table) -> RichTable:
         show_edge=False,
         collapse_padding=True,
     )
-    for column in table.columns:
+    for column, width in zip(table.columns, widths, strict=True):
         right = column.kind == "number"
-        made.add_column(Text(column.heading), justify="right" if right else "left", overflow="fold")
+        made.add_column(Text(column.heading), justify="right" if right else "left", overflow="fold", width=width)
     for row in table.rows:
         cells = zip(table.columns, row, strict=True)
         made.add_row(*(Text(cell, _style(column.kind, cell)) for column, cell in cells))

@@ -23,8 +23,8 @@ COLUMNS = (
     Column("± 95 %", "number"),
     Column("Unit", "text"),
     Column("Status", "status"),
-    Column("95 % interval", "number", rank=3),
-    Column("Truth", "number", rank=1),
+    Column("95 % interval", "number", rank=1),
+    Column("Truth", "number", rank=3),
     Column("Error", "number", rank=2),
 )
 

@@ -1,0 +1,60 @@
+"""What a terminal cannot spell and a reader that leaves do to a command: nothing."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ALGID = [sys.executable, "-m", "algid"]
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("result")
+    noisy = ("--position-noise", "1e-3", "--torque-noise", "1e-2")
+    subprocess.run([*ALGID, "synth", "case1", "-o", folder, "--torque", "wide", "--duration", "4", *noisy], check=True)
+    subprocess.run([*ALGID, "identify", folder / "case1-unloaded.mcap", "-o", folder, "--no-report", "-q"], check=True)
+    return folder / "case1-unloaded.algid"
+
+
+@pytest.mark.parametrize("errors_too", [False, True])
+def test_a_reader_that_leaves_is_no_error(result: Path, errors_too: bool) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)  # as head does once it has seen enough
+    errors = writing if errors_too else subprocess.PIPE
+    for arguments in (["compare", result, result], ["check", result, "--max-error", "50"], ["--help"]):
+        done = subprocess.run([*ALGID, *arguments], stdout=writing, stderr=errors, check=False)
+        assert (done.returncode, done.stderr or b"") == (0, b""), arguments
+    os.close(writing)
+
+
+def test_a_failure_is_one_for_a_reader_that_leaves_too(result: Path) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run([*ALGID, "check", result, "--max-error", "1e-9"], stdout=writing, check=False)
+    os.close(writing)
+    assert done.returncode == 1
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_terminals_without_greek_are_spelled_to(result: Path, encoding: str) -> None:
+    env = {**os.environ, "PYTHONIOENCODING": encoding, "COLUMNS": "80"}
+    done = subprocess.run([*ALGID, "compare", result, result], capture_output=True, env=env, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert "/sigma" in done.stdout.decode(encoding)
+    helped = subprocess.run([*ALGID, "identify", "--help"], capture_output=True, env=env, check=False)
+    assert (helped.returncode, helped.stderr) == (0, b"")
+    refused = subprocess.run([*ALGID, "identify", "θ–名.csv"], capture_output=True, env=env, check=False)
+    assert refused.returncode == 2
+    assert refused.stderr.decode(encoding).startswith("algid: theta-\\u540d.csv: ")
+
+
+def test_windows_is_refused_in_one_line() -> None:
+    code = "import sys; sys.platform = 'win32'; from algid.cli import main; main()"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "algid: it runs on Linux and macOS; on Windows, run it in WSL\n"
