@@ -189,13 +189,13 @@ ESTIMATE_COLUMNS = (
     Column("Parameter", "name"),
     Column("Estimate", "number"),
     Column("± std", "number", rank=2),
-    Column("± std, %", "number", rank=5),
+    Column("± std, %", "number", rank=6),
     Column("Unit", "text"),
     Column("Status", "status"),
     Column("95 % interval", "number", rank=1),
-    Column("Truth", "number", rank=4),
-    Column("Error %", "number"),
-    Column("Paper %", "number", rank=3),
+    Column("Truth", "number", rank=5),
+    Column("Error %", "number", rank=3),
+    Column("Paper %", "number", rank=4),
 )
 TABLE4_COLUMNS = tuple(
     column for column in ESTIMATE_COLUMNS if column.kind != "status" and "interval" not in column.heading
