@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from algid.errors import ResultError
@@ -17,6 +18,7 @@ from algid.report.figures.inertia import inertia
 from algid.report.figures.information import TITLE as INFORMATION
 from algid.report.figures.information import information
 from algid.report.figures.residual import residual
+from algid.report.figures.signals import signals
 from algid.report.figures.torque import TITLE as TORQUE
 from algid.report.figures.torque import torque
 from algid.report.reduce import LARGEST
@@ -24,13 +26,23 @@ from algid.report.series import TorqueLog, read_torque
 from algid.results import Estimate, Result
 
 
-def gallery(folder: Path, result: Result, told: Told | None = None) -> tuple[TorqueLog | None, list[Figure | Missing]]:
-    """What the figures need of `torque.parquet`, where it can be read, and the figures."""
+@dataclass(frozen=True)
+class Gallery:
+    """What the figures need of `torque.parquet`, where it can be read; the figures, those of the paper apart."""
+
+    torque: TorqueLog | None
+    figures: list[Figure | Missing]
+    paper: list[Figure | Missing]
+
+
+def gallery(folder: Path, result: Result, told: Told | None = None) -> Gallery:
+    """Every figure that the folder gives, in the page's order."""
     result = drawable(result)
     series, loaded, seconds = (folder / f"{name}.parquet" for name in ("estimates", "loaded", "information"))
-    figures = [_try("convergence", "Convergence of the estimates", series, lambda: convergence(series, result))]
+    paper = [_try("convergence", "Convergence of the estimates", series, lambda: convergence(series, result))]
+    figures: list[Figure | Missing] = []
     if loaded.exists():
-        figures.append(
+        paper.append(
             _try("loaded", "Convergence, loaded log", loaded, lambda: convergence(loaded, result, loaded=True))
         )
     measured = folder / "torque.parquet"
@@ -41,12 +53,12 @@ def gallery(folder: Path, result: Result, told: Told | None = None) -> tuple[Tor
         figures.append(torque(found, result.logs))
         if found.reduced:
             figures.append(_try("closeup", CLOSEUP, measured, lambda: closeup(measured, found)))
-        figures += [residual(found, result), coverage(found)]
+        figures += [residual(found, result), signals(found, result.logs), coverage(found)]
     read = None if isinstance(found, Missing) else found
     figures.append(correlation(result))
     figures.append(_try("information", INFORMATION, seconds, lambda: information(seconds, result)))
     figures.append(inertia(result, read))
-    return read, figures
+    return Gallery(read, figures, paper)
 
 
 def drawable(result: Result) -> Result:

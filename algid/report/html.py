@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import html
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from algid.report.figures.base import Figure, Legend, Missing
@@ -45,6 +45,7 @@ TEMPLATE: dict[str, Any] = {
 
 
 LONGEST_TEXT = 4_000
+CARDED = 3  # columns; a row of a wider table stands as a card on a phone, so that no column is out of sight
 LONG_CELL = 40  # beyond, a cell breaks into lines
 KEYS = "Arrow keys move, plus and minus zoom, 0 resets."
 
@@ -60,16 +61,34 @@ def script_json(value: object) -> str:
     return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
 
 
-def table_html(table: Table) -> str:
-    """A table that scrolls sideways by itself where the page is narrow."""
+def table_html(table: Table, drawn: Mapping[str, str] | None = None, heading: str = "") -> str:
+    """A table that scrolls sideways by itself where the page is narrow.
+
+    `drawn` holds drawings by the name of their row, for a last column under `heading`.
+    """
     head = "".join(f'<th scope="col"{_class(column)}>{escaped(column.heading)}</th>' for column in table.columns)
-    body = "".join(f"<tr>{_cells(table.columns, row)}</tr>\n" for row in table.rows)
+    head += f'<th scope="col" class="drawn">{escaped(heading)}</th>' if drawn else ""
+    body = "".join(
+        f"<tr{_doubtful(table, row)}>{_cells(table.columns, row)}{_drawn(drawn, row)}</tr>\n" for row in table.rows
+    )
     note = f'<p class="note">{escaped(table.note)}</p>' if table.note else ""
+    cards = " cards" if len(table.columns) > CARDED else ""
     return (
-        f'<div class="scroll" role="region" tabindex="0" aria-label="{escaped(table.title)}"><table>'
+        f'<div class="scroll{cards}" role="region" tabindex="0" aria-label="{escaped(table.title)}"><table>'
         f"<caption>{escaped(table.title)}</caption>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody>"
         f"</table></div>{note}\n"
     )
+
+
+def _doubtful(table: Table, row: tuple[str, ...]) -> str:
+    """The class of a row whose number must not be used as it is."""
+    kinds = {column.kind: text for column, text in zip(table.columns, row, strict=True)}
+    poor = "doubtful status" in kinds or kinds.get("status", Status.OK.value) != Status.OK.value
+    return ' class="doubtful"' if poor else ""
+
+
+def _drawn(drawn: Mapping[str, str] | None, row: tuple[str, ...]) -> str:
+    return f'<td class="drawn">{drawn.get(row[0], "")}</td>' if drawn else ""
 
 
 def _cells(columns: Iterable[Column], row: tuple[str, ...]) -> str:
@@ -85,7 +104,8 @@ def _cell(column: Column, text: str) -> str:
         return f'<td class="status{" ok" if text == Status.OK.value else ""}">{escaped(text)}</td>'
     main = " estimate" if column.heading == "Estimate" else ""
     long = " long" if column.kind == "text" and len(text) > LONG_CELL else ""
-    return f'<td class="{column.kind}{main}{long}">{escaped(text)}</td>'
+    label = f' data-label="{escaped(column.heading)}"' if column.kind == "number" and not main else ""
+    return f'<td class="{column.kind}{main}{long}"{label}>{escaped(text)}</td>'
 
 
 def _class(column: Column) -> str:
@@ -101,7 +121,8 @@ def figure_html(figure: Figure | Missing) -> str:
     note = f'<p class="note">{escaped(figure.note)}</p>' if figure.note else ""
     columns = " two" if figure.columns == 2 else ""
     return (
-        f'<figure aria-labelledby="{figure.key}">{head}{_legend(figure)}<div class="panels{columns}">{panels}</div>\n'
+        f'<figure aria-labelledby="{figure.key}">{head}{_views(figure)}{_legend(figure)}'
+        f'<div class="panels{columns}">{panels}</div>\n'
         f'<figcaption><p class="reading">{escaped(figure.reading)}</p>{note}</figcaption></figure>\n'
     )
 
@@ -117,6 +138,19 @@ def _panel(figure: Figure, place: int) -> str:
     return (
         f'<div class="panel">{title}<div class="plot" id="{panel_id(figure, place)}" role="img" tabindex="0" '
         f'style="min-height:{panel.height}px" aria-label="{escaped(panel.says)}. {KEYS}"></div></div>'
+    )
+
+
+def _views(figure: Figure) -> str:
+    """A choice among the logs, which the script makes the panels show."""
+    if not figure.views:
+        return ""
+    options = "".join(
+        f'<option value="{low:.9g},{high:.9g}">{escaped(name)}</option>' for name, low, high in figure.views
+    )
+    return (
+        f'<label class="views">Show <select data-figure="{figure.key}"><option value="">all logs</option>{options}'
+        "</select></label>"
     )
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from algid.files import whole_file
 from algid.progress import Told
 from algid.report.figures.base import Figure, Missing
+from algid.report.forest import forest
 from algid.report.gallery import gallery
 from algid.report.html import TEMPLATE, escaped, figure_html, panel_id, script_json, table_html
 from algid.report.library import library
@@ -33,6 +34,9 @@ from algid.report.verdict import LEVEL_WORDS, Verdict, verdict
 from algid.results import Result, read_result
 
 LIBRARY = "plotly.min.js"
+FIRST = ("Parameters", "Payload")
+SECOND = ("Torque prediction",)
+PAPER = ("paper", "The paper's tables and convergence")
 SIGNS = {"good": "✓", "reservations": "!", "failed": "✕"}
 
 
@@ -76,22 +80,47 @@ def _write_once(path: Path, text: str) -> None:
 
 def page_html(folder: Path, result: Result, shared_library: bool = False, told: Told | None = None) -> str:
     """The page's text; with `shared_library` it asks for the library beside the folder."""
-    torque, figures = gallery(folder, result, told)
-    judged = verdict(result)
+    shown = gallery(folder, result, told)
+    tables = {table.title: table for table in estimate_tables(result)}
+    first = [tables.pop(title) for title in FIRST if title in tables]
+    drawn = forest({**result.parameters, **result.payload}, _truth(result))
+    quality = [*quality_tables(shown.torque, result), *log_tables(result)]
     body = [
-        _head(result, judged),
-        contents(figures),
+        _head(result, verdict(result)),
+        contents(shown.figures, PAPER),
         '<main id="numbers">',
-        *map(table_html, estimate_tables(result)),
-        *map(figure_html, figures),
+        *(table_html(table, drawn.rows, drawn.heading) for table in first),
+        *(table_html(tables.pop(title)) for title in SECOND if title in tables),
+        *map(figure_html, shown.figures),
         *section("fit", "What the estimator knows of the logs", fit_tables(result)),
-        *section("data", "Data quality", [*quality_tables(torque, result), *log_tables(result)], _warnings(result)),
+        *section("data", "Data quality", quality, _warnings(result)),
         *section("settings", "Settings and provenance", [settings_table(result.settings), provenance_table(result)]),
+        _paper(result, [*map(table_html, tables.values()), *map(figure_html, shown.paper)]),
         "</main>",
         f"<footer>Made by algid {escaped(result.version)} from {escaped(str(folder.name))}/result.json.</footer>",
         '<noscript><p class="missing">The figures need JavaScript; all numbers stand without it.</p></noscript>',
     ]
-    return document(file_name(result.log.path), "\n".join(body), script_json(drawing(figures)), shared_library)
+    return document(
+        file_name(result.log.path),
+        "\n".join(body),
+        script_json(drawing([*shown.figures, *shown.paper])),
+        shared_library,
+    )
+
+
+def _truth(result: Result) -> dict[str, float]:
+    """What a synthetic log was made with, by parameter."""
+    rows = {row.parameter: row.truth for row in result.table4 if row.truth is not None}
+    return {**rows, **result.truth}
+
+
+def _paper(result: Result, content: Sequence[str]) -> str:
+    """The paper's tables and convergence: open where the paper is the matter, folded where a real log is."""
+    if not content:
+        return ""
+    key, title = PAPER
+    opened = " open" if result.estimator == "paper" or _truth(result) else ""
+    return f'<details class="paper" id="{key}"{opened}><summary>{title}</summary>\n{"".join(content)}</details>'
 
 
 def document(title: str, body: str, data: str, shared_library: bool = False) -> str:
@@ -179,12 +208,12 @@ def _first(judged: Verdict) -> str:
     return cause + (f'<p class="cause">Run first: <code>{escaped(judged.command)}</code></p>' if judged.command else "")
 
 
-def contents(figures: Sequence[Figure | Missing]) -> str:
-    """Links to the page's parts."""
+def contents(figures: Sequence[Figure | Missing], *more: tuple[str, str]) -> str:
+    """Links to the page's parts: figures, data, settings and `more`, each its key and title."""
     targets = [("numbers", "Numbers"), *((figure.key, figure.title) for figure in figures)]
-    targets += [("data", "Data quality"), ("settings", "Settings and provenance")]
+    targets += [("data", "Data quality"), ("settings", "Settings and provenance"), *more]
     links = "".join(f'<li><a href="#{key}">{escaped(title)}</a></li>' for key, title in targets)
-    return f'<nav aria-label="Contents"><ul>{links}</ul></nav>'
+    return f'<nav aria-label="Contents"><details open><summary>Contents</summary><ul>{links}</ul></details></nav>'
 
 
 def section(key: str, title: str, tables: Sequence[Table], extra: str = "") -> list[str]:

@@ -32,7 +32,7 @@ from algid.signals.filters import Spectrum, stretch_length
 EPSILON = 0.2  # s: the paper's ε
 WINDOW = 2.0  # s: after which the paper's integrals restart, unless its own settings say otherwise
 LARGEST_CONDITION = 1e10  # beyond, the paper's stages call a system singular
-SERIES_POINTS = 2_000
+SERIES_POINTS = 1_600
 STRETCHES = 400
 SAMPLES = 20_000
 MIDDLES = 500
@@ -150,9 +150,20 @@ def _positive(value: object, otherwise: float) -> float:
 
 
 COLUMNS = ("log", "t", "theta1", "theta2", "omega1", "omega2", "tau1", "tau2", "tau1_predicted", "tau2_predicted")
-SERIES = ("tau1", "tau2", "tau1_predicted", "tau2_predicted", "residual1", "residual2")
-POINTS = 3_600  # a series; twice what a wide screen can show
-DOTS = 3_000
+SERIES = (
+    "theta1",
+    "theta2",
+    "omega1",
+    "omega2",
+    "tau1",
+    "tau2",
+    "tau1_predicted",
+    "tau2_predicted",
+    "residual1",
+    "residual2",
+)
+POINTS = 2_400  # a series; twice what the page is wide
+DOTS = 2_000
 LONGEST_GAP = 5  # sampling periods; longer breaks the line
 
 

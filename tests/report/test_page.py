@@ -21,11 +21,13 @@ from algid.arm import FloatArray
 from algid.errors import ResultError
 from algid.report import write_report
 from algid.report.figures.base import Figure, Missing
+from algid.report.figures.timeline import views
 from algid.report.gallery import gallery
 from algid.report.html import escaped, script_json
 from algid.report.library import library
-from algid.report.series import read_torque
-from algid.results import Estimate, Result, read_result, write_result
+from algid.report.page import page_html
+from algid.report.series import LogRange, read_torque
+from algid.results import Estimate, Result, Status, read_result, write_result
 from tests.report.folders import HOSTILE, hostile
 
 BUNDLE = Path(str(resources.files("algid.report"))) / "assets/plotly.min.js.gz"
@@ -50,9 +52,10 @@ class Tags(HTMLParser):
 
 
 def test_every_figure_is_one_that_plotly_knows(case_folder: Path, result: Result) -> None:
-    _, figures = gallery(case_folder, result)
+    shown = gallery(case_folder, result)
+    figures = [*shown.figures, *shown.paper]
     assert [figure.title for figure in figures if isinstance(figure, Missing)] == []
-    assert len(figures) == 9
+    assert len(figures) == 10
     for figure in figures:
         assert isinstance(figure, Figure)
         assert figure.reading.startswith("Read: ")
@@ -101,6 +104,7 @@ def test_foreign_text_stays_text(folder: Path, result: Result) -> None:
     write_result(hostile(result), folder / "result.json")
     text = write_report(folder).read_text(encoding="utf-8")
     own = re.sub(r"<(script|style)[^>]*>.*?</\1>", "", text, flags=re.DOTALL)
+    own = re.sub(r'<svg class="forest" .*?</svg>', "", own)  # the page's own drawings
     tags = Tags(own).found
     assert {"img", "svg", "b", "script"}.isdisjoint(tag for tag, _ in tags)
     assert not [attrs for _, attrs in tags if any(name.startswith("on") for name in attrs)]
@@ -246,3 +250,33 @@ def test_the_library_in_a_page_is_the_one_that_was_built_for_it(folder: Path) ->
 @pytest.mark.skipif(not BUNDLE.is_file(), reason="built without npm: pages carry the whole of plotly")
 def test_a_page_is_light(folder: Path) -> None:
     assert write_report(folder).stat().st_size <= 1_500_000
+
+
+def test_the_papers_part_is_open_for_its_own_cases_and_folded_for_a_real_log(folder: Path, result: Result) -> None:
+    assert '<details class="paper" id="paper" open>' in page_html(folder, result)
+    rows = [row.model_copy(update={"truth": None, "error_percent": None}) for row in result.table4]
+    real = page_html(folder, result.model_copy(update={"table4": rows, "truth": {}}))
+    assert '<details class="paper" id="paper">' in real
+    before, after = real.split('<details class="paper" id="paper">')
+    assert 'id="convergence-0"' not in before
+    assert 'id="convergence-0"' in after
+    assert before.index('id="torque"') < before.index('id="residual"') < before.index('id="signals"')
+
+
+def test_rows_that_must_not_be_used_are_not_green(folder: Path, result: Result) -> None:
+    poor = result.parameters["k1"].model_copy(update={"status": Status.NOT_CONVERGED})
+    failed = page_html(folder, result.model_copy(update={"parameters": {**result.parameters, "k1": poor}}))
+    assert 'class="verdict failed"' in failed
+    assert 'class="status ok"' not in failed
+    assert failed.count('<tr class="doubtful">') >= len(result.parameters)
+    assert '<tr class="doubtful">' not in page_html(folder, result)
+
+
+def test_a_choice_of_logs_moves_the_time_axis(result: Result) -> None:
+    ranges = {0: LogRange(0.0, 2.0, 200), 1: LogRange(5.0, 8.0, 300)}
+    logs = [result.log, result.log.model_copy(update={"path": "second.csv"})]
+    assert views({0: ranges[0]}, logs) == ()
+    (_, first, end), (name, start, last) = views(ranges, logs)
+    assert (first, end, name) == (0.0, 2.0, "second.csv")
+    assert last - start == pytest.approx(3.0)
+    assert start > end

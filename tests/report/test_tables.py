@@ -31,7 +31,8 @@ def from_markdown(text: str) -> list[list[str]]:
 
 
 def from_html(text: str) -> list[list[str]]:
-    rows = re.findall(r"<tr>(.*?)</tr>", text, re.DOTALL)
+    text = re.sub(r'<t[hd][^>]*class="drawn">.*?</t[hd]>', "", text, flags=re.DOTALL)
+    rows = re.findall(r"<tr[^>]*>(.*?)</tr>", text, re.DOTALL)
     return [[html.unescape(cell) for cell in re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row, re.DOTALL)] for row in rows]
 
 

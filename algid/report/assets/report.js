@@ -78,6 +78,7 @@
     plot.on("plotly_relayout", (change) => follow(panel, change));
     plot.addEventListener("keydown", keys(panel));
   };
+  const folded = (panel) => document.getElementById(panel.id).closest("details:not([open])");
   const redraw = (size) => {
     for (const panel of page.panels) if (drawn.has(panel.id)) draw(panel, size && size[panel.columns]);
   };
@@ -91,8 +92,22 @@
       for (const panel of page.panels) if (panel.figure === figure && drawn.has(panel.id)) draw(panel);
     });
   }
+  for (const select of document.querySelectorAll(".views select")) {
+    select.addEventListener("change", () => {
+      const [low, high] = select.value.split(",").map(Number);
+      const first = page.panels.find((panel) => panel.figure === select.dataset.figure);
+      const update = select.value ? { "xaxis.range[0]": low, "xaxis.range[1]": high } : { "xaxis.autorange": true };
+      Plotly.relayout(first.id, update);
+    });
+  }
+  const menu = document.querySelector("nav details");
+  if (menu && innerWidth < 640) menu.open = false; // a phone shows the numbers first
   dark.addEventListener("change", () => redraw());
-  addEventListener("beforeprint", () => { root.dataset.theme = "light"; redraw(PRINTED); });
+  addEventListener("beforeprint", () => {
+    for (const details of document.querySelectorAll("details.paper")) details.open = true;
+    root.dataset.theme = "light";
+    redraw(PRINTED);
+  });
   addEventListener("afterprint", () => { delete root.dataset.theme; redraw(); });
 
   // The library stands in the page as text, gzip in base64; its own hash lets it run.
@@ -108,16 +123,21 @@
     const packed = document.getElementById("library");
     if (packed) await unpack(packed);
     let failed = 0;
-    for (const panel of page.panels) {
-      try {
-        await start(panel);
-      } catch (error) {
-        failed += 1;
-        document.getElementById(panel.id).textContent = "This panel could not be drawn: " + error.message;
+    const drawAll = async () => {
+      for (const panel of page.panels) {
+        if (drawn.has(panel.id) || folded(panel)) continue;
+        try {
+          await start(panel);
+        } catch (error) {
+          failed += 1;
+          document.getElementById(panel.id).textContent = "This panel could not be drawn: " + error.message;
+        }
+        await new Promise((next) => setTimeout(next)); // let the page answer between panels
       }
-      await new Promise((next) => setTimeout(next)); // let the page answer between panels
-    }
-    root.dataset.failed = failed;
-    root.dataset.drawn = drawn.size;
+      root.dataset.failed = failed;
+      root.dataset.drawn = drawn.size;
+    };
+    for (const details of document.querySelectorAll("details")) details.addEventListener("toggle", drawAll);
+    await drawAll();
   })();
 })();

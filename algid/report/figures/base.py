@@ -43,7 +43,10 @@ class Panel:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure: its title, panels and legend, one line that tells how to read it, one about what it holds."""
+    """A figure: its title, panels and legend, one line that tells how to read it, one about what it holds.
+
+    `views` are stretches of the time axis to choose from: name, start and end.
+    """
 
     key: str
     title: str
@@ -52,6 +55,7 @@ class Figure:
     legend: tuple[Legend, ...] = ()
     note: str = ""
     columns: int = 1
+    views: tuple[tuple[str, float, float], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,15 @@ def chained(
     return (np.concatenate(x), np.concatenate(y)) if x else (np.empty(0), np.empty(0))
 
 
+def views(ranges: Mapping[int, LogRange], logs: list[LogSummary]) -> tuple[tuple[str, float, float], ...]:
+    """Name, start and end of each log on the common axis; nothing for a single one."""
+    moved = offsets(ranges)
+    spans = [
+        (_words(log, logs), moved[log] + span.first, moved[log] + span.last) for log, span in sorted(ranges.items())
+    ]
+    return tuple(spans) if len(spans) > 1 else ()
+
+
 def separators(ranges: Mapping[int, LogRange], moved: Mapping[int, float], logs: list[LogSummary]) -> Layout:
     """Shapes and annotations that tell the logs apart; none for a single one."""
     if len(ranges) < 2:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from algid.report.figures.base import Figure, Layout, Legend, Panel, Trace, axis, line
-from algid.report.figures.timeline import chained, offsets, separators
+from algid.report.figures.timeline import chained, offsets, separators, views
 from algid.report.series import TorqueLog
 from algid.report.text import significant
 from algid.results import LogSummary
@@ -20,7 +20,7 @@ def torque(found: TorqueLog, logs: list[LogSummary]) -> Figure:
     """The torques of all logs one after another."""
     panels = tuple(_joint(found, logs, joint) for joint in (1, 2))
     reading = "Read: blue should cover grey, and orange should look like noise without a trace of the motion."
-    return Figure("torque", TITLE, panels, reading, LEGEND, _note(found))
+    return Figure("torque", TITLE, panels, reading, LEGEND, _note(found), views=views(found.ranges, logs))
 
 
 def _joint(found: TorqueLog, logs: list[LogSummary], joint: int) -> Panel:
