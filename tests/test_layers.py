@@ -31,7 +31,9 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "synth": room("arm errors files log progress", "numpy pydantic scipy"),
     "table4": room("arm log results synth", "numpy"),
     "writers": room("errors files log ros2", "mcap numpy polars pyarrow"),
-    "readers": room("arm errors log profile runtime units", "google lz4 mcap numpy polars pyarrow rosbags zstandard"),
+    "readers": room(
+        "arm errors log profile runtime units", "google lz4 mcap numpy polars pyarrow rosbags scipy zstandard"
+    ),
     "inspection": room("arm errors log profile readers signals", "numpy"),
     "report": room(
         "arm errors files progress results ros2 signals", "mcap numpy plotly polars pyarrow rich"

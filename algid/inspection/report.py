@@ -76,6 +76,11 @@ def contents(path: Path) -> tuple[str, tuple[Entry, ...]]:
         return kind, tuple(_parquet(path))
     if kind.startswith("csv"):
         return kind, tuple(_csv(path, kind))
+    if kind in ("npz", "npy", "mat", "feather"):
+        from algid.readers.arrays import frame_of
+
+        frame = frame_of(path, kind)
+        return kind, tuple(Entry(name, str(told), frame.height) for name, told in frame.schema.items())
     return kind, ()
 
 

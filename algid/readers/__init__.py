@@ -20,7 +20,7 @@ def open_log(path: str | Path, profile: Profile | None = None) -> TableReader:
     Parameters
     ----------
     path : str or Path
-        A CSV (also compressed), Parquet or MCAP file, or a rosbag2 folder.
+        A CSV (also compressed), Parquet, MCAP, Feather, NumPy, MATLAB or ROS 1 bag file, or a rosbag2 folder.
     profile : Profile, optional
         What the log's names, units and signs mean, where the log does not tell.
 
@@ -47,6 +47,10 @@ def open_log(path: str | Path, profile: Profile | None = None) -> TableReader:
         from algid.readers.csv import open_csv
 
         return open_csv(path, profile, kind)
+    if kind in ("npz", "npy", "mat", "feather"):
+        from algid.readers.arrays import open_arrays
+
+        return open_arrays(path, kind, profile)
     if kind == "bag":
         from algid.readers.bag import open_bag
 

@@ -19,11 +19,13 @@ STEMS: dict[str, tuple[str, ...]] = {
         *("theta", "theta_meas", "pos_meas", "q_meas", "position_measured", "measured_position", "actual_q"),
         *("position", "pos", "q", "angle", "joint_position", "joint_pos", "joint_angle", "jointposition"),
         *("positions", "angles", "ang", "phi", "pos_filt", "q_filt", "position_filtered", "theta_filt"),
+        *("observation_position", "observation_state"),
     ),
     "omega": (
         *("omega", "vel_meas", "dq_meas", "velocity_measured", "measured_velocity", "actual_qd"),
         *("velocity", "vel", "dq", "qd", "qdot", "q_dot", "dtheta", "thetadot", "theta_dot"),
         *("joint_velocity", "joint_vel", "velocities", "speed", "vel_filt", "dq_filt", "velocity_filtered"),
+        "observation_velocity",
     ),
     "tau": (
         *("tau", "tau_meas", "tau_j", "torque_measured", "measured_torque", "actual_tau", "actual_torque"),
@@ -38,7 +40,7 @@ STEMS: dict[str, tuple[str, ...]] = {
             "torque_cmd",
             "target_torque",
         ),
-        "motor_torque",
+        *("motor_torque", "observation_effort", "observation_torque"),
         *("actual_current", "current", "currents", "motor_current", "joint_current", "i_q", "iq"),
     ),
 }

@@ -21,12 +21,17 @@ ZSTD = b"\x28\xb5\x2f\xfd"
 GZIP = b"\x1f\x8b"
 BAG = b"#ROSBAG V"
 SQLITE = b"SQLite format 3\x00"
+_KINDS = (
+    *((MCAP, "mcap"), (PARQUET, "parquet"), (BAG, "bag"), (SQLITE, "db3"), (b"ARROW1", "feather")),
+    *((b"\x93NUMPY", "npy"), (b"MATLAB ", "mat")),
+)
 _HEAD = 1 << 16
 _EMPTY_LINES = re.compile(rb"\n[\r\n]*\n")
 
 
 def sniff(path: Path) -> str:
-    """The format of a log: "mcap", "parquet", "csv", "csv.zst", "csv.gz", "bag", "db3" or "rosbag2".
+    """The format of a log: "mcap", "parquet", "csv", "csv.zst", "csv.gz", "feather", "npz", "npy", "mat",
+    "bag", "db3" or "rosbag2".
 
     Raises
     ------
@@ -60,9 +65,11 @@ def _folder(path: Path) -> str:
 
 
 def _by_content(path: Path, head: bytes) -> str:
-    for magic, name in ((MCAP, "mcap"), (PARQUET, "parquet"), (BAG, "bag"), (SQLITE, "db3")):
-        if head.startswith(magic):
-            return name
+    kind = next((name for magic, name in _KINDS if head.startswith(magic)), None)
+    if kind is not None:
+        return kind
+    if head.startswith(b"PK\x03\x04") and path.suffix.lower() == ".npz":  # any zip begins so
+        return "npz"
     if head.startswith((ZSTD, GZIP)):
         return _compressed(path, "csv.zst" if head.startswith(ZSTD) else "csv.gz")
     if not head:
