@@ -53,11 +53,16 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "arm errors estimators files identification model profile report results runtime settings signals",
         "mcap numpy polars pyarrow",
     ),
+    "design": room(
+        "arm errors estimators files identification log model progress report results settings signals synth writers",
+        "numpy polars pydantic scipy",
+    ),
     "fleet": room("errors files progress report", "numpy polars scipy"),
     "cli": room(
-        "batch check errors files fleet identification inspection log profile progress readers report results runtime "
+        "batch check design errors estimators files "
+        "fleet identification inspection log profile progress readers report results runtime "
         "settings stores synth track writers",
-        "rich typer",
+        "numpy rich typer",
     ),
 }  # fmt: skip
 

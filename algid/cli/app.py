@@ -11,6 +11,7 @@ from algid.cli.batch import batch
 from algid.cli.check import check
 from algid.cli.compare import compare
 from algid.cli.convert import convert
+from algid.cli.design import design
 from algid.cli.fleet import fleet
 from algid.cli.guide import guide
 from algid.cli.identify import identify
@@ -47,6 +48,20 @@ def _root(
 profiles = typer.Typer(help="Profiles tell what a log's names, units and signs mean.", no_args_is_help=True)
 profiles.command("new")(new)
 
-for command in (inspect, identify, validate, batch, fleet, track, check, report, compare, synth, convert, guide):
+for command in (
+    inspect,
+    design,
+    identify,
+    validate,
+    batch,
+    fleet,
+    track,
+    check,
+    report,
+    compare,
+    synth,
+    convert,
+    guide,
+):
     app.command()(command)
 app.add_typer(profiles, name="profile")

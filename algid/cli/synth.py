@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -38,10 +39,16 @@ def synth(
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write into.")] = Path(),
     kind: Annotated[Format, typer.Option("--format", help="Format of the logs.")] = Format.MCAP,
     rate: Annotated[float, typer.Option(help="Samples a second, Hz.", min=1e-3)] = 1000.0,
-    duration: Annotated[float, typer.Option(help="Length of each log, s.", min=1e-3)] = 1.0,
+    duration: Annotated[
+        float | None, typer.Option(help="Length of each log, s; 1, or as long as the motion.", min=1e-3)
+    ] = None,
     torque: Annotated[
-        str, typer.Option(help="case (the case's own), wide (0.3 to 8 Hz), none, or a log whose torque is replayed.")
-    ] = "case",
+        str | None,
+        typer.Option(help="case (the case's own, the default), wide (0.3 to 8 Hz), none, or a log to replay."),
+    ] = None,
+    motion: Annotated[
+        Path | None, typer.Option(help="Folder of algid design: a controller follows its motion, instead of --torque.")
+    ] = None,
     torque_hold: Annotated[
         Hold, typer.Option(help="Whether the drive holds (zoh) or ramps (foh) the torque between samples.")
     ] = Hold.EXACT,
@@ -70,11 +77,16 @@ def synth(
     from algid.synth.cases import load_case
     from algid.synth.run import EXCITATIONS, Recording, held, synthesise
     from algid.synth.sensors import Sensors
-    from algid.writers import write_log
 
     described = load_case(case)
     sensors = Sensors(position_noise, torque_noise, encoder_bits, jitter, drop, seed)
+    if motion is not None:
+        _refuse_beside_motion({"--initial": initial, "--payload-schedule": payload_schedule, "--torque": torque})
+        _rehearse(described, motion, Recording(rate, duration or 0.0, sensors=sensors), out, kind)
+        return
+    duration = 1.0 if duration is None else duration
     recording = _recording(Recording(rate=rate, duration=duration, sensors=sensors), initial)
+    torque = torque or "case"
     drive = _torque(described, torque, torque_hold)
     if torque_hold is not Hold.EXACT and torque in EXCITATIONS:
         drive = held(drive, rate, duration, "zoh" if torque_hold is Hold.ZOH else "foh")
@@ -83,10 +95,40 @@ def synth(
             logs: tuple[Log, ...] = synthesise(described, drive, recording, told)
         else:
             logs = (_scheduled(described, drive, recording, payload_schedule, told),)
+    _write(logs, out, kind)
+
+
+def _write(logs: Sequence[Log], out: Path, kind: Format) -> None:
+    from algid.writers import write_log
+
     for log in logs:
         path = out / f"{log.origin.path}.{kind.value}"
         write_log(path, log, truth=log.origin.truth, kind=kind.value)
         print(path)
+
+
+def _refuse_beside_motion(flags: dict[str, str | None]) -> None:
+    from algid.errors import SettingError
+
+    for flag, value in flags.items():
+        if value is not None:
+            raise SettingError(
+                f"{flag} {value}: a motion starts where it was planned and carries one payload; leave it out"
+            )
+
+
+def _rehearse(case: Case, motion: Path, recording: Recording, out: Path, kind: Format) -> None:
+    from dataclasses import replace
+
+    from algid.report.progress import progress
+    from algid.synth.follow import read_plan
+    from algid.synth.run import rehearse
+
+    plan = read_plan(motion)
+    recording = replace(recording, duration=recording.duration or plan.duration)
+    with progress("samples") as told:
+        logs = rehearse(case, plan, recording, told)
+    _write(logs, out, kind)
 
 
 def _scheduled(case: Case, torque: Torque, recording: Recording, text: str, told: Told | None) -> Log:

@@ -123,20 +123,22 @@ def _paper(result: Result, content: Sequence[str]) -> str:
     return f'<details class="paper" id="{key}"{opened}><summary>{title}</summary>\n{"".join(content)}</details>'
 
 
-def document(title: str, body: str, data: str, shared_library: bool = False) -> str:
+def document(title: str, body: str, data: str, shared_library: bool = False, scripts: Sequence[str] = ()) -> str:
     """A whole page out of its body and its figures' data.
 
-    It carries the plotting library, packed; with `shared_library` it asks for the one beside the folder.
+    It carries the plotting library, packed; with `shared_library` it asks for the one beside the folder. `scripts` run
+    after the page's own.
     """
-    script, style = _asset("report.js"), _asset("report.css")
+    running, style = [_asset("report.js"), *scripts], _asset("report.css")
     if shared_library:
         nonce = hashlib.sha256((body + data).encode()).hexdigest()  # nobody who writes the body can foretell it
         source, tag = f"'nonce-{nonce}'", f'<script nonce="{nonce}" src="../{LIBRARY}"></script>'
     else:
         own = library()
         source, tag = _hash(own.script), f'<script type="text/plain" id="library">{own.packed}</script>'
+    elements = "\n".join(f"<script>{script}</script>" for script in running)
     policy = (
-        f"default-src 'none'; script-src {source} {_hash(script)}; style-src 'unsafe-inline'; "
+        f"default-src 'none'; script-src {' '.join([source, *map(_hash, running)])}; style-src 'unsafe-inline'; "
         "img-src data: blob:; base-uri 'none'; form-action 'none'"
     )
     return (
@@ -146,7 +148,7 @@ def document(title: str, body: str, data: str, shared_library: bool = False) -> 
         '<meta name="color-scheme" content="light dark">\n<link rel="icon" href="data:,">\n'
         f"<title>{escaped(title)} · algid</title>\n<style>{style}</style>\n</head>\n<body>\n"
         f'<a class="skip" href="#numbers">Skip to the numbers</a>\n{body}\n'
-        f'<script type="application/json" id="figures">{data}</script>\n{tag}\n<script>{script}</script>\n'
+        f'<script type="application/json" id="figures">{data}</script>\n{tag}\n{elements}\n'
         "</body>\n</html>\n"
     )
 

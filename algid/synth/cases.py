@@ -41,15 +41,25 @@ class _Table(BaseModel):
 class _ArmTable(_Table):
     m1: Positive
     m2: Positive
-    lc1: Finite
-    lc2: Finite
     l1: Positive
     l2: Positive
-    I1: NonNegative
-    I2: NonNegative
-    b1: NonNegative
-    b2: NonNegative
+    lc1: Finite | None = None
+    lc2: Finite | None = None
+    I1: NonNegative | None = None
+    I2: NonNegative | None = None
+    b1: NonNegative = 0.0
+    b2: NonNegative = 0.0
     g: NonNegative = 9.81
+
+    def arm(self) -> Arm:
+        """The arm; a link of which only length and mass are given is uniform: l / 2, m l² / 12."""
+        uniform = {
+            "lc1": self.l1 / 2,
+            "lc2": self.l2 / 2,
+            "I1": self.m1 * self.l1**2 / 12,
+            "I2": self.m2 * self.l2**2 / 12,
+        }
+        return Arm(**{**uniform, **self.model_dump(exclude_none=True)})
 
 
 class _PayloadTable(_Table):
@@ -111,7 +121,7 @@ def _read_case(path: Path) -> Case:
     content = read_toml(path, _CaseFile)
     return Case(
         name=path.stem,
-        arm=Arm(**content.arm.model_dump()),
+        arm=content.arm.arm(),
         payload=content.payload.m_p,
         torque=None if content.torque is None else _multi_sine(content.torque),
         paper_error_percent=dict(content.paper_error_percent),

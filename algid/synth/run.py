@@ -13,6 +13,7 @@ from algid.log import Log, Truth
 from algid.progress import Told
 from algid.synth.cases import Case
 from algid.synth.excitation import Hold, SampledTorque, Torque, no_torque, wide_multi_sine
+from algid.synth.follow import Plan, follow
 from algid.synth.sensors import Sensors, record, sample_times
 from algid.synth.simulator import HANGING, Motion, simulate
 
@@ -59,6 +60,21 @@ def synthesise(case: Case, torque: Torque, recording: Recording, told: Told | No
     unloaded = _one(case, torque, recording, 0.0, told)
     other = replace(recording.sensors, seed=recording.sensors.seed + 1)
     return unloaded, _one(case, torque, replace(recording, sensors=other), case.payload, told)
+
+
+def rehearse(case: Case, plan: Plan, recording: Recording, told: Told | None = None) -> list[Log]:
+    """The unloaded and, with a payload, the loaded log of a case whose controller follows a plan from its start."""
+    return [_followed(case, plan, recording, payload, told) for payload in dict.fromkeys((0.0, case.payload))]
+
+
+def _followed(case: Case, plan: Plan, recording: Recording, payload: float, told: Told | None) -> Log:
+    bare = case.arm.constants()
+    k = with_payload(bare, case.arm.payload_constants(payload))
+    role = "loaded" if payload else "unloaded"
+    sensors = replace(recording.sensors, seed=recording.sensors.seed + bool(payload))
+    t = sample_times(recording.rate, recording.duration, sensors)
+    motion = follow(k, plan, t, bare, bool(payload), _counted(told, role, recording))
+    return record(motion, sensors, Truth(case.arm, payload, case.name), f"{case.name}-{role}")
 
 
 def with_schedule(

@@ -25,6 +25,7 @@ from algid.synth.excitation import SampledTorque, Torque
 
 RELATIVE_TOLERANCE = 1e-12
 ABSOLUTE_TOLERANCE = 1e-13
+STEERED_TOLERANCE = 1e-8
 LONGEST_STEP = 0.01  # s: no torque of interest changes unseen within it
 HANGING = np.array([-np.pi / 2, 0.0])
 
@@ -72,6 +73,40 @@ def simulate(
     start = np.concatenate([theta0, np.zeros(2) if omega0 is None else omega0])
     states = _states(k, torque, t, start, reached or (lambda _now: None))
     return Motion(t=t, theta=states[:2], omega=states[2:], tau=torque(t))
+
+
+def steered(
+    k: FloatArray,
+    controller: Callable[[float, FloatArray], FloatArray],
+    t: FloatArray,
+    theta0: FloatArray,
+    reached: Callable[[float], None] | None = None,
+) -> Motion:
+    """Move the arm `k` from rest at `theta0` (2,) rad by a torque (2,) N m that depends on time and state (4,).
+
+    Parameters and results as for `simulate`; a controller pulls errors together, so its tolerance is wider:
+    angles within 1e-8 rad of the exact solution.
+    """
+    reached = reached or (lambda _now: None)
+
+    def step(now: float, _state: FloatArray) -> float:
+        reached(now)
+        return 1.0
+
+    solution = solve_ivp(
+        lambda now, state: _rate(k, state, controller(now, state)),
+        (t[0], t[-1]),
+        np.concatenate([theta0, np.zeros(2)]),
+        method="DOP853",
+        t_eval=t,
+        rtol=STEERED_TOLERANCE,
+        atol=STEERED_TOLERANCE,
+        max_step=LONGEST_STEP,
+        events=step,
+    )
+    states: FloatArray = solution.y
+    tau = np.stack([controller(now, state) for now, state in zip(t.tolist(), states.T, strict=True)], axis=1)
+    return Motion(t=t, theta=states[:2], omega=states[2:], tau=tau)
 
 
 def _states(

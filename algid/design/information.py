@@ -1,0 +1,226 @@
+"""What a motion tells about an arm, under the likelihood of `refined`, and how that changes with the motion.
+
+The information of a log is S = Yᵀ V⁻¹ Y with V = Σ_τ + G Σ_θ Gᵀ (`algid.estimators.whitening`). White noise of
+σ at R samples a second is, below half of r samples a second, white noise of σ √(r / R) at r: a motion of a few
+hertz is weighed at 50 to 100 samples a second.
+
+======  ==========================================================  ==================
+symbol  name                                                        shape
+======  ==========================================================  ==================
+S       information on the shared parameters, all runs together     (Q, Q)
+Y       regressor along the motion                                  (2, q, N)
+P       derivatives of the torque by θ, ω, α                        (3, 2, 2, N)
+W       V⁻¹ Y, rows by joint                                        (q, 2, N)
+A       derivative of a function of S                               (Q, Q)
+dY, dP  derivatives of Y and P by θ1, θ2, ω1, ω2, α1, α2            (6, ...)
+======  ==========================================================  ==================
+
+For a fixed A, d tr(A S) = 2 tr(A Wᵀ dY) − 2 tr(A Wᵀ dG Σ_θ Gᵀ W): Y and P are functions of the motion at one
+instant, so six differences at all instants at once give the derivative by the whole motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import lapack
+
+from algid.arm import FloatArray
+from algid.estimators.parametrisation import Shared
+from algid.estimators.whitening import NoiseLevels, along_stencil, covariance_factor
+from algid.model import Model, Motion, partials, regressor
+from algid.signals.differences import POINTS, Stencil
+
+_STEP = 1e-5  # of the central differences, rad, rad/s, rad/s²: their error is its square
+COMPONENTS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """What a campaign measures, and with what noise.
+
+    Parameters
+    ----------
+    shared : Shared
+        Which parameters are estimated.
+    runs : (int, int)
+        Runs of the motion without and with the payload.
+    noise : NoiseLevels
+        Of the samples as they are recorded.
+    rate : float, Hz
+        At which the logs are recorded.
+    """
+
+    shared: Shared
+    runs: tuple[int, int]
+    noise: NoiseLevels
+    rate: float
+
+    @property
+    def kinds(self) -> tuple[bool, ...]:
+        """Whether there are runs of each kind, as `loaded`."""
+        return tuple(loaded for loaded, runs in zip((False, True), self.runs, strict=True) if runs)
+
+    def weight(self, rate: float) -> float:
+        """By how much samples at `rate` weigh more than those that are recorded."""
+        return self.rate / rate
+
+
+class Slopes:
+    """Regressor and torque derivatives along a motion at `rate` Hz, and their derivatives by the motion."""
+
+    def __init__(self, model: Model, motion: Motion, rate: float) -> None:
+        self.model, self.motion, self.rate = model, motion, rate
+
+    @cached_property
+    def Y(self) -> FloatArray:
+        """Regressor (2, q, N)."""
+        return regressor(self.model, self.motion)
+
+    @cached_property
+    def dY(self) -> FloatArray:
+        """Its derivatives (6, 2, q, N)."""
+        return np.stack(
+            [
+                (regressor(self.model, ahead) - regressor(self.model, behind)) / (2 * _STEP)
+                for ahead, behind in self._beside
+            ]
+        )
+
+    def dP(self, c: FloatArray) -> FloatArray:
+        """Derivatives (6, 3, 2, 2, N) of the torque's derivatives at the coefficients `c` (q,)."""
+        return np.stack(
+            [
+                (partials(self.model, c, ahead) - partials(self.model, c, behind)) / (2 * _STEP)
+                for ahead, behind in self._beside
+            ]
+        )
+
+    @cached_property
+    def _beside(self) -> list[tuple[Motion, Motion]]:
+        return list(_neighbours(self.motion))
+
+
+def _neighbours(motion: Motion) -> Iterator[tuple[Motion, Motion]]:
+    """The motion with each of its six components a step ahead, and a step behind."""
+    signals = (motion.theta, motion.omega, motion.alpha)
+    for order in range(3):
+        for joint in range(2):
+            pair = []
+            for step in (_STEP, -_STEP):
+                moved = [signal if place != order else signal.copy() for place, signal in enumerate(signals)]
+                moved[order][joint] += step
+                pair.append(Motion(*moved))
+            yield pair[0], pair[1]
+
+
+@dataclass(frozen=True, eq=False)
+class _Log:
+    """One kind of run, whitened: its W over σ_τ, H, and what its information counts for."""
+
+    loaded: bool
+    c: FloatArray
+    T: FloatArray
+    count: float
+    W: FloatArray
+    H: FloatArray
+    Z: FloatArray
+
+
+class Information:
+    """Information on the shared parameters at `beta` of a campaign that repeats one motion.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    beta : (Q,), the arm's parameters
+    slopes : Slopes
+        Of the motion at equal steps in time. What lies beyond its ends counts as rest.
+    """
+
+    def __init__(self, experiment: Experiment, beta: FloatArray, slopes: Slopes) -> None:
+        self._slopes = slopes
+        shared, noise = experiment.shared, experiment.noise
+        self._weights = Stencil(1 / slopes.rate).weights
+        self._ratio = noise.theta[None, :] / noise.tau[:, None]
+        self._sigma = noise.tau
+        self._logs = []
+        for loaded in experiment.kinds:
+            c, T = shared.coefficients(beta, loaded), shared.jacobian(beta, loaded)
+            count = experiment.runs[loaded] * experiment.weight(slopes.rate)
+            self._logs.append(self._whitened(loaded, c, T, count))
+
+    def _whitened(self, loaded: bool, c: FloatArray, T: FloatArray, count: float) -> _Log:
+        slopes = self._slopes
+        P = partials(slopes.model, c, slopes.motion)
+        H = along_stencil(P, self._weights) * self._ratio[:, :, None, None]
+        factor = covariance_factor(H)
+        q, n = slopes.Y.shape[1:]
+        rows = np.ascontiguousarray((slopes.Y / self._sigma[:, None, None]).transpose(1, 2, 0)).reshape(q, -1)
+        Z, failed = lapack.dtbtrs(factor, rows.T, uplo="L", trans="N")
+        W, failed_too = lapack.dtbtrs(factor, Z, uplo="L", trans="T")
+        if failed or failed_too:
+            raise np.linalg.LinAlgError("banded substitution failed")
+        by_joint = np.ascontiguousarray(W.T.reshape(q, n, 2).transpose(0, 2, 1))
+        return _Log(loaded, c, T, count, by_joint, H, Z.T)
+
+    @cached_property
+    def S(self) -> FloatArray:
+        """Information (Q, Q) of all runs."""
+        return sum(
+            (log.count * log.T.T @ (log.Z @ log.Z.T) @ log.T for log in self._logs[1:]),
+            self._logs[0].count * self._logs[0].T.T @ (self._logs[0].Z @ self._logs[0].Z.T) @ self._logs[0].T,
+        )
+
+    def parts(self, samples: int) -> FloatArray:
+        """Information (B, Q, Q) of each `samples` samples of the motion; the last part may be shorter."""
+        total = []
+        for log in self._logs:
+            q = log.Z.shape[0]
+            starts = np.arange(0, log.Z.shape[1], 2 * samples)
+            Z = log.Z.reshape(q, -1)
+            part = np.stack([Z[:, a : a + 2 * samples] @ Z[:, a : a + 2 * samples].T for a in starts])
+            total.append(log.count * log.T.T @ part @ log.T)
+        return np.sum(total, axis=0)
+
+    def gradient(self, A: FloatArray) -> FloatArray:
+        """Derivative (6, N) of tr(A S) by the motion, for a symmetric A (Q, Q)."""
+        slopes = self._slopes
+        to_Y = np.zeros_like(slopes.Y)
+        total = np.zeros((COMPONENTS, slopes.Y.shape[2]))
+        for log in self._logs:
+            inner = log.count * log.T @ A @ log.T.T
+            AW = np.tensordot(inner, log.W, axes=1)
+            to_Y += 2 * AW.transpose(1, 0, 2) / self._sigma[:, None, None]
+            to_P = self._by_partials(AW, log)
+            total += np.einsum("oabn,coabn->cn", to_P, slopes.dP(log.c))
+        return total + np.einsum("aqn,caqn->cn", to_Y, slopes.dY)
+
+    def _by_partials(self, AW: FloatArray, log: _Log) -> FloatArray:
+        """Derivative (3, 2, 2, N) by the torque's derivatives."""
+        n = AW.shape[2]
+        back = np.zeros((AW.shape[0], 2, n + POINTS - 1))
+        for point in range(POINTS):
+            back[:, :, point : point + n] += np.einsum("abn,qan->qbn", log.H[:, :, point], log.W)
+        windows = np.lib.stride_tricks.sliding_window_view(back, n, axis=2)
+        along = np.tensordot(self._weights, windows, axes=(1, 2))
+        return -2 * np.einsum("qan,oqbn->oabn", AW, along) * self._ratio[None, :, :, None]
+
+
+def covariance(S: FloatArray) -> FloatArray:
+    """Inverse of the information S (Q, Q), scaled first.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If S leaves a direction open.
+    """
+    size = 1 / np.sqrt(np.diag(S))
+    if not np.all(np.isfinite(size)):
+        raise np.linalg.LinAlgError("a parameter without information")
+    factor = np.linalg.cholesky(S * np.outer(size, size))
+    half = np.linalg.solve(factor, np.diag(size))
+    return half.T @ half

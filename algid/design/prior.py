@@ -1,0 +1,248 @@
+"""What is known of an arm before its run: from a result's folder, a shipped case, or a TOML file of the arm."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from algid.arm import Arm, FloatArray
+from algid.design.belief import SURE, Belief
+from algid.errors import ResultError, SettingError
+from algid.estimators.parametrisation import Shared
+from algid.estimators.whitening import NoiseLevels
+from algid.identification.by_likelihood import model_of
+from algid.model import TERMS, Model
+from algid.report.text import joined
+from algid.results import Result, Status, read_result
+from algid.settings import Settings
+from algid.synth.cases import Case, load_case
+
+WRONG = 0.2  # share by which masses and friction of a drawing may be wrong
+_FAR = 5.0  # standard deviations beyond which two statements contradict each other
+_UNPLANNED = ("load", "gain", "zero", "lag")  # the torque is not linear in them, or they are not of one instant
+NOISE = ("theta1", "theta2", "tau1", "tau2")
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """An arm as it is believed to be.
+
+    Parameters
+    ----------
+    source : str
+        The file or case that it comes from.
+    belief : Belief
+    lengths : (2,), m
+        Of the links; NaN where they are not known.
+    noise : NoiseLevels or None
+        Of the logs behind a result.
+    warnings : sentences about what does not fit
+    """
+
+    source: str
+    belief: Belief
+    lengths: FloatArray
+    noise: NoiseLevels | None
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Knowns:
+    """What the user knows better than the prior: link lengths and payload, and how wrong the rest may be."""
+
+    l1: float | None = None
+    l2: float | None = None
+    payload: float | None = None
+    error: float | None = None
+
+    @property
+    def lengths(self) -> dict[str, float]:
+        """The link lengths that are given, in m."""
+        return {name: value for name, value in (("l1", self.l1), ("l2", self.l2)) if value is not None}
+
+
+def prior_of(source: str, loaded: bool | None, knowns: Knowns) -> Prior:
+    """The prior that `source` describes.
+
+    Parameters
+    ----------
+    source : str
+        A result's folder or file, the name of a shipped case, or a TOML file of an arm.
+    loaded : bool or None
+        Whether there are to be runs with the payload; None where there are if a payload is known.
+    knowns : Knowns
+
+    Raises
+    ------
+    ResultError
+        If a result has no error bars where they are needed.
+    SettingError
+        If what is known contradicts itself, or a payload is to be carried of which nothing is known.
+    """
+    path = Path(source)
+    if path.is_dir() or path.suffix == ".json":
+        prior = _of_result(read_result(path), source, loaded, knowns)
+    else:
+        prior = _of_case(load_case(source), source, loaded, knowns)
+    _check(prior)
+    return prior
+
+
+def _of_case(case: Case, source: str, loaded: bool | None, knowns: Knowns) -> Prior:
+    arm = replace(case.arm, **knowns.lengths)
+    mass = case.payload if knowns.payload is None else knowns.payload
+    shared = _shared(Model(gravity=arm.g), mass or None, loaded, source, knowns)
+    error = WRONG if knowns.error is None else knowns.error
+    mean = _parameters(shared, arm, mass)
+    spread = np.stack([_parameters(shared, *wrong) - mean for wrong in _wrong(arm, mass, error)], axis=1)
+    return Prior(source, Belief(shared, mean, spread, box=True), np.array([arm.l1, arm.l2]), None)
+
+
+def _shared(model: Model, mass: float | None, loaded: bool | None, source: str, knowns: Knowns) -> Shared:
+    if loaded and not mass:
+        raise SettingError(f"{source}: it knows no payload for the loaded runs; give --payload KG, or --runs 1,0")
+    return Shared(model, payload=bool(mass) if loaded is None else loaded, lengths=knowns.lengths)
+
+
+def _parameters(shared: Shared, arm: Arm, mass: float) -> FloatArray:
+    """Parameters (Q,) of an arm and its payload."""
+    value = {f"k{place}": float(k) for place, k in enumerate(arm.constants(), start=1)}
+    value |= {"m_p": mass, "l1": arm.l1, "l2": arm.l2}
+    return np.array([value[name] for name in shared.names])
+
+
+def _wrong(arm: Arm, mass: float, error: float) -> list[tuple[Arm, float]]:
+    """The arm with each of its masses and frictions too large by that share: the parameters are linear in them."""
+    more = 1 + error
+    return [
+        (replace(arm, m1=more * arm.m1, I1=more * arm.I1), mass),
+        (replace(arm, m2=more * arm.m2, I2=more * arm.I2), mass),
+        (replace(arm, b1=more * arm.b1), mass),
+        (replace(arm, b2=more * arm.b2), mass),
+        (arm, more * mass),
+    ]
+
+
+def _of_result(result: Result, source: str, loaded: bool | None, knowns: Knowns) -> Prior:
+    model, left_out = _planned(model_of(Settings.of(result.settings)))
+    value = {name: found.estimate for name, found in result.estimates.items()}
+    value |= {name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None}
+    lengths = {name: value[name] for name in ("l1", "l2") if result.settings.get(name) is not None} | knowns.lengths
+    mass = value.get("m_p") if knowns.payload is None else knowns.payload
+    shared = _shared(model, mass, loaded, source, replace(knowns, **lengths))
+    value |= lengths | ({} if mass is None else {"m_p": mass})
+    missing = next((name for name in shared.names if value.get(name) is None), None)
+    if missing is not None:
+        remedy = f"give --{missing}" if missing in ("l1", "l2") else "identify it from logs that tell it"
+        raise ResultError(f"{source}: the result has no {missing}; {remedy}")
+    mean = np.array([value[name] for name in shared.names], dtype=np.float64)
+    given = {"m_p"} if knowns.payload is not None else set()
+    spread = _spread(result, source, shared.names, mean, given, knowns.error)
+    known = {**value, **lengths}
+    reach = np.array([np.nan if known.get(name) is None else known[name] for name in ("l1", "l2")], dtype=np.float64)
+    warnings = (*left_out, *_contradictions(result, knowns))
+    return Prior(source, Belief(shared, mean, spread, box=False), reach, _noise(result), warnings)
+
+
+def _planned(model: Model) -> tuple[Model, tuple[str, ...]]:
+    """The model less the terms that no regressor holds, and a sentence about them."""
+    spare = [term for term in model.terms if term in _UNPLANNED]
+    if not spare:
+        return model, ()
+    words = joined([TERMS[term].title for term in spare])
+    return replace(model, terms=tuple(term for term in model.terms if term not in spare)), (
+        f"the plan leaves out {words}: where they are estimated too, error bars are somewhat larger than predicted",
+    )
+
+
+def _spread(
+    result: Result, source: str, names: Sequence[str], mean: FloatArray, given: set[str], error: float | None
+) -> FloatArray:
+    """F (Q, Q): a root of the result's covariance; what has no error bar is wrong by `error` at `SURE` deviations."""
+    covariance = np.zeros((len(names), len(names)))
+    known = [name for name in names if name not in given and _has_error_bar(result, name)]
+    if known and result.fit is not None:
+        places = [result.fit.covariance_names.index(name) for name in known]
+        rows = [names.index(name) for name in known]
+        covariance[np.ix_(rows, rows)] = np.array(result.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
+    bare = [name for name in names if name not in known]
+    without = [name for name in bare if name not in given]
+    if without and error is None:
+        why = (
+            f"the result of --estimator {result.estimator} has no error bars"
+            if result.fit is None
+            else f"the result leaves {', '.join(without)} without error bars"
+        )
+        raise ResultError(f"{source}: {why}; identify from logs that tell, or say how wrong it may be: --prior-error")
+    for name in bare:
+        row = names.index(name)
+        covariance[row, row] = ((WRONG if error is None else error) * mean[row] / SURE) ** 2
+    eigenvalues, vectors = np.linalg.eigh(covariance / np.outer(_size(mean), _size(mean)))
+    return _size(mean)[:, None] * vectors * np.sqrt(np.maximum(eigenvalues, 0.0))
+
+
+def _size(mean: FloatArray) -> FloatArray:
+    return np.maximum(np.abs(mean), 1e-12)
+
+
+def _has_error_bar(result: Result, name: str) -> bool:
+    found = result.estimates.get(name)
+    ok = found is not None and found.status is Status.OK and found.std is not None
+    return ok and result.fit is not None and name in result.fit.covariance_names
+
+
+def _noise(result: Result) -> NoiseLevels | None:
+    noise: Mapping[str, Any] = {} if result.fit is None else result.fit.noise
+    if not all((noise.get(name) or 0) > 0 for name in NOISE):
+        return None
+    levels = np.array([noise[name] for name in NOISE])
+    return NoiseLevels(levels[:2], levels[2:])
+
+
+def _contradictions(result: Result, knowns: Knowns) -> tuple[str, ...]:
+    """A given length against what the result says of it: by itself, and by l1 = g k1 / k2."""
+    told = {name: (found.estimate, found.std) for name, found in result.payload.items() if name in ("l1", "l2")}
+    by_constants = _first_length(result)
+    if by_constants is not None:
+        told["l1"] = by_constants
+    sentences = []
+    for name, given in knowns.lengths.items():
+        estimate, std = told.get(name, (None, None))
+        if estimate is None or not std:
+            continue
+        distance = abs(given - estimate) / std
+        if distance > _FAR:
+            sentences.append(
+                f"--{name} {given:g} lies {distance:.0f} σ from the result's {estimate:.5g} ± {std:.2g} m; one is wrong"
+            )
+    return tuple(sentences)
+
+
+def _first_length(result: Result) -> tuple[float, float] | None:
+    """l1 = g k1 / k2 and its standard deviation."""
+    gravity = Settings.of(result.settings).gravity
+    k1, k2 = (result.parameters.get(name) for name in ("k1", "k2"))
+    if not gravity or result.fit is None or k1 is None or k2 is None or not k1.estimate or not k2.estimate:
+        return None
+    if not all(_has_error_bar(result, name) for name in ("k1", "k2")):
+        return None
+    places = [result.fit.covariance_names.index(name) for name in ("k1", "k2")]
+    covariance = np.array(result.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
+    slope = gravity * np.array([1 / k2.estimate, -k1.estimate / k2.estimate**2])
+    return gravity * k1.estimate / k2.estimate, float(np.sqrt(slope @ covariance @ slope))
+
+
+def _check(prior: Prior) -> None:
+    """Refuse a prior whose inertia matrix is not positive definite: no arm is like that, and none can be moved so."""
+    belief = prior.belief
+    value = dict(zip(belief.shared.names, belief.mean.tolist(), strict=True))
+    k1, k3, k5 = value["k1"], value["k3"], value["k5"]
+    if min(k3, k5) <= 0 or k3 * k5 <= k1**2:
+        raise SettingError(
+            f"{prior.source}: its inertia matrix is not positive definite (k1 {k1:.3g}, k3 {k3:.3g}, k5 {k5:.3g} "
+            "kg m²); no arm is like that: identify it anew, or describe the arm in a TOML file"
+        )

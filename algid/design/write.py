@@ -1,0 +1,185 @@
+"""A design's folder: the trajectory for controllers, players and people, and what it will tell.
+
+``trajectory.csv``, ``.parquet`` and ``.mcap``, ``joint_trajectory.yaml``, ``design.json``, ``report.html``.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from algid import __version__
+from algid.arm import FloatArray
+from algid.design.campaign import Design
+from algid.design.page import page_html
+from algid.design.tables import amounts, sentence
+from algid.files import whole_file
+from algid.log import Log, Origin
+from algid.model import UNITS
+
+POINTS = 50.0  # a second, of the joint trajectory: its controller joins them by polynomials of fifth degree
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a design comes from: its prior's file, its command line, the names of the robot's joints, warnings."""
+
+    source: str
+    command: str
+    joints: tuple[str, str] = ("joint1", "joint2")
+    warnings: Sequence[str] = ()
+
+
+def write_design(design: Design, folder: Path, origin: Provenance) -> None:
+    """Write everything into `folder`. Raises `OutputError`."""
+    _write_tables(design, folder)
+    _write_mcap(design, folder / "trajectory.mcap")
+    texts = {
+        "design.json": design_json(design, origin),
+        "report.html": page_html(design, origin.source, origin.warnings),
+    }
+    if design.campaign.drive == "position":
+        texts["joint_trajectory.yaml"] = joint_trajectory(design, origin.joints)
+    for name, text in texts.items():
+        with whole_file(folder / name) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+
+
+def trajectory(design: Design) -> dict[str, FloatArray]:
+    """The trajectory's columns: time, angles, velocities, accelerations, feed-forward torques."""
+    motion = design.motion
+    columns = {"t": design.t}
+    for name, values in (("theta", motion.theta), ("omega", motion.omega), ("alpha", motion.alpha)):
+        columns |= {f"{name}{joint + 1}": values[joint] for joint in range(2)}
+    for loaded, torque in design.torque.items():
+        prefix = "loaded_" if loaded else ""
+        columns |= {f"{prefix}tau{joint + 1}": torque[joint] for joint in range(2)}
+    return columns
+
+
+def _write_tables(design: Design, folder: Path) -> None:
+    import polars as pl
+
+    frame = pl.DataFrame(trajectory(design))
+    with whole_file(folder / "trajectory.csv") as temporary:
+        frame.write_csv(temporary)
+    with whole_file(folder / "trajectory.parquet") as temporary:
+        frame.write_parquet(temporary)
+
+
+def _write_mcap(design: Design, path: Path) -> None:
+    from algid.writers import write_log
+
+    origin = Origin(path=path.name, format="design", mapping={})
+    stamps = np.round(design.t * 1e9).astype(np.int64)
+    write_log(path, Log(stamps, design.motion.theta, design.torque[False], origin, design.motion.omega), kind="mcap")
+
+
+def joint_trajectory(design: Design, joints: tuple[str, str]) -> str:
+    """The motion as trajectory_msgs/JointTrajectory in YAML, as a joint_trajectory_controller takes it."""
+    every = max(1, round(design.campaign.experiment.rate / POINTS))
+    places = [*range(0, design.t.size - 1, every), design.t.size - 1]
+    lines = [
+        "# trajectory_msgs/msg/JointTrajectory, planned by algid design.",
+        "# Angles in rad: the first joint's from the horizontal (gravity pulls along -y), the second's from link 1.",
+        "# Hanging straight down is (-1.5708, 0). Move the arm slowly to the first point before it is played.",
+        "header: {stamp: {sec: 0, nanosec: 0}, frame_id: ''}",
+        f"joint_names: {json.dumps(list(joints), ensure_ascii=False)}",
+        "points:",
+    ]
+    motion = design.motion
+    for place in places:
+        nanoseconds = round(float(design.t[place]) * 1e9)
+        lines += [
+            f"- positions: {_numbers(motion.theta[:, place])}",
+            f"  velocities: {_numbers(motion.omega[:, place])}",
+            f"  accelerations: {_numbers(motion.alpha[:, place])}",
+            f"  time_from_start: {{sec: {nanoseconds // 10**9}, nanosec: {nanoseconds % 10**9}}}",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _numbers(values: FloatArray) -> str:
+    return f"[{', '.join(repr(round(float(value), 9) + 0.0) for value in values)}]"
+
+
+def design_json(design: Design, origin: Provenance) -> str:
+    """The text of ``design.json``: everything that decides the design, and what it predicts."""
+    return json.dumps(content(design, origin), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def content(design: Design, origin: Provenance) -> dict[str, Any]:
+    """What ``design.json`` holds."""
+    campaign = design.campaign
+    experiment, limits = campaign.experiment, campaign.limits
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "version": __version__,
+        "prior": origin.source,
+        "command": origin.command,
+        "sentence": sentence(design),
+        "drive": campaign.drive,
+        "duration": campaign.duration,
+        "rate": experiment.rate,
+        "runs": {"unloaded": experiment.runs[0], "loaded": experiment.runs[1]},
+        "seed": campaign.seed,
+        "interrupted": design.interrupted,
+        "noise": {
+            f"{name}{joint + 1}": float(values[joint])
+            for name, values in (("theta", experiment.noise.theta), ("tau", experiment.noise.tau))
+            for joint in range(2)
+        },
+        "gravity": experiment.shared.model.gravity,
+        "parameters": {name: _parameter(design, place) for place, name in enumerate(design.names)},
+        "largest_relative_bound": design.largest,
+        "limits": {
+            "range": [_finite(limits.low), _finite(limits.high)],
+            "speed": _finite(limits.speed),
+            "acceleration": _finite(limits.acceleration),
+            "torque": _finite(limits.torque),
+            "tip_height": limits.height if np.isfinite(limits.height) else None,
+            "margin": campaign.margin,
+        },
+        "used": [_used(design, place) for place in range(len(design.binding))],
+        "start": design.motion.theta[:, 0].tolist(),
+        "joints": list(origin.joints),
+        "warnings": list(origin.warnings),
+    }
+
+
+def _parameter(design: Design, place: int) -> Mapping[str, Any]:
+    asked = design.campaign.asked
+    known = bool(asked.known[place])
+    return {
+        "believed": float(design.campaign.belief.mean[place]),
+        "believed_std": float(design.campaign.belief.std[place]),
+        "std": float(design.std[place]),
+        "relative": float(design.relative[place]) if known else None,
+        "worst_std": float(design.worst[place]),
+        "unit": UNITS[design.names[place]],
+        "asked": bool(asked.wanted[place]),
+        "information_by_second": [round(float(share), 4) for share in design.shares[place]],
+    }
+
+
+def _used(design: Design, place: int) -> dict[str, Any]:
+    row, used = design.binding[place]
+    limit, value = amounts(design, row, used)
+    return {
+        "limit": row.limit,
+        "joint": None if row.joint is None else row.joint + 1,
+        "loaded": row.loaded,
+        "allowed": limit,
+        "most": value,
+        "share": used,
+    }
+
+
+def _finite(values: FloatArray) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]

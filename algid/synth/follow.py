@@ -1,0 +1,111 @@
+"""A simulated arm that follows a planned motion: feed-forward torque and a position controller around it.
+
+    τ = τ_ff(t) + M(θ) (ω_c² (θ_d − θ) + 2 ω_c (θ̇_d − θ̇))
+
+The plan's torque is that of the arm as it was believed to be; what the true arm needs beside it, the controller adds.
+M is the inertia of the arm without payload. The controller sees the true state: its sensors' noise is not fed back.
+
+======  ==========================================  ==========
+symbol  name                                        unit
+======  ==========================================  ==========
+θ_d     planned angles                              rad
+τ_ff    planned torques                             N m
+ω_c     `STIFFNESS`, the controller's bandwidth     rad/s
+======  ==========================================  ==========
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from algid.arm import FloatArray, mass_matrix
+from algid.errors import SettingError
+from algid.synth.simulator import Motion, steered
+
+STIFFNESS = 2 * np.pi * 10.0
+_KNOTS = 200.0  # a second, at most: a plan is smooth
+COLUMNS = ("t", "theta1", "theta2", "omega1", "omega2", "tau1", "tau2")
+LOADED_COLUMNS = ("loaded_tau1", "loaded_tau2")
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A motion to follow: times t (N,) in s, angles, velocities, torques without and with payload, each (2, N)."""
+
+    t: FloatArray
+    theta: FloatArray
+    omega: FloatArray
+    tau: FloatArray
+    loaded_tau: FloatArray
+
+    @property
+    def duration(self) -> float:
+        """From the first to the last instant, s."""
+        return float(self.t[-1] - self.t[0])
+
+
+def read_plan(path: Path) -> Plan:
+    """The plan in the folder of a design, or in its ``trajectory.csv``.
+
+    Raises
+    ------
+    SettingError
+        If there is none, or it lacks a column.
+    """
+    file = path / "trajectory.csv" if path.is_dir() else path
+    try:
+        with file.open(encoding="utf-8", newline="") as stream:
+            rows = csv.reader(stream)
+            names = next(rows, [])
+            values = np.array([[float(text) for text in row] for row in rows], dtype=np.float64).T
+    except (OSError, ValueError) as error:
+        raise SettingError(
+            f"{file}: not the trajectory of a design ({error}); expected what algid design wrote"
+        ) from error
+    missing = next((name for name in COLUMNS if name not in names), None)
+    if missing is not None or values.ndim != 2 or values.shape[1] < 2:
+        found = f"no column {missing}" if missing is not None else "no motion"
+        raise SettingError(f"{file}: expected {', '.join(COLUMNS)}, found {found}; give what algid design wrote")
+    column = dict(zip(names, values, strict=True))
+    pairs = {name: np.stack([column[f"{name}1"], column[f"{name}2"]]) for name in ("theta", "omega", "tau")}
+    loaded = [column.get(name) for name in LOADED_COLUMNS]
+    with_load = pairs["tau"] if loaded[0] is None or loaded[1] is None else np.stack([loaded[0], loaded[1]])
+    if not np.all(np.isfinite(values)) or np.any(np.diff(column["t"]) <= 0):
+        raise SettingError(f"{file}: expected finite numbers at increasing times; write the design anew")
+    return Plan(column["t"] - column["t"][0], pairs["theta"], pairs["omega"], pairs["tau"], with_load)
+
+
+def follow(
+    k: FloatArray, plan: Plan, t: FloatArray, inertia: FloatArray, loaded: bool, reached: Callable[[float], None] | None
+) -> Motion:
+    """The motion of the arm `k` (7,) that a controller holds to the plan, at the times `t` (N,) in s.
+
+    Parameters
+    ----------
+    inertia : (7,), constants of the arm that the controller is tuned for
+    loaded : bool
+        Whether the plan's torque is the loaded one.
+    reached : callable
+        Called with each time in s that the integration has come to.
+    """
+    from scipy.interpolate import make_interp_spline
+
+    every = max(1, round(plan.t.size / max(plan.duration * _KNOTS, 1)))
+    kept = np.unique(np.append(np.arange(0, plan.t.size, every), plan.t.size - 1))
+    wanted = np.concatenate([plan.theta, plan.omega, plan.loaded_tau if loaded else plan.tau])[:, kept]
+    spline = make_interp_spline(plan.t[kept], wanted.T, k=min(5, kept.size - 1))
+    end = plan.duration
+
+    def controller(now: float, state: FloatArray) -> FloatArray:
+        at = spline(min(now, end))
+        m11, m12, m22 = mass_matrix(inertia, state[:2])
+        push = STIFFNESS**2 * (at[:2] - state[:2]) + 2 * STIFFNESS * (at[2:4] - state[2:])
+        feedback = np.array([m11 * push[0] + m12 * push[1], m12 * push[0] + m22 * push[1]])
+        return at[4:] + feedback
+
+    return steered(k, controller, t, plan.theta[:, 0], reached)
