@@ -1,6 +1,8 @@
-"""Read damaged logs and fail on a traceback, a hang, much memory, or a wrong result without a word.
+"""Read damaged and hostile logs; fail on a traceback, a hang, much memory, or a wrong result without a word.
 
 Usage: python -m pipelines.fuzz [FILES] [SEED]
+
+So many files with damaged bytes (`pipelines.mutations`) and as many that lie by their structure (`pipelines.hostile`).
 """
 
 from __future__ import annotations
@@ -13,98 +15,131 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
+
+import numpy as np
 
 from algid.errors import LogError
 from algid.log import Log
 from algid.readers import read_log
+from pipelines.hostile import corpus
 from pipelines.mutations import clean_files, damage
 
 FILES = 20_000
 _BATCH = 500
 _SECONDS = 5.0
 _MEMORY = 1 << 30
+FAILURES = ("crash", "traceback", "hang", "silent")
 
 
 def main() -> int:
     """Run batches in processes of their own, so that a crash is a finding and not the end."""
     files = int(sys.argv[1]) if len(sys.argv) > 1 else FILES
     seed = int(sys.argv[2]) if len(sys.argv) > 2 else 1
-    total: Counter[str] = Counter()
-    worst = 0
-    for batch in range(0, files, _BATCH):
-        command = [
-            sys.executable,
-            "-m",
-            "pipelines.fuzz",
-            "--batch",
-            str(seed + batch),
-            str(min(_BATCH, files - batch)),
-        ]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=_BATCH * _SECONDS, check=False)
-        if done.returncode not in (0, 1):
-            total["crash"] += 1
-            print(f"seed {seed + batch}: crashed with {done.returncode}\n{done.stderr[-2000:]}")
-        for line in done.stdout.splitlines():
-            kind, _, text = line.partition("\t")
-            if kind == "memory":
-                worst = max(worst, int(text))
-            elif kind.startswith("count "):
-                total[kind.removeprefix("count ")] += int(text)
-            else:
-                print(line)
-    print(f"{files} files: {dict(total)}; at most {worst >> 20} MB")
-    return int(any(total[kind] for kind in ("crash", "traceback", "hang", "silent")) or worst > _MEMORY)
+    failed = 0
+    for source in ("damaged", "hostile"):
+        total: Counter[str] = Counter()
+        memory, slowest = 0, 0.0
+        for first in range(seed, seed + files, _BATCH):
+            command = [
+                sys.executable,
+                "-m",
+                "pipelines.fuzz",
+                source,
+                str(first),
+                str(min(_BATCH, seed + files - first)),
+            ]
+            done = subprocess.run(command, capture_output=True, text=True, timeout=_BATCH * _SECONDS, check=False)
+            if done.returncode != 0:
+                total["crash"] += 1
+                print(f"{source}, seed {first}: crashed with {done.returncode}\n{done.stderr[-2000:]}")
+            for line in done.stdout.splitlines():
+                kind, _, text = line.partition("\t")
+                if kind == "memory":
+                    memory = max(memory, int(text))
+                elif kind == "slowest":
+                    slowest = max(slowest, float(text))
+                elif kind.startswith("count "):
+                    total[kind.removeprefix("count ")] += int(text)
+                else:
+                    print(line, flush=True)
+        print(f"{files} {source} files: {dict(total)}; at most {memory >> 20} MB, {slowest:.2f} s", flush=True)
+        failed += sum(total[kind] for kind in FAILURES) + (memory > _MEMORY)
+    return int(failed > 0)
 
 
-def batch(seed: int, files: int) -> int:
-    """Read so many damaged files and print what came of them."""
+def batch(source: str, seed: int, files: int) -> int:
+    """Read so many files and print what came of them."""
     counts: Counter[str] = Counter()
+    slowest = 0.0
     folder = Path(tempfile.mkdtemp(prefix="algid-fuzz-"))
     try:
-        clean = [(path, path.read_bytes(), read_log(path)) for path in clean_files(folder)]
-        for number in range(files):
-            draw = random.Random(seed + number)
-            path, content, log = clean[number % len(clean)]
-            path.write_bytes(damage(content, draw))
-            kind, text = _outcome(path, log)
+        for name, path, log in _damaged(folder, seed, files) if source == "damaged" else _hostile(folder, seed, files):
+            start = time.process_time()  # a busy machine is no hang; one that waits is ended with its batch
+            kind, text = outcome(path, log)
+            seconds = time.process_time() - start
+            slowest = max(slowest, seconds)
+            kind = "hang" if seconds > _SECONDS else kind
             counts[kind] += 1
-            if kind in ("traceback", "hang", "silent"):
-                print(f"{kind}\t{path.suffix} seed {seed + number} of batch {seed}: {text}")
+            if kind in FAILURES:
+                print(f"{kind}\t{name}: {text} ({seconds:.1f} s)", flush=True)
     finally:
         shutil.rmtree(folder)
     for kind, count in counts.items():
         print(f"count {kind}\t{count}")
-    print(f"memory\t{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024}")
+    print(f"slowest\t{slowest}\nmemory\t{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024}")
     return 0
 
 
-def _outcome(path: Path, clean: Log) -> tuple[str, str]:
-    start = time.perf_counter()
+def _damaged(folder: Path, seed: int, files: int) -> Iterator[tuple[str, Path, Log | None]]:
+    clean = [(path, path.read_bytes(), read_log(path)) for path in clean_files(folder)]
+    for number in range(files):
+        path, content, log = clean[number % len(clean)]
+        path.write_bytes(damage(content, random.Random(seed + number)))
+        yield f"{path.suffix} seed {seed + number} of batch {seed}", path, log
+
+
+def _hostile(folder: Path, seed: int, files: int) -> Iterator[tuple[str, Path, Log | None]]:
+    for path, one in corpus(folder, files, seed):
+        yield path.name, path, one.log
+        path.unlink()
+
+
+def outcome(path: Path, log: Log | None) -> tuple[str, str]:
+    """What comes of a file: "same", "told", "refused", or one of `FAILURES`; and more of it.
+
+    `log` is what stands in the file unless it is said otherwise; None where any answer is right that is one.
+    """
     try:
         found = read_log(path)
     except LogError as error:
-        outcome = ("refused", "") if "\n" not in str(error) else ("traceback", "more than one line")
+        return ("refused", "") if "\n" not in str(error) else ("traceback", "more than one line")
     except BaseException as error:
         return "traceback", f"{type(error).__name__}: {error}"[:400]
-    else:
-        outcome = _compared(found, clean)
-    return ("hang", "") if time.perf_counter() - start > _SECONDS else outcome
+    if log is None:
+        return "read", ""
+    return _compared(found, log)
 
 
-def _compared(found: Log, clean: Log) -> tuple[str, str]:
-    same = all(
-        getattr(found, name) is not None and getattr(found, name).tobytes() == getattr(clean, name).tobytes()
-        for name in ("stamp_ns", "theta", "tau", "omega")
-    )
-    if same and found.origin.truth == clean.origin.truth:
+def _compared(found: Log, log: Log) -> tuple[str, str]:
+    """A log that lacks samples must call that a loss; other values must be told of."""
+    names = ("stamp_ns", "theta", "tau", "omega")
+    same = all(_equal(getattr(found, name), getattr(log, name)) for name in names)
+    if same and found.origin.truth == log.origin.truth:
         return "same", ""
-    if found.notices:
-        return "told", ""
-    return "silent", f"{len(found)} samples, truth {found.origin.truth}"
+    if len(found) < len(log) and np.isin(found.stamp_ns, log.stamp_ns).all():
+        told = any(notice.lossy for notice in found.notices)
+    else:
+        told = bool(found.notices)
+    return ("told", "") if told else ("silent", f"{len(found)} samples of {len(log)}, truth {found.origin.truth}")
+
+
+def _equal(one: np.ndarray | None, other: np.ndarray | None) -> bool:
+    return one is other or (one is not None and other is not None and one.tobytes() == other.tobytes())
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1 and sys.argv[1] == "--batch":
-        sys.exit(batch(int(sys.argv[2]), int(sys.argv[3])))
+    if len(sys.argv) > 3:
+        sys.exit(batch(sys.argv[1], int(sys.argv[2]), int(sys.argv[3])))
     sys.exit(main())

@@ -1,0 +1,51 @@
+"""A short run of the hostile files of `make fuzz`: each is read, told or refused, and a batch over them ends."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from algid.log import Log, Notice, Origin
+from pipelines import fuzz
+from pipelines.hostile import corpus, hostile
+from pipelines.mutations import clean_log
+
+
+@pytest.mark.parametrize("seed", range(0, 200, 50))
+def test_hostile_files_are_read_told_or_refused(seed: int, tmp_path: Path) -> None:
+    outcomes = {path.name: fuzz.outcome(path, one.log) for path, one in corpus(tmp_path, 50, seed)}
+    failed = {name: text for name, (kind, text) in outcomes.items() if kind in fuzz.FAILURES}
+    assert failed == {}
+    assert {kind for kind, _ in outcomes.values()} >= {"refused", "same"}
+
+
+def test_a_file_is_the_same_for_the_same_seed() -> None:
+    ones = [hostile(seed) for seed in range(60)]
+    assert [hostile(seed) for seed in range(10)] == ones[:10]
+    assert len({one.kind for one in ones}) > 6
+
+
+def test_the_judge_sees_what_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
+    log = clean_log(20)
+
+    def judged(found: Log) -> str:
+        monkeypatch.setattr(fuzz, "read_log", lambda _: found)
+        return fuzz.outcome(Path("log.mcap"), log)[0]
+
+    lossy, other = Notice("CUT_OFF", "", lossy=True), Notice("GAPS", "")
+    assert judged(log) == "same"
+    assert judged(log.part(0, 19)) == "silent"
+    assert judged(_noting(log.part(0, 19), other)) == "silent"
+    assert judged(_noting(log.part(0, 19), lossy)) == "told"
+    assert judged(Log(log.stamp_ns, log.theta + 1, log.tau, Origin("", "", {}), log.omega)) == "silent"
+
+    def fails(_: Path) -> Log:
+        raise RuntimeError
+
+    monkeypatch.setattr(fuzz, "read_log", fails)
+    assert fuzz.outcome(Path("log.mcap"), log)[0] == "traceback"
+
+
+def _noting(log: Log, notice: Notice) -> Log:
+    return Log(log.stamp_ns, log.theta, log.tau, log.origin, log.omega, (notice,))
