@@ -115,20 +115,22 @@ class FitSummary(_Model):
     """What a statistical estimator knows beside the estimates.
 
     `noise` holds the standard deviations theta1, theta2 (rad), tau1, tau2 (N m); `covariance` belongs to
-    `covariance_names`; `intervals` says what the intervals rest on; `unidentifiable` says in words which
-    directions the logs do not determine.
+    `covariance_names`; `intervals` says what the intervals rest on (white noise, blocks of the logs, or the larger of
+    those and of the jackknife over logs); `by_log` is what each log tells by itself; `unidentifiable` says in words
+    which directions the logs do not determine.
     """
 
     noise: dict[str, float]
     covariance_names: list[str]
     covariance: list[list[float | None]]
-    intervals: Literal["likelihood", "sandwich"]
+    intervals: Literal["likelihood", "sandwich", "jackknife"]
     iterations: int
     converged: bool
     whiteness: dict[str, Whiteness] = {}
     unidentifiable: list[str] = []
     terms: list[TermCriterion] = []
     broken_bounds: list[Bound] = []
+    by_log: list[dict[str, Estimate]] = []
     residual: TorquePrediction | None = None
     cross_validation: TorquePrediction | None = None
 

@@ -147,6 +147,41 @@ def sandwich(
     return meat * (max(stretches, freedom + 1) / freedom), freedom
 
 
+def left_out(
+    shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None = None
+) -> FloatArray:
+    """Most likely shared parameters (n, Q) without each of n logs in turn, from `beta` and without a further pass."""
+    others = [[*logs[:place], *logs[place + 1 :]] for place in range(len(logs))]
+    return np.array([combine(shared, rest, beta, prior)[0] for rest in others])
+
+
+FEWEST_LOGS = 4
+
+
+def jackknife(logs: Sequence[LogInformation], without: FloatArray) -> FloatArray | None:
+    """Covariance (Q, Q) of an estimate from how it moves as logs are left out.
+
+    Parameters
+    ----------
+    logs : n of them; None is returned for fewer than `FEWEST_LOGS`
+    without : (n, Q), estimates without each log: see `left_out`
+
+    Notes
+    -----
+    Tukey's jackknife, stratified by kind of log (Wolter 2007, eq. 4.5.3): Σ_h (n_h − 1)/n_h Σ_i (β_(hi) − β̄_h)². What
+    differs from run to run is in it. A kind of which there is one log alone adds nothing.
+    """
+    if len(logs) < FEWEST_LOGS:
+        return None
+    covariance = np.zeros((without.shape[1],) * 2)
+    for loaded in (False, True):
+        kind = without[[log.loaded is loaded for log in logs]]
+        if len(kind) > 1:
+            moved = kind - kind.mean(axis=0)
+            covariance += (1 - 1 / len(kind)) * moved.T @ moved
+    return covariance
+
+
 MOST_BLOCKS = 4096
 
 

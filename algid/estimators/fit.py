@@ -11,13 +11,22 @@ import numpy as np
 from scipy.special import stdtrit
 
 from algid.arm import FloatArray, keep_arrays, read_only
-from algid.estimators.combine import LogInformation, Prior, combine, sandwich
+from algid.estimators.combine import (
+    LogInformation,
+    Prior,
+    combine,
+    jackknife,
+    left_out,
+    long_run_variance,
+    sandwich,
+    scaled_pinv,
+)
 from algid.estimators.identifiability import Identifiability, Whiteness, examine, open_directions
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
 
 Status = Literal["OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED"]
-Intervals = Literal["likelihood", "sandwich"]
+Intervals = Literal["likelihood", "sandwich", "jackknife"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +41,9 @@ class Fit:
     values : (Q,), in `algid.model.UNITS`
     covariance : (Q, Q)
         As wide as the logs leave it where a parameter is not identifiable; see `std`.
-    intervals : "likelihood" or "sandwich"
-        What `covariance` rests on.
+    intervals : "likelihood", "sandwich" or "jackknife"
+        What `covariance` rests on: white noise; blocks of the logs; or the larger of that and of the jackknife over
+        four logs or more, in which what differs from run to run is.
     quantile : float
         Half width of a 95 % interval in standard deviations, normal or Student's.
     status : Q of "OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED"
@@ -43,6 +53,8 @@ class Fit:
     whiteness : outcome of the test on the innovations; None for the weak estimator
     freedom : independent stretches of log behind a sandwich, else samples of torque
     iterations, converged : of the refined estimator
+    without : (n, Q) or None
+        The estimates without each of the logs, where error bars needed them.
     note : why the refined estimator handed back the weak estimate although nothing failed
     moved : (2,), rad, how far each joint travelled
     """
@@ -62,6 +74,7 @@ class Fit:
     iterations: int = 0
     converged: bool = True
     prior: Prior | None = None
+    without: FloatArray | None = None
     note: str | None = None
     moved: FloatArray = field(default_factory=lambda: np.full(2, np.inf))
 
@@ -102,6 +115,32 @@ class Fit:
         return float(np.sqrt(max(float(told @ self.covariance @ told), 0.0)))
 
 
+@dataclass(frozen=True, eq=False)
+class OwnEstimate:
+    """What one log tells by itself: coefficients and standard deviations (q,), infinite where it leaves them open."""
+
+    loaded: bool
+    values: FloatArray
+    std: FloatArray
+
+    def __post_init__(self) -> None:
+        keep_arrays(self)
+
+
+def own_estimates(fit: Fit) -> tuple[OwnEstimate, ...]:
+    """Each log's own estimate of `Shared.log_names`, unloaded logs first, with the blocks of that log alone."""
+    found = []
+    for log in fit.logs:
+        S, g = log.total
+        values = log.c0 + scaled_pinv(S) @ g
+        known = examine(fit.shared.log_names, values, S, fit.moved)
+        meat, _ = long_run_variance(log.g - log.S @ (values - log.c0))
+        covariance = known.covariance @ meat @ known.covariance if fit.intervals != "likelihood" else known.covariance
+        std = np.where(known.determined, np.sqrt(np.maximum(np.diag(covariance), 0.0)), np.inf)
+        found.append(OwnEstimate(log.loaded, values, std))
+    return tuple(found)
+
+
 def conclude(
     estimator: Literal["weak", "refined"],
     shared: Shared,
@@ -112,28 +151,40 @@ def conclude(
     *,
     coloured: bool,
     samples: int = 1,
+    without: FloatArray | None = None,
 ) -> Fit:
-    """Solve for the shared parameters from `beta` and attach error bars and statuses."""
+    """Solve for the shared parameters from `beta` and attach error bars and statuses.
+
+    `without` (n, Q) are the estimates without each of the logs, where the estimator has made them itself.
+    """
     beta, S, _ = combine(shared, logs, beta, prior)
     known = examine(shared.names, beta, S, moved)
     covariance, quantile = known.covariance, 1.959963984540054
+    intervals: Intervals = "likelihood"
     freedom = samples
     if coloured:
-        robust, quantile, freedom = _robust(shared, logs, beta, known, prior)
+        robust, freedom = _robust(shared, logs, beta, known, prior)
         # The long-run variance of a short log errs low; white noise alone is the least there can be.
         covariance = robust if estimator == "weak" else _widened(robust, covariance)
+        quantile, intervals = _quantile(freedom), "sandwich"
+        without = left_out(shared, logs, beta, prior) if without is None else without
+        repeated = jackknife(logs, without)
+        if repeated is not None:
+            covariance, intervals = _widened(covariance, repeated), "jackknife"
     return Fit(
         estimator=estimator,
         shared=shared,
         values=beta,
         covariance=covariance,
-        intervals="sandwich" if coloured else "likelihood",
+        intervals=intervals,
         quantile=quantile,
         freedom=freedom,
         status=tuple("OK" if yes else "NOT_IDENTIFIABLE" for yes in known.determined),
         unidentifiable=known.sentences,
         logs=tuple(logs),
         prior=prior,
+        without=without,
+        moved=moved,
     )
 
 
@@ -143,10 +194,14 @@ def _robust(
     beta: FloatArray,
     known: Identifiability,
     prior: Prior | None,
-) -> tuple[FloatArray, float, int]:
+) -> tuple[FloatArray, int]:
     meat, freedom = sandwich(shared, logs, beta, prior)
-    covariance = known.covariance @ meat @ known.covariance
-    return covariance, float(stdtrit(max(2, freedom), 0.975)), freedom
+    return known.covariance @ meat @ known.covariance, freedom
+
+
+def _quantile(freedom: int) -> float:
+    """Half width of a 95 % interval in standard deviations that `freedom` independent squares estimate."""
+    return float(stdtrit(max(2, freedom), 0.975))
 
 
 def _widened(robust: FloatArray, least: FloatArray) -> FloatArray:

@@ -45,6 +45,7 @@ _LEAST = {
     "k1": 1e-6,
 }
 _UNDETERMINED = 0.5  # standard deviation of a direction, in sizes of its parameters
+_DAMPING = 0.1  # of √(inertia × gravity), half the critical damping: an arm may be free of friction, and that be known
 _NOTHING = 1e-14  # of the largest eigenvalue: rounding
 _SHARE = 0.15  # of an eigenvector: below it a parameter has no part in the direction
 STILL = 0.01  # rad: a joint that moves less has not moved
@@ -86,11 +87,16 @@ def _spectrum(S: FloatArray, size: FloatArray) -> tuple[FloatArray, FloatArray, 
 
 
 def sizes(names: Sequence[str], values: FloatArray) -> FloatArray:
-    """Size (Q,) of each parameter: the largest value of its class."""
+    """Size (Q,) of each parameter: the largest value of its class, of viscous friction a share of critical damping."""
     by_name = dict(zip(names, np.abs(values).tolist(), strict=True))
+
+    def largest_of(members: Sequence[str]) -> float:
+        return max((by_name[name] for name in members if name in by_name), default=0.0)
+
+    damping = _DAMPING * np.sqrt(largest_of(("k1", "k3", "k5")) * largest_of(("k2", "k4")))
     size = {}
     for members in _CLASSES:
-        largest = max((by_name[name] for name in members if name in by_name), default=0.0)
+        largest = max(largest_of(members), damping if "k6" in members else 0.0)
         for name in members:
             size[name] = max(largest, _LEAST.get(members[0], 1e-6))
     return np.array([size[name] for name in names])

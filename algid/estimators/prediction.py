@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.estimators.combine import combine
+from algid.estimators.combine import left_out
 from algid.estimators.fit import Fit
 from algid.estimators.weak import Source
 from algid.model import Model, Motion, regressor
@@ -207,10 +207,9 @@ def cross_validate(
         return None
     total = PredictionScore()
     columns = len(fit.shared.model.names)
+    without = left_out(fit.shared, fit.logs, fit.values, fit.prior) if fit.without is None else fit.without
     for place, (source, log) in enumerate(zip(sources, fit.logs, strict=True)):
-        others = [other for number, other in enumerate(fit.logs) if number != place]
-        beta, _, _ = combine(fit.shared, others, fit.values, fit.prior)
-        c = fit.shared.coefficients(beta, log.loaded)
+        c = fit.shared.coefficients(without[place], log.loaded)
         delay = float(c[columns:].sum())
         total += score(fit.shared.model, c[:columns], source(), lambda dt, delay=delay: _seconds(shift, dt) + delay)  # type: ignore[misc]
     return total

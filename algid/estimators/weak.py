@@ -19,7 +19,7 @@ from typing import Literal
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.estimators.combine import BlockSums, LogInformation, Prior, combine, scaled_pinv
+from algid.estimators.combine import FEWEST_LOGS, BlockSums, LogInformation, Prior, combine, scaled_pinv
 from algid.estimators.fit import Fit, conclude
 from algid.estimators.modulating_functions import OVERLAP, Windows
 from algid.estimators.parametrisation import Shared
@@ -272,19 +272,43 @@ def fit(
         bare = _normals(unloaded, settings, at[0])
         burdened = _normals(loaded, settings, at[1])
         beta, logs = _start(shared, bare, burdened, prior)
-        change = 0.0
+        base, change = settings.delay, 0.0
         if shared.delay:
-            place = len(settings.model.names)
-            change = float(beta[place])
-            logs = [_with_delay(log, place, settings.delay) for log in logs]
-            settings = replace(settings, delay=settings.delay + change)
-            beta = beta.copy()
-            beta[place] = settings.delay
+            change = float(beta[len(settings.model.names)])
+            beta, logs = _from(shared, beta, logs, base)
+            settings = replace(settings, delay=base + change)
         before, at = at, _linearisation(shared, beta, logs)
         if abs(change) < _DELAY_SETTLED * max(normal.dt for normal in bare + burdened) and _settled(shared, before, at):
             break
     moved = np.max([normal.moved for normal in bare + burdened], axis=0)
-    return replace(conclude("weak", shared, logs, beta, moved, prior, coloured=True), moved=moved)
+    without = _left_out(shared, bare, burdened, prior, base, beta)
+    return conclude("weak", shared, logs, beta, moved, prior, coloured=True, without=without)
+
+
+def _left_out(
+    shared: Shared,
+    bare: list[Normal],
+    burdened: list[Normal],
+    prior: Prior | None,
+    base: float,
+    beta: FloatArray,
+) -> FloatArray | None:
+    """Estimates (n, Q) without each log, every other one weighed anew; None where no error bar needs them.
+
+    `base` is the delay, in s, from which the passes tell a change.
+    """
+    if len(bare) + len(burdened) < FEWEST_LOGS:
+        return None
+    found = []
+    for place in range(len(bare) + len(burdened)):
+        rest = [n for number, n in enumerate(bare) if number != place]
+        rest_loaded = [n for number, n in enumerate(burdened) if len(bare) + number != place]
+        if (bare and not rest) or (burdened and not rest_loaded):
+            found.append(beta)  # a kind of which there is no other log
+            continue
+        start, others = _from(shared, *_start(shared, rest, rest_loaded, prior), base)
+        found.append(combine(shared, others, start, prior)[0])
+    return np.array(found)
 
 
 def _linearisation(
@@ -342,8 +366,15 @@ def _stacked(logs: Sequence[LogInformation]) -> tuple[FloatArray, FloatArray]:
     return np.concatenate([log.S for log in logs]), np.concatenate([log.g for log in logs])
 
 
-def _with_delay(log: LogInformation, place: int, base: float) -> LogInformation:
-    """The log's likelihood in the whole delay, where it was linearised in the change from `base`."""
-    c0 = log.c0.copy()
-    c0[place] += base
-    return replace(log, c0=c0)
+def _from(
+    shared: Shared, beta: FloatArray, logs: Sequence[LogInformation], base: float
+) -> tuple[FloatArray, list[LogInformation]]:
+    """Estimate and likelihoods in the whole delay, where they were in the change from `base`."""
+    if not shared.delay:
+        return beta, list(logs)
+    place = len(shared.model.names)
+
+    def whole(values: FloatArray) -> FloatArray:
+        return np.where(np.arange(values.size) == place, values + base, values)
+
+    return whole(beta), [replace(log, c0=whole(log.c0)) for log in logs]

@@ -15,7 +15,7 @@ import numpy as np
 from algid import __version__, results
 from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.estimators.diagnostics import broken_bounds, payload_distance, term_worths
-from algid.estimators.fit import Fit
+from algid.estimators.fit import Fit, OwnEstimate, own_estimates
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
 from algid.estimators.prediction import PredictionFilter, PredictionScore, cross_validate, score
 from algid.identification.by_likelihood import Predictions
@@ -264,9 +264,20 @@ def fit_summary(fit: Fit, predictions: Predictions, survey: Survey, settings: Se
         broken_bounds=[
             results.Bound(bound=b.bound, value=b.value, distance_sigma=b.distance) for b in broken_bounds(fit)
         ],
+        by_log=[_own(fit, own) for own in own_estimates(fit)],
         residual=prediction(_residual(fit, predictions, survey, settings)),
         cross_validation=None if crossed is None else prediction(crossed),
     )
+
+
+def _own(fit: Fit, own: OwnEstimate) -> dict[str, Estimate]:
+    """A log's own estimates by name; those of a loaded log hold its payload's share."""
+    found = {}
+    for name, value, std in zip(fit.shared.log_names, own.values, own.std, strict=True):
+        status = "OK" if np.isfinite(std) else "NOT_IDENTIFIABLE"
+        half = fit.quantile * std
+        found[name] = estimate(value, std, (value - half, value + half), UNITS[name], status)
+    return found
 
 
 def _open_covariance(fit: Fit) -> FloatArray:
@@ -324,7 +335,12 @@ def prediction(found: PredictionScore) -> results.TorquePrediction | None:
 def fit_warnings(fit: Fit) -> Iterator[str]:
     """What a user should know about a fit."""
     if fit.note:
-        yield fit.note
+        few = (
+            ""
+            if fit.intervals == "jackknife"
+            else "; what differs from run to run is not in them: give four logs or more"
+        )
+        yield fit.note if fit.intervals == "jackknife" else fit.note + few
     if not fit.converged and not (fit.note or "").startswith("--constrain"):
         yield "the refined estimator did not converge; the weak estimate is reported instead"
     yield from fit.unidentifiable

@@ -49,7 +49,8 @@ def _whiteness(result: Result) -> Table:
     )
     how = {
         "likelihood": "the likelihood, which takes it to be white",
-        "sandwich": "a sandwich, which lets it be coloured",
+        "sandwich": "a sandwich, which lets it be coloured; what differs from run to run is not in it: give four logs",
+        "jackknife": "the larger of a sandwich, which lets it be coloured, and a jackknife over the logs",
     }
     note = f"The intervals rest on {how[result.fit.intervals]}."
     return Table("Whiteness of the residual", columns, rows, note).without_empty()

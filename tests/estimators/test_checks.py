@@ -8,8 +8,9 @@ import pytest
 
 from algid.arm import inverse_dynamics
 from algid.estimators import refined, weak
-from algid.estimators.combine import MOST_BLOCKS, BlockSums, long_run_variance
+from algid.estimators.combine import MOST_BLOCKS, BlockSums, LogInformation, jackknife, long_run_variance
 from algid.estimators.diagnostics import broken_bounds, constrained, payload_distance, term_worths
+from algid.estimators.fit import own_estimates
 from algid.estimators.identifiability import examine
 from algid.estimators.prediction import cross_validate, score
 from algid.estimators.weak import Source, WeakSettings
@@ -129,3 +130,42 @@ def test_long_run_variance_of_an_autoregression() -> None:
     variance, lags = long_run_variance(scores)
     assert lags > 5
     assert variance[0, 0] / noise.size == pytest.approx(1 / (1 - 0.6) ** 2, rel=0.15)  # spectrum at zero
+
+
+def test_the_jackknife_of_a_mean_is_its_standard_error() -> None:
+    """Logs of one coefficient each, alike in information: the variance of a mean in closed form."""
+    rng = np.random.default_rng(0)
+    told = rng.normal(2.0, 0.3, 7)
+    logs = [LogInformation(False, np.array([x]), np.ones((1, 1, 1)), np.zeros((1, 1))) for x in told]
+    without = np.array([np.delete(told, place).mean() for place in range(7)])[:, None]
+    found = jackknife(logs, without)
+    assert found is not None
+    assert found[0, 0] == pytest.approx(told.var(ddof=1) / 7, rel=1e-12)
+    assert jackknife(logs[:3], without[:3]) is None
+
+
+def test_what_differs_from_run_to_run_is_in_the_intervals_of_four_logs(bench: Bench) -> None:
+    """Viscous friction that differs by 10 % from run to run, as with the temperature of the grease."""
+    frictions = 1 + 0.1 * np.random.default_rng(1).standard_normal(5)
+    logs = [bench.log(sigma=1e-3, seed=seed) for seed in range(5)]
+    logs = [
+        replace(log, tau=log.tau + (share - 1) * bench.arm.b1 * np.array([[1.0], [0.0]]) * bench.bare.omega)
+        for log, share in zip(logs, frictions, strict=True)
+    ]
+    sources: list[Source] = [partial(list, [log]) for log in logs]
+    three, five = weak.fit(sources[:3]), weak.fit(sources)
+    assert (three.intervals, five.intervals) == ("sandwich", "jackknife")
+    expected = bench.arm.b1 * frictions.std(ddof=1) / np.sqrt(5)
+    assert 0.5 * expected < five.std[5] < 1.5 * expected  # logs weigh by how well the joint estimate fits them
+    assert abs(five.values[5] - bench.arm.b1) < 3 * five.std[5]
+    own = own_estimates(five)
+    assert np.allclose([one.values[5] for one in own], bench.arm.b1 * frictions, rtol=0.02)
+
+
+def test_friction_that_is_not_there_has_its_error_bar(bench: Bench) -> None:
+    log = bench.log(sigma=1e-3)
+    log = replace(log, tau=log.tau - np.array([[bench.arm.b1], [bench.arm.b2]]) * bench.bare.omega)
+    fit = weak.fit([partial(list, [log])], settings=WeakSettings(Model(("coulomb",))))
+    assert set(fit.status) == {"OK"}
+    assert np.all(np.abs(fit.values[5:]) < 4.5 * fit.std[5:])
+    assert np.all(fit.std[5:] < 0.02)

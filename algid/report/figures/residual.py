@@ -91,7 +91,9 @@ def _note(result: Result) -> str:
         return ""
     white = [name for name, test in result.fit.whiteness.items() if test.white]
     how = (
-        "the intervals allow for that" if result.fit.intervals == "sandwich" else "the intervals do not allow for that"
+        "the intervals allow for that"
+        if result.fit.intervals != "likelihood"
+        else "the intervals do not allow for that"
     )
     if len(white) == len(result.fit.whiteness):
         return "The estimator's test finds the residual white."
