@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from algid.errors import LogError
 from algid.log import Log
 
 if TYPE_CHECKING:
@@ -51,11 +50,9 @@ def open_log(path: str | Path, profile: Profile | None = None) -> TableReader:
         from algid.readers.arrays import open_arrays
 
         return open_arrays(path, kind, profile)
-    if kind == "bag":
-        from algid.readers.bag import open_bag
+    from algid.readers.bag import open_bag
 
-        return open_bag(path, profile)
-    raise LogError(f"{path}: a single {kind} file; open the folder that holds it and its metadata.yaml")
+    return open_bag(path, profile)
 
 
 def _open_bag(path: Path, profile: Profile | None) -> TableReader:

@@ -52,11 +52,13 @@ def _names(folder: Path) -> list[str]:
     with metadata.open("rb") as stream:
         text = stream.read(_LARGEST_METADATA).decode("utf-8", errors="replace")
     _refuse_compressed(folder, text)
-    # the one list that matters, without a YAML package: rosbag2 writes it as a block, one name a line
+    # the one list that matters, without a YAML package: a block, one name a line, or [one, two]
     block = re.search(r"^\s*relative_file_paths:\s*\n((?:\s*-\s*\S.*\n?)+)", text, re.MULTILINE)
-    if block is None:
+    flow = re.search(r"^\s*relative_file_paths:\s*\[([^\]]*)\]", text, re.MULTILINE)
+    if block is None and flow is None:
         raise LogError(f"{metadata}: no relative_file_paths; expected the metadata of a rosbag2 folder")
-    names = [line.strip().removeprefix("-").strip().strip("\"'") for line in block[1].splitlines()]
+    lines = block[1].splitlines() if block else [one for one in flow[1].split(",") if one.strip()] if flow else []
+    names = [line.strip().removeprefix("-").strip().strip("\"'") for line in lines]
     for name in names:
         if Path(name).name != name or name in ("", ".", ".."):
             raise LogError(f"{metadata}: {name[:80]!r} leads outside the bag's folder; expected a file in it")

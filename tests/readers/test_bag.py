@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from algid.errors import LogError
 from algid.log import Log
+from algid.profile import Profile
 from algid.readers import read_log
 from tests.readers.logs import EPOCH_NS, noise_log, same
 
@@ -52,6 +54,55 @@ def test_bags_of_both_generations_read_the_same(tmp_path: Path) -> None:
         found = read_log(tmp_path / name)
         assert same(found, log)
         assert found.origin.mapping["tau2"] == "/joint_states: effort[j2]"
+
+
+def two(folder: Path, topics: tuple[str, ...] = ("/joint_states",)) -> Log:
+    """A rosbag2 folder in SQLite, the same states on each topic."""
+    log = noise_log(200, start_ns=EPOCH_NS)
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    with Writer2(folder, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        channels = [writer.add_connection(topic, TYPE, typestore=store) for topic in topics]
+        for row, stamp in enumerate(log.stamp_ns.tolist()):
+            data = store.serialize_cdr(message(store, log, row, first=False), TYPE)
+            for channel in channels:
+                writer.write(channel, stamp, data)
+    return log
+
+
+def test_a_loose_file_and_a_folder_without_metadata(tmp_path: Path) -> None:
+    log = two(tmp_path / "bag")
+    (file,) = (tmp_path / "bag").glob("*.db3")
+    assert same(read_log(file), log)
+    (tmp_path / "bag" / "metadata.yaml").unlink()
+    assert same(read_log(tmp_path / "bag"), log)
+
+
+def test_topic_and_source_of_a_profile_are_honoured(tmp_path: Path) -> None:
+    log = two(tmp_path / "bag", ("/one", "/two"))
+    assert read_log(tmp_path / "bag", Profile(topic="/two")).origin.reading.topics == ("/two",)
+    crossed = Profile.model_validate(
+        {"topic": "/one", "tau1": {"source": "effort[j2]"}, "tau2": {"topic": "/two", "source": "effort[0]"}}
+    )
+    found = read_log(tmp_path / "bag", crossed)
+    assert found.tau.tolist() == log.tau[::-1].tolist()
+    assert found.origin.mapping["tau2"] == "/two: effort[0]"
+    assert found.origin.reading.topics == ("/one", "/two")
+    recorded = read_log(tmp_path / "bag", Profile(topic="/one", clock="log"))
+    assert recorded.origin.mapping["t"] == "log time"
+    with pytest.raises(LogError, match=r"joints j1, j2.*--topic NAME --joints A,B"):
+        read_log(tmp_path / "bag", Profile(joints=("foo", "bar")))
+    with pytest.raises(LogError, match="no topic holds"):
+        read_log(tmp_path / "bag", Profile(topic="/three"))
+
+
+def test_metadata_may_list_its_files_in_brackets(tmp_path: Path) -> None:
+    log = two(tmp_path / "bag")
+    metadata = tmp_path / "bag" / "metadata.yaml"
+    text = metadata.read_text()
+    flow = re.sub(r"relative_file_paths:\s*\n\s*-\s*(\S+)", r"relative_file_paths: [\1]", text)
+    assert flow != text
+    metadata.write_text(flow)
+    assert same(read_log(tmp_path / "bag"), log)
 
 
 def test_a_damaged_bag_is_refused_in_one_line(tmp_path: Path) -> None:
