@@ -3,10 +3,10 @@
     import algid
 
     unloaded, loaded = algid.synthesise("case1", duration=3.0, excitation="wide")
-    result = algid.identify_logs(unloaded, loaded)
+    result = algid.identify(unloaded, loaded)
     print(result.parameters["k1"].estimate, result.payload["m_p"].ci95)
 
-The names below load what they need when they are first used. (`algid.identify` is the package of estimators.)
+The names below load what they need when they are first used.
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from algid.api import identify_logs, synthesise
+    from algid.api import synthesise
     from algid.arm import Arm
     from algid.errors import AlgidError
+    from algid.identification.identify import identify
     from algid.log import Log
     from algid.readers import read_log
     from algid.results import Result, read_result
@@ -33,7 +34,7 @@ __all__ = [
     "Result",
     "Settings",
     "__version__",
-    "identify_logs",
+    "identify",
     "read_log",
     "read_result",
     "simulate",
@@ -47,13 +48,17 @@ _HOMES = {
     "Log": "algid.log",
     "Result": "algid.results",
     "Settings": "algid.settings",
-    "identify_logs": "algid.api",
+    "identify": "algid.identification.identify",
     "read_log": "algid.readers",
     "read_result": "algid.results",
     "simulate": "algid.synth.simulator",
     "synthesise": "algid.api",
     "write_log": "algid.writers",
 }
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
 
 
 def __getattr__(name: str) -> Any:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from algid.identification.identify import identify as identify_logs
 from algid.log import Log
 from algid.synth import run
 from algid.synth.cases import load_case
 from algid.synth.sensors import Sensors
-
-__all__ = ["identify_logs", "synthesise"]
 
 
 def synthesise(

@@ -93,9 +93,9 @@ TEMPORARY = "algid-"
 """What everything that algid puts into the system's temporary folder starts with."""
 
 
-def result_folder(first_log: str, parent: Path) -> Path:
-    """Where the result of a log goes: `parent/STEM.algid`."""
-    return parent / f"{Path(first_log).stem or 'log'}.algid"
+def result_folder(first_log: str, parent: Path, name: str | None = None) -> Path:
+    """Where the result of a log goes: `parent/NAME.algid`, NAME the log's stem by default."""
+    return parent / f"{Path(first_log).stem or 'log' if name is None else name}.algid"
 
 
 def refuse_existing(folder: Path, force: bool) -> None:

@@ -137,6 +137,25 @@ def with_settings(profile: Profile, settings: Mapping[str, Any]) -> Profile:
     return found
 
 
+def over(profile: Profile | None, earlier: Mapping[str, Any]) -> Profile | None:
+    """The profile of an earlier result, as that holds it, with what `profile` sets over it; None where neither is.
+
+    Raises
+    ------
+    SettingError
+        If the earlier one cannot be used.
+    """
+    if not earlier:
+        return profile
+    known = with_settings(Profile(), earlier)
+    known._flags = frozenset()
+    if profile is None:
+        return known
+    found = with_settings(known, profile.model_dump(exclude_unset=True))
+    found._flags = profile._flags
+    return found
+
+
 def _places(name: str, value: object) -> list[str]:
     return [f"{name}.{inner}" for inner in value] if isinstance(value, Mapping) else [name]
 

@@ -1,13 +1,16 @@
 """What an identification found: the one source of every table, file and page that shows it.
 
-A `Result` is written as `result.json` (schema version 1) and read back; JSON Schema comes from the models.
+A `Result` is written as `result.json` (schema version 2; version 1 is still read) and read back; JSON Schema comes
+from the models.
 Numbers that do not exist (NaN) are null; an unbounded interval is ``[null, null]``. Nothing in a result depends
 on when it was made, so that the same log and settings give the same bytes.
 """
 
 from __future__ import annotations
 
+import html
 import json
+from collections.abc import Iterator
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, Literal
@@ -17,7 +20,9 @@ from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from algid.errors import ResultError
 from algid.files import first_misfit, whole_file
 
-SCHEMA_VERSION: Literal[1] = 1
+SCHEMA_VERSION: Literal[2] = 2
+READABLE = (1, 2)
+"""Versions that are read; what the first one did not hold has its default."""
 
 
 class Status(StrEnum):
@@ -61,10 +66,64 @@ class Table4Row(_Model):
     paper_error_percent: float | None = None
 
 
-class LogSummary(_Model):
-    """A log that was used: first stamp in ns, duration in s, rate in Hz, each signal's channel.
+class ChannelRecord(_Model):
+    """How one channel was read: algid's value is `factor` times the recorded one, in `unit`, plus `offset` in SI.
 
-    `sha256` is null where only what was needed of a log was fetched from an object store.
+    `told` is who said so: a flag, a profile, the channel's name, or nobody ("assumed").
+    """
+
+    source: str
+    unit: str
+    told: str = "assumed"
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+class LogReading(_Model):
+    """How a log was read: see `algid.log.Reading`, whose fields these are."""
+
+    channels: dict[str, ChannelRecord] = {}
+    joints: tuple[str, str] | None = None
+    joints_told: str | None = None
+    topics: list[str] = []
+    clock: str | None = None
+    time_unit: str | None = None
+    zero: str = "horizontal"
+    second_angle: str = "relative"
+    unwrap: tuple[bool, bool] = (False, False)
+    start: float | None = None
+    end: float | None = None
+    accepted: list[str] = []
+
+    def differences(self, other: LogReading) -> Iterator[str]:
+        """What decides the estimates and is read otherwise here than in `other`, in clauses."""
+        for name in ("zero", "second_angle", "joints"):
+            mine, others = getattr(self, name), getattr(other, name)
+            if mine != others and mine is not None and others is not None:
+                yield f"{name} {_words(mine)} instead of {_words(others)}"
+        for name in self.channels.keys() & other.channels.keys():
+            mine, others = self.channels[name], other.channels[name]
+            if mine.unit != others.unit:
+                yield f"{name} in {mine.unit} instead of {others.unit}"
+            if mine.factor * others.factor < 0:
+                yield f"{name} with the other sign"
+            if abs(mine.offset - others.offset) > SAME_OFFSET:
+                yield f"{name} offset by {mine.offset:.6g} instead of {others.offset:.6g}"
+
+
+def _words(value: str | tuple[str, str]) -> str:
+    return value if isinstance(value, str) else ",".join(value)
+
+
+SAME_OFFSET = 1e-9
+"""rad or N m: offsets this close are one, written in different units."""
+
+
+class LogSummary(_Model):
+    """A log that was used: first stamp in ns, duration in s, rate in Hz, each signal's channel, how it was read.
+
+    `sha256` is null where only what was needed of a log was fetched from an object store. `reading` is null in
+    results of schema version 1.
     """
 
     path: str
@@ -76,6 +135,7 @@ class LogSummary(_Model):
     duration: float
     rate: float
     mapping: dict[str, str]
+    reading: LogReading | None = None
 
 
 class Whiteness(_Model):
@@ -87,11 +147,26 @@ class Whiteness(_Model):
 
 
 class TermCriterion(_Model):
-    """Whether an optional term of the model earned its place: change of the criterion, negative is better."""
+    """Whether an optional term of the model earned its place: change of the criterion, negative is better.
+
+    Where the terms were chosen automatically, `gain_heldout` is by how much the term lowers the squared error of
+    torque that was held out, as a share, `evidence` the log of the odds for it, and `why` says what decided.
+    """
 
     term: str
-    delta_bic: float
+    delta_bic: float | None = None
     kept: bool
+    gain_heldout: float | None = None
+    evidence: float | None = None
+    why: str = ""
+
+
+class Endogeneity(_Model):
+    """Whether the regressors correlate with the error, as feedback makes them: a joint's statistic and p-value."""
+
+    statistic: float
+    p_value: float | None
+    endogenous: bool
 
 
 class Bound(_Model):
@@ -117,7 +192,7 @@ class FitSummary(_Model):
     `noise` holds the standard deviations theta1, theta2 (rad), tau1, tau2 (N m); `covariance` belongs to
     `covariance_names`; `intervals` says what the intervals rest on (white noise, blocks of the logs, or the larger of
     those and of the jackknife over logs); `by_log` is what each log tells by itself; `unidentifiable` says in words
-    which directions the logs do not determine.
+    which directions the logs do not determine; `endogeneity` goes by joint.
     """
 
     noise: dict[str, float]
@@ -133,6 +208,7 @@ class FitSummary(_Model):
     by_log: list[dict[str, Estimate]] = []
     residual: TorquePrediction | None = None
     cross_validation: TorquePrediction | None = None
+    endogeneity: dict[str, Endogeneity] = {}
 
     @model_validator(mode="after")
     def _covariance_is_square(self) -> FitSummary:
@@ -153,10 +229,11 @@ class Result(_Model):
     """The outcome of one identification.
 
     `truth` holds what a synthetic log was made with, by parameter; `causes` what probably lies behind a poor
-    result, the most likely one first.
+    result, the most likely one first; `profile` what the user said about the logs, in a profile's words. How each
+    log was read in the end stands in its `reading`.
     """
 
-    schema_version: Literal[1] = SCHEMA_VERSION
+    schema_version: Literal[2] = SCHEMA_VERSION
     version: str
     estimator: str
     parameters: dict[str, Estimate]
@@ -167,6 +244,7 @@ class Result(_Model):
     truth: dict[str, float] = {}
     fit: FitSummary | None = None
     settings: dict[str, Any]
+    profile: dict[str, Any] = {}
     log: LogSummary
     more_logs: list[LogSummary] = []
     data_lost: bool = False
@@ -188,6 +266,35 @@ class Result(_Model):
         """Whether every estimate has status OK."""
         return all(estimate.status is Status.OK for estimate in self.estimates.values())
 
+    def __str__(self) -> str:
+        rows = [("parameter", "estimate", "std", "unit", "status"), *self._rows()]
+        widths = [max(len(row[column]) for row in rows) for column in range(5)]
+        lines = [f"{self.estimator} estimate from {ascii(self.log.path)[1:-1]}{self._others}"]
+        for row in rows:
+            name, value, std, unit, status = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+            numbers = (cell.strip().rjust(len(cell)) for cell in (value, std))
+            lines.append("  ".join((name, *numbers, unit, status)).rstrip())
+        return "\n".join(lines)
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        """For notebooks."""
+        heading, *rows = [("Parameter", "Estimate", "± std", "Unit", "Status"), *self._rows()]
+        head = "".join(f"<th>{cell}</th>" for cell in heading)
+        body = "".join(f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
+        title = html.escape(f"{self.estimator} estimate from {ascii(self.log.path)[1:-1]}{self._others}")
+        return f"<table><caption>{title}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+    @property
+    def _others(self) -> str:
+        return f" and {len(self.more_logs)} more" if self.more_logs else ""
+
+    def _rows(self) -> Iterator[tuple[str, str, str, str, str]]:
+        for name, found in self.estimates.items():
+            value = "-" if found.estimate is None else f"{found.estimate:.6g}"
+            yield name, value, "-" if found.std is None else f"{found.std:.2g}", found.unit, found.status.value
+
 
 def result_schema() -> dict[str, Any]:
     """JSON Schema of `result.json`."""
@@ -205,14 +312,25 @@ def write_result(result: Result, path: Path) -> None:
         temporary.write_text(result_json(result), encoding="utf-8")
 
 
-def read_result(path: Path) -> Result:
-    """Read the result file `path`, or `path/result.json` where `path` is a folder.
+def read_result(path: str | Path) -> Result:
+    """Read a result.
+
+    Parameters
+    ----------
+    path : str or Path
+        The result file, or the folder that holds its `result.json`.
+
+    Returns
+    -------
+    Result
+        One of schema version 1 comes back as of version 2.
 
     Raises
     ------
     ResultError
         If it is missing, not a result, or of another schema version.
     """
+    path = Path(path)
     file = path / "result.json" if path.is_dir() else path
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
@@ -221,11 +339,12 @@ def read_result(path: Path) -> Result:
     except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise ResultError(f"{file}: not JSON ({error}); expected a result of algid identify") from error
     found = content.get("schema_version") if isinstance(content, dict) else None
-    if found != SCHEMA_VERSION:
+    if found not in READABLE:
+        known = " or ".join(map(str, READABLE))
         raise ResultError(
-            f"{file}: schema_version: expected {SCHEMA_VERSION}, found {found!r}; identify again with this version"
+            f"{file}: schema_version: expected {known}, found {found!r}; identify again with this version"
         )
     try:
-        return Result.model_validate(content)
+        return Result.model_validate(content | {"schema_version": SCHEMA_VERSION})
     except ValidationError as error:
         raise ResultError(f"{file}: {first_misfit(error)}; identify again with this version") from error

@@ -10,7 +10,7 @@ ALGID := $(BIN)/algid
 demo: setup
 	@rm -rf $(DEMO)
 	@for case in $(CASES); do \
-	  $(ALGID) synth $$case -o $(DEMO) >/dev/null && \
+	  $(ALGID) synth --force $$case -o $(DEMO) >/dev/null && \
 	  for estimator in paper refined; do \
 	    $(ALGID) identify $(DEMO)/$$case-unloaded.mcap --loaded $(DEMO)/$$case-loaded.mcap \
 	      --estimator $$estimator -o $(DEMO)/$$estimator --quiet || exit; \
@@ -26,7 +26,7 @@ define PIPELINE
 pipeline-$(1)-$(2): setup
 	@echo "== $(1) $(2)"
 	@rm -rf $(PIPELINES)/$(1)-$(2)
-	@$(ALGID) synth $(1) --format $(2) -o $(PIPELINES)/$(1)-$(2) >/dev/null
+	@$(ALGID) synth --force $(1) --format $(2) -o $(PIPELINES)/$(1)-$(2) >/dev/null
 	@for estimator in paper refined; do \
 	  $(ALGID) identify $(PIPELINES)/$(1)-$(2)/$(1)-unloaded.$(2) \
 	    --loaded $(PIPELINES)/$(1)-$(2)/$(1)-loaded.$(2) --estimator $$$$estimator \
@@ -41,6 +41,6 @@ $(foreach case,$(CASES),$(foreach format,$(FORMATS),$(eval $(call PIPELINE,$(cas
 .PHONY: pictures
 pictures: setup
 	@rm -rf build/pictures
-	@$(ALGID) synth case1 --torque wide --duration 10 --position-noise 1e-3 --torque-noise 1e-2 -o build/pictures >/dev/null
+	@$(ALGID) synth --force case1 --torque wide --duration 10 --position-noise 1e-3 --torque-noise 1e-2 -o build/pictures >/dev/null
 	@$(ALGID) identify build/pictures/case1-unloaded.mcap --loaded build/pictures/case1-loaded.mcap -o build/pictures -q
 	$(BIN)/python -m pipelines.pictures build/pictures/case1-unloaded.algid -o data/pictures

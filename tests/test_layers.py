@@ -44,7 +44,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "signals table4",
         "numpy pyarrow",
     ),
-    "api": room("identification log synth"),
+    "api": room("log synth"),
     "batch": room(
         "errors files identification profile readers report results runtime settings stores",
         "distributed mcap polars pyarrow",

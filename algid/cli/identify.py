@@ -24,6 +24,7 @@ def identify(
         list[Path] | None, typer.Option(help="A log of the arm with its payload; may be repeated.")
     ] = None,
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the result folder LOG.algid.")] = Path(),
+    name: Annotated[str | None, typer.Option(help="Of the result folder, NAME.algid; LOG's name by default.")] = None,
     parameters: Annotated[
         Path | None, typer.Option(help="Result of the arm identified before: then LOGS are of the loaded arm.")
     ] = None,
@@ -43,8 +44,10 @@ def identify(
     import shlex
 
     from algid.errors import SettingError
+    from algid.files import result_folder
     from algid.identification.identify import identify as run
     from algid.report.progress import progress
+    from algid.report.text import visible
     from algid.report.verdict import verdict
     from algid.runtime import keep_freed
 
@@ -61,6 +64,7 @@ def identify(
             parameters=parameters,
             profile=choice.profile(),
             out=out,
+            name=name,
             force=force,
             report=report,
             export=export is not None,
@@ -68,16 +72,16 @@ def identify(
             told=told,
         )
     if verbose:
-        _tell(result, out)
+        _tell(result)
     if not quiet:
         print_result(result, output)
+        typer.echo(f"wrote {visible(str(result_folder(result.log.path, out, name)))}", err=True)
     if not result.complete or result.data_lost or verdict(result).level == "failed":
         raise typer.Exit(EXIT_INCOMPLETE)
 
 
-def _tell(result: Result, out: Path) -> None:
-    """What was read, how, and where the result went, on standard error."""
-    from algid.files import result_folder
+def _tell(result: Result) -> None:
+    """What was read, and how, on standard error."""
     from algid.report.text import visible
 
     for log in result.logs:
@@ -87,4 +91,3 @@ def _tell(result: Result, out: Path) -> None:
             print(visible(f"  {signal} from {source}"), file=sys.stderr)
     for name, value in result.settings.items():
         print(visible(f"{name} = {value}"), file=sys.stderr)
-    print(visible(f"written: {result_folder(result.log.path, out)}"), file=sys.stderr)

@@ -63,6 +63,7 @@ def synth(
     jitter: Annotated[float, typer.Option(help="Jitter of the stamps, s (standard deviation).", min=0)] = 0.0,
     drop: Annotated[float, typer.Option(help="Share of samples lost at random.", min=0, max=0.9)] = 0.0,
     seed: Annotated[int, typer.Option(help="Seed of noise, jitter and losses.", min=0)] = 0,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite logs that are there.")] = False,
     payload_schedule: Annotated[
         str | None, typer.Option(help="One log instead, its payload changing: S=KG,…, like 2=0.05,4=0; bare before.")
     ] = None,
@@ -73,6 +74,7 @@ def synth(
 
     Example: algid synth case1 -o logs --position-noise 1e-3 --torque-noise 1e-2 --duration 10 --torque wide
     """
+    from algid.files import refuse_existing
     from algid.report.progress import progress
     from algid.synth.cases import load_case
     from algid.synth.run import EXCITATIONS, Recording, held, synthesise
@@ -90,6 +92,8 @@ def synth(
     drive = _torque(described, torque, torque_hold)
     if torque_hold is not Hold.EXACT and torque in EXCITATIONS:
         drive = held(drive, rate, duration, "zoh" if torque_hold is Hold.ZOH else "foh")
+    for role in ("unloaded", "loaded") if payload_schedule is None else ("schedule",):
+        refuse_existing(out / f"{described.name}-{role}.{kind.value}", force)
     with progress("samples") as told:
         if payload_schedule is None:
             logs: tuple[Log, ...] = synthesise(described, drive, recording, told)

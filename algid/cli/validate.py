@@ -28,19 +28,23 @@ def validate(
 
     Example: algid validate run1-unloaded.algid run2-unloaded.mcap --max-nrmse 0.3
     """
-    from algid.identification.source import Survey, open_sources
+    from algid.identification.identify import reused
+    from algid.identification.source import Survey, open_sources, read_otherwise
     from algid.identification.validate import validate as judge
     from algid.report.progress import progress
+    from algid.report.text import visible
     from algid.results import read_result
 
-    meaning = choice.profile()
     known = read_result(result)
+    meaning = reused(choice.profile(), known)
     gravity = float(known.settings.get("gravity", 9.81))
     sources = open_sources(logs, "unloaded", meaning, gravity) + open_sources(loaded, "loaded", meaning, gravity)
     with progress("samples") as told:
         survey = Survey(sources, told)
         survey.begin("prediction")
         found = judge(known, survey, str(result))
+    for warning in read_otherwise([survey.summary(log) for log in survey.logs], known, str(result)):
+        typer.echo(f"algid: {visible(warning)}", err=True)
     for name, one in {**found.logs, "all logs": found.total}.items():
         print(_line(name, one))
     if found.total is not None:

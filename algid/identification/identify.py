@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from algid.estimators.paper import SHORTEST
 from algid.files import remove_stale, result_folder, whole_folder
 from algid.identification.by_paper import run_paper
 from algid.identification.series import write_fit_series
-from algid.identification.source import LogLike, LogSource, Survey, open_sources
+from algid.identification.source import LogLike, LogSource, Survey, open_sources, read_otherwise
 from algid.identification.summary import Outcome, result_of
 from algid.progress import Told
 from algid.results import Result, read_result, write_result
@@ -36,7 +36,7 @@ class Earlier:
     file: str
 
     @classmethod
-    def of(cls, parameters: Result | Path | None) -> Earlier | None:
+    def of(cls, parameters: Result | str | Path | None) -> Earlier | None:
         """The result itself, or that of a file."""
         if parameters is None or isinstance(parameters, Result):
             return None if parameters is None else cls(parameters, parameters.log.path)
@@ -48,9 +48,9 @@ def identify(
     loaded: LogLike | Iterable[LogLike] | None = None,
     settings: Settings | None = None,
     *,
-    parameters: Result | Path | None = None,
+    parameters: Result | str | Path | None = None,
     profile: Profile | None = None,
-    out: Path | None = None,
+    out: str | Path | None = None,
     name: str | None = None,
     force: bool = False,
     report: bool = True,
@@ -69,7 +69,7 @@ def identify(
     parameters : Result or path of one
         An arm identified before; then no unloaded log is needed.
     profile : Profile
-        What the logs' names, units and signs mean.
+        What the logs' names, units and signs mean; where it is silent, what was said of the earlier result's logs.
     out : Path
         Folder to write into; None writes nothing.
     name : str
@@ -94,25 +94,27 @@ def identify(
     ValueError
         If there is neither an unloaded log nor `parameters`.
     """
-    settings = settings or Settings()
+    settings, out = settings or Settings(), None if out is None else Path(out)
     earlier = Earlier.of(parameters)
+    profile = profile if earlier is None else reused(profile, earlier.result)
     sources = [
         *open_sources(unloaded, "unloaded", profile, settings.gravity),
         *open_sources(loaded, "loaded", profile, settings.gravity),
     ]
     survey = Survey(sources, told)
+    said = {} if profile is None else profile.model_dump(mode="json", exclude_unset=True)
     if not survey.unloaded and (earlier is None or not survey.loaded):
         raise ValueError("an unloaded log is needed, or parameters and a loaded log")
     if settings.cross_validate and (len(survey.unloaded) == 1 or len(survey.loaded) == 1):
         kind = "unloaded" if len(survey.unloaded) == 1 else "loaded"
         raise SettingError(f"--cross-validate: expected two {kind} logs or more, found one; give more, or leave it out")
     if out is None:
-        return _identify(survey, settings, earlier, None, report)
-    folder = result_folder(sources[0].name, out) if name is None else out / f"{name}.algid"
+        return _complete(_identify(survey, settings, earlier, None, report), earlier, said)
+    folder = result_folder(sources[0].name, out, name)
     if name is None:  # a batch sweeps its whole output once
         remove_stale(folder)
     with whole_folder(folder, force) as temporary:
-        result = _identify(survey, settings, earlier, temporary, report)
+        result = _complete(_identify(survey, settings, earlier, temporary, report), earlier, said)
         if command is not None:
             result = result.model_copy(update={"settings": result.settings | {"command": command}})
         write_result(result, temporary / "result.json")
@@ -121,6 +123,19 @@ def identify(
         if export:
             _export(temporary, told)
     return result
+
+
+def reused(profile: Profile | None, earlier: Result) -> Profile | None:
+    """What the user says about logs, and where that is silent what was said of the earlier result's."""
+    from algid.profile import over
+
+    return over(profile, earlier.profile)
+
+
+def _complete(result: Result, earlier: Earlier | None, said: dict[str, Any]) -> Result:
+    """The result with what the user said about its logs, and a warning where they were read otherwise than before."""
+    otherwise = [] if earlier is None else read_otherwise(result.logs, earlier.result, earlier.file)
+    return result.model_copy(update={"profile": said, "warnings": [*otherwise, *result.warnings]})
 
 
 def _identify(survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None, report: bool) -> Result:

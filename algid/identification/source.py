@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
 from functools import partial
 from itertools import chain
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Literal
 
 from algid.errors import LogError
-from algid.log import Log, Notice, Origin
+from algid.log import Log, Notice, Origin, Reading
 from algid.progress import Told
-from algid.results import LogSummary
+from algid.results import ChannelRecord, LogReading, LogSummary, Result
 from algid.runtime import Beside, ahead
 from algid.signals.segments import Segment, segments
 
@@ -212,6 +212,7 @@ class Survey:
             duration=duration,
             rate=(seen.rows - 1) / duration if duration > 0 else 0.0,
             mapping=dict(log.origin.mapping),
+            reading=_reading(log.origin.reading),
         )
 
     def _sha256(self, log: LogSource) -> str | None:
@@ -265,6 +266,26 @@ class Survey:
         self._done[log] = rows
         expected = [self._seen[one].rows if one in self._seen else one.promised for one in self._over]
         self.told(words, sum(self._done.values()), sum(expected) if all(expected) else 0)
+
+
+def _reading(reading: Reading) -> LogReading:
+    return LogReading(
+        **{f.name: getattr(reading, f.name) for f in fields(reading) if f.name != "channels"},
+        channels={name: ChannelRecord(**asdict(one)) for name, one in reading.channels.items()},
+    )
+
+
+def read_otherwise(logs: Sequence[LogSummary], earlier: Result, file: str) -> list[str]:
+    """Warnings of logs that were read otherwise than those of an earlier result, which `file` holds."""
+    before = earlier.log.reading
+    if before is None:
+        return []
+    told = []
+    for log in logs:
+        differences = sorted(log.reading.differences(before)) if log.reading else []
+        if differences:
+            told.append(f"{PurePath(log.path).name}: read otherwise than the log of {file}: {', '.join(differences)}")
+    return told
 
 
 def _with_end(blocks: Iterator[Log], promised: int) -> Iterator[tuple[Log, bool]]:

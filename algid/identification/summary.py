@@ -92,6 +92,7 @@ def _truth(logs: Sequence[LogSource]) -> tuple[Truth | None, float | None]:
 
 def _notices(notices: Sequence[tuple[str, Notice]]) -> list[str]:
     """What was noticed in the logs, by their names: each loss, and of the rest the first of each kind."""
+    notices = [(PurePath(path).name, notice) for path, notice in notices]  # the paths stand among the logs
     losses = [f"{name}: {notice.text}" for name, notice in notices if notice.lossy]
     alike: dict[str, list[tuple[str, str]]] = {}
     for name, notice in notices:
@@ -102,7 +103,7 @@ def _notices(notices: Sequence[tuple[str, Notice]]) -> list[str]:
 
 def _one_for_all(found: Sequence[tuple[str, str]]) -> str:
     (name, text), *others = found
-    names = list(dict.fromkeys(PurePath(other).name for other, _ in others if other != name))
+    names = list(dict.fromkeys(other for other, _ in others if other != name))
     if not names:
         return f"{name}: {text}" + (f" (and {len(others)} more of the kind)" if others else "")
     more = ", …" if len(names) > NAMED else ""

@@ -136,11 +136,24 @@ def _change(first: Estimate | None, other: Estimate | None) -> str:
     return f"{100 * (other.estimate - first.estimate) / abs(first.estimate):+.3g}"
 
 
+def _readings(result: Result) -> dict[str, str]:
+    """How the first log of each kind was read, by dotted names."""
+    firsts = {log.role: log for log in reversed(result.logs)}
+    return {
+        f"{role} log: {name}": value
+        for role, log in firsts.items()
+        if log.reading is not None
+        for name, value in flat_settings(log.reading.model_dump()).items()
+    }
+
+
 def _settings(results: Sequence[Result], labels: list[str]) -> Table:
-    every = [{**flat_settings(r.settings), "estimator": r.estimator, "algid": r.version} for r in results]
+    every = [
+        {**flat_settings(r.settings), "estimator": r.estimator, "algid": r.version, **_readings(r)} for r in results
+    ]
     names = dict.fromkeys(name for settings in every for name in settings)
     differing = [name for name in names if len({settings.get(name) for settings in every}) > 1]
     rows = tuple((visible(n), *(visible(settings.get(n, ABSENT)) for settings in every)) for n in differing)
     columns = (Column("Setting", "name"), *(Column(label, "text") for label in labels))
-    note = "" if rows else "Every setting is the same."
+    note = "" if rows else "Every setting is the same, and every log was read the same way."
     return Table("Settings that differ", columns, rows, note)

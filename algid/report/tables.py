@@ -14,7 +14,7 @@ from algid.report.series import TorqueLog
 from algid.report.table import Column, Table
 from algid.report.text import ABSENT, digits_of, file_name, interval, percent, resolved, significant, unit_text, visible
 from algid.report.verdict import replaced_estimator, verdict
-from algid.results import Estimate, LogSummary, Result, Table4Row, TorquePrediction
+from algid.results import Estimate, LogSummary, Result, Table4Row, TermCriterion, TorquePrediction
 
 LONGEST_VALUE = 4_000  # characters: a command that names many logs is there to be copied
 
@@ -58,9 +58,28 @@ def _whiteness(result: Result) -> Table:
 
 def _terms(result: Result) -> Table:
     assert result.fit is not None
-    rows = tuple((visible(t.term), f"{t.delta_bic:+.1f}", "yes" if t.kept else "no") for t in result.fit.terms)
-    columns = (Column("Term", "name"), Column("Change of BIC", "number"), Column("Kept", "text"))
-    return Table("Terms tried", columns, rows, "A negative change says that the term earns its place.")
+    rows = tuple(_term_row(term) for term in result.fit.terms)
+    columns = (
+        Column("Term", "name"),
+        Column("Change of BIC", "number"),
+        Column("Held-out error, %", "number"),
+        Column("Log odds", "number"),
+        Column("Kept", "text"),
+        Column("Why", "text"),
+    )
+    note = "A negative change says that the term earns its place."
+    return Table("Terms tried", columns, rows, note).without_empty()
+
+
+def _term_row(term: TermCriterion) -> tuple[str, ...]:
+    return (
+        visible(term.term),
+        ABSENT if term.delta_bic is None else f"{term.delta_bic:+.1f}",
+        ABSENT if term.gain_heldout is None else f"{-100 * term.gain_heldout:+.2f}",
+        ABSENT if term.evidence is None else f"{term.evidence:+.1f}",
+        "yes" if term.kept else "no",
+        visible(term.why),
+    )
 
 
 def _bounds(result: Result) -> Table:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from algid import __version__
 from algid.errors import LogError
-from algid.identification.source import LogLike, Survey, open_source
+from algid.identification.identify import reused
+from algid.identification.source import LogLike, Survey, open_source, read_otherwise
 from algid.report.verdict import verdict
 from algid.results import read_result
 from algid.runtime import one_blas_thread
@@ -41,7 +42,7 @@ def track_log(
     l1, l2 : float, m
         Link lengths; the result's by default.
     profile : Profile
-        What the log's names, units and signs mean.
+        What the log's names, units and signs mean; where it is silent, what was said of the result's logs.
     settings : mapping
         What else the result should tell of the call.
 
@@ -53,7 +54,7 @@ def track_log(
         If the result cannot be read, or leaves a constant or a link length open.
     """
     result = read_result(parameters)
-    source = open_source(log, "loaded", profile, result.settings.get("gravity", 9.81), changing=True)
+    source = open_source(log, "loaded", reused(profile, result), result.settings.get("gravity", 9.81), changing=True)
     survey = Survey([source])
     first = next(survey.segments(source), None)
     if first is None:
@@ -64,6 +65,7 @@ def track_log(
             found = track(partial(survey.segments, source), arm, covariance)
     except ValueError as error:
         raise LogError(f"{source.name}: {error}; record longer") from error
+    otherwise = read_otherwise([survey.summary(source)], result, str(parameters))
     truth, notices = source.origin.truth, survey.seen(source).notices
     judged = verdict(result)
     return TrackResult(
@@ -75,7 +77,7 @@ def track_log(
         settings={"l1": arm.l1, "l2": arm.l2, "gravity": arm.model.gravity, **(settings or {})},
         version=__version__,
         schedule=None if truth is None else truth.schedule or ((0.0, truth.payload),),
-        warnings=tuple(notice.text for notice in notices),
+        warnings=(*otherwise, *(notice.text for notice in notices)),
         data_lost=any(notice.lossy for notice in notices),
     )
 

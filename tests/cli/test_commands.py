@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 import signal
 import subprocess
 import sys
@@ -77,7 +79,7 @@ def test_verbose_tells_on_stderr_what_was_read_and_how(logs: Path, tmp_path: Pat
     assert json.loads(found.out)["estimator"] == "refined"
     assert "2001 samples" in found.err
     assert "  theta1 from theta1" in found.err
-    assert f"written: {tmp_path / 'case1-unloaded.algid'}" in found.err
+    assert f"wrote {tmp_path / 'case1-unloaded.algid'}" in found.err
 
 
 def test_help_has_an_example_for_every_command() -> None:
@@ -200,6 +202,58 @@ def test_a_failed_result_ends_with_three_and_says_what_to_run(logs: Path, tmp_pa
     assert any(line.startswith("Likely cause: ") for line in lines[1:4])
     assert f"Run first:    algid inspect {tmp_path / 'wrong.csv'}" in lines
     assert " OK " not in found.out
+
+
+def test_synth_overwrites_nothing_unless_forced(tmp_path: Path) -> None:
+    call = ("synth", "case1", "-o", tmp_path, "--duration", "0.1", "--format", "csv")
+    assert Outcome(*call).code == 0
+    (tmp_path / "case1-unloaded.csv").unlink()
+    (tmp_path / "case1-loaded.csv").write_text("mine")
+    refused = Outcome(*call)
+    assert (refused.code, refused.err.count("\n")) == (2, 1)
+    assert "case1-loaded.csv: exists already" in refused.err
+    assert not (tmp_path / "case1-unloaded.csv").exists()
+    assert (tmp_path / "case1-loaded.csv").read_text() == "mine"
+    assert Outcome(*call, "--force").code == 0
+    assert (tmp_path / "case1-loaded.csv").read_text() != "mine"
+
+
+def test_identify_says_where_it_wrote_and_takes_a_name(logs: Path, tmp_path: Path) -> None:
+    call = ("identify", logs / "case1-unloaded.csv", "-o", tmp_path, "--name", "monday", "--no-report")
+    found = Outcome(*call, "--estimator", "weak")
+    assert found.code == 0, found.err
+    assert found.err == f"wrote {tmp_path / 'monday.algid'}\n"
+    assert (tmp_path / "monday.algid" / "result.json").exists()
+
+
+def test_how_a_log_was_read_is_reused_and_compared(logs: Path, tmp_path: Path) -> None:
+    """θ1 of the log counts from hanging: said once, for the arm; its later logs are read the same way."""
+    hanging = {
+        role: pl.read_csv(logs / f"case1-{role}.csv").with_columns(pl.col("theta1") + math.pi / 2)
+        for role in ("unloaded", "loaded")
+    }
+    for role, table in hanging.items():
+        table.drop("omega1", "omega2").write_csv(tmp_path / f"{role}.csv")
+    quick = ("-o", tmp_path, "--estimator", "weak", "--no-report", "--format", "json")
+    arm = Outcome("identify", tmp_path / "unloaded.csv", *quick, "--zero", "hanging")
+    assert arm.code == 0, arm.err
+    content = json.loads(arm.out)
+    assert content["profile"] == {"zero": "hanging"}
+    assert content["log"]["reading"]["zero"] == "hanging"
+    known = ("--parameters", tmp_path / "unloaded.algid")
+    alike = Outcome("identify", *known, tmp_path / "loaded.csv", *quick)
+    assert json.loads(alike.out)["log"]["reading"]["zero"] == "hanging"
+    assert json.loads(alike.out)["payload"]["m_p"]["estimate"] == pytest.approx(0.3515, rel=0.02)
+    other = Outcome("identify", *known, tmp_path / "loaded.csv", *quick, "--zero", "horizontal", "--name", "other")
+    (warning,) = [w for w in json.loads(other.out)["warnings"] if "read otherwise" in w]
+    assert "zero horizontal instead of hanging" in warning
+    good = Outcome("validate", tmp_path / "unloaded.algid", tmp_path / "unloaded.csv")
+    assert min(map(float, re.findall(r"R² (\S+?)[;\s]", good.out))) > 0.999
+    assert good.err == ""
+    wrong = Outcome("validate", tmp_path / "unloaded.algid", tmp_path / "unloaded.csv", "--zero", "horizontal")
+    assert "zero horizontal instead of hanging" in wrong.err
+    compared = Outcome("compare", tmp_path / "loaded.algid", tmp_path / "other.algid", "--format", "json")
+    assert json.loads(compared.out)["settings"]["loaded log: zero"] == ["hanging", "horizontal"]
 
 
 def test_replayed_torque_gives_the_same_motion(logs: Path, tmp_path: Path) -> None:

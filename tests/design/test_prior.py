@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from algid import api
+import algid
 from algid.design.belief import SURE
 from algid.design.criterion import asked_for
 from algid.design.prior import Knowns, prior_of
@@ -19,8 +19,8 @@ from algid.synth.sensors import Sensors
 
 @pytest.fixture(scope="module")
 def result() -> Result:
-    logs = api.synthesise("case1", duration=2.0, rate=500.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
-    return api.identify_logs(*logs)
+    logs = algid.synthesise("case1", duration=2.0, rate=500.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
+    return algid.identify(*logs)
 
 
 def saved(result: Result, folder: Path, **changes: object) -> str:
@@ -73,9 +73,9 @@ def test_an_impossible_arm_is_refused(result: Result, tmp_path: Path) -> None:
 
 
 def test_friction_of_a_real_arm_is_planned_for_and_what_cannot_be_is_said(tmp_path: Path) -> None:
-    logs = api.synthesise("case1", duration=2.0, rate=500.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
+    logs = algid.synthesise("case1", duration=2.0, rate=500.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
     settings = Settings(friction="coulomb", torque_offset=True)
-    belief = prior_of(saved(api.identify_logs(*logs, settings), tmp_path), None, Knowns()).belief
+    belief = prior_of(saved(algid.identify(*logs, settings), tmp_path), None, Knowns()).belief
     assert {"f1", "f2", "o1", "o2"} <= set(belief.shared.names)
     asked = asked_for(belief, None, "it")
     places = [belief.shared.names.index(name) for name in ("o1", "o2")]

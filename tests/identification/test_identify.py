@@ -68,7 +68,7 @@ def test_folder_holds_schema_valid_result_and_flat_series(tmp_path: Path, wide: 
     folder = tmp_path / "case1-unloaded.algid"
     content = json.loads((folder / "result.json").read_text())
     jsonschema.validate(content, result_schema())
-    assert content["schema_version"] == 1
+    assert content["schema_version"] == 2
     assert read_result(folder) == result
     series = pl.read_parquet(folder / "estimates.parquet")
     assert series.columns[0] == "t"
@@ -145,8 +145,8 @@ def test_settings_that_the_paper_lacks_are_refused() -> None:
 def test_other_schema_versions_are_refused(tmp_path: Path, wide: tuple[Log, Log]) -> None:
     identify(wide[0], None, PAPER, out=tmp_path, report=False)
     file = tmp_path / "case1-unloaded.algid" / "result.json"
-    file.write_text(file.read_text().replace('"schema_version": 1', '"schema_version": 7'))
-    with pytest.raises(ResultError, match="expected 1, found 7"):
+    file.write_text(file.read_text().replace('"schema_version": 2', '"schema_version": 7'))
+    with pytest.raises(ResultError, match="expected 1 or 2, found 7"):
         read_result(file)
 
 

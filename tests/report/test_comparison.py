@@ -20,7 +20,10 @@ def test_only_settings_that_differ_are_shown(result: Result) -> None:
     other = result.model_copy(update={"settings": {**result.settings, "window": 4.0}, "estimator": "weak"})
     rows = compare([result, other], ["a", "b"]).settings.rows
     assert rows == (("estimator", "refined", "weak"), ("window", "–", "4"))
-    assert compare([result, result], ["a", "b"]).settings.note == "Every setting is the same."
+    assert (
+        compare([result, result], ["a", "b"]).settings.note
+        == "Every setting is the same, and every log was read the same way."
+    )
 
 
 def test_a_parameter_that_only_one_has_is_shown_without_a_difference(result: Result) -> None:
