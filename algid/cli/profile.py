@@ -12,7 +12,7 @@ from algid.cli.inspect import plain
 
 def new(
     log: Annotated[Path, typer.Argument(help="The log to write a profile for.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Where to write it.")] = Path("algid.toml"),
+    out: Annotated[Path, typer.Option("-o", "--out", help="Where to write it.")] = Path("algid.toml"),
     force: Annotated[bool, typer.Option(help="Overwrite the profile.")] = False,
 ) -> None:
     """Write a profile with everything that can be set, filled in with what a log tells.
@@ -23,9 +23,9 @@ def new(
     from algid.files import whole_file
     from algid.inspection.draft import draft_profile
 
-    if output.exists() and not force:
-        raise OutputError(f"{output}: exists already; overwrite it with --force")
+    if out.exists() and not force:
+        raise OutputError(f"{out}: exists already; overwrite it with --force")
     text = draft_profile(log)
-    with whole_file(output) as temporary:
+    with whole_file(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    typer.echo(plain(f"{output}: written; edit it, then try: algid inspect {log} --profile {output}"))
+    typer.echo(plain(f"{out}: written; edit it, then try: algid inspect {log} --profile {out}"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -64,6 +65,9 @@ def synth(
     drop: Annotated[float, typer.Option(help="Share of samples lost at random.", min=0, max=0.9)] = 0.0,
     seed: Annotated[int, typer.Option(help="Seed of noise, jitter and losses.", min=0)] = 0,
     force: Annotated[bool, typer.Option("--force", help="Overwrite logs that are there.")] = False,
+    start_time: Annotated[
+        datetime | None, typer.Option(help="When the log starts, in UTC; its stamps count from nought by default.")
+    ] = None,
     payload_schedule: Annotated[
         str | None, typer.Option(help="One log instead, its payload changing: S=KG,…, like 2=0.05,4=0; bare before.")
     ] = None,
@@ -81,7 +85,7 @@ def synth(
     from algid.synth.sensors import Sensors
 
     described = load_case(case)
-    sensors = Sensors(position_noise, torque_noise, encoder_bits, jitter, drop, seed)
+    sensors = Sensors(position_noise, torque_noise, encoder_bits, jitter, drop, seed, _stamp(start_time))
     if motion is not None:
         _refuse_beside_motion({"--initial": initial, "--payload-schedule": payload_schedule, "--torque": torque})
         _rehearse(described, motion, Recording(rate, duration or 0.0, sensors=sensors), out, kind)
@@ -133,6 +137,11 @@ def _rehearse(case: Case, motion: Path, recording: Recording, out: Path, kind: F
     with progress("samples") as told:
         logs = rehearse(case, plan, recording, told)
     _write(logs, out, kind)
+
+
+def _stamp(start: datetime | None) -> int:
+    """ns since 1970."""
+    return 0 if start is None else int(start.replace(tzinfo=UTC).timestamp()) * 10**9
 
 
 def _scheduled(case: Case, torque: Torque, recording: Recording, text: str, told: Told | None) -> Log:

@@ -23,6 +23,7 @@ class Sensors:
     jitter : float, s, standard deviation of the sampling instants about the uniform ones
     drop : float in [0, 1), share of samples lost at random
     seed : int
+    start_ns : int, the first stamp
     """
 
     position_noise: float = 0.0
@@ -31,6 +32,7 @@ class Sensors:
     jitter: float = 0.0
     drop: float = 0.0
     seed: int = 0
+    start_ns: int = 0
 
     @property
     def exact(self) -> bool:
@@ -73,7 +75,7 @@ def record(motion: Motion, sensors: Sensors, truth: Truth, name: str) -> Log:
         theta = step * np.round(theta / step)
     tau = motion.tau + sensors.torque_noise * rng.standard_normal(motion.tau.shape)
     return Log(
-        stamp_ns=np.round(motion.t * 1e9).astype(np.int64),
+        stamp_ns=sensors.start_ns + np.round(motion.t * 1e9).astype(np.int64),
         theta=theta,
         tau=tau,
         omega=motion.omega if sensors.exact else None,
