@@ -112,6 +112,14 @@ class Profile(_Strict):
         """Who set `setting`, such as ``joints`` or ``tau1.unit``: a flag beats the file."""
         return "flag" if setting in self._flags else "profile"
 
+    def place(self, name: str) -> tuple[str | None, str | None]:
+        """Topic and field of the canonical channel `name`; a source may be both, ``/joint_states: effort[elbow]``."""
+        channel = self.channel(name)
+        topic, colon, field = (channel.source or "").partition(": ")
+        if colon and topic.startswith("/"):
+            return topic, field
+        return channel.topic or self.topic, channel.source
+
     def channel(self, name: str) -> Angle | Velocity | Torque:
         """The profile of the canonical channel `name`."""
         found: Angle | Velocity | Torque = getattr(self, name)

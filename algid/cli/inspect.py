@@ -51,6 +51,11 @@ def _print(found: Inspection, console: Console) -> None:
 
     console.print(f"{escape(plain(found.path))}: {found.format}{', synthetic' if found.synthetic else ''}")
     _table(console, "channels", ("name", "type", "samples"), _entries(found))
+    for entry in found.entries[:100]:
+        if entry.joints or entry.fields:
+            joints = f"joints {', '.join(entry.joints)}; " if entry.joints else ""
+            fields = ", ".join(entry.fields[:12]) + (" …" if len(entry.fields) > 12 else "")
+            console.print(escape(plain(f"{entry.name}: {joints}fields {fields or 'without a number'}")))
     mapping = [(name, plain(source)) for name, source in sorted((found.mapping or {}).items())]
     _table(console, "taken as", ("algid", "log"), mapping)
     if found.clock is not None:

@@ -6,23 +6,33 @@ import json
 from pathlib import Path
 
 from algid.inspection.report import Entry, look
+from algid.log import Origin, Reading
 from algid.readers import open_log
 from algid.readers.table import CHANNELS
 
 _HEAD = """\
 # What the log's names, units and signs mean. Lines behind # are defaults or not known: edit what is wrong.
-# zero = "hanging"           # θ1 is nought hanging straight down, not along the horizontal
+# zero = "hanging"           # θ1 is zero hanging straight down, not along the horizontal
 # second_angle = "absolute"  # θ2 from the horizontal or vertical, not from link 1
 # gravity = 9.81             # 0 for an arm that moves in a horizontal plane
 # velocity = false           # leave the log's velocities out
 # signs = [1, 1]             # -1 turns a joint's angle, velocity and torque round
 # offsets = [0.0, 0.0]       # rad, added to the angles
+# start = 0.0                # s since the first sample: leave out what comes before
+# end = 60.0                 # s since the first sample: leave out what comes after
+# accept = ["GAPS"]          # codes of checks that may warn, but not refuse
 """
+_ENCODER = (
+    "# gear_ratio = 1.0  # turns of the encoder in one of the joint\n# counts = 4096.0  # encoder counts in one turn\n"
+)
 _UNITS = {
-    "theta": '# unit = "deg"  # rad, deg, rev, counts (with counts = counts in a turn)\n# unwrap = true\n',
-    "omega": '# unit = "deg"  # a second; or rpm\n',
-    "tau": '# unit = "A"  # "N m", "mN m", A, mA\n# torque_constant = 0.1  # N m/A\n# gear_ratio = 1.0\n',
+    "theta": f'# unit = "deg"  # rad, mrad, deg, rev, counts\n{_ENCODER}# unwrap = true  # where it jumps by a turn\n',
+    "omega": f'# unit = "deg"  # a second; or rpm\n{_ENCODER}',
+    "tau": '# unit = "N m"  # or mN m, N cm, kN m, kgf m, kgf cm, lbf ft, lbf in, ozf in, A, mA\n'
+    "# torque_constant = 0.1  # N m/A at the motor, of a current\n"
+    "# gear_ratio = 1.0  # turns of the motor in one of the joint\n",
 }
+_ON_TOPICS = ("mcap", "rosbag2", "bag", "db3")
 
 
 def draft_profile(path: Path) -> str:
@@ -33,30 +43,44 @@ def draft_profile(path: Path) -> str:
     LogError
         If there is no such log, or its format is unknown.
     """
-    log = look(path, lambda: open_log(path).origin.mapping)
-    mapping = log.found or {}
-    known = _source(mapping, log.format) if mapping else f"# {_safe(log.refused or '')}\n"
-    return _HEAD + known + _listed(log.entries) + _channels(mapping, log.format)
+    log = look(path, lambda: open_log(path).origin)
+    origin = log.found
+    head = "" if origin else f"# {_safe(log.refused or '')}\n"
+    reading = origin.reading if origin else Reading()
+    return _HEAD + head + _source(origin, reading, log.format) + _listed(log.entries) + _channels(origin, log.format)
 
 
-def _source(mapping: dict[str, str], kind: str) -> str:
-    if kind in ("mcap", "rosbag2"):
-        topic = mapping["theta1"].partition(": ")[0]
-        return f"topic = {_quoted(topic)}\n# clock = \"log\"  # the recorder's times, not the messages' own\n"
-    return f'time = {_quoted(mapping["t"])}\n# time_unit = "s"  # s, ms, us, ns\n'
+def _source(origin: Origin | None, reading: Reading, kind: str) -> str:
+    """The lines of topic, joints, clock and time: those of the log, behind # where they are not known."""
+    joints = f"joints = {json.dumps(list(reading.joints))}" if reading.joints else '# joints = ["shoulder", "elbow"]'
+    if kind in _ON_TOPICS:
+        topic = f"topic = {_quoted(reading.topics[0])}" if reading.topics else '# topic = "/joint_states"'
+        time = ('# time = "t"  # of tables', '# time_unit = "s"  # of tables: s, ms, us, ns')
+        clock = "# clock = \"log\"  # the recorder's times, not the messages' own"
+    else:
+        topic, clock = '# topic = "/joint_states"  # of bags', '# clock = "log"  # of bags: header or log'
+        unit = f'time_unit = "{reading.time_unit}"' if reading.time_unit else '# time_unit = "s"'
+        name = f"time = {_quoted(origin.mapping['t'])}" if origin else '# time = "t"'
+        time = (name, f"{unit}  # s, ms, us, ns")
+    return "\n".join([topic, f"{joints}  # first joint first", clock, *time, ""])
 
 
 def _listed(entries: tuple[Entry, ...]) -> str:
     return "".join(f"# in the log: {_safe(one.name)[:80]} ({_safe(one.type)[:60]})\n" for one in entries[:64])
 
 
-def _channels(mapping: dict[str, str], kind: str) -> str:
+def _channels(origin: Origin | None, kind: str) -> str:
     text = ""
     for name in CHANNELS:
-        source = mapping.get(name, "")
-        place = source.partition(": ")[2] if kind in ("mcap", "rosbag2") else source
-        line = f"source = {_quoted(place)}\n" if place else "# source = \n"
-        text += f"\n[{name}]\n{line}# sign = -1\n# offset = 0.0\n{_UNITS[name[:-1]]}"
+        topic, source = "", origin.mapping.get(name, "") if origin else ""
+        if kind in _ON_TOPICS:
+            topic, _, source = source.partition(": ")
+        own = topic and origin is not None and topic != origin.reading.topics[0]
+        lines = [
+            f"topic = {_quoted(topic)}" if own else '# topic = "/joint_states"  # where it is another',
+            f"source = {_quoted(source)}" if source else '# source = "NAME"',
+        ]
+        text += f"\n[{name}]\n" + "\n".join(lines) + f"\n# sign = -1\n# offset = 0.0\n{_UNITS[name[:-1]]}"
     return text
 
 

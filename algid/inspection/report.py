@@ -21,13 +21,19 @@ from algid.readers.sniff import sniff
 
 @dataclass(frozen=True)
 class Entry:
-    """A column or a topic: its name, its type, and how many samples it has where that is known."""
+    """A column or a topic: its name, its type, and how many samples it has where that is known.
+
+    A topic's `joints` are those that its messages name, its `fields` paths of their numbers.
+    """
 
     name: str
     type: str
     count: int | None = None
+    joints: tuple[str, ...] = ()
+    fields: tuple[str, ...] = ()
 
 
+_MOST_SHOWN = 64
 T = TypeVar("T")
 
 
@@ -87,12 +93,15 @@ def contents(path: Path) -> tuple[str, tuple[Entry, ...]]:
 def _topics(path: Path) -> Iterator[Entry]:
     from algid.readers.mcap import opened
     from algid.readers.mcap.catalogue import schema_name
+    from algid.readers.mcap.plan import fields_shown
 
-    with opened(path) as (_, found):
+    with opened(path) as (file, found):
         for number, channel in sorted(found.channels.items()):
             told = f"{schema_name(found, channel) or 'no schema'}, {channel.message_encoding}"
             count = None if found.counts is None else found.counts.get(number, 0)
-            yield Entry(channel.topic, told, count)
+            shown = number in list(found.channels)[:_MOST_SHOWN]
+            joints, fields = fields_shown(file, found, number) if shown else ((), ())
+            yield Entry(channel.topic, told, count, joints[:_MOST_SHOWN], fields[:_MOST_SHOWN])
 
 
 def _parquet(path: Path) -> Iterator[Entry]:

@@ -46,7 +46,7 @@ def open_bag(path: Path, profile: Profile | None = None, notices: tuple[Notice, 
         raise LogError(
             f"{path}: bags need the rosbags package: pip install 'algid[bags]', or convert it to MCAP"
         ) from error
-    named = {name: channel for name in CHANNELS if profile and (channel := profile.channel(name)).source}
+    named = {name: profile.place(name) for name in CHANNELS if profile and profile.channel(name).source}
     sources: dict[str, tuple[str, str]] = {}
     reading, said = Reading(joints_told="profile"), notices
     topic = profile.topic if profile else None
@@ -54,12 +54,12 @@ def open_bag(path: Path, profile: Profile | None = None, notices: tuple[Notice, 
         usual = _usual(path, profile)
         topic, sources, reading = usual.topic, usual.sources, usual.reading
         said += usual.notices
-    for name, channel in named.items():
-        home = channel.topic or topic
+    for name, (own, field) in named.items():
+        home = own or topic
         if home is None:
             told = f'--set {name}.topic=NAME (profile: topic = "NAME" of [{name}])'
-            raise LogError(f"{path}: {name} is to be taken from {channel.source!r} without a topic: {told}")
-        sources[name] = (home, str(channel.source))
+            raise LogError(f"{path}: {name} is to be taken from {field!r} without a topic: {told}")
+        sources[name] = (home, str(field))
     if (profile and not profile.velocity) or not all(name in sources for name in VELOCITIES):
         sources = {name: source for name, source in sources.items() if name not in VELOCITIES}
     clock = (profile.clock if profile else None) or "header"

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import gzip
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 import pytest
 import typer
+from pydantic import BaseModel
 from typer.testing import CliRunner
 
 from algid.cli import convert, inspect, profile
 from algid.errors import OutputError, SettingError
-from algid.profile import load_profile
+from algid.profile import Angle, Profile, Torque, Velocity, load_profile
 from algid.readers import read_log
 from algid.writers import FORMATS, write_log
 from tests.inspection.test_checks import moving_log
-from tests.readers.logs import TRUTH, noise_log, same
+from tests.readers.logs import EPOCH_NS, TRUTH, noise_log, same
+from tests.readers.mcaps import joint_state, write_mcap
 
 APP = typer.Typer()
 APP.command("inspect")(inspect.inspect)
@@ -148,3 +151,50 @@ def test_a_new_profile_reads_the_log_as_before(kind: str, tmp_path: Path) -> Non
     assert same(read_log(tmp_path / f"arm.{kind}", load_profile(tmp_path / "algid.toml")), log)
     with pytest.raises(OutputError, match="--force"):
         run("new", tmp_path / f"arm.{kind}", "-o", tmp_path / "algid.toml")
+
+
+def test_inspect_of_a_refused_mcap_shows_joints_and_fields(tmp_path: Path) -> None:
+    stamps = [EPOCH_NS + step * 1_000_000 for step in range(10)]
+    names = ["shoulder", "elbow"]
+    messages = [("/joint_states", one, joint_state(one, names, [1, 2], [], []).done()) for one in stamps]
+    write_mcap(tmp_path / "log.mcap", messages)
+    text = " ".join(run("inspect", tmp_path / "log.mcap", code=2).split())
+    assert "/joint_states: joints shoulder, elbow; fields" in text
+    assert "position[shoulder], position[elbow]" in text
+    assert "effort (empty)" in text
+    assert "'/joint_states' with the joints shoulder, elbow, whose effort stay empty" in text
+    found = json.loads(run("inspect", tmp_path / "log.mcap", "--format", "json", code=2))
+    assert found["entries"][0]["joints"] == names
+
+
+def test_what_inspect_prints_is_what_a_profile_takes(tmp_path: Path) -> None:
+    stamps = [EPOCH_NS + step * 1_000_000 for step in range(10)]
+    for topic in ("/one", "/two"):
+        messages = [(topic, one, joint_state(one, ["a", "b"], [1, 2], [], [3, 4]).done()) for one in stamps]
+        write_mcap(tmp_path / f"{topic[1:]}.mcap", messages)
+    first = read_log(tmp_path / "one.mcap")
+    sources = {name: {"source": first.origin.mapping[name]} for name in ("theta1", "theta2", "tau1", "tau2")}
+    assert sources["theta1"] == {"source": "/one: position[a]"}
+    assert same(read_log(tmp_path / "one.mcap", Profile.model_validate(sources)), first)
+
+
+def keys(model: type[BaseModel]) -> set[str]:
+    return {name for name, field in model.model_fields.items() if field.annotation not in (Angle, Velocity, Torque)}
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_a_new_profile_writes_all_that_can_be_set(kind: str, tmp_path: Path) -> None:
+    write_log(tmp_path / f"arm.{kind}", moving_log())
+    run("new", tmp_path / f"arm.{kind}", "-o", tmp_path / "algid.toml")
+    text = (tmp_path / "algid.toml").read_text()
+    head, *tables = re.split(r"^\[", text, flags=re.MULTILINE)
+    assert keys(Profile) - set(re.findall(r"^(?:# )?(\w+) = ", head, re.MULTILINE)) == set()
+    for table in tables:
+        models: dict[str, type[BaseModel]] = {"theta": Angle, "omega": Velocity}
+        model = models.get(table[:5], Torque)
+        assert keys(model) - set(re.findall(r"^(?:# )?(\w+) = ", table, re.MULTILINE)) == set()
+    plain = re.sub(r"^# (?=\w+ = )", "", text, flags=re.MULTILINE)
+    lines = [line for line in plain.splitlines() if not line.startswith("#")]
+    (tmp_path / "all.toml").write_text("\n".join(lines))
+    load_profile(tmp_path / "all.toml")  # every line is valid once it is no comment
+    load_profile(tmp_path / "algid.toml")

@@ -19,9 +19,9 @@ from algid.readers.mcap.topic import (
     JOINT_STATE,
     Fields,
     Topic,
-    has_names,
     joint_fields,
     joint_names,
+    names_in,
     repeated_name,
     stamp_paths,
 )
@@ -70,7 +70,9 @@ def plan(file: File, found: Catalogue, profile: Profile | None) -> Plan:
     for channel, (topic, path) in named.items():
         home = topic or (usual.topic if usual else None) or (profile.topic if profile else None)
         if home is None:
-            raise LogError(f"{file.path}: the profile takes {channel} from {path!r} without a topic; name one")
+            raise LogError(
+                f"{file.path}: {channel} is taken from {path!r} without a topic: --topic NAME (profile: topic = …)"
+            )
         sources[channel] = (home, path)
     if (profile and not profile.velocity) or not all(name in sources for name in VELOCITIES):
         sources = {name: source for name, source in sources.items() if name not in VELOCITIES}
@@ -95,8 +97,8 @@ def _joints_reading(usual: _Usual, profile: Profile | None) -> tuple[Reading, tu
 def _named(profile: Profile | None) -> dict[str, tuple[str | None, str]]:
     if profile is None:
         return {}
-    channels = {name: profile.channel(name) for name in (*JOINT_CHANNELS, *VELOCITIES)}
-    return {name: (one.topic or profile.topic, one.source) for name, one in channels.items() if one.source}
+    places = {name: profile.place(name) for name in (*JOINT_CHANNELS, *VELOCITIES)}
+    return {name: (topic, source) for name, (topic, source) in places.items() if source}
 
 
 def _topic(
@@ -153,6 +155,7 @@ def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> _Usua
     """The one topic with joint states."""
     fitting: dict[str, _Usual] = {}
     many: dict[str, list[str]] = {}
+    lacking: list[str] = []
     refused: list[LogError] = []
     for name, type_name in _candidates(file, found, profile):
         try:
@@ -161,12 +164,14 @@ def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> _Usua
                 chosen = _joints(joints, profile)
                 if chosen:
                     there = (joints[0], joints[1]) if len(joints) == 2 else chosen
-                    fitting.setdefault(name, _Usual(name, there, has_names(shape), joint_fields(shape, chosen)))
+                    fitting.setdefault(name, _Usual(name, there, bool(names_in(shape)), joint_fields(shape, chosen)))
                     break
                 if repeated := repeated_name(shape):
                     refused.append(_repeated(file, name, repeated))
-                if len(joints) > 2:
+                if len(joints) > 2 or (joints and profile and profile.joints):
                     many[name] = joints
+                elif not joints and (lack := _lack(name, shape)) and lack not in lacking:
+                    lacking.append(lack)
         except LogError as error:  # another topic may still hold the joints
             refused.append(error)
     if _USUAL in fitting:
@@ -188,9 +193,38 @@ def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> _Usua
     if profile is not None and all(profile.channel(name).source for name in JOINT_CHANNELS):
         return None
     wanted = f"the joints {profile.joints}" if profile and profile.joints else "positions and efforts of two joints"
-    raise NothingFoundError(
-        f"{file.path}: no topic holds {wanted}; found {listed(found)}; name topics and fields in a profile"
-    )
+    mend = "--topic NAME --joints A,B, or --set tau1.topic=NAME --set tau1.source=FIELD … (profile: topic, joints, …)"
+    told = "; ".join(lacking[:4]) or listed(found)
+    raise NothingFoundError(f"{file.path}: no topic holds {wanted}; found {told}; name topics and fields: {mend}")
+
+
+def _lack(topic: str, shape: Shape) -> str | None:
+    """What a message with named joints lacks."""
+    joints = names_in(shape)
+    if not joints:
+        return None
+    empty = [what for what in ("position", "effort") if shape.find(f"{what}[0]") is None]
+    return f"{topic!r} with the joints {', '.join(joints[:8])}, whose {' and '.join(empty) or 'fields'} stay empty"
+
+
+def fields_shown(file: File, found: Catalogue, number: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Joints that the first message of a channel names, and its numbers' paths as a profile's source takes them."""
+    channel = found.channels[number]
+    try:
+        shape = next(_shapes(file, found, channel.topic, schema_name(found, channel)), None)
+    except LogError:
+        return (), ()
+    if shape is None:
+        return (), ()
+    joints = names_in(shape)
+    return joints, tuple(path for name, one in shape.numbers.items() for path in _paths_of(name, one.count, joints))
+
+
+def _paths_of(name: str, count: int, joints: tuple[str, ...]) -> list[str]:
+    """The paths of a field's numbers: one, none, or one a place."""
+    if count < 2:
+        return [name if count else f"{name} (empty)"]
+    return [f"{name}[{place}]" for place in (joints if len(joints) == count else range(min(count, 64)))]
 
 
 def _joints(names: list[str], profile: Profile | None) -> tuple[str, str] | None:
@@ -202,7 +236,7 @@ def _joints(names: list[str], profile: Profile | None) -> tuple[str, str] | None
 def _repeated(file: File, topic: str, joint: str) -> LogError:
     return LogError(
         f"{file.path}: messages on {topic!r} name the joint {joint!r} twice; name the fields by their places, "
-        'as in source = "position[0]" of [theta1], in a profile'
+        '--set theta1.source="position[0]" … (profile: source = "position[0]" of [theta1] …)'
     )
 
 
@@ -213,7 +247,7 @@ def _candidates(file: File, found: Catalogue, profile: Profile | None) -> list[t
         return [place for place in places if place[0] == profile.topic]
     some = [place for place, numbers in places.items() if _may_hold(found, min(numbers))]
     if len(some) > _MOST_CANDIDATES:
-        raise LogError(f"{file.path}: {len(some)} topics may hold joint states; choose with topic = … in a profile")
+        raise LogError(f"{file.path}: {len(some)} topics may hold joint states: --topic NAME (profile: topic = …)")
     return some
 
 

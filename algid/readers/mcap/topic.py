@@ -49,22 +49,18 @@ def stamp_paths(shape: Shape) -> tuple[str, str] | None:
 
 def joint_names(shape: Shape) -> list[str]:
     """The joints that a message of this shape has both a position and an effort for."""
-    names = _names(shape) or tuple(str(place) for place in range(64))
+    names = names_in(shape) or tuple(str(place) for place in range(64))
     return [name for name in names if _paths(shape, name, "theta") and _paths(shape, name, "tau")]
-
-
-def has_names(shape: Shape) -> bool:
-    """Whether messages of this shape name their joints."""
-    return bool(_names(shape))
 
 
 def repeated_name(shape: Shape) -> str | None:
     """A joint that a message of this shape names twice, if any."""
-    names = _names(shape)
+    names = names_in(shape)
     return next((name for name in names if names.count(name) > 1), None)
 
 
-def _names(shape: Shape) -> tuple[str, ...]:
+def names_in(shape: Shape) -> tuple[str, ...]:
+    """The joints that a message of this shape names."""
     lists = [texts for path, texts in shape.texts.items() if path in ("name", "names", "joint_names")]
     return lists[0][:_MOST_JOINTS] if lists else ()
 
