@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
 from itertools import chain
 from pathlib import Path, PurePath
@@ -64,6 +65,7 @@ class LogSource:
     promised: int
     gravity: float
     digest: Callable[[], str] | None
+    notices: tuple[Notice, ...] = ()
 
 
 def open_source(
@@ -106,11 +108,32 @@ def open_source(
 def open_sources(
     logs: LogLike | Iterable[LogLike] | None, role: Role, profile: Profile | None, gravity: float
 ) -> list[LogSource]:
-    """Sources of one log, several, or none: see `open_source`."""
+    """Sources of one log, several, or none: see `open_source`. A log that is given twice counts once, with a notice."""
     if logs is None:
         return []
     several = [logs] if isinstance(logs, str | Path | Log | Staged) else list(logs)
-    return [open_source(log, role, profile, gravity) for log in several]
+    return _distinct([open_source(log, role, profile, gravity) for log in several])
+
+
+def _distinct(sources: list[LogSource]) -> list[LogSource]:
+    """The sources without those of the same SHA-256 as one before, which tells of them.
+
+    Only logs that promise as many samples as another are hashed for it.
+    """
+    kept: list[LogSource] = []
+    places: dict[tuple[int, str], int] = {}
+    lengths = Counter(source.promised for source in sources if source.digest)
+    for source in sources:
+        content = (source.promised, source.digest()) if source.digest and lengths[source.promised] > 1 else None
+        if content is not None and content in places:
+            said = Notice("SAME_LOG", f"SAME_LOG: {source.name} is the same log, byte for byte, and counts once")
+            twin = places[content]
+            kept[twin] = replace(kept[twin], notices=(*kept[twin].notices, said))
+            continue
+        if content is not None:
+            places[content] = len(kept)
+        kept.append(source)
+    return kept
 
 
 def _refuse_the_other_role(source: LogSource) -> None:
@@ -225,7 +248,7 @@ class Survey:
 
     def _counted(self, log: LogSource) -> Iterator[Log]:
         rows, first_ns, last_ns = 0, 0, 0
-        notices: list[Notice] = []
+        notices: list[Notice] = list(log.notices)
         self._start_hashing(log)
         self._tell(log, 0)
         for block, alone in _with_end(log.blocks(), log.promised):

@@ -16,6 +16,8 @@ SPIKES                no       single samples far off their neighbours
 SATURATED_EFFORT      no       a torque clipped at its limit
 GAPS                  no       samples are missing
 JITTER                no       uneven stamps
+SLOW_SAMPLING         no       fewer than ten samples in a period of the motion
+SHORT_LOG             no       less than a second
 NEAR_STAMPS           no       samples that stand all but on top of one another
 GRAVITY_COMPENSATED   no       torques do not carry the arm's weight
 FLIPPED_SIGN          no       gravity pulls upwards: a sign is wrong
@@ -123,6 +125,8 @@ def clock_figures(log: Log) -> ClockFigures:
 _DENORMAL = 1e-6
 _SPIKE = 30.0
 _TURN = 2 * math.pi
+_SHORTEST = 1.0
+_FEWEST = 10.0
 _LEAST_PULL = 1.3
 """Weight in N m to inertia in kg m^2: a fifth of g/l for links of 1.5 m."""
 
@@ -294,6 +298,16 @@ def _spikes(log: Log) -> Iterator[Finding]:
 
 def _clock(log: Log) -> Iterator[Finding]:
     clock = clock_figures(log)
+    if clock.duration < _SHORTEST:
+        text = f"the log lasts {clock.duration:.3g} s; an estimate needs a second of motion at least, ten are better"
+        yield Finding("SHORT_LOG", text)
+    samples = _samples_a_period(log)
+    if samples < _FEWEST:
+        text = (
+            f"{samples:.2g} samples in a period of the motion at {clock.rate:.4g} Hz: too slow to tell its "
+            "acceleration; record faster, or move more slowly"
+        )
+        yield Finding("SLOW_SAMPLING", text)
     near = near_stamps(log.stamp_ns, log.period)
     if near:
         text = (
@@ -308,6 +322,22 @@ def _clock(log: Log) -> Iterator[Finding]:
         told = f"stamps jitter by {clock.jitter * 1e3:.3g} ms about a period of {1e3 / clock.rate:.4g} ms"
         bend = max(float(np.sqrt(np.mean(np.diff(row, 2) ** 2))) for row in log.theta) / 8
         yield Finding("JITTER", f"{told}; resampling moves angles by {bend:.2g} rad at most, linearly")
+
+
+def _samples_a_period(log: Log) -> float:
+    """Samples in a period of the faster joint's motion; infinite where a step between samples is below 0.02 rad.
+
+    Of a sine with p samples a period, second differences are 2 sin(π/p) times first ones in size. Medians, so that
+    spikes and rest do not count; steps that small may be noise.
+    """
+    fewest = math.inf
+    for theta in log.theta:
+        first, second = np.diff(theta), np.diff(theta, 2)
+        step = float(np.median(np.abs(first)))
+        if step > 0.02:
+            bend = min(1.0, float(np.median(np.abs(second))) / (2 * step))
+            fewest = min(fewest, math.pi / math.asin(bend)) if bend > 0 else fewest
+    return fewest
 
 
 def _gravity(figures: DynamicFigures) -> Iterator[Finding]:

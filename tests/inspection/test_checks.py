@@ -138,3 +138,24 @@ def test_the_recorded_runs_tell_their_zero(shared_data: Path) -> None:
         figures = dynamic_figures(log)
         assert figures is not None
         assert figures.explained > 0.8
+
+
+def sine(rate: float, duration: float, frequency: float = 2.0) -> Log:
+    """Both joints swing by one radian; torques follow in closed form."""
+    t = np.arange(round(rate * duration)) / rate
+    theta = np.stack([np.sin(2 * np.pi * frequency * t), np.cos(2 * np.pi * frequency * t)])
+    return Log(np.rint(t * 1e9).astype(np.int64), theta, 3 * theta[::-1].copy(), Origin("arm.csv", "csv", {}))
+
+
+@pytest.mark.parametrize(("rate", "slow"), [(12.3, True), (17.3, True), (25.1, False), (1000, False)])
+def test_sampling_too_slow_for_the_motion_is_told(rate: float, slow: bool) -> None:
+    found = {finding.code: finding.text for finding in examine(sine(rate, 20), gravity=0)}
+    assert ("SLOW_SAMPLING" in found) == slow
+    if slow:
+        # a rate that does not beat with the motion; medians of some hundred samples are good to a few percent
+        assert float(found["SLOW_SAMPLING"].split()[0]) == pytest.approx(rate / 2, rel=0.1)
+
+
+def test_logs_of_a_tenth_of_a_second_are_told() -> None:
+    assert "SHORT_LOG" in codes(sine(1000, 0.1))
+    assert "SHORT_LOG" not in codes(sine(1000, 1.1))
