@@ -49,7 +49,7 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
             return _read(paths, main, rows)
         return aligned(_read(paths, main, rows), [_series(name, paths, other) for other in others])
 
-    return reader_of(origin, tables, profile, {}, wanted.notices, rows)
+    return reader_of(origin, tables, profile, wanted.units, wanted.notices, rows)
 
 
 def _read(paths: Sequence[Path], topic: Topic, rows: int) -> Iterator[Table]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from algid.errors import LogError
@@ -25,6 +25,7 @@ from algid.readers.mcap.topic import (
     repeated_name,
     stamp_paths,
 )
+from algid.readers.names import CURRENTS, choose, take_apart
 from algid.readers.table import JOINT_CHANNELS, VELOCITIES
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ class Plan:
     mapping: dict[str, str]
     reading: Reading
     notices: tuple[Notice, ...]
+    units: dict[str, str]
 
 
 def plan(file: File, found: Catalogue, profile: Profile | None) -> Plan:
@@ -82,7 +84,8 @@ def plan(file: File, found: Catalogue, profile: Profile | None) -> Plan:
     clock = topics[0].fields.stamp if topics[0].clock != "log" else None
     mapping["t"] = f"{homes[0]}: {clock[0].rpartition('.')[0]}" if clock else "log time"
     reading = replace(reading, topics=tuple(homes), clock="header" if clock else "log")
-    return Plan(topics, mapping, reading, notices)
+    units = {} if usual is None else {name: one for name, one in usual.units.items() if name not in named}
+    return Plan(topics, mapping, reading, notices, units)
 
 
 def _joints_reading(usual: _Usual, profile: Profile | None) -> tuple[Reading, tuple[Notice, ...]]:
@@ -149,6 +152,24 @@ class _Usual:
     joints: tuple[str, str]
     named: bool
     paths: dict[str, str]
+    units: dict[str, str] = field(default_factory=dict)
+
+
+def _flat(topic: str, shape: Shape, profile: Profile | None) -> _Usual | None:
+    """A message of plain numbers, ``{"q1": …, "tau1": …}`` or ``{"q": […], "tau": […]}``, by their names."""
+    paths = [path for name, one in shape.numbers.items() for path in _paths_of(name, one.count, ())]
+    try:
+        choice = choose(paths, profile.joints if profile else None)
+    except LookupError:
+        return None
+    found = {name: path for name, path in choice.columns.items() if name != "t"}
+    if not all(name in found for name in VELOCITIES):
+        found = {name: path for name, path in found.items() if name not in VELOCITIES}
+    if not set(JOINT_CHANNELS) <= found.keys() or not all(shape.find(path) for path in found.values()):
+        return None
+    currents = {name: "A" for name, path in found.items() if take_apart(path).stem in CURRENTS}
+    joints = choice.joints or ("1", "2")
+    return _Usual(topic, joints, choice.joints is not None, found, {**choice.units, **currents})
 
 
 def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> _Usual | None:
@@ -165,6 +186,9 @@ def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> _Usua
                 if chosen:
                     there = (joints[0], joints[1]) if len(joints) == 2 else chosen
                     fitting.setdefault(name, _Usual(name, there, bool(names_in(shape)), joint_fields(shape, chosen)))
+                    break
+                if not joints and (flat := _flat(name, shape, profile)):
+                    fitting.setdefault(name, flat)
                     break
                 if repeated := repeated_name(shape):
                     refused.append(_repeated(file, name, repeated))
