@@ -10,7 +10,7 @@ from algid.report.html import escaped
 from algid.report.text import significant
 from algid.results import Estimate
 
-WIDTH, HEIGHT = 190.0, 22.0  # of a row's drawing, pixels
+WIDTH, HEIGHT = 150.0, 22.0  # of a row's drawing, pixels
 EDGE = 8.0  # where an arrow tells that an interval goes on
 WIDEST = 100.0  # percent: an interval beyond says little more than the estimate's size
 ROOM = 1.15  # of the widest interval
@@ -27,7 +27,7 @@ class Forest:
     @property
     def heading(self) -> str:
         """What stands above the column."""
-        return f"95 % interval, ± {significant(self.limit, 1)} %"
+        return f"within ± {significant(self.limit, 1)} %"
 
 
 def forest(

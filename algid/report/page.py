@@ -15,11 +15,13 @@ from pathlib import Path
 
 from algid.files import whole_file
 from algid.progress import Told
+from algid.report.arm import arm_script
 from algid.report.figures.base import Figure, Missing
 from algid.report.forest import forest
 from algid.report.gallery import gallery
 from algid.report.html import TEMPLATE, escaped, figure_html, panel_id, script_json, table_html
 from algid.report.library import library
+from algid.report.posture import arm_of
 from algid.report.table import Table
 from algid.report.tables import (
     estimate_tables,
@@ -83,14 +85,17 @@ def page_html(folder: Path, result: Result, shared_library: bool = False, told: 
     shown = gallery(folder, result, told)
     tables = {table.title: table for table in estimate_tables(result)}
     first = [tables.pop(title) for title in FIRST if title in tables]
+    arm = arm_of(result, shown.torque)
     drawn = forest({**result.parameters, **result.payload}, _truth(result))
     quality = [*quality_tables(shown.torque, result), *log_tables(result)]
     body = [
         _head(result, verdict(result)),
         contents(shown.figures, PAPER),
         '<main id="numbers">',
+        '<div class="first"><div>',
         *(table_html(table, drawn.rows, drawn.heading) for table in first),
         *(table_html(tables.pop(title)) for title in SECOND if title in tables),
+        f"</div>{arm}</div>",
         *map(figure_html, shown.figures),
         *section("fit", "What the estimator knows of the logs", fit_tables(result)),
         *section("data", "Data quality", quality, _warnings(result)),
@@ -105,6 +110,7 @@ def page_html(folder: Path, result: Result, shared_library: bool = False, told: 
         "\n".join(body),
         script_json(drawing([*shown.figures, *shown.paper])),
         shared_library,
+        [arm_script()] if arm else [],
     )
 
 

@@ -100,6 +100,19 @@
       Plotly.relayout(first.id, update);
     });
   }
+  // While the arm moves, a line in the panels of its time shows the moment.
+  document.addEventListener("arm-time", ({ detail }) => {
+    for (const panel of page.panels) {
+      if (panel.sync !== "torque" || !drawn.has(panel.id)) continue;
+      const plot = document.getElementById(panel.id);
+      const { xaxis, _size } = plot._fullLayout;
+      const cursor = plot.querySelector(".cursor") || plot.appendChild(document.createElement("div"));
+      const left = xaxis._offset + xaxis.l2p(detail);
+      cursor.className = "cursor";
+      cursor.hidden = left < xaxis._offset || left > xaxis._offset + xaxis._length;
+      Object.assign(cursor.style, { left: left + "px", top: _size.t + "px", height: _size.h + "px" });
+    }
+  });
   const menu = document.querySelector("nav details");
   if (menu && innerWidth < 640) menu.open = false; // a phone shows the numbers first
   dark.addEventListener("change", () => redraw());

@@ -1,0 +1,44 @@
+"""The arm that a page draws: to scale, in the posture of the log."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from algid.report.posture import arm_of
+from algid.report.series import read_torque
+from algid.results import Estimate, Result
+
+
+def links(drawing: str) -> tuple[float, float]:
+    found = [float(x) for x in re.findall(r'class="link[^"]*" x1="0" y1="0" x2="([\d.]+)"', drawing)]
+    assert len(found) == 2
+    return found[0], found[1]
+
+
+def test_links_are_as_long_as_the_payload_tells_or_as_the_constants_do(result: Result, case_folder: Path) -> None:
+    torque = read_torque(case_folder / "torque.parquet")
+    known = {name: Estimate(estimate=value, unit="m") for name, value in (("l1", 0.3), ("l2", 0.2))}
+    assert links(arm_of(result.model_copy(update={"payload": known}), torque)) == (0.3, 0.2)
+    k1, k2 = (Estimate(estimate=value, unit="") for value in (0.2, 9.81 * 0.2 / 0.25))
+    bare = {"payload": {}, "settings": {"gravity": 9.81}, "parameters": {**result.parameters, "k1": k1, "k2": k2}}
+    drawing = arm_of(result.model_copy(update=bare), torque)
+    assert links(drawing)[0] == pytest.approx(0.25)  # l1 = g k1 / k2
+    assert "not known" in drawing
+    upside_down = k2.model_copy(update={"estimate": -7.0})
+    bare["parameters"] = {**result.parameters, "k1": k1, "k2": upside_down}
+    assert arm_of(result.model_copy(update=bare), torque) == ""
+    assert arm_of(result, None) == ""
+
+
+def test_the_arm_stands_as_the_log_begins(result: Result, case_folder: Path) -> None:
+    torque = read_torque(case_folder / "torque.parquet")
+    known = {name: Estimate(estimate=0.5, unit="m") for name in ("l1", "l2")}
+    drawing = arm_of(result.model_copy(update={"payload": known}), torque)
+    turned = re.search(r'class="link1" transform="rotate\(([-\d.]+)\)"', drawing)
+    assert turned is not None
+    first = torque.series[0]["theta1"][1]
+    assert float(turned[1]) == pytest.approx(-np.degrees(first[np.isfinite(first)][0]), abs=1e-3)  # SVG turns clockwise
