@@ -169,6 +169,19 @@ class Endogeneity(_Model):
     endogenous: bool
 
 
+class TorqueModel(_Model):
+    """The torque's terms beside eq. (1), the speeds in rad/s that shape friction, and who chose the terms.
+
+    `held_out` says what was left out of the fit to try each term: whole logs, or blocks of them.
+    """
+
+    terms: list[str]
+    coulomb_speed: float
+    stribeck_speed: float
+    chosen_by: Literal["logs", "settings", "parameters"]
+    held_out: Literal["logs", "blocks"] | None = None
+
+
 class Bound(_Model):
     """A physical bound that the estimates break, and by how many standard deviations."""
 
@@ -203,6 +216,7 @@ class FitSummary(_Model):
     converged: bool
     whiteness: dict[str, Whiteness] = {}
     unidentifiable: list[str] = []
+    model: TorqueModel | None = None
     terms: list[TermCriterion] = []
     broken_bounds: list[Bound] = []
     by_log: list[dict[str, Estimate]] = []

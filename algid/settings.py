@@ -62,8 +62,10 @@ class Settings:
         After how long the paper's integrals restart (2 s), or the length of the weak form's windows (0.4 s).
     bandwidth : float, Hz, of the zero-phase differentiator
     gravity : float, m/s^2, 0 for an arm that moves in a horizontal plane
-    friction : 'viscous' or 'coulomb' (viscous and Coulomb)
-    torque_offset, rotor_inertia : bool, further columns of the model
+    model : 'auto', 'plain', or terms of the torque between commas
+        Names in `algid.model.TERMS`, and delay; 'auto' lets the logs choose.
+    friction : 'viscous' or 'coulomb', torque_offset, rotor_inertia : bool
+        Short forms of terms in `model`, as is a delay of 'estimate': with one of them nothing else is chosen.
     torque_hold : 'foh' or 'zoh'
     delay : float, s, between torque and angle, or 'estimate'
     l1, l2 : float, m, link lengths where known
@@ -93,11 +95,18 @@ class Settings:
     )
     bandwidth: float = field(default=60.0, metadata={"help": "Of the zero-phase differentiator, Hz."})
     gravity: float = field(default=9.81, metadata={"help": "m/s²; 0 for an arm that moves in a horizontal plane."})
-    friction: Literal["viscous", "coulomb"] = field(
-        default="viscous", metadata={"help": "Viscous, or viscous and Coulomb."}
+    model: str = field(
+        default="auto",
+        metadata={
+            "help": "Terms of the torque: auto (chosen by the logs), plain (none), or some of coulomb, stribeck, "
+            "asymmetry, load, offset, rotor, gain, zero, lag, delay, like coulomb,rotor.",
+        },
     )
-    torque_offset: bool = field(default=False, metadata={"help": "Estimate an offset of each torque."})
-    rotor_inertia: bool = field(default=False, metadata={"help": "Estimate joint 2's rotor inertia."})
+    friction: Literal["viscous", "coulomb"] = field(
+        default="viscous", metadata={"help": "Viscous, or viscous and Coulomb: --model coulomb."}
+    )
+    torque_offset: bool = field(default=False, metadata={"help": "Estimate torque offsets: --model offset."})
+    rotor_inertia: bool = field(default=False, metadata={"help": "Estimate joint 2's rotor: --model rotor."})
     torque_hold: Literal["foh", "zoh"] = field(
         default="foh", metadata={"help": "Torque between samples: ramped or held."}
     )
@@ -120,6 +129,8 @@ class Settings:
             raise SettingError(f"--gravity: expected a number of 0 or more, found {self.gravity:g}")
         if self.delay != "estimate" and not math.isfinite(self.delay):
             raise SettingError(f"--delay: expected seconds or 'estimate', found {self.delay:g}")
+        if self.model not in ("auto", "plain"):
+            self._check_terms()
         if self.estimator == "paper":
             self._refuse_what_the_paper_lacks()
 
@@ -136,6 +147,23 @@ class Settings:
         if known.get("poles") is not None:
             known["poles"] = tuple(complex(pole) if isinstance(pole, str) else float(pole) for pole in known["poles"])
         return cls(**known)
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Terms asked for, by name or by a short form; "delay" where it is to be estimated."""
+        listed = () if self.model in ("auto", "plain") else tuple(name.strip() for name in self.model.split(","))
+        short = {
+            "coulomb": self.friction == "coulomb",
+            "offset": self.torque_offset,
+            "rotor": self.rotor_inertia,
+            "delay": self.delay == "estimate",
+        }
+        return tuple(dict.fromkeys((*listed, *(term for term, asked in short.items() if asked))))
+
+    @property
+    def chooses(self) -> bool:
+        """Whether the logs choose the terms."""
+        return self.model == "auto" and not self.terms
 
     @property
     def luenberger(self) -> bool:
@@ -161,7 +189,25 @@ class Settings:
         poles = map(complex, self.poles or PAPER_POLES)
         return asdict(self) | {"poles": [pole.real if pole.imag == 0 else str(pole) for pole in poles]}
 
+    def _check_terms(self) -> None:
+        from algid.model import TERMS
+
+        for term in self.terms:
+            if term not in (*TERMS, "delay"):
+                raise SettingError(
+                    f"--model: expected auto, plain or some of {', '.join(TERMS)}, delay; found {term!r}"
+                )
+            needed = TERMS[term].needs if term in TERMS else None
+            if needed is not None and needed not in self.terms:
+                raise SettingError(f"--model: {term} has no meaning without {needed}; add {needed} to the list")
+        if {"delay", "lag"} <= set(self.terms):
+            raise SettingError("--model: no log tells a delay from a lag beside it; leave one of them out")
+
     def _refuse_what_the_paper_lacks(self) -> None:
+        if self.model not in ("auto", "plain"):
+            raise SettingError(
+                f"--model {self.model}: the paper's method has no such terms; use --estimator refined or weak"
+            )
         ours = {f.name: f.default for f in fields(self)}
         for name in ("friction", "torque_offset", "rotor_inertia", "delay", "l1", "l2", "constrain", "cross_validate"):
             if getattr(self, name) != ours[name]:

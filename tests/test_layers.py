@@ -26,7 +26,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "files": room("errors", "pydantic"),
     "stores": room("errors files", "pyarrow"),
     "profile": room("errors files units", "pydantic"),
-    "settings": room("errors signals"),
+    "settings": room("errors model signals"),
     "results": room("errors files", "pydantic"),
     "synth": room("arm errors files log progress", "numpy pydantic scipy"),
     "table4": room("arm log results synth", "numpy"),
@@ -50,7 +50,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "distributed mcap polars pyarrow",
     ),
     "track": room(
-        "arm errors estimators files identification model profile report results runtime settings signals",
+        "arm errors estimators files identification model profile report results runtime signals",
         "mcap numpy polars pyarrow",
     ),
     "design": room(

@@ -45,3 +45,32 @@ def test_text_of_an_option_that_means_nothing_names_the_option() -> None:
     for name, text in (("delay", "soon"), ("poles", "1,2,3"), ("poles", "a,b")):
         with pytest.raises(SettingError, match=f"^{flag(name)}"):
             Choice(defaults | {"delay": "0", name: text}, None, {}).settings()
+
+
+def test_short_forms_and_lists_name_the_same_terms() -> None:
+    short = Settings(friction="coulomb", torque_offset=True, rotor_inertia=True, delay="estimate")
+    assert set(short.terms) == set(Settings(model="coulomb, offset,rotor,delay").terms)
+    assert Settings().chooses
+    assert not short.chooses
+    assert not Settings(model="plain").chooses
+    assert Settings(model="plain").terms == ()
+
+
+@pytest.mark.parametrize(
+    ("model", "told"),
+    [
+        ("backlash", "found 'backlash'"),
+        ("stribeck", "add coulomb"),
+        ("delay,lag", "leave one of them out"),
+        ("", "found ''"),
+    ],
+)
+def test_a_list_of_terms_that_means_nothing_is_refused(model: str, told: str) -> None:
+    with pytest.raises(SettingError, match=f"^--model: .*{told}"):
+        Settings(model=model)
+
+
+def test_the_papers_method_takes_no_terms() -> None:
+    assert Settings(estimator="paper").model == "auto"
+    with pytest.raises(SettingError, match="--model coulomb: the paper's method"):
+        Settings(estimator="paper", model="coulomb")

@@ -128,7 +128,7 @@ def _wrong(arm: Arm, mass: float, error: float) -> list[tuple[Arm, float]]:
 
 
 def _of_result(result: Result, source: str, loaded: bool | None, knowns: Knowns) -> Prior:
-    model, left_out = _planned(model_of(Settings.of(result.settings)))
+    model, left_out = _planned(model_of(result))
     value = {name: found.estimate for name, found in result.estimates.items()}
     value |= {name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None}
     lengths = {name: value[name] for name in ("l1", "l2") if result.settings.get(name) is not None} | knowns.lengths

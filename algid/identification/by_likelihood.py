@@ -14,6 +14,7 @@ from algid.estimators.combine import Prior
 from algid.estimators.diagnostics import constrained
 from algid.estimators.fit import Fit
 from algid.estimators.prediction import PredictionSums
+from algid.estimators.selection import CHOICE, Selection, needs_shape, select
 from algid.identification.source import LogSource, Survey
 from algid.identification.velocities import with_velocities
 from algid.model import Model
@@ -27,7 +28,38 @@ Predictions = Mapping[LogSource, PredictionSums]
 """What scores a prediction of a log by any coefficients."""
 
 
-def run_fit(survey: Survey, settings: Settings, prior: Prior | None) -> tuple[Fit, Predictions]:
+def choose_model(survey: Survey, settings: Settings, earlier: Result | None = None) -> Selection:
+    """The torque's model that the settings ask for, that an earlier result had, or that the logs choose.
+
+    Raises
+    ------
+    LogError
+        If no log is long enough.
+    """
+    if settings.chooses and earlier is not None:
+        terms = ("delay",) if "delay" in earlier.parameters else ()
+        return replace(_given(model_of(earlier), terms), chosen_by="parameters")
+    plain = Model(gravity=settings.gravity)
+    if not settings.chooses and not needs_shape(settings.terms):
+        return _given(plain, settings.terms)
+    candidates = [term for term in CHOICE if term != "delay" or settings.delay == 0] if settings.chooses else []
+    unloaded, loaded = (_passes(survey, logs, settings) for logs in (survey.unloaded, survey.loaded))
+    try:
+        return select(unloaded, loaded, _weak_settings(settings, _given(plain, ())), candidates, settings.terms)
+    except ValueError as error:
+        raise _too_short(survey, error) from error
+
+
+def _given(model: Model, terms: Sequence[str]) -> Selection:
+    wanted = tuple(term for term in (*model.terms, *terms) if term != "delay")
+    return Selection(replace(model, terms=wanted), "delay" in terms)
+
+
+def _too_short(survey: Survey, error: ValueError) -> LogError:
+    return LogError(f"{', '.join(log.name for log in survey.logs)}: {error}; record longer")
+
+
+def run_fit(survey: Survey, settings: Settings, chosen: Selection, prior: Prior | None) -> tuple[Fit, Predictions]:
     """Fit the settings' estimator to logs.
 
     Parameters
@@ -35,6 +67,8 @@ def run_fit(survey: Survey, settings: Settings, prior: Prior | None) -> tuple[Fi
     survey : Survey
         Of the logs; its `told` is told the refined estimator's steps too.
     settings : Settings
+    chosen : Selection
+        The torque's model, and whether a delay is estimated.
     prior : Prior
         What is known of the arm beforehand.
 
@@ -48,37 +82,35 @@ def run_fit(survey: Survey, settings: Settings, prior: Prior | None) -> tuple[Fi
         If no log is long enough.
     """
     sums: dict[LogSource, PredictionSums] = {}
-    weak_settings = _weak_settings(settings)
-    unloaded, loaded = (_passes(survey, logs, settings, sums) for logs in (survey.unloaded, survey.loaded))
+    weak_settings = _weak_settings(settings, chosen)
+    unloaded, loaded = (_watching(survey, logs, settings, chosen, sums) for logs in (survey.unloaded, survey.loaded))
     try:
         if settings.estimator == "weak":
             fit = weak.fit(unloaded, loaded, weak_settings, settings.lengths, prior)
         else:
             fit = refined.fit(unloaded, loaded, _refined_settings(settings, weak_settings, prior), survey.told)
     except ValueError as error:
-        names = ", ".join(log.name for log in survey.logs)
-        raise LogError(f"{names}: {error}; record longer") from error
+        raise _too_short(survey, error) from error
     return constrained(fit) if settings.constrain else fit, sums
 
 
-def model_of(settings: Settings) -> Model:
-    """The columns that the settings switch on."""
-    wanted = {
-        "coulomb": settings.friction == "coulomb",
-        "offset": settings.torque_offset,
-        "rotor": settings.rotor_inertia,
-    }
-    return Model(tuple(term for term, asked in wanted.items() if asked), settings.gravity)
+def model_of(result: Result) -> Model:
+    """The torque's model behind a result; a result that names none was made with what its settings ask for."""
+    settings = Settings.of(result.settings)
+    found = None if result.fit is None else result.fit.model
+    if found is None:
+        return _given(Model(gravity=settings.gravity), settings.terms).model
+    return Model(tuple(found.terms), settings.gravity, found.coulomb_speed, found.stribeck_speed)
 
 
-def _weak_settings(settings: Settings) -> weak.WeakSettings:
+def _weak_settings(settings: Settings, chosen: Selection) -> weak.WeakSettings:
     own_velocities = settings.velocity == "measured" or settings.luenberger
     ours = weak.WeakSettings(
-        model=model_of(settings),
+        model=chosen.model,
         bandwidth=None if own_velocities else settings.bandwidth,
         hold=settings.torque_hold,
         delay=0.0 if settings.delay == "estimate" else settings.delay,
-        estimate_delay=settings.delay == "estimate",
+        estimate_delay=chosen.delay,
     )
     return ours if settings.window is None else replace(ours, window=settings.window)
 
@@ -97,45 +129,55 @@ def _refined_settings(
     )
 
 
-def _passes(
-    survey: Survey, logs: Sequence[LogSource], settings: Settings, sums: dict[LogSource, PredictionSums]
-) -> list[Pass]:
+def _passes(survey: Survey, logs: Sequence[LogSource], settings: Settings) -> list[Pass]:
     """A callable a log that gives a fresh pass, with velocities only where they are not observed on the way."""
     own = settings.velocity == "measured" or settings.luenberger
-    passes: list[Pass] = [
+    return [
         partial(with_velocities, survey, log, settings, luenberger=settings.luenberger)
         if own
         else partial(survey.segments, log)
         for log in logs
     ]
-    model = model_of(settings)  # what the prediction is scored by depends on the estimate of some terms
-    if settings.delay == "estimate" or not model.linear or "lag" in model.terms:
+
+
+def _watching(
+    survey: Survey,
+    logs: Sequence[LogSource],
+    settings: Settings,
+    chosen: Selection,
+    sums: dict[LogSource, PredictionSums],
+) -> list[Pass]:
+    """`_passes` that gather what the prediction will be scored by, where that depends on no estimate."""
+    passes = _passes(survey, logs, settings)
+    if chosen.delay or not chosen.model.linear or "lag" in chosen.model.terms:
         return passes
-    return [partial(_watched, log, moving, settings, sums) for log, moving in zip(logs, passes, strict=True)]
+    return [
+        partial(_watched, log, moving, settings, chosen.model, sums) for log, moving in zip(logs, passes, strict=True)
+    ]
 
 
 def _watched(
-    log: LogSource, moving: Pass, settings: Settings, sums: dict[LogSource, PredictionSums]
+    log: LogSource, moving: Pass, settings: Settings, model: Model, sums: dict[LogSource, PredictionSums]
 ) -> Iterator[Segment]:
     """A pass that also gathers, once, what the prediction will be scored by."""
     if log in sums:
         yield from moving()
         return
-    gathered = PredictionSums(model_of(settings), settings.torque_shift)
+    gathered = PredictionSums(model, settings.torque_shift)
     yield from beside(moving(), gathered.push)
     gathered.finish()
     sums[log] = gathered
 
 
-def prior_of(result: Result, settings: Settings, file: str | None = None) -> Prior:
-    """What an earlier result knows of the arm; where it is wrong, its `file` is named, or its log.
+def prior_of(result: Result, model: Model, file: str | None = None) -> Prior:
+    """What an earlier result knows of the arm's `model`; where it is wrong, its `file` is named, or its log.
 
     Raises
     ------
     ResultError
         If its estimator gives no error bars, or it does not determine all constants of the model.
     """
-    model, file = model_of(settings), file or result.log.path
+    file = file or result.log.path
     if result.fit is None:
         raise ResultError(
             f"{file}: the result of --estimator {result.estimator} has no error bars; "

@@ -157,13 +157,16 @@ def _by_the_paper(survey: Survey, settings: Settings, earlier: Earlier | None, f
 
 
 def _by_likelihood(survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None) -> Result:
-    from algid.identification.by_likelihood import prior_of, run_fit
+    from algid.identification.by_likelihood import choose_model, prior_of, run_fit
     from algid.identification.summary import outcome_of
 
-    prior = None if earlier is None else prior_of(earlier.result, settings, earlier.file)
-    fit, predictions = run_fit(survey, settings, prior)
+    survey.begin("choosing terms")
+    chosen = choose_model(survey, settings, None if earlier is None else earlier.result)
+    prior = None if earlier is None else prior_of(earlier.result, chosen.model, earlier.file)
+    survey.begin("fitting")
+    fit, predictions = run_fit(survey, settings, chosen, prior)
     survey.begin("prediction")
-    outcome = outcome_of(fit, predictions, survey, settings)
+    outcome = outcome_of(fit, predictions, survey, settings, chosen)
     if folder is not None:
         survey.begin("series")
         write_fit_series(folder, fit, survey, settings)

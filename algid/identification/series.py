@@ -18,7 +18,7 @@ from algid.estimators.noise import first_guess
 from algid.estimators.paper import Series
 from algid.estimators.prediction import PredictionFilter
 from algid.identification.source import Survey
-from algid.model import Model, Motion, regressor
+from algid.model import Model, Motion, torque
 from algid.settings import Settings
 from algid.signals.filters import half_length, smoothed
 from algid.signals.segments import Segment, pieces
@@ -53,7 +53,8 @@ def _torques(piece: Segment, model: Model, c: FloatArray, shift: float) -> dict[
     theta = smoothed(piece.theta, piece.dt, max(bandwidth, min(PredictionFilter().motion, 0.1 / piece.dt)))
     omega = np.gradient(theta, piece.dt, axis=1)
     motion = Motion(theta, omega, np.gradient(omega, piece.dt, axis=1))
-    predicted = smoothed(np.einsum("aqn,q->an", regressor(model, motion), c), piece.dt, bandwidth)
+    predicted = smoothed(torque(model, c, motion), piece.dt, bandwidth)
+    shift -= model.values(c)["lag"]  # a torque that lags shows at its stamp what acted before
     predicted = np.stack([np.interp(piece.t + shift, piece.t, row) for row in predicted])
     reach = min(half_length(piece.dt, bandwidth), len(piece) // 2)
     predicted[:, :reach] = predicted[:, len(piece) - reach :] = np.nan

@@ -18,6 +18,7 @@ from algid.estimators.diagnostics import broken_bounds, payload_distance, term_w
 from algid.estimators.fit import Fit, OwnEstimate, own_estimates
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
 from algid.estimators.prediction import PredictionFilter, PredictionScore, cross_validate, score
+from algid.estimators.selection import Selection
 from algid.identification.by_likelihood import Predictions
 from algid.identification.series import torque_coefficients, torque_shift
 from algid.identification.source import LogSource, Survey
@@ -122,12 +123,12 @@ def _contradictions(logs: Sequence[LogSource]) -> list[str]:
 FAR_APART = 5.0  # standard deviations past which two logs are not of one arm
 
 
-def outcome_of(fit: Fit, predictions: Predictions, survey: Survey, settings: Settings) -> Outcome:
+def outcome_of(fit: Fit, predictions: Predictions, survey: Survey, settings: Settings, chosen: Selection) -> Outcome:
     """The fit as a result holds it."""
     found = _estimates(fit)
     payload = {name: found.pop(name) for name in PAYLOAD_PARAMETERS if name in found}
     rows, stds = table_rows(fit)
-    summary = fit_summary(fit, predictions, survey, settings)
+    summary = fit_summary(fit, predictions, survey, settings, chosen)
     units = {**TABLE_UNITS, "l1": "m", "l2": "m"}
     combined = (
         {name: _row_estimate(rows, stds, name, fit, units[name]) for name in LOADED_ROWS} if survey.loaded else {}
@@ -243,9 +244,10 @@ def _row_weights(place: dict[str, int], names: Sequence[str]) -> dict[str, Float
     return weights
 
 
-def fit_summary(fit: Fit, predictions: Predictions, survey: Survey, settings: Settings) -> results.FitSummary:
+def fit_summary(
+    fit: Fit, predictions: Predictions, survey: Survey, settings: Settings, chosen: Selection
+) -> results.FitSummary:
     """The statistical part of a result."""
-    worths = term_worths(fit)
     crossed = None
     if settings.cross_validate:
         unloaded, loaded = (
@@ -261,7 +263,8 @@ def fit_summary(fit: Fit, predictions: Predictions, survey: Survey, settings: Se
         converged=fit.converged,
         whiteness=_whiteness(fit),
         unidentifiable=list(fit.unidentifiable),
-        terms=[results.TermCriterion(term=w.term, delta_bic=w.delta_bic, kept=w.earned) for w in worths],
+        model=_model(chosen),
+        terms=_terms(fit, chosen),
         broken_bounds=[
             results.Bound(bound=b.bound, value=b.value, distance_sigma=b.distance) for b in broken_bounds(fit)
         ],
@@ -279,6 +282,32 @@ def _own(fit: Fit, own: OwnEstimate) -> dict[str, Estimate]:
         half = fit.quantile * std
         found[name] = estimate(value, std, (value - half, value + half), UNITS[name], status)
     return found
+
+
+def _model(chosen: Selection) -> results.TorqueModel:
+    return results.TorqueModel(
+        terms=list(chosen.model.terms),
+        coulomb_speed=chosen.model.coulomb_speed,
+        stribeck_speed=chosen.model.stribeck_speed,
+        chosen_by=chosen.chosen_by,
+        held_out=chosen.held_out,
+    )
+
+
+def _terms(fit: Fit, chosen: Selection) -> list[results.TermCriterion]:
+    """What the logs said of each term they chose from, or of those that were given."""
+    if chosen.trials:
+        return [
+            results.TermCriterion(
+                term=trial.term,
+                kept=trial.kept,
+                gain_heldout=finite(trial.prediction),
+                evidence=0.5 * trial.evidence,  # a Wald statistic is twice a difference of log-likelihoods
+                why=trial.reason,
+            )
+            for trial in chosen.trials
+        ]
+    return [results.TermCriterion(term=w.term, delta_bic=w.delta_bic, kept=w.earned) for w in term_worths(fit)]
 
 
 def _open_covariance(fit: Fit) -> FloatArray:

@@ -35,7 +35,7 @@ def validate(result: Result, survey: Survey, name: str) -> Validation:
         If a parameter that the prediction needs has no estimate.
     """
     settings = Settings.of(result.settings)
-    model = model_of(settings)
+    model = model_of(result)
     found: dict[str, TorquePrediction | None] = {}
     total, delay = PredictionScore(), result.parameters.get("delay")
     shift = partial(settings.torque_shift, found_delay=None if delay is None else delay.estimate)

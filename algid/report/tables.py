@@ -56,6 +56,13 @@ def _whiteness(result: Result) -> Table:
     return Table("Whiteness of the residual", columns, rows, note).without_empty()
 
 
+def chosen_terms(result: Result) -> list[Table]:
+    """What became of each term of the torque, where the logs chose."""
+    if result.fit is None or result.fit.model is None or result.fit.model.chosen_by != "logs":
+        return []
+    return [_terms(result)]
+
+
 def _terms(result: Result) -> Table:
     assert result.fit is not None
     rows = tuple(_term_row(term) for term in result.fit.terms)
@@ -67,7 +74,14 @@ def _terms(result: Result) -> Table:
         Column("Kept", "text"),
         Column("Why", "text"),
     )
-    note = "A negative change says that the term earns its place."
+    model = result.fit.model
+    if model is not None and model.held_out is not None:
+        note = (
+            f"Held-out error: squared, of whole {model.held_out}, each predicted from the others, with the term beside"
+        )
+        note += " those kept against without. Log odds: of the term, its price taken off."
+    else:
+        note = "A negative change says that the term earns its place."
     return Table("Terms tried", columns, rows, note).without_empty()
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from algid.report.table import Column, Table
-from algid.report.tables import estimate_tables
+from algid.report.tables import chosen_terms, estimate_tables
 from algid.report.verdict import LEVEL_WORDS, Level, Verdict, verdict
 from algid.results import Result, Status
 
@@ -21,7 +21,7 @@ LEVEL_STYLES: dict[Level, str] = {"good": "bold green", "reservations": "bold ye
 def print_table(result: Result, console: Console) -> None:
     """Print the verdict, the estimates and what is known against them to `console`."""
     print_verdict(verdict(result), console)
-    for table in estimate_tables(result):
+    for table in [*estimate_tables(result), *chosen_terms(result)]:
         console.print()
         print_one(table, console)
 

@@ -31,7 +31,6 @@ from algid.estimators.whitening import Linearised, NoiseLevels, linearise, traje
 from algid.identification.by_likelihood import model_of, prior_of
 from algid.model import Model
 from algid.results import Result
-from algid.settings import Settings
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.filters import smoothed
 from algid.signals.segments import Segment, pieces
@@ -167,15 +166,15 @@ def arm_of(result: Result, first: Segment, l1: float | None = None, l2: float | 
             f"{result.log.path}: the result of --estimator {result.estimator} has no error bars; "
             "identify with --estimator refined or weak"
         )
-    settings = Settings.of(result.settings)
-    prior = prior_of(result, settings)
+    model = model_of(result)
+    prior = prior_of(result, model)
     names = [*prior.names, *(n for n, given in (("l1", l1), ("l2", l2)) if given is None and _free(result, n))]
     places = [result.fit.covariance_names.index(name) for name in names]
     rows = [(*prior.names, "l1", "l2").index(name) for name in names]
     covariance = np.zeros((len(prior.names) + 2,) * 2)
     covariance[np.ix_(rows, rows)] = np.array(result.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
     known = Arm(
-        model_of(settings),
+        model,
         prior.mean,
         _length(result, "l1", l1),
         _length(result, "l2", l2),

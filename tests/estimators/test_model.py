@@ -6,6 +6,7 @@ import sympy as sp
 
 from algid import arm
 from algid.model import TERMS, UNITS, Model, Motion, partials, regressor, sensitivity, sine_cosine, torque
+from tests.estimators.by_hand import evaluated, torque_by_hand
 
 FULL = Model(tuple(TERMS), coulomb_speed=0.5, stribeck_speed=0.8)
 VALUES = {
@@ -34,56 +35,14 @@ def _motion(seed: int = 0) -> Motion:
     return Motion(rng.uniform(-3, 3, (2, 50)), rng.uniform(-2, 2, (2, 50)), rng.uniform(-40, 40, (2, 50)))
 
 
-def _by_hand() -> sp.Matrix:
-    """The torque of every term, Lagrange's equations done by SymPy, in the symbols of `VALUES` and of the motion."""
-    t = sp.Symbol("t")
-    angles = [sp.Function(f"q{joint}")(t) for joint in (1, 2)]
-    speeds = [angle.diff(t) for angle in angles]
-    value = {name: sp.Symbol(name) for name in VALUES}
-    q1, q2 = angles[0] + value["zero1"], angles[1] + value["zero2"]
-    k1, k2, k3, k4, k5 = (value[f"k{number}"] for number in range(1, 6))
-    kinetic = ((k5 + k3 + 2 * k1 * sp.cos(q2)) * speeds[0] ** 2 + k3 * speeds[1] ** 2) / 2
-    kinetic += (k3 + k1 * sp.cos(q2)) * speeds[0] * speeds[1]
-    potential = k4 * sp.sin(q1) + k2 * sp.sin(q1 + q2)
-    lagrangian = kinetic - potential
-    torques = []
-    for joint, (angle, speed) in enumerate(zip(angles, speeds, strict=True), 1):
-        load = lagrangian.diff(speed).diff(t) - lagrangian.diff(angle)
-        sign = sp.tanh(speed / sp.Symbol("ws"))
-        friction = value[f"k{joint + 5}"] * speed + value[f"f{joint}"] * sign + value[f"a{joint}"] * sign**2
-        friction += value[f"s{joint}"] * sign * sp.exp(-((speed / sp.Symbol("wS")) ** 2))
-        friction += value[f"e{joint}"] * sp.sqrt(load**2) * sign
-        torques.append(load + friction + value[f"o{joint}"])
-    torques[1] = (torques[1] + value["j2"] * speeds[1].diff(t)) * (1 + value["gain2"])
-    plain = [
-        (angle.diff(t, order), sp.Symbol(f"{letter}{joint}"))
-        for order, letter in ((2, "alpha"), (1, "omega"), (0, "theta"))
-        for joint, angle in enumerate(angles, 1)
-    ]
-    return sp.Matrix([torque.doit().subs(plain) for torque in torques])
-
-
-def _function(expression: sp.Matrix, motion: Motion) -> np.ndarray:
-    signals = {
-        f"{letter}{j + 1}": x[j]
-        for letter, x in vars(motion).items()
-        if letter in ("theta", "omega", "alpha")
-        for j in range(2)
-    }
-    known = {**VALUES, "ws": FULL.coulomb_speed, "wS": FULL.stribeck_speed, **signals}
-    names = sorted(map(str, expression.free_symbols))
-    rows = [sp.lambdify(names, entry, "numpy")(*(known[name] for name in names)) for entry in expression]
-    return np.array([np.broadcast_to(row, motion.theta.shape[1:]) for row in rows]).reshape(*expression.shape, -1)
-
-
 def test_the_torque_of_every_term_is_that_of_sympy() -> None:
-    expected = _function(_by_hand(), _motion())[:, 0]
+    expected = evaluated(torque_by_hand(), FULL, VALUES, _motion())[:, 0]
     assert np.allclose(torque(FULL, C, _motion()), expected, rtol=1e-12, atol=1e-12)  # rounding
 
 
 def test_the_sensitivity_of_every_term_is_that_of_sympy() -> None:
-    slopes = _by_hand().jacobian([sp.Symbol(name) for name in FULL.names if name != "lag"])
-    expected = _function(slopes, _motion())
+    slopes = torque_by_hand().jacobian([sp.Symbol(name) for name in FULL.names if name != "lag"])
+    expected = evaluated(slopes, FULL, VALUES, _motion())
     ours = np.delete(sensitivity(FULL, C, _motion()), FULL.names.index("lag"), axis=1)
     assert np.allclose(ours, expected, rtol=1e-11, atol=1e-11)  # rounding
 

@@ -9,7 +9,7 @@ import pytest
 
 import algid
 from algid.arm import FloatArray
-from algid.identification.by_likelihood import run_fit
+from algid.identification.by_likelihood import choose_model, run_fit
 from algid.identification.by_paper import run_paper
 from algid.identification.source import LogSource, Survey, open_source
 from algid.identification.summary import outcome_of, result_of
@@ -50,12 +50,13 @@ def estimates(log: LogSource, settings: Settings) -> tuple[FloatArray, FloatArra
         result = result_of(run_paper(survey, log, None, settings), settings, survey)
         values = np.array([one.estimate for one in result.parameters.values()], dtype=np.float64)
         return values, 1e-9 * np.abs(values), result  # condition numbers to 1e6, times rounding
-    fit, predictions = run_fit(survey, settings, None)
+    chosen = choose_model(survey, settings)
+    fit, predictions = run_fit(survey, settings, chosen, None)
     assert fit.converged
     # A window or sample lost at a seam moves an estimate by 1e-4 of its deviation or more; rounding, times the
     # condition of the normal equations, by 1e-9 of it.
     room = np.concatenate([fit.std, fit.std]) * 1e-7
-    result = result_of(outcome_of(fit, predictions, survey, settings), settings, survey)
+    result = result_of(outcome_of(fit, predictions, survey, settings, chosen), settings, survey)
     return np.concatenate([fit.values, fit.std]), room, result
 
 

@@ -1,0 +1,291 @@
+"""Which terms the torque's model needs: weighed by prediction of what was not fitted, and by evidence.
+
+The normal equations of the weak form are gathered with the columns of every term, and every model without some of
+them is solved from the same Gram matrices. Moments over smooth windows are a residual filtered after the model, so
+that the held-out ones measure how well a model predicts.
+
+Terms are taken in where they lower the squared moments of folds (logs, or blocks of a log) that were left out of
+the fit, and where the evidence outweighs its price,
+
+    W > n (log N + 2 log T)
+
+with W their Wald statistic, n their coefficients, N the independent stretches of log (Schwarz 1978) and T the terms
+to choose from (Chen & Chen 2008, γ = 1). What makes a column, the width of friction and where a term that is not
+linear is linearised, is improved between the rounds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.estimators.term_grams import Coefficients, Grams, Training, term_names
+from algid.estimators.weak import Source, WeakSettings
+from algid.model import TERMS, Model
+
+TIMING = ("delay", "lag")  # the same to first order: one column tells both
+CHOICE = (*(term for term in TERMS if term != "lag"), "delay")
+_FIRST_TERMS = ("coulomb", "offset", "rotor")
+_WIDTHS = np.array([0.01, 0.02, 0.04, 0.08, 0.16, 0.32])  # rad/s
+_FADES = np.array([0.1, 0.3, 0.9])  # rad/s
+_NEAR = np.array([0.7, 0.84, 1.0, 1.2, 1.44])  # of a shape found before
+_SHAPED = {"coulomb_speed": {"coulomb", "load", "asymmetry", "stribeck"}, "stribeck_speed": {"stribeck"}}
+_RELINEARISED = {"load", "gain", "zero", "delay"}
+_PLAUSIBLE = {  # coefficients beyond are another convention, or what a log that tells little makes of its noise
+    "f1": (0.0, np.inf),
+    "f2": (0.0, np.inf),
+    "j2": (0.0, np.inf),
+    "e1": (0.0, 0.5),
+    "e2": (0.0, 0.5),
+    "gain2": (-0.5, 0.5),
+    "zero1": (-0.35, 0.35),
+    "zero2": (-0.35, 0.35),
+    "delay": (-0.05, 0.05),
+}
+_ROUNDS = 4
+_TOGETHER = 2  # terms that are tried at once
+
+Shape = Literal["coulomb_speed", "stribeck_speed"]
+
+
+@dataclass(frozen=True)
+class TermTrial:
+    """What became of one term, beside those that were kept.
+
+    Parameters
+    ----------
+    term : str
+    kept : bool
+    prediction : float
+        Share by which the held-out squared moments fall with it; negative where they grow.
+    evidence : float
+        Its Wald statistic less its price; negative where it is not worth it.
+    reason : str
+        Why it was kept or left out, in words.
+    """
+
+    term: str
+    kept: bool
+    prediction: float
+    evidence: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The model chosen, whether a delay is estimated beside it, and who chose.
+
+    `trials` are those of the terms, and `held_out` is what was left out of the fit in turn; where the terms were
+    given there are none.
+    """
+
+    model: Model
+    delay: bool
+    chosen_by: Literal["logs", "settings", "parameters"] = "settings"
+    trials: tuple[TermTrial, ...] = ()
+    held_out: Literal["logs", "blocks"] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """What the columns are made at: settings, shapes and coefficients by name, of unloaded and of loaded logs."""
+
+    logs: tuple[Training, ...]
+    settings: WeakSettings
+    at: Mapping[bool, Coefficients]
+
+    def grams(self, terms: Sequence[str], **shape: float) -> Grams:
+        """Normal equations with the columns of `terms`."""
+        model = replace(self.settings.model, terms=tuple(term for term in terms if term != "delay"), **shape)
+        return Grams(self.logs, replace(self.settings, model=model), self.at)
+
+    def shaped(self, shape: Shape, values: FloatArray, terms: Sequence[str]) -> _Look:
+        """With the value of a shape at which the model with `terms` fits best."""
+        costs = [self.grams(terms, **{shape: float(value)}).cost for value in values]
+        best = float(np.exp(_lowest(np.log(values), costs)))
+        model = replace(self.settings.model, **{shape: best})  # type: ignore[arg-type]
+        return replace(self, settings=replace(self.settings, model=model))
+
+    def moved(self, grams: Grams, terms: Sequence[str]) -> _Look:
+        """At what the sub-model with `terms` gives."""
+        at = grams.coefficients(terms)
+        delay = self.settings.delay + at[False]["delay"]
+        moved = replace(self, settings=replace(self.settings, delay=delay), at=at)
+        for shape, shaped in _SHAPED.items():
+            if shaped & set(terms):
+                now = getattr(self.settings.model, shape)
+                moved = moved.shaped(shape, now * _NEAR, terms)  # type: ignore[arg-type]
+        return moved
+
+
+def needs_shape(terms: Sequence[str]) -> bool:
+    """Whether some of `terms` have a width or a speed that is to be found."""
+    return bool(set(terms) & set[str]().union(*_SHAPED.values()))
+
+
+def select(
+    unloaded: Sequence[Source],
+    loaded: Sequence[Source],
+    settings: WeakSettings,
+    candidates: Sequence[str] = CHOICE,
+    kept: Sequence[str] = (),
+) -> Selection:
+    """Choose the terms of the torque's model.
+
+    Parameters
+    ----------
+    unloaded, loaded : sequences of callables
+        Each gives a fresh iterable of `Segment`; it is called once.
+    settings : WeakSettings
+        Its model's gravity, its window, bandwidth, hold and delay.
+    candidates : names in `CHOICE`
+        A delay that turns out negative is a lag where that explains more.
+    kept : names in `TERMS`, or "delay"
+        Terms that stay whatever the data say; only their shapes are found.
+
+    Raises
+    ------
+    ValueError
+        If no log is long enough for a window.
+    """
+    logs = [Training.of(source, kind) for kind, sources in ((False, unloaded), (True, loaded)) for source in sources]
+    start = _first_look(tuple(logs), settings)
+    look, fixed, before = start, tuple(kept), None
+    everything = tuple(dict.fromkeys((*candidates, *kept)))
+    searches: list[_Search] = []
+    for _ in range(_ROUNDS):
+        grams = look.grams(everything)
+        told = [term for term in candidates if set(term_names(term)) & set(grams.names) and term not in fixed]
+        searches.append(_Search(grams, tuple(told), fixed))
+        terms = searches[-1].run()
+        if terms == before or not (_RELINEARISED | _SHAPED["coulomb_speed"]) & set(terms):
+            break
+        look, before = look.moved(grams, terms), terms
+        if "delay" in terms:
+            fixed = tuple(dict.fromkeys((*fixed, "delay")))
+    model = replace(look.settings.model, terms=tuple(term for term in terms if term != "delay"))
+    if not candidates:
+        return Selection(model, "delay" in terms)
+    trials = tuple(searches[0 if term == "delay" else -1].trial(term, terms, kept) for term in everything)
+    return _as_lag(start, look, terms, Selection(model, "delay" in terms, "logs", trials, grams.held_out))
+
+
+def _first_look(logs: tuple[Training, ...], settings: WeakSettings) -> _Look:
+    """At the constants, and at the shapes of friction, that a model of the most common terms gives."""
+    look = _Look(logs, settings, {False: {}, True: {}}).shaped("coulomb_speed", _WIDTHS, _FIRST_TERMS)
+    at = look.grams(_FIRST_TERMS).coefficients((*_FIRST_TERMS, "delay"))
+    linear = {kind: {name: c for name, c in values.items() if name != "delay"} for kind, values in at.items()}
+    return replace(look, at=linear).shaped("stribeck_speed", _FADES, (*_FIRST_TERMS, "stribeck"))
+
+
+def _lowest(x: FloatArray, y: Sequence[float]) -> float:
+    """Where the parabola through the least value and its neighbours has its bottom; at an end, the end itself."""
+    least = int(np.argmin(y))
+    if least in (0, len(x) - 1):
+        return float(x[least])
+    a, b, _ = np.polyfit(x[least - 1 : least + 2] - x[least], y[least - 1 : least + 2], 2)
+    return float(x[least] - b / (2 * a)) if a > 0 else float(x[least])
+
+
+def _as_lag(start: _Look, look: _Look, terms: Sequence[str], chosen: Selection) -> Selection:
+    """The selection with a lag in place of a negative delay where that fits better."""
+    if not chosen.delay or look.settings.delay >= start.settings.delay:
+        return chosen
+    timely = replace(look, settings=replace(look.settings, delay=start.settings.delay))
+    others = [term for term in terms if term != "delay"]
+    if timely.grams(others).cost >= look.grams(others).cost:  # both with the torque's slope, the one shifted before
+        return chosen
+    trials = tuple(replace(trial, term="lag") if trial.term == "delay" else trial for trial in chosen.trials)
+    model = replace(chosen.model, terms=(*chosen.model.terms, "lag"))
+    return replace(chosen, model=model, delay=False, trials=trials)
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """Forward by single terms, then by pairs, then backward."""
+
+    grams: Grams
+    candidates: tuple[str, ...]
+    fixed: tuple[str, ...]
+
+    def worth(self, terms: Sequence[str], beside: Sequence[str]) -> tuple[float, float]:
+        """Evidence less its price, and the share by which the held-out squares fall."""
+        among = [*beside, *terms]
+        wald, stretches = self.grams.wald(terms, among)
+        count = sum(len(term_names(term)) for term in terms)
+        price = count * (np.log(stretches) + 2 * np.log(max(2, len(self.candidates))))
+        before, after = (self.grams.held_out_squares(some) for some in (beside, among))
+        return wald - float(price), 1 - after / before
+
+    def plausible(self, terms: Sequence[str], among: Sequence[str]) -> bool:
+        """Whether the coefficients of `terms` beside `among` are within `_PLAUSIBLE`."""
+        value = self.grams.coefficients([*among, *terms])[False]
+        names = [name for term in terms for name in term_names(term) if name in _PLAUSIBLE]
+        return all(_PLAUSIBLE[name][0] <= value[name] <= _PLAUSIBLE[name][1] for name in names)
+
+    def run(self) -> list[str]:
+        """The terms that stay."""
+        kept = list(self.fixed)
+        while added := self._addition(kept):
+            kept += added
+        while (dropped := self._removal(kept)) is not None:
+            kept.remove(dropped)
+        return kept
+
+    def _addition(self, kept: list[str]) -> list[str]:
+        left = [term for term in self.candidates if term not in kept and _need(term) in (None, *kept)]
+        for count in range(1, _TOGETHER + 1):
+            found: list[tuple[float, list[str]]] = []
+            for terms in combinations(left, count):
+                evidence, gain = self.worth(terms, kept)
+                if evidence > 0 and gain > 0 and self.plausible(terms, kept):
+                    found.append((evidence, list(terms)))
+            if found:
+                return max(found)[1]
+        return []
+
+    def _removal(self, kept: list[str]) -> str | None:
+        needed = {_need(term) for term in kept}
+        free = [term for term in kept if term not in self.fixed and term not in needed]
+        poor = []
+        for term in free:
+            others = [other for other in kept if other != term]
+            evidence, gain = self.worth([term], others)
+            if evidence <= 0 or gain <= 0 or not self.plausible([term], others):
+                poor.append((evidence, term))
+        return min(poor)[1] if poor else None
+
+    def trial(self, term: str, kept: Sequence[str], asked: Sequence[str]) -> TermTrial:
+        """What became of a term, beside those that were kept."""
+        beside = [other for other in kept if other != term and _need(other) != term]
+        if term in asked:
+            return TermTrial(term, True, *self._judged(term, beside), "asked for")
+        if term not in self.candidates:
+            return TermTrial(term, False, 0.0, 0.0, "left out: without gravity it has no effect")
+        if _need(term) not in (None, *beside):
+            return TermTrial(term, False, 0.0, 0.0, f"left out: no meaning without {_need(term)}")
+        gain, evidence = self._judged(term, beside)
+        if term in kept:
+            reason = "kept: predicts better what was left out, and is evident"
+        elif evidence <= 0:
+            reason = "left out: the logs cannot tell it from nothing"
+        elif gain <= 0:
+            reason = "left out: predicts no better what was left out"
+        elif not self.plausible([term], beside):
+            reason = "left out: its value would contradict physics"
+        else:
+            reason = "left out: other terms explain the same"
+        return TermTrial(term, term in kept, gain, evidence, reason)
+
+    def _judged(self, term: str, beside: Sequence[str]) -> tuple[float, float]:
+        evidence, gain = self.worth([term], beside)
+        return gain, evidence
+
+
+def _need(term: str) -> str | None:
+    return None if term == "delay" else TERMS[term].needs

@@ -1,0 +1,212 @@
+"""Normal equations of the weak form with the columns of any terms, out of which every sub-model is solved.
+
+======  ==================================================================  ====================
+symbol  name                                                                shape
+======  ==================================================================  ====================
+p       coefficients of the columns, the delay, the loaded arm's k1 … k5    (P,)
+G       Gram matrices of a log by stretch, joints weighed, the torque last  (B, P + 1, P + 1)
+======  ==================================================================  ====================
+
+Loaded logs share every coefficient with unloaded ones save k1 … k5, so that friction is one where both kinds tell
+it and no payload need be guessed. Joints weigh by the residual of all columns together, log by log, whatever the
+sub-model, so that sub-models compare.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from algid.arm import FloatArray
+from algid.estimators.combine import long_run_variance, scaled_pinv
+from algid.estimators.modulating_functions import OVERLAP
+from algid.estimators.weak import Normal, Source, WeakSettings, normal_equations
+from algid.model import TERMS
+from algid.signals.segments import Segment, pieces
+
+IntArray = NDArray[np.int64]
+Coefficients = Mapping[str, float]
+
+_PIECES = 8  # of a log, and up to twice as many: what a selection looks at
+_PIECE_SAMPLES = 16384
+_FOLDS = 5  # blocks of a log, where there are too few logs to leave whole ones out
+_FEWEST_LOGS = 3
+_REWEIGHTINGS = 4
+_RIGID = ("k1", "k2", "k3", "k4", "k5")
+
+
+def term_names(term: str) -> tuple[str, ...]:
+    """Names of the coefficients of a term, or of the delay."""
+    return ("delay",) if term == "delay" else TERMS[term].names
+
+
+@dataclass(frozen=True, eq=False)
+class Training:
+    """Evenly spread pieces of a log, all of it where it is short."""
+
+    pieces: tuple[Segment, ...]
+    loaded: bool
+
+    @classmethod
+    def of(cls, source: Source, loaded: bool) -> Training:
+        """The pieces of one pass over a log."""
+        kept: list[Segment] = []
+        stride = 1
+        for index, piece in enumerate(pieces(source(), _PIECE_SAMPLES)):
+            if index % stride:
+                continue
+            kept.append(_copied(piece, piece.continues and stride == 1))
+            if len(kept) > 2 * _PIECES:
+                kept, stride = [replace(piece, continues=False) for piece in kept[::2]], 2 * stride
+        return cls(tuple(kept), loaded)
+
+    def segments(self) -> Iterable[Segment]:
+        """The pieces, as a source gives them."""
+        return self.pieces
+
+
+def _copied(piece: Segment, continues: bool) -> Segment:
+    """The piece without hold on the block it was cut from."""
+    omega = None if piece.omega is None else piece.omega.copy()
+    return replace(piece, theta=piece.theta.copy(), tau=piece.tau.copy(), omega=omega, continues=continues)
+
+
+class Grams:
+    """Normal equations of all logs with the columns of a model and of the delay.
+
+    Parameters
+    ----------
+    logs : Training of each log
+    settings : WeakSettings
+    at : coefficients by name, of unloaded and of loaded logs
+        Where terms that are not linear are linearised.
+
+    Raises
+    ------
+    ValueError
+        If no log is long enough for a window.
+    """
+
+    def __init__(self, logs: Sequence[Training], settings: WeakSettings, at: Mapping[bool, Coefficients]) -> None:
+        self.settings = settings = replace(settings, estimate_delay=True)
+        self.names = (*settings.model.names, "delay")
+        self._rigid = [place for place, name in enumerate(self.names) if name in _RIGID]
+        normals = []
+        for log in logs:
+            here = np.array([at[log.loaded].get(name, 0.0) for name in settings.model.names])
+            if (normal := normal_equations(log.segments, settings, here)) is not None:
+                normals.append((log.loaded, normal))
+        if not normals:
+            raise ValueError("no log is long enough: expected at least a second of samples without a gap")
+        self.kinds = {loaded for loaded, _ in normals}
+        self._both = len(self.kinds) == 2
+        self.size = len(self.names) + self._both * len(self._rigid)
+        self._weigh(normals)
+        whole = all(sum(loaded is kind for loaded, _ in normals) >= _FEWEST_LOGS for kind in self.kinds)
+        self.held_out: Literal["logs", "blocks"] = "logs" if whole else "blocks"
+        parts = 1 if whole else _FOLDS
+        self._folds = np.array(
+            [part.sum(axis=0) for gram in self._logs for part in np.array_split(gram, parts) if len(part)]
+        )
+        self._total = self._folds.sum(axis=0)
+
+    def _weigh(self, normals: Sequence[tuple[bool, Normal]]) -> None:
+        weights: list[FloatArray] = [np.ones(2) for _ in normals]
+        for _ in range(_REWEIGHTINGS):
+            pairs = list(zip(normals, weights, strict=True))
+            total = sum(
+                (self._wide(loaded, np.einsum("a,baxy->xy", w, normal.gram)[None]) for (loaded, normal), w in pairs),
+                np.zeros((1, self.size + 1, self.size + 1)),
+            )
+            p = _solved(total[0], np.arange(self.size))
+            weights = [_row_weights(normal, p[self._places(loaded)]) for loaded, normal in normals]
+        # Overlapping rows repeat each other: a window's worth of rows counts as two.
+        share = 2.0 / OVERLAP
+        self._logs = [
+            self._wide(loaded, np.einsum("a,baxy->bxy", share * w, normal.gram))
+            for (loaded, normal), w in zip(normals, weights, strict=True)
+        ]
+        self.cost = -sum(
+            share * normal.rows * float(np.sum(np.log(w))) for (_, normal), w in zip(normals, weights, strict=True)
+        )
+
+    def _places(self, loaded: bool) -> IntArray:
+        """Where a log's coefficients stand in p."""
+        places = np.arange(len(self.names))
+        if loaded and self._both:
+            places[self._rigid] = len(self.names) + np.arange(len(self._rigid))
+        return places
+
+    def _wide(self, loaded: bool, gram: FloatArray) -> FloatArray:
+        """Gram matrices (B, P + 1, P + 1) in p of a log's (B, q + 1, q + 1)."""
+        wide = np.zeros((len(gram), self.size + 1, self.size + 1))
+        rows = [*self._places(loaded), self.size]
+        wide[np.ix_(range(len(gram)), rows, rows)] = gram
+        return wide
+
+    def _columns(self, terms: Iterable[str]) -> IntArray:
+        """Places in p of eq. (1) and of `terms`."""
+        names = {name for term in terms for name in term_names(term)}
+        basic = [place for place, name in enumerate(self.names) if name[0] == "k" or name in names]
+        return np.array([*basic, *range(len(self.names), self.size)])
+
+    def coefficients(self, terms: Iterable[str]) -> dict[bool, dict[str, float]]:
+        """Coefficients by name of the sub-model with `terms`, of each kind of log there is."""
+        p = _solved(self._total, self._columns(terms))
+        found = {kind: dict(zip(self.names, p[self._places(kind)].tolist(), strict=True)) for kind in self.kinds}
+        return {kind: found.get(kind, next(iter(found.values()))) for kind in (False, True)}
+
+    def held_out_squares(self, terms: Iterable[str]) -> float:
+        """Sum of the squared moments of logs, or of blocks of a log, each predicted from the others."""
+        columns = self._columns(terms)
+        value = 0.0
+        for fold in self._folds:
+            v = np.append(-_solved(self._total - fold, columns), 1.0)
+            value += float(v @ fold @ v)
+        return value
+
+    def wald(self, terms: Sequence[str], among: Sequence[str]) -> tuple[float, float]:
+        """How far the coefficients of `terms` are from nothing in the sub-model with the terms `among`.
+
+        Returns
+        -------
+        The smaller of the Wald statistics by the plain and by the sandwich covariance, and the independent
+        stretches of log behind them
+        """
+        columns = self._columns(among)
+        p = _solved(self._total, columns)
+        inverse = scaled_pinv(self._total[np.ix_(columns, columns)])
+        meat, stretches = np.zeros_like(inverse), 0
+        for gram in self._logs:
+            variance, lags = long_run_variance((gram[:, :-1, -1] - gram[:, :-1, :-1] @ p)[:, columns])
+            meat += variance
+            stretches += len(gram) // (lags + 1)
+        stretches = max(stretches, len(columns) + 2)
+        robust = inverse @ meat @ inverse * (stretches / (stretches - len(columns)))
+        names = {name for term in terms for name in term_names(term)}
+        own = [place for place, column in enumerate(columns) if column in self._own(names)]
+        value = p[columns[own]]
+        found = [float(value @ scaled_pinv(S[np.ix_(own, own)]) @ value) for S in (inverse, robust)]
+        return min(found), float(stretches)
+
+    def _own(self, names: set[str]) -> set[int]:
+        return {place for place, name in enumerate(self.names) if name in names}
+
+
+def _row_weights(normal: Normal, c: FloatArray) -> FloatArray:
+    """Inverse residual variance (2,) of a row of each joint."""
+    v = np.append(-c, 1.0)
+    gram = normal.gram.sum(axis=0)
+    squares = np.einsum("x,axy,y->a", v, gram, v)
+    return np.asarray(normal.rows / np.maximum(squares, 1e-24 * gram[:, -1, -1] + 1e-300))
+
+
+def _solved(gram: FloatArray, columns: IntArray) -> FloatArray:
+    """p (P,) of least squares with the columns given, zero elsewhere."""
+    p = np.zeros(len(gram) - 1)
+    p[columns] = scaled_pinv(gram[np.ix_(columns, columns)]) @ gram[columns, -1]
+    return p

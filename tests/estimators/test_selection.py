@@ -1,0 +1,50 @@
+"""The terms of the torque that logs choose."""
+
+from __future__ import annotations
+
+import pytest
+
+from algid.estimators.selection import CHOICE, Selection, needs_shape, select
+from algid.estimators.weak import WeakSettings
+from algid.model import TERMS, Model
+from tests.estimators.conftest import Bench
+from tests.estimators.test_terms import term_log, term_values
+
+SETTINGS = WeakSettings(bandwidth=60.0)
+
+
+def _chosen(bench: Bench, terms: tuple[str, ...], **asked: object) -> Selection:
+    model = Model(terms, coulomb_speed=0.05)
+    values = term_values(bench, terms)
+    logs = [term_log(bench, model, values, loaded) for loaded in (False, True)]
+    return select([lambda: [logs[0]]], [lambda: [logs[1]]], SETTINGS, **asked)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "terms", [(), ("coulomb",), ("offset", "rotor"), ("load",), ("gain",), ("zero",), ("lag",)], ids="+".join
+)
+def test_the_terms_that_are_there_are_chosen_and_no_other(bench: Bench, terms: tuple[str, ...]) -> None:
+    chosen = _chosen(bench, terms)
+    assert chosen.model.terms == terms
+    assert not chosen.delay
+    assert chosen.chosen_by == "logs"
+    assert chosen.held_out == "blocks"
+    assert {trial.term for trial in chosen.trials if trial.kept} == set(terms)
+    assert all(trial.prediction > 0 and trial.evidence > 0 for trial in chosen.trials if trial.kept)
+    assert len(chosen.trials) == len(CHOICE)
+
+
+def test_the_width_of_friction_is_found(bench: Bench) -> None:
+    chosen = _chosen(bench, ("coulomb",), candidates=(), kept=("coulomb",))
+    assert chosen.chosen_by == "settings"
+    assert chosen.model.terms == ("coulomb",)
+    assert chosen.model.coulomb_speed == pytest.approx(0.05, rel=0.5)  # velocities are smoothed: a widest guess
+
+
+def test_terms_with_a_shape_are_those_of_friction() -> None:
+    assert {term for term in TERMS if needs_shape([term])} == {"coulomb", "stribeck", "asymmetry", "load"}
+
+
+def test_logs_too_short_for_a_window_are_refused() -> None:
+    with pytest.raises(ValueError, match="no log is long enough"):
+        select([list], [], SETTINGS)

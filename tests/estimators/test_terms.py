@@ -1,0 +1,117 @@
+"""Each term of the torque, found again by both estimators on exact motions with a little noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from algid.arm import CONSTANT_NAMES, FloatArray, forward_dynamics, with_payload
+from algid.estimators import refined, weak
+from algid.estimators.fit import Fit
+from algid.estimators.whitening import low_passed
+from algid.model import TERMS, UNITS, Model, Motion
+from algid.signals.segments import Segment
+from tests.estimators.by_hand import evaluated, torque_by_hand
+from tests.estimators.conftest import DT, Bench
+
+SIGMA = 1e-4  # rad, and ten times as many N m
+VALUES = {
+    "coulomb": (0.3, 0.1),
+    "offset": (0.1, -0.05),
+    "rotor": (0.004,),
+    "stribeck": (0.3, 0.1),
+    "asymmetry": (0.05, -0.03),
+    "load": (0.05, 0.08),
+    "gain": (-0.04,),
+    "zero": (0.02, -0.03),
+    "lag": (5e-3,),
+}
+
+
+def term_values(bench: Bench, terms: tuple[str, ...]) -> dict[str, float]:
+    found = dict(zip(CONSTANT_NAMES, bench.arm.constants().tolist(), strict=True))
+    for term in terms:
+        found |= dict(zip(TERMS[term].names, VALUES[term], strict=True))
+    return found
+
+
+def term_log(bench: Bench, model: Model, values: dict[str, float], loaded: bool = False) -> Segment:
+    """A log whose torque SymPy's equations give along an exact motion."""
+    moved = bench.burdened if loaded else bench.bare
+    k = bench.arm.constants()
+    if loaded:
+        k = with_payload(k, bench.arm.payload_constants(bench.payload))
+    alpha = forward_dynamics(k, moved.theta, moved.omega, moved.tau)
+    zero = np.array([[values.get("zero1", 0.0)], [values.get("zero2", 0.0)]])
+    here = {**values, **dict(zip(CONSTANT_NAMES, k.tolist(), strict=True))}
+    tau = evaluated(torque_by_hand(), model, here, Motion(moved.theta - zero, moved.omega, alpha))[:, 0]
+    if "lag" in values:
+        tau = _behind(tau, values["lag"])
+    rng = np.random.default_rng(loaded)
+    noise = SIGMA * rng.standard_normal((2, *tau.shape))
+    return Segment(0.0, DT, moved.theta - zero + noise[0], tau + 10 * noise[1])
+
+
+def _behind(tau: FloatArray, lag: float) -> FloatArray:
+    """What a first-order low-pass shows of a torque that is straight between its samples."""
+    decay = np.exp(-DT / lag)
+    mean = (1 - decay) * lag / DT
+    shown, _ = lfilter([1 - mean, mean - decay], [1, -decay], tau, axis=1, zi=mean * tau[:, :1])
+    return np.asarray(shown)
+
+
+def _fit(estimator: str, model: Model, log: Segment, loaded: Segment | None = None) -> Fit:
+    logs = [lambda: [log]], [] if loaded is None else [lambda: [loaded]]
+    if estimator == "weak":
+        return weak.fit(*logs, settings=weak.WeakSettings(model=model))
+    return refined.fit(*logs, settings=refined.RefinedSettings(model=model))
+
+
+@pytest.mark.parametrize("estimator", ["weak", "refined"])
+@pytest.mark.parametrize("term", TERMS)
+def test_each_term_is_found(bench: Bench, term: str, estimator: str) -> None:
+    needed = TERMS[term].needs
+    terms = (term,) if needed is None else (needed, term)
+    model, values = Model(terms), term_values(bench, terms)
+    fit = _fit(estimator, model, term_log(bench, model, values))
+    assert fit.estimator == estimator
+    assert fit.converged
+    assert set(fit.status) == {"OK"}
+    truth = np.array([values[name] for name in fit.names])
+    own = [fit.names.index(name) for name in TERMS[term].names]
+    assert np.all(np.abs(fit.values - truth)[own] < 0.1 * np.abs(truth[own]))
+    assert np.all(np.abs(fit.values - truth) < 5 * fit.std)  # nine values at most: 5 σ is one in a million
+
+
+@pytest.mark.parametrize("estimator", ["weak", "refined"])
+def test_terms_that_are_not_linear_are_found_under_a_payload_too(bench: Bench, estimator: str) -> None:
+    model = Model(("load", "gain", "zero"))
+    values = term_values(bench, model.terms)
+    fit = _fit(estimator, model, term_log(bench, model, values), term_log(bench, model, values, loaded=True))
+    assert fit.estimator == estimator
+    known = {**values, "m_p": bench.payload, "l1": bench.arm.l1, "l2": bench.arm.l2}
+    truth = np.array([known[name] for name in fit.names])
+    assert np.all(np.abs(fit.values - truth) < 5 * fit.std)
+    assert np.all(fit.std < 0.05 * np.array([1.0 if UNITS[n] in ("1", "rad") else known[n] for n in fit.names]))
+
+
+@pytest.mark.parametrize("lag", [5.3e-3, 0.7e-3, -3e-3])
+def test_a_low_pass_in_time_is_the_low_pass_brought_forward(lag: float) -> None:
+    t = np.arange(2000) * DT
+    hertz = 6.0
+    # The response exp(iωT) / (1 + iωT) of a sine wave, in closed form.
+    passed = np.exp(2j * np.pi * hertz * (t + lag)) / (1 + 2j * np.pi * hertz * lag)
+    ours = low_passed(np.sin(2 * np.pi * hertz * t), DT, lag)
+    inner = slice(200, -200)
+    assert np.allclose(ours[inner], passed.imag[inner], atol=5e-4)  # straight lines between samples: (ω dt)² / 12
+
+
+def test_an_estimated_term_leaves_the_logs_as_they_were(bench: Bench) -> None:
+    log = term_log(bench, Model(), term_values(bench, ()))
+    before = replace(log, theta=log.theta.copy(), tau=log.tau.copy())
+    _fit("refined", Model(("zero", "gain", "load", "lag")), log)
+    assert np.array_equal(log.theta, before.theta)
+    assert np.array_equal(log.tau, before.tau)
