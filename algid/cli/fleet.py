@@ -13,8 +13,6 @@ from algid.cli.report import ResultFormat
 if TYPE_CHECKING:
     from algid.fleet.history import History
 
-MOST_ROBOTS = 40  # on a terminal, where nothing was found of them
-
 
 def fleet(
     batch: Annotated[Path, typer.Argument(metavar="BATCH", help="Folder of algid batch, with its jobs.parquet.")],
@@ -42,25 +40,13 @@ def fleet(
 def _print(history: History, form: ResultFormat) -> None:
     from rich.console import Console
 
-    from algid.fleet.page import drift_table, finding_table, robot_table
-    from algid.report.markdown import markdown_table
-    from algid.report.terminal import print_one
-    from algid.report.text import counted
+    from algid.fleet.page import fleet_document
+    from algid.report.markdown import document_markdown
+    from algid.report.terminal import print_document
 
     if form is ResultFormat.JSON:
         typer.echo(json.dumps(history.as_dict(), indent=2, allow_nan=False))
-        return
-    tables = [table for table in (drift_table(history), finding_table(history)) if table.rows]
-    if history.robots <= MOST_ROBOTS:
-        tables.append(robot_table(history))
-    found = f"{counted(history.drifts.height, 'drift')} and {counted(history.findings.height, 'finding')}"
-    summary = f"{counted(history.robots, 'robot')}, {counted(history.logs, 'log')}: {found}"
-    if form is ResultFormat.MARKDOWN:
-        typer.echo("\n".join([*map(markdown_table, tables), *history.untested, summary]))
-        return
-    console = Console(highlight=False)
-    for table in tables:
-        print_one(table, console)
-        console.print()
-    for sentence in (*history.untested, summary):
-        console.print(sentence, markup=False)
+    elif form is ResultFormat.MARKDOWN:
+        typer.echo(document_markdown(fleet_document(history)), nl=False)
+    else:
+        print_document(fleet_document(history), Console(highlight=False))

@@ -72,12 +72,7 @@ def _print(result: TrackResult, form: ResultFormat) -> None:
         return
     from rich.console import Console
 
-    from algid.report.terminal import print_one, print_verdict
-    from algid.track.tables import change_table, stretch_table, verdict
+    from algid.report.terminal import print_document
+    from algid.track.page import track_document
 
-    console = Console()
-    print_verdict(verdict(result), console)
-    for table in (stretch_table(result), change_table(result)):
-        if table.rows:
-            console.print()
-            print_one(table, console)
+    print_document(track_document(result), Console())

@@ -7,15 +7,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from algid.fleet.history import ALPHA, SPAN
+from algid.report.document import Document
 from algid.report.figures.base import Figure, Panel, axis, label
 from algid.report.html import escaped, figure_html, script_json, table_html
-from algid.report.page import document, drawing
+from algid.report.page import banner, document, drawing
 from algid.report.table import Column, Table
 from algid.report.text import ABSENT, counted, joined, significant, visible
+from algid.report.verdict import LEVEL_WORDS, Level, Verdict
 
 if TYPE_CHECKING:
     from algid.fleet.history import History
 
+MOST_ROBOTS = 40  # whose table is printed
 MOST_ROWS = 200
 MOST_PANELS = 12
 
@@ -26,8 +29,7 @@ def fleet_html(history: History) -> str:
     facts = f"{counted(history.robots, 'robot')} · {counted(history.logs, 'log')}"
     body = [
         f'<header><p class="kicker">algid · a fleet\'s history</p><h1>Fleet</h1><p class="facts">{escaped(facts)}</p>',
-        "</header>",
-        *(f'<p class="facts">{escaped(sentence)}</p>' for sentence in history.untested),
+        f"{banner(verdict(history))}</header>",
         '<main id="numbers">',
         *(table_html(table) for table in (drift_table(history), finding_table(history)) if table.rows),
         *map(figure_html, figures),
@@ -35,6 +37,22 @@ def fleet_html(history: History) -> str:
         "</main>",
     ]
     return document("Fleet", "\n".join(body), script_json(drawing(figures)))
+
+
+def verdict(history: History) -> Verdict:
+    """Whether anything drifts or stands out; what could not be tested is the reason to doubt it."""
+    drifts, findings = history.drifts.height, history.findings.height
+    level: Level = "reservations" if drifts or findings or history.untested else "good"
+    told = f"{counted(history.robots, 'robot')}, {counted(history.logs, 'log')}"
+    found = f"{counted(drifts, 'drift')} and {counted(findings, 'finding')}"
+    return Verdict(level, f"{LEVEL_WORDS[level]}: {told}: {found}.", tuple(history.untested))
+
+
+def fleet_document(history: History) -> Document:
+    """The report of a fleet; a long list of robots of which nothing was found is left to the page."""
+    found = [table for table in (drift_table(history), finding_table(history)) if table.rows]
+    robots = [robot_table(history)] if history.robots <= MOST_ROBOTS else []
+    return Document("Fleet", verdict(history), (*found, *robots))
 
 
 def robot_table(history: History) -> Table:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from pathlib import Path
 
 from algid.files import whole_file
+from algid.report.document import Document, result_document
 from algid.report.table import Table
-from algid.report.tables import estimate_tables, fit_tables, log_tables, provenance_table
-from algid.report.text import file_name
-from algid.report.verdict import LEVEL_WORDS, Level, Verdict, verdict
+from algid.report.verdict import LEVEL_WORDS, Level
 from algid.results import Result, read_result
 
 LEVEL_SIGNS: dict[Level, str] = {"good": "✅", "reservations": "⚠️", "failed": "❌"}
@@ -19,20 +17,15 @@ _SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|~@&])")
 
 def markdown(result: Result) -> str:
     """Verdict, estimates, fit, logs and provenance of `result` as GitHub's Markdown."""
-    return document(
-        f"Identification of {file_name(result.log.path)}",
-        verdict(result),
-        [*estimate_tables(result), *fit_tables(result)],
-        "Logs and provenance",
-        [log_tables(result)[0], provenance_table(result)],
-    )
+    return document_markdown(result_document(result))
 
 
-def document(title: str, judged: Verdict, tables: Sequence[Table], summary: str, details: Sequence[Table]) -> str:
-    """A title, a verdict and tables, and `details` folded away below their `summary`."""
+def document_markdown(document: Document) -> str:
+    """A report as GitHub's Markdown: title, verdict and tables, and its details folded away."""
+    judged = document.verdict
     word = LEVEL_WORDS[judged.level]
     lines = [
-        f"### {escaped(title)}",
+        f"### {escaped(document.title)}",
         "",
         f"{LEVEL_SIGNS[judged.level]} **{word}**{escaped(judged.sentence.removeprefix(word))}",
         "",
@@ -40,8 +33,14 @@ def document(title: str, judged: Verdict, tables: Sequence[Table], summary: str,
         *(["Run first:", "", *_code(judged.command), ""] if judged.command else []),
         *(f"- {escaped(reason)}" for reason in judged.reasons),
     ]
-    folded = [f"<details><summary>{summary}</summary>", "", *map(markdown_table, details), "</details>"]
-    return "\n".join([*lines, "", *map(markdown_table, tables), *folded]) + "\n"
+    folded = [
+        f"<details><summary>{document.summary}</summary>",
+        "",
+        *map(markdown_table, document.details),
+        "</details>",
+    ]
+    tables = map(markdown_table, (*document.tables, *document.more))
+    return "\n".join([*lines, "", *tables, *(folded if document.details else [])]) + "\n"
 
 
 def write_markdown(folder: Path) -> Path:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from algid.report.document import Document, result_document
 from algid.report.table import Column, Table
-from algid.report.tables import chosen_terms, estimate_tables
-from algid.report.verdict import LEVEL_WORDS, Level, Verdict, verdict
+from algid.report.verdict import LEVEL_WORDS, Level, Verdict
 from algid.results import Result, Status
 
 if TYPE_CHECKING:
@@ -20,8 +20,13 @@ LEVEL_STYLES: dict[Level, str] = {"good": "bold green", "reservations": "bold ye
 
 def print_table(result: Result, console: Console) -> None:
     """Print the verdict, the estimates and what is known against them to `console`."""
-    print_verdict(verdict(result), console)
-    for table in [*estimate_tables(result), *chosen_terms(result)]:
+    print_document(result_document(result), console)
+
+
+def print_document(document: Document, console: Console) -> None:
+    """Print a report's verdict and its tables."""
+    print_verdict(document.verdict, console)
+    for table in document.tables:
         console.print()
         print_one(table, console)
 

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from algid.files import whole_file
+from algid.report.document import Document
 from algid.report.export import START_KEY, write_series
 from algid.report.html import escaped, figure_html, script_json, table_html
-from algid.report.markdown import document as markdown_document
+from algid.report.markdown import document_markdown
 from algid.report.page import banner, contents, document, drawing, section
 from algid.report.text import file_name, significant
 from algid.track.figures import figures
@@ -50,12 +51,21 @@ def _warnings(result: TrackResult) -> str:
     return f"<ul>{''.join(f'<li>{escaped(warning)}</li>' for warning in result.warnings)}</ul>"
 
 
+def track_document(result: TrackResult) -> Document:
+    """The report of a track."""
+    return Document(
+        f"Payload in time of {file_name(result.log.path)}",
+        verdict(result),
+        tuple(table for table in (stretch_table(result), change_table(result)) if table.rows),
+        (fit_table(result),),
+        "Log and provenance",
+        (quality_tables(result)[0], provenance_tables(result)[1]),
+    )
+
+
 def markdown(result: TrackResult) -> str:
     """The track as GitHub's Markdown."""
-    tables = [table for table in (stretch_table(result), change_table(result), fit_table(result)) if table.rows]
-    details = [quality_tables(result)[0], provenance_tables(result)[1]]
-    title = f"Payload in time of {file_name(result.log.path)}"
-    return markdown_document(title, verdict(result), tables, "Log and provenance", details)
+    return document_markdown(track_document(result))
 
 
 TOPIC = "/algid/payload"

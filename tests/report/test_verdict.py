@@ -4,6 +4,7 @@ import pytest
 from rich.console import Console
 
 from algid.report import markdown, print_table
+from algid.report.document import result_document
 from algid.report.html import table_html
 from algid.report.tables import estimate_tables
 from algid.report.verdict import verdict
@@ -173,3 +174,16 @@ def test_nothing_of_a_failed_result_is_green(result: Result) -> None:
         assert ("\x1b[32mOK" in printed.get()) is green
         assert ('class="status ok"' in "".join(map(table_html, estimate_tables(shown)))) is green
     assert "✅" not in markdown(failed)
+
+
+def test_one_document_holds_what_every_format_shows(result: Result) -> None:
+    made = result_document(result)
+    console = Console(width=200)
+    with console.capture() as printed:
+        print_table(result, console)
+    shown = printed.get()
+    text = markdown(result)
+    for table in (*made.tables, *made.more, *made.details):
+        assert f"**{table.title}**" in text
+        assert (table.title in shown) is (table in made.tables)
+    assert made.verdict.sentence.partition(":")[0] in shown
