@@ -11,11 +11,13 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.design.belief import Belief
 from algid.design.criterion import Asked
-from algid.design.information import Experiment, Information, Slopes
+from algid.design.information import Experiment, Slopes, informations
 from algid.design.limits import Limits, Row, Usage, usage
 from algid.design.optimise import optimise
 from algid.design.position import JUDGED_RATE, PositionProblem
-from algid.design.posture import resting
+from algid.design.posture import HANGING, resting
+from algid.design.swing import sampled
+from algid.design.torque import TorqueProblem, search
 from algid.model import Motion
 from algid.progress import Told
 
@@ -61,9 +63,10 @@ class Design:
     ----------
     campaign : Campaign
     t : (N,), s
-    motion : Motion
+    motions : dict of Motion
+        The believed arm's, without and with the payload: the same under position control.
     torque : dict of (2, N), N m
-        What the believed arm needs for the motion, without and with the payload.
+        What the believed arm needs for them.
     std : (Q,)
         Predicted standard deviations for the believed arm, of all runs together.
     worst : (Q,)
@@ -76,13 +79,18 @@ class Design:
 
     campaign: Campaign
     t: FloatArray
-    motion: Motion
+    motions: dict[bool, Motion]
     torque: dict[bool, FloatArray]
     std: FloatArray
     worst: FloatArray
     shares: FloatArray
     usage: Usage
     interrupted: bool
+
+    @property
+    def motion(self) -> Motion:
+        """The motion without payload, or with it where there is no other."""
+        return self.motions[min(self.motions)]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -128,40 +136,71 @@ def plan(campaign: Campaign, told: Told | None = None) -> Design:
     KeyboardInterrupt
         If it is interrupted before there is a motion; later, the best so far is the plan.
     """
-    kept = campaign.limits.within(campaign.margin)
-    loads = [campaign.belief.load(loaded) for loaded in campaign.experiment.kinds]
-    model = campaign.experiment.shared.model
-    rest = resting(kept, model, loads)
-    problem = PositionProblem(campaign.experiment, campaign.belief, kept, campaign.asked, campaign.duration, rest)
-    found = optimise(problem, campaign.experiment.rate, campaign.seed, told)
     t = np.arange(round(campaign.duration * campaign.experiment.rate) + 1) / campaign.experiment.rate
-    return judge(campaign, t, problem.motion(found.x, t), found.interrupted)
+    return _swung(campaign, t, told) if campaign.drive == "torque" else _guided(campaign, t, told)
 
 
-def judge(campaign: Campaign, t: FloatArray, motion: Motion, interrupted: bool = False) -> Design:
-    """What the motion at the times `t` (N,) tells, and what it uses of the limits."""
+def _guided(campaign: Campaign, t: FloatArray, told: Told | None) -> Design:
+    """The plan under position control: one motion, whatever the arm."""
+    kept = campaign.limits.within(campaign.margin)
     experiment, belief = campaign.experiment, campaign.belief
-    slopes = Slopes(experiment.shared.model, motion, experiment.rate)
     loads = [belief.load(loaded) for loaded in experiment.kinds]
-    information = Information(experiment, belief.mean, slopes)
-    C = campaign.asked.covariance(information.S)
+    rest = resting(kept, experiment.shared.model, loads)
+    problem = PositionProblem(experiment, belief, kept, campaign.asked, campaign.duration, rest)
+    found = optimise(problem, experiment.rate, campaign.seed, told)
+    motion = problem.motion(found.x, t)
+    slopes = Slopes(experiment.shared.model, motion, experiment.rate)
+    kinds = (False, True) if experiment.shared.payload else (False,)
+    torque = {loaded: np.einsum("aqn,q->an", slopes.Y, belief.load(loaded).c) for loaded in kinds}
+    used = usage(campaign.limits, slopes, loads, derivatives=False)
+    return _judged(campaign, t, dict.fromkeys(kinds, motion), torque, used, found.interrupted)
+
+
+def _swung(campaign: Campaign, t: FloatArray, told: Told | None) -> Design:
+    """The plan of an open loop: one torque, under which every arm and load moves in its own way."""
+    limits = campaign.limits.within(campaign.margin)
+    start = limits.middle if campaign.experiment.shared.model.gravity == 0 else np.array(HANGING)
+    problem = TorqueProblem(
+        campaign.experiment, campaign.belief, limits, campaign.asked, campaign.duration, start, campaign.seed
+    )
+    x, interrupted = search(problem, campaign.seed, told)
+    swung = problem.checked(x)
+    motions = {loaded: sampled(swung.t, motion, t) for loaded, motion in swung.motions.items()}
+    torque = dict.fromkeys(motions, problem.torques(swung.x, t))
+    share = 1 - campaign.margin
+    used = Usage(swung.usage.rows, swung.usage.u * share)
+    return _judged(campaign, t, motions, torque, used, interrupted)
+
+
+def _judged(
+    campaign: Campaign,
+    t: FloatArray,
+    motions: dict[bool, Motion],
+    torque: dict[bool, FloatArray],
+    used: Usage,
+    interrupted: bool,
+) -> Design:
+    """What a plan tells, at the times `t` (N,) of its log."""
+    experiment, belief = campaign.experiment, campaign.belief
+    recorded = {loaded: motions[loaded] for loaded in experiment.kinds}
     every = max(1, round(experiment.rate / JUDGED_RATE))
-    thinned = Motion(*(signal[:, ::every] for signal in (motion.theta, motion.omega, motion.alpha)))
-    coarse = Slopes(experiment.shared.model, thinned, experiment.rate / every)
-    arms = belief.draws(ARMS, campaign.seed)
-    drawn = [campaign.asked.covariance(Information(experiment, arm, coarse).S) for arm in arms]
-    parts = information.parts(round(SECOND * experiment.rate))
+    whole = informations(experiment, recorded, belief.mean, 1, experiment.rate)
+    C = campaign.asked.covariance(np.sum([one.S for one in whole], axis=0))
+    drawn = [
+        campaign.asked.covariance(
+            np.sum([one.S for one in informations(experiment, recorded, arm, every, experiment.rate)], axis=0)
+        )
+        for arm in belief.draws(ARMS, campaign.seed)
+    ]
+    parts = np.sum([one.parts(round(SECOND * experiment.rate)) for one in whole], axis=0)
     return Design(
         campaign=campaign,
         t=t,
-        motion=motion,
-        torque={
-            loaded: np.einsum("aqn,q->an", slopes.Y, belief.load(loaded).c)
-            for loaded in ((False, True) if experiment.shared.payload else (False,))
-        },
+        motions=motions,
+        torque=torque,
         std=np.sqrt(np.diag(C)),
         worst=np.sqrt(np.max([np.diag(one) for one in [C, *drawn]], axis=0)),
         shares=np.einsum("pi,bij,jp->pb", C, parts, C) / np.diag(C)[:, None],
-        usage=usage(campaign.limits, slopes, loads, derivatives=False),
+        usage=used,
         interrupted=interrupted,
     )

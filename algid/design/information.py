@@ -210,17 +210,14 @@ class Information:
         return -2 * np.einsum("qan,oqbn->oabn", AW, along) * self._ratio[None, :, :, None]
 
 
-def covariance(S: FloatArray) -> FloatArray:
-    """Inverse of the information S (Q, Q), scaled first.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If S leaves a direction open.
-    """
-    size = 1 / np.sqrt(np.diag(S))
-    if not np.all(np.isfinite(size)):
-        raise np.linalg.LinAlgError("a parameter without information")
-    factor = np.linalg.cholesky(S * np.outer(size, size))
-    half = np.linalg.solve(factor, np.diag(size))
-    return half.T @ half
+def informations(
+    experiment: Experiment, motions: dict[bool, Motion], beta: FloatArray, every: int, rate: float
+) -> list[Information]:
+    """The information of each kind's runs, its motion thinned to every so manieth of `rate` samples a second."""
+    found = []
+    for loaded, motion in motions.items():
+        runs = (0, experiment.runs[1]) if loaded else (experiment.runs[0], 0)
+        own = Experiment(experiment.shared, runs, experiment.noise, experiment.rate)
+        thinned = Motion(*(signal[:, ::every] for signal in (motion.theta, motion.omega, motion.alpha)))
+        found.append(Information(own, beta, Slopes(experiment.shared.model, thinned, rate / every)))
+    return found

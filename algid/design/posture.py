@@ -13,6 +13,7 @@ from algid.design.limits import Limits, Row, usage
 from algid.errors import SettingError
 from algid.model import Model, Motion
 
+HANGING = (-np.pi / 2, 0.0)
 _STEPS = 41  # postures of each joint that are tried
 _WIDE = np.pi  # rad to either side, where a range is not limited
 _EASY = 0.7  # usage up to which the middle of the range will do

@@ -87,12 +87,19 @@ def prior_of(source: str, loaded: bool | None, knowns: Knowns) -> Prior:
     if path.is_dir() or path.suffix == ".json":
         prior = _of_result(read_result(path), source, loaded, knowns)
     else:
-        prior = _of_case(load_case(source), source, loaded, knowns)
+        prior = of_case(load_case(source), source, loaded, knowns)
     _check(prior)
     return prior
 
 
-def _of_case(case: Case, source: str, loaded: bool | None, knowns: Knowns) -> Prior:
+def of_case(case: Case, source: str, loaded: bool | None, knowns: Knowns) -> Prior:
+    """The prior of a simulated or drawn arm: its masses and friction may be wrong, its lengths are right.
+
+    Raises
+    ------
+    SettingError
+        If there are to be loaded runs without a payload.
+    """
     arm = replace(case.arm, **knowns.lengths)
     mass = case.payload if knowns.payload is None else knowns.payload
     shared = _shared(Model(gravity=arm.g), mass or None, loaded, source, knowns)

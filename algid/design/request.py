@@ -13,10 +13,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from algid.arm import FloatArray
 from algid.design.limits import Limits
+from algid.design.posture import HANGING
 from algid.errors import SettingError
 from algid.files import read_toml
 
-HOME = (-np.pi / 2, 0.0)  # hanging: what a range of one number a joint is to both sides of
 Positive = Annotated[float, Field(gt=0)]  # inf is no limit
 Pair = Positive | tuple[Positive, Positive]
 Span = tuple[float, float]
@@ -107,7 +107,10 @@ def _range(value: Any) -> tuple[FloatArray, FloatArray]:
     if isinstance(pair[0], tuple | list):
         low, high = np.array(pair, dtype=np.float64).T
     else:
-        half, home = np.array(pair, dtype=np.float64), np.array(HOME)
+        half, home = (
+            np.array(pair, dtype=np.float64),
+            np.array(HANGING),
+        )  # what a range of one number a joint is to both sides of
         low, high = home - half, home + half
     for joint in range(2):
         if not low[joint] < high[joint]:

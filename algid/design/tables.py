@@ -6,12 +6,20 @@ import numpy as np
 
 from algid.design.campaign import Design
 from algid.design.limits import Row
+from algid.design.torque import END
 from algid.model import UNITS
 from algid.report.table import Column, Table
 from algid.report.text import ABSENT, percent, resolved, significant, unit_text
 
 BINDS = 0.98  # of what the margin leaves: a limit that is used as far is what keeps the error bars from being less
-SIGNS = {"range": "rad", "speed": "rad/s", "acceleration": "rad/s²", "torque": "N m", "tip-height": "m"}
+SIGNS = {
+    "range": "rad",
+    "speed": "rad/s",
+    "acceleration": "rad/s²",
+    "torque": "N m",
+    "tip-height": "m",
+    "rest": "rad/s",
+}
 
 
 def bound_table(design: Design) -> Table:
@@ -100,6 +108,9 @@ def amounts(design: Design, row: Row, used: float) -> tuple[float, float]:
     if row.joint is None:
         reach = float(limits.lengths.sum())
         return limits.height, reach - used * (reach - limits.height)
+    if row.limit == "rest":
+        limit = END * float(np.abs(design.motion.omega[row.joint]).max())
+        return limit, used * limit
     sign = 1.0 if row.upper else -1.0
     if row.limit == "range":
         low, high = float(limits.low[row.joint]), float(limits.high[row.joint])

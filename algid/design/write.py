@@ -20,7 +20,7 @@ from algid.design.page import page_html
 from algid.design.tables import amounts, sentence
 from algid.files import whole_file
 from algid.log import Log, Origin
-from algid.model import UNITS
+from algid.model import UNITS, Motion
 
 POINTS = 50.0  # a second, of the joint trajectory: its controller joins them by polynomials of fifth degree
 SCHEMA_VERSION = 1
@@ -53,14 +53,18 @@ def write_design(design: Design, folder: Path, origin: Provenance) -> None:
 
 def trajectory(design: Design) -> dict[str, FloatArray]:
     """The trajectory's columns: time, angles, velocities, accelerations, feed-forward torques."""
-    motion = design.motion
-    columns = {"t": design.t}
-    for name, values in (("theta", motion.theta), ("omega", motion.omega), ("alpha", motion.alpha)):
-        columns |= {f"{name}{joint + 1}": values[joint] for joint in range(2)}
-    for loaded, torque in design.torque.items():
-        prefix = "loaded_" if loaded else ""
-        columns |= {f"{prefix}tau{joint + 1}": torque[joint] for joint in range(2)}
+    columns = {"t": design.t, **_signals(design.motion, ("theta", "omega", "alpha"))}
+    first = min(design.torque)
+    columns |= {f"tau{joint + 1}": design.torque[first][joint] for joint in range(2)}
+    if True in design.torque and not first:
+        if design.motions[True] is not design.motion:
+            columns |= {f"loaded_{name}": values for name, values in _signals(design.motions[True], ("theta",)).items()}
+        columns |= {f"loaded_tau{joint + 1}": design.torque[True][joint] for joint in range(2)}
     return columns
+
+
+def _signals(motion: Motion, names: Sequence[str]) -> dict[str, FloatArray]:
+    return {f"{name}{joint + 1}": getattr(motion, name)[joint] for name in names for joint in range(2)}
 
 
 def _write_tables(design: Design, folder: Path) -> None:
@@ -78,7 +82,11 @@ def _write_mcap(design: Design, path: Path) -> None:
 
     origin = Origin(path=path.name, format="design", mapping={})
     stamps = np.round(design.t * 1e9).astype(np.int64)
-    write_log(path, Log(stamps, design.motion.theta, design.torque[False], origin, design.motion.omega), kind="mcap")
+    write_log(
+        path,
+        Log(stamps, design.motion.theta, design.torque[min(design.torque)], origin, design.motion.omega),
+        kind="mcap",
+    )
 
 
 def joint_trajectory(design: Design, joints: tuple[str, str]) -> str:

@@ -1,0 +1,227 @@
+"""Open loop: a multi-sine of torques swings the arm from rest, and limits hold for arms drawn from the belief.
+
+τ_i(t) = w(t) τ̂_i Σ_l (a_il sin ω_l t + b_il cos ω_l t), with the window w of `algid.design.fourier` and amplitudes in
+shares of the torque's limit τ̂. Where the arm goes depends on the arm: each candidate is simulated for the believed arm
+and for arms drawn from the belief, without and with the payload, all in one batch. An evolution strategy (recombination
+of the better half, step sizes by the spread of it) needs no derivatives of that. A joint whose limit is nought has no
+drive and is swung along.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.design.belief import Belief
+from algid.design.criterion import Asked
+from algid.design.fourier import Fourier
+from algid.design.information import Experiment, Slopes, informations
+from algid.design.limits import Limits, Row, Usage, usage
+from algid.design.swing import Swings, step_for, swing
+from algid.errors import SettingError
+from algid.model import Motion
+from algid.progress import Told
+
+POPULATION = 24
+GENERATIONS = 30
+SEARCHED_ARMS = 2  # drawn beside the believed one while searching
+CHECKED_ARMS = 24  # drawn for the last check of the limits
+END = 0.1  # of the largest velocity, that may be left of it at the end
+_PENALTY = 20.0  # on each share of a limit beyond it
+_LOST = 0.5  # beyond the limits by so much, what a motion tells does not matter
+_INFORMATION_RATE = 100.0  # Hz, about
+
+
+@dataclass(frozen=True, eq=False)
+class Swung:
+    """A pattern x (n,) that keeps the limits: each kind's motion of the believed arm at the times t, what it uses."""
+
+    x: FloatArray
+    t: FloatArray
+    motions: dict[bool, Motion]
+    usage: Usage
+
+
+class TorqueProblem:
+    """Open-loop torques within limits, for arms of a belief.
+
+    Parameters
+    ----------
+    experiment, belief, limits, asked : as for `algid.design.position.PositionProblem`
+    duration : float, s
+    start : (2,), rad
+        Where the arm hangs at rest.
+    seed : int
+        Of the arms drawn.
+
+    Raises
+    ------
+    SettingError
+        If a torque has no limit: an open loop needs one.
+    """
+
+    def __init__(
+        self,
+        experiment: Experiment,
+        belief: Belief,
+        limits: Limits,
+        asked: Asked,
+        duration: float,
+        start: FloatArray,
+        seed: int,
+    ) -> None:
+        if not np.all(np.isfinite(limits.torque)):
+            raise SettingError("--torque: an open loop needs a limit at each joint, found inf; give one")
+        if np.any(start <= limits.low) or np.any(start >= limits.high):
+            raise SettingError("--range: an open loop starts hanging at rest, which the range leaves out; widen it")
+        self._experiment, self._belief, self._limits, self._asked = experiment, belief, limits, asked
+        self._start = start
+        self._family = Fourier(duration)
+        self._driven = np.flatnonzero(limits.torque > 0)
+        self.size = 2 * self._family.harmonics.size * self._driven.size
+        self._arms = np.vstack([belief.mean, belief.draws(SEARCHED_ARMS, seed)])
+        self._checked = np.vstack([belief.mean, belief.draws(CHECKED_ARMS, seed + 1)])
+        model = experiment.shared.model
+        self._step = step_for(model, self._coefficients(self._checked, list(experiment.kinds)), duration)
+
+    def _coefficients(self, arms: FloatArray, kinds: list[bool]) -> FloatArray:
+        """C (q, arms × kinds), the kinds of an arm side by side."""
+        shared = self._experiment.shared
+        return np.array([shared.coefficients(arm, loaded) for arm in arms for loaded in kinds]).T
+
+    def torques(self, x: FloatArray, t: FloatArray) -> FloatArray:
+        """Torques (2, N) of a pattern at the times `t` (N,) in s."""
+        phase = np.multiply.outer(self._family.harmonics, t)
+        waves = np.concatenate([np.sin(phase), np.cos(phase)]) * self._family.window(t)[0]
+        torque = np.zeros((2, t.size))
+        torque[self._driven] = x.reshape(self._driven.size, -1) @ waves
+        return torque * self._limits.torque[:, None]
+
+    def random(self, rng: np.random.Generator) -> FloatArray:
+        """A random pattern: slow harmonics as strong as fast ones, peaks near the limit."""
+        x = rng.standard_normal(self.size)
+        return x / np.sqrt(self._family.harmonics.size) * rng.uniform(0.05, 0.4)
+
+    def _swings(self, patterns: FloatArray, arms: FloatArray, kinds: list[bool]) -> Swings:
+        """Every pattern (P, n) on every arm and kind, in that order of columns."""
+        count = 2 * round(self._family.duration / self._step) + 1
+        t = 0.5 * self._step * np.arange(count)
+        each = np.array([self.torques(x, t).T for x in patterns]).transpose(1, 2, 0)
+        C = self._coefficients(arms, kinds)
+        return swing(
+            self._experiment.shared.model,
+            np.tile(C, (1, len(patterns))),
+            np.repeat(each, C.shape[1], axis=2),
+            self._step,
+            self._start,
+        )
+
+    def figures(self, patterns: FloatArray) -> FloatArray:
+        """What the search makes small (P,): the logarithm of the largest relative bound, and a penalty on limits."""
+        kinds = list(self._experiment.kinds)
+        swings = self._swings(patterns, self._arms, kinds)
+        width = len(self._arms) * len(kinds)
+        found = []
+        for place, x in enumerate(patterns):
+            columns = range(place * width, (place + 1) * width)
+            motions = [swings.motion(column) for column in columns]
+            most = max(float(row.u.max()) for row in self._used(x, swings.t, motions))
+            beyond = max(0.0, most - 1.0)
+            told = self._figure(dict(zip(kinds, motions, strict=False))) if beyond < _LOST else 0.0
+            found.append(told + _PENALTY * min(beyond, 1e3))
+        return np.array(found)
+
+    def _figure(self, motions: dict[bool, Motion]) -> float:
+        try:
+            figure = np.log(self._asked.largest(self.information(motions, self._belief.mean)))
+        except np.linalg.LinAlgError:
+            return float("inf")
+        return float(figure) if np.isfinite(figure) else float("inf")
+
+    def information(self, motions: dict[bool, Motion], beta: FloatArray) -> FloatArray:
+        """S (Q, Q) of all runs of an arm `beta` (Q,) whose kinds move differently."""
+        every = max(1, int(1 / (self._step * _INFORMATION_RATE)))
+        return np.sum([one.S for one in informations(self._experiment, motions, beta, every, 1 / self._step)], axis=0)
+
+    def _used(self, x: FloatArray, t: FloatArray, motions: list[Motion]) -> list[Usage]:
+        """Usages of limits by motions: kinematic ones, the torque itself, rest at the end of the believed arm."""
+        model = self._experiment.shared.model
+        torque = self.torques(x, t)
+        found = [usage(self._limits, Slopes(model, motion, 1.0), (), derivatives=False) for motion in motions]
+        rows, values = [], []
+        for joint in self._driven.tolist():
+            rows.append(Row("torque", joint))
+            values.append(np.abs(torque[joint]) / self._limits.torque[joint])
+        found.append(Usage(tuple(rows), np.array(values)))
+        calm = [_unrest(motion) for motion in motions[: len(self._experiment.kinds)]]
+        rest = np.max(calm, axis=0)[:, None]
+        found.append(Usage(tuple(Row("rest", joint) for joint in range(2)), rest))
+        return found
+
+    def checked(self, x: FloatArray) -> Swung:
+        """The motion of a pattern, its amplitude drawn back until no limit breaks for any arm that is checked."""
+        kinds = list(self._experiment.kinds)
+        for shrunk in x * np.linspace(1.0, 0.0, 41)[:, None]:
+            swings = self._swings(shrunk[None], self._checked, kinds)
+            motions = [swings.motion(column) for column in range(len(self._checked) * len(kinds))]
+            used = self._used(shrunk, swings.t, motions)
+            if max(float(one.u.max()) for one in used) <= 1.0 or not shrunk.any():
+                break
+        return Swung(shrunk, swings.t, dict(zip(kinds, motions, strict=False)), _worst(used))
+
+
+def _unrest(motion: Motion) -> FloatArray:
+    """Velocities (2,) left at the end over what may be left."""
+    return np.abs(motion.omega[:, -1]) / (END * np.maximum(np.abs(motion.omega).max(axis=1), 1e-9))
+
+
+def _worst(used: list[Usage]) -> Usage:
+    """The largest usage of each row among the arms."""
+    most: dict[Row, float] = {}
+    for one in used:
+        for row, value in zip(one.rows, one.most.tolist(), strict=True):
+            most[row] = max(most.get(row, 0.0), value)
+    return Usage(tuple(most), np.array(list(most.values()))[:, None])
+
+
+def search(problem: TorqueProblem, seed: int, told: Told | None = None) -> tuple[FloatArray, bool]:
+    """The best pattern found (n,), and whether the search was broken off.
+
+    An evolution strategy with weighted recombination and a step size for each number (Ros & Hansen 2008 restrict
+    the covariance to a diagonal as well).
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If it is interrupted before there is a pattern to keep.
+    """
+    rng = np.random.default_rng(seed)
+    best: tuple[float, FloatArray] | None = None
+    try:
+        patterns = np.array([problem.random(rng) for _ in range(2 * POPULATION)])
+        weights = np.log(POPULATION / 2 + 0.5) - np.log(np.arange(1, POPULATION // 2 + 1))
+        weights /= weights.sum()
+        middle, spread = np.zeros(problem.size), np.full(problem.size, 0.1)
+        for generation in range(GENERATIONS):
+            figures = problem.figures(patterns)
+            order = np.argsort(figures)
+            if best is None or figures[order[0]] < best[0]:
+                best = float(figures[order[0]]), patterns[order[0]]
+            if generation == 0:
+                middle, spread = patterns[order[0]], np.full(problem.size, 0.5 * np.std(patterns[order[0]]))
+            else:
+                chosen = patterns[order[: POPULATION // 2]]
+                moved = weights @ chosen
+                variance = weights @ (chosen - middle) ** 2
+                middle, spread = moved, np.sqrt(0.8 * spread**2 + 0.2 * variance)
+            patterns = middle + spread * rng.standard_normal((POPULATION, problem.size))
+            if told is not None:
+                told("searching", generation + 1, GENERATIONS)
+    except KeyboardInterrupt:
+        if best is None:
+            raise
+        return best[1], True
+    assert best is not None
+    return best[1], False
