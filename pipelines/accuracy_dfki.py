@@ -11,12 +11,13 @@ from scipy.interpolate import CubicSpline
 
 from algid.estimators import refined, weak
 from algid.estimators.prediction import cross_validate
+from algid.estimators.selection import Selection, select
 from algid.estimators.weak import Source
 from algid.model import Model
 from algid.signals.segments import Segment
 
-PUBLISHED = (0.159, 0.114)
-AIM = (0.140, 0.097)
+ASKED = (0.123, 0.078)  # N m; the parameters published with the data reach 0.149 and 0.085 behind the same filter
+AIM = (0.118, 0.072)
 
 
 def run(path: Path) -> Segment:
@@ -37,19 +38,20 @@ def evaluate(folder: Path) -> list[dict[str, Any]]:
     """RMSE by joint of each model, and what the differentiator's bandwidth does to k2."""
     runs = [run(path) for path in sorted((folder / "C1_sysid").glob("*.csv"))]
     sources: list[Source] = [lambda log=log: [log] for log in runs]  # type: ignore[misc]
+    given = [Selection(Model(terms), delay=False) for terms in ((), ("coulomb", "offset"), ("coulomb", "rotor"))]
     rows: list[dict[str, Any]] = []
-    for terms in (
-        ("coulomb", "offset"),
-        ("coulomb", "offset", "rotor"),
-        ("coulomb", "rotor"),
-    ):
-        model = Model(terms)
-        fit = refined.fit(sources, settings=refined.RefinedSettings(model=model))
+    for chosen in (select(sources, (), weak.WeakSettings(bandwidth=60.0)), *given):
+        settings = weak.WeakSettings(model=chosen.model, bandwidth=60.0, estimate_delay=chosen.delay)
+        fit = refined.fit(
+            sources,
+            settings=refined.RefinedSettings(model=chosen.model, estimate_delay=chosen.delay, weak=settings),
+        )
         score = cross_validate(fit, sources)
         assert score is not None
+        terms = " + ".join([*chosen.model.terms, *(["delay"] if chosen.delay else [])]) or "viscous"
         for joint in range(2):
-            what = f"{' + '.join(terms)}: RMSE of joint {joint + 1}, N m (aim {AIM[joint]:.3f})"
-            rows.append({"what": what, "value": float(score.rmse[joint]), "asked": PUBLISHED[joint]})
+            what = f"{terms} (chosen by {chosen.chosen_by}): RMSE of joint {joint + 1}, N m (aim {AIM[joint]:.3f})"
+            rows.append({"what": what, "value": float(score.rmse[joint]), "asked": ASKED[joint]})
     rows.append(_bandwidth(sources))
     return rows
 
