@@ -54,12 +54,14 @@ class Truth:
 class Notice:
     """Something a reader saw that its user should know.
 
-    `code` is a fixed word such as ``DUPLICATE_STAMPS``; `lossy` tells that samples are missing from the log.
+    `code` is a fixed word such as ``DUPLICATE_STAMPS``; `lossy` tells that samples are missing from the log; `flags`
+    are those that mend it.
     """
 
     code: str
     text: str
     lossy: bool = False
+    flags: tuple[str, ...] = ()
 
 
 Teller = Literal["flag", "profile", "names", "order"]
@@ -99,7 +101,7 @@ class Reading:
     clock : 'header', 'log' (the recorder's times) or 'column'
         'header' stands for the messages' own stamps, unless they turn out to stand still.
     time_unit : unit of the times, None where it is told by the values only
-    zero, second_angle : as in a profile
+    zero, second_angle, drive, signs, offsets : as in a profile; signs and offsets are in those of the channels too
     unwrap : whether each joint's jumps by a turn were made continuous
     start, end : float, s
         Where the log was cut, in time since its first sample.
@@ -114,6 +116,9 @@ class Reading:
     time_unit: str | None = None
     zero: str = "horizontal"
     second_angle: str = "relative"
+    drive: str = "joint"
+    signs: tuple[int, int] = (1, 1)
+    offsets: tuple[float, float] = (0.0, 0.0)
     unwrap: tuple[bool, bool] = (False, False)
     start: float | None = None
     end: float | None = None

@@ -83,6 +83,8 @@ class Profile(_Strict):
     """What a log's names, units and signs mean. Angles become θ1 from the horizontal, θ2 from link 1.
 
     `start` and `end`, in s since the log's first sample, cut it; `accept` names checks that may warn but not refuse.
+    `drive` is where the second motor stands: in its joint, or at the base, where a belt or a parallelogram takes its
+    torque to θ1 + θ2. Torques then become those of the joints: τ1 + τ2 and τ2.
     """
 
     topic: str | None = None
@@ -92,6 +94,7 @@ class Profile(_Strict):
     time_unit: TimeUnit | None = None
     zero: Literal["horizontal", "hanging"] = "horizontal"
     second_angle: Literal["relative", "absolute"] = "relative"
+    drive: Literal["joint", "base"] = "joint"
     gravity: float = Field(default=9.81, ge=0)
     velocity: bool = True
     signs: tuple[Literal[1, -1], Literal[1, -1]] = (1, 1)

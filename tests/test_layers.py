@@ -34,7 +34,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "readers": room(
         "arm errors log profile runtime units", "google lz4 mcap numpy polars pyarrow rosbags scipy zstandard"
     ),
-    "inspection": room("arm errors log profile readers signals", "numpy"),
+    "inspection": room("arm errors estimators log profile readers signals", "numpy"),
     "report": room(
         "arm errors files progress results ros2 signals", "mcap numpy plotly polars pyarrow rich"
     ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import Field, dataclass, fields
 from functools import cache, wraps
@@ -25,14 +26,18 @@ AngleUnit = Annotated[str | None, typer.Option(help="rad, deg, rev or counts.")]
 TorqueUnit = Annotated[str | None, typer.Option(help='"N m", "mN m", A or mA.')]
 Zero = Annotated[str | None, typer.Option(help="Where θ1 is zero: horizontal or hanging.")]
 SecondAngle = Annotated[str | None, typer.Option(help="θ2 is relative (to link 1) or absolute.")]
+Drive = Annotated[str | None, typer.Option(help="Where the second motor stands: in its joint, or at the base.")]
+Sets = Annotated[
+    list[str] | None, typer.Option("--set", help="Any setting of a profile, as tau1.sign=-1; may be repeated.")
+]
 Clock = Annotated[str | None, typer.Option(help="Stamps of the messages' header, or of the log.")]
 Start = Annotated[str | None, typer.Option(help="Leave out what comes before, s since the log's first sample.")]
 End = Annotated[str | None, typer.Option(help="Leave out what comes after, s since the log's first sample.")]
 Accept = Annotated[str | None, typer.Option(help="Checks that may warn but not refuse, as CODE,CODE.")]
 
 
-def profile_from(file: Path | None, **flags: str | None) -> Profile | None:
-    """The profile of a file with flags over it; None where neither is given.
+def profile_from(file: Path | None, sets: Sequence[str] = (), **flags: str | None) -> Profile | None:
+    """The profile of a file with flags over it, and `sets` over these; None where none is given.
 
     Raises
     ------
@@ -40,7 +45,7 @@ def profile_from(file: Path | None, **flags: str | None) -> Profile | None:
         If the file or a flag is wrong.
     """
     given = {name: value for name, value in flags.items() if value is not None}
-    if file is None and not given:
+    if file is None and not given and not sets:
         return None
     from algid.profile import Profile, load_profile, with_settings
 
@@ -54,6 +59,8 @@ def profile_from(file: Path | None, **flags: str | None) -> Profile | None:
             settings |= {channel: {"unit": value} for channel in ("tau1", "tau2")}
         else:
             settings[name] = value
+    for text in sets:
+        _merge(settings, _setting(text))
     return with_settings(load_profile(file) if file else Profile(), settings)
 
 
@@ -64,6 +71,7 @@ class Choice:
     settings_flags: Mapping[str, Any]
     profile_file: Path | None
     profile_flags: Mapping[str, str | None]
+    profile_sets: Sequence[str] = ()
 
     def settings(self) -> Settings:
         """As the pipeline takes them. Raises `SettingError` where an option is wrong."""
@@ -77,7 +85,7 @@ class Choice:
 
     def profile(self, file: Path | None = None) -> Profile | None:
         """The profile of `file`, or of ``--profile``, with the flags over it. Raises `SettingError`."""
-        return profile_from(file or self.profile_file, **self.profile_flags)
+        return profile_from(file or self.profile_file, self.profile_sets, **self.profile_flags)
 
 
 def _profile(
@@ -88,10 +96,12 @@ def _profile(
     torque_unit: TorqueUnit = None,
     zero: Zero = None,
     second_angle: SecondAngle = None,
+    drive: Drive = None,
     clock: Clock = None,
     start: Start = None,
     end: End = None,
     accept: Accept = None,
+    sets: Sets = None,
 ) -> None:
     """The options of a profile."""
 
@@ -115,7 +125,7 @@ def _taking(
     def with_options(**values: Any) -> None:
         chosen = {parameter.name: values.pop(parameter.name) for parameter in settings}
         meaning = {parameter.name: values.pop(parameter.name) for parameter in profile}
-        command(Choice(chosen, meaning.pop("profile"), meaning), **values)
+        command(Choice(chosen, meaning.pop("profile"), meaning, meaning.pop("sets") or ()), **values)
 
     every = [*own, *profile, *settings]
     with_options.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]  # typer reads it
@@ -134,6 +144,34 @@ def _settings() -> tuple[inspect.Parameter, ...]:
     """An option for each field of `Settings`."""
     hints = get_type_hints(Settings)
     return tuple(_option(field, hints[field.name]) for field in fields(Settings))
+
+
+def _setting(text: str) -> dict[str, Any]:
+    """A profile's setting out of KEY=VALUE: the value as TOML has it, or a bare word."""
+    import tomllib
+
+    from algid.errors import SettingError
+
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        raise SettingError(f"--set {text}: expected KEY=VALUE like tau1.sign=-1")
+    try:
+        return tomllib.loads(f"{key} = {value}")
+    except tomllib.TOMLDecodeError:
+        pass
+    try:
+        return tomllib.loads(f"{key} = {json.dumps(value.strip())}")
+    except tomllib.TOMLDecodeError as error:
+        raise SettingError(f"--set {text}: expected KEY=VALUE like tau1.sign=-1 ({error})") from error
+
+
+def _merge(settings: dict[str, Any], more: Mapping[str, Any]) -> None:
+    """Set what `more` holds, channel by channel."""
+    for name, value in more.items():
+        if isinstance(value, Mapping):
+            settings[name] = {**settings.get(name, {}), **value}
+        else:
+            settings[name] = value
 
 
 def _option(field: Field[Any], kind: Any) -> inspect.Parameter:

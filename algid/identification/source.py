@@ -275,7 +275,8 @@ class Survey:
                 raise LogError(f"{log.name}: {refused.code}: {refused.text}")
             place = "" if alone else f" (in its first {block.duration:.0f} s)"
             self._findings[log] = [
-                Notice(finding.code, f"{finding.code}: {finding.text}{place}") for finding in findings
+                Notice(finding.code, f"{finding.code}: {finding.text}{place}", flags=finding.flags)
+                for finding in findings
             ]
         return self._findings[log]
 

@@ -6,7 +6,7 @@ A fit as a result holds it: estimates with intervals, Table 4's rows, diagnostic
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import PurePath
 
@@ -30,8 +30,10 @@ from algid.table4 import LOADED_ROWS, UNLOADED_ROWS, finite, paper_errors, table
 from algid.table4 import UNITS as TABLE_UNITS
 
 NAMED = 3  # logs that a warning names beside the first
-SUSPICIOUS = ("FLIPPED_SIGN", "WRONG_ZERO", "GRAVITY_COMPENSATED", "STUCK_SENSOR")
+SUSPICIOUS = ("WRONG_CONVENTION", "ZERO_OFFSET", "FLIPPED_SIGN", "WRONG_ZERO", "GRAVITY_COMPENSATED", "STUCK_SENSOR")
 """Named checks that say why estimates would be wrong."""
+CONTRADICTED = "WRONG_CONVENTION"
+"""The named check that says that estimates are wrong, unless the user accepts it."""
 FAR_BEYOND = 3.0  # standard deviations past a bound of physics that chance does not explain
 NEAR_CONSTANT = 0.1  # of the torque's RMS: a residual this small passes, however little there was to explain
 
@@ -59,6 +61,13 @@ def result_of(outcome: Outcome, settings: Settings, survey: Survey) -> Result:
     truth, payload = _truth(survey.logs)
     first, *others = [survey.summary(log) for log in survey.logs]
     notices = [(log.name, notice) for log in survey.logs for notice in survey.seen(log).notices]
+    if any(_is_contradicted(log, survey) for log in survey.logs):
+        outcome = replace(
+            outcome,
+            parameters=distrusted(outcome.parameters),
+            loaded=distrusted(outcome.loaded),
+            payload=distrusted(outcome.payload),
+        )
     return Result(
         version=__version__,
         estimator=outcome.estimator or settings.estimator,
@@ -80,8 +89,17 @@ def result_of(outcome: Outcome, settings: Settings, survey: Survey) -> Result:
 
 def _suspicions(notices: Sequence[tuple[str, Notice]]) -> list[Cause]:
     """What the named checks saw that spoils estimates, each code once."""
-    seen = {notice.code: notice.text for _, notice in reversed(notices) if notice.code in SUSPICIOUS}
-    return [Cause(cause=text.removeprefix(f"{code}: ")) for code, text in seen.items()]
+    seen = {notice.code: notice for _, notice in reversed(notices) if notice.code in SUSPICIOUS}
+    return [
+        Cause(cause=seen[code].text.removeprefix(f"{code}: "), flags=list(seen[code].flags))
+        for code in SUSPICIOUS
+        if code in seen
+    ]
+
+
+def _is_contradicted(log: LogSource, survey: Survey) -> bool:
+    accepted = log.origin.reading.accepted
+    return CONTRADICTED not in accepted and any(one.code == CONTRADICTED for one in survey.seen(log).notices)
 
 
 def _truth(logs: Sequence[LogSource]) -> tuple[Truth | None, float | None]:

@@ -20,6 +20,8 @@ SLOW_SAMPLING         no       fewer than ten samples in a period of the motion
 SHORT_LOG             no       less than a second
 NEAR_STAMPS           no       samples that stand all but on top of one another
 GRAVITY_COMPENSATED   no       torques do not carry the arm's weight
+WRONG_CONVENTION      no       physics contradicts signs, order, reference or zeros, and one other convention is right
+ZERO_OFFSET           no       the zeros of the angles are a little off
 FLIPPED_SIGN          no       gravity pulls upwards: a sign is wrong
 WRONG_ZERO            no       gravity pulls sideways: θ1 is not from the horizontal
 ====================  =======  ==========================================================
@@ -28,6 +30,7 @@ WRONG_ZERO            no       gravity pulls sideways: θ1 is not from the horiz
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 
@@ -35,6 +38,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.errors import LogError
+from algid.inspection.conventions import Mend, mend
 from algid.inspection.dynamics import DynamicFigures, dynamic_figures
 from algid.log import Log, Notice, join
 from algid.signals.spacing import NEAR, near_stamps, spaced
@@ -133,11 +137,12 @@ _LEAST_PULL = 1.3
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing seen: its code, what it means, and whether the log is refused for it."""
+    """One thing seen: its code, what it means, whether the log is refused for it, and the flags that mend it."""
 
     code: str
     text: str
     refuse: bool = False
+    flags: tuple[str, ...] = ()
 
 
 def examine(log: Log, *, gravity: float = 9.81) -> tuple[Finding, ...]:
@@ -146,10 +151,23 @@ def examine(log: Log, *, gravity: float = 9.81) -> tuple[Finding, ...]:
         return ()
     every = (*_efforts(log), *_angles(log), *_degrees(log), *_spikes(log), *_clock(log))
     found = [_yielding(finding, log.origin.reading.accepted) for finding in every]
-    if gravity > 0 and not any(finding.refuse for finding in found):
+    if any(finding.refuse for finding in found):
+        return tuple(found)
+    mended = mend(log, gravity=gravity > 0)
+    if mended is not None:
+        found.append(_convention(mended))
+    elif gravity > 0:
         figures = dynamic_figures(log)
         found += _gravity(figures) if figures is not None else []
     return tuple(found)
+
+
+def _convention(mended: Mend) -> Finding:
+    told = f"set {mended.lines} in a profile, or {' '.join(map(shlex.quote, mended.flags))}"
+    if not mended.another:
+        return Finding("ZERO_OFFSET", f"{mended.words}; {told}", flags=mended.flags)
+    text = f"{mended.words}, by all that physics says ({mended.contradiction}); {told}"
+    return Finding("WRONG_CONVENTION", text, flags=mended.flags)
 
 
 def admit(log: Log, *, gravity: float = 9.81) -> Log:
@@ -164,7 +182,7 @@ def admit(log: Log, *, gravity: float = 9.81) -> Log:
     for finding in found:
         if finding.refuse:
             raise LogError(f"{log.origin.path}: {finding.code}: {finding.text}")
-    return replace(log, notices=log.notices + tuple(Notice(one.code, one.text) for one in found))
+    return replace(log, notices=log.notices + tuple(Notice(one.code, one.text, flags=one.flags) for one in found))
 
 
 def _yielding(finding: Finding, accepted: Collection[str]) -> Finding:

@@ -14,6 +14,7 @@ _HEAD = """\
 # What the log's names, units and signs mean. Lines behind # are defaults or not known: edit what is wrong.
 # zero = "hanging"           # θ1 is zero hanging straight down, not along the horizontal
 # second_angle = "absolute"  # θ2 from the horizontal or vertical, not from link 1
+# drive = "base"             # the second motor stands at the base: its torque acts on θ1 + θ2
 # gravity = 9.81             # 0 for an arm that moves in a horizontal plane
 # velocity = false           # leave the log's velocities out
 # signs = [1, 1]             # -1 turns a joint's angle, velocity and torque round

@@ -196,12 +196,20 @@ def reader_of(
         channels=channels,
         zero=profile.zero,
         second_angle=profile.second_angle,
+        drive=profile.drive,
+        signs=profile.signs,
+        offsets=profile.offsets,
         unwrap=(profile.theta1.unwrap, profile.theta2.unwrap),
         start=profile.start,
         end=profile.end,
         accepted=profile.accept,
     )
-    units = Conversion(channels, hanging=profile.zero == "hanging", absolute=profile.second_angle == "absolute")
+    units = Conversion(
+        channels,
+        hanging=profile.zero == "hanging",
+        absolute=profile.second_angle == "absolute",
+        base=profile.drive == "base",
+    )
     return TableReader(replace(origin, reading=reading), tables, units, notices, rows)
 
 

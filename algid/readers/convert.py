@@ -91,11 +91,15 @@ class Gatherer:
 
 @dataclass(frozen=True)
 class Conversion:
-    """Value · factor + offset for each channel of a table, then the zero and the reference of the angles."""
+    """Value · factor + offset for each channel of a table, then the zero and the reference of the angles.
+
+    A second motor at the base does the work τ_m1 θ̇1 + τ_m2 (θ̇1 + θ̇2): joint 1 has the sum of both torques.
+    """
 
     channels: Mapping[str, ChannelReading]
     hanging: bool = False
     absolute: bool = False
+    base: bool = False
 
     def apply(self, table: Table, room: Room) -> None:
         """Fill in a table's angles, torques and, where recorded, velocities in rad, N m, rad/s."""
@@ -110,6 +114,8 @@ class Conversion:
                 omega[1] -= omega[0]
         if self.hanging:
             theta[0] -= math.pi / 2
+        if self.base:
+            room.tau[0] += room.tau[1]
 
     def _joint_pair(self, table: Table, names: Sequence[str], both: FloatArray) -> None:
         for row, name in zip(both, names, strict=True):

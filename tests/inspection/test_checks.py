@@ -19,13 +19,14 @@ from algid.readers import read_log
 K = Arm(6, 3, 0.15, 0.1, 0.3, 0.2, 0.1, 0.02, 1.5, 0.3).constants()
 
 
-def moving_log(rows: int = 6000) -> Log:
+def moving_log(rows: int = 6000, pace: float = 1.0) -> Log:
     """Closed-form motion and the torque that eq. (1) gives for it, 1 kHz, with measurement noise."""
     draw = np.random.default_rng(4)
     t = np.arange(rows) * 1e-3
     theta, omega, alpha = np.zeros((3, 2, rows))
     for joint, terms in enumerate((((0.9, 2.1), (0.4, 5.3)), ((1.1, 1.3), (0.5, 6.1)))):
-        for size, rate in terms:
+        for size, usual in terms:
+            rate = pace * usual
             theta[joint] += size * np.sin(rate * t)
             omega[joint] += size * rate * np.cos(rate * t)
             alpha[joint] -= size * rate**2 * np.sin(rate * t)
@@ -50,8 +51,12 @@ def with_row(values: FloatArray, row: int, new: FloatArray | float) -> FloatArra
     return changed
 
 
+SLOW = 0.05
+"""Pace at which a log tells where gravity pulls, and no more."""
+
+
 def spoiled(name: str) -> Log:
-    log = moving_log()
+    log = moving_log(20_000, SLOW) if name in ("FLIPPED_SIGN", "WRONG_ZERO") else moving_log()
     theta, tau, omega = log.theta, log.tau, log.omega
     assert omega is not None
     match name:
@@ -83,8 +88,10 @@ def spoiled(name: str) -> Log:
         case "JITTER":
             late = np.random.default_rng(5).integers(0, 300_000, len(log))
             return replace(log, stamp_ns=log.stamp_ns + late)
-        case "FLIPPED_SIGN":
+        case "FLIPPED_SIGN" | "WRONG_CONVENTION":
             return replace(log, tau=-tau)
+        case "ZERO_OFFSET":
+            return replace(log, theta=theta + np.array([[np.radians(4)], [0.0]]), omega=None)
         case "WRONG_ZERO":
             return replace(log, theta=with_row(theta, 0, theta[0] + np.pi / 2))
         case _:
@@ -98,9 +105,10 @@ def spoiled(name: str) -> Log:
 REFUSED = ("EFFORT_ZERO", "EFFORT_DENORMAL", "EFFORT_CONSTANT", "WRAPPED_ANGLE", "DEGREES")
 TOLD = ("SATURATED_EFFORT", "ANGLE_CONSTANT", "STUCK_SENSOR", "SPIKES", "GAPS", "JITTER")
 TOLD_OF_GRAVITY = ("FLIPPED_SIGN", "WRONG_ZERO", "GRAVITY_COMPENSATED")
+TOLD_OF_CONVENTIONS = ("WRONG_CONVENTION", "ZERO_OFFSET")
 
 
-@pytest.mark.parametrize("code", REFUSED + TOLD + TOLD_OF_GRAVITY)
+@pytest.mark.parametrize("code", REFUSED + TOLD + TOLD_OF_GRAVITY + TOLD_OF_CONVENTIONS)
 def test_each_check_sees_what_it_is_for(code: str) -> None:
     log = spoiled(code)
     assert code in codes(log)
@@ -128,9 +136,9 @@ def test_encoder_step_and_noise_floor() -> None:
 
 def test_the_recorded_runs_tell_their_zero(shared_data: Path) -> None:
     runs = sorted((shared_data / "dfki" / "C1_sysid").glob("*.csv"))
-    turned = {"WRONG_ZERO", "FLIPPED_SIGN", "GRAVITY_COMPENSATED"}
+    turned = {"WRONG_ZERO", "FLIPPED_SIGN", "GRAVITY_COMPENSATED", "WRONG_CONVENTION"}
     blamed = [turned & set(codes(read_log(run))) for run in runs]
-    assert set.union(*blamed) == {"WRONG_ZERO"}
+    assert set.union(*blamed) == {"WRONG_ZERO", "WRONG_CONVENTION"}
     assert sum(map(bool, blamed)) >= 5
     for run in runs:
         log = read_log(run, Profile(zero="hanging"))

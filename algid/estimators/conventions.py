@@ -1,0 +1,458 @@
+"""Which convention of angles and torques makes a log obey the equations of motion of a real arm.
+
+A log may have been recorded under another convention than algid's: signs, order of the joints, θ2 from the
+horizontal, another zero, angles of the motors, a second motor that stands at the base. Each such mistake is a linear
+map of (θ, τ), so each is tried: the log is mapped back and eq. (1), with friction and offsets, fitted in its weak form.
+
+======  ==================================================================  ================
+symbol  name                                                                shape
+======  ==================================================================  ================
+X       moments of the columns `COLUMNS`, by joint and window               (2, 15, R)
+b       moments of the two torques as recorded                              (2, R)
+c       coefficients under one convention's zeros, `ZEROED`                 (12,)
+T       c's place among the columns, for the zeros δ1 and δ2                (15, 12)
+======  ==================================================================  ================
+
+**Zeros are linear.** With θ1 + δ1 and θ2 + δ2 in the place of the angles, k4 cos θ1 becomes k4 cos δ1 cos θ1 −
+k4 sin δ1 sin θ1; likewise k2 with δ1 + δ2, and k1 with δ2. Each of the three has therefore a second column, a quarter
+turn on, and one pass over the log serves every zero. Signs and order of the torques are linear in b. A second motor
+at the base turns θ1 + θ2 and does the work τ_m1 θ̇1 + τ_m2 (θ̇1 + θ̇2): its own equations are the difference of the
+joints' and the second joint's. Only order, relative sign, reference and scale of the angles need a pass of their own.
+
+**What no log can tell** (tests prove each):
+
+- θ → −θ, τ → −τ, δ1 → π − δ1, δ2 → −δ2: the arm seen from behind. All signs flipped is the same as θ1 from the other
+  horizontal, the constants are the same, and half of the conventions need not be tried. With zeros that hang it is
+  no mistake at all.
+- τ → a τ, and t → a t: a common gain, a clock that runs fast. The constants scale, no equation is broken.
+- θ2 → θ2 + π turns k1 and k2 round. Only k1 k2 = m2² g l1 lc2² ≥ 0 is demanded by physics; that k1 and k2 themselves
+  are positive says that link 2's centre of gravity lies on link 2's side of its joint, which no counterweight spoils.
+- Without gravity, every δ1.
+
+**What physics demands** (Table 1): M22 = k3 + j2 > 0, k5 > 0 and k3 k5 > k1² (M positive definite, by the inequality of
+Cauchy and Schwarz on m2 l1² ≤ k5, m2 lc2² ≤ k3), friction that brakes, k1 k2 ≥ 0; and k2, k4 ≥ 0: gravity pulls down.
+Friction is judged by its torque at the joint's RMS speed, since a real one falls with speed at first (Stribeck).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from math import copysign, pi, remainder
+
+import numpy as np
+from scipy.optimize import minimize
+
+from algid.arm import FloatArray
+from algid.estimators.modulating_functions import OVERLAP, Windows
+from algid.model import sine_cosine
+from algid.signals.filters import correlate, differentiator, half_length
+
+COLUMNS = ("k1", "k1'", "k2", "k2'", "k3", "k4", "k4'", "k5", "k6", "k7", "f1", "f2", "o1", "o2", "j2")
+ZEROED = tuple(name for name in COLUMNS if not name.endswith("'"))
+WINDOW = 0.4  # s
+_BANDWIDTH = 40.0  # Hz, of the velocity beside k1
+_COULOMB_SPEED = 0.1  # rad/s
+_REWEIGHTINGS = 4
+_FLOOR = 1e-9  # of a torque's power: a residual below it is rounding
+_CLEAN = 1e-3  # of a torque's power: what the arm's true convention leaves on a log that is nearly all model
+_FINE, _COARSE = (250.0, 40.0), (125.0, 12.0)  # Hz and s: what is looked at, and what scales are sought in
+_QUARTERS = (0.0, 0.5 * pi, pi, -0.5 * pi)
+_SHIFTED = 3  # conventions, of the best, whose zeros are set free
+_SCALES = (0.1, 400.0)  # from turns (0.16) to the motors behind large gears
+_WIDEST = 40.0  # rad: no scale is tried under which a joint would move further
+_EXACT = (180 / pi, 1 / (2 * pi), *range(2, 401))
+"""Scales of their own right: degrees, turns, whole gears."""
+_NEAR = 0.01  # of a scale: how near one of those it is tried for them
+
+_INERTIAL = ("M22 > 0", "k5 > 0", "det M > 0", "k1 k2 > 0")
+
+BROKEN = -4.0
+"""A demand of physics missed by more standard deviations than this is broken."""
+MET = 4.0
+"""A convention is physical where the demands of inertia are met by as many."""
+APART = 1.0
+"""Two conventions are told apart where the logarithms of what they leave of the torques differ by this in sum."""
+EVIDENCE = 15.0
+"""And where that is worth so much in log-likelihood: a chance of 1 in 3000 among a thousand conventions tried."""
+LEAST = 1e-5
+"""To leave less than this share of a torque is no merit: one joint's exact equation does not outweigh the other's."""
+EXPLAINED = 0.2
+"""A convention that leaves more than this share of a torque explains nothing."""
+
+
+@dataclass(frozen=True)
+class Convention:
+    """What has to be done to angles and torques as they were read; by default nothing.
+
+    The angles of the joints change places, are divided by `scale`, multiplied by `signs`, θ1 is taken off an `absolute`
+    θ2, and `zero` is added. The torques change places and are multiplied by `torque_signs`. `base`: the second motor
+    stands at the base.
+    """
+
+    swapped: bool = False
+    scale: tuple[float, float] = (1.0, 1.0)
+    signs: tuple[int, int] = (1, 1)
+    absolute: bool = False
+    zero: tuple[float, float] = (0.0, 0.0)
+    torques_swapped: bool = False
+    torque_signs: tuple[int, int] = (1, 1)
+    base: bool = False
+
+    def angles(self, theta: FloatArray) -> FloatArray:
+        """Angles (2, N) in rad under algid's convention out of those that were read."""
+        first, second = theta[::-1] if self.swapped else theta
+        first, second = first * (self.signs[0] / self.scale[0]), second * (self.signs[1] / self.scale[1])
+        return np.stack([first, second - first if self.absolute else second]) + np.array(self.zero)[:, None]
+
+    def torques(self, tau: FloatArray) -> FloatArray:
+        """Torques (2, N) at the joints in N m out of those that were read."""
+        first, second = tau[::-1] if self.torques_swapped else tau
+        first, second = self.torque_signs[0] * first, self.torque_signs[1] * second
+        return np.stack([first + second if self.base else first, second])
+
+    def mirrored(self) -> Convention:
+        """The same arm seen from behind: another convention with the same constants."""
+        turn = (remainder(pi - self.zero[0], 2 * pi), remainder(-self.zero[1], 2 * pi))
+        return replace(
+            self,
+            signs=(-self.signs[0], -self.signs[1]),
+            torque_signs=(-self.torque_signs[0], -self.torque_signs[1]),
+            zero=turn,
+        )
+
+
+AS_READ = Convention()
+
+
+def _size(left: FloatArray) -> float:
+    return float(np.log(left).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A convention and what the log says under it.
+
+    Parameters
+    ----------
+    convention : Convention
+    k : (12,), `ZEROED`
+    left : (2,), share of each recorded torque's mean square that is not explained
+    demands : what physics demands, and how many standard deviations the log is on the right side
+    """
+
+    convention: Convention
+    k: FloatArray
+    left: FloatArray
+    demands: dict[str, float]
+
+    @property
+    def score(self) -> float:
+        """Sum of the logarithms of what is left: less is better."""
+        return _size(np.maximum(self.left, LEAST))
+
+    @property
+    def broken(self) -> dict[str, float]:
+        """The demands that the log breaks under this convention."""
+        return {name: distance for name, distance in self.demands.items() if distance < BROKEN}
+
+    @property
+    def convincing(self) -> bool:
+        """Whether the log shows a real arm: every inertia is told, nothing is broken, the torque explained."""
+        inertial = (self.demands[name] for name in _INERTIAL if name in self.demands)
+        return not self.broken and min(inertial) > MET and float(self.left.max()) < EXPLAINED
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The log as it was read, the best convention, and whether it is `alone`.
+
+    It is where the log shows a real arm under it, and no other convention that physics allows comes near.
+    """
+
+    as_read: Candidate
+    best: Candidate
+    alone: bool
+
+
+def judge(theta: FloatArray, tau: FloatArray, dt: float, *, gravity: bool = True) -> Judgement | None:
+    """Try every convention on angles (2, N) in rad and torques (2, N) in N m, `dt` s apart.
+
+    None where the log is too short (six windows) or too slow (ten samples a window) to tell, or a torque is nought.
+    """
+    if theta.shape[1] * dt < 6 * WINDOW or 10 * dt > WINDOW or not np.all(np.any(tau != 0, axis=1)):
+        return None
+    log = _Trials(theta, tau, dt, gravity)
+    found = list(log.discrete())
+    judged = _judged(found, log.apart)
+    if judged.alone and judged.best.left.max() < _CLEAN:
+        return judged
+    found += log.shifted(found)
+    judged = _judged(found, log.apart)
+    if not judged.alone:
+        found += log.scaled()
+        judged = _judged(found, log.apart)
+    return judged
+
+
+def _judged(found: Sequence[Candidate], apart: float) -> Judgement:
+    as_read = next(one for one in found if one.convention == AS_READ)
+    possible = sorted((one for one in found if not one.broken), key=lambda one: one.score)
+    if not possible:
+        return Judgement(as_read, as_read, alone=False)
+    best = possible[0]
+    alone = best.convincing and all(other.score - best.score > apart for other in possible[1:2])
+    return Judgement(as_read, best, alone)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sums:
+    """Sums over the windows of a log whose angles were mapped.
+
+    Gram matrices of the columns (2, 15, 15), their products with both recorded torques (2, 15, 2), the power of these
+    (2,), and the joints' RMS speeds (2,) in rad/s.
+    """
+
+    gram: FloatArray
+    cross: FloatArray
+    power: FloatArray
+    speed: FloatArray
+    independent: float
+
+
+class _Trials:
+    """One log, mapped and fitted under any convention."""
+
+    def __init__(self, theta: FloatArray, tau: FloatArray, dt: float, gravity: bool) -> None:
+        self._fine = _thinned(theta, tau, dt, *_FINE)
+        self._coarse = _thinned(theta, tau, dt, *_COARSE)
+        kept = [not name.startswith(("k2", "k4")) or gravity for name in COLUMNS]
+        self._free = np.eye(len(COLUMNS))[:, kept]
+        self._zeros = [(turn, half) for half in (0.0, pi) for turn in (_QUARTERS if gravity else _QUARTERS[:1])]
+        self._names = tuple(name for name in ZEROED if name not in ("k2", "k4") or gravity)
+        self.apart = max(APART, 2 * EVIDENCE * WINDOW / (self._fine[0].shape[1] * self._fine[2]))
+        """By how much the scores of two conventions differ that are told apart."""
+        self._passes: dict[Convention, tuple[_Sums, _Sums]] = {}
+
+    def discrete(self) -> Iterator[Candidate]:
+        """Every convention without a scale, its zeros by quarter and half turns."""
+        for swapped, sign, absolute in product((False, True), (1, -1), (False, True)):
+            for family in _families(Convention(swapped=swapped, signs=(1, sign), absolute=absolute)):
+                yield from self._with_zeros(family, self._zeros)
+
+    def shifted(self, found: Sequence[Candidate]) -> Iterator[Candidate]:
+        """The conventions that leave least when both zeros are free, with the zeros that fit best."""
+        families = dict.fromkeys(replace(one.convention, zero=(0.0, 0.0)) for one in found)
+        for family in sorted(families, key=lambda family: self._score(family, self._fine))[:_SHIFTED]:
+            yield from self._with_free_zero(family, found)
+
+    def scaled(self) -> Iterator[Candidate]:
+        """The scales of both angles, or of one, that leave least under the log's own signs and order."""
+        for joints in ((1, 1), (1, 0), (0, 1)):
+            family = self._scaled(joints)
+            if family is None:
+                continue
+            found = list(self._with_zeros(family, self._zeros))
+            yield from found
+            yield from self._with_free_zero(family, found)
+
+    def _with_zeros(self, family: Convention, zeros: Sequence[tuple[float, float]]) -> Iterator[Candidate]:
+        sums = self._sums(family, self._fine)
+        fitted = _solved(sums, family, np.stack([self._place(zero) for zero in zeros]))
+        for zero, c, left, covariance in zip(zeros, *fitted, strict=True):
+            demands = _demands(dict(zip(self._names, c, strict=True)), covariance, sums.speed)
+            yield Candidate(replace(family, zero=zero), c, left, demands)
+
+    def _with_free_zero(self, family: Convention, found: Sequence[Candidate]) -> Iterator[Candidate]:
+        """The zeros that fit best, where they leave far less than those that were found."""
+        (free,) = self._with_zeros(family, [self._best_zero(family)])
+        own = [one.score for one in found if replace(one.convention, zero=(0.0, 0.0)) == family]
+        if free.score < min(own) - self.apart:
+            yield free
+
+    def _score(self, family: Convention, log: _Thinned) -> float:
+        """What is left with free zeros, a sum of logarithms."""
+        return _size(_solved(self._sums(family, log), family, self._free[None])[1])
+
+    def _best_zero(self, family: Convention) -> tuple[float, float]:
+        """Zeros δ1 and δ2 in rad that leave least, with k1, k2 and k4 positive where the log tells."""
+        sums = self._sums(family, self._fine)
+        c = self._free @ _solved(sums, family, self._free[None])[0][0]
+        start = np.array([np.arctan2(c[6], c[5]), np.arctan2(c[1], c[0])])
+
+        def score(zero: FloatArray) -> float:
+            return _size(_solved(sums, family, self._place((zero[0], zero[1]))[None])[1])
+
+        best = minimize(score, start, method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-3, "maxiter": 200}).x
+        return remainder(float(best[0]), 2 * pi), remainder(float(best[1]), 2 * pi)
+
+    def _scaled(self, joints: tuple[int, int]) -> Convention | None:
+        """What the angles of `joints` have to be divided by; None where no scale leaves far less than none."""
+
+        def score(scale: float, log: _Thinned) -> float:
+            return self._score(_scaled_by(scale, joints), log)
+
+        grid = _grid(np.ptp(self._coarse[0], axis=1)[np.array(joints) == 1])
+        scale = min(grid, key=lambda scale: score(scale, self._coarse))
+        if score(scale, self._coarse) > score(1.0, self._coarse) - self.apart:
+            return None
+        step = 1.2
+        while step > 1 + 1e-5:
+            around = [scale / step, scale / step**0.5, scale, scale * step**0.5, scale * step]
+            scale = min(around, key=lambda scale: score(scale, self._fine))
+            step = step**0.5
+        near = [whole for whole in _EXACT if abs(scale / whole - 1) < _NEAR]
+        nearest = min(near, key=lambda whole: abs(scale / whole - 1), default=scale)
+        exact = score(nearest, self._fine) < score(scale, self._fine) + self.apart
+        return _scaled_by(nearest if exact else scale, joints)
+
+    def _place(self, zero: tuple[float, float]) -> FloatArray:
+        """T (15, q) of the zeros δ1 and δ2."""
+        T = np.zeros((len(COLUMNS), len(self._names)))
+        turned = {"k1": zero[1], "k2": zero[0] + zero[1], "k4": zero[0]}
+        for column, name in enumerate(self._names):
+            row = COLUMNS.index(name)
+            T[row, column] = 1.0
+            if name in turned:
+                T[row : row + 2, column] = np.cos(turned[name]), np.sin(turned[name])
+        return T
+
+    def _sums(self, family: Convention, log: _Thinned) -> _Sums:
+        """Sums for a family's angles and drive; those of the last pass over the log serve the next one too."""
+        angles = Convention(swapped=family.swapped, scale=family.scale, signs=family.signs, absolute=family.absolute)
+        if angles not in self._passes or log is not self._fine:
+            passed = _summed(angles.angles(log[0]), log[1], log[2])
+            if log is not self._fine:
+                return passed[family.base]
+            self._passes[angles] = passed
+        return self._passes[angles][family.base]
+
+
+_Thinned = tuple[FloatArray, FloatArray, float]
+
+
+def _thinned(theta: FloatArray, tau: FloatArray, dt: float, rate: float, longest: float) -> _Thinned:
+    """Means over as many samples as leave `rate` Hz, of the first `longest` s: angles, torques and their period."""
+    width = max(1, round(1 / (rate * dt)))
+    count = min(theta.shape[1], round(longest / dt)) // width
+    thin = (signal[:, : count * width].reshape(2, count, width).mean(axis=2) for signal in (theta, tau))
+    return next(thin), next(thin), dt * width
+
+
+def _families(angles: Convention) -> Iterator[Convention]:
+    """Every order and sign of the torques, and both drives, beside angles mapped so."""
+    for base, swapped, first, second in product((False, True), (False, True), (1, -1), (1, -1)):
+        yield replace(angles, base=base, torques_swapped=swapped, torque_signs=(first, second))
+
+
+def _scaled_by(scale: float, joints: tuple[int, int]) -> Convention:
+    return Convention(scale=(scale if joints[0] else 1.0, scale if joints[1] else 1.0))
+
+
+def _grid(travel: FloatArray) -> list[float]:
+    """Scales to try for angles that `travel` so far, rad as read: two neighbours differ by half a radian at most."""
+    scale = max(_SCALES[0], float(travel.max()) / _WIDEST)
+    grid = []
+    while scale < _SCALES[1]:
+        grid.append(scale)
+        scale *= 1 + min(0.15, 0.5 * scale / max(float(travel.max()), 1e-9))
+    return grid
+
+
+def _summed(theta: FloatArray, tau: FloatArray, dt: float) -> tuple[_Sums, _Sums]:
+    """Sums with the second motor in its joint, and with it at the base."""
+    bandwidth = max(min(_BANDWIDTH, 0.2 / dt), 6.0 / WINDOW)
+    windows = Windows(dt, WINDOW, 0.0, bandwidth)
+    reach = half_length(dt, bandwidth)
+    omega = correlate(theta, differentiator(dt, bandwidth))
+    theta, tau = theta[:, reach:-reach], tau[:, reach:-reach]
+    weight, slope, bend = windows.kernels()
+    (s1, s2), (c1, c2) = sine_cosine(theta)
+    friction = np.tanh(omega / _COULOMB_SPEED)
+    centripetal = omega[0] * (omega[0] + omega[1])
+    weighed = [centripetal * s2, centripetal * c2, c1, s1, c1 * c2 - s1 * s2, s1 * c2 + c1 * s2, *friction, *tau]
+    turned2, turning2, c1_, s1_, c12_, s12_, f1, f2, *b = windows.moments(np.stack(weighed), weight)
+    slope1, slope2, momentum, momentum_ = windows.moments(np.stack([*theta, c2 * omega[0], s2 * omega[0]]), slope)
+    bend1, bend2, s2_bend, c2_bend = windows.moments(np.stack([*theta, s2, c2]), bend)
+    nought, one = np.zeros_like(f1), np.ones_like(f1)
+    columns = {
+        "k1": (s2_bend - 2 * momentum, turned2 - momentum),
+        "k1'": (c2_bend + 2 * momentum_, turning2 + momentum_),
+        "k2": (c12_, c12_),
+        "k2'": (-s12_, -s12_),
+        "k3": (bend1 + bend2, bend1 + bend2),
+        "k4": (c1_, nought),
+        "k4'": (-s1_, nought),
+        "k5": (bend1, nought),
+        "k6": (-slope1, nought),
+        "k7": (nought, -slope2),
+        "f1": (f1, nought),
+        "f2": (nought, f2),
+        "o1": (one, nought),
+        "o2": (nought, one),
+        "j2": (nought, bend2),
+    }
+    X = np.array([columns[name] for name in COLUMNS]).swapaxes(0, 1)
+    torques = np.array(b)
+    speed = np.sqrt(np.mean(omega**2, axis=1))
+    independent = X.shape[2] / OVERLAP
+    drives = (X, np.stack([X[0] - X[1], X[1]]))
+    sums = [
+        _Sums(
+            Y @ Y.swapaxes(1, 2),
+            Y @ torques.T,
+            np.sum(torques**2, axis=1),
+            speed,
+            independent,
+        )
+        for Y in drives
+    ]
+    return sums[0], sums[1]
+
+
+def _solved(sums: _Sums, family: Convention, T: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Weighted least squares for each T of (Z, 15, q): c (Z, q), shares left (Z, 2) and covariances (Z, q, q)."""
+    order = [1, 0] if family.torques_swapped else [0, 1]
+    cross = np.stack([family.torque_signs[joint] * sums.cross[joint, :, order[joint]] for joint in (0, 1)])
+    power = sums.power[order]
+    gram = T.swapaxes(1, 2)[:, None] @ sums.gram @ T[:, None]
+    aimed = np.einsum("zxi,ax->zai", T, cross)
+    weight = np.broadcast_to(1 / power, (T.shape[0], 2))
+    for _ in range(_REWEIGHTINGS):
+        normal = np.einsum("za,zaij->zij", weight, gram)
+        size = np.sqrt(np.maximum(np.einsum("zii->zi", normal), 1e-300))
+        unit = normal / (size[:, :, None] * size[:, None, :]) + 1e-12 * np.eye(T.shape[2])
+        inverse = np.linalg.inv(unit) / (size[:, :, None] * size[:, None, :])
+        c = np.einsum("zij,za,zaj->zi", inverse, weight, aimed)
+        squares = power - 2 * np.einsum("zai,zi->za", aimed, c) + np.einsum("zi,zaij,zj->za", c, gram, c)
+        squares = np.maximum(squares, _FLOOR * power)
+        weight = sums.independent / squares
+    return c, squares / power, inverse
+
+
+def _demands(k: dict[str, float], covariance: FloatArray, speed: FloatArray) -> dict[str, float]:
+    """What physics demands of the coefficients, in standard deviations on its right side."""
+    place = {name: number for number, name in enumerate(k)}
+
+    def distance(value: float, slopes: dict[str, float]) -> float:
+        slope = np.zeros(len(k))
+        for name, share in slopes.items():
+            slope[place[name]] = share
+        return value / max(float(slope @ covariance @ slope), 1e-300) ** 0.5
+
+    k1, m22, k5 = k["k1"], k["k3"] + k["j2"], k["k5"]
+    found = {
+        "M22 > 0": distance(m22, {"k3": 1, "j2": 1}),
+        "k5 > 0": distance(k5, {"k5": 1}),
+        "det M > 0": distance(
+            k5 * m22 + k["k3"] * k["j2"] - k1**2, {"k1": -2 * k1, "k3": k5 + k["j2"], "k5": m22, "j2": k5 + k["k3"]}
+        ),
+        "that the friction of joint 1 brakes": distance(k["k6"] * speed[0] + k["f1"], {"k6": float(speed[0]), "f1": 1}),
+        "that the friction of joint 2 brakes": distance(k["k7"] * speed[1] + k["f2"], {"k7": float(speed[1]), "f2": 1}),
+    }
+    if "k2" not in k:
+        return found | {"k1 > 0": distance(k1, {"k1": 1})}
+    first, second, fourth = (distance(k[name], {name: 1}) for name in ("k1", "k2", "k4"))
+    both = copysign(min(abs(first), abs(second)), first * second)
+    return found | {"k1 k2 > 0": both, "k2 > 0": second, "k4 > 0": fourth}

@@ -1,0 +1,232 @@
+"""The convention under which a log obeys physics, where it is not the one it was read by, and what sets it.
+
+`algid.estimators.conventions` finds it; here it becomes words, and the profile's settings that change the reading.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from math import degrees, isclose, pi, remainder
+from typing import Any
+
+from algid.estimators.conventions import AS_READ, Candidate, Convention, judge
+from algid.log import Log, Reading
+from algid.signals.segments import Segment, append, segments
+
+_SMALL = 0.1  # rad: a zero this close is a bad calibration, not another convention
+_TOLD = 0.01  # rad: a zero closer than this is not worth a word
+_SAME = 1e-3  # of a scale or rad: as good as equal
+
+
+@dataclass(frozen=True)
+class Mend:
+    """How a log has to be read.
+
+    Parameters
+    ----------
+    words : what is wrong, in clauses
+    contradiction : what physics says against the convention that the log was read by
+    settings : the profile's settings that mend it; a channel's are a dictionary of their own
+    another : whether it is another convention, not the same one with its zeros a little off
+    """
+
+    words: str
+    contradiction: str
+    settings: dict[str, Any]
+    another: bool
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """Flags that say the same."""
+        flags: list[str] = []
+        for name, value in self.settings.items():
+            if name in ("zero", "second_angle", "drive"):
+                flags += ["--" + name.replace("_", "-"), str(value)]
+            elif name == "joints":
+                flags += ["--joints", ",".join(value)]
+            elif isinstance(value, Mapping):
+                for key, inner in value.items():
+                    flags += ["--set", f"{name}.{key}={json.dumps(inner, ensure_ascii=False)}"]
+            else:
+                flags += ["--set", f"{name}={json.dumps(value)}"]
+        return tuple(flags)
+
+    @property
+    def lines(self) -> str:
+        """The profile's lines."""
+        own = [f"{name} = {_toml(value)}" for name, value in self.settings.items() if not isinstance(value, Mapping)]
+        for name, value in self.settings.items():
+            if isinstance(value, Mapping):
+                own += [f"{key} = {_toml(inner)} of [{name}]" for key, inner in value.items()]
+        return ", ".join(own)
+
+
+def mend(log: Log, *, gravity: bool = True) -> Mend | None:
+    """What sets a log right that physics contradicts as it was read; None where it is right, or the log does not tell.
+
+    Parameters
+    ----------
+    log : Log, as it was read
+    gravity : False for an arm in a horizontal plane
+    """
+    longest = _longest_stretch(log)
+    judged = None if longest is None else judge(longest.theta, longest.tau, longest.dt, gravity=gravity)
+    if judged is None or not judged.alone or judged.best.convention == AS_READ:
+        return None
+    convention = min(
+        (judged.best.convention, judged.best.convention.mirrored()), key=lambda one: len(list(_clauses(one)))
+    )
+    words = " and ".join(_clauses(convention))
+    if convention.mirrored().zero == (0.0, 0.0) and replace(convention, zero=(0.0, 0.0)) == AS_READ:
+        words = "all signs are turned round, or θ1 counts from the other horizontal (the same arm seen from behind)"
+    small = all(abs(angle) < _SMALL for angle in convention.zero)
+    return Mend(
+        words,
+        _contradiction(judged.as_read, judged.best),
+        _settings(convention, log),
+        another=not small or replace(convention, zero=(0.0, 0.0)) != AS_READ,
+    )
+
+
+def _longest_stretch(log: Log) -> Segment | None:
+    """The longest stretch of a log without a gap, evenly sampled."""
+    stretches: list[Segment] = []
+    for segment in segments([log]):
+        if segment.continues and stretches:
+            stretches[-1] = append(stretches[-1], segment)
+        else:
+            stretches.append(segment)
+    return max(stretches, key=len, default=None)
+
+
+def _contradiction(as_read: Candidate, best: Candidate) -> str:
+    broken = sorted(as_read.broken.items(), key=lambda found: found[1])
+    left = f"{100 * float(as_read.left.max()):.3g} % of a torque stays unexplained"
+    if not broken:
+        return f"{left}, {100 * float(best.left.max()):.2g} % then"
+    (name, distance), *_ = broken
+    return f"it demands {name}, which the log misses by {-distance:.0f} standard deviations"
+
+
+def _clauses(convention: Convention) -> Iterator[str]:
+    """What is wrong with a log that has to be read by `convention`."""
+    yield from _order(convention)
+    for joint in (0, 1):
+        angle, torque = convention.signs[joint] < 0, convention.torque_signs[joint] < 0
+        if angle and torque:
+            yield f"joint {joint + 1} counts the other way round"
+        elif angle or torque:
+            yield f"the sign of {'θ' if angle else 'τ'}{joint + 1} is wrong"
+    if convention.absolute:
+        yield "θ2 counts from the horizontal or the vertical, not from link 1"
+    if convention.base:
+        yield "the second motor stands at the base"
+    yield from _scale(convention.scale)
+    for joint, off in enumerate(convention.zero):
+        if abs(off) > _TOLD:
+            yield _zero(joint, off)
+
+
+def _order(convention: Convention) -> Iterator[str]:
+    if convention.swapped and convention.torques_swapped:
+        yield "the joints are swapped"
+    elif convention.swapped or convention.torques_swapped:
+        yield f"the {'angles' if convention.swapped else 'torques'} of the joints are swapped"
+
+
+def _scale(scale: tuple[float, float]) -> Iterator[str]:
+    for what, one in zip(("θ1", "θ2"), scale, strict=True):
+        if _is_unit(one):
+            yield f"{what} is in {'degrees' if one > 1 else 'turns'}"
+        elif one != 1:
+            yield f"{what} is the motor's angle, {one:.4g} times the joint's"
+
+
+def _is_unit(scale: float) -> bool:
+    return isclose(scale, 180 / pi) or isclose(scale, 1 / (2 * pi))
+
+
+def _zero(joint: int, angle: float) -> str:
+    if joint == 0 and abs(angle + pi / 2) < _SAME:
+        return "θ1 is nought hanging straight down"
+    if joint == 0 and abs(angle - pi / 2) < _SAME:
+        return "θ1 is nought upright"
+    return f"the zero of θ{joint + 1} is off by {degrees(angle):.4g} degrees"
+
+
+def _settings(convention: Convention, log: Log) -> dict[str, Any]:
+    """The settings that read the log by `convention`, over those that it was read by."""
+    reading = log.origin.reading
+    found: dict[str, Any] = dict(_sources(convention, log))
+    place = (1, 0) if convention.swapped else (0, 1)
+    for joint in (0, 1):
+        theta, tau = found.setdefault(f"theta{joint + 1}", {}), found.setdefault(f"tau{joint + 1}", {})
+        # A channel that is swapped keeps what the profile says of its joint: names and units go with the joint.
+        if convention.signs[joint] < 0 and convention.torque_signs[joint] < 0:
+            signs = list(found.get("signs", reading.signs))
+            signs[joint] = -signs[joint]
+            found["signs"] = signs
+        elif convention.signs[joint] < 0:
+            theta["sign"] = -_own_sign(reading, f"theta{joint + 1}")
+        elif convention.torque_signs[joint] < 0:
+            tau["sign"] = -_own_sign(reading, f"tau{joint + 1}")
+        scale = convention.scale[joint]
+        if _is_unit(scale):
+            theta["unit"] = "deg" if scale > 1 else "rev"
+        elif scale != 1:
+            theta["gear_ratio"] = float(f"{scale:.6g}")
+    if convention.absolute:
+        found["second_angle"] = "absolute"
+    if convention.base:
+        found["drive"] = "base"
+    found |= _zeros(convention, reading, place)
+    return {name: value for name, value in found.items() if value != {}}
+
+
+def _sources(convention: Convention, log: Log) -> Iterator[tuple[str, Any]]:
+    """Where the channels come from that have to change places."""
+    joints = log.origin.reading.joints
+    if convention.swapped and convention.torques_swapped and joints is not None:
+        yield "joints", [joints[1], joints[0]]
+        return
+    for name, swapped in (("theta", convention.swapped), ("tau", convention.torques_swapped)):
+        for joint in (1, 2) if swapped else ():
+            source = log.origin.mapping.get(f"{name}{3 - joint}", f"{name}{3 - joint}")
+            yield f"{name}{joint}", {"source": source.partition(": ")[2] or source}
+
+
+def _own_sign(reading: Reading, name: str) -> int:
+    """The sign that the profile gives a channel, beside that of its joint."""
+    return reading.channels[name].sign * reading.signs[int(name[-1]) - 1] if name in reading.channels else 1
+
+
+def _zeros(convention: Convention, reading: Reading, place: tuple[int, int]) -> dict[str, Any]:
+    """Zero and offsets of the profile: what is added to the angles as recorded, once signs and scales are right."""
+    channels = (reading.channels.get("theta1"), reading.channels.get("theta2"))
+    own = [0.0 if channel is None else channel.offset for channel in channels]
+    hanging = -pi / 2 if reading.zero == "hanging" else 0.0
+    read = [own[0] + hanging, own[1] - (own[0] if reading.second_angle == "absolute" else 0.0)]
+    first, second = (convention.signs[joint] / convention.scale[joint] * read[place[joint]] for joint in (0, 1))
+    first, second = first + convention.zero[0], second - (first if convention.absolute else 0.0) + convention.zero[1]
+    if isclose(first, read[0], abs_tol=_SAME) and isclose(second, read[1], abs_tol=_SAME) and not convention.absolute:
+        return {}
+    zeros = {"horizontal": first, "hanging": first + pi / 2}
+    zero = min(zeros, key=lambda name: (abs(remainder(zeros[name], 2 * pi)) > _SAME, name != reading.zero))
+    offset = remainder(zeros[zero], 2 * pi)
+    both = (offset, second + (offset if convention.absolute else 0.0))
+    offsets = [
+        _plain(remainder(angle, 2 * pi) - (own[joint] - reading.offsets[joint])) for joint, angle in enumerate(both)
+    ]
+    found: dict[str, Any] = {"zero": zero} if zero != reading.zero else {}
+    return found | ({"offsets": offsets} if offsets != list(reading.offsets) else {})
+
+
+def _plain(angle: float) -> float:
+    """An angle with six digits, as one writes it down; nought where it is one."""
+    return 0.0 if abs(angle) < _SAME else float(f"{angle:.6g}")
+
+
+def _toml(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False)
