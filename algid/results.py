@@ -90,6 +90,9 @@ class LogReading(_Model):
     time_unit: str | None = None
     zero: str = "horizontal"
     second_angle: str = "relative"
+    drive: str = "joint"
+    signs: tuple[int, int] = (1, 1)
+    offsets: tuple[float, float] = (0.0, 0.0)
     unwrap: tuple[bool, bool] = (False, False)
     start: float | None = None
     end: float | None = None
@@ -97,7 +100,7 @@ class LogReading(_Model):
 
     def differences(self, other: LogReading) -> Iterator[str]:
         """What decides the estimates and is read otherwise here than in `other`, in clauses."""
-        for name in ("zero", "second_angle", "joints"):
+        for name in ("zero", "second_angle", "drive", "joints"):
             mine, others = getattr(self, name), getattr(other, name)
             if mine != others and mine is not None and others is not None:
                 yield f"{name} {_words(mine)} instead of {_words(others)}"
