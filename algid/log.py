@@ -55,13 +55,14 @@ class Notice:
     """Something a reader saw that its user should know.
 
     `code` is a fixed word such as ``DUPLICATE_STAMPS``; `lossy` tells that samples are missing from the log; `flags`
-    are those that mend it.
+    are those that mend it; `note` tells that it says how the log was read and is no reason to doubt a result.
     """
 
     code: str
     text: str
     lossy: bool = False
     flags: tuple[str, ...] = ()
+    note: bool = False
 
 
 Teller = Literal["flag", "profile", "names", "order"]

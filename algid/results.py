@@ -247,7 +247,7 @@ class Result(_Model):
 
     `truth` holds what a synthetic log was made with, by parameter; `causes` what probably lies behind a poor
     result, the most likely one first; `profile` what the user said about the logs, in a profile's words. How each
-    log was read in the end stands in its `reading`.
+    log was read in the end stands in its `reading`; `notes` tell of what could have been read otherwise.
     """
 
     schema_version: Literal[2] = SCHEMA_VERSION
@@ -265,6 +265,7 @@ class Result(_Model):
     log: LogSummary
     more_logs: list[LogSummary] = []
     data_lost: bool = False
+    notes: list[str] = []
     warnings: list[str] = []
     causes: list[Cause] = []
 

@@ -75,6 +75,8 @@ def identify(
         _tell(result)
     if not quiet:
         print_result(result, output)
+        for note in result.notes:
+            typer.echo(f"note: {visible(note)}", err=True)
         typer.echo(f"wrote {visible(str(result_folder(result.log.path, out, name)))}", err=True)
     if not result.complete or result.data_lost or verdict(result).level == "failed":
         raise typer.Exit(EXIT_INCOMPLETE)

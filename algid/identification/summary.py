@@ -82,7 +82,12 @@ def result_of(outcome: Outcome, settings: Settings, survey: Survey) -> Result:
         log=first,
         more_logs=others,
         data_lost=any(notice.lossy for _, notice in notices),
-        warnings=[*_notices(notices), *_contradictions(survey.logs), *outcome.warnings],
+        notes=_notices([(name, notice) for name, notice in notices if notice.note]),
+        warnings=[
+            *_notices([(name, notice) for name, notice in notices if not notice.note]),
+            *_contradictions(survey.logs),
+            *outcome.warnings,
+        ],
         causes=[*outcome.causes, *_suspicions(notices)],
     )
 

@@ -113,7 +113,7 @@ class TableReader:
             held = table.take(inside)
         if held is not None:
             text = f"{left_out} samples before {start or 0:g} s or behind {'the end' if end is None else f'{end:g} s'}"
-            yield held.noting(Notice("CUT", f"{text} were left out, as told"))
+            yield held.noting(Notice("CUT", f"{text} were left out, as told", note=True))
 
     def _convert(self, table: Table, room: Room, unwrapper: Unwrapper) -> None:
         room.stamp_ns[:] = table.stamp_ns

@@ -43,7 +43,7 @@ def order_notice(names: Sequence[str], chosen: tuple[str, str], told: Literal["n
     else:
         return ()
     other = f'--joints {second},{first} swaps them (profile: joints = ["{second}", "{first}"])'
-    return (Notice("JOINT_ORDER", f"{text}; {other}"),)
+    return (Notice("JOINT_ORDER", f"{text}; {other}", note=told == "names"),)
 
 
 def _ranks(first: str, second: str) -> tuple[int, int] | None:
