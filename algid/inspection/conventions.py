@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 from math import degrees, isclose, pi, remainder
 from typing import Any
 
+import numpy as np
+
 from algid.estimators.conventions import AS_READ, Candidate, Convention, judge
 from algid.log import Log, Reading
 from algid.signals.segments import Segment, append, segments
@@ -72,7 +74,9 @@ def mend(log: Log, *, gravity: bool = True) -> Mend | None:
     gravity : False for an arm in a horizontal plane
     """
     longest = _longest_stretch(log)
-    judged = None if longest is None else judge(longest.theta, longest.tau, longest.dt, gravity=gravity)
+    if longest is None or not np.all(np.mean(longest.tau**2, axis=1) > 0):  # a torque that is none tells nothing
+        return None
+    judged = judge(longest.theta, longest.tau, longest.dt, gravity=gravity)
     if judged is None or not judged.alone or judged.best.convention == AS_READ:
         return None
     convention = min(
