@@ -104,8 +104,10 @@ def optimise(problem: Problem, rate: float, seed: int, told: Told | None = None)
                 better = search.run(better, stage)
                 search.judged(better)
     except KeyboardInterrupt:
-        if search.best is None:
+        if search.current is None:
             raise
+        search.judged(search.current)
+        assert search.best is not None
         return Found(*search.best, interrupted=True)
     assert search.best is not None
     return Found(*search.best, interrupted=False)
@@ -134,6 +136,7 @@ class _Search:
     def __init__(self, problem: Problem, rate: float, told: Told | None) -> None:
         self._problem, self._rate, self._told = problem, rate, told
         self.best: tuple[FloatArray, float] | None = None
+        self.current: FloatArray | None = None
         self._rows = 1
         self._done = 0
         self._total = STARTS * FIRST.iterations + KEPT * sum(stage.iterations for stage in LATER)
@@ -160,7 +163,8 @@ class _Search:
 
         start = self._done
 
-        def step(_x: FloatArray) -> None:
+        def step(x: FloatArray) -> None:
+            self.current = x.copy()
             self._done += 1
             if self._told is not None:
                 self._told("searching", self._done, self._total)

@@ -96,6 +96,8 @@ def limit_table(design: Design) -> Table:
 
 def limit_name(row: Row) -> str:
     """A limit and its side in words."""
+    if row.limit == "rest":
+        return f"velocity of joint {(row.joint or 0) + 1} at the end"
     joint = "" if row.joint is None else f" of joint {row.joint + 1}"
     side = "" if row.joint is None else ", up" if row.upper else ", down"
     load = "" if row.loaded is None else ", loaded" if row.loaded else ", unloaded"

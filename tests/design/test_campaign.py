@@ -124,7 +124,7 @@ def test_a_search_that_is_broken_off_keeps_the_best_so_far() -> None:
     def impatient(_stage: str, _done: int, _total: int) -> None:
         nonlocal calls
         calls += 1
-        if calls == 60:
+        if calls == 20:
             raise KeyboardInterrupt
 
     told: Told = impatient
@@ -132,6 +132,7 @@ def test_a_search_that_is_broken_off_keeps_the_best_so_far() -> None:
     assert found.interrupted
     assert np.isfinite(found.largest)
     assert max(used for _, used in found.binding) <= 1.0
+    assert found.largest < 0.5 * np.median(random_bounds(5))
 
 
 def run(*arguments: str) -> tuple[int, str]:
@@ -200,6 +201,21 @@ def test_the_campaign_can_be_rehearsed(folder: Path, tmp_path: Path) -> None:
         # the true arm is the believed one: what is left is the sensors' noise
         error = log.theta[0] - plan_of["theta1"].to_numpy()
         assert np.sqrt(np.mean(error**2)) == pytest.approx(1e-3, rel=0.1)
+
+
+def test_an_open_loop_is_written_as_a_log_whose_torque_synth_replays(tmp_path: Path) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("algid.design.torque.GENERATIONS", 3)
+        patch.setattr("algid.design.torque.POPULATION", 8)
+        limits = ["--range", "1.5", "--speed", "9", "--torque", "1.9,0"]  # joint 2 has no drive
+        code, text = run("case1", *limits, *SENSORS, "--drive", "torque", "--duration", "2", "-o", str(tmp_path))
+    assert code in (0, 3), text
+    assert "velocity of joint 2 at the end" in text
+    folder = tmp_path / "case1.design"
+    assert not (folder / "joint_trajectory.yaml").exists()
+    log = read_log(folder / "trajectory.csv")
+    assert not log.tau[1].any()
+    assert np.abs(log.tau[0]).max() > 0
 
 
 REFUSED = [
