@@ -145,7 +145,8 @@ class _Case:
         times = np.arange(2 * round(DURATION / STEP) + 1) * (STEP / 2)
         torque = wide(times)
         width = float(np.exp(np.random.default_rng(seed).uniform(np.log(0.03), np.log(0.2))))
-        size = np.sqrt(np.mean(torque**2, axis=1))
+        # The unloaded arm's, so that the loaded one has the same joints.
+        size = np.sqrt(np.mean(wide_multi_sine(arm, 1000 * seed)(times) ** 2, axis=1))
         if loaded:
             k = with_payload(k, arm.payload_constants(payload))
         return cls(errors, seed, arm, payload, loaded, k, times, torque, size, width)
@@ -188,10 +189,11 @@ class _Arms:
         self.width = np.array([case.width for case in cases])
         self.f, self.s, self.a, self.r = (each(n) * size for n in ("coulomb", "stribeck", "asymmetry", "ripple"))
         self.speed, self.e, self.play = each("stribeck_speed"), each("load"), each("play")
-        self.j2 = each("rotor") * self.k[2]
+        own = np.stack([case.arm.constants() for case in cases], axis=-1)  # without payload
+        self.j2 = each("rotor") * own[2]
         elastic, base = each("elastic"), each("base")
         self.stiff = elastic == 0
-        inertia = np.stack([self.k[4] + self.k[2], self.k[2]])
+        inertia = np.stack([own[4] + own[2], own[2]])
         self.motor = np.where(self.stiff, 1.0, MOTOR_SHARE * inertia)
         self.stiffness = np.where(self.stiff, 0.0, (2 * np.pi * elastic) ** 2 * inertia)
         self.damping = np.where(self.stiff, 0.0, 0.04 * np.sqrt(self.stiffness * inertia))
