@@ -146,8 +146,9 @@ def _lines(path: Path, head: bytes) -> list[str]:
     lines = re.split("\r\n|\n", text)
     if max(map(len, lines[:-1] or lines)) >= _LONGEST_LINE - 4 or (len(lines) == 1 and len(head) >= _LONGEST_LINE):
         raise LogError(f"{path}: a line of more than 65,000 characters; expected a table of a few columns")
-    if len(lines) == 1 and "\r" in text:
-        raise LogError(f"{path}: lines end in carriage returns alone; save it with line feeds")
+    lone = next((number for number, line in enumerate(lines, start=1) if "\r" in line.rstrip("\r")), None)
+    if lone is not None:
+        raise LogError(f"{path}: line {lone} holds carriage returns alone, without line feeds; save it with line feeds")
     return lines if len(head) < _LONGEST_LINE else lines[:-1]
 
 

@@ -111,6 +111,8 @@ def _within(chunk: Record, edit: Callable[[list[Record], random.Random], bool], 
     else:
         content = zstandard.decompress(packed) if name else packed
     records = split(content)
+    if not records:
+        return True
     strict = edit(records, draw)
     content = b"".join(record.bytes() for record in records)
     crc = draw.choice((zlib.crc32(content), zlib.crc32(content), crc, 0))

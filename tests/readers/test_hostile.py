@@ -257,3 +257,14 @@ def test_a_truth_that_is_no_number_is_refused(number: float, tmp_path: Path) -> 
     pq.write_table(arm_table().replace_schema_metadata({"algid": text}), tmp_path / "log.parquet")
     with pytest.raises(LogError, match="truth in the file's metadata cannot be read"):
         read_log(tmp_path / "log.parquet")
+
+
+@pytest.mark.parametrize("header", ["t,theta1,theta2,tau1,tau2", '"t","theta1","theta2","tau1","tau2"'])
+@pytest.mark.parametrize("end", ["", "\n", "\n1,2,3,4,5\n"])
+def test_lines_that_end_in_carriage_returns_alone_are_refused(header: str, end: str, tmp_path: Path) -> None:
+    rows = [f"{row},0,0,0,0" for row in range(30)]
+    (tmp_path / "log.csv").write_bytes(("\r".join([header, *rows]) + end).encode())
+    with pytest.raises(LogError, match="carriage returns alone"):
+        read_log(tmp_path / "log.csv")
+    (tmp_path / "log.csv").write_bytes(("\r\n".join([header, *rows]) + "\r\n").encode())
+    assert len(read_log(tmp_path / "log.csv")) == 30

@@ -24,7 +24,7 @@ from algid.readers.mcap.salvage import Gap, salvaged
 _FOOTER_SIZE = 9 + 20 + 8
 _LARGEST_SUMMARY = 1 << 28
 _MOST_INDEXES = 2_000_000
-_MOST_SPANS = 500_000
+_MOST_SPANS = 100_000
 _SPAN = 1 << 23
 _LOOSE, _TORN = -1, -2
 
@@ -315,12 +315,14 @@ def _looked_into(file: File, span: Span, found: Catalogue) -> Span:
     try:
         content = file.read(span.start, span.length + span.index_length)
         if span.loose:
-            records = records_in(content)
+            records = records_in(content, works=file.works)
         else:
             chunk = content[: span.length]
+            if not claimed(chunk):
+                return replace(span, channels=frozenset())
             file.unpacks(claimed(chunk))
             unpacked = unpack_torn(chunk)[0] if span.torn else unpack(chunk)
-            records = records_in(unpacked, content[span.length :])
+            records = records_in(unpacked, content[span.length :], file.works)
         for code, body in records.others:
             if code in (framing.SCHEMA, framing.CHANNEL):
                 _define(found, code, body, span.start)

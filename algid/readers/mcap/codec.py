@@ -80,5 +80,5 @@ def decoder_for(
     """
     walk = walk_for(path, channel, schema)
     if channel.message_encoding == "json":
-        return jsontext.JsonDecoder(wanted, frozenset(wanted))
+        return jsontext.JsonDecoder(wanted, frozenset(wanted), works)
     return Decoder(walk, wanted, frozenset(wanted), works)

@@ -28,7 +28,7 @@ LARGEST_CHUNK = 1 << 28
 """A recorder closes a chunk at some MiB; beyond 256 MiB it is a mistake or an attack."""
 _WINDOW = 1 << 20
 _PIECE = 1 << 20
-_MOST_OTHERS = 300_000
+MOST_OTHERS = 300_000
 """Schemas, channels and the like side by side; ids end at 65,535."""
 PEEK = FRAME.size + 80
 """Bytes that tell a record's kind: its frame, and the head of a chunk."""
@@ -179,8 +179,8 @@ def walk_bytes(content: bytes | memoryview, start: int, end: int) -> Iterator[Re
         if start + FRAME.size + length > end:
             raise BrokenOffError(start, Record(code, start + FRAME.size, length))
         others += code != MESSAGE
-        if others > _MOST_OTHERS:
-            raise DamagedError(f"more than {_MOST_OTHERS} records that are no messages")
+        if others > MOST_OTHERS:
+            raise DamagedError(f"more than {MOST_OTHERS} records that are no messages")
         yield Record(code, start + FRAME.size, length)
         start += FRAME.size + length
 

@@ -5,17 +5,18 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.readers.mcap.columnar import Fields, MisfitError, Numbers, Shape
+from algid.readers.mcap.columnar import ExcessError, Fields, MisfitError, Numbers, Shape
 from algid.readers.mcap.messages import Messages
 
 _LARGEST = 1 << 20
+_BYTES_A_STEP = 64
 
 
 def walk(payload: bytes) -> Shape:
@@ -63,6 +64,7 @@ class JsonDecoder:
 
     wanted: Mapping[str, str]
     needed: frozenset[str]
+    works: Callable[[int], bool]
     skipped: int = 0
     misfits: int = 0
     misfit: str = ""
@@ -71,7 +73,14 @@ class JsonDecoder:
         """Which messages hold what is needed (N,), and the numbers of those, by name.
 
         Messages that are no JSON object are left out and counted.
+
+        Raises
+        ------
+        ExcessError
+            If they are more than in any honest file of this size.
         """
+        if not self.works(int(messages.sizes.sum()) // _BYTES_A_STEP):
+            raise ExcessError("more text than any recorder's file of this size")
         misfits = self.misfits
         held = np.zeros(len(messages), np.bool_)
         rows: list[list[Any]] = []

@@ -60,11 +60,11 @@ def _load(file: File, catalogue: Catalogue, span: Span, channels: frozenset[int]
         content = file.read(span.start, span.length + span.index_length)
         chunk, index = content[: span.length], content[span.length :]
         if span.loose:
-            records, torn = records_in(chunk), None
+            records, torn = records_in(chunk, works=file.works), None
         else:
             file.unpacks(claimed(chunk))
             unpacked, torn = unpack_torn(chunk) if span.torn else (unpack(chunk), None)
-            records = records_in(unpacked, index)
+            records = records_in(unpacked, index, file.works)
         _check_meaning(catalogue, span, records, channels)
     except DamagedError as error:
         lost = sum(places.size for channel, places in entries(content[span.length :]) if channel in channels)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 from array import array
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,11 +16,13 @@ from numpy.typing import NDArray
 
 from algid.log import IntArray
 from algid.readers.mcap import framing
-from algid.readers.mcap.framing import DamagedError
+from algid.readers.mcap.framing import BrokenOffError, DamagedError
 
 HEAD = 31
 """Bytes of a message record before its payload: code, length, channel, sequence, log and publish time."""
 _MOST_GAPS = 256
+_SOME = (1 << 16) - 1
+"""Messages between two looks at how much work they are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +73,7 @@ class Records:
         return Messages(self.content, offsets + HEAD, lengths - (HEAD - 9), log_ns)
 
 
-def records_in(content: bytes, index: bytes = b"") -> Records:
+def records_in(content: bytes, index: bytes = b"", works: Callable[[int], bool] = lambda _: True) -> Records:
     """The records within unpacked bytes.
 
     Parameters
@@ -79,26 +81,41 @@ def records_in(content: bytes, index: bytes = b"") -> Records:
     content : bytes
     index : bytes
         The message index records that stand behind the chunk, or nothing.
+    works : callable
+        Counts steps of some microsecond; False where these are too many.
 
     Raises
     ------
     DamagedError
-        If the records do not tile the bytes.
+        If the records do not tile the bytes, or are more than in any honest file.
     """
     octets = np.frombuffer(content, np.uint8)
     found = _indexed(octets, content, index)
     if found is None and (same := alike(octets)) is not None:
         found = Records(octets, same)
-    return found or _walked(octets, content)
+    return found or _walked(octets, content, works)
 
 
-def _walked(octets: NDArray[np.uint8], content: bytes) -> Records:
-    offsets, others = array("q"), []
-    for record in framing.walk_bytes(content, 0, len(content)):
-        if record.code == framing.MESSAGE:
-            offsets.append(record.start - 9)
+def _walked(octets: NDArray[np.uint8], content: bytes, works: Callable[[int], bool]) -> Records:
+    """The records one by one: written out, since a chunk may hold millions."""
+    offsets, others = array("q"), list[tuple[int, bytes]]()
+    unpack, head, last, place = framing.FRAME.unpack_from, framing.FRAME.size, len(content), 0
+    while place < last:
+        start = place + head
+        if start > last:
+            raise BrokenOffError(place)
+        code, length = unpack(content, place)
+        if start + length > last:
+            raise BrokenOffError(place)
+        if code == framing.MESSAGE:
+            offsets.append(place)
         else:
-            others.append((record.code, content[record.start : record.end]))
+            others.append((code, content[start : start + length]))
+            if len(others) > framing.MOST_OTHERS:
+                raise DamagedError(f"more than {framing.MOST_OTHERS} records that are no messages")
+        if code == framing.MESSAGE and not len(offsets) & _SOME and not works(_SOME // 2):
+            raise DamagedError("more small messages than in any honest file of this size")
+        place = start + length
     return Records(octets, np.frombuffer(offsets, np.int64) if offsets else np.empty(0, np.int64), tuple(others))
 
 

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 
 _SAMPLES = 64
 _MOST_CANDIDATES = 256
-_WORK_A_LETTER = 4
-"""Letters of a definition that are read in a step of work."""
+_LETTERS_A_STEP, _BYTES_A_STEP = 4, 4
+"""Letters of a definition, and bytes of a message, that are read in a step of work."""
 _USUAL = "/joint_states"
 
 
@@ -187,11 +187,11 @@ def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> _Usua
                     there = (joints[0], joints[1]) if len(joints) == 2 else chosen
                     fitting.setdefault(name, _Usual(name, there, bool(names_in(shape)), joint_fields(shape, chosen)))
                     break
-                if not joints and (flat := _flat(name, shape, profile)):
-                    fitting.setdefault(name, flat)
-                    break
                 if repeated := repeated_name(shape):
                     refused.append(_repeated(file, name, repeated))
+                elif not joints and (flat := _flat(name, shape, profile)):
+                    fitting.setdefault(name, flat)
+                    break
                 if len(joints) > 2 or (joints and profile and profile.joints):
                     many[name] = joints
                 elif not joints and (lack := _lack(name, shape)) and lack not in lacking:
@@ -299,7 +299,7 @@ def _shapes(file: File, found: Catalogue, topic: str, type_name: str) -> Iterato
         return
     channel: Any = found.channels[min(channels)]
     schema = found.schemas.get(channel.schema_id)
-    _work(file, topic, len(schema.data) // _WORK_A_LETTER if schema else 0)
+    _work(file, topic, len(schema.data) // _LETTERS_A_STEP if schema else 0)
     walk = walk_for(str(file.path), channel, schema)
     for batch in batches(file, found, channels):
         messages = batch.messages
@@ -309,6 +309,7 @@ def _shapes(file: File, found: Catalogue, topic: str, type_name: str) -> Iterato
             continue
         fitting, misfit = 0, None
         for start, size in zip(messages.starts[:_SAMPLES], messages.sizes[:_SAMPLES], strict=True):
+            _work(file, topic, size // _BYTES_A_STEP)
             try:
                 shape = walk(messages.content[start : start + min(size, LARGEST_MESSAGE)].tobytes())
             except MisfitError as error:
