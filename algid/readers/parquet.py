@@ -110,8 +110,16 @@ def counted_rows(path: Path) -> int:
             for group in groups
             for values in (group.column(place).num_values for place in range(group.num_columns))
         )
+        size = path.stat().st_size
+        inside = all(
+            0 < _first(pages) <= _first(pages) + pages.total_compressed_size <= size
+            for group in groups
+            for pages in (group.column(place) for place in range(group.num_columns))
+        )
     except (pa.ArrowException, OSError, ValueError) as error:
         raise _damaged(path, error) from error
+    if not inside:  # polars panics at these, which takes it seconds
+        raise LogError(f"{path}: the Parquet footer claims pages beyond the end of the file; copy the file again")
     if not agree:
         raise LogError(f"{path}: the Parquet footer contradicts itself about its rows; copy the file again")
     return int(metadata.num_rows)
@@ -233,14 +241,18 @@ class _Groups:
         return self.columns
 
 
+def _first(pages: Any) -> int:
+    """Where the first page of a column of a row group stands."""
+    return int(min(offset for offset in (pages.dictionary_page_offset, pages.data_page_offset) if offset))
+
+
 def _has_checksums(path: Path, metadata: Any, roots: Collection[str]) -> bool:
     """Whether the first page of a column among `roots` carries a checksum, in any row group."""
     with path.open("rb") as stream:
         for group in map(metadata.row_group, range(metadata.num_row_groups)):
             for pages in map(group.column, range(group.num_columns)):
                 if pages.path_in_schema.split(".")[0] in roots:
-                    offsets = (pages.dictionary_page_offset, pages.data_page_offset)
-                    stream.seek(min(offset for offset in offsets if offset))
+                    stream.seek(_first(pages))
                     if page_has_checksum(stream.read(_PAGE_HEAD)):
                         return True
     return False

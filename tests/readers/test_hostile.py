@@ -15,6 +15,7 @@ import tempfile
 import tracemalloc
 import zlib
 from dataclasses import asdict
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -268,3 +269,14 @@ def test_lines_that_end_in_carriage_returns_alone_are_refused(header: str, end: 
         read_log(tmp_path / "log.csv")
     (tmp_path / "log.csv").write_bytes(("\r\n".join([header, *rows]) + "\r\n").encode())
     assert len(read_log(tmp_path / "log.csv")) == 30
+
+
+def test_a_footer_that_claims_pages_beyond_the_file_is_refused(tmp_path: Path) -> None:
+    whole = BytesIO()
+    pq.write_table(arm_table(), whole, compression="none", use_dictionary=False)
+    content = whole.getvalue()
+    start = len(content) - 8 - int.from_bytes(content[-8:-4], "little")
+    for cut in (100, start // 2):
+        (tmp_path / "log.parquet").write_bytes(b"PAR1" + content[start - cut : start] + content[start:])
+        with pytest.raises(LogError, match="pages beyond the end of the file"):
+            read_log(tmp_path / "log.parquet")
