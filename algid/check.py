@@ -15,7 +15,7 @@ from algid.results import Result, Table4Row
 
 
 @dataclass(frozen=True)
-class Row:
+class Judged:
     """One parameter's error in percent beside its limit; None where there was no estimate."""
 
     parameter: str
@@ -42,7 +42,7 @@ class _Tolerances(BaseModel):
 
 def judge(
     result: Result, against: Literal["paper", "truth"], max_error: float | None, tolerance_file: Path | None
-) -> list[Row]:
+) -> list[Judged]:
     """Rows of Table 4 beside their limits.
 
     Raises
@@ -56,11 +56,13 @@ def judge(
         raise ResultError(f"{result.log.path}: the log holds no true parameters; only synthetic logs can be checked")
     limits = _limits(result, against, max_error, tolerance_file)
     return [
-        Row(row.parameter, row.error_percent, limits[row.parameter]) for row in result.table4 if row.parameter in limits
+        Judged(row.parameter, row.error_percent, limits[row.parameter])
+        for row in result.table4
+        if row.parameter in limits
     ]
 
 
-def failed(rows: Sequence[Row]) -> bool:
+def failed(rows: Sequence[Judged]) -> bool:
     """Whether any row is over its limit."""
     return not all(row.passed for row in rows)
 

@@ -141,7 +141,7 @@ class LogSummary(_Model):
     reading: LogReading | None = None
 
 
-class Whiteness(_Model):
+class WhitenessTest(_Model):
     """Whether the torque residual of one joint is white: the test's p-value and the lag-one correlation."""
 
     white: bool
@@ -217,7 +217,7 @@ class FitSummary(_Model):
     intervals: Literal["likelihood", "sandwich", "jackknife"]
     iterations: int
     converged: bool
-    whiteness: dict[str, Whiteness] = {}
+    whiteness: dict[str, WhitenessTest] = {}
     unidentifiable: list[str] = []
     model: TorqueModel | None = None
     terms: list[TermCriterion] = []

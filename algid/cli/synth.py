@@ -66,7 +66,7 @@ def synth(
     seed: Annotated[int, typer.Option(help="Seed of noise, jitter and losses.", min=0)] = 0,
     force: Annotated[bool, typer.Option("--force", help="Overwrite logs that are there.")] = False,
     start_time: Annotated[
-        datetime | None, typer.Option(help="When the log starts, in UTC; its stamps count from nought by default.")
+        datetime | None, typer.Option(help="When the log starts, in UTC; its stamps count from zero by default.")
     ] = None,
     payload_schedule: Annotated[
         str | None, typer.Option(help="One log instead, its payload changing: S=KG,…, like 2=0.05,4=0; bare before.")

@@ -23,7 +23,7 @@ from algid.estimators.paper import (
 )
 from algid.identification.series import series_blocks, write_columns
 from algid.identification.source import LogSource, Survey
-from algid.identification.summary import FAR_BEYOND, Outcome, distrusted
+from algid.identification.summary import FAR_BEYOND, Identified, distrusted
 from algid.identification.velocities import with_velocities
 from algid.results import Estimate, Status
 from algid.settings import Settings
@@ -41,7 +41,7 @@ def run_paper(
     settings: Settings,
     known: FloatArray | None = None,
     folder: Path | None = None,
-) -> Outcome:
+) -> Identified:
     """Stage 1 on `unloaded`, or the `known` constants (7,); stage 2 on `loaded`; series into `folder`.
 
     Raises
@@ -61,14 +61,14 @@ def run_paper(
         if usable.all():
             rows |= unloaded_rows(k)
     if loaded is None or k is None or not np.isfinite(k).all():
-        return Outcome(parameters, _weak(STAGE2_NAMES, loaded), _weak(("m_p", "l1"), loaded), rows)
+        return Identified(parameters, _weak(STAGE2_NAMES, loaded), _weak(("m_p", "l1"), loaded), rows)
     values, wander, usable = _estimate(survey, loaded, settings, k, folder)
     names = (*STAGE2_NAMES, "l1", "m_p")
     named = _named(names, {**UNITS, "l1": "m"}, values, usable)
     if np.any((values + FAR_BEYOND * wander)[[names.index("l1"), names.index("m_p")]] < 0):
         named = distrusted(named)
     rows |= {name: estimate.estimate for name, estimate in named.items() if estimate.estimate is not None}
-    return Outcome(
+    return Identified(
         parameters,
         {name: named[name] for name in STAGE2_NAMES},
         {name: named[name] for name in ("m_p", "l1")},

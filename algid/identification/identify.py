@@ -16,7 +16,7 @@ from algid.files import remove_stale, result_folder, whole_folder
 from algid.identification.by_paper import run_paper
 from algid.identification.series import write_fit_series
 from algid.identification.source import LogLike, LogSource, Survey, open_sources, read_otherwise
-from algid.identification.summary import Outcome, result_of
+from algid.identification.summary import Identified, result_of
 from algid.progress import Told
 from algid.results import Result, read_result, write_result
 from algid.runtime import one_blas_thread
@@ -175,7 +175,7 @@ def _by_likelihood(survey: Survey, settings: Settings, earlier: Earlier | None, 
     return result_of(outcome, settings, survey)
 
 
-def _with_the_papers(outcome: Outcome, survey: Survey, settings: Settings, folder: Path) -> Outcome:
+def _with_the_papers(outcome: Identified, survey: Survey, settings: Settings, folder: Path) -> Identified:
     """The paper's convergence series of the first log of each kind, and its route to the payload."""
     first, second = _firsts(survey)
     logs = [log for log in (first, second) if log is not None]

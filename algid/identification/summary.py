@@ -39,7 +39,7 @@ NEAR_CONSTANT = 0.1  # of the torque's RMS: a residual this small passes, howeve
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class Identified:
     """Estimates by name, Table 4's rows with their standard deviations, and what else the estimator knows."""
 
     parameters: dict[str, Estimate]
@@ -56,7 +56,7 @@ class Outcome:
     """What probably lies behind a poor result, the most likely first."""
 
 
-def result_of(outcome: Outcome, settings: Settings, survey: Survey) -> Result:
+def result_of(outcome: Identified, settings: Settings, survey: Survey) -> Result:
     """The result of `outcome` on a survey's logs, the first log first."""
     truth, payload = _truth(survey.logs)
     first, *others = [survey.summary(log) for log in survey.logs]
@@ -146,7 +146,7 @@ def _contradictions(logs: Sequence[LogSource]) -> list[str]:
 FAR_APART = 5.0  # standard deviations past which two logs are not of one arm
 
 
-def outcome_of(fit: Fit, predictions: Predictions, survey: Survey, settings: Settings, chosen: Selection) -> Outcome:
+def outcome_of(fit: Fit, predictions: Predictions, survey: Survey, settings: Settings, chosen: Selection) -> Identified:
     """The fit as a result holds it."""
     found = _estimates(fit)
     payload = {name: found.pop(name) for name in PAYLOAD_PARAMETERS if name in found}
@@ -158,7 +158,7 @@ def outcome_of(fit: Fit, predictions: Predictions, survey: Survey, settings: Set
     )
     if is_implausible(summary):
         found, combined, payload = (distrusted(group) for group in (found, combined, payload))
-    return Outcome(
+    return Identified(
         parameters=found,
         loaded=combined,
         payload=payload,
@@ -351,11 +351,11 @@ def _noise(fit: Fit) -> dict[str, float]:
     return {name: float(value) for name, value in zip(names, (*theta, *tau), strict=True)}
 
 
-def _whiteness(fit: Fit) -> dict[str, results.Whiteness]:
+def _whiteness(fit: Fit) -> dict[str, results.WhitenessTest]:
     if fit.whiteness is None:
         return {}
     return {
-        f"tau{joint + 1}": results.Whiteness(
+        f"tau{joint + 1}": results.WhitenessTest(
             white=fit.whiteness.joint_white[joint],
             p_value=finite(float(fit.whiteness.p_value[joint])),
             lag1_correlation=float(fit.whiteness.lag1[joint]),

@@ -22,7 +22,7 @@ from algid.results import (
     Status,
     Table4Row,
     TorquePrediction,
-    Whiteness,
+    WhitenessTest,
     write_result,
 )
 from algid.synth.cases import Case, load_case
@@ -108,8 +108,8 @@ def _result(case: Case, k: FloatArray, covariance: FloatArray, unloaded: Recordi
             iterations=4,
             converged=True,
             whiteness={
-                "tau1": Whiteness(white=True, p_value=0.41, lag1_correlation=0.004),
-                "tau2": Whiteness(white=True, p_value=0.77, lag1_correlation=-0.011),
+                "tau1": WhitenessTest(white=True, p_value=0.41, lag1_correlation=0.004),
+                "tau2": WhitenessTest(white=True, p_value=0.77, lag1_correlation=-0.011),
             },
             residual=prediction,
         ),

@@ -8,7 +8,7 @@ from algid.report.document import result_document
 from algid.report.html import table_html
 from algid.report.tables import estimate_tables
 from algid.report.verdict import verdict
-from algid.results import Bound, Cause, Estimate, Result, Status, TorquePrediction, Whiteness
+from algid.results import Bound, Cause, Estimate, Result, Status, TorquePrediction, WhitenessTest
 from tests.report.folders import estimate
 
 
@@ -58,7 +58,7 @@ def test_more_reservations_are_counted(result: Result) -> None:
         ({"unidentifiable": ["k3 and k5 only as a sum"]}, "k3 and k5 only as a sum"),
         ({"broken_bounds": [Bound(bound="k6 ≥ 0", value=-1.0, distance_sigma=4.0)]}, "k6 ≥ 0"),
         (
-            {"whiteness": {"tau1": Whiteness(white=False, p_value=0.0, lag1_correlation=0.9)}},
+            {"whiteness": {"tau1": WhitenessTest(white=False, p_value=0.0, lag1_correlation=0.9)}},
             "the residual of tau1 is not white",
         ),
         (
@@ -76,7 +76,7 @@ def test_what_the_fit_holds_against_itself_is_a_reservation(
 
 
 def test_intervals_that_allow_for_colour_make_it_no_reservation(result: Result) -> None:
-    coloured = {"tau1": Whiteness(white=False, p_value=0.0, lag1_correlation=0.9)}
+    coloured = {"tau1": WhitenessTest(white=False, p_value=0.0, lag1_correlation=0.9)}
     assert verdict(with_fit(result, whiteness=coloured, intervals="sandwich")).level == "good"
 
 

@@ -1,4 +1,4 @@
-"""Which seconds of the logs taught each parameter."""
+"""Which seconds of the logs determine each parameter."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def information(path: Path, result: Result) -> Figure | Missing:
         return Missing("information", TITLE, f"{path.name} holds no second")
     x, gained, ranges = _summed(names, found)
     shares = _shares(gained)
-    reading = "Read: strongly coloured seconds taught most; a row with colour in one place only rests on that moment."
+    reading = "Read: strongly coloured seconds tell most; a row with colour in one place only rests on that moment."
     panel = _panel(names, x, shares, result, ranges)
     return Figure("information", TITLE, (panel,), reading, note=_note(names, x, shares))
 
