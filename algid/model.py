@@ -25,7 +25,7 @@ from functools import cached_property
 
 import numpy as np
 
-from algid.arm import CONSTANT_NAMES, CONSTANT_UNITS, FloatArray
+from algid.arm import CONSTANT_NAMES, CONSTANT_UNITS, FloatArray, mass_matrix, passive_torque
 
 
 @dataclass(frozen=True)
@@ -73,6 +73,7 @@ UNITS = {
 }
 _WITH_GRAVITY = ("k2", "k4", "zero1")
 _RIGID = ("k1", "k2", "k3", "k4", "k5")
+_SIGN_TRIALS = 4  # as many patterns as the signs of two loads have
 
 
 @dataclass(frozen=True)
@@ -346,3 +347,42 @@ def _values(model: Model, c: FloatArray | None) -> dict[str, float]:
 
 def _zeros(value: dict[str, float]) -> FloatArray:
     return np.array([value["zero1"], value["zero2"]])
+
+
+def acceleration(model: Model, c: FloatArray, theta: FloatArray, omega: FloatArray, tau: FloatArray) -> FloatArray:
+    """Accelerations (2, N) in rad/s^2 that the torques `tau` (2, N) give: `torque` solved for θ̈, without the lag.
+
+    With L = M θ̈ + n the load, D = 1 + e tanh(ω / ω_s) sgn L and R = diag(0, j2), friction and offsets in r,
+
+        (D M + R) θ̈ = τ / (1, 1 + gain2) - r - D n
+
+    The signs of L are those of the torque left for it, and found again until they are their own.
+    """
+    value = model.values(c)
+    k = np.array([value[name] for name in _RIGID] + [0.0, 0.0])
+    turned = theta + _zeros(value)[:, None]
+    left = np.array(tau, dtype=np.float64)
+    left[1] /= 1 + value["gain2"]
+    for joint in range(2):
+        left[joint] -= value[f"k{joint + 6}"] * omega[joint] + value[f"o{joint + 1}"]
+    for name, friction in friction_columns(model, omega).items():
+        left -= np.array([[value[f"{name}1"]], [value[f"{name}2"]]]) * friction
+    n = passive_torque(k, turned, omega)
+    m11, m12, m22 = mass_matrix(k, turned)
+    if "load" not in model.terms:
+        return _solved(m11, m12, m12, m22 + value["j2"], left - n)
+    e = np.array([[value["e1"]], [value["e2"]]]) * _sign(model, omega)
+    signs = np.sign(left)
+    for _ in range(_SIGN_TRIALS):
+        D = 1 + e * signs
+        alpha = _solved(D[0] * m11, D[0] * m12, D[1] * m12, D[1] * m22 + value["j2"], left - D * n)
+        found = np.sign(np.stack([m11 * alpha[0] + m12 * alpha[1], m12 * alpha[0] + m22 * alpha[1]]) + n)
+        if np.array_equal(found, signs):
+            break
+        signs = found
+    return alpha
+
+
+def _solved(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, right: FloatArray) -> FloatArray:
+    """x (2, N) with [[a, b], [c, d]] x = right."""
+    return np.stack([d * right[0] - b * right[1], a * right[1] - c * right[0]]) / (a * d - b * c)

@@ -54,12 +54,13 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "mcap numpy polars pyarrow",
     ),
     "design": room(
-        "arm errors estimators files identification log model progress report results settings signals synth writers",
+        "arm errors estimators files identification log model progress report results signals synth writers",
         "numpy polars pydantic scipy",
     ),
+    "export": room("arm errors identification model report results", "numpy scipy"),
     "fleet": room("errors files progress report", "numpy polars scipy"),
     "cli": room(
-        "batch check design errors estimators files "
+        "batch check design errors estimators export files "
         "fleet identification inspection log profile progress readers report results runtime "
         "settings stores synth track writers",
         "numpy rich typer",

@@ -12,6 +12,7 @@ from algid.cli.check import check
 from algid.cli.compare import compare
 from algid.cli.convert import convert
 from algid.cli.design import design
+from algid.cli.export import export
 from algid.cli.fleet import fleet
 from algid.cli.guide import guide
 from algid.cli.identify import identify
@@ -53,6 +54,7 @@ for command in (
     design,
     identify,
     validate,
+    export,
     batch,
     fleet,
     track,

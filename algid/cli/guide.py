@@ -17,6 +17,7 @@ class Topic(StrEnum):
     ARM = "arm"
     LOGS = "logs"
     MOTION = "motion"
+    EXPORT = "export"
     REPORT = "report"
     WARNINGS = "warnings"
     ESTIMATORS = "estimators"
@@ -32,6 +33,7 @@ SUMMARIES = {
     Topic.ARM: "the drawing, the equation of motion, what each constant is",
     Topic.LOGS: "formats, names, units, signs: a recipe for each awkward log",
     Topic.MOTION: "which motion to record",
+    Topic.EXPORT: "the arm as URDF, SDF, MJCF, Python, C; the payload as YAML",
     Topic.REPORT: "the report, figure by figure",
     Topic.WARNINGS: "every warning and status: meaning, cause, what to do",
     Topic.ESTIMATORS: "the estimators, the torque's terms, and what they assume",

@@ -15,14 +15,13 @@ from algid.errors import ResultError, SettingError
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
 from algid.identification.by_likelihood import model_of
+from algid.identification.lengths import contradictions, has_error_bar
 from algid.model import TERMS, Model
 from algid.report.text import joined
-from algid.results import Result, Status, read_result
-from algid.settings import Settings
+from algid.results import Result, read_result
 from algid.synth.cases import Case, load_case
 
 WRONG = 0.2  # share by which masses and friction of a drawing may be wrong
-_FAR = 5.0  # standard deviations beyond which two statements contradict each other
 _UNPLANNED = ("load", "gain", "zero", "lag")  # the torque is not linear in them, or they are not of one instant
 NOISE = ("theta1", "theta2", "tau1", "tau2")
 
@@ -151,7 +150,7 @@ def _of_result(result: Result, source: str, loaded: bool | None, knowns: Knowns)
     spread = _spread(result, source, shared.names, mean, given, knowns.error)
     known = {**value, **lengths}
     reach = np.array([np.nan if known.get(name) is None else known[name] for name in ("l1", "l2")], dtype=np.float64)
-    warnings = (*left_out, *_contradictions(result, knowns))
+    warnings = (*left_out, *contradictions(result, knowns.lengths))
     return Prior(source, Belief(shared, mean, spread, box=False), reach, _noise(result), warnings)
 
 
@@ -171,7 +170,7 @@ def _spread(
 ) -> FloatArray:
     """F (Q, Q): a root of the result's covariance; what has no error bar is wrong by `error` at `SURE` deviations."""
     covariance = np.zeros((len(names), len(names)))
-    known = [name for name in names if name not in given and _has_error_bar(result, name)]
+    known = [name for name in names if name not in given and has_error_bar(result, name)]
     if known and result.fit is not None:
         places = [result.fit.covariance_names.index(name) for name in known]
         rows = [names.index(name) for name in known]
@@ -196,51 +195,12 @@ def _size(mean: FloatArray) -> FloatArray:
     return np.maximum(np.abs(mean), 1e-12)
 
 
-def _has_error_bar(result: Result, name: str) -> bool:
-    found = result.estimates.get(name)
-    ok = found is not None and found.status is Status.OK and found.std is not None
-    return ok and result.fit is not None and name in result.fit.covariance_names
-
-
 def _noise(result: Result) -> NoiseLevels | None:
     noise: Mapping[str, Any] = {} if result.fit is None else result.fit.noise
     if not all((noise.get(name) or 0) > 0 for name in NOISE):
         return None
     levels = np.array([noise[name] for name in NOISE])
     return NoiseLevels(levels[:2], levels[2:])
-
-
-def _contradictions(result: Result, knowns: Knowns) -> tuple[str, ...]:
-    """A given length against what the result says of it: by itself, and by l1 = g k1 / k2."""
-    told = {name: (found.estimate, found.std) for name, found in result.payload.items() if name in ("l1", "l2")}
-    by_constants = _first_length(result)
-    if by_constants is not None:
-        told["l1"] = by_constants
-    sentences = []
-    for name, given in knowns.lengths.items():
-        estimate, std = told.get(name, (None, None))
-        if estimate is None or not std:
-            continue
-        distance = abs(given - estimate) / std
-        if distance > _FAR:
-            sentences.append(
-                f"--{name} {given:g} lies {distance:.0f} σ from the result's {estimate:.5g} ± {std:.2g} m; one is wrong"
-            )
-    return tuple(sentences)
-
-
-def _first_length(result: Result) -> tuple[float, float] | None:
-    """l1 = g k1 / k2 and its standard deviation."""
-    gravity = Settings.of(result.settings).gravity
-    k1, k2 = (result.parameters.get(name) for name in ("k1", "k2"))
-    if not gravity or result.fit is None or k1 is None or k2 is None or not k1.estimate or not k2.estimate:
-        return None
-    if not all(_has_error_bar(result, name) for name in ("k1", "k2")):
-        return None
-    places = [result.fit.covariance_names.index(name) for name in ("k1", "k2")]
-    covariance = np.array(result.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
-    slope = gravity * np.array([1 / k2.estimate, -k1.estimate / k2.estimate**2])
-    return gravity * k1.estimate / k2.estimate, float(np.sqrt(slope @ covariance @ slope))
 
 
 def _check(prior: Prior) -> None:

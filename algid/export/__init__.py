@@ -1,0 +1,1 @@
+"""A result as a model that simulators, controllers and planners load: one file a format."""

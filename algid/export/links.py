@@ -1,0 +1,162 @@
+"""Two links that move as k1 … k7 say: what the constants leave free is chosen nearest to uniform links.
+
+======  ========================================================  ==========  ======
+symbol  name                                                      shape       unit
+======  ========================================================  ==========  ======
+m       mass of a link                                            scalar      kg
+s       its first moment m lc about its joint                     scalar      kg m
+h       its second moment I + m lc² about its joint               scalar      kg m^2
+l       its length                                                scalar      m
+J1      rotor of joint 1, as the joint feels it                   scalar      kg m^2
+======  ========================================================  ==========  ======
+
+With s2 = k2 / g, h2 = k3 and l1 = g k1 / k2, Table 1 leaves
+
+    s1 = k4 / g - m2 l1,   h1 = k5 - J1 - m2 l1²
+
+A link is possible where h m > s² (Wensing et al. 2018). How far it is from a uniform one is the Bregman divergence of
+its pseudo-inertia P = [[h, s], [s, m]] from that of a uniform link of the same length and the nearest mass (Lee and
+Park 2018):
+
+    D = log(3 (h - l s + m l² / 3)² / (l² (h m - s²)))
+
+zero for uniform links only. Of a single link it is least at m = 3 h / l² - 3 s / l + 2 s² / h, at l = √(3 h / m), and
+at s = l h m / (h + m l² / 3).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from scipy.optimize import minimize_scalar
+from scipy.special import expit
+
+from algid.errors import SettingError
+
+ALONG = 0.05  # of a link's inertia across: that about its own line, as of a stout bar
+_ENDS = 25.0  # how near the ends of the masses' range the search goes, in logits
+
+
+@dataclass(frozen=True)
+class Knowns:
+    """What the user knows: lengths in m, masses in kg, the rotor of joint 1 in kg m^2; None where not known."""
+
+    l1: float | None = None
+    l2: float | None = None
+    m1: float | None = None
+    m2: float | None = None
+    rotor1: float | None = None
+
+    @property
+    def given(self) -> dict[str, float]:
+        """What is known, by name."""
+        return {name: value for name, value in vars(self).items() if value is not None}
+
+
+@dataclass(frozen=True)
+class Link:
+    """A link along x from its joint: length in m, mass in kg, centre in m, inertia about its centre in kg m^2."""
+
+    length: float
+    mass: float
+    centre: float
+    inertia: float
+
+    @property
+    def tensor(self) -> tuple[float, float, float]:
+        """Principal inertias about x, y, z at the centre: of an axially symmetric bar, which meets the triangle."""
+        return ALONG * self.inertia, self.inertia, self.inertia
+
+
+def links_of(k: Mapping[str, float], gravity: float, l1: float, knowns: Knowns, file: str) -> tuple[Link, Link]:
+    """Two links that move as the constants `k` say under `gravity` in m/s^2, link 1 being `l1` m long.
+
+    Raises
+    ------
+    SettingError
+        If what is known leaves no positive mass or inertia.
+    """
+    s2, h2 = k["k2"] / gravity if gravity else k["k1"] / l1, k["k3"]
+    h = k["k5"] - (knowns.rotor1 or 0.0)
+    arm = _Free(s2, h2, h, k["k4"] / gravity if gravity else None, l1, knowns)
+    low, high = s2**2 / h2, h / l1**2
+    if not low < high:
+        raise _refused(file, knowns, f"the rotor leaves link 1 no inertia: k5 - rotor1 is {h:.4g} kg m²", "rotor1")
+    if knowns.m1 is not None and gravity:
+        low, high = _within(arm, knowns.m1, low, high, file, knowns)
+    m2 = knowns.m2
+    if m2 is None:
+        m2 = arm.nearest(low, high)
+    elif not low < m2 < high:
+        raise _refused(
+            file,
+            knowns,
+            f"with link 2 of {m2:g} kg an inertia comes out negative; between {low:.4g} and {high:.4g} kg",
+            "m2",
+        )
+    return arm.first(m2), arm.second(m2)
+
+
+def _within(arm: _Free, m1: float, low: float, high: float, file: str, knowns: Knowns) -> tuple[float, float]:
+    """Masses of link 2 that leave a link 1 of `m1` kg possible: (h - m2 l1²) m1 > (s - m2 l1)²."""
+    assert arm.s is not None
+    middle = arm.s / arm.l1 - 0.5 * m1
+    square = middle**2 - (arm.s**2 - arm.h * m1) / arm.l1**2
+    if square > 0:
+        low, high = max(low, middle - math.sqrt(square)), min(high, middle + math.sqrt(square))
+    if square <= 0 or low >= high:
+        raise _refused(file, knowns, f"with link 1 of {m1:g} kg a mass or an inertia comes out negative", "m1")
+    return low, high
+
+
+def _refused(file: str, knowns: Knowns, why: str, name: str) -> SettingError:
+    others = " or ".join(f"--{other}" for other in knowns.given if other != name)
+    flag = "--" + name
+    return SettingError(f"{flag}: {file}: {why}; check {flag}{' or ' + others if others else ''}, or leave it out")
+
+
+@dataclass(frozen=True)
+class _Free:
+    """The arm but for its masses: see the module's table; `s` and `h` are link 1's moments at m2 = 0."""
+
+    s2: float
+    h2: float
+    h: float
+    s: float | None
+    l1: float
+    knowns: Knowns
+
+    def second(self, m2: float) -> Link:
+        length = self.knowns.l2 or math.sqrt(3 * self.h2 / m2)
+        return Link(length, m2, self.s2 / m2, self.h2 - self.s2**2 / m2)
+
+    def first(self, m2: float) -> Link:
+        h, l1, m1 = self.h - m2 * self.l1**2, self.l1, self.knowns.m1
+        if self.s is None:  # without gravity nothing tells link 1's first moment
+            m1 = m1 or 3 * h / l1**2
+            s = l1 * h * m1 / (h + m1 * l1**2 / 3)
+        else:
+            s = self.s - m2 * l1
+            m1 = m1 or 3 * h / l1**2 - 3 * s / l1 + 2 * s**2 / h
+        return Link(l1, m1, s / m1, h - s**2 / m1)
+
+    def nearest(self, low: float, high: float) -> float:
+        """m2 between its bounds with the least D of both links together."""
+
+        def distance(logit: float) -> float:
+            m2 = low + (high - low) * float(expit(logit))
+            return _distance(self.first(m2)) + _distance(self.second(m2))
+
+        found = minimize_scalar(distance, bounds=(-_ENDS, _ENDS), method="bounded", options={"xatol": 1e-10})
+        return low + (high - low) * float(expit(found.x))
+
+
+def _distance(link: Link) -> float:
+    """D of a link; infinite where rounding leaves it no inertia."""
+    m, s, length = link.mass, link.mass * link.centre, link.length
+    if m <= 0 or link.inertia <= 0:
+        return math.inf
+    h = link.inertia + s * link.centre
+    return math.log(3 * (h - length * s + m * length**2 / 3) ** 2 / (length**2 * m * link.inertia))
