@@ -1,0 +1,139 @@
+"""Every command of the README and the guide, run as it stands, and its output compared with the one shown.
+
+A fence ``sh`` is run by bash in an empty folder of its page, one block after another; ``sh install`` needs the
+network and a clean clone (the slow lane runs it); ``sh elsewhere`` needs a cluster that is not here. A fence ``text``
+shows what the block before it prints: numbers may differ by what another processor rounds, ``…`` stands for the rest
+of a line or for lines left out. A fence ``python`` is run too; one without a word draws.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+import algid
+
+ROOT = Path(__file__).parents[1]
+PAGES = {"README": ROOT / "README.md"} | {
+    path.stem: path for path in sorted((Path(algid.__file__).parent / "guide").glob("*.md"))
+}
+REAL = ("run.csv", "run1.csv", "run2.csv", "run3.csv", "run4.csv")
+NUMBER = re.compile(r"[-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?")
+COMMAND = re.compile(r"^(?:algid|make|pip|python|git) ", re.MULTILINE)
+ROUNDING = 1e-3  # relative: what is printed has three digits or four
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fence of a page: its words, its text and the line where it begins."""
+
+    info: str
+    text: str
+    line: int
+
+
+def blocks(text: str) -> list[Block]:
+    """Every fence of a page, in order."""
+    found = re.finditer(r"^```([^\n]*)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    return [Block(one[1].strip(), one[2], text.count("\n", 0, one.start()) + 1) for one in found]
+
+
+def run(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a block as a person would type it: bash, the environment activated, stop at the first failure."""
+    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}", "COLUMNS": "80"}
+    return subprocess.run(
+        ["bash", "-e", "-u", "-c", command], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+
+
+def mismatch(shown: str, printed: str) -> str | None:
+    """The first shown line that the printed ones do not hold, in their order; None where all are there."""
+    lines = iter(printed.splitlines())
+    for wanted in shown.splitlines():
+        if wanted.strip() in ("", "…"):
+            continue
+        if not any(alike(wanted, line) for line in lines):
+            return wanted
+    return None
+
+
+def alike(shown: str, printed: str) -> bool:
+    """Whether two lines have the same words, and numbers that rounding alone tells apart."""
+    if "…" in shown:
+        start = shown[: shown.index("…")].rstrip()
+        shown, printed = start, printed[: len(start)]
+    if " ".join(NUMBER.sub("#", shown).split()) != " ".join(NUMBER.sub("#", printed).split()):
+        return False
+    pairs = zip(NUMBER.findall(shown), NUMBER.findall(printed), strict=True)
+    return all(abs(number(a) - number(b)) <= ROUNDING * abs(number(a)) for a, b in pairs)
+
+
+def number(text: str) -> float:
+    return float(text.replace(",", ""))
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_block_says_what_it_is(page: str) -> None:
+    for block in blocks(PAGES[page].read_text(encoding="utf-8")):
+        known = {"sh", "sh install", "sh elsewhere", "text", "python", "csv", ""}
+        assert block.info in known, f"{page}, line {block.line}"
+        assert block.info.startswith("sh") or not COMMAND.search(block.text), f"{page}, line {block.line}: not run"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", [page for page, path in PAGES.items() if "```sh\n" in path.read_text("utf-8")])
+def test_commands_run_as_they_stand(page: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    text = PAGES[page].read_text(encoding="utf-8")
+    if any(name in text for name in REAL):
+        data = sorted((request.getfixturevalue("shared_data") / "dfki" / "C1_sysid").glob("*.csv"))
+        for name, log in zip(REAL, data[2:], strict=False):
+            shutil.copy(log, tmp_path / name)
+    shutil.copytree(ROOT / "data", tmp_path / "data")
+    printed = ""
+    for block in blocks(text):
+        if block.info == "sh":
+            done = run(block.text, tmp_path)
+            assert done.returncode == 0, f"{page}, line {block.line}:\n{block.text}{done.stdout}{done.stderr}"
+            printed = done.stdout + done.stderr
+        elif block.info == "text":
+            assert mismatch(block.text, printed) is None, f"{page}, line {block.line}:\n{printed}"
+        elif block.info == "python":
+            done = run(f"python - <<'END'\n{block.text}END\n", tmp_path)
+            assert done.returncode == 0, f"{page}, line {block.line}:\n{done.stdout}{done.stderr}"
+
+
+@pytest.mark.slow
+def test_the_readme_installs_from_a_clean_clone(tmp_path: Path) -> None:
+    """With the network: what `make setup` installs has to be had."""
+    block = next(one for one in blocks(PAGES["README"].read_text(encoding="utf-8")) if one.info == "sh install")
+    done = run(block.text.replace("…", str(ROOT)) + "which algid\nalgid --version\n", tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.splitlines()[-2:] == [str(tmp_path / "algid/.venv/bin/algid"), f"algid {algid.__version__}"]
+
+
+@pytest.mark.parametrize(
+    ("shown", "printed", "same"),
+    [
+        ("k1  0.0302 kg", "k1     0.0302 kg", True),
+        ("k1  0.0302 kg", "k1  0.03020001 kg", True),
+        ("k1  0.0302 kg", "k1  0.0304 kg", False),
+        ("k1  0.0302 kg", "k2  0.0302 kg", False),
+        ("Good: all …", "Good: all 7 parameters are identified", True),
+        ("Good: all …", "Failed: all", False),
+    ],
+)
+def test_shown_and_printed_lines_are_compared(shown: str, printed: str, same: bool) -> None:
+    assert alike(shown, printed) is same
+
+
+def test_a_line_that_was_never_printed_is_seen() -> None:
+    assert mismatch("a 1\n…\nc 3\n", "a 1\nb 2\nc 3\n") is None
+    assert mismatch("a 1\nc 4\n", "a 1\nb 2\nc 3\n") == "c 4"
+    assert mismatch("c 3\na 1\n", "a 1\nb 2\nc 3\n") == "a 1"
