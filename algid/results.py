@@ -223,6 +223,7 @@ class FitSummary(_Model):
     terms: list[TermCriterion] = []
     broken_bounds: list[Bound] = []
     by_log: list[dict[str, Estimate]] = []
+    endogeneity: float | None = None
     residual: TorquePrediction | None = None
     cross_validation: TorquePrediction | None = None
     endogeneity: dict[str, Endogeneity] = {}

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from algid.errors import SettingError
 
-Estimator = Literal["refined", "weak", "paper"]
+Estimator = Literal["refined", "weak", "instruments", "paper"]
 
 
 def flag(name: str) -> str:
@@ -51,7 +51,8 @@ class Settings:
 
     Parameters
     ----------
-    estimator : 'refined' (maximum likelihood, the default), 'weak' (least squares on windows) or 'paper'
+    estimator : 'refined' (maximum likelihood, the default), 'weak' (least squares on windows), 'instruments' or 'paper'
+        Instruments are for arms whose unmodelled torque drives the motion: see `algid.estimators.instruments`.
     velocity : 'observer' or 'measured'
         Where joint velocities come from. The refined estimator needs none.
     observer : 'luenberger' (eq. 6), 'zero-phase', or None

@@ -26,6 +26,7 @@ from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
 
 Status = Literal["OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED"]
+Estimator = Literal["weak", "instruments", "refined"]
 Intervals = Literal["likelihood", "sandwich", "jackknife"]
 
 
@@ -35,7 +36,7 @@ class Fit:
 
     Parameters
     ----------
-    estimator : "weak" or "refined"
+    estimator : "weak", "instruments" or "refined"
     shared : Shared
         Which parameters, in which order.
     values : (Q,), in `algid.model.UNITS`
@@ -55,11 +56,12 @@ class Fit:
     iterations, converged : of the refined estimator
     without : (n, Q) or None
         The estimates without each of the logs, where error bars needed them.
+    endogeneity : how far instruments are from least squares, in standard deviations; None where not asked
     note : why the refined estimator handed back the weak estimate although nothing failed
     moved : (2,), rad, how far each joint travelled
     """
 
-    estimator: Literal["weak", "refined"]
+    estimator: Estimator
     shared: Shared
     values: FloatArray
     covariance: FloatArray
@@ -75,6 +77,7 @@ class Fit:
     converged: bool = True
     prior: Prior | None = None
     without: FloatArray | None = None
+    endogeneity: float | None = None
     note: str | None = None
     moved: FloatArray = field(default_factory=lambda: np.full(2, np.inf))
 
@@ -142,7 +145,7 @@ def own_estimates(fit: Fit) -> tuple[OwnEstimate, ...]:
 
 
 def conclude(
-    estimator: Literal["weak", "refined"],
+    estimator: Estimator,
     shared: Shared,
     logs: Sequence[LogInformation],
     beta: FloatArray,
@@ -165,7 +168,7 @@ def conclude(
     if coloured:
         robust, freedom = _robust(shared, logs, beta, known, prior)
         # The long-run variance of a short log errs low; white noise alone is the least there can be.
-        covariance = robust if estimator == "weak" else _widened(robust, covariance)
+        covariance = robust if estimator != "refined" else _widened(robust, covariance)
         quantile, intervals = _quantile(freedom), "sandwich"
         without = left_out(shared, logs, beta, prior) if without is None else without
         repeated = jackknife(logs, without)

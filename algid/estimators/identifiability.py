@@ -93,10 +93,14 @@ def sizes(names: Sequence[str], values: FloatArray) -> FloatArray:
     def largest_of(members: Sequence[str]) -> float:
         return max((by_name[name] for name in members if name in by_name), default=0.0)
 
+    # With both lengths known the torque is linear in the payload, which may be none, and that be known: its size is
+    # that of a mass which at 1 m loads the arm as much as it loads itself.
+    mass = max(largest_of(("k2", "k4")) / 9.81, largest_of(("k1", "k3", "k5")))
+    known = "m_p" in by_name and not {"l1", "l2"} & set(by_name)
     damping = _DAMPING * np.sqrt(largest_of(("k1", "k3", "k5")) * largest_of(("k2", "k4")))
     size = {}
     for members in _CLASSES:
-        largest = max(largest_of(members), damping if "k6" in members else 0.0)
+        largest = max(largest_of(members), damping if "k6" in members else mass if known and "m_p" in members else 0.0)
         for name in members:
             size[name] = max(largest, _LEAST.get(members[0], 1e-6))
     return np.array([size[name] for name in names])

@@ -94,7 +94,7 @@ def _pass(
     samples = rows = 0
     longest = dt = 0.0
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
-    for piece, windows, fresh in _overlapping(segments, settings, window):
+    for piece, windows, fresh in overlapping(segments, settings, window):
         dt = piece.dt
         longest = max(longest, len(piece) * dt if len(piece) >= _SHORTEST else 0.0)
         samples += fresh
@@ -103,12 +103,12 @@ def _pass(
         X = windows.equations(settings.model, piece, settings.estimate_delay, at)
         rows += X.shape[2]
         if X.shape[2]:
-            sums.add(_grams(X))
+            sums.add(grams(X, OVERLAP))
     return (Normal(sums.values(), dt, samples, rows, high - low) if rows else None), longest
 
 
-def _overlapping(
-    segments: Iterable[Segment], settings: WeakSettings, window: float
+def overlapping(
+    segments: Iterable[Segment], settings: WeakSettings, window: float | None = None
 ) -> Iterator[tuple[Segment, Windows, int]]:
     """Pieces that share the samples a window needs with the piece before, their windows and fresh samples."""
     before: Segment | None = None
@@ -116,7 +116,7 @@ def _overlapping(
     left_over = 0
     for piece in pieces(segments, PIECE_SAMPLES):
         if windows is None:
-            windows = _windows(piece.dt, settings, window)
+            windows = _windows(piece.dt, settings, settings.window if window is None else window)
         fresh = len(piece)
         if piece.continues and before is not None:
             piece = _prefixed(before, piece, windows.overlap + left_over)
@@ -148,13 +148,13 @@ def _prefixed(before: Segment, piece: Segment, overlap: int) -> Segment:
     )
 
 
-def _grams(X: FloatArray) -> FloatArray:
-    """Gram matrices (B, 2, q + 1, q + 1) of X (2, q + 1, R), by stretches of `OVERLAP` rows."""
-    size, rows = X.shape[1:]
-    stretches = -(-rows // OVERLAP)
-    padded = np.zeros((2, size, stretches * OVERLAP))
-    padded[:, :, :rows] = X
-    parts = padded.reshape(2, size, stretches, OVERLAP).transpose(2, 0, 1, 3)
+def grams(X: FloatArray, rows: int) -> FloatArray:
+    """Gram matrices (B, 2, m, m) of X (2, m, R), by stretches of `rows` rows."""
+    size, count = X.shape[1:]
+    stretches = -(-count // rows)
+    padded = np.zeros((2, size, stretches * rows))
+    padded[:, :, :count] = X
+    parts = padded.reshape(2, size, stretches, rows).transpose(2, 0, 1, 3)
     return parts @ parts.swapaxes(-1, -2)
 
 

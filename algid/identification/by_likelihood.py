@@ -9,11 +9,11 @@ from functools import partial
 import numpy as np
 
 from algid.errors import LogError, ResultError
-from algid.estimators import refined, weak
+from algid.estimators import instruments, refined, weak
 from algid.estimators.combine import Prior
 from algid.estimators.diagnostics import constrained
 from algid.estimators.fit import Fit
-from algid.estimators.prediction import PredictionSums
+from algid.estimators.prediction import PredictionSums, cross_validate
 from algid.estimators.selection import CHOICE, Selection, needs_shape, select
 from algid.identification.source import LogSource, Survey
 from algid.identification.velocities import with_velocities
@@ -87,11 +87,35 @@ def run_fit(survey: Survey, settings: Settings, chosen: Selection, prior: Prior 
     try:
         if settings.estimator == "weak":
             fit = weak.fit(unloaded, loaded, weak_settings, settings.lengths, prior)
+        elif settings.estimator == "instruments":
+            fit = instruments.fit(unloaded, loaded, weak_settings, settings.lengths, prior)
         else:
             fit = refined.fit(unloaded, loaded, _refined_settings(settings, weak_settings, prior), survey.told)
+            if fit.note:
+                fit = _foretelling(fit, unloaded, loaded, weak_settings, settings, prior)
+        fit = replace(fit, endogeneity=instruments.endogeneity(unloaded, loaded, weak_settings, fit))
     except ValueError as error:
         raise _too_short(survey, error) from error
     return constrained(fit) if settings.constrain else fit, sums
+
+
+def _foretelling(
+    fit: Fit,
+    unloaded: Sequence[Pass],
+    loaded: Sequence[Pass],
+    weak_settings: weak.WeakSettings,
+    settings: Settings,
+    prior: Prior | None,
+) -> Fit:
+    """The weak `fit`, or the instruments' where that foretells logs better that it has not seen."""
+    least = cross_validate(fit, unloaded, loaded, settings.torque_shift)
+    if least is None:  # of a kind of log there is one alone
+        return fit
+    other = instruments.fit(unloaded, loaded, weak_settings, settings.lengths, prior, fit)
+    found = cross_validate(other, unloaded, loaded, settings.torque_shift) if other.converged else None
+    if found is None or np.sum(found.nrmse**2) >= np.sum(least.nrmse**2):
+        return fit
+    return replace(other, note=fit.note and fit.note.replace("weak estimate", "estimate by instruments"))
 
 
 def model_of(result: Result) -> Model:

@@ -16,6 +16,7 @@ from algid import __version__, results
 from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.estimators.diagnostics import broken_bounds, payload_distance, term_worths
 from algid.estimators.fit import Fit, OwnEstimate, own_estimates
+from algid.estimators.instruments import ENDOGENEOUS
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
 from algid.estimators.prediction import PredictionFilter, PredictionScore, cross_validate, score
 from algid.estimators.selection import Selection
@@ -143,6 +144,7 @@ def _contradictions(logs: Sequence[LogSource]) -> list[str]:
     return [f"{name}: its metadata name another arm than {logs[0].name}" for name in strangers]
 
 
+ONE_SIDED = 1.645  # standard deviations of a one-sided bound at 95 %
 FAR_APART = 5.0  # standard deviations past which two logs are not of one arm
 
 
@@ -291,6 +293,7 @@ def fit_summary(
         broken_bounds=[
             results.Bound(bound=b.bound, value=b.value, distance_sigma=b.distance) for b in broken_bounds(fit)
         ],
+        endogeneity=None if fit.endogeneity is None else finite(fit.endogeneity),
         by_log=[_own(fit, own) for own in own_estimates(fit)],
         residual=prediction(_residual(fit, predictions, survey, settings)),
         cross_validation=None if crossed is None else prediction(crossed),
@@ -385,6 +388,18 @@ def prediction(found: PredictionScore) -> results.TorquePrediction | None:
     )
 
 
+def _payload_near_zero(fit: Fit) -> Iterator[str]:
+    """What is known of a payload that is not told from none."""
+    if "m_p" not in fit.names:
+        return
+    place = fit.names.index("m_p")
+    mass, std = float(fit.values[place]), float(fit.std[place])
+    if np.isfinite(std) and abs(mass) < fit.quantile * std:
+        yield f"the payload is not told from zero: at most {max(mass + ONE_SIDED * std, 0.0):.3g} kg at 95 %"
+    elif np.isinf(std) and not fit.shared.lengths:
+        yield "without link lengths a payload near zero is not determined: give --l1 and --l2"
+
+
 def fit_warnings(fit: Fit) -> Iterator[str]:
     """What a user should know about a fit."""
     if fit.note:
@@ -399,6 +414,12 @@ def fit_warnings(fit: Fit) -> Iterator[str]:
     yield from fit.unidentifiable
     if fit.shared.model.gravity == 0:
         yield "without gravity k2 and k4 have no effect and the payload has no weight: give --l1 or --l2 to tell it"
+    if fit.endogeneity is not None and fit.endogeneity > ENDOGENEOUS and fit.estimator != "instruments":
+        yield (
+            f"instruments and least squares are {fit.endogeneity:.1f} standard deviations apart: torque that the model "
+            "lacks drives the motion, and least squares takes the constants too small; compare --estimator instruments"
+        )
+    yield from _payload_near_zero(fit)
     for bound in broken_bounds(fit):
         distance = "" if bound.distance is None else f", {bound.distance:.1f} standard deviations beyond"
         yield f"the estimates break {bound.bound}: {bound.value:.4g}{distance}"

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from algid.arm import mass_matrix, passive_torque, with_payload
-from algid.estimators import refined, weak
+from algid.estimators import instruments, refined, weak
 from algid.estimators.fit import Fit
 from algid.estimators.prediction import cross_validate, score
 from algid.estimators.refined import RefinedSettings
@@ -98,8 +98,10 @@ def _fit(estimator: str, terms: str, unloaded: list[Source], loaded: list[Source
     model = Model(tuple(term for term in terms.split() if term in MODEL_TERMS))
     hold: Literal["foh", "zoh"] = "zoh" if "hold" in terms else "foh"
     delay = "delay" in terms
-    if estimator == "weak":
-        return weak.fit(unloaded, loaded, WeakSettings(model, hold=hold, estimate_delay=delay))
+    if estimator != "refined":
+        return (weak if estimator == "weak" else instruments).fit(
+            unloaded, loaded, WeakSettings(model, hold=hold, estimate_delay=delay)
+        )
     return refined.fit(unloaded, loaded, RefinedSettings(model, hold=hold, estimate_delay=delay))
 
 
@@ -112,7 +114,7 @@ def _truth(fit: Fit) -> np.ndarray:
 
 @pytest.mark.parametrize("payload", [False, True])
 @pytest.mark.parametrize("terms", TERMS)
-@pytest.mark.parametrize("estimator", ["weak", "refined"])
+@pytest.mark.parametrize("estimator", ["weak", "instruments", "refined"])
 def test_every_kind_of_estimate_is_the_truth_within_its_error(
     cases: dict[tuple[str, bool], Case], estimator: str, terms: str, payload: bool
 ) -> None:

@@ -1,0 +1,307 @@
+"""Instrumental variables on sliding windows: what the arm would have done, in place of what it did.
+
+On a real arm the torque that no model holds (friction, play, cogging) drives the motion. The columns X of the momentum
+form are then correlated with its residual, and least squares on them is attenuated, however they are weighed.
+Instruments Z are the same columns of a motion which that torque did not drive: simulated from each window's measured
+start with the measured torque and the present coefficients. The estimate solves
+
+    Σ w Z (y − Xᵀ c) = 0
+
+(Janot, Vandanjon & Gautier 2014, IEEE Trans. Control Syst. Technol. 22; Brunot et al. 2018). Projected on the
+instruments, each log's likelihood is quadratic, so that logs, payloads and priors combine as for any estimator:
+
+    S = Aᵀ V⁻¹ A,    g = Aᵀ V⁻¹ Σ w Z (y − Xᵀ c0),    A = Σ w Z Xᵀ,    V = Σ w Z Zᵀ
+
+======  =========================================================  ===========================  ======
+symbol  name                                                       shape                        unit
+======  =========================================================  ===========================  ======
+X       columns of the two equations                               (2, q, R)                    mixed
+Z       the same of the simulated motion                           (2, q, R)                    mixed
+y       the torque's moments                                       (2, R)                       N m
+w       inverse residual variance of a row of each joint           (2,)                         1/(N m)²
+gram    [Z X y] [Z X y]ᵀ by stretch and joint                      (B, 2, 2 q + 1, 2 q + 1)     mixed
+======  =========================================================  ===========================  ======
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from algid.arm import FloatArray
+from algid.estimators import weak
+from algid.estimators.combine import BlockSums, LogInformation, Prior, long_run_variance, scaled_pinv
+from algid.estimators.fit import Fit, conclude
+from algid.estimators.modulating_functions import OVERLAP, Windows
+from algid.estimators.weak import Source, WeakSettings
+from algid.model import Model, Motion, partials, torque
+from algid.signals.filters import correlate, differentiator, half_length, smoother
+from algid.signals.segments import Segment
+
+_ROUNDS = 4
+_SETTLED = 0.05  # change of every coefficient in its standard deviations
+_STRIDE = 2  # windows overlap four-fold: more tell hardly more, and each is simulated
+_ASTRAY = 100.0  # rad: a simulated window that ends so far from the measured one has run away
+_FEWEST = 0.5  # share of the windows that must not go astray
+_EXAMINED = 4  # pieces of each log that `endogeneity` looks at
+ENDOGENEOUS = 3.0
+"""Statistic of `endogeneity` beyond which the unmodelled torque drives the motion."""
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """Sums of one log: `gram` as in the module's table; `rows` windows, of which `astray` could not be simulated."""
+
+    gram: FloatArray
+    rows: int
+    astray: int
+
+
+def fit(
+    unloaded: Sequence[Source],
+    loaded: Sequence[Source] = (),
+    settings: WeakSettings | None = None,
+    lengths: dict[str, float] | None = None,
+    prior: Prior | None = None,
+    start: Fit | None = None,
+) -> Fit:
+    """Parameters of the arm, and of its payload where there are loaded logs, by windowed instruments.
+
+    Parameters
+    ----------
+    unloaded, loaded : sequences of callables
+        Each gives a fresh iterable of `Segment`, the stretches of one log in time; called up to nine times.
+    settings : WeakSettings
+        Window, bandwidth, model, hold and delay, as for the weak estimator.
+    lengths : dict
+        Known link lengths "l1", "l2" in m.
+    prior : Prior
+        What an earlier result knows of the arm; unloaded logs are not needed then.
+    start : Fit
+        The weak estimate with these settings, where it has been made.
+
+    Returns
+    -------
+    Fit
+        With `converged` false and the weak estimate in its place where the coefficients move no arm: a mass matrix
+        that is not positive definite, or windows that go astray.
+
+    Raises
+    ------
+    ValueError
+        If no log is long enough for a window, or there is neither an unloaded log nor a prior.
+    """
+    settings = settings or WeakSettings()
+    start = weak.fit(unloaded, loaded, settings, lengths, prior) if start is None else start
+    shared = start.shared
+    base = float(start.values[len(settings.model.names)]) if shared.delay else settings.delay
+    settings = replace(settings, delay=base)
+    logs: list[LogInformation] = []
+    for kind, sources in ((False, unloaded), (True, loaded)):
+        if sources:
+            found = _solved(sources, settings, _coefficients(start, kind), kind)
+            if found is None:
+                return _failed(start)
+            logs += found
+    if shared.delay:
+        logs = [replace(log, c0=_with_delay(log.c0, base)) for log in logs]
+    return conclude("instruments", shared, logs, start.values, start.moved, prior, coloured=True)
+
+
+def _coefficients(start: Fit, loaded: bool) -> FloatArray:
+    """Those of a log at `start`; a delay as its change from the one found."""
+    c = start.shared.coefficients(start.values, loaded)
+    return _with_delay(c, -float(c[-1])) if start.shared.delay else c
+
+
+def _with_delay(c: FloatArray, change: float) -> FloatArray:
+    return np.append(c[:-1], c[-1] + change)
+
+
+def _failed(start: Fit) -> Fit:
+    status = tuple("NOT_CONVERGED" if word == "OK" else word for word in start.status)
+    return replace(start, status=status, converged=False)
+
+
+def _solved(
+    sources: Sequence[Source], settings: WeakSettings, c: FloatArray, loaded: bool
+) -> list[LogInformation] | None:
+    """Each log's projected likelihood, once coefficients and instruments agree; None where the windows go astray."""
+    logs: list[LogInformation] = []
+    for _ in range(_ROUNDS):
+        found = [moments(source, settings, c) for source in sources]
+        if any(one is None or one.astray > _FEWEST * one.rows for one in found):
+            return None
+        sums = [one for one in found if one is not None and one.rows]
+        if not sums:
+            return None
+        better, logs = solve(sums, c, loaded)
+        S = np.sum([log.total[0] for log in logs], axis=0)
+        step = better - c
+        c = better
+        if float(step @ S @ step) < _SETTLED**2:
+            break
+    return logs
+
+
+def solve(sums: Sequence[Moments], c: FloatArray, loaded: bool) -> tuple[FloatArray, list[LogInformation]]:
+    """Coefficients (q,) that logs share, from weights at `c`, and each log's projected likelihood there."""
+    weights = [_weights(one, c) for one in sums]
+    logs = [_information(one, weight, c, loaded) for one, weight in zip(sums, weights, strict=True)]
+    S, g = (np.sum(part, axis=0) for part in zip(*(log.total for log in logs), strict=True))
+    better = c + scaled_pinv(S) @ g
+    weights = [_weights(one, better) for one in sums]
+    return better, [_information(one, weight, better, loaded) for one, weight in zip(sums, weights, strict=True)]
+
+
+def _weights(sums: Moments, c: FloatArray) -> FloatArray:
+    """Inverse residual variance (2,) of a row of each joint."""
+    v = np.concatenate([np.zeros_like(c), -c, [1.0]])
+    gram = sums.gram.sum(axis=0)
+    squares = np.einsum("x,axy,y->a", v, gram, v)
+    return (sums.rows - sums.astray) / np.maximum(squares, 1e-24 * gram[:, -1, -1] + 1e-300)
+
+
+def _information(sums: Moments, weights: FloatArray, c: FloatArray, loaded: bool) -> LogInformation:
+    q = c.size
+    # Overlapping rows repeat each other: a window's worth of rows counts as two.
+    gram = np.einsum("a,baxy->bxy", weights * (2.0 * _STRIDE / OVERLAP), sums.gram)
+    A, V = gram[:, :q, q : 2 * q], gram[:, :q, :q].sum(axis=0)
+    projection = A.sum(axis=0).T @ scaled_pinv(V)
+    scores = gram[:, :q, -1] - A @ c
+    return LogInformation(loaded, c, projection @ A, scores @ projection.T)
+
+
+def moments(source: Source, settings: WeakSettings, c: FloatArray, most: int | None = None) -> Moments | None:
+    """Sums over one log, the windows simulated with coefficients `c`; None where those move no arm.
+
+    At most `most` pieces are looked at.
+    """
+    sums = BlockSums()
+    rows = astray = 0
+    linear = c[: len(settings.model.names)]
+    for piece, windows, _ in islice(weak.overlapping(source(), settings), most):
+        X = windows.equations(settings.model, piece, settings.estimate_delay, linear)
+        X = X[:, :, ::_STRIDE]
+        if not X.shape[2]:
+            continue
+        simulated = _simulated(settings.model, linear, piece, windows)
+        if simulated is None:
+            return None
+        motion, good = simulated
+        plain = Windows(piece.dt, windows.length, 0.0, None)
+        Z = plain.equations(settings.model, motion, settings.estimate_delay, linear)[:, :-1, ::OVERLAP]
+        both = np.where(good, np.concatenate([Z, X], axis=1), 0.0)
+        rows += both.shape[2]
+        astray += int(np.sum(np.logical_not(good)))
+        sums.add(weak.grams(both, OVERLAP // _STRIDE))
+    return Moments(sums.values(), rows, astray) if rows else Moments(np.zeros((0, 2, 1, 1)), 0, 0)
+
+
+def _simulated(
+    model: Model, c: FloatArray, piece: Segment, windows: Windows
+) -> tuple[Segment, NDArray[np.bool_]] | None:
+    """Every `_STRIDE`-th window's simulated motion, end to end, and which of them (R,) have not run away.
+
+    Runge-Kutta's fourth order over two samples at a time, all windows side by side, from the measured start. (To
+    start earlier, so that what the unmodelled torque did before has faded, made the instruments too weak.)
+    """
+    length, margin = OVERLAP * windows.step, windows.margin
+    starts = margin + np.arange(0, len(piece) - 2 * margin - length + 1, windows.step * _STRIDE, dtype=np.int64)
+    theta, omega = _started(piece, windows, starts)
+    instants = starts[:, None] + np.arange(length + 1)
+    at = np.clip(instants - windows.shift / windows.dt, 0, len(piece) - 1)
+    before = np.minimum(at.astype(np.int64), len(piece) - 2)
+    tau = piece.tau[:, before] + (at - before) * (piece.tau[:, before + 1] - piece.tau[:, before])
+    h = 2 * piece.dt
+    thetas, omegas = (np.empty((2, starts.size, length)) for _ in range(2))
+    for sample in range(0, length, 2):
+        rates = []
+        x, v = theta, omega
+        for now, share in ((sample, 0.5), (sample + 1, 0.5), (sample + 1, 1.0), (sample + 2, 0.0)):
+            acceleration = _acceleration(model, c, x, v, tau[:, :, min(now, length)])
+            if acceleration is None:
+                return None
+            rates.append((v, acceleration))
+            x, v = theta + share * h * rates[-1][0], omega + share * h * rates[-1][1]
+        thetas[:, :, sample], omegas[:, :, sample] = theta, omega
+        (v1, a1), (v2, a2), (v3, a3), (v4, a4) = rates
+        ahead = theta + h / 6 * (v1 + 2 * v2 + 2 * v3 + v4)
+        faster = omega + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+        # Between two steps the cubic through both states and their rates (Hermite).
+        thetas[:, :, sample + 1] = (theta + ahead) / 2 + h / 8 * (omega - faster)
+        omegas[:, :, sample + 1] = (omega + faster) / 2 + h / 8 * (a1 - a4)
+        theta, omega = (np.clip(signal, -1e6, 1e6) for signal in (ahead, faster))
+    off = np.abs(thetas - piece.theta[:, instants[:, :-1]]).max(axis=(0, 2))
+    good = off < _ASTRAY
+    angles, torques, velocities = (signal.reshape(2, -1) for signal in (thetas, tau[:, :, :-1], omegas))
+    return Segment(0.0, piece.dt, angles, torques, velocities), good
+
+
+def _started(piece: Segment, windows: Windows, starts: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+    """Angles and velocities (2, R) at the starts of windows."""
+    if windows.bandwidth is None:
+        assert piece.omega is not None  # `Windows.equations` has asked for it
+        return piece.theta[:, starts], piece.omega[:, starts]
+    reach = half_length(piece.dt, windows.bandwidth)
+    theta, omega = (
+        correlate(piece.theta, kernel(piece.dt, windows.bandwidth))[:, starts - reach]
+        for kernel in (smoother, differentiator)
+    )
+    return theta, omega
+
+
+def _acceleration(
+    model: Model, c: FloatArray, theta: FloatArray, omega: FloatArray, tau: FloatArray
+) -> FloatArray | None:
+    """Accelerations (2, R) under torques (2, R); None where the mass matrix is not positive definite."""
+    motion = Motion(theta, omega, np.zeros_like(theta))
+    free1, free2 = tau - torque(model, c, motion)
+    (m11, m12), (m21, m22) = partials(model, c, motion)[2]
+    determinant = m11 * m22 - m12 * m21
+    if np.any(determinant <= 0) or np.any(m11 <= 0):
+        return None
+    return np.stack([m22 * free1 - m12 * free2, m11 * free2 - m21 * free1]) / determinant
+
+
+def endogeneity(unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings, fit: Fit) -> float | None:
+    """How far instruments and least squares are apart on the same windows, in standard deviations of the former.
+
+    The statistic of Durbin, Wu and Hausman (Hausman 1978), coefficient by coefficient; the largest is returned. Beyond
+    `ENDOGENEOUS` the torque that the model lacks drives the motion. None where the windows cannot be simulated.
+    Of a long log the first pieces are looked at.
+    """
+    if fit.shared.delay:
+        settings = replace(settings, delay=float(fit.values[len(settings.model.names)]), estimate_delay=False)
+    largest = None
+    for kind, sources in ((False, unloaded), (True, loaded)):
+        if not sources:
+            continue
+        c = fit.shared.coefficients(fit.values, kind)[: len(settings.model.names)]
+        found = [moments(source, settings, c, _EXAMINED) for source in sources]
+        sums = [one for one in found if one is not None and one.rows and one.astray <= _FEWEST * one.rows]
+        if sums:
+            largest = max(largest or 0.0, _apart(sums, c, kind))
+    return largest
+
+
+def _apart(sums: Sequence[Moments], c: FloatArray, loaded: bool) -> float:
+    q = c.size
+    squares = [_only_least_squares(one, q) for one in sums]
+    least, _ = solve(squares, c, loaded)
+    better, logs = solve(sums, c, loaded)
+    inverse = scaled_pinv(np.sum([log.total[0] for log in logs], axis=0))
+    meat = np.sum([long_run_variance(log.g)[0] for log in logs], axis=0)
+    std = np.sqrt(np.maximum(np.diag(inverse @ meat @ inverse), 0.0))
+    told = std < np.abs(better) + np.abs(least)  # what neither tells is not apart
+    return float(np.max(np.abs(better - least)[told] / std[told], initial=0.0))
+
+
+def _only_least_squares(sums: Moments, q: int) -> Moments:
+    """The same windows with X as its own instruments."""
+    order = np.concatenate([np.arange(q, 2 * q), np.arange(q, 2 * q + 1)])
+    return replace(sums, gram=sums.gram[:, :, order[:, None], order])
