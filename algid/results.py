@@ -165,7 +165,10 @@ class TermCriterion(_Model):
 
 
 class Endogeneity(_Model):
-    """Whether the regressors correlate with the error, as feedback makes them: a joint's statistic and p-value."""
+    """Whether the regressors correlate with the error: the statistic of Durbin, Wu and Hausman, and its p-value.
+
+    By "largest" stands the coefficient at which instruments and least squares are furthest apart, in deviations.
+    """
 
     statistic: float
     p_value: float | None
@@ -223,7 +226,6 @@ class FitSummary(_Model):
     terms: list[TermCriterion] = []
     broken_bounds: list[Bound] = []
     by_log: list[dict[str, Estimate]] = []
-    endogeneity: float | None = None
     residual: TorquePrediction | None = None
     cross_validation: TorquePrediction | None = None
     endogeneity: dict[str, Endogeneity] = {}

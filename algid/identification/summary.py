@@ -5,6 +5,7 @@ A fit as a result holds it: estimates with intervals, Table 4's rows, diagnostic
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -293,11 +294,20 @@ def fit_summary(
         broken_bounds=[
             results.Bound(bound=b.bound, value=b.value, distance_sigma=b.distance) for b in broken_bounds(fit)
         ],
-        endogeneity=None if fit.endogeneity is None else finite(fit.endogeneity),
+        endogeneity=_endogeneity(fit),
         by_log=[_own(fit, own) for own in own_estimates(fit)],
         residual=prediction(_residual(fit, predictions, survey, settings)),
         cross_validation=None if crossed is None else prediction(crossed),
     )
+
+
+def _endogeneity(fit: Fit) -> dict[str, results.Endogeneity]:
+    if fit.endogeneity is None:
+        return {}
+    # as many coefficients were looked at as a log has (Bonferroni)
+    p_value = min(1.0, len(fit.shared.log_names) * math.erfc(fit.endogeneity / math.sqrt(2)))
+    endogenous = fit.endogeneity > ENDOGENEOUS
+    return {"largest": results.Endogeneity(statistic=fit.endogeneity, p_value=p_value, endogenous=endogenous)}
 
 
 def _own(fit: Fit, own: OwnEstimate) -> dict[str, Estimate]:

@@ -51,9 +51,12 @@ def observer_gain(poles: tuple[complex, ...]) -> FloatArray:
 class LuenbergerObserver:
     """The observer x̂' = (A − L C) x̂ + L y, discretised exactly for angles that are linear between samples.
 
-    It carries its state from call to call, so that a long log may pass through in pieces. The recursion runs
-    in Schur coordinates, as a cascade of first-order filters: orthogonal, so that close poles cost no digits,
-    and without a loop over samples.
+    It carries its state from call to call, so that a long log may pass through in pieces. From the angle to the
+    velocity each joint's three poles p make the transfer function
+
+        (l2 s + l3) s / (s³ + l1 s² + l2 s + l3),    s³ + l1 s² + l2 s + l3 = Π (s − p)
+
+    which runs as second-order sections, since close poles of a single third-order recursion would cost digits.
 
     Parameters
     ----------
@@ -62,18 +65,22 @@ class LuenbergerObserver:
     """
 
     def __init__(self, dt: float, poles: tuple[complex, ...] = PAPER_POLES) -> None:
-        gain = observer_gain(poles)
-        transition, self._now, self._next = _first_order_hold(A - gain @ C, gain, dt)
-        kind = "complex" if np.iscomplexobj(np.array(poles)) else "real"
-        import scipy.linalg
+        from scipy.signal import cont2discrete, zpk2sos
 
-        self._triangle, self._basis = scipy.linalg.schur(transition, output=kind)
-        self._state: FloatArray | None = None
-        self._last_angles: FloatArray = np.empty(2)
+        gain = observer_gain(poles)
+        self._sections: list[FloatArray] = []
+        for joint in range(2):
+            own = slice(3 * joint, 3 * joint + 3)
+            l1, l2, l3 = gain[own, joint]
+            numerator, _, _ = cont2discrete(([l2, l3, 0.0], [1.0, l1, l2, l3]), dt, method="foh")
+            poles_z = np.exp(np.array(poles[own]) * dt)
+            self._sections.append(zpk2sos(np.roots(numerator[0]), poles_z, numerator[0, 0]))
+        self._rest: FloatArray | None = None
+        self._states: list[FloatArray] = []
 
     def reset(self) -> None:
         """Forget the state: the next call starts at rest."""
-        self._state = None
+        self._rest = None
 
     def velocities(self, theta: FloatArray) -> FloatArray:
         """Observed joint velocities (2, N) in rad/s of the angles `theta` (2, N) in rad.
@@ -81,52 +88,13 @@ class LuenbergerObserver:
         The first call, and the first one after `reset`, starts at rest at the first angles; any other takes
         `theta` as following the last sample of the call before.
         """
-        if self._state is None:
-            self._state = self._basis.conj().T @ np.array([theta[0, 0], 0, 0, theta[1, 0], 0, 0])
-            self._last_angles = theta[:, 0]
-        before = np.concatenate([self._last_angles[:, None], theta[:, :-1]], axis=1)
-        drive = self._basis.conj().T @ (self._now @ before + self._next @ theta)
-        states = self._cascade(drive)
-        self._state, self._last_angles = states[:, -1].copy(), theta[:, -1].copy()
-        velocities: FloatArray = np.real(C_OBS @ self._basis @ states)
-        return velocities
+        from scipy.signal import sosfilt
 
-    def _cascade(self, drive: FloatArray) -> FloatArray:
-        """States (6, N) of z[n] = T z[n-1] + drive[n], T upper triangular: from the last state to the first."""
-        assert self._state is not None
-        triangle = self._triangle
-        states = np.empty_like(drive)
-        for row in reversed(range(6)):
-            later = triangle[row, row + 1 :]
-            total = drive[row].copy()
-            total[0] += later @ self._state[row + 1 :]
-            total[1:] += later @ states[row + 1 :, :-1]
-            pole = triangle[row, row]
-            total[0] += pole * self._state[row]
-            states[row] = _recursion(pole, total)
-        return states
-
-
-def _recursion(pole: complex, drive: FloatArray) -> FloatArray:
-    """z (N,) of z[n] = pole z[n-1] + drive[n] from rest: a triangular system of two bands."""
-    from scipy.linalg import get_lapack_funcs
-
-    band = np.empty((2, drive.size), drive.dtype)
-    band[0], band[1] = 1.0, -pole
-    (substitute,) = get_lapack_funcs(("tbtrs",), (band, drive))
-    found, _ = substitute(band, drive[:, None], uplo="L")
-    return found[:, 0]
-
-
-def _first_order_hold(a: FloatArray, b: FloatArray, dt: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Φ, Γ0, Γ1 with x[n+1] = Φ x[n] + Γ0 y[n] + Γ1 y[n+1] for y linear in between, by one matrix exponential."""
-    import scipy.linalg
-
-    states, inputs = b.shape
-    block = np.zeros((states + 2 * inputs, states + 2 * inputs))
-    block[:states, :states] = a * dt
-    block[:states, states : states + inputs] = b * dt
-    block[states : states + inputs, states + inputs :] = np.eye(inputs)
-    power = scipy.linalg.expm(block)
-    constant, ramp = power[:states, states : states + inputs], power[:states, states + inputs :]
-    return power[:states, :states], constant - ramp, ramp
+        if self._rest is None:
+            self._rest = theta[:, 0].copy()
+            self._states = [np.zeros((len(sections), 2)) for sections in self._sections]
+        found = np.empty_like(theta)
+        for joint, sections in enumerate(self._sections):
+            moved = theta[joint] - self._rest[joint]
+            found[joint], self._states[joint] = sosfilt(sections, moved, zi=self._states[joint])
+        return found

@@ -8,7 +8,7 @@ import numpy as np
 
 from algid.estimators import instruments, refined, weak
 from algid.estimators.refined import RefinedSettings
-from algid.estimators.weak import WeakSettings
+from algid.estimators.weak import Source, WeakSettings
 from pipelines.accuracy_scenes import random_arm
 from pipelines.disturbance import logs
 
@@ -17,7 +17,7 @@ from .conftest import Bench
 
 def test_instruments_undo_most_of_what_a_disturbance_does() -> None:
     arm = random_arm(1)[0]
-    sources = [partial(list, [log]) for log in logs(arm, 3, 21)]
+    sources: list[Source] = [partial(list, [log]) for log in logs(arm, 3, 21)]
     least = weak.fit(sources)
     found = instruments.fit(sources, start=least)
     assert found.estimator == "instruments"
@@ -32,7 +32,7 @@ def test_instruments_undo_most_of_what_a_disturbance_does() -> None:
 
 
 def test_without_a_disturbance_both_agree(bench: Bench) -> None:
-    sources = [partial(list, [bench.log(sigma=1e-3, seed=seed)]) for seed in range(2)]
+    sources: list[Source] = [partial(list, [bench.log(sigma=1e-3, seed=seed)]) for seed in range(2)]
     apart = instruments.endogeneity(sources, [], WeakSettings(), weak.fit(sources))
     assert apart is not None
     assert apart < instruments.ENDOGENEOUS
@@ -40,7 +40,8 @@ def test_without_a_disturbance_both_agree(bench: Bench) -> None:
 
 def test_a_payload_of_nothing_has_its_error_bar_where_lengths_are_known(bench: Bench) -> None:
     lengths = {"l1": bench.arm.l1, "l2": bench.arm.l2}
-    unloaded, loaded = ([partial(list, [bench.log(sigma=1e-3, seed=seed)])] for seed in (1, 2))
+    unloaded: list[Source] = [partial(list, [bench.log(sigma=1e-3, seed=1)])]
+    loaded: list[Source] = [partial(list, [bench.log(sigma=1e-3, seed=2)])]
     for fit in (
         weak.fit(unloaded, loaded, lengths=lengths),
         refined.fit(unloaded, loaded, RefinedSettings(lengths=lengths)),
