@@ -132,7 +132,7 @@ class PredictionSums:
         return PredictionScore(float(self._count), residual, self._torque.copy(), self._gram[:, -1, -1].copy())
 
     def _add(self, piece: Segment) -> None:
-        shift = _seconds(self._shift, piece.dt)
+        shift = seconds(self._shift, piece.dt)
         if self._at is not None:  # a logged torque that lags shows at its stamp what acted before
             shift -= self._model.values(self._at)["lag"]
         X = _filtered(self._model, piece, shift, self._by, self._at)
@@ -141,7 +141,8 @@ class PredictionSums:
         self._gram += X @ X.swapaxes(1, 2)
 
 
-def _seconds(shift: Shift, dt: float) -> float:
+def seconds(shift: Shift, dt: float) -> float:
+    """The time in s after which a torque that is logged every `dt` s acts."""
     return shift(dt) if callable(shift) else shift
 
 
@@ -152,7 +153,7 @@ def _filtered(model: Model, piece: Segment, shift: float, by: PredictionFilter, 
     if signals.shape[1] <= max(2 * edge + 2, 6 * (by.order + 1)):
         return np.zeros((2, len(model.names) + 1, 0))
     theta = butterworth(signals[:2], dt, min(by.motion, 0.45 / dt), by.order)
-    Y = regressor(model, _motion(theta, dt), at)
+    Y = regressor(model, motion_of(theta, dt), at)
     place = np.arange(signals.shape[1]) + shift / dt
     whole = np.clip(np.floor(place).astype(np.int64), 0, signals.shape[1] - 2)
     Y = Y[:, :, whole] + (place - whole) * (Y[:, :, whole + 1] - Y[:, :, whole])
@@ -171,7 +172,7 @@ def _decimated(piece: Segment, by: PredictionFilter) -> tuple[FloatArray, float]
     return correlate(signals, kernel, step), step * piece.dt
 
 
-def _motion(theta: FloatArray, dt: float) -> Motion:
+def motion_of(theta: FloatArray, dt: float) -> Motion:
     """Motion with derivatives by five points; the two samples at each end repeat their neighbour's."""
     inner, n = theta.shape[1] - 4, theta.shape[1]
     omega, alpha = (
@@ -211,5 +212,5 @@ def cross_validate(
     for place, (source, log) in enumerate(zip(sources, fit.logs, strict=True)):
         c = fit.shared.coefficients(without[place], log.loaded)
         delay = float(c[columns:].sum())
-        total += score(fit.shared.model, c[:columns], source(), lambda dt, delay=delay: _seconds(shift, dt) + delay)  # type: ignore[misc]
+        total += score(fit.shared.model, c[:columns], source(), lambda dt, delay=delay: seconds(shift, dt) + delay)  # type: ignore[misc]
     return total

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -9,7 +10,8 @@ import numpy as np
 
 from algid.arm import FloatArray, payload_constants, with_payload
 from algid.errors import ResultError
-from algid.estimators.prediction import PredictionScore, score
+from algid.estimators.prediction import PredictionScore, Shift, score
+from algid.estimators.rollout import RolloutScore, rollouts
 from algid.identification.by_likelihood import model_of
 from algid.identification.source import Role, Survey
 from algid.identification.summary import prediction
@@ -26,24 +28,57 @@ class Validation:
     total: TorquePrediction | None
 
 
-def validate(result: Result, survey: Survey, name: str) -> Validation:
-    """Predict the torque of a survey's logs by the estimates of `result`, whose file is called `name`.
+@dataclass(frozen=True)
+class Predictor:
+    """A model that is judged on logs: its torque, its coefficients for a log of a role, when a logged torque acts."""
+
+    model: Model
+    coefficients: Callable[[Role], FloatArray]
+    shift: Shift = 0.0
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """How far simulations come from the angles of each log, and of all together."""
+
+    logs: dict[str, RolloutScore]
+    total: RolloutScore
+
+
+def predictor_of(result: Result, name: str) -> Predictor:
+    """The model of a result whose file is called `name`; its coefficients raise as `torque_constants`."""
+    settings, model, delay = Settings.of(result.settings), model_of(result), result.parameters.get("delay")
+    shift = partial(settings.torque_shift, found_delay=None if delay is None else delay.estimate)
+    return Predictor(model, lambda role: torque_constants(result, model, role, name), shift)
+
+
+def validate(known: Predictor, survey: Survey) -> Validation:
+    """Predict the torque of a survey's logs.
 
     Raises
     ------
     ResultError
         If a parameter that the prediction needs has no estimate.
     """
-    settings = Settings.of(result.settings)
-    model = model_of(result)
     found: dict[str, TorquePrediction | None] = {}
-    total, delay = PredictionScore(), result.parameters.get("delay")
-    shift = partial(settings.torque_shift, found_delay=None if delay is None else delay.estimate)
+    total = PredictionScore()
     for log in survey.logs:
-        one = score(model, torque_constants(result, model, log.role, name), survey.segments(log), shift)
+        one = score(known.model, known.coefficients(log.role), survey.segments(log), known.shift)
         found[log.name] = prediction(one)
         total += one
     return Validation(found, prediction(total))
+
+
+def simulate(known: Predictor, survey: Survey) -> Simulation:
+    """Simulate the arm forward from states of a survey's logs; raises as `validate`."""
+    found: dict[str, RolloutScore] = {}
+    total = RolloutScore()
+    for log in survey.logs:
+        duration = survey.summary(log).duration
+        one = rollouts(known.model, known.coefficients(log.role), survey.segments(log), duration, known.shift)
+        found[log.name] = one
+        total += one
+    return Simulation(found, total)
 
 
 def torque_constants(result: Result, model: Model, role: Role, file: str) -> FloatArray:

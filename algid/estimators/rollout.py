@@ -1,0 +1,143 @@
+"""The arm simulated forward from a log's states under its torques, and how far from its angles it comes.
+
+A start every so often, all of them at once: Runge-Kutta of fourth order, torques between samples on straight lines.
+Angles and velocities of the starts, and the angles to compare with, pass the motion's zero-phase filter.
+
+======  =================================================  ===============  ======
+symbol  name                                               shape            unit
+======  =================================================  ===============  ======
+x       state θ, ω at the starts                           (4, S)           mixed
+u       torques at each half step from each start          (2 n + 1, 2, S)  N m
+y       angles at the horizons; NaN past a stretch's end   (H, 2, S)        rad
+======  =================================================  ===============  ======
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.estimators.prediction import PredictionFilter, Shift, motion_of, seconds
+from algid.model import Model, acceleration, friction_slope
+from algid.signals.filters import butterworth
+from algid.signals.segments import Cutter, Segment
+
+HORIZONS = (0.1, 0.5, 2.0)
+"""s after which the angles are compared."""
+_STARTS = 400  # of a log, at most
+_CLOSEST = 0.05  # s between starts
+_PIECE_SECONDS = 60.0
+_LONGEST, _SHORTEST = 2e-3, 1.25e-4  # s of a step
+
+
+@dataclass(frozen=True, eq=False)
+class RolloutScore:
+    """By horizon (H,): starts; by horizon and joint (H, 2): squared errors, and squared distances moved, in rad²."""
+
+    count: FloatArray = field(default_factory=lambda: np.zeros(len(HORIZONS)))
+    error: FloatArray = field(default_factory=lambda: np.zeros((len(HORIZONS), 2)))
+    moved: FloatArray = field(default_factory=lambda: np.zeros((len(HORIZONS), 2)))
+
+    def __add__(self, other: RolloutScore) -> RolloutScore:
+        return RolloutScore(self.count + other.count, self.error + other.error, self.moved + other.moved)
+
+    @property
+    def rmse(self) -> FloatArray:
+        """RMSE (H, 2) of the angles in rad; NaN without a start, infinite where the simulation runs away."""
+        return self._root_mean(self.error)
+
+    @property
+    def distance(self) -> FloatArray:
+        """RMS (H, 2) in rad of how far the joints moved: the RMSE of an arm that stays where it is."""
+        return self._root_mean(self.moved)
+
+    def _root_mean(self, squares: FloatArray) -> FloatArray:
+        return np.sqrt(np.where(self.count[:, None] > 0, squares / np.maximum(self.count, 1)[:, None], np.nan))
+
+
+def rollouts(
+    model: Model, c: FloatArray, segments: Iterable[Segment], duration: float, shift: Shift = 0.0
+) -> RolloutScore:
+    """Simulate forward from states of a log of `duration` s by the coefficients `c` (q,).
+
+    `shift` is the time in s after which a logged torque acts, as for `PredictionSums`.
+    """
+    step, total, cutter = time_step(model, c), RolloutScore(), None
+    starts: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+    spacing = max(_CLOSEST, duration / _STARTS)
+    for segment in segments:
+        cutter = cutter or Cutter(max(1, round(_PIECE_SECONDS / segment.dt)))
+        starts += [_starts(model, c, piece, spacing, step, shift) for piece in cutter.push(segment)]
+    starts += [_starts(model, c, piece, spacing, step, shift) for piece in (cutter.finish() if cutter else ())]
+    if not sum(x.shape[1] for x, _, _ in starts):
+        return total
+    x, u, y = (np.concatenate(parts, axis=-1) for parts in zip(*starts, strict=True))
+    found = np.stack(_angles_at_horizons(model, c, x, u, step))
+    judged = np.isfinite(y[:, 0])
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = np.where(judged[:, None], found - y, 0.0)
+        moved = np.where(judged[:, None], y - x[:2], 0.0)
+        squares = np.where(np.isnan(error), np.inf, error) ** 2
+    return RolloutScore(judged.sum(axis=1).astype(np.float64), squares.sum(axis=2), (moved**2).sum(axis=2))
+
+
+def time_step(model: Model, c: FloatArray) -> float:
+    """Time step in s that the stiffest friction of either joint, at rest, leaves stable; it divides the horizons."""
+    value = model.values(c)
+    k1, k3, k5 = abs(value["k1"]), value["k3"], value["k5"]
+    slope = np.abs(friction_slope(model, value, np.zeros((2, 1))))[:, 0]
+    outer, coupling, inner = k5 + k3 + 2 * k1, k3 + k1, k3 + value["j2"]
+    least = max(outer * inner - coupling**2, 1e-3 * outer * inner)
+    rate = float(max(slope[0] * inner, slope[1] * outer)) / least
+    step = _LONGEST
+    while step * rate > 1 and step > _SHORTEST:
+        step /= 2
+    return step
+
+
+def _starts(
+    model: Model, c: FloatArray, piece: Segment, spacing: float, step: float, shift: Shift
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """x, u and y of the starts in a piece of a log; only starts with the first horizon ahead of them."""
+    by, dt, n = PredictionFilter(), piece.dt, len(piece)
+    halves = 2 * round(HORIZONS[-1] / step) + 1
+    edge, first = round(by.dropped / dt), round(HORIZONS[0] / dt)
+    at = np.arange(edge, n - edge - first, max(1, round(spacing / dt)))
+    if n <= 6 * (by.order + 1) or not at.size:
+        return np.zeros((4, 0)), np.zeros((halves, 2, 0)), np.zeros((len(HORIZONS), 2, 0))
+    motion = motion_of(butterworth(piece.theta, dt, min(by.motion, 0.45 / dt), by.order), dt)
+    late = seconds(shift, dt) - model.values(c)["lag"]
+    when = at * dt + 0.5 * step * np.arange(halves)[:, None] - late
+    t = np.arange(n) * dt
+    width = max(1, round(step / dt))
+    ends, box = (width // 2, (width - 1) // 2), np.full(width, 1 / width)
+    tau = [np.convolve(np.pad(row, ends, "edge"), box, "valid") for row in piece.tau]
+    offset = 0.5 * dt * (1 - width % 2)  # of the mean over an even number of samples
+    u = np.stack([np.interp(when + offset, t, row) for row in tau], axis=1)
+    ahead = at + np.array([[horizon / dt] for horizon in HORIZONS])
+    y = np.stack([np.interp(ahead, np.arange(n), row) for row in motion.theta], axis=1)
+    y[np.broadcast_to((ahead > n - 1 - edge)[:, None], y.shape)] = np.nan
+    return np.concatenate([motion.theta[:, at], motion.omega[:, at]]), u, y
+
+
+def _angles_at_horizons(model: Model, c: FloatArray, x: FloatArray, u: FloatArray, step: float) -> list[FloatArray]:
+    """Angles (2, S) at each horizon, by the classical Runge-Kutta method of fourth order."""
+
+    def rate(x: FloatArray, tau: FloatArray) -> FloatArray:
+        return np.concatenate([x[2:], acceleration(model, c, x[:2], x[2:], tau)])
+
+    found: list[FloatArray] = []
+    ends = [round(horizon / step) for horizon in HORIZONS]
+    with np.errstate(all="ignore"):  # an arm far from the log's may run away: its error is infinite then
+        for number in range(ends[-1]):
+            begin, middle, end = u[2 * number : 2 * number + 3]
+            a = rate(x, begin)
+            b = rate(x + 0.5 * step * a, middle)
+            d = rate(x + 0.5 * step * b, middle)
+            x = x + step / 6 * (a + 2 * (b + d) + rate(x + step * d, end))
+            if number + 1 in ends:
+                found.append(x[:2])
+    return found

@@ -1,0 +1,216 @@
+"""A URDF file read back as an arm, so that one from CAD is judged on the same logs as a result.
+
+Two joints about one direction move; what is fixed to a link counts to it. θ1 is the angle of the line from joint 1 to
+joint 2 over the horizontal, θ2 that of link 2's line: to the tip, which is the last frame fixed to it, or,
+without one, to its centre of mass.
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from algid.arm import Arm, FloatArray
+from algid.errors import ResultError
+from algid.identification.source import Role
+from algid.identification.validate import Predictor
+from algid.model import Model
+
+GRAVITY = 9.81
+_PARALLEL = 1e-3  # sine of the angle between axes that count as one direction
+_BESIDE = 0.02  # of a link's length: a centre farther beside its line is told
+
+
+@dataclass(frozen=True, eq=False)
+class _Body:
+    """Mass, first moment (3,), second moment ∫ r rᵀ dm (3, 3) in the frame of a link."""
+
+    mass: float
+    moment: FloatArray
+    second: FloatArray
+
+    def moved(self, rotation: FloatArray, shift: FloatArray) -> _Body:
+        """The body in a frame in which its own stands at `shift`, turned by `rotation`."""
+        moment = rotation @ self.moment
+        second = rotation @ self.second @ rotation.T
+        cross = np.outer(moment, shift)
+        return _Body(
+            self.mass, moment + self.mass * shift, second + cross + cross.T + self.mass * np.outer(shift, shift)
+        )
+
+    def __add__(self, other: _Body) -> _Body:
+        return _Body(self.mass + other.mass, self.moment + other.moment, self.second + other.second)
+
+
+_NOTHING = _Body(0.0, np.zeros(3), np.zeros((3, 3)))
+
+
+def read_urdf(path: Path) -> tuple[Predictor, tuple[str, ...]]:
+    """The model of a URDF file for logs of the arm without payload, and sentences about what it cannot take over.
+
+    Raises
+    ------
+    ResultError
+        If it is no URDF of an arm with two joints about one direction.
+    """
+    try:
+        robot = ET.fromstring(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ResultError(f"{path}: cannot read it ({error.strerror}); expected a URDF file") from error
+    except (ET.ParseError, UnicodeDecodeError) as error:
+        raise ResultError(f"{path}: not XML ({error}); expected a URDF file") from error
+    try:
+        arm, friction, warnings = _Robot(robot).arm()
+    except (ValueError, KeyError, AttributeError) as error:
+        raise ResultError(
+            f"{path}: expected a URDF of an arm with two parallel joints: {error}; mend the file"
+        ) from error
+    model = Model(("coulomb",) if any(friction) else (), gravity=arm.g)
+    value = {f"k{number}": float(k) for number, k in enumerate(arm.constants(), start=1)}
+    value |= {"f1": friction[0], "f2": friction[1]}
+    c = np.array([value[name] for name in model.names])
+
+    def coefficients(role: Role) -> FloatArray:
+        if role == "loaded":
+            raise ResultError(f"{path}: a URDF file tells no payload; judge it on logs of the arm without one")
+        return c
+
+    return Predictor(model, coefficients), tuple(f"{path}: {warning}" for warning in warnings)
+
+
+class _Robot:
+    """The joints of a URDF file, by the link that they hang from."""
+
+    def __init__(self, robot: ET.Element) -> None:
+        self._links = {link.attrib["name"]: link for link in robot.findall("link")}
+        self._joints = robot.findall("joint")
+        self._moving = [joint for joint in self._joints if joint.attrib["type"] != "fixed"]
+        if len(self._moving) != 2 or {joint.attrib["type"] for joint in self._moving} - {"revolute", "continuous"}:
+            raise ValueError(f"found {len(self._moving)} moving joints, or not all of them turn")
+        inner = {joint.find("child").attrib["link"]: joint for joint in self._joints}  # type: ignore[union-attr]
+        self._parent = inner
+
+    def arm(self) -> tuple[Arm, tuple[float, float], list[str]]:
+        """The arm, its joints' Coulomb friction in N m, and what it does not take over."""
+        first, second = self._moving
+        base, place = self._frame(first)
+        if base in {self._child(first), self._child(second)} or self._frame(second)[0] != self._child(first):
+            first, second = second, first
+            base, place = self._frame(first)
+        if self._frame(second)[0] != self._child(first):
+            raise ValueError("the joints do not follow one another")
+        about = place[0] @ _axis(first)
+        turn, at = self._frame(second)[1]
+        if np.linalg.norm(np.cross(_axis(first), turn @ _axis(second))) > _PARALLEL:
+            raise ValueError("the joints' axes are not parallel")
+        warnings: list[str] = []
+        length, one = self._planar(self._child(first), _axis(first), at, warnings, "1")
+        tip = self._tip(self._child(second))
+        reach, two = self._planar(self._child(second), _axis(second), tip, warnings, "2")
+        tilt = math.sqrt(max(0.0, 1 - float(about[2]) ** 2))
+        g = GRAVITY * tilt if tilt > _PARALLEL else 0.0
+        arm = Arm(
+            m1=one[0], lc1=one[1], I1=one[2], l1=length, b1=_loss(first, "damping"),
+            m2=two[0], lc2=two[1], I2=two[2], l2=reach, b2=_loss(second, "damping"), g=g,
+        )  # fmt: skip
+        return arm, (_loss(first, "friction"), _loss(second, "friction")), warnings
+
+    def _child(self, joint: ET.Element) -> str:
+        return joint.find("child").attrib["link"]  # type: ignore[union-attr]
+
+    def _frame(self, joint: ET.Element) -> tuple[str, tuple[FloatArray, FloatArray]]:
+        """The moving link (or the base) that a joint hangs from, and where its frame stands there."""
+        rotation, at = _origin(joint)
+        link = joint.find("parent").attrib["link"]  # type: ignore[union-attr]
+        while link in self._parent and self._parent[link] not in self._moving:
+            turn, shift = _origin(self._parent[link])
+            rotation, at = turn @ rotation, shift + turn @ at
+            link = self._parent[link].find("parent").attrib["link"]  # type: ignore[union-attr]
+        return link, (rotation, at)
+
+    def _fixed(self, link: str) -> list[ET.Element]:
+        return [
+            joint for joint in self._joints
+            if joint not in self._moving and joint.find("parent").attrib["link"] == link  # type: ignore[union-attr]
+        ]  # fmt: skip
+
+    def _body(self, link: str) -> _Body:
+        body = _body_of(self._links[link])
+        for joint in self._fixed(link):
+            body = body + self._body(self._child(joint)).moved(*_origin(joint))
+        return body
+
+    def _tip(self, link: str) -> FloatArray:
+        body = self._body(link)
+        at, rotation = np.zeros(3), np.eye(3)
+        while self._fixed(link):
+            turn, shift = _origin(self._fixed(link)[-1])
+            at, rotation = at + rotation @ shift, rotation @ turn
+            link = self._child(self._fixed(link)[-1])
+        return at if np.linalg.norm(at) > 0 else body.moment / max(body.mass, 1e-300)
+
+    def _planar(
+        self, link: str, about: FloatArray, end: FloatArray, warnings: list[str], number: str
+    ) -> tuple[float, tuple[float, float, float]]:
+        """Length of a link in the plane, and its mass, centre along its line and inertia about its centre."""
+        body = self._body(link)
+        if body.mass <= 0:
+            raise ValueError(f"link {link} has no mass")
+        line = end - about * (about @ end)
+        length = float(np.linalg.norm(line))
+        if length == 0:
+            raise ValueError(f"link {link} has no length across its axis")
+        line = line / length
+        centre = body.moment / body.mass
+        beside = float(np.cross(about, line) @ centre)
+        if abs(beside) > _BESIDE * length:
+            warnings.append(f"the centre of link {number} lies {abs(beside):.3g} m beside its line, which is left out")
+        along = float(line @ centre)
+        second = float(np.trace(body.second) - about @ body.second @ about)  # about the joint
+        return length, (body.mass, along, second - body.mass * along**2)
+
+
+def _body_of(link: ET.Element) -> _Body:
+    inertial = link.find("inertial")
+    if inertial is None:
+        return _NOTHING
+    mass = float(inertial.find("mass").attrib["value"])  # type: ignore[union-attr]
+    told = inertial.find("inertia").attrib  # type: ignore[union-attr]
+    xx, yy, zz, xy, xz, yz = (float(told[name]) for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    return _Body(mass, np.zeros(3), second).moved(*_origin(inertial))
+
+
+def _origin(element: ET.Element) -> tuple[FloatArray, FloatArray]:
+    """Rotation and place of an element's origin: roll, pitch, yaw about fixed axes."""
+    origin = element.find("origin")
+    told = {} if origin is None else origin.attrib
+    roll, pitch, yaw = _three(told.get("rpy", "0 0 0"))
+    (a, b, c), (p, q, r) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
+    about_x = np.array([[1, 0, 0], [0, a, -p], [0, p, a]])
+    about_y = np.array([[b, 0, q], [0, 1, 0], [-q, 0, b]])
+    about_z = np.array([[c, -r, 0], [r, c, 0], [0, 0, 1]])
+    return about_z @ about_y @ about_x, _three(told.get("xyz", "0 0 0"))
+
+
+def _axis(joint: ET.Element) -> FloatArray:
+    axis = joint.find("axis")
+    found = _three("1 0 0" if axis is None else axis.attrib["xyz"])
+    return found / np.linalg.norm(found)
+
+
+def _three(text: str) -> FloatArray:
+    numbers = np.array([float(part) for part in text.split()])
+    if numbers.shape != (3,) or not np.all(np.isfinite(numbers)):
+        raise ValueError(f"expected three numbers, found {text!r}")
+    return numbers
+
+
+def _loss(joint: ET.Element, name: str) -> float:
+    dynamics = joint.find("dynamics")
+    return 0.0 if dynamics is None else float(dynamics.attrib.get(name, "0"))

@@ -1,0 +1,83 @@
+"""Simulations from many states of a log at once, against the simulator from each of them alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from algid.arm import FloatArray
+from algid.estimators.rollout import HORIZONS, RolloutScore, _angles_at_horizons, rollouts, time_step
+from algid.model import Model
+from algid.signals.segments import Segment
+from algid.synth.simulator import simulate
+from tests.export.arms import ODD
+
+K = ODD.constants()
+DT = 0.005
+
+
+def push(t: FloatArray) -> FloatArray:
+    """A torque (2, N) that swings the arm about hanging."""
+    return np.stack([2.5 * np.sin(4 * t), 0.7 * np.cos(5 * t)])
+
+
+@pytest.fixture(scope="module")
+def segment() -> Segment:
+    t = np.arange(0, 8 + DT / 2, DT)
+    moved = simulate(K, push, t)
+    return Segment(0.0, DT, moved.theta, moved.tau)
+
+
+def test_angles_are_the_simulators() -> None:
+    step = 2e-3
+    starts = np.array([[-1.5, -1.0], [0.2, -0.4], [1.0, -2.0], [0.5, 3.0]])
+    t = np.arange(2 * round(HORIZONS[-1] / step) + 1) * step / 2
+    u = np.repeat(push(t).T[:, :, None], 2, axis=2)
+    found = _angles_at_horizons(Model(), K, starts, u, step)
+    for start in range(2):
+        whole = simulate(K, push, np.array([0.0, *HORIZONS]), starts[:2, start], starts[2:, start])
+        for place, angles in enumerate(found):
+            np.testing.assert_allclose(angles[:, start], whole.theta[:, place + 1], rtol=0, atol=1e-7)  # step⁴ twice
+
+
+def test_the_true_arm_follows_the_log(segment: Segment) -> None:
+    score = rollouts(Model(), K, [segment], 8.0)
+    assert score.count[0] > score.count[1] > score.count[2] > 50
+    assert score.rmse.max() < 2e-3  # what the filter's ends and straight lines between samples leave
+    assert score.distance.max() > 0.3
+
+
+def test_a_wrong_arm_does_as_its_simulation_says(segment: Segment) -> None:
+    wrong = K * np.array([1, 1.1, 1, 1.1, 1, 1, 1])
+    score = rollouts(Model(), wrong, [segment], 8.0)
+    t = np.arange(len(segment)) * DT
+    true = simulate(K, push, t)
+    errors, starts = [], range(60, len(segment) - 60 - 100, 10)
+    for start in starts:
+        ends = np.array([t[start], t[start + 100]])
+        alone = simulate(wrong, push, ends, true.theta[:, start], true.omega[:, start])
+        errors.append(alone.theta[:, 1] - true.theta[:, start + 100])
+    np.testing.assert_allclose(score.rmse[1], np.sqrt(np.mean(np.square(errors), axis=0)), rtol=0.02)
+
+
+def test_a_delay_that_is_known_is_made_up_for(segment: Segment) -> None:
+    late = Segment(0.0, DT, segment.theta[:, 8:], segment.tau[:, 8:])
+    early = Segment(0.0, DT, segment.theta[:, 8:], segment.tau[:, :-8])  # torques that act 8 samples before their stamp
+    good = rollouts(Model(), K, [late], 8.0).rmse
+    np.testing.assert_allclose(rollouts(Model(), K, [early], 8.0, -8 * DT).rmse, good, rtol=0.1, atol=1e-4)
+    assert rollouts(Model(), K, [early], 8.0).rmse[1].min() > 10 * good[1].max()
+
+
+def test_short_logs_have_no_starts_and_wild_arms_no_bounds(segment: Segment) -> None:
+    short = rollouts(Model(), K, [segment.part(0, 100)], 0.5)
+    assert isinstance(short, RolloutScore)
+    assert not short.count.any()
+    assert np.isnan(short.rmse).all()
+    wild = rollouts(Model(), K * np.array([1, 1, 1, 1, 1, -500, -500]), [segment], 8.0)
+    assert np.isinf(wild.rmse[2]).all()
+
+
+def test_stiff_friction_shortens_the_step() -> None:
+    assert time_step(Model(), K) == 2e-3
+    stiff = Model(("coulomb",), coulomb_speed=0.01)
+    assert time_step(stiff, np.append(K, [0.3, 0.2])) < 1e-3
