@@ -234,7 +234,7 @@ class FitSummary(_Model):
     def _covariance_is_square(self) -> FitSummary:
         size = len(self.covariance_names)
         if [len(row) for row in self.covariance] != [size] * size:
-            raise ValueError(f"covariance should have {size} rows of {size} numbers, as covariance_names")
+            raise ValueError(f"covariance should have {size} rows of {size} numbers")
         return self
 
 

@@ -421,7 +421,7 @@ def _solved(sums: _Sums, family: Convention, T: FloatArray) -> tuple[FloatArray,
     weight = np.broadcast_to(1 / power, (T.shape[0], 2))
     for _ in range(_REWEIGHTINGS):
         normal = np.einsum("za,zaij->zij", weight, gram)
-        size = np.sqrt(np.maximum(np.einsum("zii->zi", normal), 1e-300))
+        size = np.sqrt(np.maximum(np.einsum("zii->zi", normal), 1e-140))
         unit = normal / (size[:, :, None] * size[:, None, :]) + 1e-12 * np.eye(T.shape[2])
         inverse = np.linalg.inv(unit) / (size[:, :, None] * size[:, None, :])
         c = np.einsum("zij,za,zaj->zi", inverse, weight, aimed)

@@ -17,12 +17,14 @@ from algid.estimators.prediction import PredictionSums, cross_validate
 from algid.estimators.selection import CHOICE, Selection, needs_shape, select
 from algid.identification.source import LogSource, Survey
 from algid.identification.velocities import with_velocities
-from algid.model import Model
+from algid.model import TERMS, Model
 from algid.results import Result
 from algid.runtime import beside
 from algid.settings import Settings
 from algid.signals.segments import Segment
 
+NOTHING = 2.0
+"""Standard deviations: a coefficient nearer to zero is not told from it."""
 Pass = Callable[[], Iterable[Segment]]
 Predictions = Mapping[LogSource, PredictionSums]
 """What scores a prediction of a log by any coefficients."""
@@ -97,6 +99,30 @@ def run_fit(survey: Survey, settings: Settings, chosen: Selection, prior: Prior 
     except ValueError as error:
         raise _too_short(survey, error) from error
     return constrained(fit) if settings.constrain else fit, sums
+
+
+def without_nothing(chosen: Selection, fit: Fit, settings: Settings) -> Selection:
+    """The selection without the terms that the logs chose and whose coefficients the fit finds to be nothing.
+
+    A term may earn its place before the weak estimator by what differentiation leaves behind; the efficient fit then
+    finds each of its coefficients within `NOTHING` standard deviations of zero.
+    """
+    if chosen.chosen_by != "logs":
+        return chosen
+    size = dict(zip(fit.names, np.abs(fit.values) / np.maximum(fit.std, 1e-300), strict=True))
+    nothing = {
+        term
+        for term in chosen.model.terms
+        if term not in settings.terms and all(size.get(name, 0.0) < NOTHING for name in TERMS[term].names)
+    }
+    trials = tuple(
+        replace(trial, kept=False, reason="the fit finds it to be zero within its error")
+        if trial.term in nothing
+        else trial
+        for trial in chosen.trials
+    )
+    terms = tuple(term for term in chosen.model.terms if term not in nothing)
+    return replace(chosen, model=replace(chosen.model, terms=terms), trials=trials) if nothing else chosen
 
 
 def _foretelling(

@@ -157,7 +157,7 @@ def _by_the_paper(survey: Survey, settings: Settings, earlier: Earlier | None, f
 
 
 def _by_likelihood(survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None) -> Result:
-    from algid.identification.by_likelihood import choose_model, prior_of, run_fit
+    from algid.identification.by_likelihood import choose_model, prior_of, run_fit, without_nothing
     from algid.identification.summary import outcome_of
 
     survey.begin("choosing terms")
@@ -165,6 +165,9 @@ def _by_likelihood(survey: Survey, settings: Settings, earlier: Earlier | None, 
     prior = None if earlier is None else prior_of(earlier.result, chosen.model, earlier.file)
     survey.begin("fitting")
     fit, predictions = run_fit(survey, settings, chosen, prior)
+    fewer = without_nothing(chosen, fit, settings)
+    if fewer != chosen:
+        chosen, (fit, predictions) = fewer, run_fit(survey, settings, fewer, prior)
     survey.begin("prediction")
     outcome = outcome_of(fit, predictions, survey, settings, chosen)
     if folder is not None:

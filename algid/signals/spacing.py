@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from algid.arm import FloatArray
 from algid.log import IntArray, Log, join
 
+BRIDGE = 16  # samples
 NEAR = 0.3
 """Periods: nodes of a cubic this far apart still carry noise of at most twice one sample's."""
 
@@ -48,16 +49,33 @@ def spaced(blocks: Iterable[Log], period: float) -> Iterator[Log]:
                 held = join([held, block])
                 continue
             held = join([held, block.part(0, int(far[0]))]) if far[0] else held
-            yield _settled(held, before, period)
+            settled: list[Log] = [_settled(held, before, period)]
             before, rest = held.part(len(held) - 1, len(held)), block.part(int(far[0]), len(block))
+        else:
+            settled = []
         far = np.flatnonzero(np.diff(rest.stamp_ns) >= near_ns)
         last = int(far[-1]) + 1 if far.size else 0
         if last:
-            yield _settled(rest.part(0, last), before, period)
+            settled.append(_settled(rest.part(0, last), before, period))
             before = rest.part(last - 1, last)
+        yield from _bridged(settled)
         held = rest.part(last, len(rest))
     if held is not None:
         yield _settled(held, before, period)
+
+
+def _bridged(settled: list[Log]) -> Iterator[Log]:
+    """What is settled, without a crumb of a block: the last cluster of a block with `BRIDGE` samples of the next.
+
+    Whether samples lie on the grid is judged a block at a time, and a crumb of one sample lies on it by chance.
+    """
+    if len(settled) < 2:
+        yield from settled
+        return
+    crumb, piece = settled
+    yield join([crumb, piece.part(0, BRIDGE)])
+    if len(piece) > BRIDGE:
+        yield piece.part(BRIDGE, len(piece))
 
 
 def near_stamps(stamp_ns: IntArray, period: float) -> int:

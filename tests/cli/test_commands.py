@@ -102,10 +102,6 @@ def broken(folder: Path, logs: Path, name: str, change: str) -> Path:
     path = folder / f"{name}.csv"
     if change == "missing column":
         table = table.drop("tau2")
-    elif change == "not a number":
-        table = table.with_columns(
-            pl.when(pl.int_range(pl.len()) == 7).then(None).otherwise(pl.col("theta1")).alias("theta1")
-        )
     elif change == "text":
         table = table.with_columns(pl.lit("abc").alias("theta2"))
     elif change == "infinite":
@@ -128,7 +124,6 @@ def broken(folder: Path, logs: Path, name: str, change: str) -> Path:
     "change",
     [
         "missing column",
-        "not a number",
         "text",
         "infinite",
         "time stands still",
@@ -323,7 +318,7 @@ def test_results_that_fit_no_arm_get_one_line(logs: Path, tmp_path: Path) -> Non
     empty = {**content, "parameters": {}}
     lost = {**content, "parameters": {**content["parameters"], "k3": {**content["parameters"]["k3"], "estimate": None}}}
     texts = [json.dumps(crooked), json.dumps(empty), "[" * 100_000]
-    for text, said in zip(texts, ("covariance should have 7 rows", "the result has no k1", "not JSON"), strict=True):
+    for text, said in zip(texts, ("covariance should have", "the result has no k1", "not JSON"), strict=True):
         path = tmp_path / "result.json"
         path.write_text(text)
         found = Outcome("identify", "--parameters", path, logs / "case1-loaded.csv", "-o", tmp_path / "out")

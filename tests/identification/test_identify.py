@@ -198,11 +198,16 @@ def test_a_result_names_the_estimator_whose_numbers_it_holds(shared_data: Path) 
     logs = sorted((shared_data / "dfki" / "C1_sysid").glob("*.csv"))
     profile = with_settings(Profile(), {"zero": "hanging"})
     result = identify(logs[:3], None, Settings(friction="coulomb"), profile=profile)
-    weak = identify(logs[:3], None, Settings(friction="coulomb", estimator="weak"), profile=profile)
-    assert result.estimator == "weak"
+    assert result.estimator in ("weak", "instruments")  # whichever foretells the logs left out better
     assert result.settings["estimator"] == "refined"
-    assert result.parameters == weak.parameters
-    assert "by the weak estimator in place of the refined one" in verdict(result).sentence
+    own = identify(logs[:3], None, Settings(friction="coulomb", estimator=result.estimator), profile=profile)  # type: ignore[arg-type]
+    for name, found in own.parameters.items():
+        shown = result.parameters[name]
+        assert found.estimate is not None
+        assert shown.estimate is not None
+        assert found.std is not None
+        assert abs(shown.estimate - found.estimate) < 0.1 * found.std  # iterations from another start
+    assert f"by the {result.estimator} estimator in place of the refined one" in verdict(result).sentence
     jitter = [warning for warning in result.warnings if "JITTER" in warning]
     assert len(jitter) == 1
     assert f"likewise in 1 other log ({logs[1].name})" in jitter[0]

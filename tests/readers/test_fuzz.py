@@ -1,4 +1,4 @@
-"""A short run of the hostile files of `make fuzz`: each is read, told or refused, and a batch over them ends."""
+"""A short run of the hostile files of `make fuzz`: each is read, told or refused."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ def result(files: tuple[Path, Path]) -> TrackResult:
 
 def test_the_sentence_tells_changes_and_masses(result: TrackResult) -> None:
     judged = verdict(result)
-    assert judged.level == "good"
+    assert judged.level == "good", judged
     assert re.fullmatch(
         r"Good: the payload changes twice at 1\.\d+ and [23]\.\d+ s, "
         r"weighing -?0\.00\d+, 0\.0[45]\d+ and -?0\.00\d+ kg, "

@@ -2,7 +2,7 @@
 
 The content of the small records is parsed by the `mcap` package; what it raises on damaged bytes is turned into
 `DamagedError` here and nowhere else. Chunks are unpacked with a bound on what they claim, and always checked
-against their CRC. By hand, since the package's readers parse every record on the way: 8 times slower.
+against their CRC. By hand, since the package's readers parse every record on the way.
 """
 
 from __future__ import annotations
