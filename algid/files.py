@@ -9,6 +9,7 @@ import fcntl
 import glob
 import os
 import reprlib
+import secrets
 import shutil
 import tempfile
 import time
@@ -35,14 +36,14 @@ def whole_file(path: Path) -> Iterator[Path]:
     OutputError
         If the folder cannot be made or written to.
     """
+    temporary = path.parent / f".{path.name}.{secrets.token_hex(4)}"  # named before it is made, as below
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        os.close(handle)
-    except OSError as error:
-        raise OutputError(f"{path}: cannot write there ({error.strerror}); choose another folder with -o") from error
-    temporary = Path(name)
-    try:
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            temporary.touch(mode=0o600, exist_ok=False)
+        except OSError as error:
+            text = f"{path}: cannot write there ({error.strerror}); choose another folder with -o"
+            raise OutputError(text) from error
         yield temporary
         temporary.chmod(0o666 & ~_umask())
         temporary.replace(path)
@@ -114,13 +115,15 @@ def whole_folder(folder: Path, force: bool) -> Iterator[Path]:
         If the folder cannot be made or written to, or exists and `force` is not set.
     """
     refuse_existing(folder, force)
+    # Named before it is made: a signal may come as soon as it stands, and it must be taken away then too.
+    temporary = folder.parent / f".{folder.name}.{secrets.token_hex(4)}"
     try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot write there ({error.strerror}); choose another folder with -o") from error
-    try:
-        temporary.chmod(0o755)
+        try:
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            temporary.mkdir(mode=0o755)
+        except OSError as error:
+            text = f"{folder}: cannot write there ({error.strerror}); choose another folder with -o"
+            raise OutputError(text) from error
         with _held(temporary, strictly=False):
             yield temporary
         _swap(temporary, folder)
