@@ -110,6 +110,7 @@ def test_commands_run_as_they_stand(page: str, tmp_path: Path, request: pytest.F
 
 
 @pytest.mark.slow
+@pytest.mark.skipif("CI" in os.environ, reason="CI runs in a clean clone that it has just installed")
 def test_the_readme_installs_from_a_clean_clone(tmp_path: Path) -> None:
     """With the network: what `make setup` installs has to be had."""
     block = next(one for one in blocks(PAGES["README"].read_text(encoding="utf-8")) if one.info == "sh install")
