@@ -8,7 +8,8 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.design.campaign import SECOND, Design
-from algid.report.figures.base import Figure, Legend, Panel, Trace, axis, label, level, line, packed, times
+from algid.report.figures.base import Figure, Legend, Panel, Trace, axis, level, line
+from algid.report.figures.information import information_panel
 
 POINTS = 2_000
 SCALE = [[0, "@card"], [1, "@blue"]]
@@ -62,22 +63,6 @@ def _panel(design: Design, what: str, values: FloatArray, title: str, limits: tu
 def _teaching(design: Design) -> Figure:
     shares = 100 * design.shares
     x = (np.arange(shares.shape[1]) + 0.5) * SECOND
-    trace = {
-        "type": "heatmap",
-        "x": times(x),
-        "y": [label(name) for name in design.names],
-        "z": {**packed(shares), "shape": f"{shares.shape[0]}, {shares.shape[1]}"},
-        "zmin": 0,
-        "zmax": float(shares.max()),
-        "colorscale": SCALE,
-        "ygap": 3,
-        "hovertemplate": "%{y}: %{z:.3g} % of its information<br>about %{x:.1f} s<extra></extra>",
-        "colorbar": {"thickness": 10, "outlinewidth": 0, "ticksuffix": " %", "nticks": 4},
-    }
-    layout = {
-        "xaxis": axis("time, s", showgrid=False),
-        "yaxis": axis(type="category", autorange="reversed", showgrid=False),
-    }
-    panel = Panel([trace], layout, "Share of each parameter's information by time", height=120 + 28 * len(design.names))
+    panel = information_panel(design.names, x, shares, SCALE)
     reading = "Read: strongly coloured seconds teach most; cut the motion there, and that parameter's error bar grows."
     return Figure("teaching", "Which second teaches what", (panel,), reading)

@@ -87,24 +87,9 @@ def steered(
     Parameters and results as for `simulate`; a controller pulls errors together, so its tolerance is wider:
     angles within 1e-8 rad of the exact solution.
     """
-    reached = reached or (lambda _now: None)
-
-    def step(now: float, _state: FloatArray) -> float:
-        reached(now)
-        return 1.0
-
-    solution = solve_ivp(
-        lambda now, state: _rate(k, state, controller(now, state)),
-        (t[0], t[-1]),
-        np.concatenate([theta0, np.zeros(2)]),
-        method="DOP853",
-        t_eval=t,
-        rtol=STEERED_TOLERANCE,
-        atol=STEERED_TOLERANCE,
-        max_step=LONGEST_STEP,
-        events=step,
-    )
-    states: FloatArray = solution.y
+    start = np.concatenate([theta0, np.zeros(2)])
+    tolerances = (STEERED_TOLERANCE, STEERED_TOLERANCE)
+    states = _integrated(k, controller, t, start, tolerances, reached or (lambda _now: None))
     tau = np.stack([controller(now, state) for now, state in zip(t.tolist(), states.T, strict=True)], axis=1)
     return Motion(t=t, theta=states[:2], omega=states[2:], tau=tau)
 
@@ -125,19 +110,32 @@ def _smooth(
     k: FloatArray, torque: Torque, t: FloatArray, start: FloatArray, reached: Callable[[float], None]
 ) -> FloatArray:
     """States (4, N) under a smooth torque."""
+    tolerances = (RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE)
+    return _integrated(k, lambda now, _state: torque(np.array([now]))[:, 0], t, start, tolerances, reached)
+
+
+def _integrated(
+    k: FloatArray,
+    drive: Callable[[float, FloatArray], FloatArray],
+    t: FloatArray,
+    start: FloatArray,
+    tolerances: tuple[float, float],
+    reached: Callable[[float], None],
+) -> FloatArray:
+    """States (4, N) at `t` under a torque (2,) of time and state, to relative and absolute `tolerances`."""
 
     def step(now: float, _state: FloatArray) -> float:
         reached(now)
         return 1.0  # an event that never comes: scipy asks for it once a step
 
     solution = solve_ivp(
-        lambda now, state: _rate(k, state, torque(np.array([now]))[:, 0]),
+        lambda now, state: _rate(k, state, drive(now, state)),
         (t[0], t[-1]),
         start,
         method="DOP853",
         t_eval=t,
-        rtol=RELATIVE_TOLERANCE,
-        atol=ABSOLUTE_TOLERANCE,
+        rtol=tolerances[0],
+        atol=tolerances[1],
         max_step=LONGEST_STEP,
         events=step,
     )

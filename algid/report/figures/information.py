@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.report.figures.base import Figure, Missing, Panel, axis, label, packed, times
+from algid.report.figures.base import Figure, Layout, Missing, Panel, axis, label, packed, times
 from algid.report.figures.timeline import offsets, separators
 from algid.report.reduce import Block, blocks, by_log, columns_of
 from algid.report.series import LogRange
@@ -16,7 +18,8 @@ from algid.results import Result
 
 TITLE = "Information per second of log"
 MOST_CELLS = 600
-SCALE = [[0, "@page"], [0.5, "@blue/0.55"], [1, "@blue"]]
+Scale = list[list[Any]]
+SCALE: Scale = [[0, "@page"], [0.5, "@blue/0.55"], [1, "@blue"]]
 
 
 def information(path: Path, result: Result) -> Figure | Missing:
@@ -57,6 +60,13 @@ def _shares(gained: FloatArray) -> FloatArray:
 
 
 def _panel(names: list[str], x: FloatArray, shares: FloatArray, result: Result, ranges: dict[int, LogRange]) -> Panel:
+    return information_panel(names, x, shares, SCALE, separators(ranges, offsets(ranges), result.logs))
+
+
+def information_panel(
+    names: Sequence[str], x: FloatArray, shares: FloatArray, scale: Scale, more: Layout | None = None
+) -> Panel:
+    """Percent `shares` (Q, n) of each parameter's information at times `x` (n,) in s; `more` joins the layout."""
     trace = {
         "type": "heatmap",
         "x": times(x),
@@ -64,7 +74,7 @@ def _panel(names: list[str], x: FloatArray, shares: FloatArray, result: Result, 
         "z": {**packed(shares), "shape": f"{shares.shape[0]}, {shares.shape[1]}"},
         "zmin": 0,
         "zmax": float(shares.max()) or 1.0,
-        "colorscale": SCALE,
+        "colorscale": scale,
         "ygap": 3,
         "hovertemplate": "%{y}: %{z:.3g} % of its information<br>about %{x:.1f} s<extra></extra>",
         "colorbar": {"thickness": 10, "outlinewidth": 0, "ticksuffix": " %", "nticks": 4},
@@ -72,7 +82,7 @@ def _panel(names: list[str], x: FloatArray, shares: FloatArray, result: Result, 
     layout = {
         "xaxis": axis("time, s", showgrid=False),
         "yaxis": axis(type="category", autorange="reversed", showgrid=False),
-        **separators(ranges, offsets(ranges), result.logs),
+        **(more or {}),
     }
     return Panel([trace], layout, "Share of each parameter's information by time", height=120 + 28 * len(names))
 
