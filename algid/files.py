@@ -50,7 +50,8 @@ def whole_file(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise OutputError(f"{path}: cannot write ({error.strerror}); choose another folder with -o") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # it may never have been made: what is told is why, not that
+            temporary.unlink()
 
 
 def _umask() -> int:
