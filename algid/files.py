@@ -5,12 +5,15 @@ TOML files are checked against a pydantic model, with errors that name file, pla
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import glob
+import io
 import os
 import reprlib
 import secrets
 import shutil
+import stat
 import tempfile
 import time
 import tomllib
@@ -60,6 +63,42 @@ def _umask() -> int:
     return mask
 
 
+LARGEST_TEXT = 1 << 26
+"""Bytes of a file that is read whole: profiles, limits, manifests, results have some thousand."""
+
+
+def read_whole(path: Path) -> bytes:
+    """The content of a file that an option names, or that stands in a result's folder.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read, has more than `LARGEST_TEXT` bytes, or is no regular file: a pipe would be waited for,
+        and a device has no end.
+    """
+    handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)  # else opening a pipe waits already
+    with os.fdopen(handle, "rb") as stream:
+        found = os.fstat(handle)
+        if not stat.S_ISREG(found.st_mode):
+            raise OSError(errno.EINVAL, "it is no regular file", str(path))
+        if found.st_size > LARGEST_TEXT:
+            raise OSError(errno.EFBIG, f"it has more than {LARGEST_TEXT >> 20} MiB", str(path))
+        return stream.read()
+
+
+def read_text(path: Path, encoding: str = "utf-8") -> str:
+    """The text of a file, with its line ends as "\\n": see `read_whole`.
+
+    Raises
+    ------
+    OSError
+        As `read_whole`.
+    UnicodeDecodeError
+        If it is not in `encoding`.
+    """
+    return io.TextIOWrapper(io.BytesIO(read_whole(path)), encoding=encoding).read()
+
+
 def read_toml(path: Path, model: type[ModelT]) -> ModelT:
     """Read `path` as a `model`.
 
@@ -71,7 +110,7 @@ def read_toml(path: Path, model: type[ModelT]) -> ModelT:
     from pydantic import ValidationError
 
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = tomllib.loads(read_text(path))
     except OSError as error:
         raise SettingError(f"{path}: cannot read it ({error.strerror}); check the name") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:

@@ -18,7 +18,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from algid.errors import ResultError
-from algid.files import first_misfit, whole_file
+from algid.files import first_misfit, read_text, whole_file
 
 SCHEMA_VERSION: Literal[2] = 2
 READABLE = (1, 2)
@@ -354,7 +354,7 @@ def read_result(path: str | Path) -> Result:
     path = Path(path)
     file = path / "result.json" if path.is_dir() else path
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
+        content = json.loads(read_text(file))
     except OSError as error:
         raise ResultError(f"{file}: cannot read it ({error.strerror}); expected a result of algid identify") from error
     except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:

@@ -57,7 +57,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "arm errors estimators files identification log model progress report results signals synth writers",
         "numpy polars pydantic scipy",
     ),
-    "export": room("arm errors identification model report results", "numpy scipy"),
+    "export": room("arm errors files identification model report results", "numpy scipy"),
     "fleet": room("errors files progress report", "numpy polars scipy"),
     "cli": room(
         "batch check design errors estimators export files "

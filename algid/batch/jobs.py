@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import csv
 import glob
+import io
 import math
 import os
 import re
@@ -23,6 +24,7 @@ from datetime import datetime
 from pathlib import Path
 
 from algid.errors import SettingError
+from algid.files import read_text
 from algid.stores import is_url, list_urls
 
 Label = str | float | int | bool
@@ -112,7 +114,7 @@ def read_manifest(path: Path) -> list[Job]:
 
 
 def _toml_rows(path: Path) -> list[tuple[str, Mapping[str, object]]]:
-    content = tomllib.loads(path.read_text(encoding="utf-8"))
+    content = tomllib.loads(read_text(path))
     tables = content.get("job")
     if not isinstance(tables, list) or set(content) != {"job"}:
         raise SettingError(f"{path}: expected tables [[job]] alone, found {', '.join(content) or 'nothing'}")
@@ -120,8 +122,7 @@ def _toml_rows(path: Path) -> list[tuple[str, Mapping[str, object]]]:
 
 
 def _csv_rows(path: Path) -> Iterable[tuple[str, Mapping[str, object]]]:
-    with path.open(encoding="utf-8-sig", newline="") as stream:
-        rows = list(csv.DictReader(stream))
+    rows = list(csv.DictReader(io.StringIO(read_text(path, "utf-8-sig"))))
     if any(None in row for row in rows):
         raise SettingError(f"{path}: a row has more cells than the header; quote commas within a cell")
     return [(f"row {number}", {k: v for k, v in row.items() if v}) for number, row in enumerate(rows, 1)]

@@ -16,6 +16,7 @@ import numpy as np
 
 from algid.arm import Arm, FloatArray
 from algid.errors import ResultError
+from algid.files import read_text
 from algid.identification.source import Role
 from algid.identification.validate import Predictor
 from algid.model import Model
@@ -58,7 +59,7 @@ def read_urdf(path: Path) -> tuple[Predictor, tuple[str, ...]]:
         If it is no URDF of an arm with two joints about one direction.
     """
     try:
-        robot = ET.fromstring(path.read_text(encoding="utf-8"))
+        robot = ET.fromstring(read_text(path))
     except OSError as error:
         raise ResultError(f"{path}: cannot read it ({error.strerror}); expected a URDF file") from error
     except (ET.ParseError, UnicodeDecodeError) as error:

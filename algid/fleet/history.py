@@ -53,6 +53,9 @@ def read_jobs(path: Path) -> pl.DataFrame:
     """
     import polars as pl
 
+    if not path.is_file():
+        found = "it is no regular file" if path.exists() else "there is no such file"
+        raise ResultError(f"{path}: {found}; expected jobs.parquet of algid batch")
     try:
         names = list(pl.read_parquet_schema(path))
         wanted = [n for n in names if n in ("job", "robot", "time", "status", "label_payload", "m_p", "m_p_std")]

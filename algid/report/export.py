@@ -75,7 +75,7 @@ def start_stamps(path: Path, logs: int) -> list[int]:
 
 
 def _write_torques(writer: Writer, path: Path, logs: int, told: Told | None) -> None:
-    if not path.exists():
+    if not path.is_file():
         return
     starts = start_stamps(path, logs)
     schema = writer.register_schema(JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode())
@@ -100,7 +100,7 @@ def _write_torques(writer: Writer, path: Path, logs: int, told: Told | None) -> 
 
 def write_series(writer: Writer, path: Path, topic: str) -> None:
     """Write a Parquet series, a message a row and a field a column but ``t``; nothing where there is no file."""
-    if not path.exists():
+    if not path.is_file():
         return
     [start] = start_stamps(path, 1)
     names = [name for name in columns_of(path) if name != "t"]

@@ -41,7 +41,7 @@ def gallery(folder: Path, result: Result, told: Told | None = None) -> Gallery:
     series, loaded, seconds = (folder / f"{name}.parquet" for name in ("estimates", "loaded", "information"))
     paper = [_try("convergence", "Convergence of the estimates", series, lambda: convergence(series, result))]
     figures: list[Figure | Missing] = []
-    if loaded.exists():
+    if loaded.is_file():
         paper.append(
             _try("loaded", "Convergence, loaded log", loaded, lambda: convergence(loaded, result, loaded=True))
         )
@@ -80,7 +80,7 @@ def drawable(result: Result) -> Result:
 
 def _torque_log(path: Path, told: Told | None) -> TorqueLog | Missing:
     title = f"{TORQUE}, residual, coverage"
-    if not path.exists():
+    if not path.is_file():
         return Missing("torque", title, _absent(path))
     try:
         return read_torque(path, told)
@@ -89,7 +89,7 @@ def _torque_log(path: Path, told: Told | None) -> TorqueLog | Missing:
 
 
 def _try(key: str, title: str, file: Path, make: Callable[[], Figure | Missing]) -> Figure | Missing:
-    if not file.exists():
+    if not file.is_file():
         return Missing(key, title, _absent(file))
     try:
         return make()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from algid import __version__
 from algid.errors import LogError
+from algid.files import read_whole
 from algid.identification.identify import reused
 from algid.identification.source import LogLike, Survey, open_source, read_otherwise
 from algid.report.verdict import verdict
@@ -84,4 +85,4 @@ def track_log(
 
 def _sha256(parameters: Path) -> str:
     file = parameters / "result.json" if parameters.is_dir() else parameters
-    return hashlib.sha256(file.read_bytes()).hexdigest()
+    return hashlib.sha256(read_whole(file)).hexdigest()
