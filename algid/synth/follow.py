@@ -25,7 +25,7 @@ import numpy as np
 
 from algid.arm import FloatArray, mass_matrix
 from algid.errors import SettingError
-from algid.synth.simulator import Motion, steered
+from algid.synth.simulator import Driven, Motion, steered
 
 STIFFNESS = 2 * np.pi * 10.0
 _KNOTS = 200.0  # a second, at most: a plan is smooth
@@ -101,11 +101,14 @@ def follow(
     spline = make_interp_spline(plan.t[kept], wanted.T, k=min(5, kept.size - 1))
     end = plan.duration
 
-    def controller(now: float, state: FloatArray) -> FloatArray:
-        at = spline(min(now, end))
-        m11, m12, m22 = mass_matrix(inertia, state[:2])
-        push = STIFFNESS**2 * (at[:2] - state[:2]) + 2 * STIFFNESS * (at[2:4] - state[2:])
-        feedback = np.array([m11 * push[0] + m12 * push[1], m12 * push[0] + m22 * push[1]])
-        return at[4:] + feedback
+    def controller(times: FloatArray) -> Driven:
+        at = spline(np.minimum(times, end)).T
 
-    return steered(k, controller, t, plan.theta[:, 0], reached)
+        def torque(theta: FloatArray, omega: FloatArray) -> FloatArray:
+            m11, m12, m22 = mass_matrix(inertia, theta)
+            push = STIFFNESS**2 * (at[:2] - theta) + 2 * STIFFNESS * (at[2:4] - omega)
+            return at[4:] + np.stack([m11 * push[0] + m12 * push[1], m12 * push[0] + m22 * push[1]])
+
+        return torque
+
+    return steered(k, controller, t, plan.theta[:, 0], spline.t, reached)

@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from algid.arm import energy, forward_dynamics
+from algid.errors import SettingError
 from algid.signals.differences import integral
 from algid.synth.cases import load_case
 from algid.synth.excitation import Hold, SampledTorque, Torque, no_torque, wide_multi_sine
@@ -55,6 +56,11 @@ def test_angles_agree_with_an_implicit_integrator() -> None:
 
     other = solve_ivp(rate, (0, 0.3), [-np.pi / 2, 0, 0, 0], method="Radau", t_eval=t, rtol=1e-11, atol=1e-12).y
     np.testing.assert_allclose(motion.theta, other[:2], atol=1e-9)
+
+
+def test_a_torque_that_no_arm_bears_is_refused() -> None:
+    with pytest.raises(SettingError, match=r"grows without bound .* weaker torque"):
+        simulate(K, lambda now: np.full((2, now.size), 1e30), np.linspace(0, 1, 11))
 
 
 @pytest.mark.parametrize("hold", ["zoh", "foh"])

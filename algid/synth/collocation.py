@@ -1,0 +1,202 @@
+"""Gauss collocation of equations of motion: all nodes of a window at once, where steppers go one by one.
+
+    ω(t) = ω₀ + ∫ α(s, θ, ω) ds,   θ(t) = θ₀ + ∫ ω ds,   α interpolated at each piece's Gauss-Legendre nodes
+
+With Q, which integrates from the window's start to each node, the velocities W at the nodes solve
+
+    W = ω₀ + Q α(θ₀ + Q W, W)      by      (I − Q ∂α/∂ω − Q² ∂α/∂θ) δ = ω₀ + Q α − W,   W ← W + δ
+
+the simplified Newton method of implicit Runge-Kutta methods (Hairer and Wanner, Solving Ordinary Differential
+Equations II, IV.8). The method has order 2s, and between the nodes its polynomial, so that a sample costs no step.
+
+======  =======================================================  ==========
+symbol  name                                                     shape
+======  =======================================================  ==========
+θ, ω    angles and velocities, x both                            (n, ...)
+α       accelerations                                            (n, P, s)
+P, s    pieces of a window, nodes of a piece                     -
+Q       integrals from the window's start to every node          (Ps, Ps)
+t       times at which states are asked for                      (N,)
+======  =======================================================  ==========
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf
+
+import numpy as np
+from numpy.polynomial.legendre import leggauss, legvander
+
+from algid.arm import FloatArray
+
+Acceleration = Callable[[FloatArray, FloatArray], FloatArray]
+"""Accelerations (n, M) from angles (n, M) and velocities (n, M), at times that are known already."""
+
+NODES = 16
+TOLERANCE = 1e-12
+LONGEST = 0.05  # s: nothing of interest changes unseen within it
+SHORTEST = 1e-9  # s
+TURNS = 10
+"""What the iteration of a window may take: more, and it is too long."""
+MOST_PIECES = 4
+"""Pieces in a window: more cost more to solve for than they save in calls."""
+_SLOPE = 1e-6  # rad and rad/s, for the derivatives of α: they only steer the iteration
+
+
+_X, _WEIGHTS = leggauss(NODES)
+_ORDERS = np.arange(NODES)
+_COEFFICIENTS = (_ORDERS + 0.5)[:, None] * legvander(_X, NODES - 1).T * _WEIGHTS
+"""From values at the nodes to coefficients of Legendre's polynomials: exact up to the degree 2s − 1."""
+
+
+def _integrals(x: FloatArray) -> FloatArray:
+    """∫ P_j from −1 to x, j = 0 … s − 1: (..., s), by (P_{j+1} − P_{j−1}) / (2j + 1)."""
+    P = legvander(x, NODES)
+    before = np.concatenate([-np.ones_like(P[..., :1]), P[..., : NODES - 1]], axis=-1)
+    return (P[..., 1:] - before) / (2 * _ORDERS + 1)
+
+
+_TO_NODES = _integrals(_X) @ _COEFFICIENTS
+
+
+def _from_start(half: FloatArray) -> FloatArray:
+    """Q (Ps, Ps) for pieces of half lengths `half` (P,), s."""
+    earlier = np.tri(half.size, k=-1)[:, None, :, None] * _WEIGHTS
+    own = np.eye(half.size)[:, None, :, None] * _TO_NODES[None, :, None, :]
+    return ((earlier + own) * half[:, None]).reshape(2 * (half.size * NODES,))
+
+
+@dataclass(frozen=True)
+class Window:
+    """The polynomials that the iteration of a window found: rates (2n, P, s) of the state (2n,) at `edges` (P + 1,)."""
+
+    edges: FloatArray
+    state: FloatArray
+    rates: FloatArray
+
+    @cached_property
+    def half(self) -> FloatArray:
+        """Half the length of each piece (P,), s."""
+        return 0.5 * np.diff(self.edges)
+
+    @cached_property
+    def starts(self) -> FloatArray:
+        """States at the edges (2n, P + 1)."""
+        steps = self.half * (self.rates @ _WEIGHTS)
+        return np.cumsum(np.concatenate([self.state[:, None], steps], axis=1), axis=1)
+
+    def between(self, t: FloatArray) -> FloatArray:
+        """States (2n, N) at the times `t` (N,) within the window."""
+        piece = np.clip(np.searchsorted(self.edges, t, side="left") - 1, 0, self.half.size - 1)
+        x = (t - self.edges[piece]) / self.half[piece] - 1.0
+        coefficients = (self.rates @ _COEFFICIENTS.T)[:, piece]
+        within = np.einsum("jns,ns->jn", coefficients, _integrals(x))
+        return self.starts[:, piece] + self.half[piece] * within
+
+    def resolved(self) -> bool:
+        """Whether the last two of each polynomial's coefficients are below the tolerance."""
+        last = self.half[:, None] * np.abs(self.rates @ _COEFFICIENTS[-2:].T)
+        scale = np.maximum(1.0, np.abs(self.starts).max(axis=1))
+        return bool(np.all(last <= TOLERANCE * scale[:, None, None]))
+
+
+def integrate(
+    accelerate_at: Callable[[FloatArray], Acceleration],
+    start: FloatArray,
+    t: FloatArray,
+    corners: FloatArray | None = None,
+    reached: Callable[[float], None] | None = None,
+) -> FloatArray:
+    """States (2n, N) at the times `t` (N,) of θ̈ = α(t, θ, ω) from `start` (2n,), angles then velocities, at ``t[0]``.
+
+    Parameters
+    ----------
+    accelerate_at : callable
+        Takes times (M,) in s, and gives what maps angles (n, M) in rad and velocities (n, M) in rad/s at these times
+        to accelerations (n, M) in rad/s².
+    start : (2n,) float64
+    t : (N,) float64, s, increasing
+    corners : (C,) float64, s, increasing
+        Times at which α or a derivative of it jumps.
+    reached : callable
+        Called with each time that the integration has come to.
+
+    Returns
+    -------
+    (2n, N) float64
+        Every window's polynomials are resolved to `TOLERANCE`, relative to the state or to 1.
+
+    Raises
+    ------
+    ArithmeticError
+        If the motion grows without bound.
+    """
+    breaks = np.append([] if corners is None else corners[(corners > t[0]) & (corners < t[-1])], t[-1])
+    states = np.empty((start.size, t.size))
+    states[:, 0] = state = start
+    longest, done, now = LONGEST, 1, float(t[0])
+    while done < t.size:
+        with np.errstate(over="ignore", invalid="ignore"):  # a window that is too long may leave all bounds
+            window, turns = _solved(accelerate_at, state, _edges(now, breaks, longest))
+        if window is None:
+            longest *= 0.5
+            if longest < SHORTEST:
+                raise ArithmeticError(f"the motion grows without bound beyond {now:.6g} s")
+            continue
+        now, state = float(window.edges[-1]), window.starts[:, -1]
+        until = int(np.searchsorted(t, now, side="right"))
+        states[:, done:until] = window.between(t[done:until])
+        done = until
+        longest = min(LONGEST, longest * (1.25 if turns < TURNS // 2 else 1.0))
+        if reached is not None:
+            reached(now)
+    return states
+
+
+def _edges(now: float, breaks: FloatArray, longest: float) -> FloatArray:
+    """The next window's edges: the breaks within its length, at most so many, or its own end before the first."""
+    first = int(np.searchsorted(breaks, now, side="right"))
+    ahead = breaks[first : first + MOST_PIECES]
+    within = ahead[ahead <= now + longest]
+    return np.concatenate([[now], within if within.size else [now + longest]])
+
+
+def _solved(
+    accelerate_at: Callable[[FloatArray], Acceleration], state: FloatArray, edges: FloatArray
+) -> tuple[Window | None, int]:
+    """The window between `edges` (P + 1,), and how many turns it took; None where it is too long."""
+    n = state.size // 2
+    half = 0.5 * np.diff(edges)
+    times = (edges[:-1] + half)[:, None] + half[:, None] * _X
+    accelerate, Q = accelerate_at(times.ravel()), _from_start(half)
+    by_theta, by_omega = _slopes(accelerate_at, float(edges[0]), state)
+    newton = np.linalg.inv(np.eye(n * times.size) - np.kron(by_omega, Q) - np.kron(by_theta, Q @ Q))
+    omega = np.broadcast_to(state[n:, None], (n, times.size))
+    before = inf
+    for turn in range(TURNS):
+        alpha = accelerate(state[:n, None] + omega @ Q.T, omega)
+        change = (newton @ (state[n:, None] + alpha @ Q.T - omega).ravel()).reshape(n, -1)
+        omega = omega + change
+        size = float(np.abs(change).max())
+        if not size < before:  # also where it is no number
+            break
+        if size <= TOLERANCE * max(1.0, float(np.abs(omega).max())):
+            rates = np.concatenate([omega, accelerate(state[:n, None] + omega @ Q.T, omega)])
+            window = Window(edges, state, rates.reshape(2 * n, *times.shape))
+            return (window, turn) if window.resolved() else (None, turn)
+        before = size
+    return None, TURNS
+
+
+def _slopes(
+    accelerate_at: Callable[[FloatArray], Acceleration], now: float, state: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """∂α/∂θ and ∂α/∂ω, (n, n) each, at a time and state (2n,)."""
+    n = state.size // 2
+    moved = state[:, None] + _SLOPE * np.concatenate([np.zeros((2 * n, 1)), np.eye(2 * n)], axis=1)
+    alpha = accelerate_at(np.full(2 * n + 1, now))(moved[:n], moved[n:])
+    slopes = (alpha[:, 1:] - alpha[:, :1]) / _SLOPE
+    return slopes[:, :n], slopes[:, n:]

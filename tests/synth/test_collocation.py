@@ -1,0 +1,63 @@
+"""Gauss collocation against closed forms and another library's integrator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.special import ellipj, ellipk
+
+from algid.arm import FloatArray
+from algid.synth.collocation import Acceleration, integrate
+
+Timed = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+
+
+def at(acceleration: Timed) -> Callable[[FloatArray], Acceleration]:
+    return lambda times: lambda theta, omega: acceleration(times, theta, omega)
+
+
+def test_a_pendulum_swings_as_jacobi_s_elliptic_sine() -> None:
+    top = 2.5
+    modulus = np.sin(top / 2) ** 2
+    t = np.linspace(0, 20, 173)
+    states = integrate(at(lambda _t, theta, _omega: -np.sin(theta)), np.array([top, 0.0]), t)
+    exact = 2 * np.arcsin(np.sqrt(modulus) * ellipj(ellipk(modulus) - t, modulus)[0])
+    np.testing.assert_allclose(states[0], exact, atol=1e-10)
+
+
+def test_corners_between_and_on_samples_are_met() -> None:
+    corners = np.array([0.1, 0.25, 0.2501, 0.7])  # a push that begins and ends: velocity and angle in closed form
+    t = np.linspace(0, 1, 11)
+    levels = np.array([0.0, 3.0, -7.0, 2.0, 0.0])
+
+    def pushed(times: FloatArray, theta: FloatArray, _omega: FloatArray) -> FloatArray:
+        return np.broadcast_to(levels[np.searchsorted(corners, times)], theta.shape)
+
+    states = integrate(at(pushed), np.zeros(2), t, corners)
+    edges = np.concatenate([[0.0], corners, [1.0]])
+    spans = np.clip(t[:, None] - edges[:-1], 0, np.diff(edges))
+    after = t[:, None] - edges[:-1] - spans  # time since each push ended
+    np.testing.assert_allclose(states[1], spans @ levels, atol=1e-13)
+    np.testing.assert_allclose(states[0], (spans**2 / 2 + spans * np.maximum(after, 0)) @ levels, atol=1e-13)
+
+
+def test_a_stiff_damper_agrees_with_an_implicit_integrator() -> None:
+    def damped(times: FloatArray, theta: FloatArray, omega: FloatArray) -> FloatArray:
+        return 40 * np.sin(9 * times) - 900 * omega - 50 * theta**3
+
+    t = np.linspace(0, 2, 21)
+    states = integrate(at(damped), np.array([1.0, 30.0]), t)
+
+    def rate(now: float, y: FloatArray) -> list[float]:
+        return [y[1], float(40 * np.sin(9 * now) - 900 * y[1] - 50 * y[0] ** 3)]
+
+    other = solve_ivp(rate, (0, 2), [1.0, 30.0], method="Radau", t_eval=t, rtol=1e-11, atol=1e-12).y
+    np.testing.assert_allclose(states, other, atol=1e-8)
+
+
+def test_what_no_double_holds_is_refused() -> None:
+    with pytest.raises(ArithmeticError, match=r"beyond (1|0\.99)"):  # θ̈ = 6 θ² from θ(0) = 1: (1 − t)^−2
+        integrate(at(lambda _t, theta, _omega: 6 * theta**2), np.array([1.0, 2.0]), np.array([0.0, 2.0]))
