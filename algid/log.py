@@ -102,7 +102,8 @@ class Reading:
     clock : 'header', 'log' (the recorder's times) or 'column'
         'header' stands for the messages' own stamps, unless they turn out to stand still.
     time_unit : unit of the times, None where it is told by the values only
-    zero, second_angle, drive, signs, offsets : as in a profile; signs and offsets are in those of the channels too
+    zero, second_angle, drive, passive, signs, offsets : as in a profile
+        Signs and offsets are in those of the channels too.
     unwrap : whether each joint's jumps by a turn were made continuous
     start, end : float, s
         Where the log was cut, in time since its first sample.
@@ -118,6 +119,7 @@ class Reading:
     zero: str = "horizontal"
     second_angle: str = "relative"
     drive: str = "joint"
+    passive: int | None = None
     signs: tuple[int, int] = (1, 1)
     offsets: tuple[float, float] = (0.0, 0.0)
     unwrap: tuple[bool, bool] = (False, False)

@@ -35,6 +35,11 @@ def _parts(text: object) -> object:
     return [part.strip() for part in text.split(",")] if isinstance(text, str) else text
 
 
+def _number(text: object) -> object:
+    """The number that a flag's text is."""
+    return int(text) if isinstance(text, str) and text.isdecimal() else text
+
+
 class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -84,7 +89,8 @@ class Profile(_Strict):
 
     `start` and `end`, in s since the log's first sample, cut it; `accept` names checks that may warn but not refuse.
     `drive` is where the second motor stands: in its joint, or at the base, where a belt or a parallelogram takes its
-    torque to θ1 + θ2. Torques then become those of the joints: τ1 + τ2 and τ2.
+    torque to θ1 + θ2. Torques then become those of the joints: τ1 + τ2 and τ2. `passive` is a joint without a motor, as
+    an acrobot's first or a pendubot's second: its torque is nought, whatever the log says.
     """
 
     topic: str | None = None
@@ -95,6 +101,7 @@ class Profile(_Strict):
     zero: Literal["horizontal", "hanging"] = "horizontal"
     second_angle: Literal["relative", "absolute"] = "relative"
     drive: Literal["joint", "base"] = "joint"
+    passive: Annotated[Literal[1, 2] | None, BeforeValidator(_number)] = None
     gravity: float = Field(default=9.81, ge=0)
     velocity: bool = True
     signs: tuple[Literal[1, -1], Literal[1, -1]] = (1, 1)

@@ -91,6 +91,7 @@ class LogReading(_Model):
     zero: str = "horizontal"
     second_angle: str = "relative"
     drive: str = "joint"
+    passive: int | None = None
     signs: tuple[int, int] = (1, 1)
     offsets: tuple[float, float] = (0.0, 0.0)
     unwrap: tuple[bool, bool] = (False, False)

@@ -27,6 +27,7 @@ TorqueUnit = Annotated[str | None, typer.Option(help='"N m", "mN m", A or mA.')]
 Zero = Annotated[str | None, typer.Option(help="Where θ1 is zero: horizontal or hanging.")]
 SecondAngle = Annotated[str | None, typer.Option(help="θ2 is relative (to link 1) or absolute.")]
 Drive = Annotated[str | None, typer.Option(help="Where the second motor stands: in its joint, or at the base.")]
+Passive = Annotated[str | None, typer.Option(help="The joint without a motor, 1 or 2: its torque is zero.")]
 Sets = Annotated[
     list[str] | None, typer.Option("--set", help="Any setting of a profile, as tau1.sign=-1; may be repeated.")
 ]
@@ -97,6 +98,7 @@ def _profile(
     zero: Zero = None,
     second_angle: SecondAngle = None,
     drive: Drive = None,
+    passive: Passive = None,
     clock: Clock = None,
     start: Start = None,
     end: End = None,

@@ -36,7 +36,7 @@ from algid.arm import FloatArray
 from algid.estimators import weak
 from algid.estimators.combine import BlockSums, LogInformation, Prior, long_run_variance, scaled_pinv
 from algid.estimators.fit import Fit, conclude
-from algid.estimators.modulating_functions import OVERLAP, Windows
+from algid.estimators.modulating_functions import OVERLAP, Windows, row_weights
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import Model, Motion, partials, torque
 from algid.signals.filters import correlate, differentiator, half_length, smoother
@@ -161,9 +161,7 @@ def solve(sums: Sequence[Moments], c: FloatArray, loaded: bool) -> tuple[FloatAr
 def _weights(sums: Moments, c: FloatArray) -> FloatArray:
     """Inverse residual variance (2,) of a row of each joint."""
     v = np.concatenate([np.zeros_like(c), -c, [1.0]])
-    gram = sums.gram.sum(axis=0)
-    squares = np.einsum("x,axy,y->a", v, gram, v)
-    return (sums.rows - sums.astray) / np.maximum(squares, 1e-24 * gram[:, -1, -1] + 1e-300)
+    return row_weights(sums.gram.sum(axis=0), v, sums.rows - sums.astray)
 
 
 def _information(sums: Moments, weights: FloatArray, c: FloatArray, loaded: bool) -> LogInformation:

@@ -92,7 +92,7 @@ class LogEvidence:
         self.noise = self._known or guess
         self._sensor = guess.tau
         self._floor = replace(self._floor, tau=np.maximum(self._floor.tau, _SURE * guess.tau))
-        self._least = _NEGLIGIBLE * np.max([np.sqrt(np.mean(piece.tau**2, axis=1)) for piece in self.kept], axis=0)
+        self._least = _NEGLIGIBLE * _loads(self.kept)
 
     @property
     def trained(self) -> int:
@@ -169,6 +169,12 @@ def _copied(piece: Segment) -> Segment:
 
 def _first_trajectory(piece: Segment) -> FloatArray:
     return smoothed(piece.theta, piece.dt, min(_SMOOTHING, 0.1 / piece.dt))
+
+
+def _loads(kept: Sequence[Segment]) -> FloatArray:
+    """RMS torque (2,) of each joint; a joint without a motor bears a load of the size of the other's."""
+    rms = np.max([np.sqrt(np.mean(piece.tau**2, axis=1)) for piece in kept], axis=0)
+    return np.where(rms > 0, rms, rms.max())
 
 
 def _guessed_noise(kept: Sequence[Segment], floor: NoiseLevels) -> NoiseLevels:

@@ -203,6 +203,26 @@ class Windows:
         return correlate(piece.theta[:, self.margin - reach : len(piece) - self.margin + reach], kernel)
 
 
+def row_weights(gram: FloatArray, v: FloatArray, rows: int) -> FloatArray:
+    """Inverse residual variance (2,) of a row of each joint.
+
+    Parameters
+    ----------
+    gram : (2, m, m)
+        Gram matrices of the columns by joint, the torque last.
+    v : (m,)
+        What makes a residual of the columns: the coefficients with their sign turned, and 1 for the torque.
+    rows : int
+
+    Notes
+    -----
+    A residual below rounding, 1e-12 of the torque, counts as that. The joint with the larger torque sets the measure:
+    a joint without a motor has none, and its load is of the size of the other's.
+    """
+    squares = np.einsum("x,axy,y->a", v, gram, v)
+    return np.asarray(rows / np.maximum(squares, 1e-24 * float(gram[:, -1, -1].max()) + 1e-300))
+
+
 def _linearise_bilinear(X: FloatArray, model: Model, at: FloatArray, gain2: float) -> None:
     """Complete X, made at `at`, by the column of the gain, and the torque by what the linearisation at `at` adds.
 

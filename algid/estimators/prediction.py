@@ -80,14 +80,18 @@ class PredictionScore:
 
     @property
     def nrmse(self) -> FloatArray:
-        """RMSE over the torque's root mean square (2,)."""
-        return np.sqrt(self.residual / np.maximum(self.square, 1e-300))
+        """RMSE over the torque's root mean square (2,); of a joint without torque over the other joint's."""
+        return np.sqrt(self.residual / np.maximum(self._of_drive(self.square), 1e-300))
 
     @property
     def r2(self) -> FloatArray:
-        """Share of the torque's variance that is predicted (2,)."""
+        """Share of the torque's variance that is predicted (2,); of a joint without torque, of the other joint's."""
         spread = self.square - self.torque**2 / max(self.count, 1.0)
-        return 1 - self.residual / np.maximum(spread, 1e-300)
+        return 1 - self.residual / np.maximum(self._of_drive(spread), 1e-300)
+
+    def _of_drive(self, power: FloatArray) -> FloatArray:
+        """`power` (2,), of a joint without a motor that of the one that drives the arm."""
+        return np.where(self.square > 0, power, power[::-1])
 
 
 class PredictionSums:

@@ -30,6 +30,7 @@ from algid.model import TERMS, Model
 
 TIMING = ("delay", "lag")  # the same to first order: one column tells both
 CHOICE = (*(term for term in TERMS if term != "lag"), "delay")
+_OF_BOTH_TORQUES = ("gain",)  # where a joint has no motor, its gain is nothing and makes its equation vanish
 _FIRST_TERMS = ("coulomb", "offset", "rotor")
 _WIDTHS = np.array([0.01, 0.02, 0.04, 0.08, 0.16, 0.32])  # rad/s
 _FADES = np.array([0.1, 0.3, 0.9])  # rad/s
@@ -154,6 +155,8 @@ def select(
         If no log is long enough for a window.
     """
     logs = [Training.of(source, kind) for kind, sources in ((False, unloaded), (True, loaded)) for source in sources]
+    if not all(log.driven for log in logs):
+        candidates = [term for term in candidates if term not in _OF_BOTH_TORQUES]
     start = _first_look(tuple(logs), settings)
     look, fixed, before = start, tuple(kept), None
     everything = tuple(dict.fromkeys((*candidates, *kept)))

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.estimators.combine import long_run_variance, scaled_pinv
-from algid.estimators.modulating_functions import OVERLAP
+from algid.estimators.modulating_functions import OVERLAP, row_weights
 from algid.estimators.weak import Normal, Source, WeakSettings, normal_equations
 from algid.model import TERMS
 from algid.signals.segments import Segment, pieces
@@ -63,6 +63,11 @@ class Training:
             if len(kept) > 2 * _PIECES:
                 kept, stride = [replace(piece, continues=False) for piece in kept[::2]], 2 * stride
         return cls(tuple(kept), loaded)
+
+    @property
+    def driven(self) -> bool:
+        """Whether both joints have a torque."""
+        return all(any(piece.tau[joint].any() for piece in self.pieces) for joint in (0, 1))
 
     def segments(self) -> Iterable[Segment]:
         """The pieces, as a source gives them."""
@@ -123,7 +128,10 @@ class Grams:
                 np.zeros((1, self.size + 1, self.size + 1)),
             )
             p = _solved(total[0], np.arange(self.size))
-            weights = [_row_weights(normal, p[self._places(loaded)]) for loaded, normal in normals]
+            weights = [
+                row_weights(normal.gram.sum(axis=0), np.append(-p[self._places(loaded)], 1.0), normal.rows)
+                for loaded, normal in normals
+            ]
         # Overlapping rows repeat each other: a window's worth of rows counts as two.
         share = 2.0 / OVERLAP
         self._logs = [
@@ -195,14 +203,6 @@ class Grams:
 
     def _own(self, names: set[str]) -> set[int]:
         return {place for place, name in enumerate(self.names) if name in names}
-
-
-def _row_weights(normal: Normal, c: FloatArray) -> FloatArray:
-    """Inverse residual variance (2,) of a row of each joint."""
-    v = np.append(-c, 1.0)
-    gram = normal.gram.sum(axis=0)
-    squares = np.einsum("x,axy,y->a", v, gram, v)
-    return np.asarray(normal.rows / np.maximum(squares, 1e-24 * gram[:, -1, -1] + 1e-300))
 
 
 def _solved(gram: FloatArray, columns: IntArray) -> FloatArray:

@@ -21,7 +21,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.estimators.combine import FEWEST_LOGS, BlockSums, LogInformation, Prior, combine, scaled_pinv
 from algid.estimators.fit import Fit, conclude
-from algid.estimators.modulating_functions import OVERLAP, Windows
+from algid.estimators.modulating_functions import OVERLAP, Windows, row_weights
 from algid.estimators.parametrisation import Shared
 from algid.model import Model
 from algid.signals.differences import held_torque
@@ -170,17 +170,8 @@ def solve(normals: Sequence[Normal], loaded: bool = False) -> tuple[FloatArray, 
             [np.einsum("a,axy->xy", w, n.gram.sum(axis=0)) for w, n in zip(weights, normals, strict=True)], axis=0
         )
         c = scaled_pinv(total[:-1, :-1]) @ total[:-1, -1]
-        weights = [_weights(normal, c) for normal in normals]
+        weights = [row_weights(n.gram.sum(axis=0), np.append(-c, 1.0), n.rows) for n in normals]
     return c, [_information(n, c, w, loaded) for n, w in zip(normals, weights, strict=True)]
-
-
-def _weights(normal: Normal, c: FloatArray) -> FloatArray:
-    """Inverse residual variance (2,) of a row of each joint."""
-    v = np.append(-c, 1.0)
-    gram = normal.gram.sum(axis=0)
-    squares = np.einsum("x,axy,y->a", v, gram, v)
-    floor = 1e-24 * gram[:, -1, -1] + 1e-300
-    return normal.rows / np.maximum(squares, floor)
 
 
 def _information(normal: Normal, c: FloatArray, weights: FloatArray, loaded: bool) -> LogInformation:

@@ -203,10 +203,16 @@ def _source(log: Log, name: str) -> str:
 
 
 def _efforts(log: Log) -> Iterator[Finding]:
-    for name, tau in zip(("tau1", "tau2"), log.tau, strict=True):
+    for joint, tau in enumerate(log.tau, start=1):
+        if joint == log.origin.reading.passive:
+            continue
+        name = f"tau{joint}"
         largest, what = float(np.abs(tau).max()), _source(log, name)
         if largest == 0:
-            text = f"{what} is zero in every sample; name the measured torque: {_other(name)}"
+            text = (
+                f"{what} is zero in every sample; name the measured torque: {_other(name)}; for a joint without a "
+                f"motor: --passive {joint} (profile: passive = {joint})"
+            )
             yield Finding("EFFORT_ZERO", text, True)
         elif largest < _DENORMAL:
             text = f"{what} never exceeds {largest:.3g} N m: no torque; name the measured one: {_other(name)}"

@@ -15,6 +15,7 @@ _HEAD = """\
 # zero = "hanging"           # θ1 is zero hanging straight down, not along the horizontal
 # second_angle = "absolute"  # θ2 from the horizontal or vertical, not from link 1
 # drive = "base"             # the second motor stands at the base: its torque acts on θ1 + θ2
+# passive = 2                # the joint without a motor: its torque is zero
 # gravity = 9.81             # 0 for an arm that moves in a horizontal plane
 # velocity = false           # leave the log's velocities out
 # signs = [1, 1]             # -1 turns a joint's angle, velocity and torque round

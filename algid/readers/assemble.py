@@ -129,11 +129,11 @@ class TableReader:
                 yield held
             held = table
             if "NOT_FINITE" in self.origin.reading.accepted:
-                good = np.all([np.abs(values) < _LARGEST for values in table.columns.values()], axis=0)
+                good = np.all([np.abs(values) < _LARGEST for values in self._measured(table).values()], axis=0)
                 dropped += len(table) - int(np.count_nonzero(good))
                 held = table.take(good)
             else:
-                for name, values in table.columns.items():
+                for name, values in self._measured(table).items():
                     self._check(name, values, first)
             first += len(table)
         if held is not None and dropped:
@@ -141,6 +141,11 @@ class TableReader:
             held = held.noting(Notice("NOT_FINITE", text, lossy=True))
         if held is not None:
             yield held
+
+    def _measured(self, table: Table) -> Mapping[str, FloatArray]:
+        """The columns of a table without the torque of a joint that has no motor."""
+        without = f"tau{self.origin.reading.passive}"
+        return {name: values for name, values in table.columns.items() if name != without}
 
     def _check(self, name: str, values: FloatArray, first: int) -> None:
         # one pass without an array of its own: a small sum of squares has no large term, and no NaN
@@ -197,6 +202,7 @@ def reader_of(
         zero=profile.zero,
         second_angle=profile.second_angle,
         drive=profile.drive,
+        passive=profile.passive,
         signs=profile.signs,
         offsets=profile.offsets,
         unwrap=(profile.theta1.unwrap, profile.theta2.unwrap),
@@ -209,6 +215,7 @@ def reader_of(
         hanging=profile.zero == "hanging",
         absolute=profile.second_angle == "absolute",
         base=profile.drive == "base",
+        passive=profile.passive,
     )
     return TableReader(replace(origin, reading=reading), tables, units, notices, rows)
 

@@ -75,13 +75,16 @@ def assign(
     """
     named = _named(path, available, profile)
     try:
-        choice = choose(available, profile.joints if profile else None, named)
+        choice = choose(available, profile.joints if profile else None, named, profile.passive if profile else None)
     except LookupError as error:
         raise LogError(
             f"{path}: {error}; choose two with --joints NAME,NAME, or name each column: --set theta1.source=NAME … "
             '(profile: joints = ["…", "…"], or source of [theta1] …)'
         ) from error
     sources = dict(choice.columns) | named
+    if profile and profile.passive and f"tau{3 - profile.passive}" in sources:
+        # a joint without a motor needs no torque of its own: what stands in its place is not looked at
+        sources.setdefault(f"tau{profile.passive}", sources[f"tau{3 - profile.passive}"])
     if (profile and not profile.velocity) or not all(name in sources for name in VELOCITIES):
         sources = {name: column for name, column in sources.items() if name not in VELOCITIES}
     missing = [name for name in ("t", *JOINT_CHANNELS) if name not in sources]

@@ -94,12 +94,14 @@ class Conversion:
     """Value · factor + offset for each channel of a table, then the zero and the reference of the angles.
 
     A second motor at the base does the work τ_m1 θ̇1 + τ_m2 (θ̇1 + θ̇2): joint 1 has the sum of both torques.
+    The torque of the `passive` joint, which has no motor, is nought.
     """
 
     channels: Mapping[str, ChannelReading]
     hanging: bool = False
     absolute: bool = False
     base: bool = False
+    passive: int | None = None
 
     def apply(self, table: Table, room: Room) -> None:
         """Fill in a table's angles, torques and, where recorded, velocities in rad, N m, rad/s."""
@@ -114,6 +116,8 @@ class Conversion:
                 omega[1] -= omega[0]
         if self.hanging:
             theta[0] -= math.pi / 2
+        if self.passive is not None:
+            room.tau[self.passive - 1] = 0.0
         if self.base:
             room.tau[0] += room.tau[1]
 
@@ -149,6 +153,8 @@ def _channel_reading(path: str, name: str, source: str, profile: Profile, stated
     channel, joint = profile.channel(name), int(name[-1]) - 1
     unit = channel.unit or stated or ("N m" if name.startswith("tau") else "rad")
     told = profile.told_by(f"{name}.unit") if channel.unit else "names" if stated else "assumed"
+    if name == f"tau{profile.passive}":
+        return ChannelReading("none: no motor", "N m", "profile", 0.0)
     _refuse_unit(path, name, source, unit)
     sign = channel.sign * profile.signs[joint]
     offset = channel.offset + (profile.offsets[joint] if name.startswith("theta") else 0.0)

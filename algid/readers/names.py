@@ -145,7 +145,12 @@ def on_motor_side(column: str) -> bool:
     return not _MOTOR_SIDE.isdisjoint(re.findall(r"[a-z]+", column.lower()))
 
 
-def choose(columns: Iterable[str], joints: tuple[str, str] | None = None, named: Collection[str] = ()) -> Choice:
+def choose(
+    columns: Iterable[str],
+    joints: tuple[str, str] | None = None,
+    named: Collection[str] = (),
+    passive: int | None = None,
+) -> Choice:
     """Canonical channels found among `columns`; those not found are left out.
 
     Parameters
@@ -157,6 +162,8 @@ def choose(columns: Iterable[str], joints: tuple[str, str] | None = None, named:
         ``elbow_pos``.
     named : collection of str
         Canonical channels whose columns are told: what is chosen for them need not be plain.
+    passive : 1, 2 or None
+        The joint without a motor, whose torque need not be there.
 
     Raises
     ------
@@ -175,6 +182,8 @@ def choose(columns: Iterable[str], joints: tuple[str, str] | None = None, named:
         if joints and "theta1" not in {*chosen, *named}:
             there = _joints_there({**parts, **worded})
             raise LookupError(f"no columns of the joints {', '.join(joints)}; joints there are: {there}")
+    if passive and "tau1" not in chosen and (torque := _only_torque(parts, chosen.get(f"theta{3 - passive}"))):
+        chosen[f"tau{3 - passive}"] = torque
     time = _time(parts)
     if time:
         chosen["t"] = time
@@ -252,12 +261,27 @@ def _pair(parts: dict[str, Name], stems: tuple[str, ...], joints: tuple[str, str
     return None
 
 
+def _only_torque(parts: dict[str, Name], angle: str | None) -> str | None:
+    """The torque of the joint whose angle is given, or the only torque there is, where the other joint has none."""
+    for stem in STEMS["tau"]:
+        found = [column for column, name in parts.items() if name.stem == stem]
+        own = [column for column in found if angle in parts and parts[column].joint == parts[angle].joint]
+        if len(own or found) == 1:
+            return (own or found)[0]
+    return None
+
+
 def _of_one_pair(chosen: dict[str, str], parts: dict[str, Name]) -> dict[str, str]:
     """Only quantities of the joints that the angles have: torques of other joints are not theirs."""
     pair = [parts[chosen[f"theta{joint}"]].joint for joint in (1, 2)] if "theta1" in chosen else None
     kept = {}
     for channel, column in chosen.items():
-        own = channel == "t" or pair is None or parts[column].joint == pair[int(channel[-1]) - 1]
+        own = (
+            channel == "t"
+            or pair is None
+            or parts[column].joint is None
+            or parts[column].joint == pair[int(channel[-1]) - 1]
+        )
         # drivers mix counting from nought and from one between quantities: the order is what counts then
         if own or {parts[column].joint, pair[int(channel[-1]) - 1] if pair else None} <= {"0", "1", "2"}:
             kept[channel] = column

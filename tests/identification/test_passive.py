@@ -1,0 +1,122 @@
+"""Arms with a joint that has no motor: an acrobot's first, a pendubot's second."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from algid.arm import CONSTANT_NAMES
+from algid.cli.app import app
+from algid.errors import LogError
+from algid.estimators import instruments, refined, weak
+from algid.estimators.weak import Source
+from algid.identification.identify import identify
+from algid.log import Log, Origin, Reading
+from algid.profile import Profile
+from algid.readers import open_log
+from algid.report.verdict import verdict
+from algid.results import Result
+from algid.settings import Settings
+from algid.signals.segments import Segment
+from algid.synth.cases import load_case
+from algid.synth.excitation import wide_multi_sine
+from algid.synth.simulator import Motion, simulate
+
+DT = 2e-3
+SIGMA = 1e-3  # rad; ten times as much in N m
+
+
+@cache
+def moved(case: str, passive: int, duration: float = 5.0) -> Motion:
+    arm = load_case(case).arm
+    wide = wide_multi_sine(arm, 3)
+    driven = np.array([[float(passive != 1)], [float(passive != 2)]])
+    return simulate(arm.constants(), lambda t: wide(t) * driven, np.arange(round(duration / DT) + 1) * DT)
+
+
+def logged(motion: Motion, seed: int, sigma: float = SIGMA) -> Segment:
+    rng = np.random.default_rng(seed)
+    noise = sigma * rng.standard_normal((2, *motion.theta.shape))
+    return Segment(0.0, DT, motion.theta + noise[0], np.where(motion.tau != 0, motion.tau + 10 * noise[1], 0.0))
+
+
+def source(log: Segment) -> Source:
+    return lambda: [log]
+
+
+def identified(log: Segment, model: str = "auto") -> Result:
+    stamps = np.arange(len(log), dtype=np.int64) * round(1e9 * DT)
+    origin = Origin("pendubot.csv", "csv", {}, reading=Reading(passive=1 if not log.tau[0].any() else 2))
+    return identify(Log(stamps, log.theta, log.tau, origin), settings=Settings(model=model))
+
+
+@pytest.mark.parametrize("passive", [1, 2])
+@pytest.mark.parametrize("case", ["case1", "case2"])
+def test_a_joint_without_motor_leaves_all_constants_told(case: str, passive: int) -> None:
+    """With the terms chosen by the log: none of them, and every constant within its interval's reach."""
+    motion, k = moved(case, passive), load_case(case).arm.constants()
+    result = identified(logged(motion, 0))
+    assert verdict(result).level != "failed"
+    assert result.estimator == "refined"
+    for name, true in zip(CONSTANT_NAMES, k, strict=True):
+        found = result.parameters[name]
+        assert found.estimate is not None
+        assert found.std is not None
+        assert abs(found.estimate - true) < 4 * found.std < 0.2 * true
+    assert result.fit is not None
+    assert result.fit.residual is not None
+    assert min(result.fit.residual.r2) > 0.99
+
+
+@pytest.mark.parametrize("estimator", [weak.fit, instruments.fit, refined.fit])
+@pytest.mark.parametrize("passive", [1, 2])
+def test_exact_logs_give_exact_constants(estimator: object, passive: int) -> None:
+    """Without noise both residuals are rounding: neither may drown the other joint's equation, which sets the scale."""
+    fit = estimator([source(logged(moved("case1", passive), 0, 0.0))])  # type: ignore[operator]
+    # the bound is the weak form's quadrature at 500 Hz
+    np.testing.assert_allclose(fit.values, load_case("case1").arm.constants(), rtol=2e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("passive", [1, 2])
+def test_intervals_hold_where_a_joint_has_no_motor(passive: int) -> None:
+    """Of 200 independent draws a right interval misses 10 ± 3.1 by chance; one of 90 % misses 20."""
+    motion, k = moved("case1", passive), load_case("case1").arm.constants()
+    fits = [refined.fit([source(logged(motion, seed))]) for seed in range(200)]
+    missed = np.sum([np.abs(fit.values - k) > fit.quantile * fit.std for fit in fits], axis=0)
+    assert missed.mean() <= 16
+    assert missed.mean() >= 4
+
+
+def test_a_log_needs_no_torque_of_a_joint_without_motor(tmp_path: Path) -> None:
+    log = logged(moved("case1", 2), 0)
+    columns = np.column_stack([np.arange(len(log)) * DT, *log.theta, log.tau[0]])
+    for header in ("t,q1,q2,tau1", "t,q1,q2,torque", "t,shoulder_pos,elbow_pos,shoulder_effort"):
+        file = tmp_path / "log.csv"
+        np.savetxt(file, columns, delimiter=",", header=header, comments="")
+        read = open_log(file, Profile(passive=2)).whole()
+        np.testing.assert_allclose(read.tau, log.tau, rtol=1e-12)
+
+
+def test_what_a_joint_without_motor_logs_as_torque_is_not_read(tmp_path: Path) -> None:
+    log = logged(moved("case1", 2), 0)
+    columns = np.column_stack([np.arange(len(log)) * DT, *log.theta, log.tau[0], np.full(len(log), np.nan)])
+    np.savetxt(tmp_path / "log.csv", columns, delimiter=",", header="t,theta1,theta2,tau1,tau2", comments="")
+    read = open_log(tmp_path / "log.csv", Profile(passive=2)).whole()
+    assert not read.tau[1].any()
+
+
+def test_a_torque_that_is_zero_is_refused_until_the_joint_is_called_passive(tmp_path: Path) -> None:
+    log = logged(moved("case1", 2), 0)
+    columns = np.column_stack([np.arange(len(log)) * DT, *log.theta, *log.tau])
+    file = tmp_path / "log.csv"
+    np.savetxt(file, columns, delimiter=",", header="t,theta1,theta2,tau1,tau2", comments="")
+    with pytest.raises(LogError, match=r"EFFORT_ZERO.*--passive 2 \(profile: passive = 2\)"):
+        identify(file)
+    done = CliRunner().invoke(app, ["identify", str(file), "--passive", "2", "-o", str(tmp_path), "--no-report"])
+    assert done.exit_code == 0, done.output
+    assert "EFFORT_ZERO" not in done.output
