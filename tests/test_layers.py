@@ -36,7 +36,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "inspection": room("arm errors estimators log profile readers signals", "numpy"),
     "report": room(
-        "arm errors files progress results ros2 signals", "mcap numpy plotly polars pyarrow rich"
+        "arm errors files progress results ros2", "mcap numpy plotly polars pyarrow rich"
     ),
     "check": room("errors files results", "pydantic"),
     "identification": room(

@@ -22,6 +22,7 @@ from algid.estimators.combine import (
     scaled_pinv,
 )
 from algid.estimators.identifiability import Identifiability, Whiteness, examine, open_directions
+from algid.estimators.innovations import ResidualSums
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
 
@@ -52,6 +53,7 @@ class Fit:
     logs : each log's quadratic likelihood, unloaded ones first
     noise : each log's noise levels; None for the weak estimator
     whiteness : outcome of the test on the innovations; None for the weak estimator
+    residual : sums over the innovations, log by log; empty where the estimator has not gathered them
     freedom : independent stretches of log behind a sandwich, else samples of torque
     iterations, converged : of the refined estimator
     without : (n, Q) or None
@@ -72,6 +74,7 @@ class Fit:
     logs: tuple[LogInformation, ...]
     noise: tuple[NoiseLevels, ...] | None = None
     whiteness: Whiteness | None = None
+    residual: tuple[ResidualSums, ...] = ()
     freedom: int = 1
     iterations: int = 0
     converged: bool = True

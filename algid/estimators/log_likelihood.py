@@ -14,6 +14,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.estimators.combine import BlockSums, LogInformation
 from algid.estimators.identifiability import Correlations, correlations
+from algid.estimators.innovations import ResidualSums, residual_sums
 from algid.estimators.noise import (
     VarianceScore,
     change_told,
@@ -50,6 +51,7 @@ class Outcome:
     information: LogInformation
     noise_score: VarianceScore | None
     innovations: Correlations
+    residual: ResidualSums
 
 
 class LogEvidence:
@@ -106,30 +108,28 @@ class LogEvidence:
 
     def train(self, c: FloatArray) -> Outcome:
         """Linearise the training set at the coefficients `c`; keeps the trajectories found."""
-        stretches, scores = (BlockSums(), BlockSums()), []
-        innovations: list[Correlations] = []
+        gathered, scores = _Gathered(), []
         for seed, (piece, theta) in enumerate(zip(self.kept, self._trajectories, strict=True)):
             linear = self._linearise(c, theta, piece)
-            _collect(linear, stretches, innovations)
+            gathered.take(linear, piece.dt)
             multiplier = linear.solve_transposed(linear.columns[-1:])[0]
             self._trajectories[seed] = trajectory(piece, linear, multiplier, self.noise)
             if self._known is None:
                 scores.append(variance_score(linear, len(piece), seed))
         score = sum(scores[1:], scores[0]) if scores else None
-        return Outcome(_information(self.loaded, c, stretches), score, added(innovations))
+        return gathered.outcome(self.loaded, c, score)
 
     def run(self, c: FloatArray) -> Outcome:
         """Pass over the whole log at the coefficients `c`, settling each piece's trajectory by itself."""
-        stretches = (BlockSums(), BlockSums())
-        innovations: list[Correlations] = []
+        gathered = _Gathered()
         for piece in pieces(self._source(), PIECE_SAMPLES):
             if len(piece) < _SHORTEST:
                 continue
             first = self._linearise(c, _first_trajectory(piece), piece)
             multiplier = first.solve_transposed(first.columns[-1:])[0]
             theta = trajectory(piece, first, multiplier, self.noise)
-            _collect(self._linearise(c, theta, piece), stretches, innovations)
-        return Outcome(_information(self.loaded, c, stretches), None, added(innovations))
+            gathered.take(self._linearise(c, theta, piece), piece.dt)
+        return gathered.outcome(self.loaded, c)
 
     def improve_noise(self, outcome: Outcome) -> float:
         """Better noise levels from a training pass; the largest change of a log variance in its deviations."""
@@ -194,22 +194,34 @@ def _floor(kept: Sequence[Segment]) -> NoiseLevels:
     return NoiseLevels(least_theta, least_tau)
 
 
-def _collect(linear: Linearised, stretches: tuple[BlockSums, BlockSums], innovations: list[Correlations]) -> None:
-    """Add a piece's information and score, by stretches, and the sums over its innovations."""
-    Z, w = linear.columns[:-1], linear.columns[-1]
-    rows = 2 * _STRETCH
-    count = -(-w.size // rows)
-    padded = np.zeros((Z.shape[0] + 1, count * rows))
-    padded[:, : w.size] = linear.columns
-    parts = padded.reshape(-1, count, rows).swapaxes(0, 1)
-    gram = parts @ parts.swapaxes(1, 2)
-    stretches[0].add(gram[:, :-1, :-1])
-    stretches[1].add(gram[:, :-1, -1])
-    innovations.append(correlations(np.ascontiguousarray(w.reshape(-1, 2).T)))
+class _Gathered:
+    """A log's information and score, by stretches, and the sums over its innovations."""
 
+    def __init__(self) -> None:
+        self._S, self._g = BlockSums(), BlockSums()
+        self._innovations: list[Correlations] = []
+        self._residual: list[ResidualSums] = []
 
-def _information(loaded: bool, c: FloatArray, stretches: tuple[BlockSums, BlockSums]) -> LogInformation:
-    return LogInformation(loaded, c, stretches[0].values(), stretches[1].values())
+    def take(self, linear: Linearised, dt: float) -> None:
+        """Add a piece, its samples `dt` s apart."""
+        Z, w = linear.columns[:-1], linear.columns[-1]
+        rows = 2 * _STRETCH
+        count = -(-w.size // rows)
+        padded = np.zeros((Z.shape[0] + 1, count * rows))
+        padded[:, : w.size] = linear.columns
+        parts = padded.reshape(-1, count, rows).swapaxes(0, 1)
+        gram = parts @ parts.swapaxes(1, 2)
+        self._S.add(gram[:, :-1, :-1])
+        self._g.add(gram[:, :-1, -1])
+        joints = np.ascontiguousarray(w.reshape(-1, 2).T)
+        self._innovations.append(correlations(joints))
+        self._residual.append(residual_sums(joints, dt))
+
+    def outcome(self, loaded: bool, c: FloatArray, score: VarianceScore | None = None) -> Outcome:
+        """What the pass at the coefficients `c` has given."""
+        information = LogInformation(loaded, c, self._S.values(), self._g.values())
+        residual = sum(self._residual[1:], self._residual[0])
+        return Outcome(information, score, added(self._innovations), residual)
 
 
 def added(innovations: Sequence[Correlations]) -> Correlations:

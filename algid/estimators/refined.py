@@ -145,7 +145,8 @@ def fit(
     )
     noise = tuple(log.noise for log in logs)
     fitted = _no_surer(fitted, start)
-    return replace(fitted, noise=noise, whiteness=whiteness, iterations=training.iterations)
+    residual = tuple(outcome.residual for outcome in outcomes)
+    return replace(fitted, noise=noise, whiteness=whiteness, residual=residual, iterations=training.iterations)
 
 
 def _no_surer(fitted: Fit, start: Fit) -> Fit:

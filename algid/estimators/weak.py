@@ -21,6 +21,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.estimators.combine import FEWEST_LOGS, BlockSums, LogInformation, Prior, combine, scaled_pinv
 from algid.estimators.fit import Fit, conclude
+from algid.estimators.innovations import LAGS, ResidualSums, pooled, residual_sums
 from algid.estimators.modulating_functions import OVERLAP, Windows, row_weights
 from algid.estimators.parametrisation import Shared
 from algid.model import Model
@@ -105,6 +106,40 @@ def _pass(
         if X.shape[2]:
             sums.add(grams(X, OVERLAP))
     return (Normal(sums.values(), dt, samples, rows, high - low) if rows else None), longest
+
+
+def residuals(source: Source, settings: WeakSettings, c: FloatArray) -> ResidualSums | None:
+    """Sums over the windows' residual y − Xᵀc at coefficients `c` (q,) of one log, the torque's moments beside it.
+
+    The windows are those of `normal_equations`; None where the log is too short for one.
+    """
+    gathered, longest = _residuals(source(), settings, settings.window, c)
+    if longest < 4 * settings.window and longest > 0:
+        gathered, _ = _residuals(source(), settings, longest / 4, c)
+    return pooled(gathered)
+
+
+def _residuals(
+    segments: Iterable[Segment], settings: WeakSettings, window: float, c: FloatArray
+) -> tuple[list[ResidualSums], float]:
+    found: list[ResidualSums] = []
+    rows: list[FloatArray] = []
+    longest = spacing = 0.0
+    for piece, windows, _ in overlapping(segments, settings, window):
+        longest = max(longest, len(piece) * piece.dt if len(piece) >= _SHORTEST else 0.0)
+        if not piece.continues or sum(part.shape[1] for part in rows) >= PIECE_SAMPLES:
+            found, rows = _summed(found, rows, spacing), []
+        spacing = windows.step * windows.dt
+        X = windows.equations(settings.model, piece, False, c)
+        rows.append(np.concatenate([X[:, -1] - np.einsum("q,aqr->ar", c, X[:, :-1]), X[:, -1]]))
+    return _summed(found, rows, spacing), longest
+
+
+def _summed(found: list[ResidualSums], rows: list[FloatArray], spacing: float) -> list[ResidualSums]:
+    together = np.concatenate(rows, axis=1) if rows else np.empty((4, 0))
+    if together.shape[1] < 2 * OVERLAP:
+        return found
+    return [*found, residual_sums(together, spacing, OVERLAP, LAGS * OVERLAP // 2)]
 
 
 def overlapping(

@@ -13,8 +13,10 @@ from algid.estimators import instruments, refined, weak
 from algid.estimators.combine import Prior
 from algid.estimators.diagnostics import constrained
 from algid.estimators.fit import Fit
+from algid.estimators.innovations import ResidualSums, pooled
 from algid.estimators.prediction import PredictionSums, cross_validate
 from algid.estimators.selection import CHOICE, Selection, needs_shape, select
+from algid.identification.series import torque_coefficients
 from algid.identification.source import LogSource, Survey
 from algid.identification.velocities import with_velocities
 from algid.model import TERMS, Model
@@ -99,6 +101,24 @@ def run_fit(survey: Survey, settings: Settings, chosen: Selection, prior: Prior 
     except ValueError as error:
         raise _too_short(survey, error) from error
     return constrained(fit) if settings.constrain else fit, sums
+
+
+def residual_of(survey: Survey, settings: Settings, chosen: Selection, fit: Fit) -> ResidualSums | None:
+    """Sums over the residual of the estimator whose fit it is: its innovations, or that of its windows.
+
+    None where no log is long enough.
+    """
+    if fit.residual:
+        return pooled(fit.residual)
+    weak_settings = _weak_settings(settings, chosen)
+    if fit.shared.delay:
+        found = float(fit.values[fit.names.index("delay")])
+        weak_settings = replace(weak_settings, delay=found, estimate_delay=False)
+    sums = [
+        weak.residuals(moving, weak_settings, torque_coefficients(fit, log.role))
+        for log, moving in zip(survey.logs, _passes(survey, survey.logs, settings), strict=True)
+    ]
+    return pooled([one for one in sums if one is not None])
 
 
 def without_nothing(chosen: Selection, fit: Fit, settings: Settings) -> Selection:

@@ -157,7 +157,7 @@ def _by_the_paper(survey: Survey, settings: Settings, earlier: Earlier | None, f
 
 
 def _by_likelihood(survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None) -> Result:
-    from algid.identification.by_likelihood import choose_model, prior_of, run_fit, without_nothing
+    from algid.identification.by_likelihood import choose_model, prior_of, residual_of, run_fit, without_nothing
     from algid.identification.summary import outcome_of
 
     survey.begin("choosing terms")
@@ -172,7 +172,7 @@ def _by_likelihood(survey: Survey, settings: Settings, earlier: Earlier | None, 
     outcome = outcome_of(fit, predictions, survey, settings, chosen)
     if folder is not None:
         survey.begin("series")
-        write_fit_series(folder, fit, survey, settings)
+        write_fit_series(folder, fit, survey, settings, residual_of(survey, settings, chosen, fit))
         if settings.estimator == "refined":
             outcome = _with_the_papers(outcome, survey, settings, folder)
     return result_of(outcome, settings, survey)

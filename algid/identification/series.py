@@ -14,9 +14,11 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.estimators.fit import Fit
+from algid.estimators.innovations import ResidualSums, autocorrelation, spectra, whiteness_of
 from algid.estimators.noise import first_guess
 from algid.estimators.paper import Series
 from algid.estimators.prediction import PredictionFilter
+from algid.estimators.running import has_running, running
 from algid.identification.source import Survey
 from algid.model import Model, Motion, torque
 from algid.settings import Settings
@@ -84,7 +86,7 @@ START_KEY = b"start_ns"
 ROWS = 1 << 17
 
 
-def write_columns(path: Path, blocks: Iterable[Mapping[str, FloatArray]], start_ns: Sequence[int]) -> None:
+def write_columns(path: Path, blocks: Iterable[Mapping[str, object]], start_ns: Sequence[int]) -> None:
     """Write blocks of flat columns as one Parquet file, with each log's first stamp in its metadata."""
     import pyarrow
     import pyarrow.parquet
@@ -136,8 +138,64 @@ def information_blocks(fit: Fit, durations: Sequence[float]) -> Iterator[dict[st
         }
 
 
-def write_fit_series(folder: Path, fit: Fit, survey: Survey, settings: Settings) -> None:
-    """Write `torque.parquet` and `information.parquet` of a fit."""
+def running_columns(fit: Fit, durations: Sequence[float]) -> dict[str, FloatArray]:
+    """Each shared parameter by time of each log, and half its 95 % interval, all logs before it included."""
+    found = running(fit, durations)
+    lengths = np.array(durations)[found.log]
+    return {
+        "log": found.log,
+        "t": found.share * lengths,
+        **{name: found.beta[:, place] for place, name in enumerate(fit.names)},
+        **{f"{name}_half": found.half[:, place] for place, name in enumerate(fit.names)},
+    }
+
+
+WHITE_SPECTRUM, SPECTRUM, TORQUE_SPECTRUM, AUTOCORRELATION = (
+    "whitened spectrum",
+    "spectrum",
+    "torque spectrum",
+    "autocorrelation",
+)
+
+
+def innovation_rows(sums: ResidualSums, *, whitened: bool) -> Iterator[dict[str, object]]:
+    """Spectrum and autocorrelation of a residual: a row a joint and a frequency (Hz) or a lag (s).
+
+    `low` and `high` hold 95 % of the values of white noise. A whitened residual has its spectrum in shares of white
+    noise; that of windows is in (N m)²/Hz and stands beside the torque's own through the same windows.
+    """
+    kinds: list[tuple[str, FloatArray, FloatArray, FloatArray, FloatArray]] = []
+    if whitened:
+        found = whiteness_of(sums)
+        low, high = (np.broadcast_to(one, found.density.shape) for one in (found.low, found.high))
+        kinds.append((WHITE_SPECTRUM, found.frequency, found.density, low, high))
+    else:
+        found = spectra(sums)
+        nowhere = np.full((2, found.frequency.size), np.nan)
+        kinds += [
+            (kind, found.frequency, found.density[rows], nowhere, nowhere)
+            for kind, rows in ((SPECTRUM, slice(0, 2)), (TORQUE_SPECTRUM, slice(2, 4)))
+        ]
+    r = autocorrelation(sums)
+    kinds.append((AUTOCORRELATION, r.lag, r.correlation, -r.half, r.half))
+    for kind, x, values, low, high in kinds:
+        for joint in range(2):
+            yield {
+                "quantity": [kind] * x.size,
+                "joint": np.full(x.size, joint + 1, dtype=np.int32),
+                "x": x,
+                "value": values[joint],
+                "low": low[joint],
+                "high": high[joint],
+            }
+
+
+def write_fit_series(folder: Path, fit: Fit, survey: Survey, settings: Settings, residual: ResidualSums | None) -> None:
+    """Write the time series of a fit, and what its `residual` looks like.
+
+    `torque.parquet`, `information.parquet`, `running.parquet` (not of a fit that was held within bounds or did not
+    converge) and, where there is a residual, `innovations.parquet`.
+    """
     summaries = [survey.summary(log) for log in survey.logs]
     starts = [summary.start_ns for summary in summaries]
     coefficients: dict[str, FloatArray] = {
@@ -147,6 +205,11 @@ def write_fit_series(folder: Path, fit: Fit, survey: Survey, settings: Settings)
     write_columns(folder / "torque.parquet", torques, starts)
     durations = [summary.duration for summary in summaries]
     write_columns(folder / "information.parquet", information_blocks(fit, durations), starts)
+    if has_running(fit):
+        write_columns(folder / "running.parquet", [running_columns(fit, durations)], starts)
+    if residual is not None:
+        rows = innovation_rows(residual, whitened=bool(fit.residual))
+        write_columns(folder / "innovations.parquet", rows, starts)
 
 
 def torque_coefficients(fit: Fit, role: str) -> FloatArray:

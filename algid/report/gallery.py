@@ -17,7 +17,10 @@ from algid.report.figures.coverage import coverage
 from algid.report.figures.inertia import inertia
 from algid.report.figures.information import TITLE as INFORMATION
 from algid.report.figures.information import information
-from algid.report.figures.residual import residual
+from algid.report.figures.innovations import TITLE as INNOVATIONS
+from algid.report.figures.innovations import innovations
+from algid.report.figures.running import TITLE as RUNNING
+from algid.report.figures.running import running
 from algid.report.figures.signals import signals
 from algid.report.figures.torque import TITLE as TORQUE
 from algid.report.figures.torque import torque
@@ -38,7 +41,9 @@ class Gallery:
 def gallery(folder: Path, result: Result, told: Told | None = None) -> Gallery:
     """Every figure that the folder gives, in the page's order."""
     result = drawable(result)
-    series, loaded, seconds = (folder / f"{name}.parquet" for name in ("estimates", "loaded", "information"))
+    series, loaded, seconds, left, so_far = (
+        folder / f"{name}.parquet" for name in ("estimates", "loaded", "information", "innovations", "running")
+    )
     paper = [_try("convergence", "Convergence of the estimates", series, lambda: convergence(series, result))]
     figures: list[Figure | Missing] = []
     if loaded.is_file():
@@ -53,8 +58,11 @@ def gallery(folder: Path, result: Result, told: Told | None = None) -> Gallery:
         figures.append(torque(found, result.logs))
         if found.reduced:
             figures.append(_try("closeup", CLOSEUP, measured, lambda: closeup(measured, found)))
-        figures += [residual(found, result), signals(found, result.logs), coverage(found)]
     read = None if isinstance(found, Missing) else found
+    figures.append(_try("innovations", INNOVATIONS, left, lambda: innovations(left, result)))
+    figures.append(_try("running", RUNNING, so_far, lambda: running(so_far, result)))
+    if read is not None:
+        figures += [signals(read, result.logs), coverage(read)]
     figures.append(correlation(result))
     figures.append(_try("information", INFORMATION, seconds, lambda: information(seconds, result)))
     figures.append(inertia(result, read))

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,9 +53,7 @@ def blocks(path: Path, names: Sequence[str], rows: int = ROWS) -> Iterator[Block
     import pyarrow.lib
     import pyarrow.parquet
 
-    absent = [name for name in names if name not in columns_of(path)]
-    if absent:
-        raise ResultError(f"{path}: expected a column {absent[0]!r}, found none; identify again with this version")
+    _check_columns(path, names)
     try:
         # without pre_buffer=False the file is kept in memory as it is read
         with pyarrow.parquet.ParquetFile(path, pre_buffer=False) as file:
@@ -62,6 +61,31 @@ def blocks(path: Path, names: Sequence[str], rows: int = ROWS) -> Iterator[Block
                 yield {name: _array(batch.column(name)) for name in names}
     except (OSError, pyarrow.lib.ArrowException) as error:
         raise _unreadable(path, error) from error
+
+
+def table_of(path: Path, names: Sequence[str]) -> dict[str, list[Any]]:
+    """The columns `names` of a small file, whatever they hold.
+
+    Raises
+    ------
+    ResultError
+        If the file cannot be read or lacks a column.
+    """
+    import pyarrow.lib
+    import pyarrow.parquet
+
+    _check_columns(path, names)
+    try:
+        found: dict[str, list[Any]] = pyarrow.parquet.read_table(path, columns=list(names)).to_pydict()
+    except (OSError, pyarrow.lib.ArrowException) as error:
+        raise _unreadable(path, error) from error
+    return found
+
+
+def _check_columns(path: Path, names: Sequence[str]) -> None:
+    absent = [name for name in names if name not in columns_of(path)]
+    if absent:
+        raise ResultError(f"{path}: expected a column {absent[0]!r}, found none; identify again with this version")
 
 
 def row_count(path: Path) -> int:

@@ -27,7 +27,6 @@ from algid.report.reduce import (
     columns_of,
     row_count,
 )
-from algid.signals.filters import Spectrum, stretch_length
 
 EPSILON = 0.2  # s: the paper's ε
 WINDOW = 2.0  # s: after which the paper's integrals restart, unless its own settings say otherwise
@@ -186,10 +185,10 @@ class LogRange:
 
 @dataclass
 class TorqueLog:
-    """Reduced series by log and name, samples of the motion, extremes, spectra of torque and residual.
+    """Reduced series by log and name, samples of the motion, extremes.
 
     `motion` is (4, m): θ1, θ2, θ̇1, θ̇2; `extremes` maps a column to its smallest and largest value;
-    `density` (4, n) belongs to τ1, τ2 and the residuals; `rms` and `residual_rms` are in N m a joint.
+    `rms` and `residual_rms` are in N m a joint.
     `worst` gives the log and the time in s of each joint's largest residual; `reduced` tells whether a
     series holds fewer samples than the log.
     """
@@ -198,10 +197,6 @@ class TorqueLog:
     series: dict[int, dict[str, tuple[FloatArray, FloatArray]]]
     motion: FloatArray
     extremes: dict[str, tuple[float, float]]
-    frequency: FloatArray
-    density: FloatArray
-    autocorrelation: FloatArray
-    independent: int
     rms: tuple[float, float]
     residual_rms: tuple[float, float]
     unpredicted: int
@@ -230,8 +225,6 @@ class _Gathering:
     def __post_init__(self) -> None:
         self.size = bucket_size(self.total, POINTS)
         self.motion = Thinned(self.total // DOTS)
-        self.spectrum: Spectrum | None = None
-        self.dt = float("nan")
         self.squares = np.zeros(4)
         self.counts = np.zeros(4)
         self.worst: dict[int, tuple[float, int, float]] = {}
@@ -239,7 +232,7 @@ class _Gathering:
     def take(self, log: int, block: Block) -> None:
         """Add the next block of the log of that number."""
         block |= {f"residual{j}": block[f"tau{j}"] - block[f"tau{j}_predicted"] for j in (1, 2)}
-        follows = self._range(log, block["t"])
+        self._range(log, block["t"])
         reducers = self.reducers.setdefault(log, {name: MinMax(self.size) for name in SERIES})
         for name, reducer in reducers.items():
             reducer.feed(block["t"], block[name])
@@ -247,10 +240,9 @@ class _Gathering:
         self._widen(block)
         self._find_worst(log, block)
         self._sum(block)
-        self._transform(log, block, follows)
 
-    def _range(self, log: int, t: FloatArray) -> bool:
-        """Extend the log's range; whether the block follows what was there."""
+    def _range(self, log: int, t: FloatArray) -> None:
+        """Extend the log's range."""
         follows = log in self.ranges
         span = self.ranges.setdefault(log, LogRange(float(t[0]), float(t[0])))
         steps = np.diff(t, prepend=span.last if follows else t[0])
@@ -260,7 +252,6 @@ class _Gathering:
         span.last = float(t[-1])
         span.largest_gap = max(span.largest_gap, float(steps.max()))
         span.gaps += int(np.count_nonzero(steps > LONGEST_GAP * span.period))
-        return follows
 
     def _widen(self, block: Block) -> None:
         for name in (*COLUMNS[2:], "residual1", "residual2"):
@@ -281,29 +272,14 @@ class _Gathering:
             self.squares[place] += finite @ finite
             self.counts[place] += finite.size
 
-    def _transform(self, log: int, block: Block, follows: bool) -> None:
-        period = self.ranges[log].period
-        if self.spectrum is None:
-            self.spectrum, self.dt = Spectrum(4, stretch_length(self.total)), period
-        if not follows:
-            self.spectrum.cut()
-        if abs(period - self.dt) <= 0.01 * self.dt:  # a log of another rate has another spectrum
-            self.spectrum.feed(np.stack([block[n] for n in ("tau1", "tau2", "residual1", "residual2")]))
-
     def result(self) -> TorqueLog:
         """What was gathered."""
-        spectrum = self.spectrum or Spectrum(4, 128)
-        frequency, density = spectrum.density(self.dt)
         rms = np.sqrt(self.squares / np.maximum(self.counts, 1))
         return TorqueLog(
             ranges=self.ranges,
             series={log: {name: self._series(log, name) for name in SERIES} for log in self.reducers},
             motion=self.motion.result(4),
             extremes=self.extremes,
-            frequency=frequency,
-            density=density if spectrum.stretches else density[:, :0],
-            autocorrelation=spectrum.autocorrelation()[2:],
-            independent=spectrum.stretches * stretch_length(self.total),
             rms=(float(rms[0]), float(rms[1])),
             residual_rms=(float(rms[2]), float(rms[3])),
             unpredicted=int(self.counts[0] - self.counts[2]),

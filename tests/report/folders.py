@@ -13,7 +13,9 @@ import pyarrow.parquet as pq
 from scipy.signal import butter, filtfilt
 
 from algid.arm import CONSTANT_NAMES, CONSTANT_UNITS, FloatArray, forward_dynamics, regressor, with_payload
+from algid.estimators.innovations import residual_sums
 from algid.estimators.paper import STAGE2_NAMES, stage1, stage2
+from algid.identification.series import innovation_rows, write_columns
 from algid.results import (
     Estimate,
     FitSummary,
@@ -65,6 +67,8 @@ def build(folder: Path, duration: float = 10.0, case_name: str = "case1", **chan
     write_result(result, folder / "result.json")
     _write_torque(folder / "torque.parquet", [unloaded, loaded], k)
     _write_information(folder / "information.parquet", y)
+    _write_running(folder / "running.parquet", y, unloaded)
+    _write_innovations(folder / "innovations.parquet", unloaded)
     _write_series(folder, unloaded, loaded, k)
     return result
 
@@ -176,6 +180,27 @@ def _write_information(path: Path, y: FloatArray) -> None:
     gained = squares[:, : int(seconds * RATE)].reshape(7, seconds, -1).sum(axis=2)
     columns = {"log": np.zeros(seconds, np.int32), "t": np.arange(seconds, dtype=np.float64)}
     pl.DataFrame(columns | dict(zip(CONSTANT_NAMES, gained, strict=True))).write_parquet(path)
+
+
+def _write_running(path: Path, y: FloatArray, found: Recording) -> None:
+    """Least squares on the first samples, at twenty moments."""
+    columns: dict[str, list[float]] = {
+        name: [] for name in ("t", *CONSTANT_NAMES, *(f"{n}_half" for n in CONSTANT_NAMES))
+    }
+    for end in np.linspace(0, y.shape[2], 21).astype(int)[1:]:
+        k, covariance = _least_squares(y[:, :, :end], found.measured[:, :end])
+        columns["t"].append(end / RATE)
+        for name, value, spread in zip(CONSTANT_NAMES, k, np.sqrt(np.diag(covariance)), strict=True):
+            columns[name].append(float(value))
+            columns[f"{name}_half"].append(1.96 * float(spread))
+    log = pl.Series("log", [0] * len(columns["t"]), pl.Int32)
+    pl.DataFrame({"log": log, **columns}).write_parquet(path)
+
+
+def _write_innovations(path: Path, found: Recording) -> None:
+    """The noise itself, which is what is left where the model is the arm."""
+    sums = residual_sums((found.measured - found.motion.tau) / NOISE, 1 / RATE)
+    write_columns(path, innovation_rows(sums, whitened=True), [START_NS])
 
 
 def _write_series(folder: Path, unloaded: Recording, loaded: Recording, k: FloatArray) -> None:

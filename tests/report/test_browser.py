@@ -49,7 +49,7 @@ def test_a_complete_report(browser: Browser, folder: Path, width: int, dark: boo
     page = write_report(folder)
     seen = browser.look(page, width, dark)
     assert_sound(seen, page, "case1-unloaded.mcap · algid")
-    assert seen.drawn == 32
+    assert seen.drawn == 39
     written = browser.driver.execute_script("return document.getElementById('correlation-0').data[0].texttemplate")
     assert (written is None) == (width == 400)  # where the cells have no room for numbers
     assert seen.background == ("rgb(16, 21, 28)" if dark else "rgb(255, 255, 255)")

@@ -1,0 +1,159 @@
+"""Spectrum and autocorrelation of an estimator's own residual, and how far white noise's own would scatter.
+
+Sums over pieces of any length add up, so that a log is gone over in bounded memory. Each piece gives its whole
+periodogram (Hann's window), added up in narrow bins of equal ratio, and its lag products. Rows that overlap, as
+windows do, are correlated however white the noise: `stride` of them apart they are not.
+
+======  =================================================  ============  ==============
+symbol  name                                               shape         unit
+======  =================================================  ============  ==============
+w       residual, and signals to compare its spectrum to   (s, n)        u
+P       periodogram, 1 for white noise of unit variance    (s, n // 2)   u²
+f       frequency                                          (F,)          cycles a row
+r       autocorrelation                                    (2, L)        1
+======  =================================================  ============  ==============
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtri
+
+from algid.arm import FloatArray, keep_arrays
+
+LAGS = 40
+NORMAL = 1.959963984540054
+"""Half width of a 95 % interval in standard deviations."""
+ALIKE = 0.01  # relative difference of two periods that counts as none
+_BINS = 112
+_EDGES = np.geomspace(2.0**-14, 0.5, _BINS + 1)  # cycles a row
+_FIRST = 2  # lines of a periodogram below that the mean leaks into
+_NEIGHBOURS = (4 / 9, 1 / 36)  # squared correlation of Hann's lines one and two apart (Harris 1978)
+_FREEDOM = 12.0  # of a point of the spectrum at least: its band then is a factor of two or so either way
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualSums:
+    """Sums over a residual whose rows are `dt` s apart, and over the signals beside it.
+
+    Parameters
+    ----------
+    dt : float, s
+    stride : rows after which white noise leaves nothing in common
+    power : (s, bins), Σ P by bin
+    lines, scatter : (bins,), lines of the periodograms in each bin, and the variance of their sum for unit white noise
+    products, pairs : (2, lags + 1) and (lags + 1,), Σ w_i w_(i+lag) and of how many pairs
+    """
+
+    dt: float
+    stride: int
+    power: FloatArray
+    lines: FloatArray
+    scatter: FloatArray
+    products: FloatArray
+    pairs: FloatArray
+
+    def __post_init__(self) -> None:
+        keep_arrays(self)
+
+    def __add__(self, other: ResidualSums) -> ResidualSums:
+        return ResidualSums(
+            self.dt,
+            self.stride,
+            self.power + other.power,
+            self.lines + other.lines,
+            self.scatter + other.scatter,
+            self.products + other.products,
+            self.pairs + other.pairs,
+        )
+
+
+def residual_sums(w: FloatArray, dt: float, stride: int = 1, lags: int = LAGS) -> ResidualSums:
+    """Sums for one piece of residual: the first two rows of w (s, n), n at least 4; the others have a spectrum only."""
+    n = w.shape[1]
+    taper = np.hanning(n + 1)[:-1]
+    centred = w - w.mean(axis=1, keepdims=True)
+    periodogram = np.abs(np.fft.rfft(taper * centred)[:, _FIRST:]) ** 2 / np.sum(taper**2)
+    frequency = np.fft.rfftfreq(n)[_FIRST:]
+    place = np.clip(np.searchsorted(_EDGES, frequency, side="right") - 1, 0, _BINS - 1)
+    lines = np.bincount(place, minlength=_BINS).astype(np.float64)
+    power = np.stack([np.bincount(place, row, minlength=_BINS) for row in periodogram])
+    near, far = (share * np.maximum(lines - apart, 0.0) for apart, share in enumerate(_NEIGHBOURS, start=1))
+    scatter = lines + 2 * (near + far)
+    products = np.array([[row[lag:] @ row[: max(n - lag, 0)] for lag in range(lags + 1)] for row in w[:2]])
+    pairs = np.maximum(n - np.arange(lags + 1, dtype=np.float64), 0.0)
+    return ResidualSums(dt, stride, power.astype(np.float64), lines, scatter, products, pairs)
+
+
+def pooled(sums: Sequence[ResidualSums]) -> ResidualSums | None:
+    """The sums of logs together; those whose rows are spaced unlike the first one's are left out."""
+    alike = [one for one in sums if abs(one.dt - sums[0].dt) <= ALIKE * sums[0].dt]
+    return sum(alike[1:], alike[0]) if alike else None
+
+
+@dataclass(frozen=True, eq=False)
+class Spectra:
+    """Densities (s, F) at frequencies (F,) in Hz, and the factors (F,) within which 95 % of white noise's lie.
+
+    Densities are in u²/Hz, one-sided.
+    """
+
+    frequency: FloatArray
+    density: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+
+def spectra(sums: ResidualSums) -> Spectra:
+    """Spectra of all signals, neighbouring bins put together until each holds `_FREEDOM` degrees of freedom."""
+    starts, count, spread = [], 0.0, 0.0
+    begin = 0
+    for place in range(_BINS):
+        count, spread = count + sums.lines[place], spread + sums.scatter[place]
+        if count and 2 * count**2 / spread >= _FREEDOM:
+            starts.append(begin)
+            begin, count, spread = place + 1, 0.0, 0.0
+    if not starts:
+        return Spectra(np.empty(0), np.empty((sums.power.shape[0], 0)), np.empty(0), np.empty(0))
+    ends = np.array([*starts[1:], begin]) - 1
+    lines, scatter = (np.add.reduceat(one[:begin], starts) for one in (sums.lines, sums.scatter))
+    density = np.add.reduceat(sums.power[:, :begin], starts, axis=1) / lines
+    freedom = 2 * lines**2 / scatter
+    low, high = (chdtri(freedom, tail) / freedom for tail in (0.975, 0.025))
+    middle = np.sqrt(_EDGES[starts] * _EDGES[ends + 1])
+    return Spectra(middle / sums.dt, 2 * sums.dt * density, low, high)
+
+
+@dataclass(frozen=True, eq=False)
+class Autocorrelation:
+    """Correlations (2, L) at lags (L,) in s, and half widths (2, L) of bands that hold 95 % of those of white noise."""
+
+    lag: FloatArray
+    correlation: FloatArray
+    half: FloatArray
+
+
+def autocorrelation(sums: ResidualSums) -> Autocorrelation:
+    """Correlations at multiples of the stride.
+
+    The band is Bartlett's for a moving average over one stride: its variance is Σ r_i² / n, over lags i within the
+    stride, both ways (Bartlett 1946; Box & Jenkins, sec. 2.1.6).
+    """
+    mean = sums.products / np.maximum(sums.pairs, 1.0)
+    r = np.divide(mean, mean[:, :1], out=np.zeros_like(mean), where=mean[:, :1] > 0)
+    known = np.flatnonzero(sums.pairs[:: sums.stride] > sums.pairs[0] / 4)[1:] * sums.stride
+    variance = 1 + 2 * np.sum(r[:, 1 : sums.stride] ** 2, axis=1)
+    half = NORMAL * np.sqrt(variance[:, None] / sums.pairs[known])
+    return Autocorrelation(known * sums.dt, r[:, known], half)
+
+
+def whiteness_of(sums: ResidualSums) -> Spectra:
+    """Spectra of the residual alone in shares of white noise of the same variance: 1 is white."""
+    found = spectra(sums)
+    variance = (sums.products[:, 0] / np.maximum(sums.pairs[0], 1.0))[:, None]
+    level = 2 * sums.dt * variance
+    share = np.divide(found.density[:2], level, out=np.zeros_like(found.density[:2]), where=level > 0)
+    return Spectra(found.frequency, share, found.low, found.high)

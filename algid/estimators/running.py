@@ -1,0 +1,90 @@
+"""What an estimator had found by each moment of its logs, taken in turn, and how sure it was.
+
+A fit's logs are quadratic likelihoods by stretch of time; those up to a moment add up as all of them do.
+
+======  =====================================================  =============
+symbol  name                                                   shape
+======  =====================================================  =============
+beta    shared parameters by each moment                       (T, Q)
+half    half width of their 95 % intervals                     (T, Q)
+======  =====================================================  =============
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from algid.arm import FloatArray
+from algid.estimators.combine import LogInformation, combine
+from algid.estimators.fit import Fit
+from algid.estimators.identifiability import examine
+
+MOMENTS = 96
+"""About how many moments the logs are looked at together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Running:
+    """Estimates by moment: the log (T,) and the share of it (T,) gone over, then the module's table.
+
+    NaN where what was gone over leaves a parameter open.
+    """
+
+    log: NDArray[np.int32]
+    share: FloatArray
+    beta: FloatArray
+    half: FloatArray
+
+
+def running(fit: Fit, durations: Sequence[float], moments: int = MOMENTS) -> Running:
+    """Estimates of `fit`'s parameters as its logs, `durations` s long each, are gone over one after the other.
+
+    The band is that of the information so far, wider by the factor that the fit's own intervals are wider than the
+    information of all logs has it: that of coloured residuals and of what differs from run to run.
+    """
+    widening = _widening(fit)
+    places, shares, betas, halves = [], [], [], []
+    for number, log in enumerate(fit.logs):
+        count = max(2, round(moments * durations[number] / sum(durations)))
+        ends = np.unique(np.linspace(0, log.S.shape[0], count + 1).astype(int)[1:])
+        S, g = np.zeros_like(log.S[0]), np.zeros_like(log.g[0])
+        begin = 0
+        for end in ends:
+            S, g = S + log.S[begin:end].sum(axis=0), g + log.g[begin:end].sum(axis=0)
+            begin = int(end)
+            so_far = [*fit.logs[:number], LogInformation(log.loaded, log.c0, S[None], g[None])]
+            beta, half = _estimate(fit, so_far, widening)
+            places.append(number)
+            shares.append(end / log.S.shape[0])
+            betas.append(beta)
+            halves.append(half)
+    return Running(np.array(places, dtype=np.int32), np.array(shares), np.array(betas), np.array(halves))
+
+
+def _estimate(fit: Fit, logs: Sequence[LogInformation], widening: FloatArray) -> tuple[FloatArray, FloatArray]:
+    beta, S, _ = combine(fit.shared, logs, fit.values, fit.prior)
+    if not S.any():  # a joint at rest, and nothing else so far
+        return np.full(beta.shape, np.nan), np.full(beta.shape, np.nan)
+    known = examine(fit.names, beta, S, fit.moved)
+    std = np.sqrt(np.maximum(np.diag(known.covariance), 0.0))
+    open_ones = np.logical_not(known.determined)
+    return np.where(open_ones, np.nan, beta), np.where(open_ones, np.nan, fit.quantile * widening * std)
+
+
+def _widening(fit: Fit) -> FloatArray:
+    """Reported standard deviations (Q,) over those of the information alone."""
+    _, S, _ = combine(fit.shared, fit.logs, fit.values, fit.prior)
+    plain = np.sqrt(np.maximum(np.diag(examine(fit.names, fit.values, S, fit.moved).covariance), 0.0))
+    known = np.isfinite(fit.std) & (plain > 0)
+    return np.divide(fit.std, plain, out=np.ones_like(plain), where=known)
+
+
+def has_running(fit: Fit) -> bool:
+    """Whether the fit is where its likelihood is largest: a fit held within bounds is not."""
+    beta, S, _ = combine(fit.shared, fit.logs, fit.values, fit.prior)
+    step = beta - fit.values
+    return bool(fit.converged and step @ S @ step < 1e-6)

@@ -1,0 +1,204 @@
+"""What the estimator left: spectrum and autocorrelation of its own residual, with the band of white noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.report.figures.base import Figure, Legend, Missing, Panel, Trace, axis, level, line, packed
+from algid.report.reduce import table_of
+from algid.results import Result
+
+TITLE = "Innovations: what the estimator left"
+WHITENED, SPECTRUM, TORQUE, CORRELATION = "whitened spectrum", "spectrum", "torque spectrum", "autocorrelation"
+COLUMNS = ("quantity", "joint", "x", "value", "low", "high")
+FAINT = 0.02  # a correlation below which the estimator's test takes colour not to matter
+HEIGHT = 260
+MILLI = 0.5  # s: lags that end before are told in milliseconds
+RESIDUAL = Legend("residual", "the estimator's residual", "@orange")
+BAND = Legend("", "95 % band of white noise", "@blue/0.25", "area")
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One quantity of one joint: its axis, its values, and the band that holds 95 % of white noise's, or NaN."""
+
+    x: FloatArray
+    value: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+    @property
+    def inside(self) -> int:
+        """How many values lie within the band."""
+        return int(np.count_nonzero((self.value >= self.low) & (self.value <= self.high)))
+
+
+Curves = dict[tuple[str, int], Curve]
+
+
+def innovations(path: Path, result: Result) -> Figure | Missing:
+    """A spectrum and an autocorrelation a joint. Raises `ResultError`."""
+    curves = read_curves(path)
+    joints = [joint for joint in (1, 2) if (CORRELATION, joint) in curves]
+    if not joints:
+        return Missing("innovations", TITLE, "the logs are too short to tell noise from colour")
+    whitened = any(quantity == WHITENED for quantity, _ in curves)
+    panels = tuple(panel for joint in joints for panel in (_spectrum(curves, joint), _correlation(curves, joint)))
+    faint = _has_faint(curves, joints)
+    legend = [RESIDUAL, BAND]
+    if not whitened:
+        legend.insert(1, Legend("torque", "measured torque, through the same windows", "@measured"))
+    if faint:
+        legend.append(Legend("", f"±{FAINT:g}: fainter colour moves no error bar", "@muted", "dash"))
+    return Figure(
+        "innovations", TITLE, panels, _reading(whitened), tuple(legend), _note(curves, joints, result), columns=2
+    )
+
+
+def read_curves(path: Path) -> Curves:
+    """What `path` holds, by quantity and joint. Raises `ResultError`."""
+    rows = table_of(path, COLUMNS)
+    quantity = np.array(rows.pop("quantity"))
+    numbers = {name: np.array(values, dtype=np.float64) for name, values in rows.items()}
+    found: Curves = {}
+    for kind in dict.fromkeys(quantity.tolist()):
+        for joint in (1, 2):
+            own = (quantity == kind) & (numbers["joint"] == joint)
+            if own.any():
+                found[kind, joint] = Curve(*(numbers[name][own] for name in COLUMNS[2:]))
+    return found
+
+
+def _reading(whitened: bool) -> str:
+    if whitened:
+        return (
+            "Read: white noise leaves 19 of 20 points and bars inside the blue band; a hump in the spectrum is motion "
+            "that the model misses, bars that start high and fall are an error slower than the sampling."
+        )
+    return (
+        "Read: a flat orange line far below grey is noise and a hump is motion that the model misses; bars inside the "
+        "blue band, one window apart, are white."
+    )
+
+
+def _spectrum(curves: Curves, joint: int) -> Panel:
+    title, says = f"Joint {joint}: spectrum", f"Spectrum of joint {joint}'s residual"
+    white = curves.get((WHITENED, joint))
+    if white is not None:
+        hover = "%{y:.3g} of white noise at %{x:.3g} Hz<extra></extra>"
+        traces = [*_band(white), line(white.x, white.value, "@orange", "residual", "residual", hover=hover)]
+        y = axis("share of white noise", type="log", **_round_ticks(white))
+        return Panel(traces, _layout(white.x, y), f"{says}; {_count(white)} inside the band", title, HEIGHT)
+    hover = "%{y:.3g} (N m)²/Hz at %{x:.3g} Hz<extra></extra>"
+    torque, own = curves.get((TORQUE, joint)), curves.get((SPECTRUM, joint))
+    traces = []
+    if torque is not None:
+        traces.append(line(torque.x, torque.value, "@measured", "torque", "torque", width=2, hover=hover))
+    if own is not None:
+        traces.append(line(own.x, own.value, "@orange", "residual", "residual", hover=hover))
+    both = [curve.value for curve in (torque, own) if curve is not None]
+    x = own.x if own is not None else np.ones(1)
+    y = axis("(N m)²/Hz", type="log", tickfont={"size": 10}, **_powers(np.concatenate(both or [np.ones(1)])))
+    return Panel(traces, _layout(x, y), says, title, HEIGHT)
+
+
+def _layout(x: FloatArray, y: dict[str, object]) -> dict[str, object]:
+    ticks = [0.1, 0.3, 1, 3, 10, 30, 100, 300, 1000]
+    shown = {"tickvals": ticks, "ticktext": [f"{tick:g}" for tick in ticks]}
+    if x.size > 1:
+        shown["range"] = [float(np.log10(x[0])), float(np.log10(x[-1]))]
+    return {"xaxis": axis("frequency, Hz", type="log", **shown), "yaxis": y, "hovermode": "closest"}
+
+
+def _round_ticks(white: Curve) -> dict[str, object]:
+    """Ticks and a range that holds the band and the values, in shares of white noise."""
+    positive = white.value[white.value > 0]
+    low = min(0.25, float(white.low.min()), *positive.tolist())
+    high = max(4.0, float(white.high.max()), float(white.value.max()))
+    ticks = [0.001, 0.01, 0.1, 0.3, 1, 3, 10, 100, 1000, 10_000, 100_000]
+    return {
+        "tickvals": ticks,
+        "ticktext": [f"{tick:,g}" for tick in ticks],
+        "range": [float(np.log10(low)) - 0.05, float(np.log10(high)) + 0.05],
+    }
+
+
+def _powers(density: FloatArray) -> dict[str, object]:
+    """Ticks at every other power of ten where there are many; plotly's own where there are few."""
+    positive = density[density > 0]
+    many = positive.size and positive.max() > 1e4 * positive.min()
+    return {"dtick": 2} if many else {"nticks": 5}
+
+
+def _band(curve: Curve) -> list[Trace]:
+    edge = {"type": "scatter", "mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "x": packed(curve.x)}
+    return [
+        {**edge, "y": packed(curve.low)},
+        {**edge, "y": packed(curve.high), "fill": "tonexty", "fillcolor": "@blue/0.25"},
+    ]
+
+
+def _correlation(curves: Curves, joint: int) -> Panel:
+    curve = curves[CORRELATION, joint]
+    scale, unit = (1e3, "ms") if curve.x[-1] <= MILLI else (1.0, "s")
+    x = scale * curve.x
+    bars = {
+        "type": "bar",
+        "x": packed(x),
+        "y": packed(curve.value),
+        "marker": {"color": "@orange"},
+        "name": "residual",
+        "legendgroup": "residual",
+        "hovertemplate": f"%{{y:.3f}} at %{{x:.4g}} {unit}<extra></extra>",
+    }
+    step = x[0]
+    shapes = [level(sign * FAINT, "@muted", "dash", 1.0) for sign in (-1, 1)] if _is_faint(curve) else []
+    reach = 1.15 * max(float(np.abs(curve.value).max()), 2 * float(curve.high.max()), FAINT if shapes else 0.0)
+    layout = {
+        "xaxis": axis(f"lag, {unit}", range=[0.0, float(x[-1] + 0.7 * step)]),
+        "yaxis": axis("correlation", range=[max(-reach, -1.05), min(reach, 1.05)]),
+        "shapes": shapes,
+        "bargap": 0.35,
+    }
+    beside = Curve(np.array([0.0, *x[1:-1], x[-1] + step]), curve.value, curve.low, curve.high)
+    says = f"Autocorrelation of joint {joint}'s residual; {_count(curve)} inside the band"
+    return Panel([*_band(beside), bars], layout, says, f"Joint {joint}: autocorrelation", HEIGHT)
+
+
+def _is_faint(curve: Curve) -> bool:
+    """Whether the band is so narrow that colour too faint to matter leaves it."""
+    return bool(curve.x.size > 1 and float(np.abs(curve.high).max()) < FAINT)
+
+
+def _has_faint(curves: Curves, joints: list[int]) -> bool:
+    return any(_is_faint(curves[CORRELATION, joint]) for joint in joints)
+
+
+def _count(curve: Curve) -> str:
+    return f"{curve.inside} of {curve.x.size}"
+
+
+def _note(curves: Curves, joints: list[int], result: Result) -> str:
+    """How many values lie inside the bands, and what the estimator's own test says."""
+    told = " and ".join(_count(curves[CORRELATION, joint]) for joint in joints)
+    note = f"Inside the band: {told} correlations of joints 1 and 2"
+    white = [curves[WHITENED, joint] for joint in joints if (WHITENED, joint) in curves]
+    if white:
+        note += f", {' and '.join(map(_count, white))} frequencies"
+    return f"{note}.{_judged(result)}"
+
+
+def _judged(result: Result) -> str:
+    fit = result.fit
+    if fit is None:
+        return ""
+    allow = "the intervals allow for colour" if fit.intervals != "likelihood" else "the intervals do not allow for that"
+    if not fit.whiteness:
+        return f" The {result.estimator} estimator takes no noise to be white: {allow}."
+    if all(test.white for test in fit.whiteness.values()):
+        return " The estimator's test finds no colour that would move an error bar."
+    return f" The estimator's test finds the residual coloured; {allow}."

@@ -1,0 +1,131 @@
+"""What the estimator had found by each moment of the logs, and its shrinking 95 % band."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from algid.arm import FloatArray
+from algid.report.figures.base import Figure, Layout, Legend, Missing, Panel, axis, label, level, line, packed, times
+from algid.report.figures.timeline import offsets, separators, views
+from algid.report.reduce import Block, blocks, by_log, columns_of
+from algid.report.series import LogRange
+from algid.report.text import resolved, significant, unit_text
+from algid.results import Estimate, Result
+
+TITLE = "Running estimate"
+HALF = "_half"
+HEIGHT = 210
+SETTLED = 4.0  # final half widths that the first view shows at least, either way
+READING = (
+    "Read: the band must shrink and the line stay inside what the band was before; a line that leaves it late tells "
+    "of a part of the logs that contradicts the rest."
+)
+LEGEND = (
+    Legend("estimate", "estimate from all samples so far", "@blue"),
+    Legend("band", "its 95 % interval", "@blue/0.25", "area"),
+    Legend("", "final estimate", "@muted", "dash"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """One parameter's estimate and the half width of its 95 % interval (T,), NaN while it is open."""
+
+    name: str
+    value: FloatArray
+    half: FloatArray
+
+    @property
+    def strays(self) -> NDArray[np.intp]:
+        """Where the band misses the final estimate."""
+        return np.flatnonzero(np.abs(self.value - self.value[-1]) > self.half)
+
+
+def running(path: Path, result: Result) -> Figure | Missing:
+    """A panel a parameter that has an estimate at the end. Raises `ResultError`."""
+    names = [name.removesuffix(HALF) for name in columns_of(path) if name.endswith(HALF)]
+    found = list(by_log(blocks(path, ["log", "t", *names, *(name + HALF for name in names)])))
+    if not names or not found:
+        return Missing("running", TITLE, f"{path.name} holds no series")
+    ranges = _ranges(found)
+    moved = offsets(ranges)
+    t = np.concatenate([block["t"] + moved[log] for log, block in found])
+
+    def whole(name: str) -> FloatArray:
+        return np.concatenate([block[name] for _, block in found])
+
+    courses = [Course(name, whole(name), whole(name + HALF)) for name in names if name in result.estimates]
+    courses = [course for course in courses if np.isfinite(course.value[-1])]
+    if not courses:
+        return Missing("running", TITLE, "no parameter is determined")
+    starts = separators(ranges, moved, result.logs).get("shapes", [])
+    panels = tuple(_panel(course, t, result.estimates[course.name], starts) for course in courses)
+    note = _note(courses, t) + _truths(courses, result)
+    return Figure("running", TITLE, panels, READING, LEGEND, note, 2, views(ranges, result.logs))
+
+
+def _ranges(found: list[tuple[int, Block]]) -> dict[int, LogRange]:
+    ranges: dict[int, LogRange] = {}
+    for log, block in found:
+        ranges.setdefault(log, LogRange(0.0, 0.0)).last = float(block["t"][-1])
+    return ranges
+
+
+def _panel(course: Course, t: FloatArray, final: Estimate, starts: list[Layout]) -> Panel:
+    name, value, half = course.name, course.value, course.half
+    unit = unit_text(final.unit)
+    hover = f"{label(name)} %{{y:.5g}} {unit}<br>by %{{x:.4g}} s<extra></extra>"
+    edge = {
+        "type": "scatter",
+        "mode": "lines",
+        "line": {"width": 0},
+        "hoverinfo": "skip",
+        "x": times(t),
+        "legendgroup": "band",
+    }
+    traces = [
+        {**edge, "y": packed(value - half)},
+        {**edge, "y": packed(value + half), "fill": "tonexty", "fillcolor": "@blue/0.25"},
+        line(t, value, "@blue", label(name), "estimate", hover=hover),
+    ]
+    layout = {
+        "xaxis": axis("time, s", range=[0.0, float(t[-1])]),
+        "yaxis": axis(unit, range=_view(value, half)),
+        "shapes": [*starts, level(float(value[-1]), "@muted", "dash", 1.0)],
+        "hovermode": "closest",
+    }
+    says = f"{name} over time, in the end {resolved(final.estimate, final.std)} {unit}"
+    return Panel(traces, layout, says, name, HEIGHT, "running")
+
+
+def _view(value: FloatArray, half: FloatArray) -> list[float]:
+    """The final interval several times over, and the middle half of the series with its band."""
+    known = np.isfinite(value) & np.isfinite(half)
+    later = np.flatnonzero(known)
+    later = later[later.size // 3 :]
+    low = [float(value[-1] - SETTLED * half[-1]), *(value[later] - half[later]).tolist()]
+    high = [float(value[-1] + SETTLED * half[-1]), *(value[later] + half[later]).tolist()]
+    return [min(low), max(high)]
+
+
+def _note(courses: list[Course], t: FloatArray) -> str:
+    """When the last band missed its final estimate."""
+    late = {course.name: float(t[course.strays[-1]]) for course in courses if course.strays.size}
+    if not late:
+        return "Every band held the final estimate from the start."
+    latest = max(late, key=lambda name: late[name])
+    when = f"{significant(late[latest], 3)} s of {significant(float(t[-1]), 3)} s"
+    return f"The last band to miss its final estimate was that of {latest}, at {when}."
+
+
+def _truths(courses: list[Course], result: Result) -> str:
+    """How often the bands hold a truth that is known."""
+    truth = {row.parameter: row.truth for row in result.table4 if row.truth is not None} | result.truth
+    known = [course for course in courses if course.name in truth]
+    held = sum(int(np.sum(np.abs(course.value - truth[course.name]) <= course.half)) for course in known)
+    count = sum(int(np.isfinite(course.half).sum()) for course in known)
+    return f" The bands hold the truth {significant(100 * held / count, 3)} % of the time." if count else ""

@@ -1,0 +1,86 @@
+"""The residual's pictures against other libraries' spectra, and their bands against noise that is known to be white."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import periodogram
+from scipy.stats import binom
+
+from algid.arm import FloatArray
+from algid.estimators.innovations import autocorrelation, pooled, residual_sums, spectra, whiteness_of
+
+DT = 2e-3
+
+
+def _inside(value: FloatArray, low: FloatArray, high: FloatArray) -> int:
+    return int(np.count_nonzero((value >= low) & (value <= high)))
+
+
+def test_the_bands_hold_95_percent_of_white_noise_and_tell_it_from_90() -> None:
+    rng = np.random.default_rng(5)
+    lags = bins = lags_in = bins_in = 0
+    for _ in range(40):
+        pieces = [residual_sums(rng.normal(size=(2, n)), DT) for n in (4000, 2500, 700)]
+        sums = pooled(pieces)
+        assert sums is not None
+        r, S = autocorrelation(sums), whiteness_of(sums)
+        lags, lags_in = lags + r.correlation.size, lags_in + _inside(r.correlation, -r.half, r.half)
+        bins, bins_in = bins + S.density.size, bins_in + _inside(S.density, S.low, S.high)
+    for count, inside in ((lags, lags_in), (bins, bins_in)):
+        low, high = binom.interval(0.999, count, 0.95)
+        assert low <= inside <= high, (count, inside)
+        assert inside > binom.ppf(0.999, count, 0.90)
+
+
+def test_rows_that_overlap_have_a_band_of_their_own() -> None:
+    """White noise through windows that overlap eight-fold: a moving average, uncorrelated from eight rows on."""
+    rng = np.random.default_rng(7)
+    kernel = np.hanning(10)[1:-1]
+    count = inside = 0
+    for _ in range(60):
+        e = np.stack([np.convolve(row, kernel, "valid") for row in rng.normal(size=(2, 2007))])
+        r = autocorrelation(residual_sums(e, 0.05, stride=8, lags=80))
+        assert r.lag[0] == pytest.approx(0.4, rel=1e-12)
+        count, inside = count + r.correlation.size, inside + _inside(r.correlation, -r.half, r.half)
+    low, high = binom.interval(0.999, count, 0.95)
+    assert low <= inside <= high, (count, inside)
+    assert inside > binom.ppf(0.999, count, 0.90)
+
+
+def test_the_density_holds_the_variance() -> None:
+    """Parseval: the mean over all frequencies, by scipy's periodogram and ours, and the variance are one number."""
+    w = np.random.default_rng(0).normal(size=(2, 3000))
+    sums = residual_sums(w, DT)
+    _, P = periodogram(w, 1 / DT, window="hann")
+    # scipy halves the last line, which has no partner at negative frequencies; our first two are left out
+    ours = 2 * DT * sums.power.sum(axis=1)
+    np.testing.assert_allclose(ours, P[:, 2:].sum(axis=1) + P[:, -1], rtol=1e-9)
+
+
+def test_the_density_of_coloured_noise_is_that_of_its_filter() -> None:
+    rng = np.random.default_rng(1)
+    e = rng.normal(size=(2, 60_000))
+    w = np.stack([np.convolve(row, [1.0, 0.8], "valid") for row in e])
+    found = spectra(residual_sums(w, DT))
+    exact = 2 * DT * np.abs(1 + 0.8 * np.exp(-2j * np.pi * found.frequency * DT)) ** 2
+    share = found.density / exact
+    # the bins are narrow beside the filter's shape but for the highest, where it falls to a hundredth
+    wide = found.frequency < 0.35 / DT
+    assert np.mean((share[:, wide] > found.low[wide]) & (share[:, wide] < found.high[wide])) > 0.9
+    r = autocorrelation(residual_sums(w, DT)).correlation
+    np.testing.assert_allclose(r[:, 0], 0.8 / 1.64, atol=0.02)  # five standard errors of 60,000 samples
+
+
+def test_logs_of_another_rate_are_left_out() -> None:
+    w = np.random.default_rng(2).normal(size=(2, 400))
+    alone = pooled([residual_sums(w, DT), residual_sums(w, 3 * DT)])
+    assert alone is not None
+    assert alone.pairs[0] == 400
+    assert pooled([]) is None
+
+
+def test_a_residual_that_is_nothing_is_no_number() -> None:
+    found = residual_sums(np.zeros((2, 400)), DT)
+    assert not autocorrelation(found).correlation.any()
+    assert not whiteness_of(found).density.any()

@@ -1,0 +1,77 @@
+"""The running estimate: where it ends, what its band holds on the way, and that it shrinks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from algid.estimators import refined, weak
+from algid.estimators.fit import Fit
+from algid.estimators.running import has_running, running
+from algid.signals.segments import Segment
+
+from .conftest import Bench
+
+
+def _source(segment: Segment):  # type: ignore[no-untyped-def]
+    return lambda: iter([segment])
+
+
+def _fit(bench: Bench, estimator: str, seed: int, loaded: bool) -> Fit:
+    bare = [_source(bench.log(sigma=1e-4, seed=seed))]
+    burdened = [_source(bench.log(True, sigma=1e-4, seed=seed))] if loaded else []
+    return weak.fit(bare, burdened) if estimator == "weak" else refined.fit(bare, burdened)
+
+
+@pytest.mark.parametrize("estimator", ["weak", "refined"])
+def test_it_ends_where_the_fit_does(bench: Bench, estimator: str) -> None:
+    fit = _fit(bench, estimator, 1, loaded=True)
+    found = running(fit, [4.0, 4.0], 40)
+    assert has_running(fit)
+    assert list(np.unique(found.log)) == [0, 1]
+    np.testing.assert_allclose(found.beta[-1], fit.values, rtol=1e-6)  # both are optima, found to 1e-5 deviations
+    np.testing.assert_allclose(found.half[-1], fit.quantile * fit.std, rtol=1e-6)
+    first_loaded = int(np.flatnonzero(found.log)[0])
+    payload = [fit.names.index(name) for name in ("m_p", "l1", "l2")]
+    assert np.isnan(found.beta[first_loaded - 1, payload]).all()
+    assert np.isfinite(found.beta[-1]).all()
+
+
+def test_its_band_shrinks(bench: Bench) -> None:
+    found = running(_fit(bench, "refined", 2, loaded=False), [4.0], 40)
+    known = found.half[np.isfinite(found.half).all(axis=1)]
+    assert np.all(np.diff(known, axis=0) <= 1e-3 * known[:-1])  # information adds up; its linearisation moves a little
+    assert np.all(known[-1] < 0.5 * known[0])
+
+
+def test_a_log_that_begins_at_rest_begins_with_nothing(bench: Bench) -> None:
+    log = bench.log()
+    still = np.zeros((2, 2000))
+    rest = Segment(0.0, log.dt, np.concatenate([still, log.theta], axis=1), np.concatenate([still, log.tau], axis=1))
+    found = running(weak.fit([_source(rest)]), [6.0], 30)  # pytest makes an overflow an error
+    assert np.isnan(found.beta[0]).any()
+    assert np.isfinite(found.beta[-1]).all()
+
+
+@pytest.mark.slow
+def test_its_band_holds_the_truth_19_times_of_20(bench: Bench) -> None:
+    """Half way and at three quarters, seven constants of many draws; 90 % intervals would be told."""
+    truth = bench.arm.constants()
+    count = inside = 0
+    for seed in range(30):
+        found = running(_fit(bench, "refined", 10 + seed, loaded=False), [4.0], 8)
+        for place in (3, 5):
+            held = np.abs(found.beta[place] - truth) <= found.half[place]
+            count, inside = count + held.size, inside + int(held.sum())
+    # the two moments share samples, the constants are correlated: the bounds allow for a third as many draws
+    low, high = (edge * 3 for edge in binom.interval(0.999, count // 3, 0.95))
+    assert low <= inside <= high, (inside, count)
+
+
+def test_a_fit_held_within_bounds_has_none(bench: Bench) -> None:
+    from dataclasses import replace
+
+    fit = _fit(bench, "weak", 1, loaded=False)
+    assert not has_running(replace(fit, values=fit.values * 1.01))
+    assert not has_running(replace(fit, converged=False))

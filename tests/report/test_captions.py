@@ -1,0 +1,91 @@
+"""What the figures say in words is what they show."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from scipy.stats import binom
+
+from algid.report.figures.base import Figure
+from algid.report.figures.innovations import CORRELATION, WHITENED, innovations, read_curves
+from algid.report.figures.running import running
+from algid.report.gallery import gallery
+from algid.report.verdict import verdict
+from algid.results import Result, WhitenessTest
+
+
+@pytest.fixture
+def folder(case_folder: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(case_folder, tmp_path / "case1.algid"))
+
+
+def _figure(made: object) -> Figure:
+    assert isinstance(made, Figure)
+    return made
+
+
+def test_a_good_reports_innovations_lie_in_their_band(case_folder: Path, result: Result) -> None:
+    assert verdict(result).level == "good"
+    curves = read_curves(case_folder / "innovations.parquet")
+    assert set(curves) == {(kind, joint) for kind in (WHITENED, CORRELATION) for joint in (1, 2)}
+    count = sum(curve.x.size for curve in curves.values())
+    inside = sum(curve.inside for curve in curves.values())
+    low, high = binom.interval(0.999, count, 0.95)
+    assert low <= inside <= high
+    assert inside > binom.ppf(0.95, count, 0.85)
+
+
+def test_the_note_counts_what_the_picture_shows(folder: Path, result: Result) -> None:
+    path = folder / "innovations.parquet"
+    figure = _figure(innovations(path, result))
+    rows = pl.read_parquet(path).with_columns(inside=pl.col("value").is_between(pl.col("low"), pl.col("high")))
+    for quantity, words in ((CORRELATION, "correlations of joints 1 and 2"), (WHITENED, "frequencies")):
+        own = rows.filter(pl.col("quantity") == quantity)
+        told = [own.filter(pl.col("joint") == joint) for joint in (1, 2)]
+        counts = " and ".join(f"{int(one['inside'].sum())} of {one.height}" for one in told)
+        assert f"{counts} {words}" in figure.note
+    assert "finds no colour" in figure.note
+
+
+def test_colour_is_told_and_seen(folder: Path, result: Result) -> None:
+    path = folder / "innovations.parquet"
+    raised = pl.when(pl.col("quantity") == CORRELATION).then(0.8).otherwise(pl.col("value"))
+    pl.read_parquet(path).with_columns(value=raised).write_parquet(path)
+    assert result.fit is not None
+    coloured = {name: WhitenessTest(white=False, p_value=0.0, lag1_correlation=0.8) for name in ("tau1", "tau2")}
+    poor = result.model_copy(update={"fit": result.fit.model_copy(update={"whiteness": coloured})})
+    figure = _figure(innovations(path, poor))
+    assert "Inside the band: 0 of 40 and 0 of 40 correlations" in figure.note
+    assert "coloured; the intervals do not allow for that" in figure.note
+
+
+def test_the_running_estimate_ends_at_the_estimate_and_tells_when_it_strayed(folder: Path, result: Result) -> None:
+    path = folder / "running.parquet"
+    figure = _figure(running(path, result))
+    rows = pl.read_parquet(path)
+    assert [panel.title for panel in figure.panels] == [name for name in rows.columns if f"{name}_half" in rows.columns]
+    for panel in figure.panels:
+        estimate = result.parameters[panel.title].estimate
+        assert estimate is not None
+        assert rows[panel.title][-1] == pytest.approx(estimate, rel=1e-9)
+        (mark,) = [shape for shape in panel.layout["shapes"] if shape.get("xref") == "paper"]
+        assert mark["y0"] == pytest.approx(estimate, rel=1e-9)
+        low, high = panel.layout["yaxis"]["range"]
+        assert low < estimate < high
+    truth = {row.parameter: row.truth for row in result.table4}
+    held = [np.mean(np.abs(rows[name].to_numpy() - truth[name]) <= rows[f"{name}_half"].to_numpy()) for name in truth]
+    told = re.search(r"The bands hold the truth ([\d.]+) % of the time", figure.note)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(100 * float(np.mean(held)), rel=1e-2)  # three digits are written
+
+
+def test_no_figure_is_without_a_reading_aid(case_folder: Path, result: Result) -> None:
+    shown = gallery(case_folder, result)
+    for figure in (*shown.figures, *shown.paper):
+        assert _figure(figure).reading.startswith("Read: "), figure.key
+        assert all(panel.says for panel in _figure(figure).panels)
