@@ -225,7 +225,7 @@ def _read_by_catalogue(part: Partial) -> list[Range]:
     for record in framing.walk_bytes(content, 0, len(content)):
         body = content[record.start : record.end]
         if record.code == framing.CHUNK_INDEX:
-            chunks.append(framing.parse(records.ChunkIndex, body))
+            chunks.append(framing.chunk_index(body))
             wanted += [(offset, offset + _INDEX_HEAD) for offset in chunks[-1].message_index_offsets.values()]
         elif record.code == _METADATA_INDEX:
             place = framing.parse(records.MetadataIndex, body)

@@ -13,13 +13,21 @@ import numpy as np
 import pytest
 import zstandard
 from mcap.reader import make_reader
-from mcap.writer import CompressionType
+from mcap.writer import CompressionType, IndexType
 
 from algid.errors import LogError
 from algid.log import Log
 from algid.profile import Profile
 from algid.readers import open_log, read_log
-from algid.ros2 import HEADER
+from algid.readers.mcap import opened
+from algid.readers.mcap.catalogue import Catalogue
+from algid.readers.mcap.catalogue import catalogue as walk
+from algid.readers.mcap.columnar import Decoder
+from algid.readers.mcap.framing import File
+from algid.readers.mcap.json import _Paths
+from algid.readers.mcap.load import batches
+from algid.readers.mcap.messages import Messages
+from algid.ros2 import HEADER, JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.writers import write_log
 from tests.readers.logs import EPOCH_NS, noise_log, same
 from tests.readers.mcaps import NO_INDEX, Cdr, joint_state, write_mcap
@@ -473,3 +481,100 @@ def test_messages_of_a_damaged_chunk_are_counted_by_its_index(tmp_path: Path) ->
     path.write_bytes(content)
     found = read_log(path)
     assert any(f"{len(log) - len(found)} messages are missing" in notice.text for notice in found.notices)
+
+
+def small_chunks(path: Path, rows: int = 3000, **options: Any) -> None:
+    """Joint states, each in a chunk of its own."""
+    schemas = {"/joint_states": (JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode())}
+    wave = np.sin(np.arange(rows) * 0.01)
+    messages = (
+        (
+            "/joint_states",
+            row * 10**6,
+            joint_state(row * 10**6, position=(wave[row], 0.5), effort=(1.0, -wave[row])).done(),
+        )
+        for row in range(rows)
+    )
+    write_mcap(path, messages, schemas, chunk_size=1, **options)
+
+
+@pytest.mark.parametrize("index", [IndexType.ALL, IndexType.NONE])
+def test_small_chunks_are_loaded_many_at_a_time(
+    index: IndexType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small_chunks(tmp_path / "a.mcap", index_types=index)
+    decoded: list[int] = []
+    columns = Decoder.columns
+
+    def counted(self: Decoder, messages: Messages) -> Any:
+        decoded.append(len(messages))
+        return columns(self, messages)
+
+    monkeypatch.setattr(Decoder, "columns", counted)
+    log = read_log(tmp_path / "a.mcap")
+    assert len(log) == 3000
+    assert np.array_equal(log.theta[0], np.sin(np.arange(3000) * 0.01))
+    assert sum(decoded) == 3000
+    assert len(decoded) <= 30
+
+
+def test_one_damaged_chunk_among_many_small_ones_is_left_out_alone(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    small_chunks(path, compression=CompressionType.NONE)
+    content = bytearray(path.read_bytes())
+    content[content.index(struct.pack("<d", np.sin(1500 * 0.01)))] ^= 1
+    path.write_bytes(content)
+    log = read_log(path)
+    assert len(log) == 2999
+    assert 1500 * 10**6 not in log.stamp_ns
+    assert [(one.code, one.lossy) for one in log.notices if one.lossy] == [("DAMAGED_CHUNK", True)]
+    assert "1 messages are missing" in next(one.text for one in log.notices if one.lossy)
+
+
+def test_small_chunks_that_unpack_to_much_are_not_held_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small_chunks(tmp_path / "a.mcap", rows=500)
+    monkeypatch.setattr("algid.readers.mcap.load._GROUP_UNPACKED", 1000)
+    with opened(tmp_path / "a.mcap") as (file, found):
+        held = [len(batch.messages) for batch in batches(file, found, frozenset({1})) if batch.messages is not None]
+    assert sum(held) == 500
+    assert max(held) < 10
+
+
+def test_a_file_without_summary_is_walked_once_for_all_passes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    small_chunks(tmp_path / "a.mcap", index_types=IndexType.NONE)
+    walks: list[Path] = []
+
+    def counted(file: File) -> Catalogue:
+        walks.append(file.path)
+        return walk(file)
+
+    monkeypatch.setattr("algid.readers.mcap.catalogue", counted)
+    reader = open_log(tmp_path / "a.mcap")
+    first, second = (sum(map(len, reader.blocks())) for _ in range(2))
+    assert (first, second, len(walks)) == (3000, 3000, 1)
+    small_chunks(tmp_path / "a.mcap", rows=2000, index_types=IndexType.NONE)
+    assert sum(map(len, reader.blocks())) == 2000
+    assert len(walks) == 2
+
+
+def test_json_of_very_many_fields_is_refused_before_it_takes_long(tmp_path: Path) -> None:
+    plain: dict[str, Any] = {"name": ["a", "b"], "position": [1, 2], "effort": [3, 4]}
+    texts = [json.dumps(plain)] * 64 + [json.dumps({**plain, "x": {str(k): 0 for k in range(50_000)}})] * 60
+    messages = ((TOPIC, row * 10**6, text.encode()) for row, text in enumerate(texts))
+    schemas = {"/joint_states": ("J", "jsonschema", b"{}")}
+    write_mcap(tmp_path / "a.mcap", messages, schemas, encoding="json", chunk_size=1 << 26)
+    with pytest.raises(LogError, match="more text than any recorder's file of this size"):
+        read_log(tmp_path / "a.mcap")
+
+
+def test_a_json_path_is_looked_up_once_among_many_fields() -> None:
+    found = _Paths({"name": ["a", "b", "b"], "position": [1.5, 2, 3], "x": 1})
+    assert [found.value(path) for path in (["position", "[a]"], ["position", "[2]"], ["position", "[b]"])] == [
+        1.5,
+        3,
+        None,
+    ]
+    assert found.value(["x"]) == 1
+    assert found.value(["x", "y"]) is None

@@ -31,7 +31,8 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
     """
     from algid.readers.mcap.plan import NothingFoundError, plan
 
-    with opened(paths[0]) as (file, found):
+    known: Known = {}
+    with opened(paths[0], known) as (file, found):
         try:
             wanted = plan(file, found, profile)
         except NothingFoundError as error:
@@ -45,30 +46,33 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
 
     def tables(rows: int) -> Iterator[Table]:
         main, *others = wanted.topics
-        if not others:
-            return _read(paths, main, rows)
-        return aligned(_read(paths, main, rows), [_series(name, paths, other) for other in others])
+        samples = _read(paths, main, rows, known)
+        return aligned(samples, [_series(name, paths, other, known) for other in others]) if others else samples
 
     return reader_of(origin, tables, profile, wanted.units, wanted.notices, rows)
 
 
-def _read(paths: Sequence[Path], topic: Topic, rows: int) -> Iterator[Table]:
+def _read(paths: Sequence[Path], topic: Topic, rows: int, known: Known) -> Iterator[Table]:
     for path in paths:
-        with opened(path) as (file, found):
+        with opened(path, known) as (file, found):
             yield from topic.tables(str(path), file, found, rows)
 
 
-def _series(name: str, paths: Sequence[Path], topic: Topic) -> Series:
+def _series(name: str, paths: Sequence[Path], topic: Topic, known: Known) -> Series:
     """A topic as a whole, in time order."""
-    tables = [table for table in Sorter(name).run(_read(paths, topic, BLOCK_ROWS)) if len(table)]
+    tables = [table for table in Sorter(name).run(_read(paths, topic, BLOCK_ROWS, known)) if len(table)]
     if not tables:
         raise LogError(f"{name}: topic {topic.name!r} holds no sample; name another source in the profile")
     return Series(topic.name, stack(tables))
 
 
+Known = dict[tuple[Path, int, int], Catalogue]
+"""Catalogues by path, size and time of change: several passes go over a log, and one without a summary is walked."""
+
+
 @contextmanager
-def opened(path: Path) -> Iterator[tuple[File, Catalogue]]:
-    """The opened file and its catalogue.
+def opened(path: Path, known: Known | None = None) -> Iterator[tuple[File, Catalogue]]:
+    """The opened file and its catalogue, taken from the `known` ones, and put there, where these are given.
 
     Raises
     ------
@@ -76,10 +80,15 @@ def opened(path: Path) -> Iterator[tuple[File, Catalogue]]:
         If not even the start of the file is MCAP.
     """
     with File(path) as file:
-        try:
-            found = catalogue(file)
-        except DamagedError as error:
-            raise LogError(f"{path}: the MCAP file cannot be read: {error}") from error
+        found = None if known is None else known.get((path, file.size, file.changed_ns))
+        if found is None:
+            try:
+                found = catalogue(file)
+            except DamagedError as error:
+                raise LogError(f"{path}: the MCAP file cannot be read: {error}") from error
+        if known is not None:
+            known[path, file.size, file.changed_ns] = found
+            found = found.copy()
         yield file, found
 
 

@@ -13,11 +13,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
 from algid.log import KEY, Notice
 from algid.readers.mcap import framing
-from algid.readers.mcap.framing import DamagedError, File, claimed, parse, unpack, unpack_torn
+from algid.readers.mcap.framing import ChunkIndex, DamagedError, File, claimed, parse, unpack, unpack_torn
 from algid.readers.mcap.messages import records_in
 from algid.readers.mcap.salvage import Gap, salvaged
 
@@ -60,6 +58,19 @@ class Catalogue:
     notices: list[Notice] = field(default_factory=list)
     damage: list[str] = field(default_factory=list)
     redefined: dict[int, int] = field(default_factory=dict)
+    _agreed: dict[tuple[int, bytes], Any] = field(default_factory=dict, repr=False)
+
+    def copy(self) -> Catalogue:
+        """One that reading may add to."""
+        return replace(
+            self,
+            schemas=dict(self.schemas),
+            channels=dict(self.channels),
+            metadata=dict(self.metadata),
+            notices=list(self.notices),
+            damage=list(self.damage),
+            redefined=dict(self.redefined),
+        )
 
     def define(self, code: int, content: bytes) -> None:
         """Take in the content of a schema's or a channel's record; the first of an id holds.
@@ -78,11 +89,15 @@ class Catalogue:
         """A schema or a channel as its record says, that has no other meaning yet: see `define`."""
         from mcap import records
 
+        if (code, content) in self._agreed:  # recorders repeat them in every chunk
+            return self._agreed[code, content]
         kind, known = (records.Schema, self.schemas) if code == framing.SCHEMA else (records.Channel, self.channels)
         one = parse(kind, content)
         if known.get(one.id, one) != one:
             changed = [one.id] if code == framing.CHANNEL else self._channels_of_schema(one.id)
             raise RedefinedError(f"{kind.__name__.lower()} {one.id} is defined anew and differently", changed)
+        if one.id in known:
+            self._agreed[code, content] = one
         return one
 
     def _channels_of_schema(self, number: int) -> list[int]:
@@ -123,13 +138,14 @@ def _from_summary(file: File) -> Catalogue | None:
     if place is None:
         return None
     content = file.read(*place)
-    found, statistics, chunks, metadata = Catalogue(), None, [], []
+    found, statistics, metadata = Catalogue(), None, []
+    chunks: list[ChunkIndex] = []
     for record in framing.walk_bytes(content, 0, len(content)):
         body = content[record.start : record.end]
         if record.code in (framing.SCHEMA, framing.CHANNEL):
             found.define(record.code, body)
         elif record.code == framing.CHUNK_INDEX:
-            chunks.append(parse(records.ChunkIndex, body))
+            chunks.append(framing.chunk_index(body))
         elif record.code == framing.STATISTICS:
             statistics = parse(records.Statistics, body)
         elif record.code == framing.METADATA_INDEX:
@@ -165,7 +181,7 @@ def _summary(file: File) -> tuple[int, int] | None:
     return start, end - start
 
 
-def _chunk_span(file: File, chunk: Any) -> Span:
+def _chunk_span(file: File, chunk: ChunkIndex) -> Span:
     start, length = chunk.chunk_start_offset + 9, chunk.chunk_length - 9
     if not (length > 0 and start + length + chunk.message_index_length <= file.size):
         raise DamagedError(f"it claims a chunk at byte {chunk.chunk_start_offset}")
@@ -173,7 +189,7 @@ def _chunk_span(file: File, chunk: Any) -> Span:
     return Span(start, length, chunk.message_index_length, channels)
 
 
-def _check_counts(file: File, chunks: list[Any], statistics: Any) -> None:
+def _check_counts(file: File, chunks: list[ChunkIndex], statistics: Any) -> None:
     """Compare the messages that the indexes list with those that the statistics count, for every channel."""
     if statistics.chunk_count != len(chunks):
         raise DamagedError(f"it lists {len(chunks)} of {statistics.chunk_count} chunks")
@@ -193,14 +209,14 @@ def _check_counts(file: File, chunks: list[Any], statistics: Any) -> None:
         raise DamagedError("its indexes and its statistics count different numbers of messages")
 
 
-def between(chunks: list[Any], end: int) -> list[tuple[int, int]]:
+def between(chunks: list[ChunkIndex], end: int) -> list[tuple[int, int]]:
     """Bytes [start, end) around chunks in file order, up to the summary at `end`: neither these nor their indexes."""
     ends = [chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length for chunk in chunks]
     starts = [chunk.chunk_start_offset for chunk in chunks]
     return [pair for pair in zip([len(framing.MAGIC), *ends], [*starts, end], strict=True) if pair[0] != pair[1]]
 
 
-def _check_between(file: File, chunks: list[Any], end: int) -> None:
+def _check_between(file: File, chunks: list[ChunkIndex], end: int) -> None:
     """Chunks must not overlap, and no message or chunk stand beside those that are listed."""
     for first, last in between(chunks, end):
         if first > last:
@@ -318,15 +334,16 @@ def _looked_into(file: File, span: Span, found: Catalogue) -> Span:
             records = records_in(content, works=file.works)
         else:
             chunk = content[: span.length]
-            if not claimed(chunk):
+            size = claimed(chunk)
+            if not size:
                 return replace(span, channels=frozenset())
-            file.unpacks(claimed(chunk))
+            file.unpacks(size)
             unpacked = unpack_torn(chunk)[0] if span.torn else unpack(chunk)
             records = records_in(unpacked, content[span.length :], file.works)
         for code, body in records.others:
             if code in (framing.SCHEMA, framing.CHANNEL):
                 _define(found, code, body, span.start)
-        return replace(span, channels=frozenset(np.unique(records.channels).tolist()))
+        return replace(span, channels=records.channels_seen)
     except DamagedError as error:
         found.damage.append(f"{error} (at byte {span.start})")
     return span

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, NamedTuple
 
 from algid.errors import LogError
 
@@ -74,6 +74,7 @@ class File:
     read_bytes: int = 0
     _unpacked: int = 0
     _work: int = 0
+    changed_ns: int = 0
     _handle: int = field(default=-1, repr=False)
 
     def __enter__(self) -> File:
@@ -81,7 +82,8 @@ class File:
             self._handle = os.open(self.path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
         except OSError as error:
             raise LogError(f"{self.path}: the log cannot be read ({error.strerror})") from error
-        self.size = os.fstat(self._handle).st_size
+        status = os.fstat(self._handle)
+        self.size, self.changed_ns = status.st_size, status.st_mtime_ns
         return self
 
     def __exit__(
@@ -196,6 +198,36 @@ def parse(kind: Any, content: bytes) -> Any:
         raise DamagedError(f"a {kind.__name__} record cannot be read ({error})") from error
 
 
+class ChunkIndex(NamedTuple):
+    """Where the summary says that a chunk lies, and by channel where the indexes of its messages do."""
+
+    chunk_start_offset: int
+    chunk_length: int
+    message_index_offsets: dict[int, int]
+    message_index_length: int
+
+
+_INDEX_HEAD = struct.Struct("<QQQQI")
+_INDEX_PAIR = struct.Struct("<HQ")
+
+
+def chunk_index(content: bytes) -> ChunkIndex:
+    """A chunk index record's content; by hand, since a file may hold a hundred thousand of them.
+
+    Raises
+    ------
+    DamagedError
+        If it breaks off.
+    """
+    try:
+        _, _, start, length, size = _INDEX_HEAD.unpack_from(content)
+        end = _INDEX_HEAD.size + size
+        (indexes,) = struct.unpack_from("<Q", content, end)
+        return ChunkIndex(start, length, dict(_INDEX_PAIR.iter_unpack(content[_INDEX_HEAD.size : end])), indexes)
+    except struct.error as error:
+        raise DamagedError(f"a ChunkIndex record cannot be read ({error})") from error
+
+
 @dataclass(frozen=True)
 class _Chunk:
     """A chunk record's head and what is there of its packed records."""
@@ -208,15 +240,12 @@ class _Chunk:
 
 
 def _chunk(content: bytes) -> _Chunk:
-    if len(content) < 40:
-        raise DamagedError("a chunk breaks off")
-    _, _, size, crc, name_length = struct.unpack_from("<QQQII", content)
+    size = claimed(content)
+    crc, name_length = struct.unpack_from("<II", content, 24)
     if name_length > 32 or 32 + name_length + 8 > len(content):
         raise DamagedError("a chunk's compression has no name")
     name = content[32 : 32 + name_length]
     (packed_size,) = struct.unpack_from("<Q", content, 32 + name_length)
-    if size > LARGEST_CHUNK:
-        raise DamagedError(f"a chunk claims {size} bytes unpacked, more than {LARGEST_CHUNK}")
     return _Chunk(size, crc, name, packed_size, memoryview(content)[40 + name_length :])
 
 
@@ -228,7 +257,12 @@ def claimed(content: bytes) -> int:
     DamagedError
         If they are more than `LARGEST_CHUNK`.
     """
-    return _chunk(content).size
+    if len(content) < 40:
+        raise DamagedError("a chunk breaks off")
+    (size,) = struct.unpack_from("<Q", content, 16)
+    if size > LARGEST_CHUNK:
+        raise DamagedError(f"a chunk claims {size} bytes unpacked, more than {LARGEST_CHUNK}")
+    return int(size)
 
 
 def unpack(content: bytes) -> bytes:

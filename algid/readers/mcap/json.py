@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,8 @@ from algid.readers.mcap.columnar import ExcessError, Fields, MisfitError, Number
 from algid.readers.mcap.messages import Messages
 
 _LARGEST = 1 << 20
-_BYTES_A_STEP = 64
+_BYTES_A_STEP, _COMMAS_A_STEP, _STEPS_A_COLON = 64, 8, 2
+"""What parsing takes: bytes of text, numbers of a list, fields of an object; the last are by far the slowest."""
 
 
 def walk(payload: bytes) -> Shape:
@@ -79,19 +80,21 @@ class JsonDecoder:
         ExcessError
             If they are more than in any honest file of this size.
         """
-        if not self.works(int(messages.sizes.sum()) // _BYTES_A_STEP):
-            raise ExcessError("more text than any recorder's file of this size")
+        self._spend(int(messages.sizes.sum()) // _BYTES_A_STEP)
         misfits = self.misfits
         held = np.zeros(len(messages), np.bool_)
+        paths = [_PART.findall(path) for path in self.wanted.values()]
         rows: list[list[Any]] = []
         for row, (start, size) in enumerate(zip(messages.starts, messages.sizes, strict=True)):
+            payload = messages.content[start : start + size].tobytes()
+            self._spend(payload.count(b":") * _STEPS_A_COLON + payload.count(b",") // _COMMAS_A_STEP)
             try:
-                found = _object(messages.content[start : start + size].tobytes())
+                found = _object(payload)
             except MisfitError as error:
                 self.misfits += 1
                 self.misfit = self.misfit or str(error)
                 continue
-            values = [_value(found, path) for path in self.wanted.values()]
+            values = list(map(_Paths(found).value, paths))
             held[row] = all(
                 value is not None or name not in self.needed for name, value in zip(self.wanted, values, strict=True)
             )
@@ -99,6 +102,10 @@ class JsonDecoder:
                 rows.append(values)
         self.skipped += int(held.size - np.count_nonzero(held)) - (self.misfits - misfits)
         return held, {name: _column([row[place] for row in rows]) for place, name in enumerate(self.wanted)}
+
+    def _spend(self, steps: int) -> None:
+        if not self.works(steps):
+            raise ExcessError("more text than any recorder's file of this size")
 
 
 def _column(values: list[Any]) -> NDArray[np.generic]:
@@ -113,22 +120,37 @@ def _float(value: float | None) -> float:
         return math.inf
 
 
-def _value(found: Any, path: str) -> Any:
-    """The number at a path as in `Shape.find`, or None."""
-    parent: Any = None
-    for part in re.findall(r"\[[^\]]*\]|[^.\[\]]+", path):
-        if not part.startswith("["):
-            parent, found = found, found.get(part) if isinstance(found, dict) else None
-            continue
-        index = _place(parent, part[1:-1])
-        if index is None and part[1:-1].isdigit():
-            index = int(part[1:-1])
-        found = found[index] if isinstance(found, list) and index is not None and index < len(found) else None
-    return found if isinstance(found, (int, float)) and not isinstance(found, bool) else None
+_PART = re.compile(r"\[[^\]]*\]|[^.\[\]]+")
 
 
-def _place(parent: Any, name: str) -> int | None:
-    """Where a name stands in a list beside; behind its end, where nothing is, for one that stands there twice."""
-    lists = [one for one in parent.values() if isinstance(one, list)] if isinstance(parent, dict) else []
-    named = next((one for one in lists if name in one), [])
-    return None if not named else named.index(name) if named.count(name) == 1 else len(named)
+class _Paths:
+    """Takes numbers out of one message by paths as in `Shape.find`."""
+
+    def __init__(self, message: dict[str, Any]) -> None:
+        self._message = message
+        self._lists: dict[int, list[list[Any]]] = {}
+        """Lists that stand side by side, by the object that holds them: an object may have very many other fields."""
+
+    def value(self, parts: Sequence[str]) -> Any:
+        """The number at a path, or None."""
+        found: Any = self._message
+        parent: Any = None
+        for part in parts:
+            if not part.startswith("["):
+                parent, found = found, found.get(part) if isinstance(found, dict) else None
+                continue
+            index = self._place(parent, part[1:-1])
+            if index is None and part[1:-1].isdigit():
+                index = int(part[1:-1])
+            found = found[index] if isinstance(found, list) and index is not None and index < len(found) else None
+        return found if isinstance(found, (int, float)) and not isinstance(found, bool) else None
+
+    def _place(self, parent: Any, name: str) -> int | None:
+        """Where a name stands in a list beside; behind its end, where nothing is, for one that stands there twice."""
+        if not isinstance(parent, dict):
+            return None
+        lists = self._lists.get(id(parent))
+        if lists is None:
+            lists = self._lists[id(parent)] = [one for one in parent.values() if isinstance(one, list)]
+        named = next((one for one in lists if name in one), [])
+        return None if not named else named.index(name) if named.count(name) == 1 else len(named)

@@ -3,25 +3,32 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
+from functools import partial
 
 from algid.log import Notice
 from algid.readers.mcap import framing
 from algid.readers.mcap.catalogue import Catalogue, RedefinedError, Span
 from algid.readers.mcap.framing import DamagedError, File, claimed, has_checksum, unpack, unpack_torn
-from algid.readers.mcap.messages import Messages, Records, entries, records_in
+from algid.readers.mcap.messages import Messages, Records, entries, joined, records_in
 from algid.runtime import executor
 
 _AHEAD = 3
 _AHEAD_BYTES = 1 << 23
 """Chunks beyond this size are not read ahead, so that memory stays bounded by one of them."""
 
+_GROUP_BYTES, _GROUP_UNPACKED = 1 << 16, 1 << 21
+"""Small chunks are loaded together up to these sizes, packed and unpacked."""
+
 
 @dataclass(frozen=True)
 class Batch:
-    """Messages of one span, or None and why they are lost; of a torn chunk also how much is there."""
+    """Messages of one span or of many small ones, or None and why those of one are lost.
+
+    Of a torn chunk also how much is there.
+    """
 
     messages: Messages | None
     checked: bool
@@ -38,23 +45,92 @@ def spans_of(catalogue: Catalogue, channels: frozenset[int]) -> list[Span]:
 
 
 def batches(file: File, catalogue: Catalogue, channels: frozenset[int]) -> Iterator[Batch]:
-    """The messages of `channels`, a span at a time and in file order; a damaged span yields its reason."""
-    waiting: deque[Future[Batch]] = deque()
+    """The messages of `channels` in file order, many small spans at once; a damaged span yields its reason."""
+    waiting: deque[Future[_Loaded]] = deque()
     with executor(2) as pool:
         try:
-            for span in spans_of(catalogue, channels):
-                ahead = _AHEAD if span.length <= _AHEAD_BYTES else 0
+            for spans in _groups(spans_of(catalogue, channels)):
+                ahead = _AHEAD if spans[0].length <= _AHEAD_BYTES else 0
                 while len(waiting) > ahead:
-                    yield waiting.popleft().result()
-                waiting.append(pool.submit(_load, file, catalogue, span, channels))
+                    yield from _all_of(waiting.popleft().result())
+                waiting.append(pool.submit(_load, file, catalogue, spans, channels))
             while waiting:
-                yield waiting.popleft().result()
+                yield from _all_of(waiting.popleft().result())
         finally:
             for future in waiting:
                 future.cancel()
 
 
-def _load(file: File, catalogue: Catalogue, span: Span, channels: frozenset[int]) -> Batch:
+def _groups(spans: Sequence[Span]) -> Iterator[Sequence[Span]]:
+    """Spans side by side that are loaded as one: by itself each small one would cost more than its messages do."""
+    first = size = 0
+    for place, span in enumerate(spans):
+        if place > first and size + span.length > _GROUP_BYTES:
+            yield spans[first:place]
+            first, size = place, 0
+        size += span.length
+    if spans:
+        yield spans[first:]
+
+
+@dataclass(frozen=True)
+class _Loaded:
+    """Batches of the first spans of a group, and what loads the others, where these unpack to more than one holds."""
+
+    batches: list[Batch]
+    others: Callable[[], _Loaded] | None = None
+
+
+def _all_of(loaded: _Loaded) -> Iterator[Batch]:
+    """The batches of a whole group."""
+    yield from loaded.batches
+    while loaded.others is not None:
+        loaded = loaded.others()
+        yield from loaded.batches
+
+
+@dataclass(frozen=True)
+class _Sound:
+    """The records of a span, whether they were checked, and of a torn chunk its size as it should be."""
+
+    records: Records
+    checked: bool
+    torn: int | None = None
+
+
+def _load(file: File, catalogue: Catalogue, spans: Sequence[Span], channels: frozenset[int]) -> _Loaded:
+    """Batches of spans: a damaged or torn one by itself, those between two of them as one."""
+    found: list[Batch] = []
+    sound: list[_Sound] = []
+    size = 0
+    others = None
+    for place, span in enumerate(spans):
+        if size > _GROUP_UNPACKED:
+            others = partial(_load, file, catalogue, spans[place:], channels)
+            break
+        one = _opened(file, catalogue, span, channels)
+        if isinstance(one, Batch) or one.torn is not None:
+            found += _joined(sound, channels)
+            found += [one] if isinstance(one, Batch) else _joined([one], channels)
+            sound = []
+        else:
+            sound.append(one)
+            size += one.records.content.size
+    return _Loaded([*found, *_joined(sound, channels)], others)
+
+
+def _joined(sound: Sequence[_Sound], channels: frozenset[int]) -> list[Batch]:
+    """The messages of sound spans as one batch, or none."""
+    if not sound:
+        return []
+    checked = all(one.checked or not one.records.offsets.size for one in sound)
+    held, size = sound[0].records.content.size, sound[0].torn
+    messages = joined([one.records for one in sound]).of(channels)
+    return [Batch(messages, checked, torn=None if size is None else (held, size))]
+
+
+def _opened(file: File, catalogue: Catalogue, span: Span, channels: frozenset[int]) -> _Sound | Batch:
+    """What a span holds, or the batch that says why it is lost."""
     content = b""
     try:
         content = file.read(span.start, span.length + span.index_length)
@@ -70,8 +146,7 @@ def _load(file: File, catalogue: Catalogue, span: Span, channels: frozenset[int]
         lost = sum(places.size for channel, places in entries(content[span.length :]) if channel in channels)
         return Batch(None, checked=True, reason=f"{error} (at byte {span.start})", lost=lost)
     whole = torn is None or torn == len(records.content)
-    checked = not span.loose and (has_checksum(chunk) or not whole)
-    return Batch(records.of(channels), checked, torn=None if whole else (len(records.content), torn or 0))
+    return _Sound(records, not span.loose and (has_checksum(chunk) or not whole), None if whole else torn)
 
 
 def _check_meaning(catalogue: Catalogue, span: Span, records: Records, channels: frozenset[int]) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 from array import array
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,11 @@ from algid.readers.mcap.framing import BrokenOffError, DamagedError
 
 HEAD = 31
 """Bytes of a message record before its payload: code, length, channel, sequence, log and publish time."""
+_LEAST = HEAD - 9
 _MOST_GAPS = 256
+_SMALL = 1 << 13
+"""Bytes; NumPy takes as long to look at an index as a walk over so many."""
+_FEW = 256
 _SOME = (1 << 16) - 1
 """Messages between two looks at how much work they are."""
 
@@ -47,30 +51,37 @@ class Records:
     others: tuple[tuple[int, bytes], ...] = ()
 
     @property
+    def channels_seen(self) -> frozenset[int]:
+        """The channels that have messages here."""
+        channels = self.channels
+        return frozenset(channels.tolist() if channels.size < _FEW else np.unique(channels).tolist())
+
+    @property
     def channels(self) -> NDArray[np.generic]:
         """The channel of each message (M,)."""
         return gather(self.content, self.offsets + 9, "<u2")
 
     def of(self, wanted: Collection[int]) -> Messages:
-        """The messages of the channels `wanted`, in file order.
-
-        Raises
-        ------
-        DamagedError
-            If a message is shorter than its head.
-        """
+        """The messages of the channels `wanted`, in file order."""
         offsets = self.offsets
         if offsets.size == 0:
             return Messages(self.content, offsets, offsets, offsets)
         lengths = gather(self.content, offsets + 1, "<u8").astype(np.int64)
-        if lengths.min() < HEAD - 9:
-            raise DamagedError("a message is shorter than its head")
         channels = self.channels
         ours = np.isin(channels, list(wanted)) if len(wanted) > 1 else channels == next(iter(wanted), -1)
         if not ours.all():
             offsets, lengths = offsets[ours], lengths[ours]
         log_ns = gather(self.content, offsets + 15, "<i8").astype(np.int64, copy=False)
         return Messages(self.content, offsets + HEAD, lengths - (HEAD - 9), log_ns)
+
+
+def joined(several: Sequence[Records]) -> Records:
+    """The records of many small chunks as those of one; what stands between messages is left out."""
+    if len(several) == 1:
+        return several[0]
+    bases = np.cumsum([0, *(one.content.size for one in several[:-1])])
+    offsets = [one.offsets + base for one, base in zip(several, bases, strict=True)]
+    return Records(np.concatenate([one.content for one in several]), np.concatenate(offsets))
 
 
 def records_in(content: bytes, index: bytes = b"", works: Callable[[int], bool] = lambda _: True) -> Records:
@@ -87,9 +98,12 @@ def records_in(content: bytes, index: bytes = b"", works: Callable[[int], bool] 
     Raises
     ------
     DamagedError
-        If the records do not tile the bytes, or are more than in any honest file.
+        If the records do not tile the bytes, a message is shorter than its head, or they are more than in any
+        honest file.
     """
     octets = np.frombuffer(content, np.uint8)
+    if len(content) < _SMALL:  # sooner walked than compared with its index
+        return _walked(octets, content, works)
     found = _indexed(octets, content, index)
     if found is None and (same := alike(octets)) is not None:
         found = Records(octets, same)
@@ -108,6 +122,8 @@ def _walked(octets: NDArray[np.uint8], content: bytes, works: Callable[[int], bo
         if start + length > last:
             raise BrokenOffError(place)
         if code == framing.MESSAGE:
+            if length < _LEAST:
+                raise DamagedError("a message is shorter than its head")
             offsets.append(place)
         else:
             others.append((code, content[start : start + length]))
@@ -149,7 +165,7 @@ def _indexed(octets: NDArray[np.uint8], content: bytes, index: bytes) -> Records
     if records.size == 0 or records[0] < 0 or records[-1] > octets.size - HEAD:
         return None
     lengths = gather(octets, records + 1, "<u8")
-    if not np.all(octets[records] == framing.MESSAGE) or lengths.max() > octets.size:
+    if not np.all(octets[records] == framing.MESSAGE) or lengths.max() > octets.size or lengths.min() < _LEAST:
         return None
     ends = records + 9 + lengths.astype(np.int64)
     gaps = np.flatnonzero(ends[:-1] != records[1:])
