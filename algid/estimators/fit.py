@@ -177,6 +177,7 @@ def conclude(
         repeated = jackknife(logs, without)
         if repeated is not None:
             covariance, intervals = _widened(covariance, repeated), "jackknife"
+            quantile = max(quantile, _quantile(_repeats(logs)))
     return Fit(
         estimator=estimator,
         shared=shared,
@@ -208,6 +209,12 @@ def _robust(
 def _quantile(freedom: int) -> float:
     """Half width of a 95 % interval in standard deviations that `freedom` independent squares estimate."""
     return float(stdtrit(max(2, freedom), 0.975))
+
+
+def _repeats(logs: Sequence[LogInformation]) -> int:
+    """Independent squares behind a jackknife over logs: those of each kind, less one."""
+    kinds = [sum(log.loaded is loaded for log in logs) for loaded in (False, True)]
+    return sum(count - 1 for count in kinds if count > 0)
 
 
 def _widened(robust: FloatArray, least: FloatArray) -> FloatArray:

@@ -84,7 +84,7 @@ def result_of(outcome: Identified, settings: Settings, survey: Survey) -> Result
         log=first,
         more_logs=others,
         data_lost=any(notice.lossy for _, notice in notices),
-        notes=_notices([(name, notice) for name, notice in notices if notice.note]),
+        notes=[*_notices([(name, notice) for name, notice in notices if notice.note]), *_on_intervals(outcome)],
         warnings=[
             *_notices([(name, notice) for name, notice in notices if not notice.note]),
             *_contradictions(survey.logs),
@@ -92,6 +92,12 @@ def result_of(outcome: Identified, settings: Settings, survey: Survey) -> Result
         ],
         causes=[*outcome.causes, *_suspicions(notices)],
     )
+
+
+def _on_intervals(outcome: Identified) -> list[str]:
+    """What intervals over blocks of logs leave out, where no warning says so."""
+    over_blocks = outcome.fit is not None and outcome.fit.intervals == "sandwich"
+    return [ONE_RUN] if over_blocks and not any(ONE_RUN in warning for warning in outcome.warnings) else []
 
 
 def _suspicions(notices: Sequence[tuple[str, Notice]]) -> list[Cause]:
@@ -145,6 +151,8 @@ def _contradictions(logs: Sequence[LogSource]) -> list[str]:
     return [f"{name}: its metadata name another arm than {logs[0].name}" for name in strangers]
 
 
+ONE_RUN = "what differs from run to run is not in the intervals: give four logs or more"
+"""Of intervals that rest on blocks of logs."""
 ONE_SIDED = 1.645  # standard deviations of a one-sided bound at 95 %
 FAR_APART = 5.0  # standard deviations past which two logs are not of one arm
 
@@ -413,12 +421,7 @@ def _payload_near_zero(fit: Fit) -> Iterator[str]:
 def fit_warnings(fit: Fit) -> Iterator[str]:
     """What a user should know about a fit."""
     if fit.note:
-        few = (
-            ""
-            if fit.intervals == "jackknife"
-            else "; what differs from run to run is not in them: give four logs or more"
-        )
-        yield fit.note if fit.intervals == "jackknife" else fit.note + few
+        yield f"{fit.note}; {ONE_RUN}" if fit.intervals == "sandwich" else fit.note
     if not fit.converged and not (fit.note or "").startswith("--constrain"):
         yield "the refined estimator did not converge; the weak estimate is reported instead"
     yield from fit.unidentifiable

@@ -10,8 +10,9 @@ from algid.arm import inverse_dynamics
 from algid.estimators import refined, weak
 from algid.estimators.combine import MOST_BLOCKS, BlockSums, LogInformation, jackknife, long_run_variance
 from algid.estimators.diagnostics import broken_bounds, constrained, payload_distance, term_worths
-from algid.estimators.fit import own_estimates
+from algid.estimators.fit import conclude, own_estimates
 from algid.estimators.identifiability import examine
+from algid.estimators.parametrisation import Shared
 from algid.estimators.prediction import cross_validate, score
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import Model
@@ -169,3 +170,25 @@ def test_friction_that_is_not_there_has_its_error_bar(bench: Bench) -> None:
     assert set(fit.status) == {"OK"}
     assert np.all(np.abs(fit.values[5:]) < 4.5 * fit.std[5:])
     assert np.all(fit.std[5:] < 0.02)
+
+
+def test_intervals_of_a_few_logs_hold_where_runs_differ() -> None:
+    """Five logs of an arm that differs from run to run: 1,000 draws tell 95 from 90 % (3 σ are 2.1 and 2.8 %).
+
+    The jackknife itself is exact for logs alike; with the normal quantile 88 % of the intervals held the truth.
+    """
+    rng = np.random.default_rng(0)
+    shared = Shared(Model(gravity=0.0))
+    size = len(shared.log_names)
+    inside = []
+    for _ in range(200):
+        logs = []
+        for _ in range(5):
+            own = rng.standard_normal(size)  # the truth is 0
+            S = np.repeat(4.0 * np.eye(size)[None], 40, axis=0)
+            g = rng.standard_normal((40, size)) * 2.0 + S @ own
+            logs.append(LogInformation(False, np.zeros(size), S, g))
+        fit = conclude("weak", shared, logs, np.zeros(size), np.ones(2), coloured=True)
+        assert fit.intervals == "jackknife"
+        inside.append(np.abs(fit.values) <= fit.quantile * np.sqrt(np.diag(fit.covariance)))
+    assert 0.929 < np.mean(inside) < 0.971
