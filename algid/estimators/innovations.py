@@ -110,17 +110,19 @@ class Spectra:
 def spectra(sums: ResidualSums) -> Spectra:
     """Spectra of all signals, neighbouring bins put together until each holds `_FREEDOM` degrees of freedom."""
     starts, count, spread = [], 0.0, 0.0
-    begin = 0
+    begin = last = 0
     for place in range(_BINS):
+        begin = begin if count or sums.lines[place] else place
         count, spread = count + sums.lines[place], spread + sums.scatter[place]
         if count and 2 * count**2 / spread >= _FREEDOM:
             starts.append(begin)
-            begin, count, spread = place + 1, 0.0, 0.0
+            begin = last = place + 1
+            count, spread = 0.0, 0.0
     if not starts:
         return Spectra(np.empty(0), np.empty((sums.power.shape[0], 0)), np.empty(0), np.empty(0))
-    ends = np.array([*starts[1:], begin]) - 1
-    lines, scatter = (np.add.reduceat(one[:begin], starts) for one in (sums.lines, sums.scatter))
-    density = np.add.reduceat(sums.power[:, :begin], starts, axis=1) / lines
+    ends = np.array([*starts[1:], last]) - 1
+    lines, scatter = (np.add.reduceat(one[:last], starts) for one in (sums.lines, sums.scatter))
+    density = np.add.reduceat(sums.power[:, :last], starts, axis=1) / lines
     freedom = 2 * lines**2 / scatter
     low, high = (chdtri(freedom, tail) / freedom for tail in (0.975, 0.025))
     middle = np.sqrt(_EDGES[starts] * _EDGES[ends + 1])

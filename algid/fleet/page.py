@@ -6,18 +6,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from algid import __version__
 from algid.fleet.history import ALPHA, SPAN
 from algid.report.document import Document
 from algid.report.figures.base import Figure, Panel, axis, label
-from algid.report.html import escaped, figure_html, script_json, table_html
-from algid.report.page import banner, document, drawing
+from algid.report.frame import figures_html, framed, links_of
+from algid.report.html import table_html
 from algid.report.table import Column, Table
 from algid.report.text import ABSENT, counted, joined, significant, visible
 from algid.report.verdict import LEVEL_WORDS, Level, Verdict
 
 if TYPE_CHECKING:
-    from algid.fleet.history import History
+    from algid import __version__
+from algid.fleet.history import History
 
+MADE = f"Made by algid {__version__}."
 MOST_ROBOTS = 40  # whose table is printed
 MOST_ROWS = 200
 MOST_PANELS = 12
@@ -28,15 +31,11 @@ def fleet_html(history: History) -> str:
     figures = _figures(history)
     facts = f"{counted(history.robots, 'robot')} · {counted(history.logs, 'log')}"
     body = [
-        f'<header><p class="kicker">algid · a fleet\'s history</p><h1>Fleet</h1><p class="facts">{escaped(facts)}</p>',
-        f"{banner(verdict(history))}</header>",
-        '<main id="numbers">',
         *(table_html(table) for table in (drift_table(history), finding_table(history)) if table.rows),
-        *map(figure_html, figures),
+        *figures_html(figures),
         table_html(robot_table(history)),
-        "</main>",
     ]
-    return document("Fleet", "\n".join(body), script_json(drawing(figures)))
+    return framed("a fleet's history", "Fleet", facts, verdict(history), links_of(figures), body, figures, MADE)
 
 
 def verdict(history: History) -> Verdict:

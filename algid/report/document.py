@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from algid.report.table import Table
-from algid.report.tables import chosen_terms, estimate_tables, fit_tables, log_tables, provenance_table
+from algid.report.tables import chosen_terms, estimate_tables, fit_tables, log_tables, provenance_table, terms_tables
 from algid.report.text import file_name
 from algid.report.verdict import Verdict, verdict
 from algid.results import Result
@@ -43,7 +43,7 @@ def result_document(result: Result) -> Document:
         f"Identification of {file_name(result.log.path)}",
         verdict(result),
         (*estimate_tables(result), *chosen),
-        tuple(table for table in fit_tables(result) if table not in chosen),
+        (*fit_tables(result), *(table for table in terms_tables(result) if table not in chosen)),
         "Logs and provenance",
         (log_tables(result)[0], provenance_table(result)),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -10,10 +11,11 @@ from algid.report.html import escaped
 from algid.report.text import significant
 from algid.results import Estimate
 
-WIDTH, HEIGHT = 150.0, 22.0  # of a row's drawing, pixels
+WIDTH, HEIGHT = 140.0, 22.0  # of a row's drawing, pixels
 EDGE = 8.0  # where an arrow tells that an interval goes on
 WIDEST = 100.0  # percent: an interval beyond says little more than the estimate's size
 ROOM = 1.15  # of the widest interval
+MOST = 2.5  # of the median interval: wider ones end in arrows, so that they do not hide the others
 STEPS = (1.0, 2.0, 5.0, 10.0)
 
 
@@ -45,7 +47,7 @@ def forest(
     """
     shares = {name: _share(found) for name, found in group.items()}
     known = {name: share for name, share in shares.items() if share is not None}
-    limit = _round_up(min(max(known.values(), default=0.0) * ROOM, WIDEST))
+    limit = _limit(list(known.values()))
     rows = {
         name: _row(name, group[name], share, limit, (truth or {}).get(name), (logs or {}).get(name, ()))
         for name, share in known.items()
@@ -59,6 +61,13 @@ def _share(found: Estimate) -> float | None:
         return None
     half = (found.ci95[1] - found.ci95[0]) / 2
     return 100 * half / abs(found.estimate) if found.estimate else math.inf
+
+
+def _limit(shares: Sequence[float]) -> float:
+    """The scale that holds every interval, or where a few are far wider than most, all but those."""
+    widest = max(shares, default=0.0) * ROOM
+    usual = MOST * statistics.median(shares) if shares else 0.0
+    return _round_up(min(widest, usual, WIDEST))
 
 
 def _round_up(value: float) -> float:
@@ -85,11 +94,7 @@ def _row(name: str, found: Estimate, share: float, limit: float, truth: float | 
         if share > limit
         else ""
     )
-    dots = "".join(
-        f'<circle class="log" cx="{place(value):.1f}" cy="{y + 5:g}" r="2"/>'
-        for value in logs
-        if 0 <= place(value) <= WIDTH
-    )
+    dots = "".join(_dot(place(value), y + 6) for value in logs)
     ring = (
         f'<circle class="truth" cx="{place(truth):.1f}" cy="{y:g}" r="4"/>'
         if truth is not None and 0 <= place(truth) <= WIDTH
@@ -102,3 +107,10 @@ def _row(name: str, found: Estimate, share: float, limit: float, truth: float | 
         f'y2="{HEIGHT:g}"/><line class="reach" x1="{middle - reach:.1f}" y1="{y:g}" x2="{middle + reach:.1f}" '
         f'y2="{y:g}"/>{ends}<circle class="value" cx="{middle:g}" cy="{y:g}" r="2.5"/>{dots}{ring}</svg>'
     )
+
+
+def _dot(x: float, y: float) -> str:
+    """A log's own estimate; hollow at the edge where it lies beyond."""
+    if 0 <= x <= WIDTH:
+        return f'<circle class="log" cx="{x:.1f}" cy="{y:g}" r="1.8"/>'
+    return f'<circle class="log beyond" cx="{2.5 if x < 0 else WIDTH - 2.5:g}" cy="{y:g}" r="1.8"/>'

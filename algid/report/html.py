@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import html
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from algid.report.figures.base import Figure, Legend, Missing
@@ -61,22 +62,55 @@ def script_json(value: object) -> str:
     return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
 
 
-def table_html(table: Table, drawn: Mapping[str, str] | None = None, heading: str = "") -> str:
+@dataclass(frozen=True)
+class Drawn:
+    """A column of drawings by the name of their row, after the column `after`, or last."""
+
+    heading: str
+    rows: Mapping[str, str]
+    after: str = ""
+
+
+def table_html(table: Table, drawn: Sequence[Drawn] = (), links: Mapping[str, str] | None = None) -> str:
     """A table that scrolls sideways by itself where the page is narrow.
 
-    `drawn` holds drawings by the name of their row, for a last column under `heading`.
+    `links` holds where the names of rows lead.
     """
-    head = "".join(f'<th scope="col"{_class(column)}>{escaped(column.heading)}</th>' for column in table.columns)
-    head += f'<th scope="col" class="drawn">{escaped(heading)}</th>' if drawn else ""
-    body = "".join(
-        f"<tr{_doubtful(table, row)}>{_cells(table.columns, row)}{_drawn(drawn, row)}</tr>\n" for row in table.rows
-    )
+    slots = _slots(table.columns, drawn)
+    head = "".join(map(_heading, slots))
+    body = "".join(f"<tr{_doubtful(table, row)}>{_row(slots, row, links or {})}</tr>\n" for row in table.rows)
     note = f'<p class="note">{escaped(table.note)}</p>' if table.note else ""
-    cards = " cards" if len(table.columns) > CARDED else ""
+    cards = " cards" if len(slots) > CARDED else ""
     return (
         f'<div class="scroll{cards}" role="region" tabindex="0" aria-label="{escaped(table.title)}"><table>'
         f"<caption>{escaped(table.title)}</caption>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody>"
         f"</table></div>{note}\n"
+    )
+
+
+Slot = tuple[int, Column] | Drawn
+"""A column of the table with its place in a row, or one of drawings."""
+
+
+def _slots(columns: Sequence[Column], drawn: Sequence[Drawn]) -> list[Slot]:
+    slots: list[Slot] = []
+    for place, column in enumerate(columns):
+        slots += [(place, column), *(one for one in drawn if one.after == column.heading)]
+    return [*slots, *(one for one in drawn if one not in slots)]
+
+
+def _heading(slot: Slot) -> str:
+    if isinstance(slot, Drawn):
+        return f'<th scope="col" class="drawn">{escaped(slot.heading)}</th>'
+    return f'<th scope="col"{_class(slot[1])}>{escaped(slot[1].heading)}</th>'
+
+
+def _row(slots: Sequence[Slot], row: tuple[str, ...], links: Mapping[str, str]) -> str:
+    return "".join(
+        f'<td class="drawn" data-label="{escaped(slot.heading)}">{slot.rows.get(row[0], "")}</td>'
+        if isinstance(slot, Drawn)
+        else _cell(slot[1], row[slot[0]], links)
+        for slot in slots
     )
 
 
@@ -87,24 +121,19 @@ def _doubtful(table: Table, row: tuple[str, ...]) -> str:
     return ' class="doubtful"' if poor else ""
 
 
-def _drawn(drawn: Mapping[str, str] | None, row: tuple[str, ...]) -> str:
-    return f'<td class="drawn">{drawn.get(row[0], "")}</td>' if drawn else ""
-
-
-def _cells(columns: Iterable[Column], row: tuple[str, ...]) -> str:
-    return "".join(_cell(column, text) for column, text in zip(columns, row, strict=True))
-
-
-def _cell(column: Column, text: str) -> str:
+def _cell(column: Column, text: str, links: Mapping[str, str]) -> str:
     if column.kind == "name":
-        return f'<th scope="row">{escaped(text)}</th>'
+        shown = f'<a href="{escaped(links[text])}">{escaped(text)}</a>' if text in links else escaped(text)
+        return f'<th scope="row">{shown}</th>'
     if column.kind == "doubtful status":
         return f'<td class="status">{escaped(text)}</td>'
     if column.kind == "status":
         return f'<td class="status{" ok" if text == Status.OK.value else ""}">{escaped(text)}</td>'
     main = " estimate" if column.heading == "Estimate" else ""
     long = " long" if column.kind == "text" and len(text) > LONG_CELL else ""
-    label = f' data-label="{escaped(column.heading)}"' if column.kind == "number" and not main else ""
+    label = (
+        f' data-label="{escaped(column.heading.removesuffix(" std"))}"' if column.kind == "number" and not main else ""
+    )
     return f'<td class="{column.kind}{main}{long}"{label}>{escaped(text)}</td>'
 
 

@@ -31,7 +31,7 @@ def document_markdown(document: Document) -> str:
         "",
         *([f"Likely cause: {escaped(judged.cause)}", ""] if judged.cause else []),
         *(["Run first:", "", *_code(judged.command), ""] if judged.command else []),
-        *(f"- {escaped(reason)}" for reason in judged.reasons),
+        *(f"- {escaped(reason)}" for reason in judged.untold),
     ]
     folded = [
         f"<details><summary>{document.summary}</summary>",

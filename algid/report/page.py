@@ -1,25 +1,19 @@
-"""`report.html`: one file that opens offline, without a request to any host.
-
-Nothing but this package's own script runs: the page's Content-Security-Policy names the scripts by their
-hashes, or by a nonce for the library beside the page, so that a name out of a log could not run even if it
-slipped past the escaping.
-"""
+"""`report.html`: one file that opens offline, without a request to any host."""
 
 from __future__ import annotations
 
-import base64
-import hashlib
 from collections.abc import Sequence
-from importlib import resources
+from dataclasses import replace
 from pathlib import Path
 
 from algid.files import whole_file
 from algid.progress import Told
 from algid.report.arm import arm_script
-from algid.report.figures.base import Figure, Missing
+from algid.report.bars import bars
 from algid.report.forest import forest
+from algid.report.frame import LIBRARY, bullets, figures_html, framed, links_of, section
 from algid.report.gallery import gallery
-from algid.report.html import TEMPLATE, escaped, figure_html, panel_id, script_json, table_html
+from algid.report.html import Drawn, table_html
 from algid.report.library import library
 from algid.report.posture import arm_of
 from algid.report.table import Table
@@ -30,16 +24,17 @@ from algid.report.tables import (
     provenance_table,
     quality_tables,
     settings_table,
+    terms_tables,
 )
 from algid.report.text import file_name, significant
-from algid.report.verdict import LEVEL_WORDS, Verdict, verdict
+from algid.report.verdict import verdict
 from algid.results import Result, read_result
 
-LIBRARY = "plotly.min.js"
 FIRST = ("Parameters", "Payload")
 SECOND = ("Torque prediction",)
+TOLD_ELSEWHERE = ("± std, %", "Paper %")  # by the forest plot, and by Table 4
 PAPER = ("paper", "The paper's tables and convergence")
-SIGNS = {"good": "✓", "reservations": "!", "failed": "✕"}
+TERMS = ("terms", "What the model lacks")
 
 
 def write_report(folder: Path, shared_library: bool = False, told: Told | None = None) -> Path:
@@ -84,34 +79,103 @@ def page_html(folder: Path, result: Result, shared_library: bool = False, told: 
     """The page's text; with `shared_library` it asks for the library beside the folder."""
     shown = gallery(folder, result, told)
     tables = {table.title: table for table in estimate_tables(result)}
-    first = [tables.pop(title) for title in FIRST if title in tables]
+    first = _first_screen(result, tables)
     arm = arm_of(result, shown.torque)
-    drawn = forest({**result.parameters, **result.payload}, _truth(result))
+    terms = _terms(result)
     quality = [*quality_tables(shown.torque, result), *log_tables(result)]
+    notes = bullets(result.notes, "What the readers and the estimator warn of stands at the top of the page.")
     body = [
-        _head(result, verdict(result)),
-        contents(shown.figures, PAPER),
-        '<main id="numbers">',
         '<div class="first"><div>',
-        *(table_html(table, drawn.rows, drawn.heading) for table in first),
-        *(table_html(tables.pop(title)) for title in SECOND if title in tables),
+        *first,
         f"</div>{arm}</div>",
-        *map(figure_html, shown.figures),
+        *figures_html(shown.figures[:1]),
+        *terms,
+        *figures_html(shown.figures[1:]),
         *section("fit", "What the estimator knows of the logs", fit_tables(result)),
-        *section("data", "Data quality", quality, _warnings(result)),
+        *section("data", "Data quality", quality, notes),
         *section("settings", "Settings and provenance", [settings_table(result.settings), provenance_table(result)]),
-        _paper(result, [*map(table_html, tables.values()), *map(figure_html, shown.paper)]),
-        "</main>",
-        f"<footer>Made by algid {escaped(result.version)} from {escaped(str(folder.name))}/result.json.</footer>",
-        '<noscript><p class="missing">The figures need JavaScript; all numbers stand without it.</p></noscript>',
+        _paper(result, [*map(table_html, tables.values()), *figures_html(shown.paper)]),
     ]
-    return document(
-        file_name(result.log.path),
-        "\n".join(body),
-        script_json(drawing([*shown.figures, *shown.paper])),
-        shared_library,
-        [arm_script()] if arm else [],
+    links = [
+        *links_of(shown.figures[:1]),
+        *([TERMS] if terms else []),
+        *links_of(shown.figures[1:]),
+        ("data", "Data quality"),
+        ("settings", "Settings and provenance"),
+        PAPER,
+    ]
+    more = "" if not result.more_logs else f" and {len(result.more_logs)} more"
+    return framed(
+        "identification of a two-link arm",
+        f"{file_name(result.log.path)}{more}",
+        _facts(result),
+        verdict(result),
+        links,
+        body,
+        [*shown.figures, *shown.paper],
+        f"Made by algid {result.version} from {folder.name}/result.json.",
+        tab=file_name(result.log.path),
+        shared_library=shared_library,
+        scripts=[arm_script()] if arm else [],
     )
+
+
+def _first_screen(result: Result, tables: dict[str, Table]) -> list[str]:
+    """The estimates with their forest plot, and how they predict; what is shown is taken out of `tables`."""
+    logs = _own(result)
+    drawn = forest({**result.parameters, **result.payload}, _truth(result), logs)
+    column = [Drawn(drawn.heading, drawn.rows, after="Unit")] if drawn.rows else []
+    first = [tables.pop(title).without(TOLD_ELSEWHERE) for title in FIRST if title in tables]
+    if first and drawn.rows:
+        marks = [f"Drawn: the 95 % interval on a scale of ± {significant(drawn.limit, 1)} % of the estimate"]
+        marks += ["grey dots: each unloaded log's own estimate"] if logs else []
+        marks += ["ring: the truth"] if _truth(result) else []
+        first[-1] = replace(first[-1], note="; ".join([*([first[-1].note] if first[-1].note else []), *marks]) + ".")
+    shown = [table_html(table, column) for table in first]
+    return [*shown, *(table_html(tables.pop(title)) for title in SECOND if title in tables)]
+
+
+def _own(result: Result) -> dict[str, list[float]]:
+    """Each unloaded log's own estimates by name, of several logs; a loaded one's hold its payload's share."""
+    found = [] if result.fit is None else result.fit.by_log
+    if len(found) != len(result.logs):  # a log too short to be fitted has none, and which it is nobody tells
+        return {}
+    own = [one for one, log in zip(found, result.logs, strict=True) if log.role == "unloaded"]
+    values = {
+        name: [one[name].estimate for one in own if name in one and one[name].estimate is not None]
+        for name in result.parameters
+    }
+    return {name: kept for name, kept in values.items() if len(kept) > 1}  # type: ignore[misc]
+
+
+def _terms(result: Result) -> list[str]:
+    """The terms that were tried, each with what it gains drawn; nothing where none was."""
+    key, title = TERMS
+    reading = (
+        '<p class="reading">Read: a bar to the left lowers the error of torque that was held out; a term is kept where '
+        "it does so and its odds are good. What is left out would gain no more than stands here.</p>"
+    )
+    tables = terms_tables(result)
+    if not tables:
+        return []
+    gains = (
+        {}
+        if result.fit is None
+        else {term.term: -100 * term.gain_heldout for term in result.fit.terms if term.gain_heldout is not None}
+    )
+    column = [Drawn("error held out", bars(gains), after="Held-out error, %")] if gains else []
+    return [
+        f'<section aria-labelledby="{key}"><h2 id="{key}">{title}</h2>',
+        *(table_html(table, column) for table in tables),
+        reading if gains else "",
+        "</section>",
+    ]
+
+
+def _facts(result: Result) -> str:
+    seconds = significant(sum(log.duration for log in result.logs), 4)
+    samples, rate = sum(log.rows for log in result.logs), significant(result.log.rate, 4)
+    return f"{result.estimator} estimator · {seconds} s of log at {rate} Hz · {samples:,} samples"
 
 
 def _truth(result: Result) -> dict[str, float]:
@@ -127,116 +191,3 @@ def _paper(result: Result, content: Sequence[str]) -> str:
     key, title = PAPER
     opened = " open" if result.estimator == "paper" or _truth(result) else ""
     return f'<details class="paper" id="{key}"{opened}><summary>{title}</summary>\n{"".join(content)}</details>'
-
-
-def document(title: str, body: str, data: str, shared_library: bool = False, scripts: Sequence[str] = ()) -> str:
-    """A whole page out of its body and its figures' data.
-
-    It carries the plotting library, packed; with `shared_library` it asks for the one beside the folder. `scripts` run
-    after the page's own.
-    """
-    running, style = [_asset("report.js"), *scripts], _asset("report.css")
-    if shared_library:
-        nonce = hashlib.sha256((body + data).encode()).hexdigest()  # nobody who writes the body can foretell it
-        source, tag = f"'nonce-{nonce}'", f'<script nonce="{nonce}" src="../{LIBRARY}"></script>'
-    else:
-        own = library()
-        source, tag = _hash(own.script), f'<script type="text/plain" id="library">{own.packed}</script>'
-    elements = "\n".join(f"<script>{script}</script>" for script in running)
-    policy = (
-        f"default-src 'none'; script-src {' '.join([source, *map(_hash, running)])}; style-src 'unsafe-inline'; "
-        "img-src data: blob:; base-uri 'none'; form-action 'none'"
-    )
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        '<meta name="color-scheme" content="light dark">\n<link rel="icon" href="data:,">\n'
-        f"<title>{escaped(title)} · algid</title>\n<style>{style}</style>\n</head>\n<body>\n"
-        f'<a class="skip" href="#numbers">Skip to the numbers</a>\n{body}\n'
-        f'<script type="application/json" id="figures">{data}</script>\n{tag}\n{elements}\n'
-        "</body>\n</html>\n"
-    )
-
-
-def _asset(name: str) -> str:
-    return (resources.files("algid.report") / "assets" / name).read_text(encoding="utf-8")
-
-
-def _hash(script: str) -> str:
-    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
-
-
-def drawing(figures: Sequence[Figure | Missing]) -> dict[str, object]:
-    """What the page's script draws."""
-    panels = [
-        {
-            "id": panel_id(figure, place),
-            "figure": figure.key,
-            "columns": "two" if figure.columns == 2 else "one",
-            "sync": panel.sync,
-            "height": panel.height,
-            "traces": panel.traces,
-            "layout": panel.layout,
-        }
-        for figure in figures
-        if isinstance(figure, Figure)
-        for place, panel in enumerate(figure.panels)
-    ]
-    return {"template": TEMPLATE, "panels": panels}
-
-
-def _head(result: Result, judged: Verdict) -> str:
-    more = "" if not result.more_logs else f" and {len(result.more_logs)} more"
-    seconds = significant(sum(log.duration for log in result.logs), 4)
-    samples, rate = sum(log.rows for log in result.logs), significant(result.log.rate, 4)
-    facts = f"{result.estimator} estimator · {seconds} s of log at {rate} Hz · {samples:,} samples"
-    return (
-        f'<header><p class="kicker">algid · identification of a two-link arm</p>'
-        f"<h1>{escaped(file_name(result.log.path))}{more}</h1>\n"
-        f'<p class="facts">{escaped(facts)}</p>\n{banner(judged)}</header>'
-    )
-
-
-def banner(judged: Verdict) -> str:
-    """The verdict's sentence and its reasons, in its colour."""
-    word = LEVEL_WORDS[judged.level]
-    told = judged.level == "reservations" and len(judged.reasons) == 1
-    reasons = "" if told else "".join(f"<li>{escaped(reason)}</li>" for reason in judged.reasons)
-    return (
-        f'<div class="verdict {judged.level}"><span class="sign" aria-hidden="true">{SIGNS[judged.level]}</span>'
-        f"<div><p><strong>{word}</strong>{escaped(judged.sentence.removeprefix(word))}</p>"
-        f"{_first(judged)}{reasons and f'<ul>{reasons}</ul>'}</div></div>"
-    )
-
-
-def _first(judged: Verdict) -> str:
-    """The likely cause and the command to run first."""
-    cause = f'<p class="cause">Likely cause: {escaped(judged.cause)}</p>' if judged.cause else ""
-    return cause + (f'<p class="cause">Run first: <code>{escaped(judged.command)}</code></p>' if judged.command else "")
-
-
-def contents(figures: Sequence[Figure | Missing], *more: tuple[str, str]) -> str:
-    """Links to the page's parts: figures, data, settings and `more`, each its key and title."""
-    targets = [("numbers", "Numbers"), *((figure.key, figure.title) for figure in figures)]
-    targets += [("data", "Data quality"), ("settings", "Settings and provenance"), *more]
-    links = "".join(f'<li><a href="#{key}">{escaped(title)}</a></li>' for key, title in targets)
-    return f'<nav aria-label="Contents"><details open><summary>Contents</summary><ul>{links}</ul></details></nav>'
-
-
-def section(key: str, title: str, tables: Sequence[Table], extra: str = "") -> list[str]:
-    """A titled part of the page; nothing where it would be empty."""
-    if not tables and not extra:
-        return []
-    return [
-        f'<section aria-labelledby="{key}"><h2 id="{key}">{escaped(title)}</h2>',
-        extra,
-        *map(table_html, tables),
-        "</section>",
-    ]
-
-
-def _warnings(result: Result) -> str:
-    if not result.warnings:
-        return '<p class="note">The readers and the estimator gave no warning.</p>'
-    return f"<ul>{''.join(f'<li>{escaped(warning)}</li>' for warning in result.warnings)}</ul>"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -35,6 +36,10 @@ class Table:
         """This table less the columns that hold nothing."""
         kept = [i for i, _ in enumerate(self.columns) if any(row[i] not in (ABSENT, "") for row in self.rows)]
         return self.only(kept)
+
+    def without(self, headings: Collection[str]) -> Table:
+        """This table less the columns of those headings."""
+        return self.only([place for place, column in enumerate(self.columns) if column.heading not in headings])
 
     def doubted(self) -> Table:
         """This table as part of a result that failed."""

@@ -20,10 +20,16 @@ LONGEST_VALUE = 4_000  # characters: a command that names many logs is there to 
 
 
 def fit_tables(result: Result) -> list[Table]:
-    """What a statistical estimator knows beside the estimates: noise, whiteness, terms, bounds."""
+    """What a statistical estimator knows beside the estimates: noise, whiteness, bounds."""
     if result.fit is None:
         return []
-    tables = [_noise(result), _whiteness(result), _terms(result), _bounds(result)]
+    tables = [_noise(result), _whiteness(result), _bounds(result)]
+    return [table for table in tables if table.rows]
+
+
+def terms_tables(result: Result) -> list[Table]:
+    """The optional terms of the torque that were tried or given, and what each is worth."""
+    tables = [] if result.fit is None else [_terms(result)]
     return [table for table in tables if table.rows]
 
 
@@ -128,8 +134,7 @@ def tables_of(logs: list[LogSummary]) -> list[Table]:
 
 
 def _log_row(log: LogSummary) -> tuple[str, ...]:
-    rate, duration = significant(log.rate, 6), significant(log.duration, 6)
-    return file_name(log.path), log.role, visible(log.format), f"{log.rows:,}", duration, rate
+    return file_name(log.path), log.role, visible(log.format), f"{log.rows:,}", f"{log.duration:.6g}", f"{log.rate:.6g}"
 
 
 def _channel_rows(logs: list[LogSummary]) -> tuple[tuple[str, ...], ...]:
@@ -207,11 +212,11 @@ def quality_tables(torque: TorqueLog | None, result: Result) -> list[Table]:
         (
             names.get(log, f"log {log + 1}"),
             f"{span.samples:,}",
-            significant(span.first, 6) if span.first else "0",
-            significant(span.last, 6),
-            significant(1e3 * span.period, 4),
+            f"{span.first:.6g}",
+            f"{span.last:.6g}",
+            f"{1e3 * span.period:.4g}",
             str(span.gaps),
-            significant(1e3 * span.largest_gap, 4),
+            f"{1e3 * span.largest_gap:.4g}",
         )
         for log, span in sorted(torque.ranges.items())
     )

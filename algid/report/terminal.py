@@ -40,8 +40,8 @@ def print_verdict(judged: Verdict, console: Console) -> None:
     for heading, text in (("Likely cause: ", judged.cause), ("Run first:    ", judged.command)):
         if text:
             console.print(Text.assemble((heading, "bold"), text), soft_wrap=heading.startswith("Run"))
-    if judged.reasons:
-        console.print(_points(judged.reasons))
+    if judged.untold:
+        console.print(_points(judged.untold))
 
 
 def _points(reasons: Sequence[str]) -> RichTable:

@@ -49,6 +49,11 @@ class Verdict:
     cause: str | None = None
     command: str | None = None
 
+    @property
+    def untold(self) -> tuple[str, ...]:
+        """The reasons that the sentence does not hold word by word."""
+        return tuple(reason for reason in self.reasons if reason not in self.sentence)
+
 
 def verdict(result: Result) -> Verdict:
     """Judge `result` by its statuses, its intervals, its residual and its warnings."""

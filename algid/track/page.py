@@ -12,9 +12,9 @@ import numpy as np
 from algid.files import whole_file
 from algid.report.document import Document
 from algid.report.export import START_KEY, write_series
-from algid.report.html import escaped, figure_html, script_json, table_html
+from algid.report.frame import bullets, figures_html, framed, links_of, section
+from algid.report.html import table_html
 from algid.report.markdown import document_markdown
-from algid.report.page import banner, contents, document, drawing, section
 from algid.report.text import file_name, significant
 from algid.track.figures import figures
 from algid.track.payload import QUANTILE
@@ -29,26 +29,19 @@ def page_html(result: TrackResult) -> str:
     seconds, rate = significant(result.log.duration, 4), significant(result.log.rate, 4)
     facts = f"arm of {file_name(result.arm)} · {seconds} s of log at {rate} Hz · {result.log.rows:,} samples"
     body = [
-        f'<header><p class="kicker">algid · a payload in time</p><h1>{escaped(name)}</h1>',
-        f'<p class="facts">{escaped(facts)}</p>\n{banner(verdict(result))}</header>',
-        contents(drawn),
-        '<main id="numbers">',
         table_html(stretch_table(result)),
-        *map(figure_html, drawn),
+        *figures_html(drawn),
         *(table_html(table) for table in [change_table(result)] if table.rows),
         *section("data", "Data quality", [fit_table(result), *quality_tables(result)], _warnings(result)),
         *section("settings", "Settings and provenance", provenance_tables(result)),
-        "</main>",
-        f"<footer>Made by algid {escaped(result.version)}.</footer>",
-        '<noscript><p class="missing">The figures need JavaScript; all numbers stand without it.</p></noscript>',
     ]
-    return document(name, "\n".join(body), script_json(drawing(drawn)))
+    links = [*links_of(drawn), ("data", "Data quality"), ("settings", "Settings and provenance")]
+    made = f"Made by algid {result.version}."
+    return framed("a payload in time", name, facts, verdict(result), links, body, drawn, made)
 
 
 def _warnings(result: TrackResult) -> str:
-    if not result.warnings:
-        return '<p class="note">The readers gave no warning.</p>'
-    return f"<ul>{''.join(f'<li>{escaped(warning)}</li>' for warning in result.warnings)}</ul>"
+    return bullets(result.warnings, "The readers gave no warning.")
 
 
 def track_document(result: TrackResult) -> Document:

@@ -22,12 +22,14 @@ from algid.errors import ResultError
 from algid.report import write_report
 from algid.report.figures.base import Figure, Missing
 from algid.report.figures.timeline import views
+from algid.report.frame import banner
 from algid.report.gallery import gallery
 from algid.report.html import escaped, script_json
 from algid.report.library import library
 from algid.report.page import page_html
 from algid.report.series import LogRange, read_torque
-from algid.results import Estimate, Result, Status, read_result, write_result
+from algid.report.verdict import Verdict
+from algid.results import Estimate, Result, Status, TermCriterion, read_result, write_result
 from tests.report.folders import HOSTILE, hostile
 
 BUNDLE = Path(str(resources.files("algid.report"))) / "assets/plotly.min.js.gz"
@@ -284,3 +286,40 @@ def test_a_choice_of_logs_moves_the_time_axis(result: Result) -> None:
     assert (first, end, name) == (0.0, 2.0, "second.csv")
     assert last - start == pytest.approx(3.0)
     assert start > end
+
+
+def test_each_logs_own_estimate_is_a_dot_of_the_forest_plot(folder: Path, result: Result) -> None:
+    assert result.fit is not None
+    k1 = result.parameters["k1"]
+    assert k1.estimate is not None
+    own = [{"k1": k1.model_copy(update={"estimate": share * k1.estimate})} for share in (0.999, 1.001)]
+    both = [result.log, result.log.model_copy(update={"path": "second.csv"})]
+    changes = {"fit": result.fit.model_copy(update={"by_log": own}), "more_logs": both[1:]}
+    page = page_html(folder, result.model_copy(update=changes))
+    row = re.search(r'<tr><th scope="row">k1</th>.*?</tr>', page, re.DOTALL)
+    assert row is not None
+    assert row[0].count('class="log"') == 2
+    assert "grey dots: each unloaded log&#x27;s own estimate" in page
+    loaded = [both[0], both[1].model_copy(update={"role": "loaded"})]
+    changes["more_logs"] = loaded[1:]  # whose k1 holds the payload's share
+    assert 'class="log"' not in page_html(folder, result.model_copy(update=changes))
+
+
+def test_what_was_tried_stands_second_with_what_it_gains(folder: Path, result: Result) -> None:
+    assert result.fit is not None
+    terms = [
+        TermCriterion(term="coulomb", kept=True, gain_heldout=0.5, evidence=40.0, why="kept: predicts better"),
+        TermCriterion(term="offset", kept=False, gain_heldout=-0.01, evidence=-4.0, why="left out"),
+    ]
+    page = page_html(folder, result.model_copy(update={"fit": result.fit.model_copy(update={"terms": terms})}))
+    order = [page.index(f'id="{key}"') for key in ("torque", "terms", "closeup", "innovations")]
+    assert order == sorted(order)
+    assert "a bar to the left lowers the error" in page
+    assert page.count('class="less"') == 1
+
+
+def test_a_reason_that_the_verdict_tells_is_not_listed_again() -> None:
+    told = "With reservations: k1 is known, but k2 is singular."
+    one = Verdict("reservations", told, ("k2 is singular", "it jitters"))
+    assert one.untold == ("it jitters",)
+    assert banner(one).count("k2 is singular") == 1

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from algid.report import markdown, print_table, write_report
 from algid.report.markdown import escaped
-from algid.report.page import page_html
+from algid.report.page import FIRST, TOLD_ELSEWHERE, page_html
 from algid.report.table import Table
 from algid.report.tables import estimate_tables, flat_settings, log_tables, settings_table
 from algid.report.text import digits_of, resolved, significant
@@ -31,7 +31,7 @@ def from_markdown(text: str) -> list[list[str]]:
 
 
 def from_html(text: str) -> list[list[str]]:
-    text = re.sub(r'<t[hd][^>]*class="drawn">.*?</t[hd]>', "", text, flags=re.DOTALL)
+    text = re.sub(r'<t[hd][^>]*class="drawn[^>]*>.*?</t[hd]>', "", text, flags=re.DOTALL)
     rows = re.findall(r"<tr[^>]*>(.*?)</tr>", text, re.DOTALL)
     return [[html.unescape(cell) for cell in re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row, re.DOTALL)] for row in rows]
 
@@ -51,8 +51,9 @@ def from_terminal(text: str, heading: str) -> list[list[str]]:
 def test_every_format_shows_the_same_digits_and_json_holds_them(result: Result, case_folder: Path) -> None:
     parameters = next(table for table in estimate_tables(result) if table.title == "Parameters")
     expected = [list(row) for row in parameters.rows]
+    first = [list(row) for row in parameters.without(TOLD_ELSEWHERE).rows]
     page = from_html(write_report(case_folder, shared_library=True).read_text(encoding="utf-8"))
-    assert [row for row in page if row in expected][: len(expected)] == expected
+    assert [row for row in page if row in first][: len(first)] == first
     assert from_markdown(markdown(result))[1 : 1 + len(expected)] == expected
     assert from_terminal(terminal(result), "Parameters") == expected
     stored = json.loads(result_json(result))["parameters"]
@@ -67,9 +68,10 @@ def test_every_table_reaches_html_and_markdown_alike(result: Result, case_folder
     page = from_html(write_report(case_folder).read_text(encoding="utf-8"))
     text = from_markdown(markdown(result))
     for table in estimate_tables(result):
-        for row in (tuple(column.heading for column in table.columns), *table.rows):
-            assert list(row) in page
-            assert list(row) in text
+        first = table.without(TOLD_ELSEWHERE) if table.title in FIRST else table
+        for made, found in ((first, page), (table, text)):
+            for row in (tuple(column.heading for column in made.columns), *made.rows):
+                assert list(row) in found
 
 
 def test_truth_and_the_papers_error_stand_beside_the_estimate(result: Result) -> None:

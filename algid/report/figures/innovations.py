@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.report.figures.base import Figure, Legend, Missing, Panel, Trace, axis, level, line, packed
+from algid.report.figures.base import Figure, Legend, Missing, Panel, Trace, axis, band, level, line, packed
 from algid.report.reduce import table_of
 from algid.results import Result
 
@@ -146,27 +146,30 @@ def _correlation(curves: Curves, joint: int) -> Panel:
     curve = curves[CORRELATION, joint]
     scale, unit = (1e3, "ms") if curve.x[-1] <= MILLI else (1.0, "s")
     x = scale * curve.x
-    bars = {
-        "type": "bar",
-        "x": packed(x),
-        "y": packed(curve.value),
-        "marker": {"color": "@orange"},
-        "name": "residual",
-        "legendgroup": "residual",
-        "hovertemplate": f"%{{y:.3f}} at %{{x:.4g}} {unit}<extra></extra>",
-    }
-    step = x[0]
+    stems = line(
+        np.repeat(x, 3),
+        np.stack([np.zeros(x.size), curve.value, np.full(x.size, np.nan)], axis=1).ravel(),
+        "@orange",
+        "residual",
+        "residual",
+        width=4,
+        hover=f"%{{y:.3f}} at %{{x:.4g}} {unit}<extra></extra>",
+    )
+    half = 0.5 * float(x[0])
+    steps = [
+        band(low, high, "@blue/0.25") | {"xref": "x", "x0": float(at - half), "x1": float(at + half)}
+        for at, low, high in zip(x, curve.low.tolist(), curve.high.tolist(), strict=True)
+    ]
     shapes = [level(sign * FAINT, "@muted", "dash", 1.0) for sign in (-1, 1)] if _is_faint(curve) else []
     reach = 1.15 * max(float(np.abs(curve.value).max()), 2 * float(curve.high.max()), FAINT if shapes else 0.0)
     layout = {
-        "xaxis": axis(f"lag, {unit}", range=[0.0, float(x[-1] + 0.7 * step)]),
+        "xaxis": axis(f"lag, {unit}", range=[0.0, float(x[-1]) + 2 * half]),
         "yaxis": axis("correlation", range=[max(-reach, -1.05), min(reach, 1.05)]),
-        "shapes": shapes,
-        "bargap": 0.35,
+        "shapes": [*steps, *shapes],
+        "hovermode": "closest",
     }
-    beside = Curve(np.array([0.0, *x[1:-1], x[-1] + step]), curve.value, curve.low, curve.high)
     says = f"Autocorrelation of joint {joint}'s residual; {_count(curve)} inside the band"
-    return Panel([*_band(beside), bars], layout, says, f"Joint {joint}: autocorrelation", HEIGHT)
+    return Panel([stems], layout, says, f"Joint {joint}: autocorrelation", HEIGHT)
 
 
 def _is_faint(curve: Curve) -> bool:

@@ -10,7 +10,7 @@ from algid.results import LogSummary
 TITLE = "Signals"
 COLOURS = ("@blue", "@orange")
 LEGEND = tuple(Legend(f"joint{joint}", f"joint {joint}", colour) for joint, colour in enumerate(COLOURS, start=1))
-ROWS = (("theta", "angle", "rad"), ("omega", "velocity", "rad/s"), ("tau", "measured torque", "N m"))
+ROWS = (("theta", "Angle", "rad"), ("omega", "Velocity", "rad/s"), ("tau", "Measured torque", "N m"))
 READING = "Read: look for jumps, flat stretches and clipped tops; what is odd here is odd in every number above."
 
 
@@ -29,7 +29,7 @@ def _panel(found: TorqueLog, logs: list[LogSummary], name: str, words: str, unit
         traces.append(line(x, y, colour, f"joint {joint}", f"joint{joint}", width=1.2, hover=hover))
     layout = {
         "xaxis": axis("time, s"),
-        "yaxis": axis(f"{words}, {unit}"),
+        "yaxis": axis(f"{words.lower()}, {unit}"),
         "hovermode": "closest",
         **separators(found.ranges, moved, logs),
     }

@@ -64,4 +64,4 @@ def _note(found: TorqueLog) -> str:
     ]
     noisy = any(2 * residual > rms for residual, rms in zip(found.residual_rms, found.rms, strict=True))
     why = " The prediction differentiates angles twice, and with them their noise: see Torque prediction above."
-    return f"Residual: joint 1 {shares[0]}, joint 2 {shares[1]}.{why if noisy else ''}"
+    return f"Residual of joint 1: {shares[0]}; of joint 2: {shares[1]}.{why if noisy else ''}"
