@@ -206,6 +206,14 @@ class TorquePrediction(_Model):
     filter: str
 
 
+class Repeatability(_Model):
+    """What each loaded log weighs by itself, and the standard deviation of that over the runs, in kg."""
+
+    masses: list[float]
+    std: float
+    ci95: tuple[float, float]
+
+
 class FitSummary(_Model):
     """What a statistical estimator knows beside the estimates.
 
@@ -230,6 +238,7 @@ class FitSummary(_Model):
     residual: TorquePrediction | None = None
     cross_validation: TorquePrediction | None = None
     endogeneity: dict[str, Endogeneity] = {}
+    repeatability: Repeatability | None = None
 
     @model_validator(mode="after")
     def _covariance_is_square(self) -> FitSummary:

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.special import chdtrc, ndtri
+from scipy.special import chdtrc, chdtri, ndtri
 
 from algid.arm import FloatArray
 from algid.estimators.combine import LogInformation, Prior, combine, likelihood, long_run_variance, scaled_pinv
@@ -201,6 +201,40 @@ def payload_distance(fit: Fit) -> float | None:
     loaded = LogInformation(True, burdened[0], scaled_pinv(burdened[1])[None], np.zeros_like(burdened[0])[None])
     _, _, value = combine(fit.shared, [loaded], fit.values, arm)
     return max(0.0, float(-ndtri(chdtrc(freedom, max(0.0, -2 * value)))))
+
+
+@dataclass(frozen=True, eq=False)
+class Repeatability:
+    """What each of n loaded logs weighs by itself (n,), in kg, and the standard deviation of that with its interval."""
+
+    masses: FloatArray
+    std: float
+    ci95: tuple[float, float]
+
+
+def repeatability(fit: Fit) -> Repeatability | None:
+    """How far the payload differs from run to run; None with fewer than two loaded logs, or none that tell it.
+
+    Each loaded log is fitted for m_p, the arm and the lengths held as all logs tell them. The interval is that of the
+    standard deviation of normal numbers, by χ² of n − 1: wide where there are few runs.
+    """
+    loaded = [log for log in fit.logs if log.loaded]
+    if "m_p" not in fit.names or len(loaded) < 2:
+        return None
+    place = fit.names.index("m_p")
+    masses = []
+    for log in loaded:
+        slope = fit.shared.jacobian(fit.values, True)[:, place]
+        S, g = log.total
+        told = float(slope @ S @ slope)
+        if told <= 0:
+            return None
+        change = fit.shared.coefficients(fit.values, True) - log.c0
+        masses.append(fit.values[place] + float(slope @ (g - S @ change)) / told)
+    n = len(masses)
+    std = float(np.std(masses, ddof=1))
+    low, high = (std * float(np.sqrt((n - 1) / chdtri(n - 1, tail))) for tail in (0.025, 0.975))
+    return Repeatability(np.array(masses), std, (low, high))
 
 
 def _alone(logs: list[LogInformation]) -> tuple[FloatArray, FloatArray] | None:

@@ -176,8 +176,9 @@ def conclude(
         without = left_out(shared, logs, beta, prior) if without is None else without
         repeated = jackknife(logs, without)
         if repeated is not None:
-            covariance, intervals = _widened(covariance, repeated), "jackknife"
-            quantile = max(quantile, _quantile(_repeats(logs)))
+            wide = _widened(covariance, repeated)
+            quantile = _quantile(_satterthwaite(covariance, wide, freedom, _repeats(logs)))
+            covariance, intervals = wide, "jackknife"
     return Fit(
         estimator=estimator,
         shared=shared,
@@ -206,9 +207,19 @@ def _robust(
     return known.covariance @ meat @ known.covariance, freedom
 
 
-def _quantile(freedom: int) -> float:
+def _quantile(freedom: float) -> float:
     """Half width of a 95 % interval in standard deviations that `freedom` independent squares estimate."""
     return float(stdtrit(max(2, freedom), 0.975))
+
+
+def _satterthwaite(within: FloatArray, wide: FloatArray, freedom: int, repeats: int) -> float:
+    """Independent squares behind variances of which a part, `within`, rests on `freedom` and the rest on `repeats`.
+
+    Satterthwaite 1946, with the parts' mean share over the parameters.
+    """
+    told = np.diag(wide) > 0
+    share = float(np.mean(1 - np.diag(within)[told] / np.diag(wide)[told])) if told.any() else 0.0
+    return float(1 / (share**2 / max(1, repeats) + (1 - share) ** 2 / max(1, freedom)))
 
 
 def _repeats(logs: Sequence[LogInformation]) -> int:

@@ -15,7 +15,7 @@ import numpy as np
 
 from algid import __version__, results
 from algid.arm import CONSTANT_NAMES, FloatArray
-from algid.estimators.diagnostics import broken_bounds, payload_distance, term_worths
+from algid.estimators.diagnostics import broken_bounds, payload_distance, repeatability, term_worths
 from algid.estimators.fit import Fit, OwnEstimate, own_estimates
 from algid.estimators.instruments import ENDOGENEOUS
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
@@ -95,9 +95,13 @@ def result_of(outcome: Identified, settings: Settings, survey: Survey) -> Result
 
 
 def _on_intervals(outcome: Identified) -> list[str]:
-    """What intervals over blocks of logs leave out, where no warning says so."""
-    over_blocks = outcome.fit is not None and outcome.fit.intervals == "sandwich"
-    return [ONE_RUN] if over_blocks and not any(ONE_RUN in warning for warning in outcome.warnings) else []
+    """What intervals over blocks of logs leave out, where no warning says so, and how well the payload repeats."""
+    if outcome.fit is None:
+        return []
+    told = any(ONE_RUN in warning for warning in outcome.warnings)
+    said = [ONE_RUN] if outcome.fit.intervals == "sandwich" and not told else []
+    repeated = outcome.fit.repeatability
+    return said if repeated is None else [*said, _on_repeatability(repeated)]
 
 
 def _suspicions(notices: Sequence[tuple[str, Notice]]) -> list[Cause]:
@@ -306,6 +310,23 @@ def fit_summary(
         by_log=[_own(fit, own) for own in own_estimates(fit)],
         residual=prediction(_residual(fit, predictions, survey, settings)),
         cross_validation=None if crossed is None else prediction(crossed),
+        repeatability=_repeatability(fit),
+    )
+
+
+def _repeatability(fit: Fit) -> results.Repeatability | None:
+    found = repeatability(fit)
+    if found is None:
+        return None
+    return results.Repeatability(masses=found.masses.tolist(), std=found.std, ci95=found.ci95)
+
+
+def _on_repeatability(found: results.Repeatability) -> str:
+    masses = ", ".join(f"{mass:.4g}" for mass in found.masses)
+    low, high = found.ci95
+    return (
+        f"the loaded runs by themselves weigh {masses} kg: repeatability {found.std:.2g} kg "
+        f"(95 %: {low:.2g} to {high:.2g})"
     )
 
 

@@ -9,7 +9,7 @@ import pytest
 from algid.arm import inverse_dynamics
 from algid.estimators import refined, weak
 from algid.estimators.combine import MOST_BLOCKS, BlockSums, LogInformation, jackknife, long_run_variance
-from algid.estimators.diagnostics import broken_bounds, constrained, payload_distance, term_worths
+from algid.estimators.diagnostics import broken_bounds, constrained, payload_distance, repeatability, term_worths
 from algid.estimators.fit import conclude, own_estimates
 from algid.estimators.identifiability import examine
 from algid.estimators.parametrisation import Shared
@@ -19,7 +19,7 @@ from algid.model import Model
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case
 
-from .conftest import Bench
+from .conftest import DT, Bench
 
 
 def test_bounds_hold_for_a_real_arm_and_name_what_breaks(bench: Bench) -> None:
@@ -192,3 +192,27 @@ def test_intervals_of_a_few_logs_hold_where_runs_differ() -> None:
         assert fit.intervals == "jackknife"
         inside.append(np.abs(fit.values) <= fit.quantile * np.sqrt(np.diag(fit.covariance)))
     assert 0.929 < np.mean(inside) < 0.971
+
+
+def test_each_loaded_run_tells_its_payload_and_how_well_that_repeats(bench: Bench) -> None:
+    """Three payloads in turn, 5 g apart: each is found by itself, and the standard deviation has the interval of χ²."""
+    masses = bench.payload + np.array([-0.005, 0.0, 0.005])
+    z = bench.arm.payload_constants(1.0)
+    bare: list[Source] = [partial(list, [bench.log(sigma=1e-4, seed=seed)]) for seed in range(3)]
+    added = np.zeros(7)
+    added[[4, 2, 0, 3, 1]] = z  # k5, k3, k1, k4, k2
+    motion = bench.burdened
+    share = inverse_dynamics(added, motion.theta, motion.omega, np.gradient(motion.omega, DT, axis=1, edge_order=2))
+    burdened: list[Source] = []
+    for seed, mass in enumerate(masses):
+        log = bench.log(loaded=True, sigma=1e-4, seed=seed)
+        burdened.append(partial(list, [replace(log, tau=log.tau + (mass - bench.payload) * share)]))
+    fit = weak.fit(bare, burdened, lengths={"l1": bench.arm.l1, "l2": bench.arm.l2})
+    found = repeatability(fit)
+    assert found is not None
+    np.testing.assert_allclose(found.masses, masses, atol=6e-4)
+    assert found.std == pytest.approx(0.005, rel=0.15)
+    low, high = found.ci95  # χ² with two degrees of freedom: 0.0506 and 7.378
+    assert low / found.std == pytest.approx(np.sqrt(2 / 7.378), rel=1e-3)
+    assert high / found.std == pytest.approx(np.sqrt(2 / 0.05064), rel=1e-3)
+    assert repeatability(weak.fit(bare, burdened[:1], lengths={"l1": bench.arm.l1, "l2": bench.arm.l2})) is None
