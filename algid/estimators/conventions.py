@@ -42,7 +42,6 @@ from itertools import product
 from math import copysign, pi, remainder
 
 import numpy as np
-from scipy.optimize import minimize
 
 from algid.arm import FloatArray
 from algid.estimators.modulating_functions import OVERLAP, Windows
@@ -283,6 +282,8 @@ class _Trials:
 
         def score(zero: FloatArray) -> float:
             return _size(_solved(sums, family, self._place((zero[0], zero[1]))[None])[1])
+
+        from scipy.optimize import minimize
 
         best = minimize(score, start, method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-3, "maxiter": 200}).x
         return remainder(float(best[0]), 2 * pi), remainder(float(best[1]), 2 * pi)

@@ -97,7 +97,6 @@ def run_fit(survey: Survey, settings: Settings, chosen: Selection, prior: Prior 
             fit = refined.fit(unloaded, loaded, _refined_settings(settings, weak_settings, prior), survey.told)
             if fit.note:
                 fit = _foretelling(fit, unloaded, loaded, weak_settings, settings, prior)
-        fit = replace(fit, endogeneity=instruments.endogeneity(unloaded, loaded, weak_settings, fit))
     except ValueError as error:
         raise _too_short(survey, error) from error
     return constrained(fit) if settings.constrain else fit, sums
@@ -119,6 +118,12 @@ def residual_of(survey: Survey, settings: Settings, chosen: Selection, fit: Fit)
         for log, moving in zip(survey.logs, _passes(survey, survey.logs, settings), strict=True)
     ]
     return pooled([one for one in sums if one is not None])
+
+
+def with_endogeneity(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) -> Fit:
+    """The fit with how far instruments and least squares are apart on its logs."""
+    unloaded, loaded = (_passes(survey, logs, settings) for logs in (survey.unloaded, survey.loaded))
+    return replace(fit, endogeneity=instruments.endogeneity(unloaded, loaded, _weak_settings(settings, chosen), fit))
 
 
 def without_nothing(chosen: Selection, fit: Fit, settings: Settings) -> Selection:

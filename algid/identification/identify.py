@@ -157,7 +157,14 @@ def _by_the_paper(survey: Survey, settings: Settings, earlier: Earlier | None, f
 
 
 def _by_likelihood(survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None) -> Result:
-    from algid.identification.by_likelihood import choose_model, prior_of, residual_of, run_fit, without_nothing
+    from algid.identification.by_likelihood import (
+        choose_model,
+        prior_of,
+        residual_of,
+        run_fit,
+        with_endogeneity,
+        without_nothing,
+    )
     from algid.identification.summary import outcome_of
 
     survey.begin("choosing terms")
@@ -168,6 +175,7 @@ def _by_likelihood(survey: Survey, settings: Settings, earlier: Earlier | None, 
     fewer = without_nothing(chosen, fit, settings)
     if fewer != chosen:
         chosen, (fit, predictions) = fewer, run_fit(survey, settings, fewer, prior)
+    fit = with_endogeneity(fit, survey, settings, chosen)
     survey.begin("prediction")
     outcome = outcome_of(fit, predictions, survey, settings, chosen)
     if folder is not None:
