@@ -156,7 +156,7 @@ def regressor(theta: FloatArray, omega: FloatArray, alpha: FloatArray) -> FloatA
     alpha1, alpha2 = alpha
     c2, s2 = np.cos(theta2), np.sin(theta2)
     c12 = np.cos(theta1 + theta2)
-    nought = np.zeros_like(c2)
+    zeros = np.zeros_like(c2)
     return np.stack(
         [
             np.stack(
@@ -167,10 +167,10 @@ def regressor(theta: FloatArray, omega: FloatArray, alpha: FloatArray) -> FloatA
                     np.cos(theta1),
                     alpha1,
                     omega1,
-                    nought,
+                    zeros,
                 ]
             ),
-            np.stack([c2 * alpha1 + s2 * omega1**2, c12, alpha1 + alpha2, nought, nought, nought, omega2]),
+            np.stack([c2 * alpha1 + s2 * omega1**2, c12, alpha1 + alpha2, zeros, zeros, zeros, omega2]),
         ]
     )
 

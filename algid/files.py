@@ -87,7 +87,7 @@ def read_whole(path: Path) -> bytes:
 
 
 def read_text(path: Path, encoding: str = "utf-8") -> str:
-    """The text of a file, with its line ends as "\\n": see `read_whole`.
+    """The text of a file, its line ends made line feeds: see `read_whole`.
 
     Raises
     ------

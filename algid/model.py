@@ -384,5 +384,5 @@ def acceleration(model: Model, c: FloatArray, theta: FloatArray, omega: FloatArr
 
 
 def _solved(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, right: FloatArray) -> FloatArray:
-    """x (2, N) with [[a, b], [c, d]] x = right."""
+    """X (2, N) with [[a, b], [c, d]] x = right."""
     return np.stack([d * right[0] - b * right[1], a * right[1] - c * right[0]]) / (a * d - b * c)

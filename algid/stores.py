@@ -93,7 +93,7 @@ def open_store(place: str) -> Store:
 
 
 def connect(url: str) -> tuple[FileSystem, str]:
-    """pyarrow's file system behind a URL, and the path within it.
+    """Pyarrow's file system behind a URL, and the path within it.
 
     Raises
     ------

@@ -1,0 +1,1 @@
+"""Benchmarks and pipelines: what `make` runs beside the tests."""

@@ -140,7 +140,7 @@ def _rehearse(case: Case, motion: Path, recording: Recording, out: Path, kind: F
 
 
 def _stamp(start: datetime | None) -> int:
-    """ns since 1970."""
+    """Ns since 1970."""
     return 0 if start is None else int(start.replace(tzinfo=UTC).timestamp()) * 10**9
 
 

@@ -21,14 +21,14 @@ from algid.estimators.identifiability import sizes
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
 
 UNKNOWN = 1e3  # relative bound at which a parameter that the motion leaves open is held
-_SEEN = 2.0  # standard deviations of the prior from nought, for a parameter to have a size of its own
+_SEEN = 2.0  # standard deviations of the prior from zero, for a parameter to have a size of its own
 
 
 @dataclass(frozen=True, eq=False)
 class Asked:
     """Sizes (Q,) of the parameters, which of them the prior knows (Q,), and which the design is for (Q,).
 
-    What the prior cannot tell from nought has the size of its class.
+    What the prior cannot tell from zero has the size of its class.
     """
 
     size: FloatArray
@@ -65,7 +65,7 @@ def asked_for(belief: Belief, names: Sequence[str] | None, source: str) -> Asked
     Raises
     ------
     SettingError
-        If there is no such parameter, or the prior cannot tell it from nought, so that it has no relative bound.
+        If there is no such parameter, or the prior cannot tell it from zero, so that it has no relative bound.
     """
     every, mean = belief.shared.names, belief.mean
     known = np.abs(mean) > _SEEN * belief.std
@@ -79,7 +79,7 @@ def asked_for(belief: Belief, names: Sequence[str] | None, source: str) -> Asked
         place = every.index(name)
         if not known[place]:
             raise SettingError(
-                f"--for {name}: {source} cannot tell it from nought ({mean[place]:.3g} ± {belief.std[place]:.2g}), so "
+                f"--for {name}: {source} cannot tell it from zero ({mean[place]:.3g} ± {belief.std[place]:.2g}), so "
                 "that no error is large or small beside it; leave it out"
             )
     return Asked(size, known, np.array([name in names for name in every]))

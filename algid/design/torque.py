@@ -3,7 +3,7 @@
 τ_i(t) = w(t) τ̂_i Σ_l (a_il sin ω_l t + b_il cos ω_l t), with the window w of `algid.design.fourier` and amplitudes in
 shares of the torque's limit τ̂. Where the arm goes depends on the arm: each candidate is simulated for the believed arm
 and for arms drawn from the belief, without and with the payload, all in one batch. An evolution strategy (recombination
-of the better half, step sizes by the spread of it) needs no derivatives of that. A joint whose limit is nought has no
+of the better half, step sizes by the spread of it) needs no derivatives of that. A joint whose limit is zero has no
 drive and is swung along.
 """
 

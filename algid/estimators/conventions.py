@@ -178,7 +178,7 @@ class Judgement:
 def judge(theta: FloatArray, tau: FloatArray, dt: float, *, gravity: bool = True) -> Judgement | None:
     """Try every convention on angles (2, N) in rad and torques (2, N) in N m, `dt` s apart.
 
-    None where the log is too short (six windows) or too slow (ten samples a window) to tell, or a torque is nought.
+    None where the log is too short (six windows) or too slow (ten samples a window) to tell, or a torque is zero.
     """
     if theta.shape[1] * dt < 6 * WINDOW or 10 * dt > WINDOW or not np.all(np.any(tau != 0, axis=1)):
         return None
@@ -376,23 +376,23 @@ def _summed(theta: FloatArray, tau: FloatArray, dt: float) -> tuple[_Sums, _Sums
     turned2, turning2, c1_, s1_, c12_, s12_, f1, f2, *b = windows.moments(np.stack(weighed), weight)
     slope1, slope2, momentum, momentum_ = windows.moments(np.stack([*theta, c2 * omega[0], s2 * omega[0]]), slope)
     bend1, bend2, s2_bend, c2_bend = windows.moments(np.stack([*theta, s2, c2]), bend)
-    nought, one = np.zeros_like(f1), np.ones_like(f1)
+    zeros, one = np.zeros_like(f1), np.ones_like(f1)
     columns = {
         "k1": (s2_bend - 2 * momentum, turned2 - momentum),
         "k1'": (c2_bend + 2 * momentum_, turning2 + momentum_),
         "k2": (c12_, c12_),
         "k2'": (-s12_, -s12_),
         "k3": (bend1 + bend2, bend1 + bend2),
-        "k4": (c1_, nought),
-        "k4'": (-s1_, nought),
-        "k5": (bend1, nought),
-        "k6": (-slope1, nought),
-        "k7": (nought, -slope2),
-        "f1": (f1, nought),
-        "f2": (nought, f2),
-        "o1": (one, nought),
-        "o2": (nought, one),
-        "j2": (nought, bend2),
+        "k4": (c1_, zeros),
+        "k4'": (-s1_, zeros),
+        "k5": (bend1, zeros),
+        "k6": (-slope1, zeros),
+        "k7": (zeros, -slope2),
+        "f1": (f1, zeros),
+        "f2": (zeros, f2),
+        "o1": (one, zeros),
+        "o2": (zeros, one),
+        "j2": (zeros, bend2),
     }
     X = np.array([columns[name] for name in COLUMNS]).swapaxes(0, 1)
     torques = np.array(b)

@@ -148,22 +148,22 @@ class Windows:
         friction = friction_columns(model, omega)
         weighed = np.concatenate([np.stack([centripetal, c1, c1 * c2 - s1 * s2]), *friction.values()])
         centripetal_, c1_, c12_, *rubbed = self.moments(weighed, weight)
-        nought, one = np.zeros_like(c1_), np.ones_like(c1_)
+        zeros, one = np.zeros_like(c1_), np.ones_like(c1_)
         found = {
             "k1": (s2_bend - 2 * momentum_slope, centripetal_ - momentum_slope),
             "k2": (c12_, c12_),
             "k3": (theta_bend1 + theta_bend2,) * 2,
-            "k4": (c1_, nought),
-            "k5": (theta_bend1, nought),
-            "k6": (-theta_slope1, nought),
-            "k7": (nought, -theta_slope2),
-            "o1": (one, nought),
-            "o2": (nought, one),
-            "j2": (nought, theta_bend2),
+            "k4": (c1_, zeros),
+            "k5": (theta_bend1, zeros),
+            "k6": (-theta_slope1, zeros),
+            "k7": (zeros, -theta_slope2),
+            "o1": (one, zeros),
+            "o2": (zeros, one),
+            "j2": (zeros, theta_bend2),
         }
         for place, letter in enumerate(friction):
-            found[f"{letter}1"] = (rubbed[2 * place], nought)
-            found[f"{letter}2"] = (nought, rubbed[2 * place + 1])
+            found[f"{letter}1"] = (rubbed[2 * place], zeros)
+            found[f"{letter}2"] = (zeros, rubbed[2 * place + 1])
         return found
 
     def _dissipated(self, model: Model, c: FloatArray, theta: FloatArray, omega: FloatArray) -> FloatArray:

@@ -206,7 +206,7 @@ class Grams:
 
 
 def _solved(gram: FloatArray, columns: IntArray) -> FloatArray:
-    """p (P,) of least squares with the columns given, zero elsewhere."""
+    """P (P,) of least squares with the columns given, zero elsewhere."""
     p = np.zeros(len(gram) - 1)
     p[columns] = scaled_pinv(gram[np.ix_(columns, columns)]) @ gram[columns, -1]
     return p

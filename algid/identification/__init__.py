@@ -1,0 +1,1 @@
+"""A log's way from its file to a result."""

@@ -5,7 +5,7 @@ Named checks of a log: what is wrong with it, and whether that forbids its use.
 ====================  =======  ==========================================================
 code                  refused  seen
 ====================  =======  ==========================================================
-EFFORT_ZERO           yes      a torque is nought throughout
+EFFORT_ZERO           yes      a torque is zero throughout
 EFFORT_DENORMAL       yes      a torque below 1e-6 N m throughout, as from unset memory
 EFFORT_CONSTANT       yes      a torque that never changes
 WRAPPED_ANGLE         yes      an angle jumps by 2π between two samples

@@ -154,9 +154,9 @@ def _is_unit(scale: float) -> bool:
 
 def _zero(joint: int, angle: float) -> str:
     if joint == 0 and abs(angle + pi / 2) < _SAME:
-        return "θ1 is nought hanging straight down"
+        return "θ1 is zero hanging straight down"
     if joint == 0 and abs(angle - pi / 2) < _SAME:
-        return "θ1 is nought upright"
+        return "θ1 is zero upright"
     return f"the zero of θ{joint + 1} is off by {degrees(angle):.4g} degrees"
 
 
@@ -228,7 +228,7 @@ def _zeros(convention: Convention, reading: Reading, place: tuple[int, int]) -> 
 
 
 def _plain(angle: float) -> float:
-    """An angle with six digits, as one writes it down; nought where it is one."""
+    """An angle with six digits, as one writes it down; zero where it is one."""
     return 0.0 if abs(angle) < _SAME else float(f"{angle:.6g}")
 
 

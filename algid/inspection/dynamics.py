@@ -1,4 +1,4 @@
-"""A rough look at a log's dynamics: does it move the arm enough, and does its torque carry the arm's weight?
+"""A rough look at a log's dynamics: whether it moves the arm enough, and its torque carries the arm's weight.
 
 The model of eq. (1) is fitted by least squares to smoothed signals, once with gravity as it is and once with
 gravity turned by a right angle. That is no identification; it tells a wrong sign or zero from a right one.
@@ -100,9 +100,9 @@ def _smoothed(log: Log) -> tuple[FloatArray, FloatArray, float] | None:
 
 def _signs(omega: FloatArray) -> FloatArray:
     """Columns of Coulomb friction and torque offset (2, 4, N)."""
-    nought, one = np.zeros_like(omega[0]), np.ones_like(omega[0])
-    first = np.stack([np.tanh(omega[0] / 0.05), nought, one, nought])
-    return np.stack([first, np.stack([nought, np.tanh(omega[1] / 0.05), nought, one])])
+    zeros, one = np.zeros_like(omega[0]), np.ones_like(omega[0])
+    first = np.stack([np.tanh(omega[0] / 0.05), zeros, one, zeros])
+    return np.stack([first, np.stack([zeros, np.tanh(omega[1] / 0.05), zeros, one])])
 
 
 def _rows(columns: FloatArray) -> FloatArray:

@@ -282,7 +282,7 @@ def _of_one_pair(chosen: dict[str, str], parts: dict[str, Name]) -> dict[str, st
             or parts[column].joint is None
             or parts[column].joint == pair[int(channel[-1]) - 1]
         )
-        # drivers mix counting from nought and from one between quantities: the order is what counts then
+        # drivers mix counting from zero and from one between quantities: the order is what counts then
         if own or {parts[column].joint, pair[int(channel[-1]) - 1] if pair else None} <= {"0", "1", "2"}:
             kept[channel] = column
     return kept

@@ -30,8 +30,9 @@ _EMPTY_LINES = re.compile(rb"\n[\r\n]*\n")
 
 
 def sniff(path: Path) -> str:
-    """The format of a log: "mcap", "parquet", "csv", "csv.zst", "csv.gz", "feather", "npz", "npy", "mat",
-    "bag", "db3" or "rosbag2".
+    """The format of a log, by its content.
+
+    One of "mcap", "parquet", "csv", "csv.zst", "csv.gz", "feather", "npz", "npy", "mat", "bag", "db3" and "rosbag2".
 
     Raises
     ------

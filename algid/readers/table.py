@@ -46,7 +46,7 @@ class Table:
         return Table(self.stamp_ns[rows], columns, self.notices)
 
     def noting(self, *notices: Notice) -> Table:
-        """This table with more notices."""
+        """The table with more notices."""
         return Table(self.stamp_ns, self.columns, (*self.notices, *notices)) if notices else self
 
 
@@ -80,7 +80,9 @@ class Reader(Protocol):
     """
 
     @property
-    def origin(self) -> Origin: ...
+    def origin(self) -> Origin:
+        """Where the log came from, and how it is read."""
+        ...
 
     def blocks(self, rows: int = BLOCK_ROWS) -> Iterator[Log]:
         """Yield the log in blocks of at most `rows` samples. Raises `LogError` for what cannot be read."""

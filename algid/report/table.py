@@ -33,16 +33,16 @@ class Table:
     note: str = ""
 
     def without_empty(self) -> Table:
-        """This table less the columns that hold nothing."""
+        """The table less the columns that hold nothing."""
         kept = [i for i, _ in enumerate(self.columns) if any(row[i] not in (ABSENT, "") for row in self.rows)]
         return self.only(kept)
 
     def without(self, headings: Collection[str]) -> Table:
-        """This table less the columns of those headings."""
+        """The table less the columns of those headings."""
         return self.only([place for place, column in enumerate(self.columns) if column.heading not in headings])
 
     def doubted(self) -> Table:
-        """This table as part of a result that failed."""
+        """The table as part of a result that failed."""
         kinds = [replace(c, kind="doubtful status") if c.kind == "status" else c for c in self.columns]
         return replace(self, columns=tuple(kinds))
 
@@ -52,14 +52,14 @@ class Table:
         return all(column.rank <= 1 for column in self.columns)
 
     def narrower(self) -> Table | None:
-        """This table less the column that is missed least; None where all are needed."""
+        """The table less the column that is missed least; None where all are needed."""
         least = max(range(len(self.columns)), key=lambda i: self.columns[i].rank, default=None)
         if least is None or self.columns[least].rank == 0:
             return None
         return self.only([i for i in range(len(self.columns)) if i != least])
 
     def only(self, kept: list[int]) -> Table:
-        """This table with the columns `kept`."""
+        """The table with the columns `kept`."""
         return replace(
             self,
             columns=tuple(self.columns[i] for i in kept),

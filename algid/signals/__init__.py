@@ -1,0 +1,1 @@
+"""Signals on a time grid: segments, filters, differences, observers."""

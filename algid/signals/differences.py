@@ -53,7 +53,7 @@ class Stencil:
 
     @cached_property
     def weights(self) -> FloatArray:
-        """w (3, POINTS): value, first and second derivative."""
+        """W (3, POINTS): value, first and second derivative."""
         nodes = np.arange(POINTS) - _HALF - (self.shift / self.dt - self.whole)
         moments = np.vander(nodes, increasing=True).T
         wanted = np.zeros((POINTS, 3))

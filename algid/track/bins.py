@@ -54,7 +54,7 @@ class Arm:
 
     @property
     def unit(self) -> FloatArray:
-        """d (q,): what a payload of 1 kg adds to the coefficients."""
+        """D (q,): what a payload of 1 kg adds to the coefficients."""
         return self.added(payload_constants(1.0, self.l1, self.l2, self.model.gravity))
 
     @property

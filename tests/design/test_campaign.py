@@ -271,5 +271,5 @@ def test_an_arm_of_lengths_and_masses_has_uniform_links(tmp_path: Path) -> None:
     assert "m_p" not in value
     asked = asked_for(belief, None, "arm")
     assert not asked.wanted[belief.shared.names.index("k6")]  # no friction is known, so none is asked for
-    with pytest.raises(SettingError, match="cannot tell it from nought"):
+    with pytest.raises(SettingError, match="cannot tell it from zero"):
         asked_for(belief, ["k6"], "arm")

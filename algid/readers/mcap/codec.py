@@ -25,16 +25,24 @@ class Decodes(Protocol):
     """
 
     @property
-    def wanted(self) -> Mapping[str, str]: ...
+    def wanted(self) -> Mapping[str, str]:
+        """The fields wanted, by name: where each stands in a message."""
+        ...
 
     @property
-    def skipped(self) -> int: ...
+    def skipped(self) -> int:
+        """Messages that lack a field that is needed."""
+        ...
 
     @property
-    def misfits(self) -> int: ...
+    def misfits(self) -> int:
+        """Messages that do not fit their schema."""
+        ...
 
     @property
-    def misfit(self) -> str: ...
+    def misfit(self) -> str:
+        """Why the first of them does not; empty where all fit."""
+        ...
 
     def columns(self, messages: Messages) -> tuple[NDArray[np.bool_], Fields]:
         """Which messages hold what is needed (N,), and the numbers of those, by name."""

@@ -302,7 +302,7 @@ def _column(octets: NDArray[np.uint8], lead: int, at: Numbers) -> NDArray[np.gen
     start = lead + at.offset
     if at.kind == "varint":
         return _varint(octets[:, start : start + at.width], at.zigzag)
-    if at.kind == "zero":  # a number that protobuf leaves out because it is nought
+    if at.kind == "zero":  # a number that protobuf leaves out because it is zero
         return np.zeros(octets.shape[0])
     return np.ndarray(octets.shape[0], np.dtype(at.kind), octets.data, start, (octets.strides[0],))
 
