@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ from algid.errors import LogError
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign, tables
 from algid.readers.names import TIMES
+from algid.readers.parquet import units_of_schema
 from algid.readers.table import Table
 
 if TYPE_CHECKING:
@@ -36,13 +37,26 @@ def open_arrays(path: Path, kind: str, profile: Profile | None = None) -> TableR
         If the file is damaged, too large to be read as a whole, or lacks a channel.
     """
     frame = frame_of(path, kind)
-    columns = assign(str(path), frame.columns, profile)
+    columns = assign(str(path), frame.columns, profile, _units(path, frame.columns) if kind == "feather" else None)
     for name, source in columns.sources.items():
         if not (frame.schema[source].is_numeric() or (name == "t" and frame.schema[source].is_temporal())):
             raise LogError(f"{path}: {source!r} for {name} holds {frame.schema[source]}; expected numbers")
     if frame.schema[columns.sources["t"]].is_temporal():
         columns = replace(columns, time_unit="ns", time_told=True)
     return columns.reader(str(path), kind, None, _Whole(path, frame, columns).tables, profile, frame.height)
+
+
+def _units(path: Path, columns: Sequence[str]) -> dict[str, str]:
+    """Units that a Feather file's schema states; nothing for one of the first version, which has none."""
+    import pyarrow as pa
+
+    try:
+        with pa.ipc.open_file(path) as file:
+            schema = file.schema
+    except (pa.ArrowException, OSError, ValueError):
+        return {}
+    roots = {name: root for name in columns if (root := name.partition("[")[0] if name not in schema.names else name)}
+    return units_of_schema(schema, {name: root for name, root in roots.items() if root in schema.names})
 
 
 def frame_of(path: Path, kind: str) -> pl.DataFrame:

@@ -19,7 +19,7 @@ from algid.readers.assemble import TableReader, reader_of
 from algid.readers.joints import along_the_arm, order_notice
 from algid.readers.names import COMMANDED, CURRENTS, Choice, choose, on_motor_side, take_apart
 from algid.readers.table import CHANNELS, JOINT_CHANNELS, VELOCITIES, Table
-from algid.units import NANOSECONDS, TORQUE, unit_of
+from algid.units import CURRENT, NANOSECONDS, TORQUE, unit_of
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -93,12 +93,13 @@ def assign(
         told = f"{path}: no column for {', '.join(missing)}; found {_listed(available)}"
         raise LogError(f"{told}; name them: {flags} (profile: {lines})")
     units = {name: unit for name, unit in choice.units.items() if sources.get(name) == choice.columns[name]}
-    units |= _currents(sources)
     beside = {name: (stated or {})[column] for name, column in sources.items() if column in (stated or {})}
-    units |= {name: known for name, unit in beside.items() if name not in units and (known := unit_of(unit))}
+    units = {name: known for name, unit in beside.items() if (known := unit_of(unit))} | units
+    units |= {name: unit for name, unit in _currents(sources).items() if units.get(name) not in CURRENT}
     foreign = {name: unit for name, unit in choice.foreign.items() if sources.get(name) == choice.columns[name]}
     foreign |= {name: unit for name, unit in beside.items() if unit_of(unit) is None}
     said = [*_of_foreign_units(path, sources, foreign, profile), *_of_motors(path, sources, profile)]
+    said += _of_other_units(sources, units, beside, profile)
     time_told = (profile.time_unit if profile else None) or units.get("t")
     if all(sources[name] == name for name in ("t", *JOINT_CHANNELS)):
         units.setdefault("t", "s")  # algid's own names mean algid's own units
@@ -191,6 +192,22 @@ def _of_foreign_units(
             )
         text = f"the column {sources[name]!r} for {name} states the unit {unit!r}, and is taken for {told} as told"
         yield Notice("FOREIGN_UNIT", text)
+
+
+def _of_other_units(
+    sources: Mapping[str, str], units: Mapping[str, str], beside: Mapping[str, str], profile: Profile | None
+) -> Iterator[Notice]:
+    """What to say where a file states another unit than the user does, or another beside a name than in it."""
+    for name, unit in units.items():
+        told = (profile.time_unit if name == "t" else profile.channel(name).unit) if profile else None
+        if told is not None and told != unit and not (told in TORQUE and unit in CURRENT):
+            text = f"the file states the unit {unit} for {name} ({sources[name]!r}), which is taken for {told} as told"
+            yield Notice("OTHER_UNIT", text)
+        other = unit_of(beside.get(name, unit))
+        if told is None and other is not None and other != unit:
+            source = sources[name]
+            text = f"the file states the unit {other} beside {name}; its name, {source!r}, says {unit}, which holds"
+            yield Notice("OTHER_UNIT", text)
 
 
 def _of_motors(path: str, sources: Mapping[str, str], profile: Profile | None) -> Iterator[Notice]:

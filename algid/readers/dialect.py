@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from algid.errors import LogError
+from algid.readers.stated import in_text
 from algid.units import is_foreign, unit_of
 
 COMMENTS = ("#", "%", "//")
@@ -41,7 +42,7 @@ class Dialect:
     padded : bool
         Whether blanks stand behind cells.
     units : mapping
-        By column the unit that a row under the header states.
+        By column the unit that a row under the header states, else a line above it.
     dates : frozenset of str
         Columns whose cells are dates and times of day (ISO 8601).
     """
@@ -72,6 +73,7 @@ def detect(path: Path, head: bytes) -> Dialect:
         raise LogError(f"{path}: no table in the text; expected a header and rows of numbers")
     data = _below_titles(data)
     number, header = data[0]
+    above = [line.removeprefix(comment or "").strip() for line in lines[:number]]
     separator = _separator(path, header, [line for _, line in data[1:20]])
     first_row = 1
     if all(_NUMBER.match(cell) for cell in split(header, separator) if cell):
@@ -86,7 +88,7 @@ def detect(path: Path, head: bytes) -> Dialect:
         raise LogError(f"{path}: a header and no rows below it; expected rows of numbers")
     number, row = data[first_row]
     found = _checked(path, columns, separator, number, comment, [line for _, line in data[first_row:]], row)
-    return replace(found, units=units)
+    return replace(found, units={**in_text(above, columns), **units})
 
 
 def _below_titles(data: list[tuple[int, str]]) -> list[tuple[int, str]]:

@@ -12,15 +12,18 @@ from algid.log import CANONICAL_COLUMNS, KEY, Companion, Notice, loads
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign, check_written, tables
 from algid.readers.footer import FooterError, is_encrypted, page_has_checksum
+from algid.readers.stated import in_metadata
 from algid.readers.table import Table
 
 if TYPE_CHECKING:
     import polars as pl
+    import pyarrow as pa
 
     from algid.profile import Profile
 
 _MOST_COLUMNS = 4096
 _LARGEST_FOOTER = 1 << 26
+_NO_UNIT, _LONGEST_UNIT = ("", "-", "1", "none", "null", "unknown", "dimensionless"), 40
 _PAGE_HEAD = 64
 """Bytes in which a page's checksum stands, if it has one."""
 _NO_SUMS = Notice("NO_CHECKSUM", "the file has no sums of its values, as algid's have: changes would go unseen")
@@ -44,7 +47,7 @@ def open_parquet(path: Path, profile: Profile | None = None) -> TableReader:
     except (pl.exceptions.PolarsError, OSError, pl.exceptions.PanicException) as error:
         raise _damaged(path, error) from error
     check_written(str(path), list(available), companion.sums if companion else {})
-    columns = assign(str(path), list(available), profile)
+    columns = assign(str(path), list(available), profile, _units(path, available))
     if companion is None and "stamp_ns" in schema and set(CANONICAL_COLUMNS) <= schema.keys():
         columns = replace(columns, notices=(*columns.notices, _NO_SUMS))
     _check_types(path, columns, available, schema)
@@ -140,6 +143,33 @@ def _flat_names(path: Path, schema: Mapping[str, pl.DataType]) -> dict[str, tupl
         else:
             names[column] = (column, None)
     return names
+
+
+def _units(path: Path, available: Mapping[str, tuple[str, int | None]]) -> dict[str, str]:
+    """By column the unit that the metadata of its field, or of the schema, state."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        schema = pq.read_schema(path)
+    except (pa.ArrowException, OSError, ValueError):  # types that polars reads and pyarrow does not
+        return {}
+    return units_of_schema(schema, {name: column for name, (column, _) in available.items()})
+
+
+def units_of_schema(schema: pa.Schema, roots: Mapping[str, str]) -> dict[str, str]:
+    """By name the unit that an Arrow schema's metadata state; `roots` are the fields that the names belong to."""
+    found = in_metadata(_decoded(schema.metadata), list(roots))
+    for name, root in roots.items():
+        own = _decoded(schema.field(root).metadata) if schema.names.count(root) == 1 else {}
+        unit = next((value for key, value in own.items() if key.lower() in ("unit", "units")), "").strip()
+        if unit.lower() not in _NO_UNIT:
+            found[name] = unit[:_LONGEST_UNIT]
+    return found
+
+
+def _decoded(metadata: Mapping[bytes, bytes] | None) -> dict[str, str]:
+    return {key.decode(errors="replace"): value.decode(errors="replace") for key, value in (metadata or {}).items()}
 
 
 def _companion(path: Path) -> Companion | None:
