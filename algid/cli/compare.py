@@ -16,11 +16,12 @@ if TYPE_CHECKING:
 
 def compare(
     results: Annotated[list[Path], typer.Argument(metavar="RESULT RESULT...", help="Two results or more.")],
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder to write the page compare.html to.")] = None,
     form: Annotated[ResultFormat, typer.Option("--format", help="How to print the comparison.")] = ResultFormat.TABLE,
 ) -> None:
     """Lay results side by side: differences in σ from the first one, and which settings differ.
 
-    Example: algid compare monday.algid friday.algid
+    Example: algid compare monday.algid friday.algid -o friday
     """
     from algid.report import compare as compared
     from algid.report.comparison import comparison_json
@@ -37,6 +38,10 @@ def compare(
         typer.echo("\n".join(markdown_table(table) for table in (found.estimates, found.settings)), nl=False)
     else:
         typer.echo(comparison_json(found, read), nl=False)
+    if out is not None:
+        from algid.report.comparison_page import write_comparison
+
+        typer.echo(f"wrote {write_comparison(found, read, out)}", err=True)
 
 
 def labels(paths: list[Path]) -> list[str]:

@@ -31,7 +31,7 @@ def fleet(
 
     with progress("parameters") as followed:
         history = history_of(batch / "jobs.parquet", followed)
-        written = write_history(history, batch if out is None else out)
+        written = write_history(history, batch if out is None else out, batch)
     _print(history, form)
     for path in written:
         typer.echo(f"wrote {path}", err=True)

@@ -209,7 +209,8 @@ class History:
     ----------
     windows : as `windows` gives them, of all parameters
     findings : as `outliers` and `mislabelled` give them
-    roster : a row a robot: robot, logs, undated, first and last (times), tested (for drift, any parameter)
+    roster : a row a robot: robot, logs, undated, first and last (times), latest (job), tested (for drift of anything)
+    jobs : robot and job of every log, the latest first
     nameless : logs that name no robot, and are left out
     """
 
@@ -217,6 +218,7 @@ class History:
     findings: pl.DataFrame
     roster: pl.DataFrame
     nameless: int = 0
+    jobs: pl.DataFrame | None = None
 
     @property
     def robots(self) -> int:
@@ -289,7 +291,8 @@ def history_of(path: Path, progress: Told | None = None) -> History:
         followed.append(windows(jobs, name))
     history = pl.concat(followed)
     findings = pl.concat([mislabelled(jobs), outliers(jobs)]).sort("kind", "robot", "time", "parameter")
-    return History(history, findings, _roster(jobs, history), finished.height - jobs.height)
+    listed = jobs.sort("robot", "time", descending=[False, True], nulls_last=True).select("robot", "job")
+    return History(history, findings, _roster(jobs, history), finished.height - jobs.height, listed)
 
 
 def _roster(jobs: pl.DataFrame, history: pl.DataFrame) -> pl.DataFrame:
@@ -303,19 +306,26 @@ def _roster(jobs: pl.DataFrame, history: pl.DataFrame) -> pl.DataFrame:
             pl.col("time").null_count().alias("undated"),
             pl.col("time").min().alias("first"),
             pl.col("time").max().alias("last"),
+            pl.col("job").sort_by("time", nulls_last=False).last().alias("latest"),
         )
         .with_columns(tested=pl.col("robot").is_in(tested))
         .sort("robot")
     )
 
 
-def write_history(history: History, out: Path) -> list[Path]:
-    """Write ``fleet.parquet``, ``findings.parquet`` and ``fleet.html`` into `out`. Raises `OutputError`."""
-    from algid.fleet.page import fleet_html
+def write_history(history: History, out: Path, batch: Path) -> list[Path]:
+    """Write ``fleet.parquet``, ``findings.parquet`` and ``fleet.html``, which links to the reports in `batch`.
+
+    Raises
+    ------
+    OutputError
+        If `out` cannot be written.
+    """
+    from algid.fleet.page import fleet_html, reports_of
 
     for name, frame in (("fleet.parquet", history.windows), ("findings.parquet", history.findings)):
         with whole_file(out / name) as temporary:
             frame.write_parquet(temporary)
     with whole_file(out / "fleet.html") as temporary:
-        temporary.write_text(fleet_html(history), encoding="utf-8")
+        temporary.write_text(fleet_html(history, reports_of(history, batch, out)), encoding="utf-8")
     return [out / name for name in ("fleet.parquet", "findings.parquet", "fleet.html")]

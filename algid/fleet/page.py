@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 import numpy as np
 
@@ -11,31 +15,110 @@ from algid.fleet.history import ALPHA, SPAN
 from algid.report.document import Document
 from algid.report.figures.base import Figure, Panel, axis, label
 from algid.report.frame import figures_html, framed, links_of
-from algid.report.html import table_html
+from algid.report.html import Drawn, escaped, table_html
+from algid.report.sparkline import Course, sparklines
 from algid.report.table import Column, Table
 from algid.report.text import ABSENT, counted, joined, significant, visible
 from algid.report.verdict import LEVEL_WORDS, Level, Verdict
 
 if TYPE_CHECKING:
+    import polars as pl
+
     from algid import __version__
 from algid.fleet.history import History
 
 MADE = f"Made by algid {__version__}."
+READING = (
+    '<p class="reading">Read: each parameter has one scale of change for all robots; the band is the 95 % interval of '
+    f"the mean over {SPAN} months. Level within its band is steady, orange drifts. A robot's name leads to its latest "
+    "report.</p>"
+)
 MOST_ROBOTS = 40  # whose table is printed
 MOST_ROWS = 200
 MOST_PANELS = 12
 
 
-def fleet_html(history: History) -> str:
-    """The page's text."""
+def fleet_html(history: History, reports: Mapping[str, str] | None = None) -> str:
+    """The page's text; `reports` says where the report of each job is."""
+    reports = reports or {}
     figures = _figures(history)
     facts = f"{counted(history.robots, 'robot')} · {counted(history.logs, 'log')}"
+    latest = {visible(robot): reports[job] for robot, job in _latest(history) if job in reports}
+    jobs = {visible(job): place for job, place in reports.items()}
     body = [
-        *(table_html(table) for table in (drift_table(history), finding_table(history)) if table.rows),
+        table_html(robot_table(history), _courses(history), latest),
+        READING,
+        *(table_html(table, (), latest) for table in [drift_table(history)] if table.rows),
+        *(table_html(table, (), jobs) for table in [finding_table(history)] if table.rows),
         *figures_html(figures),
-        table_html(robot_table(history)),
+        *_reports(history, reports),
     ]
-    return framed("a fleet's history", "Fleet", facts, verdict(history), links_of(figures), body, figures, MADE)
+    links = [*links_of(figures), *([("reports", "Reports")] if reports else [])]
+    return framed("a fleet's history", "Fleet", facts, verdict(history), links, body, figures, MADE)
+
+
+def reports_of(history: History, batch: Path, out: Path) -> dict[str, str]:
+    """Where each job's report is, as seen from `out`; jobs without one are left out."""
+    if history.jobs is None:
+        return {}
+    found = {}
+    for job in history.jobs["job"].to_list():
+        page = batch / f"{job}.algid" / "report.html"
+        if page.is_file():
+            there = os.path.relpath(page.resolve(), out.resolve()).replace(os.sep, "/")
+            found[job] = "./" + quote(there)  # a name such as javascript: leads nowhere else
+    return found
+
+
+def _latest(history: History) -> list[tuple[str, str]]:
+    return list(history.roster.select("robot", "latest").iter_rows())
+
+
+def _courses(history: History) -> list[Drawn]:
+    """A column of sparklines a parameter: each robot's mean over time with its 95 % band."""
+    import polars as pl
+
+    drifting = set(history.drifts.select("robot", "parameter").iter_rows())
+    shown = history.roster.head(MOST_ROWS)["robot"].implode()
+    columns = []
+    for (parameter,), rows in history.windows.filter(pl.col("robot").is_in(shown)).group_by(
+        "parameter", maintain_order=True
+    ):
+        own = {
+            visible(robot): _course(str(parameter), part, (robot, parameter) in drifting)
+            for (robot,), part in rows.group_by("robot", maintain_order=True)
+        }
+        columns.append(Drawn(str(parameter), sparklines(own), small=True))
+    return columns
+
+
+def _course(parameter: str, rows: pl.DataFrame, drifts: bool) -> Course:
+    rows = rows.sort("month").drop_nulls(["mean", "mean_std"])
+    t = rows["end"].dt.epoch("ms").to_numpy().astype(np.float64)
+    mean, half = rows["mean"].to_numpy(), 1.96 * rows["mean_std"].to_numpy()
+    ends = f"{significant(mean[0])} to {significant(mean[-1])}" if mean.size > 1 else "".join(map(significant, mean))
+    return Course(t, mean, half, f"{parameter} {ends}{', drifts' if drifts else ''}", drifts)
+
+
+def _reports(history: History, reports: Mapping[str, str]) -> list[str]:
+    """Links to every log's report, by robot, the latest first."""
+    if not reports or history.jobs is None:
+        return []
+    lists = [
+        f"<dt>{escaped(robot)}</dt><dd>{_listed(part['job'].to_list(), reports)}</dd>"
+        for (robot,), part in history.jobs.group_by("robot", maintain_order=True)
+    ]
+    return [
+        '<details class="paper" id="reports"><summary>Reports</summary>',
+        f"<dl>{''.join(lists)}</dl></details>",
+    ]
+
+
+def _listed(jobs: list[str], reports: Mapping[str, str]) -> str:
+    known = [job for job in jobs if job in reports]
+    links = [f'<a href="{escaped(reports[job])}">{escaped(job)}</a>' for job in known[:MOST_ROWS]]
+    more = f" and {len(known) - MOST_ROWS:,} more" if len(known) > MOST_ROWS else ""
+    return ", ".join(links) + more or "none"
 
 
 def verdict(history: History) -> Verdict:
@@ -44,7 +127,20 @@ def verdict(history: History) -> Verdict:
     level: Level = "reservations" if drifts or findings or history.untested else "good"
     told = f"{counted(history.robots, 'robot')}, {counted(history.logs, 'log')}"
     found = f"{counted(drifts, 'drift')} and {counted(findings, 'finding')}"
-    return Verdict(level, f"{LEVEL_WORDS[level]}: {told}: {found}.", tuple(history.untested))
+    return Verdict(level, f"{LEVEL_WORDS[level]}: {told}: {found}{_clearest(history)}.", tuple(history.untested))
+
+
+def _clearest(history: History) -> str:
+    """The clearest trend of all that were tested, whether it drifts or not."""
+    import polars as pl
+
+    tested = history.windows.filter(pl.col("p").is_not_nan() & (pl.col("mean") != 0.0))
+    if not tested.height:
+        return ""
+    row = tested.sort("p", "robot", "parameter").row(0, named=True)
+    slope = 100 * row["slope"] / abs(row["mean"])
+    what = f"{row['parameter']} of {visible(row['robot'])}, {slope:+.2g} % a month (p = {significant(row['p'], 2)})"
+    return f"; the clearest trend is {what}" + ("" if row["drift"] else f", which does not pass p < {ALPHA:g}")
 
 
 def fleet_document(history: History) -> Document:
@@ -150,7 +246,7 @@ def _figures(history: History) -> list[Figure]:
     panels = tuple(_panel(history, robot, parameter) for robot, parameter in pairs)
     if not panels:
         return []
-    reading = f"Read: the mean of {SPAN} months that end there, with its 95 % interval."
+    reading = f"Read: each dot is the mean of {SPAN} months that end there, with its 95 % interval."
     return [Figure("drift", "Parameters that drift", panels, reading, columns=2)]
 
 

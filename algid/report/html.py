@@ -64,11 +64,12 @@ def script_json(value: object) -> str:
 
 @dataclass(frozen=True)
 class Drawn:
-    """A column of drawings by the name of their row, after the column `after`, or last."""
+    """A column of drawings by the name of their row, after the column `after`, or last; `small` ones share a line."""
 
     heading: str
     rows: Mapping[str, str]
     after: str = ""
+    small: bool = False
 
 
 def table_html(table: Table, drawn: Sequence[Drawn] = (), links: Mapping[str, str] | None = None) -> str:
@@ -107,7 +108,8 @@ def _heading(slot: Slot) -> str:
 
 def _row(slots: Sequence[Slot], row: tuple[str, ...], links: Mapping[str, str]) -> str:
     return "".join(
-        f'<td class="drawn" data-label="{escaped(slot.heading)}">{slot.rows.get(row[0], "")}</td>'
+        f'<td class="drawn{" small" if slot.small else ""}" data-label="{escaped(slot.heading)}">'
+        f"{slot.rows.get(row[0], '')}</td>"
         if isinstance(slot, Drawn)
         else _cell(slot[1], row[slot[0]], links)
         for slot in slots

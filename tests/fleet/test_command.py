@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import polars as pl
@@ -76,3 +77,58 @@ def test_what_is_no_batch_is_refused(tmp_path: Path) -> None:
     write_jobs(open_store(str(tmp_path)), [])
     with pytest.raises(ResultError, match="no job has given parameters"):
         CliRunner().invoke(app, ["fleet", str(tmp_path)], catch_exceptions=False)
+
+
+def test_the_page_shows_every_robot_and_leads_to_its_reports(tmp_path: Path) -> None:
+    batch = _batch(tmp_path / "batch")
+    for job in ("r0/9", "r1/3"):
+        (batch / f"{job}.algid").mkdir(parents=True)
+        (batch / f"{job}.algid/report.html").write_text("a report")
+    done = CliRunner().invoke(app, ["fleet", str(batch), "-o", str(tmp_path / "page")])
+    assert done.exit_code == 0, done.output
+    page = (tmp_path / "page/fleet.html").read_text(encoding="utf-8")
+    assert page.count('<svg class="spark') == 4  # two robots, k1 and k6
+    assert page.count('<svg class="spark marked"') == 1
+    assert 'aria-label="r0: k6 ' in page
+    robots = re.search(r"<caption>Robots</caption>.*?</table>", page, re.DOTALL)
+    assert robots is not None
+    assert '<a href="./../batch/r0/9.algid/report.html">r0</a>' in robots[0]
+    assert '<th scope="row">r1</th>' in robots[0]  # its latest log has no report
+    links = re.findall(r'href="(\./[^"]+)"', page)
+    assert links
+    assert all((tmp_path / "page" / link).is_file() for link in links)
+
+
+def test_a_fleet_that_stays_as_it_is_says_so_and_shows_it(tmp_path: Path) -> None:
+    day = 86_400 * 10**9
+    records = [
+        Record(
+            Job(f"r{robot}/{number}", ("a.csv",), robot=f"r{robot}"), End.OK, "", "", (), {}, "", 1.0,
+            1_700_000_000 * 10**9 + number * day, 10.0, "refined",
+            {"k1": (1.0 + 0.001 * ((7 * number) % 5 - 2), 0.01, "OK")},
+        )
+        for robot in range(2)
+        for number in range(20)
+    ]  # fmt: skip
+    write_jobs(open_store(str(tmp_path)), records)
+    done = CliRunner().invoke(app, ["fleet", str(tmp_path)])
+    told = " ".join(done.stdout.split())
+    assert "Good: 2 robots, 40 logs: 0 drifts and 0 findings; the clearest trend is k1 of r" in told
+    assert "which does not pass p < 0.001" in told
+    page = (tmp_path / "fleet.html").read_text(encoding="utf-8")
+    assert page.count('<svg class="spark"') == 2
+    assert "Read: each parameter has one scale" in page
+
+
+def test_a_name_that_attacks_leads_nowhere(tmp_path: Path) -> None:
+    record = Record(
+        Job("javascript:alert(1)", ("a.csv",), robot="<b>r</b>"), End.OK, "", "", (), {}, "", 1.0,
+        1_700_000_000 * 10**9, 10.0, "refined", {"k1": (1.0, 0.01, "OK")},
+    )  # fmt: skip
+    write_jobs(open_store(str(tmp_path)), [record])
+    (tmp_path / "javascript:alert(1).algid").mkdir()
+    (tmp_path / "javascript:alert(1).algid/report.html").write_text("a report")
+    assert CliRunner().invoke(app, ["fleet", str(tmp_path)]).exit_code == 0
+    page = (tmp_path / "fleet.html").read_text(encoding="utf-8")
+    assert 'href="./javascript%3Aalert%281%29.algid/report.html"' in page
+    assert "<b>r</b>" not in page

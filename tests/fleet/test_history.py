@@ -135,7 +135,7 @@ def test_what_was_not_tested_is_said_and_its_robots_are_shown(tmp_path: Path) ->
         "Drift was not tested for 2 robots",
         "Outliers were not tested for 2 robots",
     ]
-    write_history(history, tmp_path)
+    write_history(history, tmp_path, tmp_path)
     page = (tmp_path / "fleet.html").read_text()
     assert "2 robots · 4 logs" in page
     assert "for want of a robot" in page
@@ -154,7 +154,7 @@ def test_a_robot_is_shown_with_what_was_found_of_it(tmp_path: Path) -> None:
 
 def test_the_page_escapes_names_and_asks_no_host(tmp_path: Path) -> None:
     jobs = _jobs(1, 92, seed=1, growth=0.05).with_columns(robot=pl.lit("<script>alert(1)</script>"))
-    write_history(_history(jobs, tmp_path), tmp_path)
+    write_history(_history(jobs, tmp_path), tmp_path, tmp_path)
     page = (tmp_path / "fleet.html").read_text()
     assert "<script>alert" not in page
     assert "default-src 'none'" in page

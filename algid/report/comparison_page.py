@@ -1,0 +1,178 @@
+"""A comparison as a page: intervals side by side, and distances in σ against what chance explains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from algid import __version__
+from algid.files import whole_file
+from algid.report.comparison import Comparison
+from algid.report.figures.base import Figure, Layout, Legend, Panel, Trace, axis, label, packed
+from algid.report.frame import figures_html, framed, links_of
+from algid.report.html import table_html
+from algid.report.text import counted, joined, significant, visible
+from algid.report.verdict import Verdict
+from algid.results import Estimate, Result
+
+COLOURS = ("@blue", "@orange", "@green", "@amber", "@red", "@muted")
+CHANCE = 1.96  # σ that 95 % of differences by chance stay within
+FAR = 3.0  # σ that chance does not explain
+NAME = "compare.html"
+ROW, FRAME = 24, 90  # pixels of a parameter, and of what stands around them
+READING = "a difference inside the blue band is one that chance explains 19 times of 20"
+
+
+def write_comparison(found: Comparison, results: Sequence[Result], folder: Path) -> Path:
+    """Write `compare.html` into `folder`. Raises `OutputError`."""
+    path = folder / NAME
+    with whole_file(path) as temporary:
+        temporary.write_text(comparison_html(found, results), encoding="utf-8")
+    return path
+
+
+def comparison_html(found: Comparison, results: Sequence[Result]) -> str:
+    """The page's text."""
+    figures = [figure for figure in (_intervals(found, results), _distances(found)) if figure.panels]
+    body = [*figures_html(figures), table_html(found.estimates), table_html(found.settings)]
+    return framed(
+        "results side by side",
+        joined(list(found.labels)) if len(found.labels) < 4 else f"{found.labels[0]} and {len(found.labels) - 1} more",
+        f"{counted(len(results), 'result')} · measured against {found.labels[0]}",
+        verdict(found),
+        links_of(figures),
+        body,
+        figures,
+        f"Made by algid {__version__}.",
+    )
+
+
+def verdict(found: Comparison) -> Verdict:
+    """Whether the results agree: distances beyond `FAR` are named, the largest first."""
+    distances = [
+        (abs(distance), f"{visible(name)} of {other} ({distance:+.1f} σ)")
+        for name, row in found.sigma.items()
+        for other, distance in zip(found.labels[1:], row, strict=True)
+        if distance is not None
+    ]
+    if not distances:
+        return Verdict("reservations", "With reservations: no parameter has error bars in two results.")
+    far = [words for size, words in sorted(distances, reverse=True) if size > FAR]
+    if far:
+        more = f" and {len(far) - 3} more" if len(far) > 3 else ""
+        return Verdict("reservations", f"With reservations: {joined(far[:3])}{more} lie beyond {FAR:g} σ.")
+    inside = sum(size <= CHANCE for size, _ in distances)
+    largest = max(distances)[1]
+    told = f"{inside} of {len(distances)} differences are within {CHANCE:g} σ"
+    return Verdict("good", f"Good: {told}; the largest is {largest}.")
+
+
+def _colour(place: int) -> str:
+    return COLOURS[place % len(COLOURS)]
+
+
+def _legend(found: Comparison, first: int = 0) -> tuple[Legend, ...]:
+    return tuple(
+        Legend(f"result{place}", words, _colour(place)) for place, words in enumerate(found.labels[first:], start=first)
+    )
+
+
+def _share(found: Estimate | None, middle: float) -> tuple[float, float] | None:
+    """Estimate and half its interval in percent of `middle`, less 100."""
+    if found is None or found.estimate is None or found.std is None:
+        return None
+    low, high = found.ci95 or (None, None)
+    half = CHANCE * found.std if low is None or high is None else (high - low) / 2
+    return 100 * (found.estimate - middle) / abs(middle), 100 * half / abs(middle)
+
+
+def _intervals(found: Comparison, results: Sequence[Result]) -> Figure:
+    """A forest plot: every result's interval in percent of the first one's estimate."""
+    middles = {name: results[0].estimates[name].estimate for name in found.sigma if name in results[0].estimates}
+    known = {name: middle for name, middle in middles.items() if middle}
+    apart = 0.6 / len(results)
+    traces: list[Trace] = []
+    widest = [0.0]
+    for place, result in enumerate(results):
+        rows = [(at, _share(result.estimates.get(name), middle)) for at, (name, middle) in enumerate(known.items())]
+        shown = [(at, *share) for at, share in rows if share is not None]
+        x, half = (np.array([row[column] for row in shown]) for column in (1, 2))
+        y = np.array([row[0] for row in shown]) + (place - (len(results) - 1) / 2) * apart
+        widest += [float(value) for value in np.abs(x) + half]
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "markers",
+                "x": packed(x),
+                "y": packed(y),
+                "error_x": {
+                    "type": "data",
+                    "array": half.tolist(),
+                    "color": _colour(place),
+                    "thickness": 2,
+                    "width": 0,
+                },
+                "marker": {"color": _colour(place), "size": 7},
+                "name": label(found.labels[place]),
+                "legendgroup": f"result{place}",
+                "hovertemplate": f"{label(found.labels[place])} %{{x:+.3g}} %<extra></extra>",
+            }
+        )
+    reach = 1.1 * float(np.quantile(widest, 0.9))
+    layout = {
+        "xaxis": axis(f"from {label(found.labels[0])}, %", range=[-reach, reach]),
+        "yaxis": _names(list(known)),
+        "hovermode": "closest",
+    }
+    says = f"95 % intervals of {counted(len(known), 'parameter')}, {counted(len(results), 'result')}"
+    panels = (Panel(traces, layout, says, height=FRAME + (ROW + 8 * (len(results) - 2)) * len(known)),) if known else ()
+    reading = "Read: intervals of one row that overlap agree; one that stands apart has changed or was made otherwise."
+    return Figure("intervals", "Estimates with their 95 % intervals", panels, reading, _legend(found))
+
+
+def _distances(found: Comparison) -> Figure:
+    """How far each result is from the first, in combined standard deviations."""
+    names = [name for name, row in found.sigma.items() if any(distance is not None for distance in row)]
+    traces: list[Trace] = []
+    for place, words in enumerate(found.labels[1:], start=1):
+        pairs = [(found.sigma[name][place - 1], at) for at, name in enumerate(names)]
+        shown = [(distance, at) for distance, at in pairs if distance is not None]
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "markers",
+                "x": packed(np.array([distance for distance, _ in shown])),
+                "y": packed(np.array([float(at) for _, at in shown])),
+                "marker": {"color": _colour(place), "size": 8},
+                "name": label(words),
+                "legendgroup": f"result{place}",
+                "hovertemplate": f"{label(words)} %{{x:+.2f}} σ<extra></extra>",
+            }
+        )
+    sizes = [abs(distance) for row in found.sigma.values() for distance in row if distance is not None]
+    reach = max(1.1 * max(sizes, default=0.0), 4.0)
+    inside = sum(size <= CHANCE for size in sizes)
+    layout = {
+        "xaxis": axis("distance, σ", range=[-reach, reach]),
+        "yaxis": _names(names),
+        "shapes": [_chance()],
+        "hovermode": "closest",
+    }
+    largest = significant(max(sizes, default=0.0), 2)
+    note = f"{inside} of {len(sizes)} differences lie within ± {CHANCE:g} σ, the largest at {largest} σ."
+    panels = (Panel(traces, layout, f"Distances in σ. {note}", height=FRAME + ROW * len(names)),) if names else ()
+    legend = (*_legend(found, 1), Legend("", f"± {CHANCE:g} σ, 95 % by chance", "@blue/0.25", "area"))
+    return Figure("distances", f"Distances from {found.labels[0]}", panels, f"Read: {READING}.", legend, note)
+
+
+def _names(names: Sequence[str]) -> Layout:
+    """An axis of names from the top down."""
+    ticks: Layout = {"tickvals": list(range(len(names))), "ticktext": [label(name) for name in names]}
+    return axis(range=[len(names) - 0.4, -0.6], zeroline=False, fixedrange=True, **ticks)
+
+
+def _chance() -> Layout:
+    upright = {"type": "rect", "yref": "paper", "y0": 0, "y1": 1, "x0": -CHANCE, "x1": CHANCE}
+    return {**upright, "fillcolor": "@blue/0.25", "line": {"width": 0}, "layer": "below"}
