@@ -2,6 +2,8 @@
 
 Usage: python -m pipelines.fuzz [FILES] [SEED]
 
+A batch goes over every one of the hostile files too, and has to end with a result or a reason for each.
+
 So many files with damaged bytes (`pipelines.mutations`) and as many that lie by their structure (`pipelines.hostile`).
 """
 
@@ -19,6 +21,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 
 from algid.errors import LogError
 from algid.log import Log
@@ -66,7 +69,31 @@ def main() -> int:
                     print(line, flush=True)
         print(f"{files} {source} files: {dict(total)}; at most {memory >> 20} MB, {slowest:.2f} s", flush=True)
         failed += sum(total[kind] for kind in FAILURES) + (memory > _MEMORY)
+    failed += batches(files, seed)
     return int(failed > 0)
+
+
+def batches(files: int, seed: int) -> int:
+    """Have ``algid batch`` go over the hostile files, `_BATCH` at a time; how many of these runs were no good."""
+    failed = 0
+    total: Counter[str] = Counter()
+    for first in range(seed, seed + files, _BATCH):
+        count = min(_BATCH, seed + files - first)
+        with tempfile.TemporaryDirectory(prefix="algid-fuzz-") as place:
+            logs, out = Path(place, "logs"), Path(place, "out")
+            logs.mkdir()
+            names = {path.name for path, _ in corpus(logs, count, first)}
+            command = [sys.executable, "-m", "algid", "batch", str(logs), "-o", str(out), "--no-report", "-q"]
+            done = subprocess.run(command, capture_output=True, text=True, timeout=_BATCH * _SECONDS, check=False)
+            jobs = pl.read_parquet(out / "jobs.parquet") if (out / "jobs.parquet").exists() else pl.DataFrame()
+            wrong = done.returncode not in (0, 1, 3) or "Traceback" in done.stderr or jobs.height != len(names)
+            failed += wrong
+            if wrong:
+                print(f"batch over hostile, seed {first}: exit {done.returncode}, {jobs.height} of {len(names)} jobs")
+                print(done.stderr[-2000:], flush=True)
+            total.update(jobs["status"].to_list() if jobs.height else [])
+    print(f"algid batch over {files} hostile files: {dict(total)}", flush=True)
+    return failed
 
 
 def batch(source: str, seed: int, files: int) -> int:

@@ -5,5 +5,5 @@ BENCH_DIR ?= build/bench-ingest
 bench-ingest: setup ## time the readers against decompression, polars and other readers
 	$(BIN)/python -m pipelines.bench_ingest $(BENCH_DIR)
 
-fuzz: setup ## read 20,000 damaged logs and 20,000 hostile ones
+fuzz: setup ## read 20,000 damaged logs and 20,000 hostile ones, these by a batch too
 	$(BIN)/python -m pipelines.fuzz

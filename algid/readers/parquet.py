@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from algid.errors import LogError
 from algid.log import CANONICAL_COLUMNS, KEY, Companion, Notice, loads
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign, check_written, tables
-from algid.readers.footer import FooterError, is_encrypted, page_has_checksum
+from algid.readers.footer import Footer, FooterError, page_has_checksum, parsed
 from algid.readers.stated import in_metadata
 from algid.readers.table import Table
 
@@ -73,6 +73,11 @@ def schema_of(path: Path) -> dict[str, pl.DataType]:
 
 
 def _check_footer(path: Path) -> None:
+    if _footer(path).encrypted:
+        raise LogError(f"{path}: the Parquet file holds encrypted columns; write it anew without encryption")
+
+
+def _footer(path: Path) -> Footer:
     with path.open("rb") as stream:
         size = stream.seek(0, 2)
         stream.seek(max(0, size - 8))
@@ -85,11 +90,9 @@ def _check_footer(path: Path) -> None:
     if length + 12 > size or length > _LARGEST_FOOTER:
         raise LogError(f"{path}: the Parquet footer claims {length} bytes of a file of {size}; copy the file again")
     try:
-        encrypted = is_encrypted(footer)
+        return parsed(footer)
     except FooterError as error:
         raise LogError(f"{path}: the Parquet footer is damaged ({error}); copy the file again") from error
-    if encrypted:
-        raise LogError(f"{path}: the Parquet file holds encrypted columns; write it anew without encryption")
 
 
 def counted_rows(path: Path) -> int:
@@ -100,32 +103,20 @@ def counted_rows(path: Path) -> int:
     LogError
         If they do not: polars would believe one of them without a word.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        metadata = pq.read_metadata(path)
-        groups = [metadata.row_group(place) for place in range(metadata.num_row_groups)]
-        # a list column has more values than rows, a flat one just as many
-        flat = not any("." in metadata.schema.column(place).path for place in range(metadata.num_columns))
-        agree = sum(group.num_rows for group in groups) == metadata.num_rows and all(
-            values == group.num_rows if flat else values >= group.num_rows
-            for group in groups
-            for values in (group.column(place).num_values for place in range(group.num_columns))
-        )
-        size = path.stat().st_size
-        inside = all(
-            0 < _first(pages) <= _first(pages) + pages.total_compressed_size <= size
-            for group in groups
-            for pages in (group.column(place) for place in range(group.num_columns))
-        )
-    except (pa.ArrowException, OSError, ValueError) as error:
-        raise _damaged(path, error) from error
+    footer = _footer(path)
+    columns = [(pages, group.rows) for group in footer.groups for pages in group.columns]
+    # a list column has more values than rows, a flat one just as many
+    flat = all(len(pages.path) == 1 for pages, _ in columns)
+    agree = sum(group.rows for group in footer.groups) == footer.rows and all(
+        pages.values == rows if flat else pages.values >= rows for pages, rows in columns
+    )
+    size = path.stat().st_size
+    inside = all(0 < pages.first <= pages.end <= size for pages, _ in columns)
     if not inside:  # polars panics at these, which takes it seconds
         raise LogError(f"{path}: the Parquet footer claims pages beyond the end of the file; copy the file again")
     if not agree:
         raise LogError(f"{path}: the Parquet footer contradicts itself about its rows; copy the file again")
-    return int(metadata.num_rows)
+    return footer.rows
 
 
 def _flat_names(path: Path, schema: Mapping[str, pl.DataType]) -> dict[str, tuple[str, int | None]]:
@@ -239,8 +230,8 @@ class _Groups:
 
         roots = {self.available[source][0] for source in self.columns.sources.values()}
         try:
-            with pq.ParquetFile(self.path, page_checksum_verification=True, pre_buffer=False) as file:
-                if _has_checksums(self.path, file.metadata, roots):
+            if _has_checksums(self.path, roots):
+                with pq.ParquetFile(self.path, page_checksum_verification=True, pre_buffer=False) as file:
                     for _ in file.iter_batches(columns=sorted(roots)):
                         pass
         except (pa.ArrowException, OSError, ValueError) as error:
@@ -271,20 +262,14 @@ class _Groups:
         return self.columns
 
 
-def _first(pages: Any) -> int:
-    """Where the first page of a column of a row group stands."""
-    return int(min(offset for offset in (pages.dictionary_page_offset, pages.data_page_offset) if offset))
-
-
-def _has_checksums(path: Path, metadata: Any, roots: Collection[str]) -> bool:
+def _has_checksums(path: Path, roots: Collection[str]) -> bool:
     """Whether the first page of a column among `roots` carries a checksum, in any row group."""
     with path.open("rb") as stream:
-        for group in map(metadata.row_group, range(metadata.num_row_groups)):
-            for pages in map(group.column, range(group.num_columns)):
-                if pages.path_in_schema.split(".")[0] in roots:
-                    stream.seek(_first(pages))
-                    if page_has_checksum(stream.read(_PAGE_HEAD)):
-                        return True
+        for pages in (pages for group in _footer(path).groups for pages in group.columns):
+            if pages.path[:1] and pages.path[0] in roots:
+                stream.seek(pages.first)
+                if page_has_checksum(stream.read(_PAGE_HEAD)):
+                    return True
     return False
 
 

@@ -280,3 +280,18 @@ def test_a_footer_that_claims_pages_beyond_the_file_is_refused(tmp_path: Path) -
         (tmp_path / "log.parquet").write_bytes(b"PAR1" + content[start - cut : start] + content[start:])
         with pytest.raises(LogError, match="pages beyond the end of the file"):
             read_log(tmp_path / "log.parquet")
+
+
+def test_statistics_that_contradict_their_column_do_not_end_the_process(tmp_path: Path) -> None:
+    path = tmp_path / "log.parquet"
+    pq.write_table(arm_table(), path, write_page_checksum=True, row_group_size=500)
+    content = path.read_bytes()
+    start = len(content) - 8 - int.from_bytes(content[-8:-4], "little")
+    # SizeStatistics (field 16): a histogram of two repetition levels where a flat column has none
+    footer = content[start:-8].replace(b"<)\x06\x19&", b"<)&\x00\x00\x19&")
+    assert len(footer) > len(content[start:-8])
+    path.write_bytes(content[:start] + footer + len(footer).to_bytes(4, "little") + b"PAR1")
+    code = f"from algid.readers import read_log; read_log({str(path)!r})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "terminate called" not in done.stderr
+    assert done.returncode == 0 or "LogError" in done.stderr.splitlines()[-1]

@@ -578,3 +578,16 @@ def test_a_json_path_is_looked_up_once_among_many_fields() -> None:
     ]
     assert found.value(["x"]) == 1
     assert found.value(["x", "y"]) is None
+
+
+def test_a_chunk_that_claims_to_be_empty_and_is_not_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    small_chunks(path, rows=50, index_types=IndexType.NONE)
+    with opened(path) as (_, found):
+        place = found.spans[3].start + 16
+    content = bytearray(path.read_bytes())
+    content[place : place + 8] = bytes(8)
+    path.write_bytes(content)
+    log = read_log(path)
+    assert len(log) == 49
+    assert [notice.code for notice in log.notices if notice.lossy] == ["DAMAGED_CHUNK"]

@@ -25,6 +25,8 @@ _MOST_INDEXES = 2_000_000
 _MOST_SPANS = 100_000
 _SPAN = 1 << 23
 _LOOSE, _TORN = -1, -2
+_EMPTY_CHUNK = bytes(40)
+"""A chunk of nothing, not packed, without a time or a checksum."""
 
 
 @dataclass(frozen=True)
@@ -334,10 +336,9 @@ def _looked_into(file: File, span: Span, found: Catalogue) -> Span:
             records = records_in(content, works=file.works)
         else:
             chunk = content[: span.length]
-            size = claimed(chunk)
-            if not size:
+            if chunk == _EMPTY_CHUNK:
                 return replace(span, channels=frozenset())
-            file.unpacks(size)
+            file.unpacks(claimed(chunk))
             unpacked = unpack_torn(chunk)[0] if span.torn else unpack(chunk)
             records = records_in(unpacked, content[span.length :], file.works)
         for code, body in records.others:
