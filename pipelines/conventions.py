@@ -1,26 +1,29 @@
 """Which wrong conventions of a log are told, and by what: `make conventions`.
 
-Each arm is simulated, its log spoiled by one mistake and identified by the weak estimator, with its friction. A row
-passes where a right log is called right, and where a wrong one has failed and the convention that is named brings the
-constants back. Rows that no log can tell stand at the end. Writes `conventions.md` into the output folder.
+Each arm is simulated with and without friction, its log spoiled by one mistake and identified with no flag. A row
+passes where a right log is called right, and where a wrong one has failed (exit 3) and the convention that is named
+brings the constants back; sensors that fail, and logs in each other's place, must be told by their code, never be Good,
+and have failed where an error is beyond `FAR` of its own σ. Rows that no log can tell stand at the end. Writes
+`conventions.md` into the output folder.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
 
-from algid.arm import CONSTANT_NAMES, FloatArray
+from algid.arm import CONSTANT_NAMES, FloatArray, with_payload
+from algid.errors import LogError
 from algid.estimators.conventions import AS_READ, judge
 from algid.identification.identify import identify
 from algid.inspection.conventions import mend
 from algid.log import Log, Origin
 from algid.report.verdict import LEVEL_WORDS, verdict
 from algid.results import Result
-from algid.settings import Settings
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import Motion, simulate
@@ -63,17 +66,40 @@ ROWS: dict[str, Spoil] = {
     "zero of θ1 off by 40°": lambda th, ta: (_pair(th[0] + np.radians(40), th[1]), ta),
     "zero of θ2 off by 90°": lambda th, ta: (_pair(th[0], th[1] + np.pi / 2), ta),
 }
+
+
+def _without_five_percent(theta: FloatArray, tau: FloatArray) -> Pair:
+    """Samples lost, and the time of the others made from their numbers."""
+    kept = np.random.default_rng(5).random(theta.shape[1]) > 0.05
+    return theta[:, kept], tau[:, kept]
+
+
+def _dead_for_a_second(theta: FloatArray, tau: FloatArray) -> Pair:
+    dead = tau.copy()
+    dead[1, 1000:2000] = 0.0
+    return theta, dead
+
+
+SPOILED: dict[str, tuple[Spoil, str]] = {
+    "5 % of the samples lost, time renumbered": (_without_five_percent, "LOST_SAMPLES"),
+    "τ2 dead for 1 s": (_dead_for_a_second, "DEAD_EFFORT"),
+}
+"""What sensors and recorders do to a log, and the code that tells it."""
+EXCHANGED = "loaded and unloaded exchanged"
+FAR = 10.0  # σ
 INVISIBLE: dict[str, Spoil] = {
     "torques × 6": lambda th, ta: (th, 6 * ta),
     "torques ÷ 6": lambda th, ta: (th, ta / 6),
 }
 
 
-def motion_of(name: str) -> tuple[FloatArray, Motion]:
-    """Constants (7,) of an arm by name, and its motion under a wide torque."""
+def motion_of(name: str, *, loaded: bool = False) -> tuple[FloatArray, Motion]:
+    """Constants (7,) of an arm by name, and its motion under a wide torque, with half of link 2's mass or without."""
     arm = load_case(name).arm if name.startswith("case") else random_arm(int(name.removeprefix("arm")))[0]
     t = np.arange(round(DURATION * RATE) + 1) / RATE
-    return arm.constants(), simulate(arm.constants(), wide_multi_sine(arm, sum(name.encode())), t)
+    k = arm.constants()
+    moved = with_payload(k, arm.payload_constants(0.5 * arm.m2)) if loaded else k
+    return k, simulate(moved, wide_multi_sine(arm, sum(name.encode()) + loaded), t)
 
 
 def log_of(motion: Motion, spoil: Spoil, *, friction: bool, seed: int = 0) -> Log:
@@ -84,7 +110,7 @@ def log_of(motion: Motion, spoil: Spoil, *, friction: bool, seed: int = 0) -> Lo
         tau = tau + COULOMB * np.abs(tau).max(axis=1, keepdims=True) * np.tanh(motion.omega / 0.02)
     theta = motion.theta + SIGMA_THETA * rng.standard_normal(tau.shape)
     read = spoil(theta, tau + SIGMA_TAU * rng.standard_normal(tau.shape))
-    return Log(np.round(motion.t * 1e9).astype(np.int64), *read, Origin("arm.csv", "csv", {}))
+    return Log(np.round(motion.t[: read[0].shape[1]] * 1e9).astype(np.int64), *read, Origin("arm.csv", "csv", {}))
 
 
 def mended(log: Log, k: FloatArray) -> bool:
@@ -107,16 +133,54 @@ def furthest(result: Result, k: FloatArray) -> float:
 def row(name: str, spoil: Spoil, arm: str, k: FloatArray, motion: Motion, *, friction: bool) -> tuple[str, bool]:
     """A line of the table, and whether it passes."""
     log = log_of(motion, spoil, friction=friction)
-    result = identify(log, settings=Settings(estimator="weak", friction="coulomb" if friction else "viscous"))
-    found, named = verdict(result), mend(log)
-    far = furthest(result, k)
+    named = mend(log)
+    words = "" if named is None else f"{named.words}: `{' '.join(named.flags)}`"
+    try:
+        result = identify(log, report=False)
+    except LogError as refusal:  # exit 2: a scale that no joint has
+        return _line(name, arm, friction, "", "Refused", str(refusal).partition(": ")[2], True)
+    found = verdict(result)
     if name == "nothing" or name in INVISIBLE:
         passed = named is None and found.level != "failed"
+    elif name in SPOILED:
+        passed, words = _told(result, SPOILED[name][1], k), SPOILED[name][1]
     else:
         passed = found.level == "failed" and named is not None and mended(log, k)
-    words = "" if named is None else f"{named.words}: `{' '.join(named.flags)}`"
-    cells = (name, arm, "yes" if friction else "no", f"{far:.3g}", LEVEL_WORDS[found.level], words)
+    return _line(name, arm, friction, f"{furthest(result, k):.3g}", LEVEL_WORDS[found.level], words, passed)
+
+
+def _told(result: Result, code: str, k: FloatArray) -> bool:
+    """Whether a result tells `code`, is not Good, and has no error beyond `FAR` without having failed."""
+    level = verdict(result).level
+    told = any(code in warning for warning in result.warnings)
+    return told and level != "good" and (level == "failed" or furthest(result, k) <= FAR)
+
+
+def _line(name: str, arm: str, friction: bool, far: str, level: str, words: str, passed: bool) -> tuple[str, bool]:
+    cells = (name, arm, "yes" if friction else "no", far, level, words)
     return f"| {' | '.join(cells)} | {'yes' if passed else 'NO'} |", passed
+
+
+def exchanged(arm: str, k: FloatArray, *, friction: bool) -> tuple[str, bool]:
+    """The row of a loaded and an unloaded log in each other's place."""
+    loaded, unloaded = (
+        log_of(motion_of(arm, loaded=kind)[1], ROWS["nothing"], friction=friction, seed=kind) for kind in (True, False)
+    )
+    result = identify(loaded, unloaded, report=False)
+    passed = _told(result, "EXCHANGED_LOGS", k)
+    far, level = f"{furthest(result, k):.3g}", LEVEL_WORDS[verdict(result).level]
+    return _line(EXCHANGED, arm, friction, far, level, "EXCHANGED_LOGS", passed)
+
+
+def lines_of(arm: str) -> list[tuple[str, bool]]:
+    """The lines of one arm, and whether each passes."""
+    k, motion = motion_of(arm)
+    rows = {**ROWS, **{name: spoil for name, (spoil, _) in SPOILED.items()}, **INVISIBLE}
+    found = []
+    for friction in (False, True):
+        found += [row(name, spoil, arm, k, motion, friction=friction) for name, spoil in rows.items()]
+        found.append(exchanged(arm, k, friction=friction))
+    return found
 
 
 def main() -> None:
@@ -129,11 +193,9 @@ def main() -> None:
         "|---|---|---|---|---|---|---|",
     ]
     failed = 0
-    for arm in arguments.arms:
-        k, motion = motion_of(arm)
-        for name, spoil in {**ROWS, **INVISIBLE}.items():
-            for friction in (False, True):
-                line, passed = row(name, spoil, arm, k, motion, friction=friction)
+    with ProcessPoolExecutor(2) as pool:
+        for found in pool.map(lines_of, arguments.arms):
+            for line, passed in found:
                 lines.append(line)
                 failed += not passed
                 print(line, flush=True)

@@ -50,6 +50,10 @@ def bounds(shared: Shared) -> dict[str, Callable[[FloatArray], float]]:
         "det M > 0 at theta2 = 0": lambda beta: _mass(shared, beta)[1],
         "det M > 0 at theta2 = pi": lambda beta: _mass(shared, beta)[2],
     }
+    if shared.model.gravity > 0:
+        first, second = (shared.names.index(name) for name in ("k1", "k2"))
+        # Table 1: k1 k2 = m2² g l1 lc2²
+        found["k1 k2 >= 0"] = lambda beta: float(beta[first] * beta[second])
     for place, name in enumerate(shared.names):
         if name in _NOT_NEGATIVE:
             found[f"{name} >= 0"] = lambda beta, place=place: float(beta[place])  # type: ignore[misc]
@@ -77,6 +81,23 @@ def broken_bounds(fit: Fit) -> list[BrokenBound]:
         deviation = float(np.sqrt(max(0.0, float(slope @ fit.covariance @ slope))))
         broken.append(BrokenBound(name, value, -value / deviation if deviation > 0 else None))
     return broken
+
+
+def length_by_constants(fit: Fit) -> tuple[float, float] | None:
+    """l1 = g k1 / k2 (Table 1) and its standard deviation, in m; None where the logs leave k1 or k2 open.
+
+    No gain of both torques changes it: where it is not the length that is known, gravity is compensated in part, or
+    the zeros or the terms of the torque are wrong.
+    """
+    if fit.shared.model.gravity == 0:
+        return None
+    places = [fit.names.index(name) for name in ("k1", "k2")]
+    k1, k2 = fit.values[places]
+    if np.any(np.isinf(fit.std[places])) or k2 == 0:
+        return None
+    slope = fit.shared.model.gravity * np.array([1 / k2, -k1 / k2**2])
+    variance = float(slope @ fit.covariance[np.ix_(places, places)] @ slope)
+    return float(fit.shared.model.gravity * k1 / k2), float(np.sqrt(max(variance, 0.0)))
 
 
 def _slope(bound: Callable[[FloatArray], float], beta: FloatArray, size: FloatArray) -> FloatArray:

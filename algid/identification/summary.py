@@ -15,7 +15,13 @@ import numpy as np
 
 from algid import __version__, results
 from algid.arm import CONSTANT_NAMES, FloatArray
-from algid.estimators.diagnostics import broken_bounds, payload_distance, repeatability, term_worths
+from algid.estimators.diagnostics import (
+    broken_bounds,
+    length_by_constants,
+    payload_distance,
+    repeatability,
+    term_worths,
+)
 from algid.estimators.fit import Fit, OwnEstimate, own_estimates
 from algid.estimators.instruments import ENDOGENEOUS
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
@@ -32,7 +38,10 @@ from algid.table4 import LOADED_ROWS, UNLOADED_ROWS, finite, paper_errors, table
 from algid.table4 import UNITS as TABLE_UNITS
 
 NAMED = 3  # logs that a warning names beside the first
-SUSPICIOUS = ("WRONG_CONVENTION", "ZERO_OFFSET", "FLIPPED_SIGN", "WRONG_ZERO", "GRAVITY_COMPENSATED", "STUCK_SENSOR")
+SUSPICIOUS = (
+    *("WRONG_CONVENTION", "ZERO_OFFSET", "FLIPPED_SIGN", "WRONG_ZERO", "GRAVITY_COMPENSATED", "STUCK_SENSOR"),
+    *("DEAD_EFFORT", "LOST_SAMPLES"),
+)
 """Named checks that say why estimates would be wrong."""
 CONTRADICTED = "WRONG_CONVENTION"
 """The named check that says that estimates are wrong, unless the user accepts it."""
@@ -182,6 +191,7 @@ def outcome_of(fit: Fit, predictions: Predictions, survey: Survey, settings: Set
         stds=stds,
         fit=summary,
         warnings=[*fit_warnings(fit), *_not_crossed(summary, settings)],
+        causes=[Cause(cause=EXCHANGED)] if _exchanged(fit) else [],
     )
 
 
@@ -427,6 +437,26 @@ def prediction(found: PredictionScore) -> results.TorquePrediction | None:
     )
 
 
+EXCHANGED = "the payload's mass is negative by far: the loaded and the unloaded logs are exchanged"
+
+
+def _exchanged(fit: Fit) -> bool:
+    """Whether the unloaded arm bears more than the loaded one, and by far."""
+    return any(b.bound == "m_p >= 0" and b.distance is not None and b.distance > FAR_APART for b in broken_bounds(fit))
+
+
+def _unlike_lengths(fit: Fit) -> Iterator[str]:
+    """Where l1 = g k1 / k2 is not the length that was given."""
+    known, found = fit.shared.lengths.get("l1"), length_by_constants(fit)
+    if known is None or found is None:
+        return
+    length, std = found
+    if abs(length - known) > FAR_APART * std:
+        text = f"g k1 / k2 makes l1 {length:.4g} ± {fit.quantile * std:.2g} m, given are {known:g} m: gravity is"
+        why = "compensated in part, or a zero, a sign or a term of the torque is wrong"
+        yield Notice("LENGTH_MISMATCH", f"LENGTH_MISMATCH: {text} {why}").text
+
+
 def _payload_near_zero(fit: Fit) -> Iterator[str]:
     """What is known of a payload that is not told from none."""
     if "m_p" not in fit.names:
@@ -457,6 +487,9 @@ def fit_warnings(fit: Fit) -> Iterator[str]:
     for bound in broken_bounds(fit):
         distance = "" if bound.distance is None else f", {bound.distance:.1f} standard deviations beyond"
         yield f"the estimates break {bound.bound}: {bound.value:.4g}{distance}"
+    yield from _unlike_lengths(fit)
+    if _exchanged(fit):
+        yield Notice("EXCHANGED_LOGS", f"EXCHANGED_LOGS: {EXCHANGED}").text
     apart = payload_distance(fit)
     if apart is not None and apart > FAR_APART:
         yield f"the loaded and the unloaded logs are {apart:.1f} standard deviations from belonging to one arm"

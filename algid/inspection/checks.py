@@ -128,6 +128,9 @@ def clock_figures(log: Log) -> ClockFigures:
 
 _DENORMAL = 1e-6
 _SPIKE = 30.0
+_DEAD, _DEAD_RUNS = 0.1, 20  # s, and in usual runs: a torque that keeps one value so long is not measured
+_LOST, _LOST_SHARE, _AGAINST = 0.3, 0.003, 5.0
+"""Of a step: how near it lies to the double; of the samples: how many do; and over those as near to none at all."""
 _TURN = 2 * math.pi
 _SHORTEST = 1.0
 _FEWEST = 10.0
@@ -149,7 +152,7 @@ def examine(log: Log, *, gravity: float = 9.81) -> tuple[Finding, ...]:
     """Everything that the checks above find in a log; `gravity` 0 for an arm in a horizontal plane."""
     if len(log) < 4:
         return ()
-    every = (*_efforts(log), *_angles(log), *_degrees(log), *_spikes(log), *_clock(log))
+    every = (*_efforts(log), *_dead_efforts(log), *_angles(log), *_degrees(log), *_spikes(log), *_clock(log))
     found = [_yielding(finding, log.origin.reading.accepted) for finding in every]
     if any(finding.refuse for finding in found):
         return tuple(found)
@@ -225,6 +228,32 @@ def _efforts(log: Log) -> Iterator[Finding]:
             yield Finding("SATURATED_EFFORT", text)
 
 
+def _dead_efforts(log: Log) -> Iterator[Finding]:
+    for name, tau in zip(("tau1", "tau2"), log.tau, strict=True):
+        dead = _dead(tau, log.period)
+        if dead:
+            text = f"{_source(log, name)} stands still for {dead[1]:.3g} s from t = {dead[0]:.6g} s; leave that out"
+            yield Finding("DEAD_EFFORT", text)
+
+
+def _dead(tau: FloatArray, period: float) -> tuple[float, float] | None:
+    """Start and length in s of the longest run of one value, where runs are far shorter elsewhere; or None.
+
+    A run at the largest or the smallest value is a limit's, and slow publishers repeat every value as often.
+    """
+    changes = np.flatnonzero(np.diff(tau))
+    if changes.size < _DEAD_RUNS:
+        return None
+    lengths = np.diff(changes)
+    place = int(np.argmax(lengths))
+    value, longest = tau[changes[place] + 1], int(lengths[place])
+    usual = float(np.quantile(lengths, 0.95))
+    at_limit = value in (tau.max(), tau.min())
+    if at_limit or longest * period < _DEAD or longest < _DEAD_RUNS * usual:
+        return None
+    return float(changes[place] + 1) * period, longest * period
+
+
 def _angles(log: Log) -> Iterator[Finding]:
     for name, theta in zip(("theta1", "theta2"), log.theta, strict=True):
         steps, what = np.diff(theta), _source(log, name)
@@ -288,7 +317,9 @@ def _in_degrees(log: Log, name: str, text: str) -> Finding:
     flags = ("--angle-unit deg", "--angle-unit rad")
     if name.startswith("omega"):
         flags = (f"--set {name}.unit=deg", f"--set {name}.unit=rad")
-    return Finding("DEGREES", f"{text}: {flags[0]}, or {flags[1]} where it is right (profile: unit of [{name}])", True)
+    motor = "" if name.startswith("omega") else f", --set {name}.gear_ratio=N for the angle of a motor behind its gear"
+    told = f"{flags[0]}{motor}, or {flags[1]} where it is right (profile: unit or gear_ratio of [{name}])"
+    return Finding("DEGREES", f"{text}: {told}", True)
 
 
 def _ratio(log: Log, joint: int) -> float:
@@ -339,6 +370,13 @@ def _clock(log: Log) -> Iterator[Finding]:
             "receipt times do: late ones go back to the period they are missing from, the mean stands for the others"
         )
         yield Finding("NEAR_STAMPS", text)
+    lost = _lost(log)
+    if lost:
+        text = (
+            f"{lost} steps of the angles are twice as long as those beside them, though the stamps are even: samples "
+            "were lost and the others renumbered; take the stamps of the messages, or record without losses"
+        )
+        yield Finding("LOST_SAMPLES", text)
     if clock.gaps:
         text = f"{clock.gaps} gaps, the longest {clock.longest_gap:.4g} s; no window spans one"
         yield Finding("GAPS", text)
@@ -346,6 +384,23 @@ def _clock(log: Log) -> Iterator[Finding]:
         told = f"stamps jitter by {clock.jitter * 1e3:.3g} ms about a period of {1e3 / clock.rate:.4g} ms"
         bend = max(float(np.sqrt(np.mean(np.diff(row, 2) ** 2))) for row in log.theta) / 8
         yield Finding("JITTER", f"{told}; resampling moves angles by {bend:.2g} rad at most, linearly")
+
+
+def _lost(log: Log) -> int:
+    """How many steps both joints make in the time of one; 0 where noise or a slow motion does not tell.
+
+    A velocity that is twice the mean of its neighbours' is a lost sample's. Noise makes one that is nought as often.
+    """
+    velocity = np.diff(log.theta) / (np.diff(log.stamp_ns) * 1e-9)
+    around = 0.5 * (velocity[:, 2:] + velocity[:, :-2])
+    own = velocity[:, 1:-1]
+    power = np.sum(around**2, axis=0)
+    share = np.sum(own * around, axis=0) / np.maximum(power, 1e-300)
+    off = np.sqrt(np.sum((own - share * around) ** 2, axis=0))
+    told = (power > np.quantile(power, 0.25)) & (off < _LOST * np.sqrt(power))
+    lost = int(np.count_nonzero(told & (np.abs(share - 2) < _LOST)))
+    chance = int(np.count_nonzero(told & (np.abs(share) < _LOST)))
+    return lost if lost > max(_LOST_SHARE * len(log), _FEWEST, _AGAINST * chance) else 0
 
 
 def _samples_a_period(log: Log) -> float:

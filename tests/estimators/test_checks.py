@@ -9,12 +9,20 @@ import pytest
 from algid.arm import inverse_dynamics
 from algid.estimators import refined, weak
 from algid.estimators.combine import MOST_BLOCKS, BlockSums, LogInformation, jackknife, long_run_variance
-from algid.estimators.diagnostics import broken_bounds, constrained, payload_distance, repeatability, term_worths
+from algid.estimators.diagnostics import (
+    broken_bounds,
+    constrained,
+    length_by_constants,
+    payload_distance,
+    repeatability,
+    term_worths,
+)
 from algid.estimators.fit import conclude, own_estimates
 from algid.estimators.identifiability import examine
 from algid.estimators.parametrisation import Shared
 from algid.estimators.prediction import cross_validate, score
 from algid.estimators.weak import Source, WeakSettings
+from algid.identification.summary import fit_warnings
 from algid.model import Model
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case
@@ -216,3 +224,31 @@ def test_each_loaded_run_tells_its_payload_and_how_well_that_repeats(bench: Benc
     assert low / found.std == pytest.approx(np.sqrt(2 / 7.378), rel=1e-3)
     assert high / found.std == pytest.approx(np.sqrt(2 / 0.05064), rel=1e-3)
     assert repeatability(weak.fit(bare, burdened[:1], lengths={"l1": bench.arm.l1, "l2": bench.arm.l2})) is None
+
+
+def test_constants_of_no_length_and_exchanged_logs_break_bounds(bench: Bench) -> None:
+    """k1 k2 = m2² g l1 lc2² (Table 1); logs in each other's place make a payload below nothing."""
+    fit = weak.fit([lambda: [bench.log(sigma=1e-3)]])
+    turned = replace(fit, values=fit.values * np.array([1, -1, 1, 1, 1, 1, 1]))
+    (broken,) = [bound for bound in broken_bounds(turned) if bound.bound == "k1 k2 >= 0"]
+    assert broken.distance is not None
+    assert broken.distance > 20
+    assert not [bound for bound in broken_bounds(fit) if bound.bound == "k1 k2 >= 0"]
+    both = weak.fit([lambda: [bench.log(loaded=True, sigma=1e-3)]], [lambda: [bench.log(sigma=1e-3)]])
+    assert any(warning.startswith("EXCHANGED_LOGS") for warning in fit_warnings(both))
+    right = weak.fit([lambda: [bench.log(sigma=1e-3)]], [lambda: [bench.log(loaded=True, sigma=1e-3)]])
+    assert not any(warning.startswith("EXCHANGED_LOGS") for warning in fit_warnings(right))
+
+
+def test_gravity_compensated_by_half_is_told_where_the_length_is_known(bench: Bench) -> None:
+    """l1 = g k1 / k2 doubles then; with the whole torque it is the arm's own."""
+    lengths = {"l1": bench.arm.l1, "l2": bench.arm.l2}
+    log, k = bench.log(sigma=1e-4), bench.arm.constants()
+    weight = inverse_dynamics(k * np.array([0, 1, 0, 1, 0, 0, 0]), bench.bare.theta, 0 * bench.bare.omega, 0 * log.tau)
+    for share, told in ((0.0, False), (0.5, True)):
+        compensated = replace(log, tau=log.tau - share * weight)
+        fit = weak.fit([partial(list, [compensated])], lengths=lengths)
+        found = length_by_constants(fit)
+        assert found is not None
+        assert found[0] == pytest.approx(bench.arm.l1 / (1 - share), rel=0.05)
+        assert any(warning.startswith("LENGTH_MISMATCH") for warning in fit_warnings(fit)) is told

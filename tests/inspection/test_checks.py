@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,9 @@ from algid.inspection.dynamics import dynamic_figures
 from algid.log import Log, Origin
 from algid.profile import Profile
 from algid.readers import read_log
+from algid.synth.cases import load_case
+from algid.synth.excitation import wide_multi_sine
+from algid.synth.simulator import simulate
 
 K = Arm(6, 3, 0.15, 0.1, 0.3, 0.2, 0.1, 0.02, 1.5, 0.3).constants()
 
@@ -167,3 +171,62 @@ def test_sampling_too_slow_for_the_motion_is_told(rate: float, slow: bool) -> No
 def test_logs_of_a_tenth_of_a_second_are_told() -> None:
     assert "SHORT_LOG" in codes(sine(1000, 0.1))
     assert "SHORT_LOG" not in codes(sine(1000, 1.1))
+
+
+@cache
+def moving(rate: float = 1000.0, sigma: float = 3e-4) -> Log:
+    """Case 1 under a wide torque, 4 s, with noise."""
+    arm = load_case("case1").arm
+    t = np.arange(round(4 * rate)) / rate
+    motion = simulate(arm.constants(), wide_multi_sine(arm, 3), t)
+    noise = np.random.default_rng(0).standard_normal((2, *motion.theta.shape))
+    stamps = np.round(t * 1e9).astype(np.int64)
+    return Log(stamps, motion.theta + sigma * noise[0], motion.tau + 1e-2 * noise[1], Origin("a.csv", "csv", {}))
+
+
+def found_codes(log: Log) -> set[str]:
+    return {finding.code for finding in examine(log)}
+
+
+@pytest.mark.parametrize("value", [0.0, None])
+def test_a_torque_that_drops_out_is_told(value: float | None) -> None:
+    log = moving()
+    tau = log.tau.copy()
+    tau[1, 1500:2500] = tau[1, 1499] if value is None else value
+    told = [finding for finding in examine(replace(log, tau=tau)) if finding.code == "DEAD_EFFORT"]
+    assert len(told) == 1
+    assert "tau2 stands still for 1 s from t = 1." in told[0].text
+
+
+def test_a_torque_that_is_slowly_published_or_at_its_limit_is_not_dead() -> None:
+    log = moving()
+    held = np.repeat(log.tau[:, ::120], 120, axis=1)[:, : len(log)]
+    limited = np.clip(log.tau, -0.2, 0.2)
+    for tau in (log.tau, held, limited):
+        assert "DEAD_EFFORT" not in found_codes(replace(log, tau=tau))
+
+
+@pytest.mark.parametrize(("rate", "sigma"), [(1000.0, 3e-4), (200.0, 1e-3)])
+def test_lost_samples_with_new_numbers_are_told(rate: float, sigma: float) -> None:
+    log = moving(rate, sigma)
+    assert "LOST_SAMPLES" not in found_codes(log)
+    kept = np.random.default_rng(1).random(len(log)) > 0.05
+    some = int(kept.sum())
+    lost = replace(log, stamp_ns=log.stamp_ns[:some], theta=log.theta[:, kept], tau=log.tau[:, kept])
+    assert "LOST_SAMPLES" in found_codes(lost)
+    told = replace(lost, stamp_ns=log.stamp_ns[kept])  # with their own stamps nothing is wrong
+    assert "LOST_SAMPLES" not in found_codes(told)
+
+
+def test_encoders_and_rest_make_no_lost_samples() -> None:
+    log = moving()
+    step = 2 * np.pi / 4096
+    rest = replace(log, theta=log.theta[:, :1] + 3e-4 * np.random.default_rng(0).standard_normal(log.theta.shape))
+    for one in (replace(log, theta=np.round(log.theta / step) * step), rest):
+        assert "LOST_SAMPLES" not in found_codes(one)
+
+
+def test_angles_of_motors_may_be_what_looks_like_degrees() -> None:
+    log = moving()
+    (told,) = [finding for finding in examine(replace(log, theta=30 * log.theta)) if finding.code == "DEGREES"]
+    assert "--set theta1.gear_ratio=N" in told.text or "--set theta2.gear_ratio=N" in told.text
