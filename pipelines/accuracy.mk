@@ -6,6 +6,7 @@ ACCURACY_MODEL_DRAWS ?= 4
 accuracy: setup ## errors against the Cramér-Rao bound, peers, real arm; into build/accuracy
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.accuracy --draws $(ACCURACY_DRAWS) -o build/accuracy
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.accuracy_models --draws $(ACCURACY_MODEL_DRAWS) -o build/accuracy
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.accuracy_short -o build/accuracy
 
 accuracy-quick: setup
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.accuracy --quick -o build/accuracy
