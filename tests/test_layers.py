@@ -36,7 +36,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "inspection": room("arm errors estimators log profile readers signals", "numpy"),
     "report": room(
-        "arm errors files progress results ros2", "mcap numpy plotly polars pyarrow rich"
+        "arm errors files progress results ros2", "matplotlib mcap numpy plotly polars pyarrow rich"
     ),
     "check": room("errors files results", "pydantic"),
     "identification": room(
@@ -51,14 +51,14 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "track": room(
         "arm errors estimators files identification model profile report results runtime signals",
-        "mcap numpy polars pyarrow",
+        "mcap numpy polars pyarrow pydantic",
     ),
     "design": room(
         "arm errors estimators files identification log model progress report results signals synth writers",
         "numpy polars pydantic scipy",
     ),
     "export": room("arm errors files identification model report results", "numpy scipy"),
-    "fleet": room("errors files progress report", "numpy polars scipy"),
+    "fleet": room("errors files model progress report", "numpy polars scipy"),
     "cli": room(
         "batch check design errors estimators export files "
         "fleet identification inspection log profile progress readers report results runtime "

@@ -45,10 +45,14 @@ def compare(
 
 
 def labels(paths: list[Path]) -> list[str]:
-    """The folders' names without the suffix, or the whole paths where two names are equal."""
-    folders = [path.parent if path.name == "result.json" else path for path in paths]
-    names = [folder.resolve().name.removesuffix(".algid") for folder in folders]
-    return names if len(set(names)) == len(names) else [str(folder) for folder in folders]
+    """The folders' names without the suffix, with as many folders above them as tell them apart."""
+    folders = [(path.parent if path.name == "result.json" else path).resolve() for path in paths]
+    parts = [(*folder.parent.parts, folder.name.removesuffix(".algid")) for folder in folders]
+    for depth in range(1, max(map(len, parts)) + 1):
+        names = ["/".join(part[-depth:]) for part in parts]
+        if len(set(names)) == len(names):
+            return names
+    return [str(folder) for folder in folders]  # one of them is named twice
 
 
 def _print(tables: tuple[Table, ...]) -> None:

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from algid.results import Result
 
 
+OUTPUT = "Output"
+
+
 @takes_settings
 def identify(
     choice: Choice,
@@ -23,17 +26,32 @@ def identify(
     loaded: Annotated[
         list[Path] | None, typer.Option(help="A log of the arm with its payload; may be repeated.")
     ] = None,
-    out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the result folder LOG.algid.")] = Path(),
-    name: Annotated[str | None, typer.Option(help="Of the result folder, NAME.algid; LOG's name by default.")] = None,
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="Folder for the result folder LOG.algid.", rich_help_panel=OUTPUT)
+    ] = Path(),
+    name: Annotated[
+        str | None,
+        typer.Option(help="Of the result folder, NAME.algid; LOG's name by default.", rich_help_panel=OUTPUT),
+    ] = None,
     parameters: Annotated[
         Path | None, typer.Option(help="Result of the arm identified before: then LOGS are of the loaded arm.")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a result that is there.")] = False,
-    report: Annotated[bool, typer.Option(help="Write pages and time series beside result.json.")] = True,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace a result that is there.", rich_help_panel=OUTPUT)
+    ] = False,
+    report: Annotated[
+        bool, typer.Option(help="Write pages and time series beside result.json.", rich_help_panel=OUTPUT)
+    ] = True,
     export: ExportTo = None,
-    output: Annotated[ResultFormat, typer.Option("--format", help="What to print.")] = ResultFormat.TABLE,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
-    verbose: Annotated[bool, typer.Option("-v", "--verbose", help="Tell logs, channels and settings too.")] = False,
+    output: Annotated[
+        ResultFormat, typer.Option("--format", help="What to print.", rich_help_panel=OUTPUT)
+    ] = ResultFormat.TABLE,
+    quiet: Annotated[
+        bool, typer.Option("-q", "--quiet", help="Print nothing but errors.", rich_help_panel=OUTPUT)
+    ] = False,
+    verbose: Annotated[
+        bool, typer.Option("-v", "--verbose", help="Tell logs, channels and settings too.", rich_help_panel=OUTPUT)
+    ] = False,
 ) -> None:
     """Identify an arm's constants k1 … k7 and, with loaded logs, its payload; write LOG.algid.
 

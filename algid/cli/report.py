@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,7 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from algid.report.figures.base import Figure, Missing
     from algid.results import Result
+    from algid.track.result import TrackResult
+
+    Written = tuple[list[Path], Callable[[], Sequence[Figure | Missing]]]
+    """The files that were written, and what gives the figures."""
 
 
 class ResultFormat(StrEnum):
@@ -26,34 +32,97 @@ class Export(StrEnum):
     MCAP = "mcap"
 
 
-ExportTo = Annotated[Export | None, typer.Option(help="Also write estimates.mcap, for Foxglove and PlotJuggler.")]
+ExportTo = Annotated[
+    Export | None,
+    typer.Option(help="Also write estimates.mcap, for Foxglove and PlotJuggler.", rich_help_panel="Output"),
+]
+
+
+class PlotFormat(StrEnum):
+    """How figures are saved."""
+
+    PDF = "pdf"
+    PNG = "png"
+
+
+SavePlots = Annotated[
+    Path | None,
+    typer.Option(help="Folder for each figure as a file of its own, for papers; needs matplotlib: algid[plots]."),
+]
 
 
 def report(
-    results: Annotated[list[Path], typer.Argument(metavar="RESULT...", help="Result folders of algid identify.")],
+    results: Annotated[
+        list[Path], typer.Argument(metavar="RESULT...", help="Folders of algid identify or algid track.")
+    ],
     form: Annotated[ResultFormat, typer.Option("--format", help="How to print the result.")] = ResultFormat.TABLE,
     export: ExportTo = None,
+    save_plots: SavePlots = None,
+    plot_format: Annotated[PlotFormat, typer.Option(help="What --save-plots writes.")] = PlotFormat.PDF,
     shared_library: Annotated[
         bool, typer.Option("--shared-library", help="Put the plotting library once beside the folders.")
     ] = False,
 ) -> None:
     """Write report.html and report.md into each RESULT and print its table.
 
-    Example: algid report case1-unloaded.algid --export mcap
+    Example: algid report case1-unloaded.algid --save-plots figures
     """
+    from algid.track.read import is_track
+
+    for folder in results:
+        if is_track(folder):
+            written, figures = _track(folder, form, mcap=export is not None)
+        else:
+            written, figures = _identification(folder, form, shared_library, mcap=export is not None)
+        if save_plots is not None:
+            from algid.report.plots import save_plots as save
+
+            written += save(figures(), save_plots, folder.resolve().stem, plot_format.value)
+        for path in written:
+            typer.echo(f"wrote {path}", err=True)
+
+
+def _identification(folder: Path, form: ResultFormat, shared_library: bool, *, mcap: bool) -> Written:
+    """Write a result's pages and print it."""
     from algid.report import export_mcap, write_markdown, write_report
+    from algid.report.gallery import gallery
     from algid.report.progress import progress
     from algid.results import read_result
 
-    for folder in results:
-        result = read_result(folder)
-        with progress("samples") as told:
-            written = [write_report(folder, shared_library, told), write_markdown(folder)]
-            if export is Export.MCAP:
-                written.append(export_mcap(folder, told))
-        print_result(result, form)
-        for path in written:
-            typer.echo(f"wrote {path}", err=True)
+    result = read_result(folder)
+    with progress("samples") as told:
+        written = [write_report(folder, shared_library, told), write_markdown(folder)]
+        if mcap:
+            written.append(export_mcap(folder, told))
+    print_result(result, form)
+    return written, lambda: gallery(folder, result).every
+
+
+def _track(folder: Path, form: ResultFormat, *, mcap: bool) -> Written:
+    """Write a track's pages and print it."""
+    from algid.track.figures import figures
+    from algid.track.page import write_pages
+    from algid.track.read import read_track
+
+    result = read_track(folder)
+    written = write_pages(result, folder, mcap)
+    print_track(result, form)
+    return written, lambda: figures(result)
+
+
+def print_track(result: TrackResult, form: ResultFormat) -> None:
+    """Print a track to stdout."""
+    from algid.track.page import markdown, track_document
+    from algid.track.result import track_json
+
+    if form is not ResultFormat.TABLE:
+        typer.echo(track_json(result) if form is ResultFormat.JSON else markdown(result), nl=False)
+        return
+    from rich.console import Console
+
+    from algid.report.terminal import print_document
+
+    print_document(track_document(result), Console())
 
 
 def print_result(result: Result, form: ResultFormat) -> None:

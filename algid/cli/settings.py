@@ -17,24 +17,40 @@ from algid.settings import Settings, flag
 if TYPE_CHECKING:
     from algid.profile import Profile
 
+MODEL, METHOD, LOG = "The arm's model", "Method", "What the log means"
+"""Panels of a command's help."""
+MODELLED = ("gravity", "model", "friction", "torque_offset", "rotor_inertia", "torque_hold", "delay", "l1", "l2")
+
 ProfileFile = Annotated[
-    Path | None, typer.Option("--profile", help="algid.toml that says what the log's names and units mean.")
+    Path | None,
+    typer.Option("--profile", help="algid.toml that says what the log's names and units mean.", rich_help_panel=LOG),
 ]
-Topic = Annotated[str | None, typer.Option(help="Topic with the joint states.")]
-Joints = Annotated[str | None, typer.Option(help="The two joints, as NAME,NAME.")]
-AngleUnit = Annotated[str | None, typer.Option(help="rad, deg, rev or counts.")]
-TorqueUnit = Annotated[str | None, typer.Option(help='"N m", "mN m", A or mA.')]
-Zero = Annotated[str | None, typer.Option(help="Where θ1 is zero: horizontal or hanging.")]
-SecondAngle = Annotated[str | None, typer.Option(help="θ2 is relative (to link 1) or absolute.")]
-Drive = Annotated[str | None, typer.Option(help="Where the second motor stands: in its joint, or at the base.")]
-Passive = Annotated[str | None, typer.Option(help="The joint without a motor, 1 or 2: its torque is zero.")]
+Topic = Annotated[str | None, typer.Option(help="Topic with the joint states.", rich_help_panel=LOG)]
+Joints = Annotated[str | None, typer.Option(help="The two joints, as NAME,NAME.", rich_help_panel=LOG)]
+AngleUnit = Annotated[str | None, typer.Option(help="rad, deg, rev or counts.", rich_help_panel=LOG)]
+TorqueUnit = Annotated[str | None, typer.Option(help='"N m", "mN m", A or mA.', rich_help_panel=LOG)]
+Zero = Annotated[str | None, typer.Option(help="Where θ1 is zero: horizontal or hanging.", rich_help_panel=LOG)]
+SecondAngle = Annotated[str | None, typer.Option(help="θ2 is relative (to link 1) or absolute.", rich_help_panel=LOG)]
+Drive = Annotated[
+    str | None, typer.Option(help="Where the second motor stands: in its joint, or at the base.", rich_help_panel=LOG)
+]
+Passive = Annotated[
+    str | None, typer.Option(help="The joint without a motor, 1 or 2: its torque is zero.", rich_help_panel=LOG)
+]
 Sets = Annotated[
-    list[str] | None, typer.Option("--set", help="Any setting of a profile, as tau1.sign=-1; may be repeated.")
+    list[str] | None,
+    typer.Option("--set", help="Any setting of a profile, as tau1.sign=-1; may be repeated.", rich_help_panel=LOG),
 ]
-Clock = Annotated[str | None, typer.Option(help="Stamps of the messages' header, or of the log.")]
-Start = Annotated[str | None, typer.Option(help="Leave out what comes before, s since the log's first sample.")]
-End = Annotated[str | None, typer.Option(help="Leave out what comes after, s since the log's first sample.")]
-Accept = Annotated[str | None, typer.Option(help="Checks that may warn but not refuse, as CODE,CODE.")]
+Clock = Annotated[str | None, typer.Option(help="Stamps of the messages' header, or of the log.", rich_help_panel=LOG)]
+Start = Annotated[
+    str | None, typer.Option(help="Leave out what comes before, s since the log's first sample.", rich_help_panel=LOG)
+]
+End = Annotated[
+    str | None, typer.Option(help="Leave out what comes after, s since the log's first sample.", rich_help_panel=LOG)
+]
+Accept = Annotated[
+    str | None, typer.Option(help="Checks that may warn but not refuse, as CODE,CODE.", rich_help_panel=LOG)
+]
 
 
 def profile_from(file: Path | None, sets: Sequence[str] = (), **flags: str | None) -> Profile | None:
@@ -181,7 +197,8 @@ def _option(field: Field[Any], kind: Any) -> inspect.Parameter:
     default = field.default
     if "parse" in field.metadata:
         kind, default = str | None, None if default is None else f"{default:g}"
-    annotation = Annotated[kind, typer.Option(flag(field.name), help=field.metadata["help"])]
+    panel = MODEL if field.name in MODELLED else METHOD
+    annotation = Annotated[kind, typer.Option(flag(field.name), help=field.metadata["help"], rich_help_panel=panel)]
     return inspect.Parameter(field.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 

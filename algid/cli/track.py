@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from algid.cli import EXIT_INCOMPLETE
-from algid.cli.report import Export, ResultFormat
+from algid.cli.report import Export, ResultFormat, print_track
 from algid.cli.settings import Choice, takes_profile
-
-if TYPE_CHECKING:
-    from algid.track.result import TrackResult
 
 
 @takes_profile
@@ -57,22 +54,7 @@ def track(
         with whole_folder(folder, force) as temporary:
             write_track(result, temporary, mcap=export is Export.MCAP)
     if not quiet:
-        _print(result, form)
+        print_track(result, form)
         typer.echo(f"wrote {folder}", err=True)
     if not result.complete or result.data_lost or verdict(result).level == "failed":
         raise typer.Exit(EXIT_INCOMPLETE)
-
-
-def _print(result: TrackResult, form: ResultFormat) -> None:
-    from algid.track.page import markdown
-    from algid.track.result import track_json
-
-    if form is not ResultFormat.TABLE:
-        print(track_json(result) if form is ResultFormat.JSON else markdown(result), end="")
-        return
-    from rich.console import Console
-
-    from algid.report.terminal import print_document
-    from algid.track.page import track_document
-
-    print_document(track_document(result), Console())

@@ -12,13 +12,14 @@ import numpy as np
 
 from algid import __version__
 from algid.fleet.history import ALPHA, SPAN
+from algid.model import UNITS
 from algid.report.document import Document
 from algid.report.figures.base import Figure, Panel, axis, label
 from algid.report.frame import figures_html, framed, links_of
 from algid.report.html import Drawn, escaped, table_html
 from algid.report.sparkline import Course, sparklines
 from algid.report.table import Column, Table
-from algid.report.text import ABSENT, counted, joined, significant, visible
+from algid.report.text import ABSENT, counted, joined, significant, unit_text, visible
 from algid.report.verdict import LEVEL_WORDS, Level, Verdict
 
 if TYPE_CHECKING:
@@ -162,7 +163,7 @@ def robot_table(history: History) -> Table:
         Column("From", "text", rank=2),
         Column("To", "text", rank=1),
         Column("Drift", "text"),
-        Column("Logs that stand out", "number"),
+        Column("Stand out", "number"),
     )
     shown = history.roster.head(MOST_ROWS)
     rows = tuple(
@@ -265,4 +266,9 @@ def _panel(history: History, robot: str, parameter: str) -> Panel:
     }
     title = f"{label(robot)}: {parameter}"
     says = f"{visible(robot)}, {parameter}, {own.height} months"
-    return Panel([trace], {"xaxis": axis(type="date"), "yaxis": axis(parameter)}, says, title=title)
+    return Panel(
+        [trace],
+        {"xaxis": axis(type="date"), "yaxis": axis(f"{parameter}, {unit_text(UNITS[parameter])}")},
+        says,
+        title=title,
+    )

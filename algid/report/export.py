@@ -3,12 +3,14 @@
 ==========================  ==========================  ==================================================
 topic                       message                     holds
 ==========================  ==========================  ==================================================
+/algid/measured             sensor_msgs/msg/JointState  position θ, rad; velocity ω, rad/s; effort τ, N m
 /algid/predicted            sensor_msgs/msg/JointState  effort: torque that the model predicts, N m
 /algid/residual             sensor_msgs/msg/JointState  effort: measured less predicted torque, N m
 /algid/estimates            algid_msgs/msg/Estimates    the paper's series, a field each, and condition
 /algid/loaded               algid_msgs/msg/Estimates    the same of the loaded log
 ==========================  ==========================  ==================================================
 
+Angles and torques are those of the log, velocities those that the estimator used: one file is enough in Foxglove.
 Several logs keep a topic each: the second one's are `/algid/log2/predicted` and so on.
 
 ROS 2 messages in CDR, little endian: the two that an exported log needs.
@@ -18,6 +20,7 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,7 +29,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.files import whole_file
 from algid.progress import Told
-from algid.report.reduce import blocks, by_log, columns_of, row_count
+from algid.report.reduce import Block, blocks, by_log, columns_of, row_count
 from algid.results import read_result
 from algid.ros2 import HEADER, JOINT_STATE, JOINT_STATE_DEFINITION
 
@@ -34,7 +37,11 @@ if TYPE_CHECKING:
     from mcap.writer import Writer
 
 START_KEY = b"start_ns"
-TORQUES = ("log", "t", "tau1", "tau2", "tau1_predicted", "tau2_predicted")
+JOINTS = ("joint1", "joint2")
+SIGNALS = (
+    *("log", "t", "theta1", "theta2", "omega1", "omega2", "tau1", "tau2"),
+    *("tau1_predicted", "tau2_predicted"),
+)
 ROWS = 1 << 14
 
 
@@ -79,23 +86,34 @@ def _write_torques(writer: Writer, path: Path, logs: int, told: Told | None) -> 
         return
     starts = start_stamps(path, logs)
     schema = writer.register_schema(JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode())
-    message = JointTorque(("joint1", "joint2")).message
+    torque, whole = JointStates(JOINTS).message, JointStates(JOINTS, whole=True).message
     channels: dict[str, int] = {}
     done, total = 0, row_count(path)
-    for log, block in by_log(blocks(path, TORQUES, ROWS)):
+    for log, block in by_log(blocks(path, SIGNALS, ROWS)):
         stamps = _stamps(block["t"], starts[log] if log < len(starts) else 0)
         place = "/algid" if log == 0 else f"/algid/log{log + 1}"
-        predicted = np.stack([block["tau1_predicted"], block["tau2_predicted"]])
-        measured = np.stack([block["tau1"], block["tau2"]])
-        for name, values in (("predicted", predicted), ("residual", measured - predicted)):
+        theta, omega, tau, predicted = (_pairs(block, name) for name in ("theta", "omega", "tau", "tau#_predicted"))
+        residual = (tau[0] - predicted[0], tau[1] - predicted[1])
+        for name, message, signals in (
+            ("measured", whole, (theta, omega, tau)),
+            ("predicted", torque, (predicted,)),
+            ("residual", torque, (residual,)),
+        ):
             topic = f"{place}/{name}"
             if topic not in channels:
                 channels[topic] = writer.register_channel(topic, "cdr", schema)
-            for stamp, tau1, tau2 in zip(stamps, *values.tolist(), strict=True):
-                writer.add_message(channels[topic], stamp, message(stamp, tau1, tau2), stamp)
+            rows = np.stack([row for pair in signals for row in pair], axis=1).tolist()
+            for stamp, values in zip(stamps, rows, strict=True):
+                writer.add_message(channels[topic], stamp, message(stamp, values), stamp)
         done += len(stamps)
         if told is not None:
             told("export", done, total)
+
+
+def _pairs(block: Block, name: str) -> tuple[FloatArray, FloatArray]:
+    """A signal of both joints; `#` stands for the joint, which otherwise comes last."""
+    first, second = (name.replace("#", str(joint)) if "#" in name else f"{name}{joint}" for joint in (1, 2))
+    return block[first], block[second]
 
 
 def write_series(writer: Writer, path: Path, topic: str) -> None:
@@ -120,6 +138,7 @@ def _stamps(t: FloatArray, start: int) -> list[int]:
 
 ESTIMATES = "algid_msgs/msg/Estimates"
 
+_TWO = b"\x02\x00"
 _ENCAPSULATION = b"\x00\x01\x00\x00"
 _BILLION = 1_000_000_000
 
@@ -135,10 +154,10 @@ def field_names(columns: list[str]) -> list[str]:
     return ["".join(c if c.isalnum() else "_" for c in column).lower().strip("_") for column in columns]
 
 
-class JointTorque:
-    """Writes JointState messages of two joints that carry nothing but effort."""
+class JointStates:
+    """Writes JointState messages of two joints: effort alone, or position, velocity and effort where `whole`."""
 
-    def __init__(self, names: tuple[str, str]) -> None:
+    def __init__(self, names: tuple[str, str], *, whole: bool = False) -> None:
         body = bytearray(12)  # the stamp and an empty frame's length come first
         body += b"\x00" + b"\x00" * 3  # the empty string's end, then the sequence's alignment
         body[8:12] = struct.pack("<I", 1)
@@ -148,14 +167,17 @@ class JointTorque:
             text = name.encode() + b"\x00"
             body += struct.pack("<I", len(text)) + text
         _align(body, 4)
-        body += struct.pack("<II", 0, 0)  # no position, no velocity
+        body += b"" if whole else struct.pack("<II", 0, 0)  # no position, no velocity
         body += struct.pack("<I", 2)
         _align(body, 8)
         self._constant = bytes(body[8:])
+        self._values = struct.Struct("<dd2s6xdd2s6xdd" if whole else "<dd")  # each pair but the first tells its length
+        self._whole = whole
 
-    def message(self, stamp_ns: int, tau1: float, tau2: float) -> bytes:
-        """One message of the torques in N m."""
-        return _ENCAPSULATION + _stamp(stamp_ns) + self._constant + struct.pack("<dd", tau1, tau2)
+    def message(self, stamp_ns: int, values: Sequence[float]) -> bytes:
+        """One message of two torques, or of two angles, two velocities and two torques."""
+        told = [*values[:2], _TWO, *values[2:4], _TWO, *values[4:]] if self._whole else values
+        return _ENCAPSULATION + _stamp(stamp_ns) + self._constant + self._values.pack(*told)
 
 
 def numbers_message(stamp_ns: int, values: list[float]) -> bytes:

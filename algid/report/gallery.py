@@ -37,6 +37,11 @@ class Gallery:
     figures: list[Figure | Missing]
     paper: list[Figure | Missing]
 
+    @property
+    def every(self) -> list[Figure | Missing]:
+        """All figures, those of the paper last."""
+        return [*self.figures, *self.paper]
+
 
 def gallery(folder: Path, result: Result, told: Told | None = None) -> Gallery:
     """Every figure that the folder gives, in the page's order."""

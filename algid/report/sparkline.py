@@ -10,7 +10,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.report.html import escaped
 
-WIDTH, HEIGHT = 84.0, 24.0  # pixels
+WIDTH, HEIGHT = 78.0, 24.0  # pixels
 EDGE = 3.0
 USUAL = 0.9  # quantile of a column's rows that its scale holds: a wild one leaves the frame, and the others their shape
 

@@ -73,12 +73,23 @@ def write_track(result: TrackResult, folder: Path, mcap: bool = False) -> None:
     """Write everything into `folder`, `track.mcap` where asked. Raises `OutputError`."""
     _write_curve(result, folder / "track.parquet")
     _write_stretches(result, folder / "stretches.parquet")
-    texts = {"track.json": track_json(result), "report.md": markdown(result), "report.html": page_html(result)}
-    for name, text in texts.items():
-        with whole_file(folder / name) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+    _write_text(folder / "track.json", track_json(result))
+    write_pages(result, folder, mcap)
+
+
+def write_pages(result: TrackResult, folder: Path, mcap: bool = False) -> list[Path]:
+    """Write the pages of a track into its `folder`, `track.mcap` where asked. Raises `OutputError`."""
+    pages = {"report.html": page_html(result), "report.md": markdown(result)}
+    for name, text in pages.items():
+        _write_text(folder / name, text)
     if mcap:
         _write_mcap(result, folder)
+    return [folder / name for name in (*pages, *(["track.mcap"] if mcap else []))]
+
+
+def _write_text(path: Path, text: str) -> None:
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
 
 
 def _write_curve(result: TrackResult, path: Path) -> None:
@@ -95,6 +106,7 @@ def _write_curve(result: TrackResult, path: Path) -> None:
             "m_p": found.m_p,
             "low": found.m_p - QUANTILE * found.std,
             "high": found.m_p + QUANTILE * found.std,
+            "left": found.left,
             "stretch": number,
             **dict(zip(("stretch_m_p", "stretch_low", "stretch_high"), masses, strict=True)),
         }

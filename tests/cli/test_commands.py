@@ -333,3 +333,12 @@ def test_results_that_fit_no_arm_get_one_line(logs: Path, tmp_path: Path) -> Non
         wrong = Outcome(*call, logs / f"case1-{'unloaded' if call[0] == 'validate' else 'loaded'}.csv", cwd=tmp_path)
         assert (wrong.code, wrong.out) == (2, "")
         assert wrong.err.startswith(f"algid: {path}: the result "), wrong.err  # the file at fault, not its log
+
+
+def test_the_many_options_of_identify_stand_in_panels() -> None:
+    shown = Outcome("identify", "--help").out
+    panels = ["Output", "What the log means", "Method", "The arm's model"]
+    places = [shown.index(f"─ {panel} ─") for panel in panels]
+    ends = sorted([*places, len(shown)])
+    for option, panel in (("--quiet", 0), ("--export", 0), ("--angle-unit", 1), ("--estimator", 2), ("--gravity", 3)):
+        assert places[panel] < shown.index(option, places[panel]) < ends[ends.index(places[panel]) + 1], option

@@ -149,7 +149,7 @@ def test_a_robot_is_shown_with_what_was_found_of_it(tmp_path: Path) -> None:
     history = _history(jobs.with_columns(m_p=pl.lit(0.4), m_p_std=pl.lit(0.001), label_payload=pl.lit(0.5)), tmp_path)
     first = dict(zip((c.heading for c in robot_table(history).columns), robot_table(history).rows[0], strict=True))
     found = {"Robot": "r0", "Logs": "92", "From": "2026-01-01", "To": "2026-04-02", "Drift": "k6"}
-    assert first == found | {"Logs that stand out": "92"}
+    assert first == found | {"Stand out": "92"}
 
 
 def test_the_page_escapes_names_and_asks_no_host(tmp_path: Path) -> None:

@@ -64,4 +64,4 @@ def test_one_result_is_too_few(folder: Path) -> None:
 
 def test_labels_are_names_where_they_tell_apart() -> None:
     assert labels([Path("a/x.algid"), Path("a/y.algid/result.json")]) == ["x", "y"]
-    assert labels([Path("a/x.algid"), Path("b/x.algid")]) == ["a/x.algid", "b/x.algid"]
+    assert labels([Path("a/x.algid"), Path("b/x.algid")]) == ["a/x", "b/x"]

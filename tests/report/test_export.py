@@ -32,6 +32,8 @@ def read(path: Path) -> dict[str, list[Any]]:
 
 def test_the_log_holds_predicted_torque_residual_and_estimates(messages: dict[str, list[Any]]) -> None:
     assert set(messages) == {
+        "/algid/measured",
+        "/algid/log2/measured",
         "/algid/predicted",
         "/algid/residual",
         "/algid/log2/predicted",
@@ -49,6 +51,15 @@ def test_torques_are_bit_for_bit_those_of_the_parquet(messages: dict[str, list[A
     measured = rows.select("tau1", "tau2").to_numpy()
     np.testing.assert_array_equal(residual, measured - predicted)
     assert messages["/algid/predicted"][0].decoded_message.name == ["joint1", "joint2"]
+
+
+def test_what_was_measured_stands_beside_it_bit_for_bit(messages: dict[str, list[Any]], case_folder: Path) -> None:
+    rows = pl.read_parquet(case_folder / "torque.parquet")
+    for log, topic in ((0, "/algid/measured"), (1, "/algid/log2/measured")):
+        own = rows.filter(pl.col("log") == log)
+        for field, name in (("position", "theta"), ("velocity", "omega"), ("effort", "tau")):
+            found = np.array([getattr(message.decoded_message, field) for message in messages[topic]])
+            np.testing.assert_array_equal(found, own.select(f"{name}1", f"{name}2").to_numpy())
 
 
 def test_stamps_are_those_of_the_original_log(messages: dict[str, list[Any]]) -> None:

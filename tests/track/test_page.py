@@ -18,10 +18,12 @@ from typer.testing import CliRunner
 
 import algid
 from algid.cli.app import app
+from algid.errors import ResultError
 from algid.identification.identify import identify
 from algid.synth.sensors import Sensors
 from algid.track.page import markdown, page_html, write_track
 from algid.track.payload import Stretch
+from algid.track.read import read_track
 from algid.track.result import StretchStatus, TrackResult, track_json
 from algid.track.run import track_log
 from algid.track.tables import change_table, fixed, stretch_table, verdict
@@ -150,3 +152,39 @@ def test_the_page_is_drawn_whole(browser: Browser, result: TrackResult, tmp_path
     seen = browser.look(page, width, dark)
     assert_sound(seen, page, "picking.mcap · algid")
     assert seen.drawn == 2
+
+
+def test_a_track_is_read_back_as_it_was(result: TrackResult, tmp_path: Path) -> None:
+    folder = tmp_path / "picking.track"
+    write_track(result, folder)
+    again = read_track(folder)
+    assert track_json(again) == track_json(result)
+    assert verdict(again) == verdict(result)
+    for name in ("t", "m_p", "left", "changes", "holes"):
+        np.testing.assert_array_equal(getattr(again.track, name), getattr(result.track, name))
+    # the band is kept as its upper end: rounding of m_p, over the interval's half width
+    np.testing.assert_allclose(again.track.std, result.track.std, rtol=1e-9)
+
+
+def test_the_report_of_a_track_is_made_again(result: TrackResult, tmp_path: Path) -> None:
+    folder = tmp_path / "picking.track"
+    write_track(result, folder)
+    markdown_before = (folder / "report.md").read_text(encoding="utf-8")
+    (folder / "report.html").unlink()
+    (folder / "report.md").unlink()
+    done = CliRunner().invoke(app, ["report", str(folder), "--save-plots", str(tmp_path / "figures")])
+    assert done.exit_code == 0, done.output
+    assert "Payload by stretch" in done.stdout
+    assert "Payload in time" in (folder / "report.html").read_text(encoding="utf-8")
+    assert (folder / "report.md").read_text(encoding="utf-8") == markdown_before
+    assert {path.name for path in (tmp_path / "figures").iterdir()} == {"picking-payload.pdf", "picking-left.pdf"}
+
+
+@pytest.mark.parametrize("damage", ['{"stretches": []}', "[]", "{", '{"stretches": 3}'])
+def test_a_damaged_track_is_refused_in_one_line(result: TrackResult, tmp_path: Path, damage: str) -> None:
+    folder = tmp_path / "picking.track"
+    write_track(result, folder)
+    (folder / "track.json").write_text(damage)
+    with pytest.raises(ResultError, match=r"track\.json: expected") as refused:
+        read_track(folder)
+    assert "\n" not in str(refused.value)
