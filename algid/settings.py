@@ -95,7 +95,10 @@ class Settings:
         metadata={"help": "Window, s: the paper's integrals restart after it (2), or the weak form's (0.4)."},
     )
     bandwidth: float = field(default=60.0, metadata={"help": "Of the zero-phase differentiator, Hz."})
-    gravity: float = field(default=9.81, metadata={"help": "m/s²; 0 for an arm that moves in a horizontal plane."})
+    gravity: float = field(
+        default=9.81,
+        metadata={"help": "m/s², 9.81 by default; 0 for an arm that moves in a horizontal plane.", "profile": True},
+    )
     model: str = field(
         default="auto",
         metadata={

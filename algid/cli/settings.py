@@ -102,7 +102,13 @@ class Choice:
 
     def profile(self, file: Path | None = None) -> Profile | None:
         """The profile of `file`, or of ``--profile``, with the flags over it. Raises `SettingError`."""
-        return profile_from(file or self.profile_file, self.profile_sets, **self.profile_flags)
+        found = profile_from(file or self.profile_file, self.profile_sets, **self.profile_flags)
+        gravity = self.settings_flags.get("gravity")
+        if found is None or gravity is None:
+            return found
+        from algid.profile import with_settings
+
+        return with_settings(found, {"gravity": gravity})
 
 
 def _profile(
@@ -195,6 +201,8 @@ def _merge(settings: dict[str, Any], more: Mapping[str, Any]) -> None:
 def _option(field: Field[Any], kind: Any) -> inspect.Parameter:
     """A field's option; a bool has no --no-, and what its type does not tell is text for its own parser."""
     default = field.default
+    if field.metadata.get("profile"):  # the profile may say it: what is not given is not known here
+        kind, default = kind | None, None
     if "parse" in field.metadata:
         kind, default = str | None, None if default is None else f"{default:g}"
     panel = MODEL if field.name in MODELLED else METHOD

@@ -15,7 +15,7 @@ from algid.estimators.paper import SHORTEST
 from algid.files import remove_stale, result_folder, whole_folder
 from algid.identification.by_paper import run_paper
 from algid.identification.series import write_fit_series
-from algid.identification.source import LogLike, LogSource, Survey, open_sources, read_otherwise
+from algid.identification.source import LogLike, LogSource, Survey, open_sources, read_otherwise, tell_twins
 from algid.identification.summary import Identified, result_of
 from algid.progress import Told
 from algid.results import Result, read_result, write_result
@@ -97,10 +97,11 @@ def identify(
     settings, out = settings or Settings(), None if out is None else Path(out)
     earlier = Earlier.of(parameters)
     profile = profile if earlier is None else reused(profile, earlier.result)
-    sources = [
-        *open_sources(unloaded, "unloaded", profile, settings.gravity),
-        *open_sources(loaded, "loaded", profile, settings.gravity),
-    ]
+    settings = _with_gravity(settings, profile)
+    sources = tell_twins(
+        open_sources(unloaded, "unloaded", profile, settings.gravity),
+        open_sources(loaded, "loaded", profile, settings.gravity),
+    )
     survey = Survey(sources, told)
     said = {} if profile is None else profile.model_dump(mode="json", exclude_unset=True)
     if not survey.unloaded and (earlier is None or not survey.loaded):
@@ -123,6 +124,13 @@ def identify(
         if export:
             _export(temporary, told)
     return result
+
+
+def _with_gravity(settings: Settings, profile: Profile | None) -> Settings:
+    """The settings with the profile's gravity, where it names one and the settings leave theirs as it is."""
+    if profile is None or "gravity" not in profile.model_fields_set or settings.gravity != Settings.gravity:
+        return settings
+    return replace(settings, gravity=profile.gravity)
 
 
 def reused(profile: Profile | None, earlier: Result) -> Profile | None:

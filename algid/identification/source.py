@@ -6,7 +6,7 @@ import hashlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from functools import partial
+from functools import cache, partial
 from itertools import chain
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Literal
@@ -98,7 +98,7 @@ def open_source(
         path = log.path if isinstance(log, Staged) else Path(log)
         reader = open_log(path, profile)
         name, whole = (log.url, log.whole) if isinstance(log, Staged) else (str(log), True)
-        digest = partial(sha256_of, path) if whole else None
+        digest = cache(partial(sha256_of, path)) if whole else None
         source = LogSource(name, role, reader.origin, lambda: ahead(reader.blocks()), reader.rows, gravity, digest)
     if not changing:
         _refuse_the_other_role(source)
@@ -134,6 +134,21 @@ def _distinct(sources: list[LogSource]) -> list[LogSource]:
             places[content] = len(kept)
         kept.append(source)
     return kept
+
+
+def tell_twins(unloaded: list[LogSource], loaded: list[LogSource]) -> list[LogSource]:
+    """All logs, unloaded ones first; a loaded one that is also given as unloaded tells so: its payload is nought."""
+    lengths = {source.promised for source in unloaded if source.digest}
+    if not any(source.digest and source.promised in lengths for source in loaded):
+        return [*unloaded, *loaded]
+    names = {source.digest(): source.name for source in unloaded if source.digest}
+    told = []
+    for source in loaded:
+        twin = names.get(source.digest()) if source.digest else None
+        text = f"SAME_LOG: {source.name} is {twin}, byte for byte: one log is given as unloaded and as loaded"
+        said = () if twin is None else (Notice("SAME_LOG", f"{text}, which makes the payload nought"),)
+        told.append(replace(source, notices=(*source.notices, *said)))
+    return [*unloaded, *told]
 
 
 def _refuse_the_other_role(source: LogSource) -> None:

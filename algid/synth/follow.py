@@ -25,6 +25,7 @@ import numpy as np
 
 from algid.arm import FloatArray, mass_matrix
 from algid.errors import SettingError
+from algid.files import read_text
 from algid.synth.simulator import Driven, Motion, steered
 
 STIFFNESS = 2 * np.pi * 10.0
@@ -59,10 +60,9 @@ def read_plan(path: Path) -> Plan:
     """
     file = path / "trajectory.csv" if path.is_dir() else path
     try:
-        with file.open(encoding="utf-8", newline="") as stream:
-            rows = csv.reader(stream)
-            names = next(rows, [])
-            values = np.array([[float(text) for text in row] for row in rows], dtype=np.float64).T
+        rows = csv.reader(read_text(file).splitlines())
+        names = next(rows, [])
+        values = np.array([[float(text) for text in row] for row in rows], dtype=np.float64).T
     except (OSError, ValueError) as error:
         raise SettingError(
             f"{file}: not the trajectory of a design ({error}); expected what algid design wrote"

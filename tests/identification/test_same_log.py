@@ -6,10 +6,13 @@ import shutil
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from algid.cli.app import app
 from algid.identification.identify import identify
 from algid.identification.source import open_sources
 from algid.profile import Profile
+from algid.results import read_result
 from algid.settings import Settings
 from algid.writers import write_log
 from tests.inspection.test_checks import moving_log
@@ -40,6 +43,38 @@ def test_a_cut_that_was_asked_for_is_a_note_and_no_warning(tmp_path: Path) -> No
     write_log(tmp_path / "one.csv", moving_log(4000))
     result = identify(tmp_path / "one.csv", settings=Settings(estimator="weak"), profile=Profile(start=1), report=False)
     assert result.warnings == []
-    (note,) = result.notes
+    note = next(note for note in result.notes if "left out" in note)
     assert "1000 samples before 1 s" in note
     assert result.log.duration == pytest.approx(2.999)
+
+
+def test_one_log_as_unloaded_and_as_loaded_is_told_in_one_line(tmp_path: Path) -> None:
+    write_log(tmp_path / "one.csv", moving_log(4000))
+    shutil.copy(tmp_path / "one.csv", tmp_path / "copy.csv")
+    settings = Settings(estimator="weak", model="plain")
+    result = identify(tmp_path / "one.csv", tmp_path / "copy.csv", settings, report=False)
+    said = [warning for warning in result.warnings if "SAME_LOG" in warning]
+    assert len(said) == 1
+    assert "copy.csv is " in said[0]
+    assert "one log is given as unloaded and as loaded" in said[0]
+
+
+@pytest.mark.parametrize(
+    ("flags", "expected"),
+    [((), 0.0), (("--gravity", "9.81"), 9.81), (("--set", "gravity=3.7"), 3.7), (("--gravity", "1.6"), 1.6)],
+)
+def test_gravity_flag_over_profile_over_default(flags: tuple[str, ...], expected: float, tmp_path: Path) -> None:
+    write_log(tmp_path / "one.csv", moving_log(4000))
+    (tmp_path / "algid.toml").write_text("gravity = 0\n")
+    command = ["identify", str(tmp_path / "one.csv"), "-o", str(tmp_path), "--profile", str(tmp_path / "algid.toml")]
+    more = ["--estimator", "weak", "--model", "plain", "--no-report", "-q", "--accept", "NO_GRAVITY", *flags]
+    CliRunner().invoke(app, [*command, *more])
+    assert read_result(tmp_path / "one.algid").settings["gravity"] == expected
+
+
+def test_gravity_without_a_word_is_the_earths(tmp_path: Path) -> None:
+    write_log(tmp_path / "one.csv", moving_log(4000))
+    for profile, expected in ((None, 9.81), (Profile(start=0.5), 9.81), (Profile(gravity=0), 0.0)):
+        settings = Settings(estimator="weak", model="plain")
+        result = identify(tmp_path / "one.csv", settings=settings, profile=profile, report=False)
+        assert result.settings["gravity"] == expected
