@@ -239,6 +239,7 @@ class FitSummary(_Model):
     cross_validation: TorquePrediction | None = None
     endogeneity: dict[str, Endogeneity] = {}
     repeatability: Repeatability | None = None
+    torque_gain: Estimate | None = None
 
     @model_validator(mode="after")
     def _covariance_is_square(self) -> FitSummary:

@@ -70,6 +70,8 @@ class Settings:
     torque_hold : 'foh' or 'zoh'
     delay : float, s, between torque and angle, or 'estimate'
     l1, l2 : float, m, link lengths where known
+    payload_mass : float, kg, the payload's where it is known
+        Then the gain of the torques follows: what the log's torques have to be multiplied by.
     constrain : bool, solve within the physical bounds
     cross_validate : bool, leave each log out in turn
 
@@ -119,13 +121,16 @@ class Settings:
     )
     l1: float | None = field(default=None, metadata={"help": "Length of link 1, m, where known."})
     l2: float | None = field(default=None, metadata={"help": "Length of link 2, m, where known."})
+    payload_mass: float | None = field(
+        default=None, metadata={"help": "Mass of the payload, kg, where known: tells the gain of the torques."}
+    )
     constrain: bool = field(default=False, metadata={"help": "Solve within the physical bounds."})
     cross_validate: bool = field(
         default=False, metadata={"help": "Predict each log from the others and report how well."}
     )
 
     def __post_init__(self) -> None:
-        for name, low in (("window", 0.0), ("bandwidth", 0.0), ("l1", 0.0), ("l2", 0.0)):
+        for name, low in (("window", 0.0), ("bandwidth", 0.0), ("l1", 0.0), ("l2", 0.0), ("payload_mass", 0.0)):
             value = getattr(self, name)
             if value is not None and not low < value < math.inf:
                 raise SettingError(f"{flag(name)}: expected a number above {low:g}, found {value:g}")
@@ -213,7 +218,8 @@ class Settings:
                 f"--model {self.model}: the paper's method has no such terms; use --estimator refined or weak"
             )
         ours = {f.name: f.default for f in fields(self)}
-        for name in ("friction", "torque_offset", "rotor_inertia", "delay", "l1", "l2", "constrain", "cross_validate"):
+        lacking = ("friction", "torque_offset", "rotor_inertia", "delay", "l1", "l2", "payload_mass")
+        for name in (*lacking, "constrain", "cross_validate"):
             if getattr(self, name) != ours[name]:
                 raise SettingError(
                     f"{flag(name)}: the paper's method has no such term; use --estimator refined or weak"

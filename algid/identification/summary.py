@@ -104,13 +104,14 @@ def result_of(outcome: Identified, settings: Settings, survey: Survey) -> Result
 
 
 def _on_intervals(outcome: Identified) -> list[str]:
-    """What intervals over blocks of logs leave out, where no warning says so, and how well the payload repeats."""
+    """What blocks of logs leave out where no warning says so, how well the payload repeats, the torques' gain."""
     if outcome.fit is None:
         return []
     told = any(ONE_RUN in warning for warning in outcome.warnings)
     said = [ONE_RUN] if outcome.fit.intervals == "sandwich" and not told else []
     repeated = outcome.fit.repeatability
-    return said if repeated is None else [*said, _on_repeatability(repeated)]
+    said += [] if repeated is None else [_on_repeatability(repeated)]
+    return said + ([] if outcome.fit.torque_gain is None else [_on_gain(outcome.fit.torque_gain)])
 
 
 def _suspicions(notices: Sequence[tuple[str, Notice]]) -> list[Cause]:
@@ -321,6 +322,33 @@ def fit_summary(
         residual=prediction(_residual(fit, predictions, survey, settings)),
         cross_validation=None if crossed is None else prediction(crossed),
         repeatability=_repeatability(fit),
+        torque_gain=_torque_gain(fit, settings.payload_mass),
+    )
+
+
+def _torque_gain(fit: Fit, known: float | None) -> Estimate | None:
+    """What the logs' torques have to be multiplied by, where the payload's mass is known, in kg.
+
+    All that has N m in its unit, m_p too, grows with a common gain of both torques; lengths do not.
+    """
+    if known is None or "m_p" not in fit.names:
+        return None
+    place = fit.names.index("m_p")
+    mass, std = float(fit.values[place]), float(fit.std[place])
+    if not np.isfinite(std) or mass <= fit.quantile * std:
+        return estimate(np.nan, np.inf, (-np.inf, np.inf), "1", "NOT_IDENTIFIABLE")
+    low, high = known / (mass + fit.quantile * std), known / (mass - fit.quantile * std)
+    return estimate(known / mass, known / mass * std / mass, (low, high), "1", fit.status[place])
+
+
+def _on_gain(found: Estimate) -> str:
+    if found.estimate is None or found.std is None:
+        return "the payload that is known does not tell the gain of the torques: its mass is not told from zero"
+    low, high = found.ci95 or (None, None)
+    return (
+        f"by the payload that is known the torques have to be multiplied by {found.estimate:.5g} "
+        f"(95 %: {low:.5g} to {high:.5g}), and with them k1 … k7, friction and masses: "
+        "set torque_constant or gear_ratio of [tau1] and [tau2]"
     )
 
 

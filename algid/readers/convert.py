@@ -177,7 +177,9 @@ def _factor(path: str, name: str, channel: Angle | Velocity | Torque, unit: str)
             raise LogError(
                 f"{path}: {name} is a current; its torque needs the motor's constant in N m/A: "
                 f"--set {name}.torque_constant=… --set {name}.gear_ratio=… (profile: torque_constant and gear_ratio of "
-                f'[{name}]); if it is a torque after all: --set {name}.unit="N m" (profile: unit = "N m" of [{name}])'
+                f'[{name}]); if it is a torque after all: --set {name}.unit="N m" (profile: unit = "N m" of [{name}]); '
+                f"where the constant is not known: --set {name}.torque_constant=1 gives all constants up to a gain, "
+                "and a known payload that gain (--payload-mass)"
             )
         return CURRENT[unit] * float(constant) * channel.gear_ratio
     if unit == "counts":

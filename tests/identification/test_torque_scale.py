@@ -1,0 +1,81 @@
+"""What scales and mixes the torques: currents of motors whose constant is not known, a second motor at the base."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from algid.arm import with_payload
+from algid.errors import SettingError
+from algid.estimators import refined
+from algid.identification.identify import identify
+from algid.log import Log, Origin
+from algid.settings import Settings
+from algid.signals.segments import Segment
+from algid.synth.cases import load_case
+from algid.synth.excitation import wide_multi_sine
+from algid.synth.simulator import Motion, simulate
+
+DT = 2e-3
+CONSTANT = 0.093  # N m/A
+CASE = load_case("case1")
+
+
+@cache
+def moved(*, loaded: bool) -> Motion:
+    k = CASE.arm.constants()
+    k = with_payload(k, CASE.arm.payload_constants(CASE.payload)) if loaded else k
+    return simulate(k, wide_multi_sine(CASE.arm, 3 + loaded), np.arange(2501) * DT)
+
+
+def currents(*, loaded: bool, seed: int = 0) -> Log:
+    """A log in amperes of motors with `CONSTANT`, read with a torque constant of 1."""
+    motion = moved(loaded=loaded)
+    noise = np.random.default_rng([seed, loaded]).standard_normal((2, *motion.theta.shape))
+    stamps = np.round(motion.t * 1e9).astype(np.int64)
+    tau = (motion.tau + 1e-2 * noise[1]) / CONSTANT
+    return Log(stamps, motion.theta + 1e-3 * noise[0], tau, Origin(f"{loaded}.csv", "csv", {}))
+
+
+def test_a_known_payload_tells_the_gain_of_the_torques() -> None:
+    settings = Settings(model="plain", payload_mass=CASE.payload)
+    result = identify(currents(loaded=False), currents(loaded=True), settings, report=False)
+    assert result.fit is not None
+    gain = result.fit.torque_gain
+    assert gain is not None
+    assert gain.estimate is not None
+    assert gain.std is not None
+    assert abs(gain.estimate - CONSTANT) < 4 * gain.std < 0.02 * CONSTANT
+    for name, true in zip(("k1", "k4", "k7"), CASE.arm.constants()[[0, 3, 6]], strict=True):
+        found = result.parameters[name]
+        assert found.estimate is not None
+        assert found.estimate * gain.estimate == pytest.approx(true, rel=0.03)
+    l1 = result.payload["l1"]  # no gain changes a length
+    assert l1.estimate == pytest.approx(CASE.arm.l1, rel=0.03)
+    assert any("have to be multiplied by 0.09" in note for note in result.notes)
+
+
+def test_without_a_payload_there_is_no_gain_to_tell() -> None:
+    bare = identify(currents(loaded=False), settings=Settings(model="plain", payload_mass=0.5), report=False)
+    assert bare.fit is not None
+    assert bare.fit.torque_gain is None
+    with pytest.raises(SettingError, match="--payload-mass: expected a number above 0"):
+        Settings(payload_mass=0.0)
+
+
+@pytest.mark.slow
+def test_intervals_hold_where_the_second_motor_stands_at_the_base() -> None:
+    """Both joints' torques share the noise of the second motor: 200 draws, 10 ± 3.1 misses of a constant by chance."""
+    motion, k = moved(loaded=False), CASE.arm.constants()
+
+    def missed(seed: int) -> NDArray[np.bool_]:
+        noise = np.random.default_rng(seed).standard_normal((2, *motion.theta.shape))
+        tau = motion.tau + 1e-2 * np.stack([noise[1, 0] + noise[1, 1], noise[1, 1]])
+        log = Segment(0.0, DT, motion.theta + 1e-3 * noise[0], tau)
+        fit = refined.fit([lambda: [log]])
+        return np.asarray(np.abs(fit.values - k) > fit.quantile * fit.std)
+
+    assert 4 <= np.sum([missed(seed) for seed in range(200)], axis=0).mean() <= 16
