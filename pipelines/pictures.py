@@ -22,7 +22,7 @@ from rich.text import Text
 from algid.report import print_table, write_report
 from algid.results import Result, read_result
 
-SCREEN = "1280,2250"
+SCREEN = "1280,1945"  # down to the end of the torques
 DRAWN = 20_000  # ms of the page's own time, after which every figure stands
 THEMES = {"light": "1", "dark": "0"}  # as Chromium numbers them
 

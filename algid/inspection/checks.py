@@ -166,7 +166,7 @@ def examine(log: Log, *, gravity: float = 9.81) -> tuple[Finding, ...]:
 
 
 def _convention(mended: Mend) -> Finding:
-    told = f"set {mended.lines} in a profile, or {' '.join(map(shlex.quote, mended.flags))}"
+    told = f"use {' '.join(map(shlex.quote, mended.flags))}, or set {mended.lines} in a profile"
     if not mended.another:
         return Finding("ZERO_OFFSET", f"{mended.words}; {told}", flags=mended.flags)
     text = f"{mended.words}, by all that physics says ({mended.contradiction}); {told}"

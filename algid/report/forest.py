@@ -11,7 +11,7 @@ from algid.report.html import escaped
 from algid.report.text import significant
 from algid.results import Estimate
 
-WIDTH, HEIGHT = 140.0, 22.0  # of a row's drawing, pixels
+WIDTH, HEIGHT = 124.0, 22.0  # of a row's drawing, pixels
 EDGE = 8.0  # where an arrow tells that an interval goes on
 WIDEST = 100.0  # percent: an interval beyond says little more than the estimate's size
 ROOM = 1.15  # of the widest interval

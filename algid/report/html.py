@@ -47,6 +47,7 @@ TEMPLATE: dict[str, Any] = {
 
 LONGEST_TEXT = 4_000
 CARDED = 3  # columns; a row of a wider table stands as a card on a phone, so that no column is out of sight
+ANSWERS = ("yes", "no", "none")
 LONG_CELL = 40  # beyond, a cell breaks into lines
 KEYS = "Arrow keys move, plus and minus zoom, 0 resets."
 
@@ -133,9 +134,9 @@ def _cell(column: Column, text: str, links: Mapping[str, str]) -> str:
         return f'<td class="status{" ok" if text == Status.OK.value else ""}">{escaped(text)}</td>'
     main = " estimate" if column.heading == "Estimate" else ""
     long = " long" if column.kind == "text" and len(text) > LONG_CELL else ""
-    label = (
-        f' data-label="{escaped(column.heading.removesuffix(" std"))}"' if column.kind == "number" and not main else ""
-    )
+    heading = escaped(column.heading.removesuffix(" std"))  # beside an estimate ± is enough
+    bare = column.kind == "number" or text in ANSWERS  # says nothing on a card without its heading
+    label = f' data-label="{heading}"' if bare and not main else ""
     return f'<td class="{column.kind}{main}{long}"{label}>{escaped(text)}</td>'
 
 

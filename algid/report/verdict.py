@@ -51,8 +51,9 @@ class Verdict:
 
     @property
     def untold(self) -> tuple[str, ...]:
-        """The reasons that the sentence does not hold word by word."""
-        return tuple(reason for reason in self.reasons if reason not in self.sentence)
+        """The reasons that neither the sentence holds word by word, nor the cause."""
+        cause = self.cause or self.sentence
+        return tuple(reason for reason in self.reasons if reason not in self.sentence and cause not in reason)
 
 
 def verdict(result: Result) -> Verdict:

@@ -323,3 +323,6 @@ def test_a_reason_that_the_verdict_tells_is_not_listed_again() -> None:
     one = Verdict("reservations", told, ("k2 is singular", "it jitters"))
     assert one.untold == ("it jitters",)
     assert banner(one).count("k2 is singular") == 1
+    cause = "θ1 is zero hanging; use --zero hanging"
+    other = Verdict("failed", "Failed: M is not positive.", (f"algid warns: a.csv: {cause}", "it jitters"), cause)
+    assert other.untold == ("it jitters",)
