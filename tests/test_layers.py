@@ -61,7 +61,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "fleet": room("errors files model progress report", "numpy polars scipy"),
     "cli": room(
         "batch check design errors estimators export files "
-        "fleet identification inspection log profile progress readers report results runtime "
+        "fleet identification inspection log model profile progress readers report results runtime "
         "settings stores synth track writers",
         "numpy rich typer",
     ),

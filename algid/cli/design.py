@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from algid.cli import EXIT_INCOMPLETE
+from algid.cli.completion import cases
 
 if TYPE_CHECKING:
     from algid.design.campaign import Campaign, Design
@@ -35,7 +36,13 @@ class Shown(StrEnum):
 
 
 def design(
-    prior: Annotated[str, typer.Argument(help="Result folder of the arm, case1, case2, or a TOML file of the arm.")],
+    prior: Annotated[
+        str,
+        typer.Argument(
+            autocompletion=cases,
+            help="Result folder of the arm, case1, case2, or a TOML file of the arm.",
+        ),
+    ],
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the folder PRIOR.design.")] = Path(),
     limits: Annotated[
         Path | None, typer.Option(help="TOML file with range, speed, …, in the flags' words; flags beat it.")

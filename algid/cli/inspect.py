@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def inspect(
     choice: Choice,
     log: Annotated[Path, typer.Argument(help="CSV, Parquet or MCAP log, or a rosbag2 folder.")],
-    output: Annotated[str, typer.Option("--format", help="table or json.")] = "table",
+    output: Annotated[Literal["table", "json"], typer.Option("--format", help="table or json.")] = "table",
 ) -> None:
     """Show what a log holds, which channels would be used, and what is wrong with it.
 
@@ -32,11 +32,8 @@ def inspect(
 
     from rich.console import Console
 
-    from algid.errors import SettingError
     from algid.inspection.report import inspect_log
 
-    if output not in ("table", "json"):
-        raise SettingError(f"--format: expected table or json, found {output!r}")
     chosen = choice.profile()
     found = inspect_log(log, chosen)
     if output == "json":

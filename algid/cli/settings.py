@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
+from algid.cli.completion import listed, of_profile, settings_of_profile, words
 from algid.settings import Settings, flag
 
 if TYPE_CHECKING:
@@ -21,27 +22,87 @@ MODEL, METHOD, LOG = "The arm's model", "Method", "What the log means"
 """Panels of a command's help."""
 MODELLED = ("gravity", "model", "friction", "torque_offset", "rotor_inertia", "torque_hold", "delay", "l1", "l2")
 
+
+def _checks() -> list[str]:
+    from algid.inspection.checks import REFUSED
+
+    return list(REFUSED)
+
+
+def _terms() -> list[str]:
+    from algid.model import TERMS
+
+    return ["auto", "plain", *TERMS, "delay"]
+
+
+_COMPLETED = {"model": listed(_terms), "delay": words("estimate")}
+"""Settings that are text and take some words."""
+
 ProfileFile = Annotated[
     Path | None,
     typer.Option("--profile", help="algid.toml that says what the log's names and units mean.", rich_help_panel=LOG),
 ]
 Topic = Annotated[str | None, typer.Option(help="Topic with the joint states.", rich_help_panel=LOG)]
 Joints = Annotated[str | None, typer.Option(help="The two joints, as NAME,NAME.", rich_help_panel=LOG)]
-AngleUnit = Annotated[str | None, typer.Option(help="rad, deg, rev or counts.", rich_help_panel=LOG)]
-TorqueUnit = Annotated[str | None, typer.Option(help='"N m", "mN m", A or mA.', rich_help_panel=LOG)]
-Zero = Annotated[str | None, typer.Option(help="Where θ1 is zero: horizontal or hanging.", rich_help_panel=LOG)]
-SecondAngle = Annotated[str | None, typer.Option(help="θ2 is relative (to link 1) or absolute.", rich_help_panel=LOG)]
+AngleUnit = Annotated[
+    str | None,
+    typer.Option(
+        help="rad, deg, rev or counts.",
+        autocompletion=of_profile("unit", "theta1"),
+        rich_help_panel=LOG,
+    ),
+]
+TorqueUnit = Annotated[
+    str | None,
+    typer.Option(
+        help='"N m", "mN m", A or mA.',
+        autocompletion=of_profile("unit", "tau1"),
+        rich_help_panel=LOG,
+    ),
+]
+Zero = Annotated[
+    str | None,
+    typer.Option(
+        help="Where θ1 is zero: horizontal or hanging.", autocompletion=of_profile("zero"), rich_help_panel=LOG
+    ),
+]
+SecondAngle = Annotated[
+    str | None,
+    typer.Option(
+        help="θ2 is relative (to link 1) or absolute.", autocompletion=of_profile("second_angle"), rich_help_panel=LOG
+    ),
+]
 Drive = Annotated[
-    str | None, typer.Option(help="Where the second motor stands: in its joint, or at the base.", rich_help_panel=LOG)
+    str | None,
+    typer.Option(
+        help="Where the second motor stands: in its joint, or at the base.",
+        autocompletion=of_profile("drive"),
+        rich_help_panel=LOG,
+    ),
 ]
 Passive = Annotated[
-    str | None, typer.Option(help="The joint without a motor, 1 or 2: its torque is zero.", rich_help_panel=LOG)
+    str | None,
+    typer.Option(
+        help="The joint without a motor, 1 or 2: its torque is zero.",
+        autocompletion=of_profile("passive"),
+        rich_help_panel=LOG,
+    ),
 ]
 Sets = Annotated[
     list[str] | None,
-    typer.Option("--set", help="Any setting of a profile, as tau1.sign=-1; may be repeated.", rich_help_panel=LOG),
+    typer.Option(
+        "--set",
+        help="Any setting of a profile, as tau1.sign=-1; may be repeated.",
+        autocompletion=settings_of_profile,
+        rich_help_panel=LOG,
+    ),
 ]
-Clock = Annotated[str | None, typer.Option(help="Stamps of the messages' header, or of the log.", rich_help_panel=LOG)]
+Clock = Annotated[
+    str | None,
+    typer.Option(
+        help="Stamps of the messages' header, or of the log.", autocompletion=of_profile("clock"), rich_help_panel=LOG
+    ),
+]
 Start = Annotated[
     str | None, typer.Option(help="Leave out what comes before, s since the log's first sample.", rich_help_panel=LOG)
 ]
@@ -49,7 +110,10 @@ End = Annotated[
     str | None, typer.Option(help="Leave out what comes after, s since the log's first sample.", rich_help_panel=LOG)
 ]
 Accept = Annotated[
-    str | None, typer.Option(help="Checks that may warn but not refuse, as CODE,CODE.", rich_help_panel=LOG)
+    str | None,
+    typer.Option(
+        help="Checks that may warn but not refuse, as CODE,CODE.", autocompletion=listed(_checks), rich_help_panel=LOG
+    ),
 ]
 
 
@@ -206,7 +270,11 @@ def _option(field: Field[Any], kind: Any) -> inspect.Parameter:
     if "parse" in field.metadata:
         kind, default = str | None, None if default is None else f"{default:g}"
     panel = MODEL if field.name in MODELLED else METHOD
-    annotation = Annotated[kind, typer.Option(flag(field.name), help=field.metadata["help"], rich_help_panel=panel)]
+    completed = _COMPLETED.get(field.name)
+    option = typer.Option(
+        flag(field.name), help=field.metadata["help"], rich_help_panel=panel, autocompletion=completed
+    )
+    annotation = Annotated[kind, option]
     return inspect.Parameter(field.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from algid.cli.completion import cases, or_files
+
 if TYPE_CHECKING:
     from algid.log import Log
     from algid.progress import Told
@@ -36,7 +38,13 @@ class Hold(StrEnum):
 
 
 def synth(
-    case: Annotated[str, typer.Argument(help="case1, case2, or a TOML file that describes an arm.")],
+    case: Annotated[
+        str,
+        typer.Argument(
+            autocompletion=cases,
+            help="case1, case2, or a TOML file that describes an arm.",
+        ),
+    ],
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write into.")] = Path(),
     kind: Annotated[Format, typer.Option("--format", help="Format of the logs.")] = Format.MCAP,
     rate: Annotated[float, typer.Option(help="Samples a second, Hz.", min=1e-3)] = 1000.0,
@@ -45,7 +53,10 @@ def synth(
     ] = None,
     torque: Annotated[
         str | None,
-        typer.Option(help="case (the case's own, the default), wide (0.3 to 8 Hz), none, or a log to replay."),
+        typer.Option(
+            autocompletion=or_files("case", "wide", "none"),
+            help="case (the case's own, the default), wide (0.3 to 8 Hz), none, or a log to replay.",
+        ),
     ] = None,
     motion: Annotated[
         Path | None, typer.Option(help="Folder of algid design: a controller follows its motion, instead of --torque.")

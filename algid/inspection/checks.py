@@ -138,6 +138,10 @@ _LEAST_PULL = 1.3
 """Weight in N m to inertia in kg m^2: a fifth of g/l for links of 1.5 m."""
 
 
+REFUSED = ("EFFORT_ZERO", "EFFORT_DENORMAL", "EFFORT_CONSTANT", "WRAPPED_ANGLE", "DEGREES")
+"""The checks that refuse a log unless they are accepted."""
+
+
 @dataclass(frozen=True)
 class Finding:
     """One thing seen: its code, what it means, whether the log is refused for it, and the flags that mend it."""

@@ -1,0 +1,83 @@
+"""What a shell completes behind options whose choices no type tells: words, a profile's own choices, cases."""
+
+from __future__ import annotations
+
+import glob
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Literal, get_args, get_origin
+
+Completion = Callable[[str], list[str]]
+
+
+def words(*known: str) -> Completion:
+    """Completes some words."""
+    return lambda incomplete: [word for word in known if word.startswith(incomplete)]
+
+
+def listed(known: Callable[[], list[str]]) -> Completion:
+    """Completes the last of several words with commas between them, each of which may stand there once."""
+
+    def complete(incomplete: str) -> list[str]:
+        *before, last = incomplete.split(",")
+        return [",".join([*before, word]) for word in known() if word.startswith(last) and word not in before]
+
+    return complete
+
+
+def of_profile(setting: str, channel: str | None = None) -> Completion:
+    """Completes what a setting of a profile, or of one of its channels, may be."""
+
+    def complete(incomplete: str) -> list[str]:
+        from algid.profile import Profile
+
+        model: Any = Profile if channel is None else Profile.model_fields[channel].annotation
+        known = _choices(model.model_fields[setting].annotation)
+        return [word for word in known if word.startswith(incomplete)]
+
+    return complete
+
+
+def settings_of_profile(incomplete: str) -> list[str]:
+    """Completes ``KEY=`` of a profile's line, and what may stand behind it."""
+    from algid.profile import Profile
+
+    key, equals, value = incomplete.partition("=")
+    found = []
+    for name, field in Profile.model_fields.items():
+        inner = getattr(field.annotation, "model_fields", None)
+        lines = {name: field} if inner is None else {f"{name}.{one}": part for one, part in inner.items()}
+        for line, part in lines.items():
+            if not equals and line.startswith(key):
+                found.append(f"{line}=")
+            elif equals and line == key:
+                found += [f"{key}={word}" for word in _choices(part.annotation) if word.startswith(value)]
+    return found
+
+
+def or_files(*known: str) -> Completion:
+    """Completes some words, and files."""
+
+    def complete(incomplete: str) -> list[str]:
+        paths = sorted(glob.glob(f"{glob.escape(incomplete)}*"))  # noqa: PTH207  # as it was typed
+        return [*words(*known)(incomplete), *(f"{path}/" if Path(path).is_dir() else path for path in paths)]
+
+    return complete
+
+
+cases = or_files("case1", "case2")
+"""Completes the cases that algid knows, and files."""
+
+
+def _choices(annotation: Any) -> list[str]:
+    return list(dict.fromkeys(map(str, _literals(annotation))))
+
+
+def _literals(annotation: Any) -> Iterator[object]:
+    if get_origin(annotation) is Literal:
+        yield from get_args(annotation)
+    elif annotation is bool:
+        yield from ("true", "false")
+    else:
+        for part in get_args(annotation):
+            yield from _literals(part)
