@@ -71,7 +71,8 @@ def _estimate(fit: Fit, logs: Sequence[LogInformation], widening: FloatArray) ->
         return np.full(beta.shape, np.nan), np.full(beta.shape, np.nan)
     known = examine(fit.names, beta, S, fit.moved)
     std = np.sqrt(np.maximum(np.diag(known.covariance), 0.0))
-    open_ones = np.logical_not(known.determined)
+    lost = np.array([status == "NOT_IDENTIFIABLE" for status in fit.status])  # the fit may know better than its sums
+    open_ones = np.logical_not(known.determined) | lost
     return np.where(open_ones, np.nan, beta), np.where(open_ones, np.nan, fit.quantile * widening * std)
 
 

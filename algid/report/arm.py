@@ -56,7 +56,7 @@ def arm_html(arm: ArmDrawing, title: str, reading: str) -> str:
     t, theta = _frames(arm)
     tip = _tip(arm, theta)
     reach = arm.l1 + arm.l2
-    size = reach * (1 + MARGIN)
+    left, top, width, height = _frame(arm, theta, tip)
     says = f"Arm of {significant(arm.l1, 3)} m and {significant(arm.l2, 3)} m links"
     frames = {
         "t": np.round(t, DIGITS).tolist(),
@@ -66,9 +66,9 @@ def arm_html(arm: ArmDrawing, title: str, reading: str) -> str:
     name = escaped(arm.key)
     return (
         f'<figure class="arm" id="{name}-figure" aria-labelledby="{name}"><h2 id="{name}">{escaped(title)}</h2>\n'
-        f'<svg viewBox="{-size:.5g} {-size:.5g} {2 * size:.5g} {2 * size:.5g}" role="img" '
+        f'<svg viewBox="{left:.5g} {top:.5g} {width:.5g} {height:.5g}" role="img" '
         f'aria-label="{escaped(says)}">\n'
-        f"{_ground(arm, size)}{_path(tip)}{_links(arm, theta[:, 0], reach)}</svg>\n"
+        f"{_ground(arm, left, left + width)}{_path(tip)}{_links(arm, theta[:, 0], reach)}</svg>\n"
         f'<div class="player"><button type="button" aria-pressed="false" data-play>Play</button>'
         f'<input type="range" min="{t[0]:.6g}" max="{t[-1]:.6g}" value="{t[0]:.6g}" step="0.01" '
         f'aria-label="Time, s"><output>{t[0]:.2f} s</output>'
@@ -99,11 +99,22 @@ def _tip(arm: ArmDrawing, theta: FloatArray) -> FloatArray:
     )
 
 
-def _ground(arm: ArmDrawing, size: float) -> str:
-    lines = f'<line class="level" x1="{-size:.5g}" y1="0" x2="{size:.5g}" y2="0"/>'
+def _frame(arm: ArmDrawing, theta: FloatArray, tip: FloatArray) -> tuple[float, float, float, float]:
+    """Left, top, width and height that hold the arm all along its motion; at least as wide as the arm is long."""
+    reach = arm.l1 + arm.l2
+    points = np.concatenate([np.zeros((2, 1)), arm.l1 * np.stack([np.cos(theta[0]), np.sin(theta[0])]), tip], axis=1)
+    if arm.height is not None and np.isfinite(arm.height):
+        points = np.concatenate([points, [[0.0], [arm.height]]], axis=1)
+    low, high = points.min(axis=1) - MARGIN * reach, points.max(axis=1) + MARGIN * reach
+    left, right = min(float(low[0]), -reach / 2), max(float(high[0]), reach / 2)
+    return left, float(-high[1]), right - left, float(high[1] - low[1])
+
+
+def _ground(arm: ArmDrawing, left: float, right: float) -> str:
+    lines = f'<line class="level" x1="{left:.5g}" y1="0" x2="{right:.5g}" y2="0"/>'
     if arm.height is not None and np.isfinite(arm.height):
         below = -arm.height
-        lines += f'<line class="limit" x1="{-size:.5g}" y1="{below:.5g}" x2="{size:.5g}" y2="{below:.5g}"/>'
+        lines += f'<line class="limit" x1="{left:.5g}" y1="{below:.5g}" x2="{right:.5g}" y2="{below:.5g}"/>'
     return lines
 
 

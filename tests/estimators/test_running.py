@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import binom
 
 from algid.estimators import refined, weak
-from algid.estimators.fit import Fit
+from algid.estimators.fit import Fit, Status
 from algid.estimators.running import has_running, running
 from algid.signals.segments import Segment
 
@@ -75,3 +75,13 @@ def test_a_fit_held_within_bounds_has_none(bench: Bench) -> None:
     fit = _fit(bench, "weak", 1, loaded=False)
     assert not has_running(replace(fit, values=fit.values * 1.01))
     assert not has_running(replace(fit, converged=False))
+
+
+def test_what_the_fit_calls_open_has_no_running_estimate(bench: Bench) -> None:
+    from dataclasses import replace
+
+    fit = _fit(bench, "weak", 1, loaded=False)
+    status: tuple[Status, ...] = tuple("NOT_IDENTIFIABLE" if name == "k3" else "OK" for name in fit.names)
+    found = running(replace(fit, status=status), [4.0], 10)
+    assert np.isnan(found.beta[:, fit.names.index("k3")]).all()
+    assert np.isfinite(found.beta[-1, fit.names.index("k4")])

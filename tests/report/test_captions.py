@@ -84,6 +84,14 @@ def test_the_running_estimate_ends_at_the_estimate_and_tells_when_it_strayed(fol
     assert float(told[1]) == pytest.approx(100 * float(np.mean(held)), rel=1e-2)  # three digits are written
 
 
+def test_what_has_no_estimate_has_no_running_one(case_folder: Path, result: Result) -> None:
+    lost = result.parameters["k3"].model_copy(update={"estimate": None, "std": None, "ci95": (None, None)})
+    poor = result.model_copy(update={"parameters": {**result.parameters, "k3": lost}})
+    titles = [panel.title for panel in _figure(running(case_folder / "running.parquet", poor)).panels]
+    assert "k3" not in titles
+    assert "k4" in titles
+
+
 def test_no_figure_is_without_a_reading_aid(case_folder: Path, result: Result) -> None:
     shown = gallery(case_folder, result)
     for figure in (*shown.figures, *shown.paper):

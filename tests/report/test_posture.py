@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from algid.report.arm import ArmDrawing, arm_html
 from algid.report.posture import arm_of
 from algid.report.series import read_torque
 from algid.results import Estimate, Result
@@ -42,3 +43,18 @@ def test_the_arm_stands_as_the_log_begins(result: Result, case_folder: Path) -> 
     assert turned is not None
     first = torque.series[0]["theta1"][1]
     assert float(turned[1]) == pytest.approx(-np.degrees(first[np.isfinite(first)][0]), abs=1e-3)  # SVG turns clockwise
+
+
+def test_the_drawing_holds_the_arm_all_along_its_motion_and_its_limit_and_little_more() -> None:
+    t = np.linspace(0.0, 4.0, 200)
+    hanging = np.stack([-np.pi / 2 + 0.3 * np.sin(3 * t), 0.4 * np.cos(2 * t)])
+    drawing = arm_html(ArmDrawing("arm", 0.3, 0.2, t, hanging, height=-0.6), "The arm", "Read it.")
+    box = re.search(r'viewBox="([-\d.e]+) ([-\d.e]+) ([-\d.e]+) ([-\d.e]+)"', drawing)
+    assert box is not None
+    left, top, width, height = map(float, box.groups())
+    both = hanging[0] + hanging[1]
+    x = 0.3 * np.cos(hanging[0]) + 0.2 * np.cos(both)
+    y = -(0.3 * np.sin(hanging[0]) + 0.2 * np.sin(both))  # SVG's y points down
+    assert left < x.min() < x.max() < left + width
+    assert top < 0 < y.max() < 0.6 < top + height
+    assert top > -0.1  # nothing but the margin above the base of an arm that hangs

@@ -59,7 +59,11 @@ def running(path: Path, result: Result) -> Figure | Missing:
         return np.concatenate([block[name] for _, block in found])
 
     courses = [Course(name, whole(name), whole(name + HALF)) for name in names if name in result.estimates]
-    courses = [course for course in courses if np.isfinite(course.value[-1])]
+    courses = [
+        course
+        for course in courses
+        if np.isfinite(course.value[-1]) and result.estimates[course.name].estimate is not None
+    ]
     if not courses:
         return Missing("running", TITLE, "no parameter is determined")
     starts = separators(ranges, moved, result.logs).get("shapes", [])
