@@ -21,6 +21,9 @@ _GROUP, _PAGES = (4,), (4, 1, 3)
 """Structures: a row group (RowGroup), and what it says of one of its columns (ColumnMetaData)."""
 _ROWS, _GROUP_ROWS, _PATH = (3,), (4, 3), (4, 1, 3, 3)
 _VALUES, _SIZE, _DATA, _DICTIONARY = 5, 7, 9, 11
+_DICTIONARY_VALUES = (7, 1)
+_PAGE_VALUES = ((5, 1), _DICTIONARY_VALUES, (8, 1))
+"""Values of a page, in the header of its kind."""
 _DEEPEST = 16
 _MOST_VALUES = 5_000_000
 
@@ -84,6 +87,35 @@ def parsed(footer: bytes) -> Footer:
     except IndexError as error:
         raise FooterError("it breaks off") from error
     return reader.found
+
+
+@dataclass(frozen=True)
+class PageHeader:
+    """What stands before a page: bytes of its header, of the page packed and unpacked, and its values."""
+
+    length: int
+    packed: int
+    unpacked: int
+    values: int
+    dictionary: bool
+
+
+def page_header(head: bytes) -> PageHeader:
+    """The header (PageHeader) that `head` begins with.
+
+    Raises
+    ------
+    FooterError
+        If it breaks off, or is none.
+    """
+    reader = _PageReader(head)
+    try:
+        reader.struct((), 0)
+    except IndexError as error:
+        raise FooterError("a page's header breaks off") from error
+    kept = reader.kept
+    values = next((kept[path] for path in _PAGE_VALUES if path in kept), 0)
+    return PageHeader(reader.place, kept.get((3,), -1), kept.get((2,), -1), values, _DICTIONARY_VALUES in kept)
 
 
 def page_has_checksum(head: bytes) -> bool:
@@ -176,3 +208,13 @@ class _Reader:
             if shift > 63:
                 raise FooterError("it holds a number without an end")
         return value | byte << shift
+
+
+@dataclass
+class _PageReader(_Reader):
+    """Keeps every whole number of a page's header by its field."""
+
+    kept: dict[tuple[int, ...], int] = field(default_factory=dict)
+
+    def _keep(self, path: tuple[int, ...], value: int) -> None:
+        self.kept[path] = value >> 1 ^ -(value & 1)

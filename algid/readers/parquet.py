@@ -11,7 +11,7 @@ from algid.errors import LogError
 from algid.log import CANONICAL_COLUMNS, KEY, Companion, Notice, loads
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign, check_written, tables
-from algid.readers.footer import Footer, FooterError, page_has_checksum, parsed
+from algid.readers.footer import Footer, FooterError, page_has_checksum, page_header, parsed
 from algid.readers.stated import in_metadata
 from algid.readers.table import Table
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 _MOST_COLUMNS = 4096
 _LARGEST_FOOTER = 1 << 26
 _NO_UNIT, _LONGEST_UNIT = ("", "-", "1", "none", "null", "unknown", "dimensionless"), 40
+_LARGEST_HEADER = 1 << 14
 _PAGE_HEAD = 64
 """Bytes in which a page's checksum stands, if it has one."""
 _NO_SUMS = Notice("NO_CHECKSUM", "the file has no sums of its values, as algid's have: changes would go unseen")
@@ -51,6 +52,7 @@ def open_parquet(path: Path, profile: Profile | None = None) -> TableReader:
     if companion is None and "stamp_ns" in schema and set(CANONICAL_COLUMNS) <= schema.keys():
         columns = replace(columns, notices=(*columns.notices, _NO_SUMS))
     _check_types(path, columns, available, schema)
+    _check_headers(path, {available[source][0] for source in columns.sources.values()})
     source = _Groups(path, columns, available, schema, companion.sums if companion else {})
     return columns.reader(str(path), "parquet", companion.truth if companion else None, source.tables, profile, rows)
 
@@ -128,6 +130,7 @@ def _flat_names(path: Path, schema: Mapping[str, pl.DataType]) -> dict[str, tupl
     names: dict[str, tuple[str, int | None]] = {}
     for column, kind in schema.items():
         if isinstance(kind, (pl.List, pl.Array)):
+            _check_headers(path, {column})
             first = pl.scan_parquet(path, glob=False).select(pl.col(column)).head(1).collect()
             width = len(first.item()) if first.height and first.item() is not None else 0
             names |= {f"{column}[{place}]": (column, place) for place in range(min(width, 64))}
@@ -260,6 +263,25 @@ class _Groups:
         if isinstance(self.schema[column], (pl.Datetime, pl.Duration)):
             return replace(self.columns, time_unit="ns", time_told=True)
         return self.columns
+
+
+def _check_headers(path: Path, roots: Collection[str]) -> None:
+    """Refuse pages of columns among `roots` that claim values which cannot be: polars would end the process."""
+    with path.open("rb") as stream:
+        for pages in (pages for group in _footer(path).groups for pages in group.columns):
+            if not (pages.path and pages.path[0] in roots):
+                continue
+            place = pages.first
+            while place < pages.end:
+                stream.seek(place)
+                try:
+                    header = page_header(stream.read(min(_LARGEST_HEADER, pages.end - place)))
+                except FooterError:  # old writers count the bytes otherwise; polars tells of what is damaged
+                    break
+                most = header.unpacked if header.dictionary else pages.values
+                if not (0 <= header.values <= most and header.packed >= 0 and header.unpacked >= 0):
+                    raise _damaged(path, FooterError(f"a page at byte {place} claims {header.values} values"))
+                place += header.length + header.packed
 
 
 def _has_checksums(path: Path, roots: Collection[str]) -> bool:

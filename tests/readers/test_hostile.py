@@ -295,3 +295,18 @@ def test_statistics_that_contradict_their_column_do_not_end_the_process(tmp_path
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert "terminate called" not in done.stderr
     assert done.returncode == 0 or "LogError" in done.stderr.splitlines()[-1]
+
+
+@pytest.mark.parametrize("options", [{"use_dictionary": False}, {"use_dictionary": True}, {"data_page_version": "2.0"}])
+def test_a_page_that_claims_impossible_values_does_not_end_the_process(options: dict[str, Any], tmp_path: Path) -> None:
+    path = tmp_path / "log.parquet"
+    pq.write_table(arm_table(60), path, compression="none", **options)
+    content = bytearray(path.read_bytes())
+    values = bytes([0x15, 120, 0x15])  # 60 values, zigzag, in a data page's header
+    place = content.index(values, 4) + 1
+    content[place] = 119  # -60
+    path.write_bytes(content)
+    code = f"from algid.readers import read_log; read_log({str(path)!r})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 1, done.stderr
+    assert "values" in done.stderr.splitlines()[-1]
