@@ -204,8 +204,10 @@ def write_fit_series(folder: Path, fit: Fit, survey: Survey, settings: Settings,
     torques = torque_blocks(survey, fit.shared.model, coefficients, torque_shift(settings, fit))
     write_columns(folder / "torque.parquet", torques, starts)
     durations = [summary.duration for summary in summaries]
-    write_columns(folder / "information.parquet", information_blocks(fit, durations), starts)
-    if has_running(fit):
+    every = len(fit.logs) == len(summaries)  # a log too short for a window is in no fit, and nobody tells which it is
+    if every:
+        write_columns(folder / "information.parquet", information_blocks(fit, durations), starts)
+    if every and has_running(fit):
         write_columns(folder / "running.parquet", [running_columns(fit, durations)], starts)
     if residual is not None:
         rows = innovation_rows(residual, whitened=bool(fit.residual))
