@@ -77,7 +77,7 @@ def design(
     payload: Annotated[float | None, typer.Option(help="Payload of the loaded runs, kg.", min=1e-6)] = None,
     l1: Annotated[float | None, typer.Option("--l1", help="Length of link 1, m, where known.", min=1e-3)] = None,
     l2: Annotated[float | None, typer.Option("--l2", help="Length of link 2, m, where known.", min=1e-3)] = None,
-    margin: Annotated[float, typer.Option(help="Share of every limit left unused.", min=0, max=0.5)] = 0.03,
+    margin: Annotated[float, typer.Option(help="Share of every limit left unused.", min=0, max=0.5)] = 0.05,
     joints: Annotated[str, typer.Option(help="Names of the robot's joints.")] = "joint1,joint2",
     seed: Annotated[int, typer.Option(help="Seed of the search.", min=0)] = 0,
     force: Annotated[bool, typer.Option("--force", help="Replace a design that is there.")] = False,

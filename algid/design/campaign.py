@@ -22,7 +22,7 @@ from algid.model import Motion
 from algid.progress import Told
 
 Drive = Literal["position", "torque"]
-MARGIN = 0.03  # of each limit, kept for what a controller overshoots
+MARGIN = 0.05  # of each limit, kept for what a controller overshoots while its model is a fifth wrong
 ARMS = 20  # of the belief, of which the worst is reported
 OPEN = 0.5  # relative bound from which on an estimate would be called not identifiable
 SECOND = 1.0  # s: for how long each stretch of the motion is, of which is told what it teaches

@@ -52,7 +52,6 @@ def open_parquet(path: Path, profile: Profile | None = None) -> TableReader:
     if companion is None and "stamp_ns" in schema and set(CANONICAL_COLUMNS) <= schema.keys():
         columns = replace(columns, notices=(*columns.notices, _NO_SUMS))
     _check_types(path, columns, available, schema)
-    _check_headers(path, {available[source][0] for source in columns.sources.values()})
     source = _Groups(path, columns, available, schema, companion.sums if companion else {})
     return columns.reader(str(path), "parquet", companion.truth if companion else None, source.tables, profile, rows)
 
@@ -214,6 +213,7 @@ class _Groups:
         """Frames of `rows` rows, the last of fewer. Columns come in two lots, since one lot takes one core."""
         import polars as pl
 
+        _check_headers(self.path, self._roots)
         frame = pl.scan_parquet(self.path, glob=False)
         numbers = [self._number(name, source) for name, source in self.columns.sources.items()]
         middle = (len(numbers) // 2 + 1) // 2 * 2  # both joints in one lot: they may share a list column
@@ -231,7 +231,7 @@ class _Groups:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        roots = {self.available[source][0] for source in self.columns.sources.values()}
+        roots = self._roots
         try:
             if _has_checksums(self.path, roots):
                 with pq.ParquetFile(self.path, page_checksum_verification=True, pre_buffer=False) as file:
@@ -239,6 +239,10 @@ class _Groups:
                         pass
         except (pa.ArrowException, OSError, ValueError) as error:
             raise _damaged(self.path, error) from error
+
+    @property
+    def _roots(self) -> set[str]:
+        return {self.available[source][0] for source in self.columns.sources.values()}
 
     def _number(self, name: str, source: str) -> pl.Expr:
         import polars as pl

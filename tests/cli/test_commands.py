@@ -217,7 +217,9 @@ def test_identify_says_where_it_wrote_and_takes_a_name(logs: Path, tmp_path: Pat
     call = ("identify", logs / "case1-unloaded.csv", "-o", tmp_path, "--name", "monday", "--no-report")
     found = Outcome(*call, "--estimator", "weak")
     assert found.code == 0, found.err
-    assert found.err == f"wrote {tmp_path / 'monday.algid'}\n"
+    *notes, last = found.err.splitlines()
+    assert last == f"wrote {tmp_path / 'monday.algid'}"
+    assert all(note.startswith("note: ") for note in notes)
     assert (tmp_path / "monday.algid" / "result.json").exists()
 
 

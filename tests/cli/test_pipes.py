@@ -18,7 +18,7 @@ from algid.cli.app import app
 from algid.errors import AlgidError
 from algid.files import LARGEST_TEXT, read_whole
 
-WRITTEN = {"out", "scratch"}
+WRITTEN = {"out", "save_plots", "scratch"}
 """Options that name what is written, not what is read."""
 
 
