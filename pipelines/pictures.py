@@ -19,7 +19,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.text import Text
 
-from algid.report import print_table, write_report
+from algid.report.page import write_report
+from algid.report.terminal import print_table
 from algid.results import Result, read_result
 
 SCREEN = "1280,1945"  # down to the end of the torques

@@ -8,10 +8,10 @@ from dataclasses import fields
 import pytest
 from typer.main import get_command
 
-from algid.cli.app import app
 from algid.cli.settings import Choice
 from algid.errors import SettingError
 from algid.settings import Settings, flag
+from tests.cli.commands import app
 
 
 def test_every_setting_is_an_option_with_its_default_and_help() -> None:

@@ -23,11 +23,11 @@ def main() -> None:
         signal.signal(number, _stop)
     harden_streams()
     bound_by_environment()  # before anything loads numpy
-    from algid.cli.app import app
+    from algid.cli.app import called
     from algid.errors import AlgidError
 
     try:
-        app()
+        called(sys.argv[1:])()
     except AlgidError as error:
         print(f"algid: {_one_line(error)}", file=sys.stderr)
         sys.exit(EXIT_USAGE)

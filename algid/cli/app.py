@@ -1,34 +1,33 @@
-"""The commands of `algid`, gathered."""
+"""The commands of `algid`, gathered: all of them, or the one that is called."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import os
+from collections.abc import Callable, Iterable, Sequence
+from importlib import import_module
+from typing import Annotated, Any
 
 import typer
 
 from algid import __version__
-from algid.cli.batch import batch
-from algid.cli.check import check
-from algid.cli.compare import compare
-from algid.cli.convert import convert
-from algid.cli.design import design
-from algid.cli.export import export
-from algid.cli.fleet import fleet
-from algid.cli.guide import guide
-from algid.cli.identify import identify
-from algid.cli.inspect import inspect
-from algid.cli.profile import new
-from algid.cli.report import report
-from algid.cli.synth import synth
-from algid.cli.track import track
-from algid.cli.validate import validate
 
-app = typer.Typer(
-    help="Parameters and payload of a two-link arm, with honest error bars, straight from its torque and angle logs.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+COMMANDS: dict[str, Callable[[], Callable[..., Any]]] = {
+    "inspect": lambda: import_module("algid.cli.inspect").inspect,
+    "design": lambda: import_module("algid.cli.design").design,
+    "identify": lambda: import_module("algid.cli.identify").identify,
+    "validate": lambda: import_module("algid.cli.validate").validate,
+    "export": lambda: import_module("algid.cli.export").export,
+    "batch": lambda: import_module("algid.cli.batch").batch,
+    "fleet": lambda: import_module("algid.cli.fleet").fleet,
+    "track": lambda: import_module("algid.cli.track").track,
+    "check": lambda: import_module("algid.cli.check").check,
+    "report": lambda: import_module("algid.cli.report").report,
+    "compare": lambda: import_module("algid.cli.compare").compare,
+    "synth": lambda: import_module("algid.cli.synth").synth,
+    "convert": lambda: import_module("algid.cli.convert").convert,
+    "guide": lambda: import_module("algid.cli.guide").guide,
+}
+"""What loads each command, in the order of `algid --help`."""
 
 
 def _print_version(wanted: bool) -> None:
@@ -37,7 +36,6 @@ def _print_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _root(
     _version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
@@ -46,24 +44,27 @@ def _root(
     pass
 
 
-profiles = typer.Typer(help="Profiles tell what a log's names, units and signs mean.", no_args_is_help=True)
-profiles.command("new")(new)
+def gathered(names: Iterable[str]) -> typer.Typer:
+    """The application with the commands `names`, and with the profiles' where none of them is alone."""
+    made = typer.Typer(
+        help="Parameters and payload of a two-link arm, with honest error bars, from its torque and angle logs.",
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    made.callback()(_root)
+    wanted = list(names)
+    for name in wanted:
+        made.command(name)(COMMANDS[name]())
+    if len(wanted) != 1:
+        profiles = typer.Typer(help="Profiles tell what a log's names, units and signs mean.", no_args_is_help=True)
+        profiles.command("new")(import_module("algid.cli.profile").new)
+        made.add_typer(profiles, name="profile")
+    return made
 
-for command in (
-    inspect,
-    design,
-    identify,
-    validate,
-    export,
-    batch,
-    fleet,
-    track,
-    check,
-    report,
-    compare,
-    synth,
-    convert,
-    guide,
-):
-    app.command()(command)
-app.add_typer(profiles, name="profile")
+
+def called(arguments: Sequence[str]) -> typer.Typer:
+    """The application with what a command line calls: typer takes a fifth of a second to read all commands' options."""
+    first = arguments[0] if arguments else ""
+    completing = any(name.startswith("_ALGID_COMPLETE") for name in os.environ)
+    return gathered([first] if first in COMMANDS and not completing else COMMANDS)

@@ -23,7 +23,7 @@ def compare(
 
     Example: algid compare monday.algid friday.algid -o friday
     """
-    from algid.report import compare as compared
+    from algid.report.comparison import compare as compared
     from algid.report.comparison import comparison_json
     from algid.report.markdown import markdown_table
     from algid.results import read_result

@@ -84,8 +84,10 @@ def report(
 
 def _identification(folder: Path, form: ResultFormat, shared_library: bool, *, mcap: bool) -> Written:
     """Write a result's pages and print it."""
-    from algid.report import export_mcap, write_markdown, write_report
+    from algid.report.export import export_mcap
     from algid.report.gallery import gallery
+    from algid.report.markdown import write_markdown
+    from algid.report.page import write_report
     from algid.report.progress import progress
     from algid.results import read_result
 
@@ -129,7 +131,8 @@ def print_result(result: Result, form: ResultFormat) -> None:
     """Print a result to stdout: nothing but the result, so that it can be piped."""
     from rich.console import Console
 
-    from algid.report import markdown, print_table
+    from algid.report.markdown import markdown
+    from algid.report.terminal import print_table
     from algid.results import result_json
 
     if form is ResultFormat.TABLE:

@@ -70,7 +70,11 @@ def scaled_pinv(S: FloatArray, tolerance: float = RANK_TOLERANCE) -> FloatArray:
     """Pseudo-inverse of an information matrix after scaling to unit diagonal."""
     size = np.sqrt(np.maximum(np.diag(S), 0.0))
     inverse = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
-    return np.linalg.pinv(S * np.outer(inverse, inverse), rcond=tolerance, hermitian=True) * np.outer(inverse, inverse)
+    values, vectors = np.linalg.eigh(S * np.outer(inverse, inverse))
+    size = np.abs(values)
+    kept = size > tolerance * size.max(initial=0.0)
+    half = inverse[:, None] * vectors[:, kept]
+    return (half / values[kept]) @ half.T
 
 
 def combine(

@@ -211,7 +211,8 @@ def _firsts(survey: Survey) -> tuple[LogSource | None, LogSource | None]:
 
 
 def _write_pages(folder: Path, result: Result, shared_library: bool, told: Told | None) -> None:
-    from algid.report import markdown, write_report
+    from algid.report.markdown import markdown
+    from algid.report.page import write_report
 
     if told is not None:
         told("report", 0, 0)
@@ -221,7 +222,7 @@ def _write_pages(folder: Path, result: Result, shared_library: bool, told: Told 
 
 
 def _export(folder: Path, told: Told | None) -> None:
-    from algid.report import export_mcap
+    from algid.report.export import export_mcap
 
     export_mcap(folder, told)
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from algid.cli.app import app
+from tests.cli.commands import app
 
 
 class Outcome:

@@ -11,8 +11,8 @@ from typing import Any, Literal, get_origin
 import pytest
 import typer
 
-from algid.cli.app import app
 from algid.inspection import checks
+from tests.cli.commands import app
 
 FREE = {
     *("topic", "joints", "start", "end", "name", "poles", "out", "sources", "scheduler", "memory_limit", "initial"),

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 import algid
-from algid.cli.app import app
+from tests.cli.commands import app
 
 
 def run(*arguments: str | Path, code: int = 0) -> str:

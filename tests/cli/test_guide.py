@@ -9,8 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 import algid
-from algid.cli.app import app
 from algid.cli.guide import SUMMARIES, text_of
+from tests.cli.commands import app
 
 ROOT = Path(algid.__file__).parent
 CALLS = re.compile(r"\b(?:Notice|Finding)\(\s*(?:\w+=)?\"([A-Z][A-Z0-9_]*)\"")

@@ -14,9 +14,9 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from algid.cli.app import app
 from algid.errors import AlgidError
 from algid.files import LARGEST_TEXT, read_whole
+from tests.cli.commands import app
 
 WRITTEN = {"out", "save_plots", "scratch"}
 """Options that name what is written, not what is read."""

@@ -12,7 +12,6 @@ import pytest
 from typer.testing import CliRunner
 
 from algid.arm import FloatArray, inverse_dynamics
-from algid.cli.app import app
 from algid.design.campaign import Campaign, Design, plan
 from algid.design.criterion import asked_for
 from algid.design.information import Experiment, Information
@@ -25,6 +24,7 @@ from algid.errors import AlgidError, SettingError
 from algid.estimators.whitening import NoiseLevels
 from algid.progress import Told
 from algid.readers import read_log
+from tests.cli.commands import app
 
 NOISE = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
 FLAGS: dict[str, str | float | None] = {

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from algid.arm import Arm
-from algid.cli.app import app
 from algid.errors import AlgidError, ResultError, SettingError
 from algid.export.coefficients import coefficients_of
 from algid.export.description import describe
@@ -20,6 +19,7 @@ from algid.export.formats import FORMATS, exported
 from algid.export.links import Knowns, Link, links_of
 from algid.model import Model
 from algid.results import Result, result_json
+from tests.cli.commands import app
 from tests.export.arms import ODD, UNIFORM, result_of, values_of
 
 POSITIVE = st.floats(0.05, 20)

@@ -11,12 +11,12 @@ from typer.testing import CliRunner
 
 import algid
 from algid.arm import inverse_dynamics
-from algid.cli.app import app
 from algid.errors import ResultError
 from algid.export.formats import exported
 from algid.export.links import Knowns
 from algid.export.read_urdf import read_urdf
 from algid.model import Model
+from tests.cli.commands import app
 from tests.export.arms import ODD, result_of, states, values_of
 
 CAD = """<robot name="cad">

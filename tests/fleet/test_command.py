@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 
 from algid.batch.jobs import Job
 from algid.batch.records import End, Record, write_jobs
-from algid.cli.app import app
 from algid.errors import ResultError
 from algid.stores import open_store
+from tests.cli.commands import app
 
 
 def _batch(folder: Path, robots: int = 2, logs: int = 10, start_ns: int = 1_700_000_000 * 10**9) -> Path:

@@ -10,7 +10,6 @@ import pytest
 from typer.testing import CliRunner
 
 from algid.arm import CONSTANT_NAMES
-from algid.cli.app import app
 from algid.errors import LogError
 from algid.estimators import instruments, refined, weak
 from algid.estimators.weak import Source
@@ -25,6 +24,7 @@ from algid.signals.segments import Segment
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import Motion, simulate
+from tests.cli.commands import app
 
 DT = 2e-3
 SIGMA = 1e-3  # rad; ten times as much in N m

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from algid.cli.app import app
 from algid.identification.identify import identify
 from algid.identification.source import open_sources
 from algid.profile import Profile
 from algid.results import read_result
 from algid.settings import Settings
 from algid.writers import write_log
+from tests.cli.commands import app
 from tests.inspection.test_checks import moving_log
 
 

@@ -14,11 +14,11 @@ from pyarrow import feather, parquet
 from scipy.io import savemat
 from typer.testing import CliRunner
 
-from algid.cli.app import app
 from algid.errors import LogError
 from algid.log import Log
 from algid.profile import Profile
 from algid.readers import read_log
+from tests.cli.commands import app
 
 ROWS = 500
 T = np.arange(ROWS) * 1e-3

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from algid.report import write_report
+from algid.report.page import write_report
 from algid.results import Estimate, Result, Status, write_result
 from tests.report.browser import DRIVER, Browser, Seen
 from tests.report.folders import build_recorded, hostile

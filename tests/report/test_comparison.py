@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from algid.report import compare
+from algid.report.comparison import compare
 from algid.results import Estimate, Result
 from tests.report.folders import estimate
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from algid.cli.app import app
 from algid.report.comparison import compare
 from algid.report.comparison_page import _distances, _intervals, comparison_html, verdict
 from algid.results import Result, write_result
+from tests.cli.commands import app
 from tests.report.folders import HOSTILE
 
 

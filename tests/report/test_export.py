@@ -12,7 +12,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from algid.errors import ResultError
-from algid.report import export_mcap
+from algid.report.export import export_mcap
 from tests.report.folders import START_NS
 
 

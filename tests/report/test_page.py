@@ -19,14 +19,13 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.errors import ResultError
-from algid.report import write_report
 from algid.report.figures.base import Figure, Missing
 from algid.report.figures.timeline import views
 from algid.report.frame import banner
 from algid.report.gallery import gallery
 from algid.report.html import escaped, script_json
 from algid.report.library import library
-from algid.report.page import page_html
+from algid.report.page import page_html, write_report
 from algid.report.series import LogRange, read_torque
 from algid.report.verdict import Verdict
 from algid.results import Estimate, Result, Status, TermCriterion, read_result, write_result

@@ -12,12 +12,12 @@ import pytest
 from matplotlib.figure import Figure as Sheet
 from typer.testing import CliRunner
 
-from algid.cli.app import app
 from algid.errors import SettingError
 from algid.report.figures.base import Figure, Panel, axis, line
 from algid.report.gallery import gallery
 from algid.report.plots import _save, save_plots
 from algid.results import Result
+from tests.cli.commands import app
 
 
 def test_every_figure_of_the_page_becomes_a_file(case_folder: Path, result: Result, tmp_path: Path) -> None:

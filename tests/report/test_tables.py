@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from algid.report import markdown, print_table, write_report
-from algid.report.markdown import escaped
-from algid.report.page import FIRST, TOLD_ELSEWHERE, page_html
+from algid.report.markdown import escaped, markdown
+from algid.report.page import FIRST, TOLD_ELSEWHERE, page_html, write_report
 from algid.report.table import Table
 from algid.report.tables import estimate_tables, flat_settings, log_tables, settings_table
+from algid.report.terminal import print_table
 from algid.report.text import digits_of, resolved, significant
 from algid.results import Estimate, Result, Status, TorquePrediction, result_json
 from tests.report.folders import estimate, hostile

@@ -3,10 +3,11 @@ from __future__ import annotations
 import pytest
 from rich.console import Console
 
-from algid.report import markdown, print_table
 from algid.report.document import result_document
 from algid.report.html import table_html
+from algid.report.markdown import markdown
 from algid.report.tables import estimate_tables
+from algid.report.terminal import print_table
 from algid.report.verdict import verdict
 from algid.results import Bound, Cause, Estimate, Result, Status, TorquePrediction, WhitenessTest
 from tests.report.folders import estimate

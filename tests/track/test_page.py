@@ -17,7 +17,6 @@ from mcap_ros2.decoder import DecoderFactory
 from typer.testing import CliRunner
 
 import algid
-from algid.cli.app import app
 from algid.errors import ResultError
 from algid.identification.identify import identify
 from algid.synth.sensors import Sensors
@@ -28,6 +27,7 @@ from algid.track.result import StretchStatus, TrackResult, track_json
 from algid.track.run import track_log
 from algid.track.tables import change_table, fixed, stretch_table, verdict
 from algid.writers import write_log
+from tests.cli.commands import app
 from tests.report.browser import DRIVER, Browser
 from tests.report.folders import HOSTILE
 from tests.report.test_browser import assert_sound

@@ -13,7 +13,6 @@ from typer.testing import CliRunner
 
 import algid
 from algid.arm import FloatArray
-from algid.cli.app import app
 from algid.errors import LogError
 from algid.estimators.whitening import NoiseLevels
 from algid.identification.identify import identify
@@ -26,6 +25,7 @@ from algid.track.bins import Arm
 from algid.track.change_points import cuts
 from algid.track.payload import Track, track
 from algid.writers import write_log
+from tests.cli.commands import app
 from tests.track.folders import CASE, noisy
 
 MASSES = (0.0, 0.05, 0.0)
