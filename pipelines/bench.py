@@ -73,6 +73,7 @@ def contenders(folder: Path) -> list[Contender]:
         Contender("help", python("-m", "algid", "--help"), times=_QUICK),
         Contender("empty typer help", python("-c", EMPTY_APP, "--help"), times=_QUICK),
         Contender("ten seconds, report", identify(ten, out)),
+        Contender("second, report", identify(second, out)),
     ]
     for name, log in (("second", second), ("million", million)):
         found.append(Contender(f"paper {name}", identify(log, out, "--estimator", "paper", "--no-report")))
