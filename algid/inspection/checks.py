@@ -170,7 +170,7 @@ def examine(log: Log, *, gravity: float = 9.81) -> tuple[Finding, ...]:
 
 
 def _convention(mended: Mend) -> Finding:
-    told = f"use {' '.join(map(shlex.quote, mended.flags))}, or set {mended.lines} in a profile"
+    told = f"use {' '.join(map(shlex.quote, mended.flags))} (profile: {mended.lines})"
     if not mended.another:
         return Finding("ZERO_OFFSET", f"{mended.words}; {told}", flags=mended.flags)
     text = f"{mended.words}, by all that physics says ({mended.contradiction}); {told}"

@@ -161,7 +161,10 @@ def _named(path: str, available: Sequence[str], profile: Profile | None) -> dict
         named["t"] = profile.time
     for name, column in named.items():
         if column not in available:
-            raise LogError(f"{path}: the profile takes {name} from {column!r}; found {_listed(available)}")
+            raise LogError(
+                f"{path}: {name} is to be taken from {column!r}, which is not there; found {_listed(available)}; name "
+                f"another: {_flag_for(name)} (profile: {_line_for(name)})"
+            )
     return named
 
 

@@ -6,6 +6,8 @@ off, of another format, or changed since algid wrote it.
 
 from __future__ import annotations
 
+import ast
+import json
 import re
 import tomllib
 from collections.abc import Callable
@@ -16,6 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import algid
 from algid.errors import LogError
 from algid.inspection.checks import admit
 from algid.log import Log
@@ -186,6 +189,87 @@ def test_each_refusal_yields_to_the_flag_it_names(name: str, tmp_path: Path) -> 
     log = admit(read_log(path, with_settings(Profile(), settings_of(refusal.flags))))
     if refusal.warning:
         assert refusal.warning in [notice.code for notice in log.notices]
+
+
+def flat(seconds: float) -> Callable[[Path], Path]:
+    """JSON joint states whose headers' seconds are these."""
+
+    def make(folder: Path) -> Path:
+        messages = []
+        for step in range(ROWS):
+            values = moved([0.1, 0.2], step)
+            stamp = {"sec": seconds, "nanosec": step}
+            text = {"header": {"stamp": stamp}, "name": ["j1", "j2"], "position": values, "effort": values}
+            messages.append(("/arm", EPOCH_NS + step * 1_000_000, json.dumps(text).encode()))
+        write_mcap(folder / "log.mcap", messages, {"/arm": ("arm", "jsonschema", b"{}")}, encoding="json")
+        return folder / "log.mcap"
+
+    return make
+
+
+REFUSALS["header stamps that are none"] = Refusal(flat(1e300), "header stamp with", "--clock log")
+
+TAKEN = {"source": "position[a]", "topic": "/other"}
+WRONG: dict[str, tuple[Callable[[Path], Path], dict[str, Any], str]] = {
+    "a column that is not there": (table("t,q1,q2,tau1,tau2"), {"theta1": {"source": "b"}}, "--set theta1.source=NAME"),
+    "a time that is not there": (table("t,q1,q2,tau1,tau2"), {"time": "b"}, "--set time=NAME"),
+    "a field that is not there": (
+        states(("/one",), ("a", "b")), {"theta1": {"source": "b", "topic": "/one"}}, "--set theta1.source=FIELD"
+    ),
+    "a topic that is not there": (states(("/one",), ("a", "b")), {"tau1": TAKEN}, "--topic NAME"),
+    "joints that are not there": (states(("/one",), ("a", "b")), {"joints": ("c", "d")}, "--joints A,B"),
+}  # fmt: skip
+"""Logs that are refused for what a profile says of them, which that is, and the flag that the message names."""
+
+
+def flag_first(message: str) -> bool:
+    """Whether a flag stands before the first word of a profile in a message."""
+    place = re.search(r"\bprofiles?\b", message)
+    return place is None or re.search(r"--[a-z]", message[: place.start()]) is not None
+
+
+@pytest.mark.parametrize("name", REFUSALS)
+def test_a_flag_stands_before_the_line_of_a_profile(name: str, tmp_path: Path) -> None:
+    if REFUSALS[name].words:
+        with pytest.raises(LogError) as refused:
+            admit(read_log(REFUSALS[name].make(tmp_path)))
+        assert flag_first(str(refused.value)), refused.value
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_a_profile_says_wrongly_is_mended_by_a_flag(name: str, tmp_path: Path) -> None:
+    make, settings, flag = WRONG[name]
+    with pytest.raises(LogError) as refused:
+        read_log(make(tmp_path), with_settings(Profile(), settings))
+    assert f" {flag}" in str(refused.value)
+    assert "(profile: " in str(refused.value)
+    assert flag_first(str(refused.value)), refused.value
+
+
+def texts(room: str) -> list[tuple[str, str]]:
+    """Every text of a room's sources that is no docstring, what is filled in as its name; with its place."""
+    found = []
+    for path in sorted((Path(algid.__file__).parent / room).rglob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        held = {id(one) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for one in node.values}
+        held |= {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+        for node in ast.walk(tree):
+            if id(node) in held:
+                continue
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                found.append((f"{path.name}:{node.lineno}", node.value))
+            elif isinstance(node, ast.JoinedStr):
+                found.append((f"{path.name}:{node.lineno}", ast.unparse(node)))
+    return found
+
+
+@pytest.mark.parametrize("room", ["readers", "inspection"])
+def test_no_text_names_a_line_of_a_profile_alone(room: str) -> None:
+    """Also the messages that no log of these tests brings out."""
+    said = [(place, text) for place, text in texts(room) if re.search(r"\bprofile: |\b(a|the) profile\b", text)]
+    assert len(said) > 3
+    alone = [one for one in said if not re.search(r"--[a-z].*profile|\{.*flag.*profile", one[1], re.DOTALL)]
+    assert alone == []
 
 
 def test_joints_that_are_not_there_are_told_from_those_that_are(tmp_path: Path) -> None:

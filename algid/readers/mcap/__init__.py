@@ -62,7 +62,11 @@ def _series(name: str, paths: Sequence[Path], topic: Topic, known: Known) -> Ser
     """A topic as a whole, in time order."""
     tables = [table for table in Sorter(name).run(_read(paths, topic, BLOCK_ROWS, known)) if len(table)]
     if not tables:
-        raise LogError(f"{name}: topic {topic.name!r} holds no sample; name another source in the profile")
+        channel = next(iter(topic.fields.paths))
+        raise LogError(
+            f"{name}: topic {topic.name!r} holds no sample of {channel}; name another: --set {channel}.topic=NAME "
+            f"--set {channel}.source=FIELD (profile: topic and source of [{channel}])"
+        )
     return Series(topic.name, stack(tables))
 
 

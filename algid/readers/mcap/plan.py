@@ -111,12 +111,15 @@ def _topic(
     types = {type_name: _shown(file, found, name, type_name, paths) for type_name in _types(found, name)}
     types = {type_name: shown for type_name, shown in types.items() if shown.messages}
     if not types:
-        raise NothingFoundError(f"{file.path}: there is no message on topic {name!r}; found {listed(found)}")
+        mend = '--topic NAME, or --set CHANNEL.topic=NAME for one channel (profile: topic = "NAME")'
+        told = f"there is no message on topic {name!r}; found {listed(found)}; name another: {mend}"
+        raise NothingFoundError(f"{file.path}: {told}")
     type_name = min(types, key=lambda one: len(types[one].missing))
     shown = types[type_name]
     for channel in shown.missing:
         raise LogError(
-            f"{file.path}: messages on {name!r} have no {paths[channel]!r} for {channel}; found {shown.known}"
+            f"{file.path}: messages on {name!r} have no {paths[channel]!r} for {channel}; found "
+            f"{', '.join(shown.known)}; name another: --set {channel}.source=FIELD (profile: source of [{channel}])"
         )
     clock = profile.clock if profile else None
     if clock == "header" and shown.stamp is None:

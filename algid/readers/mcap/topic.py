@@ -177,7 +177,11 @@ class Topic:
                 self._chosen, notices = self._choice(header)
             stamps = header if self._chosen == "header" else stamps
         if stamps is table.stamp_ns and len(table) and stamps.min() < 0:
-            raise LogError(f"{path}: topic {self.name!r}: a log time of 2^63 ns or more; name the header's clock")
+            raise LogError(
+                f"{path}: topic {self.name!r}: a log time of 2^63 ns or more; expected ns since 1970; take the "
+                "header's stamps: --clock header"
+                ' (profile: clock = "header")'
+            )
         floats = {name: np.asarray(values, np.float64) for name, values in columns.items()}
         return Table(stamps, floats, table.notices + notices)
 
@@ -194,7 +198,8 @@ class Topic:
             if wrong.size:
                 raise LogError(
                     f"{path}: topic {self.name!r}: a header stamp with {values[wrong[0]]} for seconds or nanoseconds; "
-                    'expected whole numbers below 2^63 ns; take the recorder\'s times with clock = "log" in a profile'
+                    "expected whole numbers below 2^63 ns; take the recorder's times: "
+                    '--clock log (profile: clock = "log")'
                 )
         whole = np.floor(seconds)
         rest = nanoseconds + np.rint((seconds - whole) * 1e9) if seconds.dtype.kind == "f" else nanoseconds

@@ -1,0 +1,35 @@
+"""A log that physics refuses is identified where the user accepts it, and its result carries the warning."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from algid.inspection.checks import REFUSED
+from algid.writers import write_log
+from tests.cli.test_commands import Outcome
+from tests.inspection.test_checks import spoiled
+
+
+@pytest.mark.parametrize("code", REFUSED)
+def test_a_refused_log_is_identified_where_its_code_is_accepted(code: str, tmp_path: Path) -> None:
+    path = tmp_path / "arm.parquet"
+    write_log(path, spoiled(code))
+    refused = Outcome("identify", path, "-o", tmp_path, "--no-report")
+    assert (refused.code, refused.out) == (2, "")
+    assert refused.err.count("\n") == 1, refused.err
+    assert f"{path}: {code}: " in refused.err
+    assert f"--accept {code} (profile: accept = " in refused.err
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["arm.parquet"]
+
+    taken = Outcome(
+        "identify", path, "-o", tmp_path, "--no-report", "--model", "plain", "--estimator", "weak", "--accept", code
+    )
+    assert taken.code in (0, 3), taken.err
+    result = json.loads((tmp_path / "arm.algid" / "result.json").read_text())
+    assert any(warning.startswith(f"arm.parquet: {code}: ") for warning in result["warnings"]), result["warnings"]
+    assert "Traceback" not in taken.err
+    assert code in taken.out
+    assert result["parameters"]
