@@ -223,7 +223,9 @@ class _Search:
         count = sum(len(term_names(term)) for term in terms)
         price = count * (np.log(stretches) + 2 * np.log(max(2, len(self.candidates))))
         before, after = (self.grams.held_out_squares(some) for some in (beside, among))
-        return wald - float(price), 1 - after / before
+        # The noise is estimated too, from as many stretches.
+        evidence = stretches * np.log1p(max(wald, 0.0) / stretches)
+        return float(evidence - price), 1 - after / before
 
     def plausible(self, terms: Sequence[str], among: Sequence[str]) -> bool:
         """Whether the coefficients of `terms` beside `among` are within `_PLAUSIBLE`."""
