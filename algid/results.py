@@ -19,6 +19,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from algid.errors import ResultError
 from algid.files import first_misfit, read_text, whole_file
+from algid.words import counted
 
 SCHEMA_VERSION: Literal[2] = 2
 READABLE = (1, 2)
@@ -245,7 +246,7 @@ class FitSummary(_Model):
     def _covariance_is_square(self) -> FitSummary:
         size = len(self.covariance_names)
         if [len(row) for row in self.covariance] != [size] * size:
-            raise ValueError(f"covariance should have {size} rows of {size} numbers")
+            raise ValueError(f"covariance should have {counted(size, 'row')} of {counted(size, 'number')}")
         return self
 
 

@@ -18,6 +18,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "ros2": room(),
     "runtime": room(packages="threadpoolctl"),
     "units": room(),
+    "words": room(),
     "arm": room(packages="numpy", library=PURE),
     "model": room("arm", "numpy", PURE),
     "log": room("arm", "numpy"),
@@ -27,16 +28,16 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "stores": room("errors files", "pyarrow"),
     "profile": room("errors files units", "pydantic"),
     "settings": room("errors model signals"),
-    "results": room("errors files", "pydantic"),
+    "results": room("errors files words", "pydantic"),
     "synth": room("arm errors files log progress", "numpy pydantic scipy"),
     "table4": room("arm log results synth", "numpy"),
     "writers": room("errors files log ros2", "mcap numpy polars pyarrow"),
     "readers": room(
-        "arm errors log profile runtime units", "google lz4 mcap numpy polars pyarrow rosbags scipy zstandard"
+        "arm errors log profile runtime units words", "google lz4 mcap numpy polars pyarrow rosbags scipy zstandard"
     ),
-    "inspection": room("arm errors estimators log profile readers signals", "numpy"),
+    "inspection": room("arm errors estimators log profile readers signals words", "numpy"),
     "report": room(
-        "arm errors files progress results ros2", "matplotlib mcap numpy plotly polars pyarrow rich"
+        "arm errors files progress results ros2 words", "matplotlib mcap numpy plotly polars pyarrow rich"
     ),
     "check": room("errors files results", "pydantic"),
     "identification": room(
@@ -50,19 +51,19 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "distributed mcap polars pyarrow",
     ),
     "track": room(
-        "arm errors estimators files identification model profile report results runtime signals",
+        "arm errors estimators files identification model profile report results runtime signals words",
         "mcap numpy polars pyarrow pydantic",
     ),
     "design": room(
         "arm errors estimators files identification log model progress report results signals synth writers",
         "numpy polars pydantic scipy",
     ),
-    "export": room("arm errors files identification model report results", "numpy scipy"),
-    "fleet": room("errors files model progress report", "numpy polars scipy"),
+    "export": room("arm errors files identification model report results words", "numpy scipy"),
+    "fleet": room("errors files model progress report words", "numpy polars scipy"),
     "cli": room(
         "batch check design errors estimators export files "
         "fleet identification inspection log model profile progress readers report results runtime "
-        "settings stores synth track writers",
+        "settings stores synth track writers words",
         "numpy rich typer",
     ),
 }  # fmt: skip

@@ -11,6 +11,7 @@ import typer
 from algid.cli import EXIT_INCOMPLETE
 from algid.cli.report import ExportTo, ResultFormat, print_result
 from algid.cli.settings import Choice, takes_settings
+from algid.words import counted
 
 if TYPE_CHECKING:
     from algid.results import Result
@@ -105,7 +106,8 @@ def _tell(result: Result) -> None:
     from algid.report.text import visible
 
     for log in result.logs:
-        told = f"{log.role} {log.path}: {log.rows} samples, {log.duration:.6g} s at {log.rate:.6g} Hz, {log.format}"
+        size = f"{counted(log.rows, 'sample')}, {log.duration:.6g} s at {log.rate:.6g} Hz"
+        told = f"{log.role} {log.path}: {size}, {log.format}"
         print(visible(told), file=sys.stderr)
         for signal, source in log.mapping.items():
             print(visible(f"  {signal} from {source}"), file=sys.stderr)

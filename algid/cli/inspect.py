@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from algid.cli.settings import Choice, takes_profile
+from algid.words import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -58,8 +59,8 @@ def _print(found: Inspection, console: Console) -> None:
     if found.clock is not None:
         clock = found.clock
         console.print(
-            f"{clock.rows} samples, {clock.duration:.6g} s at {clock.rate:.6g} Hz, "
-            f"jitter {clock.jitter * 1e3:.3g} ms, {clock.gaps} gaps, the longest {clock.longest_gap:.3g} s"
+            f"{counted(clock.rows, 'sample')}, {clock.duration:.6g} s at {clock.rate:.6g} Hz, "
+            f"jitter {clock.jitter * 1e3:.3g} ms, {counted(clock.gaps, 'gap')}, the longest {clock.longest_gap:.3g} s"
         )
     _table(console, "signals", ("channel", "low", "high", "noise", "step", "saturated %"), _signals(found))
     if found.dynamics is not None:
@@ -68,7 +69,7 @@ def _print(found: Inspection, console: Console) -> None:
             f"excitation: condition number {rough.condition:.4g}; rough fit explains "
             f"{100 * rough.explained:.3g} % of the torques, "
             f"gravity {100 * rough.gravity_share:.3g} %: k4 {rough.weight1:.3g} N m, "
-            f"k2 {rough.weight2:.3g} N m, turned by {round(rough.turn)} degrees"
+            f"k2 {rough.weight2:.3g} N m, turned by {round(rough.turn)}°"
         )
     for notice in found.notices:
         console.print(f"{notice.code}: {escape(plain(notice.text))}")

@@ -12,6 +12,7 @@ import typer
 from algid.cli import EXIT_FAILED
 from algid.cli.report import ResultFormat
 from algid.cli.settings import Choice, takes_profile
+from algid.words import counted
 
 if TYPE_CHECKING:
     from algid.estimators.rollout import RolloutScore
@@ -134,7 +135,10 @@ def _simulated_lines(simulation: Simulation) -> Iterator[str]:
                 f"joint {joint}: RMSE {_number(rmse)} rad where it moved {_number(moved)} rad"
                 for joint, rmse, moved in zip((1, 2), row["rmse"], row["moved"], strict=True)
             )
-            yield f"{visible(name)}: simulated {row['horizon']:g} s from {row['starts']} states: {'; '.join(joints)}"
+            yield (
+                f"{visible(name)}: simulated {row['horizon']:g} s from "
+                f"{counted(row['starts'], 'state')}: {'; '.join(joints)}"
+            )
 
 
 def _number(value: float | None) -> str:

@@ -20,6 +20,7 @@ from algid.files import read_text
 from algid.identification.source import Role
 from algid.identification.validate import Predictor
 from algid.model import Model
+from algid.words import counted
 
 GRAVITY = 9.81
 _PARALLEL = 1e-3  # sine of the angle between axes that count as one direction
@@ -91,7 +92,7 @@ class _Robot:
         self._joints = robot.findall("joint")
         self._moving = [joint for joint in self._joints if joint.attrib["type"] != "fixed"]
         if len(self._moving) != 2 or {joint.attrib["type"] for joint in self._moving} - {"revolute", "continuous"}:
-            raise ValueError(f"found {len(self._moving)} moving joints, or not all of them turn")
+            raise ValueError(f"found {counted(len(self._moving), 'moving joint')}, or not all of them turn")
         inner = {joint.find("child").attrib["link"]: joint for joint in self._joints}  # type: ignore[union-attr]
         self._parent = inner
 

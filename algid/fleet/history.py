@@ -26,7 +26,7 @@ import numpy as np
 from algid.errors import ResultError
 from algid.files import whole_file
 from algid.progress import Told
-from algid.report.text import counted
+from algid.words import counted
 
 if TYPE_CHECKING:
     import polars as pl

@@ -19,7 +19,7 @@ from algid.report.frame import figures_html, framed, links_of
 from algid.report.html import Drawn, escaped, table_html
 from algid.report.sparkline import Course, sparklines
 from algid.report.table import Column, Table
-from algid.report.text import ABSENT, counted, joined, significant, unit_text, visible
+from algid.report.text import ABSENT, joined, significant, unit_text, visible
 from algid.report.verdict import LEVEL_WORDS, Level, Verdict
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from algid import __version__
 from algid.fleet.history import History
+from algid.words import counted
 
 MADE = f"Made by algid {__version__}."
 READING = (
@@ -176,7 +177,11 @@ def robot_table(history: History) -> Table:
         )
         for row in shown.iter_rows(named=True)
     )
-    note = "" if shown.height == history.robots else f"{history.robots:,} robots; the first {shown.height} are shown."
+    note = (
+        ""
+        if shown.height == history.robots
+        else f"{counted(history.robots, 'robot')}; the first {shown.height} are shown."
+    )
     return Table("Robots", columns, rows, note)
 
 
@@ -265,7 +270,7 @@ def _panel(history: History, robot: str, parameter: str) -> Panel:
         "hovertemplate": "%{y:.6g}<extra></extra>",
     }
     title = f"{label(robot)}: {parameter}"
-    says = f"{visible(robot)}, {parameter}, {own.height} months"
+    says = f"{visible(robot)}, {parameter}, {counted(own.height, 'month')}"
     return Panel(
         [trace],
         {"xaxis": axis(type="date"), "yaxis": axis(f"{parameter}, {unit_text(UNITS[parameter])}")},

@@ -42,6 +42,7 @@ from algid.inspection.conventions import Mend, mend
 from algid.inspection.dynamics import DynamicFigures, dynamic_figures
 from algid.log import Log, Notice, join
 from algid.signals.spacing import NEAR, near_stamps, spaced
+from algid.words import counted
 
 GAP_PERIODS = 2.5
 """A step this many periods long is a gap: a jittering clock stays below, two lost samples lie above."""
@@ -267,7 +268,8 @@ def _angles(log: Log) -> Iterator[Finding]:
         wraps = int(np.count_nonzero(np.abs(np.abs(steps) - _TURN) < 0.1 * _TURN))
         if wraps and _quiet(steps):
             text = (
-                f"{what} jumps by a turn {wraps} times: --set {name}.unwrap=true (profile: unwrap = true of [{name}])"
+                f"{what} jumps by a turn {counted(wraps, 'time')}: --set {name}.unwrap=true "
+                f"(profile: unwrap = true of [{name}])"
             )
             yield Finding("WRAPPED_ANGLE", text, True)
         frozen = _frozen(steps, log.period)
@@ -351,7 +353,7 @@ def _spikes(log: Log) -> Iterator[Finding]:
             spikes = np.flatnonzero((np.abs(off) > limit) & (aside < 0.2 * np.abs(off)) & (limit > 0))
             if spikes.size:
                 place = float(log.t[1:-1][spikes][0])
-                text = f"{_source(log, name)} has {len(spikes)} spikes, the first at t = {place:.6g} s"
+                text = f"{_source(log, name)} has {counted(len(spikes), 'spike')}, the first at t = {place:.6g} s"
                 yield Finding("SPIKES", text)
 
 
@@ -370,19 +372,21 @@ def _clock(log: Log) -> Iterator[Finding]:
     near = near_stamps(log.stamp_ns, log.period)
     if near:
         text = (
-            f"{near} samples follow the one before by less than {NEAR:g} of a period of {1e3 / clock.rate:.4g} ms, as "
+            f"{counted(near, 'sample follows', 'samples follow')} the one before by less than {NEAR:g} "
+            f"of a period of {1e3 / clock.rate:.4g} ms, as "
             "receipt times do: late ones go back to the period they are missing from, the mean stands for the others"
         )
         yield Finding("NEAR_STAMPS", text)
     lost = _lost(log)
     if lost:
         text = (
-            f"{lost} steps of the angles are twice as long as those beside them, though the stamps are even: samples "
+            f"{counted(lost, 'step of the angles is', 'steps of the angles are')} twice as long as usual, though "
+            " the stamps are even: samples "
             "were lost and the others renumbered; take the stamps of the messages, or record without losses"
         )
         yield Finding("LOST_SAMPLES", text)
     if clock.gaps:
-        text = f"{clock.gaps} gaps, the longest {clock.longest_gap:.4g} s; no window spans one"
+        text = f"{counted(clock.gaps, 'gap')}, the longest {clock.longest_gap:.4g} s; no window spans one"
         yield Finding("GAPS", text)
     if clock.jitter * clock.rate > 0.01:
         told = f"stamps jitter by {clock.jitter * 1e3:.3g} ms about a period of {1e3 / clock.rate:.4g} ms"
@@ -444,7 +448,7 @@ def _gravity(figures: DynamicFigures) -> Iterator[Finding]:
         yield Finding("FLIPPED_SIGN", text)
     elif abs(figures.turn) > 45:
         text = (
-            f"gravity is turned by {figures.turn:.0f} degrees: θ1 is not from the horizontal: --zero hanging "
+            f"gravity is turned by {figures.turn:.0f}°: θ1 is not from the horizontal: --zero hanging "
             '(profile: zero = "hanging"), or --set theta1.offset=RAD'
         )
         yield Finding("WRONG_ZERO", text)

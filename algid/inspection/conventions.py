@@ -16,6 +16,7 @@ import numpy as np
 from algid.estimators.conventions import AS_READ, Candidate, Convention, judge
 from algid.log import Log, Reading
 from algid.signals.segments import Segment, append, segments
+from algid.words import counted
 
 _SMALL = 0.1  # rad: a zero this close is a bad calibration, not another convention
 _TOLD = 0.01  # rad: a zero closer than this is not worth a word
@@ -111,7 +112,7 @@ def _contradiction(as_read: Candidate, best: Candidate) -> str:
     if not broken:
         return f"{left}, {100 * float(best.left.max()):.2g} % then"
     (name, distance), *_ = broken
-    return f"it demands {name}, which the log misses by {-distance:.0f} standard deviations"
+    return f"it demands {name}, which the log misses by {counted(round(-distance), 'standard deviation')}"
 
 
 def _clauses(convention: Convention) -> Iterator[str]:
@@ -157,7 +158,7 @@ def _zero(joint: int, angle: float) -> str:
         return "θ1 is zero hanging straight down"
     if joint == 0 and abs(angle - pi / 2) < _SAME:
         return "θ1 is zero upright"
-    return f"the zero of θ{joint + 1} is off by {degrees(angle):.4g} degrees"
+    return f"the zero of θ{joint + 1} is off by {degrees(angle):.4g}°"
 
 
 def _settings(convention: Convention, log: Log) -> dict[str, Any]:

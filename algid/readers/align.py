@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from algid.arm import FloatArray
 from algid.log import IntArray, Notice
 from algid.readers.table import Table
+from algid.words import counted
 
 _GAP = 3.0
 """Samples of the other topic this many of its periods apart are not interpolated between."""
@@ -85,6 +86,6 @@ def _told(others: Sequence[Series], lost: int) -> list[Notice]:
         for other in others
     ]
     if lost:
-        text = f"{lost} samples stand where another topic has none, and were dropped"
+        text = f"{counted(lost, 'sample was', 'samples were')} dropped, where another topic has none"
         said.append(Notice("NOT_COVERED", text, lossy=True))
     return [*said, *(notice for other in others for notice in other.table.notices)]

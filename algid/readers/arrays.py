@@ -17,6 +17,7 @@ from algid.readers.columns import Columns, assign, tables
 from algid.readers.names import TIMES
 from algid.readers.parquet import units_of_schema
 from algid.readers.table import Table
+from algid.words import counted
 
 if TYPE_CHECKING:
     import polars as pl
@@ -93,7 +94,7 @@ def _numpy(path: Path, kind: str) -> dict[str, NDArray[Any]]:
     with zipfile.ZipFile(path) as archive:
         claimed = sum(entry.file_size for entry in archive.infolist())
     if claimed > _LARGEST:
-        raise LogError(f"{path}: the archive claims {claimed} bytes unpacked; save it as Parquet")
+        raise LogError(f"{path}: the archive claims {counted(claimed, 'byte')} unpacked; save it as Parquet")
     with np.load(path, allow_pickle=False) as archive:
         return {name: archive[name] for name in archive.files}
 
@@ -138,7 +139,7 @@ def _columns(path: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArra
             upright = array if array.shape[0] == rows else array.T
             columns |= {f"{name}[{place}]": _native(upright[:, place]) for place in range(upright.shape[1])}
     if len(columns) > _MOST_COLUMNS:
-        raise LogError(f"{path}: {len(columns)} columns; expected {_MOST_COLUMNS} at most")
+        raise LogError(f"{path}: {counted(len(columns), 'column')}; expected {_MOST_COLUMNS} at most")
     return columns
 
 

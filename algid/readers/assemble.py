@@ -16,6 +16,7 @@ from algid.log import Log, Notice, Origin
 from algid.readers.convert import ROWS, Conversion, Gatherer, Room, channel_readings
 from algid.readers.order import Sorter
 from algid.readers.table import BLOCK_ROWS, Table, cut
+from algid.words import counted
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -90,7 +91,7 @@ class TableReader:
         if total < 2:
             worst = sorted(notices, key=lambda notice: not notice.lossy)[:1]
             why = "".join(f" ({notice.text})" for notice in worst)
-            raise LogError(f"{self.origin.path}: {total} samples; a log needs two at least{why}")
+            raise LogError(f"{self.origin.path}: {counted(total, 'sample')}; a log needs two at least{why}")
         if held is not None:  # what the last tables tell, also where they are empty
             yield held[0], held[1] + notices
 
@@ -112,8 +113,9 @@ class TableReader:
             left_out += len(table) - int(np.count_nonzero(inside))
             held = table.take(inside)
         if held is not None:
-            text = f"{left_out} samples before {start or 0:g} s or behind {'the end' if end is None else f'{end:g} s'}"
-            yield held.noting(Notice("CUT", f"{text} were left out, as told", note=True))
+            last = "the end" if end is None else f"{end:g} s"
+            text = f"{counted(left_out, 'sample')} before {start or 0:g} s or behind {last}"
+            yield held.noting(Notice("CUT", f"{text} left out, as told", note=True))
 
     def _convert(self, table: Table, room: Room, unwrapper: Unwrapper) -> None:
         room.stamp_ns[:] = table.stamp_ns
@@ -137,7 +139,7 @@ class TableReader:
                     self._check(name, values, first)
             first += len(table)
         if held is not None and dropped:
-            text = f"{dropped} samples hold a number that is not finite, and were left out"
+            text = f"{counted(dropped, 'sample holds', 'samples hold')} a number that is not finite; left out"
             held = held.noting(Notice("NOT_FINITE", text, lossy=True))
         if held is not None:
             yield held

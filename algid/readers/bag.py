@@ -24,6 +24,7 @@ from algid.readers.order import Sorter
 from algid.readers.rosbag2 import bag_files
 from algid.readers.sniff import SQLITE
 from algid.readers.table import BLOCK_ROWS, CHANNELS, JOINT_CHANNELS, VELOCITIES, Table, stack
+from algid.words import counted
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -147,7 +148,7 @@ class _Part:
                 yield self._table(stamps, values)
                 stamps, values = [], []
         last = self._table(stamps, values)
-        text = f"{skipped} messages on {self.topic!r} do not hold both joints and were left out"
+        text = f"{counted(skipped, 'message')} on {self.topic!r} left out for want of both joints"
         yield last.noting(Notice("OTHER_MESSAGES", text)) if skipped else last
 
     def series(self) -> Series:

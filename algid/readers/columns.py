@@ -20,6 +20,7 @@ from algid.readers.joints import along_the_arm, order_notice
 from algid.readers.names import COMMANDED, CURRENTS, Choice, choose, on_motor_side, take_apart
 from algid.readers.table import CHANNELS, JOINT_CHANNELS, VELOCITIES, Table
 from algid.units import CURRENT, NANOSECONDS, TORQUE, unit_of
+from algid.words import counted
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -381,7 +382,7 @@ def _complete(path: str, frames: Iterator[pl.DataFrame]) -> Iterator[tuple[pl.Da
             raise LogError(
                 f"{path}: no row has a value in every column that is needed; put the signals on common stamps"
             )
-        text = f"{lost} of {rows} rows lack a value and were dropped"
+        text = f"{lost} of {counted(rows, 'row')} dropped for want of a value"
         yield held, (Notice("EMPTY_CELLS", text, lossy=True),)
     else:
         yield held, ()

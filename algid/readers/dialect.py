@@ -11,6 +11,7 @@ from pathlib import Path
 from algid.errors import LogError
 from algid.readers.stated import in_text
 from algid.units import is_foreign, unit_of
+from algid.words import counted
 
 COMMENTS = ("#", "%", "//")
 _SEPARATORS = (";", "\t", ",", "|")
@@ -191,11 +192,12 @@ def _checked(
     first: str,
 ) -> Dialect:
     if len(columns) > _MOST_COLUMNS:
-        raise LogError(f"{path}: {len(columns)} columns; expected {_MOST_COLUMNS} at most")
+        raise LogError(f"{path}: {counted(len(columns), 'column')}; expected {_MOST_COLUMNS} at most")
     cells = split(first, separator)
     if len(cells) != len(columns):
         raise LogError(
-            f"{path}: line {skip + 1} has {len(cells)} cells under a header of {len(columns)}; mend the header"
+            f"{path}: line {skip + 1} has {counted(len(cells), 'cell')} under a header "
+            f"of {len(columns)}; mend the header"
         )
     repeated = sorted({name for name in columns if name and columns.count(name) > 1})
     if repeated:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 
 from algid.readers.joints import along_the_arm
 from algid.units import is_foreign, unit_of
+from algid.words import counted
 
 STEMS: dict[str, tuple[str, ...]] = {
     "theta": (
@@ -257,7 +258,9 @@ def _pair(parts: dict[str, Name], stems: tuple[str, ...], joints: tuple[str, str
         if len(by_joint) == 2 and not joints:
             return _in_order(by_joint)
         if len(by_joint) > 2 and not joints:
-            raise LookupError(f"{stem!r} stands there for {len(by_joint)} joints: {', '.join(list(by_joint)[:8])}")
+            raise LookupError(
+                f"{stem!r} stands there for {counted(len(by_joint), 'joint')}: {', '.join(list(by_joint)[:8])}"
+            )
     return None
 
 

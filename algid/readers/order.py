@@ -9,6 +9,7 @@ import numpy as np
 from algid.errors import LogError
 from algid.log import Notice
 from algid.readers.table import Table, stack
+from algid.words import counted
 
 HORIZON = 1024
 """Rows a sample may come late: a network reorders neighbours, it does not mix two recordings."""
@@ -65,7 +66,7 @@ class Sorter:
         repeated = int(fresh.size - np.count_nonzero(fresh))
         if repeated > REPEATED_SHARE * fresh.size:
             raise LogError(
-                f"{self._path}: time stands still: {repeated} of {fresh.size} stamps repeat the one before; "
+                f"{self._path}: time stands still: {repeated} of {counted(fresh.size, 'stamp')} as the one before; "
                 'expected increasing stamps; name another time: --set time=NAME (profile: time = "NAME"), of messages '
                 '--clock log (profile: clock = "log")'
             )
@@ -88,9 +89,12 @@ class Sorter:
     def _report(self) -> list[Notice]:
         found = []
         if self.late:
-            found.append(Notice("UNSORTED_STAMPS", f"{self.late} samples came late and were put in their place"))
+            found.append(Notice("UNSORTED_STAMPS", f"{counted(self.late, 'sample')} came late, now in order"))
         if self.repeated:
             found.append(
-                Notice("DUPLICATE_STAMPS", f"{self.repeated} samples repeat a stamp; the first of each was kept")
+                Notice(
+                    "DUPLICATE_STAMPS",
+                    f"{counted(self.repeated, 'sample repeats', 'samples repeat')} a stamp; the first of each was kept",
+                )
             )
         return found

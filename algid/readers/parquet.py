@@ -14,6 +14,7 @@ from algid.readers.columns import Columns, assign, check_written, tables
 from algid.readers.footer import Footer, FooterError, page_has_checksum, page_header, parsed
 from algid.readers.stated import in_metadata
 from algid.readers.table import Table
+from algid.words import counted
 
 if TYPE_CHECKING:
     import polars as pl
@@ -89,7 +90,9 @@ def _footer(path: Path) -> Footer:
     if tail[4:] != b"PAR1":
         raise LogError(f"{path}: the Parquet file is cut off: its footer is missing, so nothing can be read of it")
     if length + 12 > size or length > _LARGEST_FOOTER:
-        raise LogError(f"{path}: the Parquet footer claims {length} bytes of a file of {size}; copy the file again")
+        raise LogError(
+            f"{path}: the Parquet footer claims {counted(length, 'byte')} of a file of {size}; copy the file again"
+        )
     try:
         return parsed(footer)
     except FooterError as error:
@@ -125,7 +128,7 @@ def _flat_names(path: Path, schema: Mapping[str, pl.DataType]) -> dict[str, tupl
     import polars as pl
 
     if len(schema) > _MOST_COLUMNS:
-        raise LogError(f"{path}: {len(schema)} columns; expected {_MOST_COLUMNS} at most")
+        raise LogError(f"{path}: {counted(len(schema), 'column')}; expected {_MOST_COLUMNS} at most")
     names: dict[str, tuple[str, int | None]] = {}
     for column, kind in schema.items():
         if isinstance(kind, (pl.List, pl.Array)):
@@ -284,7 +287,9 @@ def _check_headers(path: Path, roots: Collection[str]) -> None:
                     break
                 most = header.unpacked if header.dictionary else pages.values
                 if not (0 <= header.values <= most and header.packed >= 0 and header.unpacked >= 0):
-                    raise _damaged(path, FooterError(f"a page at byte {place} claims {header.values} values"))
+                    raise _damaged(
+                        path, FooterError(f"a page at byte {place} claims {counted(header.values, 'value')}")
+                    )
                 place += header.length + header.packed
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from algid.errors import LogError
 from algid.log import Notice
+from algid.words import counted
 
 _LARGEST_METADATA = 1 << 24
 
@@ -36,9 +37,9 @@ def bag_files(folder: Path) -> Bag:
         raise LogError(f"{folder}: none of the bag's files is there; expected {names[:3]}")
     kinds = {path.suffix for path in there}
     if len(kinds) > 1:
-        raise LogError(f"{folder}: the bag mixes {', '.join(sorted(kinds))} files; read one file of it")
+        raise LogError(f"{folder}: the bag mixes files of {', '.join(sorted(kinds))}; read one file of it")
     missing = [path.name for path in paths if path not in there]
-    text = f"{len(missing)} of {len(paths)} files of the bag are missing: {', '.join(missing[:3])}"
+    text = f"{len(missing)} of {counted(len(paths), 'file')} of the bag missing: {', '.join(missing[:3])}"
     notices = (Notice("MISSING_SPLIT", text, lossy=True),) if missing else ()
     return Bag(tuple(there), kinds.pop().lstrip("."), notices)
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from algid.errors import LogError
+from algid.words import counted
 
 MCAP = b"\x89MCAP0\r\n"
 PARQUET = b"PAR1"
@@ -175,7 +176,8 @@ def _bounded(path: Path, parts: Iterator[bytes], most: int) -> Iterator[bytes]:
         total += len(part)
         if total > most:
             raise LogError(
-                f"{path}: the compressed data unpack to more than {most} bytes, as no table of their size does; "
+                f"{path}: the compressed data unpack to more than {counted(most, 'byte')}, "
+                "as no table of their size does; "
                 "if it is one, unpack it first"
             )
         yield part

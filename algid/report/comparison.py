@@ -11,6 +11,7 @@ from algid.report.table import Column, Table
 from algid.report.tables import flat_settings
 from algid.report.text import ABSENT, file_name, resolved, significant, unit_text, visible
 from algid.results import Estimate, Result
+from algid.words import counted
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> C
     if len(results) < 2:
         raise ValueError(f"a comparison needs at least two results, got {len(results)}")
     if labels is not None and len(labels) != len(results):
-        raise ValueError(f"labels must name {len(results)} results, got {len(labels)}")
+        raise ValueError(f"labels must name {counted(len(results), 'result')}, got {len(labels)}")
     shown = _distinct([visible(label) for label in labels] if labels else [file_name(r.log.path) for r in results])
     sigma = {name: _distances(name, results) for name in _names(results)}
     return Comparison(tuple(shown), sigma, _estimates(results, shown, sigma), _settings(results, shown))

@@ -13,9 +13,10 @@ from algid.report.comparison import Comparison
 from algid.report.figures.base import Figure, Layout, Legend, Panel, Trace, axis, label, packed
 from algid.report.frame import figures_html, framed, links_of
 from algid.report.html import table_html
-from algid.report.text import counted, joined, significant, visible
+from algid.report.text import joined, significant, visible
 from algid.report.verdict import Verdict
 from algid.results import Estimate, Result
+from algid.words import counted
 
 COLOURS = ("@blue", "@orange", "@green", "@amber", "@red", "@muted")
 CHANCE = 1.96  # σ that 95 % of differences by chance stay within
@@ -65,7 +66,7 @@ def verdict(found: Comparison) -> Verdict:
         return Verdict("reservations", f"With reservations: {joined(far[:3])}{more} lie beyond {FAR:g} σ.")
     inside = sum(size <= CHANCE for size, _ in distances)
     largest = max(distances)[1]
-    told = f"{inside} of {len(distances)} differences are within {CHANCE:g} σ"
+    told = f"{inside} of {counted(len(distances), 'difference')} within {CHANCE:g} σ"
     return Verdict("good", f"Good: {told}; the largest is {largest}.")
 
 
@@ -161,7 +162,7 @@ def _distances(found: Comparison) -> Figure:
         "hovermode": "closest",
     }
     largest = significant(max(sizes, default=0.0), 2)
-    note = f"{inside} of {len(sizes)} differences lie within ± {CHANCE:g} σ, the largest at {largest} σ."
+    note = f"{inside} of {counted(len(sizes), 'difference')} within ± {CHANCE:g} σ, the largest at {largest} σ."
     panels = (Panel(traces, layout, f"Distances in σ. {note}", height=FRAME + ROW * len(names)),) if names else ()
     legend = (*_legend(found, 1), Legend("", f"± {CHANCE:g} σ, 95 % by chance", "@blue/0.25", "area"))
     return Figure("distances", f"Distances from {found.labels[0]}", panels, f"Read: {READING}.", legend, note)

@@ -29,6 +29,7 @@ from algid.report.tables import (
 from algid.report.text import file_name, significant
 from algid.report.verdict import verdict
 from algid.results import Result, read_result
+from algid.words import counted
 
 FIRST = ("Parameters", "Payload")
 SECOND = ("Torque prediction",)
@@ -175,7 +176,7 @@ def _terms(result: Result) -> list[str]:
 def _facts(result: Result) -> str:
     seconds = significant(sum(log.duration for log in result.logs), 4)
     samples, rate = sum(log.rows for log in result.logs), significant(result.log.rate, 4)
-    return f"{result.estimator} estimator · {seconds} s of log at {rate} Hz · {samples:,} samples"
+    return f"{result.estimator} estimator · {seconds} s of log at {rate} Hz · {counted(samples, 'sample')}"
 
 
 def _truth(result: Result) -> dict[str, float]:

@@ -15,6 +15,7 @@ from algid.report.table import Column, Table
 from algid.report.text import ABSENT, digits_of, file_name, interval, percent, resolved, significant, unit_text, visible
 from algid.report.verdict import replaced_estimator, verdict
 from algid.results import Estimate, LogSummary, Result, Table4Row, TermCriterion, TorquePrediction
+from algid.words import counted
 
 LONGEST_VALUE = 4_000  # characters: a command that names many logs is there to be copied
 
@@ -220,7 +221,11 @@ def quality_tables(torque: TorqueLog | None, result: Result) -> list[Table]:
         )
         for log, span in sorted(torque.ranges.items())
     )
-    note = f"{torque.unpredicted:,} samples have no predicted torque." if torque.unpredicted else ""
+    note = (
+        f"{counted(torque.unpredicted, 'sample has', 'samples have')} no predicted torque."
+        if torque.unpredicted
+        else ""
+    )
     return [Table("Samples that were used", columns, rows, note)]
 
 

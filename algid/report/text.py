@@ -38,11 +38,6 @@ def joined(words: list[str]) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}" if words else ""
 
 
-def counted(count: int, noun: str) -> str:
-    """How many there are of something: 1 log, 2 logs."""
-    return f"{count:,} {noun}{'' if count == 1 else 's'}"
-
-
 def unit_text(unit: str) -> str:
     """A unit with its power as it is printed: kg m²."""
     return visible(unit).replace("^2", "²")

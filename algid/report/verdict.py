@@ -10,6 +10,7 @@ from typing import Literal
 
 from algid.report.text import joined, significant, visible
 from algid.results import Bound, Estimate, FitSummary, Result, Status, TorquePrediction
+from algid.words import counted
 
 Level = Literal["good", "reservations", "failed"]
 
@@ -113,7 +114,7 @@ def _beyond(bound: Bound) -> str:
 
 def _failure(result: Result) -> str | None:
     if result.fit is not None and not result.fit.converged:
-        return f"the estimator did not converge in {result.fit.iterations} iterations"
+        return f"the estimator did not converge in {counted(result.fit.iterations, 'iteration')}"
     if any(found.status is Status.NOT_CONVERGED for found in result.estimates.values()):
         return "the estimator did not converge"
     if _is_implausible(result):
@@ -123,7 +124,7 @@ def _failure(result: Result) -> str | None:
         return f"no parameter could be identified ({joined(words)})"
     usable, count = sum(_usable(found) for found in result.estimates.values()), len(result.estimates)
     if usable < LEAST_USABLE * count:
-        return f"only {usable} of {count} parameters could be identified"
+        return f"only {usable} of {counted(count, 'parameter')} could be identified"
     return next(_unexplained(_prediction(result.fit), WORST_R2), None)
 
 
@@ -134,12 +135,20 @@ def _usable(found: Estimate) -> bool:
 def _reserved(result: Result, reasons: tuple[str, ...]) -> str:
     usable = sum(_usable(found) for found in result.estimates.values())
     count = len(result.estimates)
-    have = f"all {count} parameters are" if usable == count else f"{usable} of {count} parameters are"
+    have = (
+        f"all {counted(count, 'parameter')} are"
+        if usable == count
+        else f"{usable} of {counted(count, 'parameter')} are"
+    )
     asked = replaced_estimator(result)
     by = "" if asked is None else f" by the {visible(result.estimator)} estimator in place of the {visible(asked)} one"
     more = len(reasons) - 1
     rest = (
-        "" if more == 0 else ", and there is one more reason below" if more == 1 else f", and {more} more reasons below"
+        ", and there is one more reason below"
+        if more == 1
+        else f", and {counted(more, 'more reason')} below"
+        if more
+        else ""
     )
     return f"With reservations: {have} identified{by}, but {reasons[0]}{rest}."
 
@@ -152,7 +161,7 @@ def replaced_estimator(result: Result) -> str | None:
 
 def _praise(result: Result) -> list[str]:
     count = len(result.estimates)
-    praise = [f"all {count} parameters are identified"]
+    praise = [f"all {counted(count, 'parameter')} are identified"]
     spreads = {name: _spread(found) for name, found in result.estimates.items() if found.std is not None}
     if spreads:
         worst = max(spreads, key=lambda name: spreads[name])

@@ -20,6 +20,7 @@ from algid.track.figures import figures
 from algid.track.payload import QUANTILE
 from algid.track.result import TrackResult, track_json
 from algid.track.tables import change_table, fit_table, provenance_tables, quality_tables, stretch_table, verdict
+from algid.words import counted
 
 
 def page_html(result: TrackResult) -> str:
@@ -27,7 +28,7 @@ def page_html(result: TrackResult) -> str:
     drawn = figures(result)
     name = file_name(result.log.path)
     seconds, rate = significant(result.log.duration, 4), significant(result.log.rate, 4)
-    facts = f"arm of {file_name(result.arm)} · {seconds} s of log at {rate} Hz · {result.log.rows:,} samples"
+    facts = f"arm of {file_name(result.arm)} · {seconds} s of log at {rate} Hz · {counted(result.log.rows, 'sample')}"
     body = [
         table_html(stretch_table(result)),
         *figures_html(drawn),

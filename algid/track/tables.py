@@ -14,6 +14,7 @@ from algid.report.text import ABSENT, file_name, joined, significant, visible
 from algid.report.verdict import LEAST_R2, WORST_R2, Verdict
 from algid.track.payload import Stretch
 from algid.track.result import StretchStatus, TrackResult
+from algid.words import counted
 
 COLUMNS = (
     Column("Stretch", "name"),
@@ -171,7 +172,7 @@ def verdict(result: TrackResult) -> Verdict:
 
 def _counted(reasons: tuple[str, ...]) -> str:
     more = len(reasons) - 1
-    rest = "" if more == 0 else f", and there {'is one more reason' if more == 1 else f'are {more} more reasons'} below"
+    rest = "" if more == 0 else f", and {counted(more, 'more reason')} below"
     return reasons[0].partition(": ")[0] + rest
 
 
@@ -182,9 +183,13 @@ def _told(result: TrackResult) -> str:
     widest = max(stretches, key=lambda stretch: stretch.std)
     times = [f"{moment:.2f}" for moment in changes[:, 0]]
     when = f" at {joined(times)} s" if len(times) <= MOST_NAMED else ""
-    how_often = "once" if len(times) == 1 else "twice" if len(times) == 2 else f"{len(times)} times"
+    how_often = "once" if len(times) == 1 else "twice" if len(times) == 2 else counted(len(times), "time")
     masses = [mass_text(stretch) for stretch in stretches]
-    what = f"weighing {joined(masses)} kg" if len(masses) <= MOST_NAMED + 1 else f"in {len(masses)} stretches"
+    what = (
+        f"weighing {joined(masses)} kg"
+        if len(masses) <= MOST_NAMED + 1
+        else f"in {counted(len(masses), 'stretch', 'stretches')}"
+    )
     return f"the payload changes {how_often}{when}, {what}, the least certain to ± {half_text(widest)} kg (95 %)"
 
 
@@ -193,7 +198,7 @@ def _failure(result: TrackResult) -> str | None:
         share = f"{max(100 * result.track.explained, 0):.0f} %"
         return f"arm and payload explain only {share} of the torque: is it this arm, in these units?"
     if result.track.colour > STRANGE and result.track.explained < ALL_BUT:
-        times = f"{result.track.colour**0.5:.0f} times"
+        times = f"{significant(float(result.track.colour) ** 0.5, 2)} times"
         return f"arm and payload miss the torque by {times} its sensors' noise: is it this arm, in these units?"
     statuses = result.statuses
     negative = sum(status is StretchStatus.NEGATIVE_MASS for status in statuses)
@@ -205,7 +210,7 @@ def _failure(result: TrackResult) -> str | None:
 
 
 def _share(some: int, count: int) -> str:
-    return "the payload weighs" if count == 1 else f"{some} of {count} stretches weigh"
+    return "the payload weighs" if count == 1 else f"{some} of {counted(count, 'stretch', 'stretches')} weigh"
 
 
 def _reasons(result: TrackResult) -> Iterator[str]:

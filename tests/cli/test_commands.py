@@ -77,7 +77,7 @@ def test_verbose_tells_on_stderr_what_was_read_and_how(logs: Path, tmp_path: Pat
     found = Outcome("identify", logs / "case1-unloaded.csv", "-o", tmp_path, "--no-report", "--format", "json", "-v")
     assert found.code == 0, found.err
     assert json.loads(found.out)["estimator"] == "refined"
-    assert "2001 samples" in found.err
+    assert "2,001 samples" in found.err
     assert "  theta1 from theta1" in found.err
     assert f"wrote {tmp_path / 'case1-unloaded.algid'}" in found.err
 

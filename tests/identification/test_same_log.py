@@ -44,7 +44,7 @@ def test_a_cut_that_was_asked_for_is_a_note_and_no_warning(tmp_path: Path) -> No
     result = identify(tmp_path / "one.csv", settings=Settings(estimator="weak"), profile=Profile(start=1), report=False)
     assert result.warnings == []
     note = next(note for note in result.notes if "left out" in note)
-    assert "1000 samples before 1 s" in note
+    assert "1,000 samples before 1 s" in note
     assert result.log.duration == pytest.approx(2.999)
 
 

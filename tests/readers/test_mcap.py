@@ -258,12 +258,12 @@ def test_a_chunk_that_breaks_off_yields_its_whole_messages(
     assert same(found, log.part(0, len(found)))
     notices = {notice.code: notice for notice in found.notices if notice.lossy}
     assert notices.keys() == {"CUT_OFF", "TORN_CHUNK"}
-    assert f"{len(found)} messages" in notices["TORN_CHUNK"].text
+    assert f"{len(found):,} messages" in notices["TORN_CHUNK"].text
     assert "could not be checked" in notices["TORN_CHUNK"].text
-    told = re.search(r"about (\d+) are lost", notices["TORN_CHUNK"].text)
+    told = re.search(r"about ([\d,]+) are lost", notices["TORN_CHUNK"].text)
     assert told is not None
     # all messages are of one size, the schema and the channel are the rest
-    assert abs(int(told[1]) - (len(log) - len(found))) < 200
+    assert abs(int(told[1].replace(",", "")) - (len(log) - len(found))) < 200
 
 
 def test_a_torn_chunk_that_is_damaged_too_is_left_out(tmp_path: Path) -> None:
@@ -295,7 +295,7 @@ def test_a_flipped_bit_costs_its_chunk_and_is_told(tmp_path: Path) -> None:
     (notice,) = found.notices
     assert notice.code == "DAMAGED_CHUNK"
     assert notice.lossy
-    assert f"{len(log) - len(found)} messages are missing" in notice.text
+    assert f"{len(log) - len(found):,} messages are missing" in notice.text
 
 
 def test_a_message_index_that_lies_is_not_believed(tmp_path: Path) -> None:
@@ -480,7 +480,7 @@ def test_messages_of_a_damaged_chunk_are_counted_by_its_index(tmp_path: Path) ->
     content[content.index(struct.pack("<d", log.theta[0, 1000]))] ^= 1
     path.write_bytes(content)
     found = read_log(path)
-    assert any(f"{len(log) - len(found)} messages are missing" in notice.text for notice in found.notices)
+    assert any(f"{len(log) - len(found):,} messages are missing" in notice.text for notice in found.notices)
 
 
 def small_chunks(path: Path, rows: int = 3000, **options: Any) -> None:
@@ -528,7 +528,7 @@ def test_one_damaged_chunk_among_many_small_ones_is_left_out_alone(tmp_path: Pat
     assert len(log) == 2999
     assert 1500 * 10**6 not in log.stamp_ns
     assert [(one.code, one.lossy) for one in log.notices if one.lossy] == [("DAMAGED_CHUNK", True)]
-    assert "1 messages are missing" in next(one.text for one in log.notices if one.lossy)
+    assert "1 message is missing" in next(one.text for one in log.notices if one.lossy)
 
 
 def test_small_chunks_that_unpack_to_much_are_not_held_together(

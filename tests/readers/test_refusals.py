@@ -335,4 +335,4 @@ def test_samples_without_a_finite_number_are_counted(tmp_path: Path) -> None:
     log = read_log(with_nan()(tmp_path), Profile(accept=("NOT_FINITE",)))
     assert len(log) == ROWS - 1
     (said,) = [one for one in log.notices if one.lossy]
-    assert said.text.startswith("1 samples hold")
+    assert said.text.startswith("1 sample holds")

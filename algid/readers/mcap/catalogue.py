@@ -18,6 +18,7 @@ from algid.readers.mcap import framing
 from algid.readers.mcap.framing import ChunkIndex, DamagedError, File, claimed, parse, unpack, unpack_torn
 from algid.readers.mcap.messages import records_in
 from algid.readers.mcap.salvage import Gap, salvaged
+from algid.words import counted
 
 _FOOTER_SIZE = 9 + 20 + 8
 _LARGEST_SUMMARY = 1 << 28
@@ -194,7 +195,7 @@ def _chunk_span(file: File, chunk: ChunkIndex) -> Span:
 def _check_counts(file: File, chunks: list[ChunkIndex], statistics: Any) -> None:
     """Compare the messages that the indexes list with those that the statistics count, for every channel."""
     if statistics.chunk_count != len(chunks):
-        raise DamagedError(f"it lists {len(chunks)} of {statistics.chunk_count} chunks")
+        raise DamagedError(f"it lists {len(chunks)} of {counted(statistics.chunk_count, 'chunk')}")
     if any(not chunk.message_index_length for chunk in chunks):
         return
     if sum(len(chunk.message_index_offsets) for chunk in chunks) > _MOST_INDEXES:
@@ -206,8 +207,8 @@ def _check_counts(file: File, chunks: list[ChunkIndex], statistics: Any) -> None
             if code != framing.MESSAGE_INDEX or named != channel or size % 16:
                 raise DamagedError(f"it claims a message index at byte {offset}")
             listed[channel] = listed.get(channel, 0) + size // 16
-    counted = {channel: count for channel, count in statistics.channel_message_counts.items() if count}
-    if listed != counted:
+    promised = {channel: count for channel, count in statistics.channel_message_counts.items() if count}
+    if listed != promised:
         raise DamagedError("its indexes and its statistics count different numbers of messages")
 
 
@@ -300,12 +301,16 @@ def _missing(file: File, gaps: list[Gap], ended: int | None, found: Catalogue) -
     said = []
     if inside:
         size = sum(gap.end - gap.start for gap in inside)
-        text = f"{size} bytes in {len(inside)} places, the first at byte {inside[0].start}, are no whole records"
+        text = (
+            f"{counted(size, 'byte')} in {counted(len(inside), 'place')}, the first at byte "
+            f"{inside[0].start}, hold no whole record"
+        )
         said.append(Notice("BROKEN_RECORD", text, lossy=True))
         found.damage += [f"no record at byte {gap.start}" for gap in inside]
     if last is not None:
-        told = "chunk, read as far as it goes" if last.torn else "record and were left out"
-        text = f"the file breaks off: its last {last.end - last.start} bytes are an unfinished {told}"
+        length = counted(last.end - last.start, "byte")
+        told = f"chunk of {length}, read as far as it goes" if last.torn else f"record of {length}, left out"
+        text = f"the file breaks off: an unfinished {told}"
         said.append(Notice("CUT_OFF", text, lossy=True))
         found.damage.append(f"it breaks off at byte {last.start}")
     elif ended is None:

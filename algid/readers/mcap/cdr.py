@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from algid.readers.mcap.columnar import MisfitError, Numbers, Shape
 from algid.readers.mcap.definitions import PRIMITIVES, Field, Types
+from algid.words import counted
 
 _ENDINGS = {0: ">", 1: "<"}
 _HEAD = 4
@@ -83,11 +84,13 @@ class _Walk:
     def advance(self, size: int) -> None:
         self.place += size
         if self.place > len(self.payload):
-            raise MisfitError(f"a message of {len(self.payload)} bytes where its schema needs {self.place} at least")
+            raise MisfitError(
+                f"a message of {counted(len(self.payload), 'byte')} where its schema needs {self.place} at least"
+            )
 
     def possible(self, count: int, least: int) -> int:
         if count * least > len(self.payload) - self.place:
-            raise MisfitError(f"a message of {len(self.payload)} bytes that claims a list of {count}")
+            raise MisfitError(f"a message of {counted(len(self.payload), 'byte')} that claims a list of {count}")
         return count
 
 
@@ -100,7 +103,7 @@ def walk(payload: bytes, root: str, types: Types) -> Shape:
         If its representation is not plain CDR, or its bytes do not fit the schema.
     """
     if len(payload) < _HEAD:
-        raise MisfitError(f"a message of {len(payload)} bytes; CDR has four at least")
+        raise MisfitError(f"a message of {counted(len(payload), 'byte')}; CDR has four at least")
     representation = int.from_bytes(payload[:2], "big")
     if representation not in _ENDINGS:
         raise MisfitError(
@@ -112,5 +115,5 @@ def walk(payload: bytes, root: str, types: Types) -> Shape:
     walk = _Walk(payload, types, shape, _ENDINGS[representation])
     walk.structure(root, "")
     if len(payload) - walk.place > _PADDING:
-        raise MisfitError(f"a message of {len(payload)} bytes where its schema ends at {walk.place}")
+        raise MisfitError(f"a message of {counted(len(payload), 'byte')} where its schema ends at {walk.place}")
     return shape

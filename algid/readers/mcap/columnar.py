@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from algid.log import IntArray
 from algid.readers.mcap.messages import Messages
+from algid.words import counted
 
 MOST_PARTS = 100_000
 """Fields, structures and strings a message may be made of; a list of numbers is one."""
@@ -223,7 +224,7 @@ class Decoder:
     ) -> Iterator[tuple[NDArray[np.intp], Fields]]:
         if size > LARGEST_MESSAGE:
             self.misfits += rows.size
-            self.misfit = self.misfit or f"messages of {size} bytes"
+            self.misfit = self.misfit or f"messages of {counted(size, 'byte')}"
             return
         lead = _lead(size)
         table = _gathered(messages, size + lead, messages.starts[rows] - lead)

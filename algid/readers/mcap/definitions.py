@@ -14,6 +14,8 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from algid.words import counted
+
 PRIMITIVES = {
     "bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
     "int32": "i4", "uint32": "u4", "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8",
@@ -68,13 +70,13 @@ def parse_msg(root: str, text: str) -> Types:
 
 def _check_length(root: str, text: str) -> None:
     if len(text) > _LONGEST:
-        raise DefinitionError(f"{root}: a definition of {len(text)} characters; expected {_LONGEST} at most")
+        raise DefinitionError(f"{root}: a definition of {counted(len(text), 'character')}; expected {_LONGEST} at most")
 
 
 def _fields(name: str, text: str) -> tuple[Field, ...]:
     fields = [found for line in text.splitlines() if (found := _field(name, line)) is not None]
     if len(fields) > _MOST_FIELDS:
-        raise DefinitionError(f"{name}: {len(fields)} fields")
+        raise DefinitionError(f"{name}: {counted(len(fields), 'field')}")
     # an empty structure takes one byte, since IDL has none
     return tuple(fields) or (Field("structure_needs_at_least_one_member", "uint8", None),)
 
@@ -90,7 +92,7 @@ def _field(name: str, line: str) -> Field | None:
         return None  # a constant
     size = found["size"]
     if size and len(size.removeprefix("<=")) > _LONGEST_NUMBER:
-        raise DefinitionError(f"{name}: a length of {len(size)} digits in the line {line.strip()[:60]!r}")
+        raise DefinitionError(f"{name}: a length of {counted(len(size), 'digit')} in the line {line.strip()[:60]!r}")
     count = None if found["array"] is None else int(size) if size.isdigit() else -1
     return Field(found["name"], found["type"], count)
 

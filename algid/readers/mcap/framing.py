@@ -18,6 +18,7 @@ from types import TracebackType
 from typing import Any, NamedTuple
 
 from algid.errors import LogError
+from algid.words import counted
 
 MAGIC = b"\x89MCAP0\r\n"
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = range(1, 9)
@@ -105,7 +106,9 @@ class File:
         """Count bytes that a chunk claims to unpack to; `DamagedError` where no honest file of this size claims so."""
         self._unpacked += size
         if self._unpacked > _FREE_BYTES + _BYTES_A_BYTE * self.size:
-            raise DamagedError(f"the chunks of a file of {self.size} bytes claim {self._unpacked} bytes so far")
+            raise DamagedError(
+                f"the chunks of a file of {counted(self.size, 'byte')} claim {counted(self._unpacked, 'byte')} so far"
+            )
 
     def works(self, steps: int) -> bool:
         """Count steps of some microsecond each; False where no honest file of this size asks for so many."""
@@ -261,7 +264,7 @@ def claimed(content: bytes) -> int:
         raise DamagedError("a chunk breaks off")
     (size,) = struct.unpack_from("<Q", content, 16)
     if size > LARGEST_CHUNK:
-        raise DamagedError(f"a chunk claims {size} bytes unpacked, more than {LARGEST_CHUNK}")
+        raise DamagedError(f"a chunk claims {counted(size, 'byte')} unpacked, more than {LARGEST_CHUNK}")
     return int(size)
 
 
@@ -275,10 +278,10 @@ def unpack(content: bytes) -> bytes:
     """
     chunk = _chunk(content)
     if chunk.packed_size != len(chunk.packed):
-        raise DamagedError(f"a chunk claims {chunk.packed_size} bytes and has {len(chunk.packed)}")
+        raise DamagedError(f"a chunk claims {counted(chunk.packed_size, 'byte')} and has {len(chunk.packed)}")
     unpacked = _unpacked(chunk.compression, chunk.packed, chunk.size)
     if len(unpacked) != chunk.size:
-        raise DamagedError(f"a chunk of {chunk.size} bytes unpacks to {len(unpacked)}")
+        raise DamagedError(f"a chunk of {counted(chunk.size, 'byte')} unpacks to {len(unpacked)}")
     _check_sum(chunk, unpacked)
     return unpacked
 
@@ -348,7 +351,7 @@ def _zstd(packed: memoryview, size: int) -> bytes:
         # the frame's own claim is what the library would allocate
         claimed = zstandard.frame_content_size(packed) if size else -1
         if claimed > size:
-            raise DamagedError(f"a chunk of {size} bytes holds a zstd frame of {claimed}")
+            raise DamagedError(f"a chunk of {counted(size, 'byte')} holds a zstd frame of {claimed}")
         return zstandard.ZstdDecompressor().decompress(packed, max_output_size=size or 1)
     except zstandard.ZstdError as error:
         raise DamagedError(f"a chunk cannot be unpacked ({error})") from error

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from algid.readers.mcap.columnar import ExcessError, Fields, MisfitError, Numbers, Shape
 from algid.readers.mcap.messages import Messages
+from algid.words import counted
 
 _LARGEST = 1 << 20
 _BYTES_A_STEP, _COMMAS_A_STEP, _STEPS_A_COLON = 64, 8, 2
@@ -35,7 +36,7 @@ def walk(payload: bytes) -> Shape:
 
 def _object(payload: bytes) -> dict[str, Any]:
     if len(payload) > _LARGEST:
-        raise MisfitError(f"a JSON message of {len(payload)} bytes; expected {_LARGEST} at most")
+        raise MisfitError(f"a JSON message of {counted(len(payload), 'byte')}; expected {_LARGEST} at most")
     try:
         found = json.loads(payload)
     except (ValueError, RecursionError) as error:

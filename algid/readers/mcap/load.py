@@ -14,6 +14,7 @@ from algid.readers.mcap.catalogue import Catalogue, RedefinedError, Span
 from algid.readers.mcap.framing import DamagedError, File, claimed, has_checksum, unpack, unpack_torn
 from algid.readers.mcap.messages import Messages, Records, entries, joined, records_in
 from algid.runtime import executor
+from algid.words import counted
 
 _AHEAD = 3
 _AHEAD_BYTES = 1 << 23
@@ -185,16 +186,16 @@ class Account:
             if batch.torn:
                 self.torn = _torn(len(batch.messages), *batch.torn)
 
-    def notices(self, counted: int | None) -> list[Notice]:
-        """What to say; `counted` is how many messages the statistics promise."""
+    def notices(self, promised: int | None) -> list[Notice]:
+        """What to say; `promised` is how many messages the statistics promise."""
         said = []
         if self.spans:
-            missing = self.lost if counted is None else counted - self.found
-            text = f"{self.spans} chunks are damaged and were left out; the first: {self.reason}"
-            counting = f"; {missing} messages are missing" if missing else ""
+            missing = self.lost if promised is None else promised - self.found
+            text = f"{counted(self.spans, 'damaged chunk')} left out; the first: {self.reason}"
+            counting = f"; {counted(missing, 'message is missing', 'messages are missing')}" if missing else ""
             said.append(Notice("DAMAGED_CHUNK", text + counting, lossy=True))
-        elif counted is not None and counted != self.found:
-            text = f"the file counts {counted} messages and holds {self.found}"
+        elif promised is not None and promised != self.found:
+            text = f"the file counts {counted(promised, 'message')} and holds {self.found}"
             said.append(Notice("MISSING_MESSAGES", text, lossy=True))
         if self.torn:
             said.append(Notice("TORN_CHUNK", self.torn, lossy=True))
@@ -205,8 +206,13 @@ class Account:
 
 def _torn(messages: int, held: int, size: int) -> str:
     """What to say of a chunk that breaks off; the lost messages are counted by the share of bytes."""
-    lost = f"about {round(messages * (size - held) / held)} are lost" if messages else "the rest is lost"
+    lost = (
+        f"about {counted(round(messages * (size - held) / held), 'is lost', 'are lost')}"
+        if messages
+        else "the rest is lost"
+    )
     return (
-        f"the last chunk breaks off: {messages} messages in its first {held} of {size} bytes were taken, {lost}; "
+        f"the last chunk breaks off: {counted(messages, 'message')} taken from its first "
+        f"{held} of {counted(size, 'byte')}, {lost}; "
         "they could not be checked, since the chunk's checksum covers all of it"
     )

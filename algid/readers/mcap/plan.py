@@ -27,6 +27,7 @@ from algid.readers.mcap.topic import (
 )
 from algid.readers.names import CURRENTS, choose, take_apart
 from algid.readers.table import JOINT_CHANNELS, VELOCITIES
+from algid.words import counted
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -213,7 +214,8 @@ def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> _Usua
         name, joints = next(iter(many.items()))
         told = ", ".join(joints[:12])
         raise LogError(
-            f"{file.path}: {name!r} has {len(joints)} joints ({told}); choose: --joints A,B (profile: joints = […])"
+            f"{file.path}: {name!r} has {counted(len(joints), 'joint')} ({told}); choose: "
+            "--joints A,B (profile: joints = […])"
         )
     if refused:
         raise refused[0]
@@ -274,7 +276,9 @@ def _candidates(file: File, found: Catalogue, profile: Profile | None) -> list[t
         return [place for place in places if place[0] == profile.topic]
     some = [place for place, numbers in places.items() if _may_hold(found, min(numbers))]
     if len(some) > _MOST_CANDIDATES:
-        raise LogError(f"{file.path}: {len(some)} topics may hold joint states: --topic NAME (profile: topic = …)")
+        raise LogError(
+            f"{file.path}: {counted(len(some), 'topic')} may hold joint states: --topic NAME (profile: topic = …)"
+        )
     return some
 
 

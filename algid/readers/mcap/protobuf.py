@@ -16,6 +16,7 @@ from typing import Any
 
 from algid.readers.mcap.columnar import MisfitError, Numbers, Shape
 from algid.readers.mcap.definitions import DefinitionError
+from algid.words import counted
 
 _FIXED = {1: "<f8", 2: "<f4", 6: "<u8", 7: "<u4", 15: "<i4", 16: "<i8"}
 _VARINTS = {3, 4, 5, 8, 13, 14, 17, 18}
@@ -50,7 +51,7 @@ def parse(root: str, data: bytes) -> Types:
     from google.protobuf.message import DecodeError
 
     if len(data) > _LONGEST:
-        raise DefinitionError(f"{root}: a descriptor of {len(data)} bytes; expected {_LONGEST} at most")
+        raise DefinitionError(f"{root}: a descriptor of {counted(len(data), 'byte')}; expected {_LONGEST} at most")
     try:
         found = {
             name: message

@@ -21,6 +21,7 @@ from algid.readers.mcap.framing import File
 from algid.readers.mcap.load import Account, batches
 from algid.readers.mcap.messages import Messages
 from algid.readers.table import VELOCITIES, Table, stack
+from algid.words import counted
 
 JOINT_STATE = ("sensor_msgs/msg/JointState", "sensor_msgs/JointState")
 DYNAMIC_JOINT_STATE = ("control_msgs/msg/DynamicJointState", "control_msgs/DynamicJointState")
@@ -140,8 +141,8 @@ class Topic:
                 yield self._clocked(path, parts)
                 parts, size = [], 0
         last = self._clocked(path, parts) if parts else Table(np.empty(0, np.int64), {})
-        counted = sum(found.counts.get(channel, 0) for channel in channels) if found.counts else None
-        said = (*account.notices(counted), *self._left_out(decoder), *self._others(found, channels))
+        promised = sum(found.counts.get(channel, 0) for channel in channels) if found.counts else None
+        said = (*account.notices(promised), *self._left_out(decoder), *self._others(found, channels))
         yield last.noting(*found.notices, *said)
 
     def count(self, found: Catalogue) -> int:
@@ -209,10 +210,13 @@ class Topic:
         said = []
         if decoder.skipped:
             lacking = "velocities too" if any(name in decoder.wanted for name in VELOCITIES) else "both joints"
-            text = f"{decoder.skipped} messages on {self.name!r} do not hold {lacking} and were left out"
+            text = f"{counted(decoder.skipped, 'message')} on {self.name!r} left out for want of {lacking}"
             said.append(Notice("OTHER_MESSAGES", text))
         if decoder.misfits:
-            text = f"{decoder.misfits} messages on {self.name!r} do not fit their schema; the first: {decoder.misfit}"
+            text = (
+                f"{counted(decoder.misfits, 'message')} on {self.name!r} of another form than "
+                f"their schema; the first: {decoder.misfit}"
+            )
             said.append(Notice("MISFIT_MESSAGES", text, lossy=True))
         return said
 
