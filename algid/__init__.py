@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from algid.synth.simulator import simulate
     from algid.writers import write_log
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "AlgidError",

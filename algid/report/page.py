@@ -114,7 +114,7 @@ def page_html(folder: Path, result: Result, shared_library: bool = False, told: 
         links,
         body,
         [*shown.figures, *shown.paper],
-        f"Made by algid {result.version} from {folder.name}/result.json.",
+        f"Made by algid {result.version} from result.json.",
         tab=file_name(result.log.path),
         shared_library=shared_library,
         scripts=[arm_script()] if arm else [],

@@ -135,7 +135,7 @@ def test_format_is_told_by_content(packed: str, tmp_path: Path) -> None:
         (CSV + "0,1,2,3,4\n0.1,1,2,3,inf\n", "tau2.*sample 2.*inf"),
         (CSV + "0,1,2,3,4\n0.1,1,x,3,4\n0.2,1,2,3,4\n", "'theta2'.*expected a number, found 'x'"),
         (CSV + "0,1,2,3,4\n0.1,1,2,3,4,5\n0.2,1,2,3,4\n", "row 2 has more cells"),
-        (CSV + "0,1,2,3,4\n", "1 samples"),
+        (CSV + "0,1,2,3,4\n", "1 sample;"),
         (CSV, "no rows"),
         (CSV + "".join(f"{9 - row},1,2,3,4\n" for row in range(9)), "time goes backwards"),
         (CSV + "5,1,2,3,4\n" * 9, "time stands still"),

@@ -137,7 +137,7 @@ def test_messages_that_do_not_fit_are_left_out_and_counted(tmp_path: Path) -> No
     assert len(found) == 299
     (notice,) = found.notices
     assert notice.lossy
-    assert "1 message on '/joint_states' of another form than their schema" in notice.text
+    assert "1 message on '/joint_states' of another form than the schema says" in notice.text
     write_mcap(
         tmp_path / "log.mcap", [(TOPIC, ns, data[: 90 if row else 200]) for row, (_, ns, data) in enumerate(messages)]
     )

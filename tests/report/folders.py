@@ -95,7 +95,7 @@ def _result(case: Case, k: FloatArray, covariance: FloatArray, unloaded: Recordi
         filter="none",
     )
     return Result(
-        version="0.1.0",
+        version="0.2.0",
         estimator="refined",
         parameters=parameters,
         payload={

@@ -214,8 +214,8 @@ class Topic:
             said.append(Notice("OTHER_MESSAGES", text))
         if decoder.misfits:
             text = (
-                f"{counted(decoder.misfits, 'message')} on {self.name!r} of another form than "
-                f"their schema; the first: {decoder.misfit}"
+                f"{counted(decoder.misfits, 'message')} on {self.name!r} of another form than the "
+                f"schema says; the first: {decoder.misfit}"
             )
             said.append(Notice("MISFIT_MESSAGES", text, lossy=True))
         return said
