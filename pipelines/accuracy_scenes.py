@@ -10,7 +10,7 @@ from algid.arm import Arm, FloatArray, regressor, with_payload
 from algid.estimators.paper import stage1, stage2
 from algid.signals.observers import LuenbergerObserver
 from algid.signals.segments import Segment
-from algid.synth.cases import load_case
+from algid.synth.cases import Case, load_case
 from algid.synth.excitation import Torque, wide_multi_sine
 from algid.synth.simulator import simulate
 from pipelines.cramer_rao import Truth
@@ -51,6 +51,14 @@ def random_arm(seed: int) -> tuple[Arm, float]:
     inertia1, inertia2 = m1 * l1**2 / 12 * rng.uniform(0.7, 1.5), m2 * l2**2 / 12 * rng.uniform(0.7, 1.5)
     b1, b2 = rng.uniform(0.05, 0.3, 2)
     return Arm(m1, m2, lc1, lc2, l1, l2, inertia1, inertia2, b1, b2), float(m2 * rng.uniform(0.25, 1.0))
+
+
+def case_of(name: str) -> Case:
+    """The paper's case `case1` or `case2`, or the random arm `arm<seed>`."""
+    if name.startswith("case"):
+        return load_case(name)
+    arm, payload = random_arm(int(name.removeprefix("arm")))
+    return Case(name, arm, payload, None, {})
 
 
 def scene(name: str) -> Scene:

@@ -29,10 +29,9 @@ from algid.identification.by_likelihood import without_nothing
 from algid.model import Model
 from algid.settings import Settings
 from algid.signals.segments import Segment
-from algid.synth.cases import load_case
 from algid.synth.excitation import Hold, SampledTorque, wide_multi_sine
 from algid.synth.simulator import simulate
-from pipelines.accuracy_scenes import random_arm
+from pipelines.accuracy_scenes import case_of
 
 ARMS = ("case1", "case2", "arm1", "arm2", "arm3")
 SIGMA_THETA, SIGMA_TAU = 1e-3, 1e-2  # rad, N m
@@ -63,7 +62,7 @@ KINDS = {
 @cache
 def _moved(name: str, kind: Kind, seed: int) -> tuple[FloatArray, Segment]:
     """Constants (7,), and the log without noise."""
-    arm = load_case(name).arm if name.startswith("case") else random_arm(int(name.removeprefix("arm")))[0]
+    arm = case_of(name).arm
     k = arm.constants()
     t = np.arange(round(kind.duration * kind.rate) + 1) / kind.rate
     wide = wide_multi_sine(arm, seed)

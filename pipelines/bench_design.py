@@ -33,9 +33,9 @@ from algid.design.prior import Knowns, of_case
 from algid.estimators import refined
 from algid.estimators.whitening import NoiseLevels
 from algid.signals.segments import Segment
-from algid.synth.cases import Case, load_case
+from algid.synth.cases import Case
 from algid.synth.follow import Plan, follow
-from pipelines.accuracy_scenes import random_arm
+from pipelines.accuracy_scenes import case_of
 
 NAMES = ("case1", "case2", "arm1", "arm2", "arm3", "arm4", "arm5")
 DURATION, RATE = 10.0, 1000.0
@@ -44,14 +44,6 @@ HANGING = np.array([-np.pi / 2, 0.0])
 WRONG = ((1.2, 1.2, 0.8), (1.2, 0.8, 1.2), (0.8, 1.2, 0.8), (0.8, 0.8, 1.2))  # of m1, m2, m_p
 Row = dict[str, Any]
 Job = tuple[str, tuple[float, float, float] | None, int]
-
-
-def case_of(name: str) -> Case:
-    """The paper's case or the random arm of that name."""
-    if name.startswith("case"):
-        return load_case(name)
-    arm, payload = random_arm(int(name.removeprefix("arm")))
-    return Case(name, arm, payload, None, {})
 
 
 def limits_of(case: Case) -> Limits:

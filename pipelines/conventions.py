@@ -24,10 +24,9 @@ from algid.inspection.conventions import mend
 from algid.log import Log, Origin
 from algid.report.verdict import LEVEL_WORDS, verdict
 from algid.results import Result
-from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import Motion, simulate
-from pipelines.accuracy_scenes import random_arm
+from pipelines.accuracy_scenes import case_of
 
 ARMS = ("case1", "case2", "arm21", "arm22", "arm23")
 RATE, DURATION = 1000.0, 5.0
@@ -95,7 +94,7 @@ INVISIBLE: dict[str, Spoil] = {
 
 def motion_of(name: str, *, loaded: bool = False) -> tuple[FloatArray, Motion]:
     """Constants (7,) of an arm by name, and its motion under a wide torque, with half of link 2's mass or without."""
-    arm = load_case(name).arm if name.startswith("case") else random_arm(int(name.removeprefix("arm")))[0]
+    arm = case_of(name).arm
     t = np.arange(round(DURATION * RATE) + 1) / RATE
     k = arm.constants()
     moved = with_payload(k, arm.payload_constants(0.5 * arm.m2)) if loaded else k

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from algid.cli.completion import listed, of_profile, settings_of_profile, words
+from algid.cli.completion import Completion, listed, of_profile, settings_of_profile, words
 from algid.settings import Settings, flag
 
 if TYPE_CHECKING:
@@ -38,83 +38,37 @@ def _terms() -> list[str]:
 _COMPLETED = {"model": listed(_terms), "delay": words("estimate")}
 """Settings that are text and take some words."""
 
-ProfileFile = Annotated[
-    Path | None,
-    typer.Option("--profile", help="algid.toml that says what the log's names and units mean.", rich_help_panel=LOG),
-]
-Topic = Annotated[str | None, typer.Option(help="Topic with the joint states.", rich_help_panel=LOG)]
-Joints = Annotated[str | None, typer.Option(help="The two joints, as NAME,NAME.", rich_help_panel=LOG)]
-AngleUnit = Annotated[
-    str | None,
-    typer.Option(
-        help="rad, deg, rev or counts.",
-        autocompletion=of_profile("unit", "theta1"),
-        rich_help_panel=LOG,
-    ),
-]
-TorqueUnit = Annotated[
-    str | None,
-    typer.Option(
-        help='"N m", "mN m", A or mA.',
-        autocompletion=of_profile("unit", "tau1"),
-        rich_help_panel=LOG,
-    ),
-]
-Zero = Annotated[
-    str | None,
-    typer.Option(
-        help="Where θ1 is zero: horizontal or hanging.", autocompletion=of_profile("zero"), rich_help_panel=LOG
-    ),
-]
+
+def _of_log(text: str, *names: str, completed: Completion | None = None) -> Any:
+    """An option that tells what the log means, with the help `text`."""
+    return typer.Option(*names, help=text, autocompletion=completed, rich_help_panel=LOG)
+
+
+ProfileFile = Annotated[Path | None, _of_log("algid.toml that says what the log's names and units mean.", "--profile")]
+Topic = Annotated[str | None, _of_log("Topic with the joint states.")]
+Joints = Annotated[str | None, _of_log("The two joints, as NAME,NAME.")]
+AngleUnit = Annotated[str | None, _of_log("rad, deg, rev or counts.", completed=of_profile("unit", "theta1"))]
+TorqueUnit = Annotated[str | None, _of_log('"N m", "mN m", A or mA.', completed=of_profile("unit", "tau1"))]
+Zero = Annotated[str | None, _of_log("Where θ1 is zero: horizontal or hanging.", completed=of_profile("zero"))]
 SecondAngle = Annotated[
-    str | None,
-    typer.Option(
-        help="θ2 is relative (to link 1) or absolute.", autocompletion=of_profile("second_angle"), rich_help_panel=LOG
-    ),
+    str | None, _of_log("θ2 is relative (to link 1) or absolute.", completed=of_profile("second_angle"))
 ]
 Drive = Annotated[
     str | None,
-    typer.Option(
-        help="Where the second motor stands: in its joint, or at the base.",
-        autocompletion=of_profile("drive"),
-        rich_help_panel=LOG,
-    ),
+    _of_log("Where the second motor stands: in its joint, or at the base.", completed=of_profile("drive")),
 ]
 Passive = Annotated[
     str | None,
-    typer.Option(
-        help="The joint without a motor, 1 or 2: its torque is zero.",
-        autocompletion=of_profile("passive"),
-        rich_help_panel=LOG,
-    ),
+    _of_log("The joint without a motor, 1 or 2: its torque is zero.", completed=of_profile("passive")),
 ]
 Sets = Annotated[
     list[str] | None,
-    typer.Option(
-        "--set",
-        help="Any setting of a profile, as tau1.sign=-1; may be repeated.",
-        autocompletion=settings_of_profile,
-        rich_help_panel=LOG,
-    ),
+    _of_log("Any setting of a profile, as tau1.sign=-1; may be repeated.", "--set", completed=settings_of_profile),
 ]
-Clock = Annotated[
-    str | None,
-    typer.Option(
-        help="Stamps of the messages' header, or of the log.", autocompletion=of_profile("clock"), rich_help_panel=LOG
-    ),
-]
-Start = Annotated[
-    str | None, typer.Option(help="Leave out what comes before, s since the log's first sample.", rich_help_panel=LOG)
-]
-End = Annotated[
-    str | None, typer.Option(help="Leave out what comes after, s since the log's first sample.", rich_help_panel=LOG)
-]
-Accept = Annotated[
-    str | None,
-    typer.Option(
-        help="Checks that may warn but not refuse, as CODE,CODE.", autocompletion=listed(_checks), rich_help_panel=LOG
-    ),
-]
+Clock = Annotated[str | None, _of_log("Stamps of the messages' header, or of the log.", completed=of_profile("clock"))]
+Start = Annotated[str | None, _of_log("Leave out what comes before, s since the log's first sample.")]
+End = Annotated[str | None, _of_log("Leave out what comes after, s since the log's first sample.")]
+Accept = Annotated[str | None, _of_log("Checks that may warn but not refuse, as CODE,CODE.", completed=listed(_checks))]
 
 
 def profile_from(file: Path | None, sets: Sequence[str] = (), **flags: str | None) -> Profile | None:

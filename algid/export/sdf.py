@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from algid.export.description import Description
 from algid.export.links import Link
-from algid.export.xml import axis, comment, losses, numbers
+from algid.export.xml import axis, comment, numbers, rotorless
 
 
 def sdf(arm: Description) -> str:
     """The arm as an SDF model, joint 1 on the world; its rotor stays in link 1's inertia."""
-    assert arm.links is not None
-    lost, remarks = losses(arm, rotors=False)
-    if arm.rotor1:
-        remarks.append("holds rotor1 within the inertia of link 1, as SDF has no rotors")
-    first, second = arm.links
-    with_rotor = Link(first.length, first.mass, first.centre, first.inertia + arm.rotor1)
+    (first, second), lost, remarks = rotorless(arm, "SDF")
     return (
         f'<?xml version="1.0"?>\n{comment(arm, remarks)}\n<sdf version="1.9">\n  <model name="{arm.name}">\n'
-        + _link("link1", "__model__", 0.0, with_rotor)
+        + _link("link1", "__model__", 0.0, first)
         + _link("link2", "link1", first.length, second)
         + f'    <frame name="tip" attached_to="link2"><pose>{numbers(second.length, 0, 0, 0, 0, 0)}</pose></frame>\n'
         + _joint("joint1", "world", "link1", axis(arm), lost.damping[0], lost.friction[0])

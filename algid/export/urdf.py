@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from algid.export.description import Description
 from algid.export.links import Link
-from algid.export.xml import axis, comment, losses, numbers
+from algid.export.xml import axis, comment, numbers, rotorless
 
 
 def urdf(arm: Description) -> str:
     """The arm as a URDF robot; joint 1's rotor stays in link 1's inertia, which turns about the same axis."""
-    assert arm.links is not None
-    lost, remarks = losses(arm, rotors=False)
-    if arm.rotor1:
-        remarks.append("holds rotor1 within the inertia of link 1, as URDF has no rotors")
-    first, second = arm.links
-    with_rotor = Link(first.length, first.mass, first.centre, first.inertia + arm.rotor1)
+    (first, second), lost, remarks = rotorless(arm, "URDF")
     joints = [
         _joint("joint1", "base", "link1", 0.0, axis(arm), lost.damping[0], lost.friction[0]),
-        _link("link1", with_rotor),
+        _link("link1", first),
         _joint("joint2", "link1", "link2", first.length, axis(arm), lost.damping[1], lost.friction[1]),
         _link("link2", second),
     ]

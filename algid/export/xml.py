@@ -6,9 +6,10 @@ and θ2 themselves and gravity pulls along -z. Without gravity it moves in the x
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from algid.export.description import Description, header, lacking
+from algid.export.links import Link
 
 HYPHENS = "\N{HYPHEN}\N{HYPHEN}"
 JUMP = "holds Coulomb friction as a jump at standstill, where algid has f tanh(omega / {width:g} rad/s)"
@@ -40,6 +41,19 @@ def losses(arm: Description, *, rotors: bool) -> tuple[Losses, list[str]]:
     friction = (kept("f1"), kept("f2"))
     second = kept("j2") if rotors else 0.0
     return Losses(damping, friction, (arm.rotor1, second)), remarks
+
+
+def rotorless(arm: Description, form: str) -> tuple[tuple[Link, Link], Losses, list[str]]:
+    """Links, losses and remarks for the format `form`, which has no rotors.
+
+    Joint 1's rotor stays in link 1's inertia, which turns about the same axis.
+    """
+    assert arm.links is not None
+    lost, remarks = losses(arm, rotors=False)
+    if arm.rotor1:
+        remarks.append(f"holds rotor1 within the inertia of link 1, as {form} has no rotors")
+    first, second = arm.links
+    return (replace(first, inertia=first.inertia + arm.rotor1), second), lost, remarks
 
 
 def axis(arm: Description) -> str:

@@ -13,6 +13,7 @@ y        the samples                         (N,)
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -31,15 +32,25 @@ LARGEST = 1e100
 Block = dict[str, FloatArray]
 
 
-def columns_of(path: Path) -> list[str]:
-    """Names of the columns of `path`; raises `ResultError` where it cannot be read."""
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    """Raises `ResultError` for what is no Parquet file that can be read."""
     import pyarrow.lib
-    import pyarrow.parquet
 
     try:
-        return list(pyarrow.parquet.read_schema(path).names)
+        yield
     except (OSError, pyarrow.lib.ArrowException) as error:
-        raise _unreadable(path, error) from error
+        reason = str(error).partition("\n")[0]
+        text = f"{path}: cannot read it as Parquet ({reason}); identify again with this version"
+        raise ResultError(text) from error
+
+
+def columns_of(path: Path) -> list[str]:
+    """Names of the columns of `path`; raises `ResultError` where it cannot be read."""
+    import pyarrow.parquet
+
+    with _reading(path):
+        return list(pyarrow.parquet.read_schema(path).names)
 
 
 def blocks(path: Path, names: Sequence[str], rows: int = ROWS) -> Iterator[Block]:
@@ -50,17 +61,13 @@ def blocks(path: Path, names: Sequence[str], rows: int = ROWS) -> Iterator[Block
     ResultError
         If the file cannot be read or lacks a column.
     """
-    import pyarrow.lib
     import pyarrow.parquet
 
     _check_columns(path, names)
-    try:
-        # without pre_buffer=False the file is kept in memory as it is read
-        with pyarrow.parquet.ParquetFile(path, pre_buffer=False) as file:
-            for batch in file.iter_batches(batch_size=rows, columns=list(names)):
-                yield {name: _array(batch.column(name)) for name in names}
-    except (OSError, pyarrow.lib.ArrowException) as error:
-        raise _unreadable(path, error) from error
+    # without pre_buffer=False the file is kept in memory as it is read
+    with _reading(path), pyarrow.parquet.ParquetFile(path, pre_buffer=False) as file:
+        for batch in file.iter_batches(batch_size=rows, columns=list(names)):
+            yield {name: _array(batch.column(name)) for name in names}
 
 
 def table_of(path: Path, names: Sequence[str]) -> dict[str, list[Any]]:
@@ -71,32 +78,27 @@ def table_of(path: Path, names: Sequence[str]) -> dict[str, list[Any]]:
     ResultError
         If the file cannot be read or lacks a column.
     """
-    import pyarrow.lib
     import pyarrow.parquet
 
     _check_columns(path, names)
-    try:
+    with _reading(path):
         found: dict[str, list[Any]] = pyarrow.parquet.read_table(path, columns=list(names)).to_pydict()
-    except (OSError, pyarrow.lib.ArrowException) as error:
-        raise _unreadable(path, error) from error
-    return found
+        return found
 
 
 def _check_columns(path: Path, names: Sequence[str]) -> None:
-    absent = [name for name in names if name not in columns_of(path)]
+    present = columns_of(path)
+    absent = [name for name in names if name not in present]
     if absent:
         raise ResultError(f"{path}: expected a column {absent[0]!r}, found none; identify again with this version")
 
 
 def row_count(path: Path) -> int:
     """Rows of `path`, from its footer; raises `ResultError` where it cannot be read."""
-    import pyarrow.lib
     import pyarrow.parquet
 
-    try:
+    with _reading(path):
         return int(pyarrow.parquet.read_metadata(path).num_rows)
-    except (OSError, pyarrow.lib.ArrowException) as error:
-        raise _unreadable(path, error) from error
 
 
 def by_log(found: Iterator[Block]) -> Iterator[tuple[int, Block]]:
@@ -113,11 +115,6 @@ def _array(column: object) -> FloatArray:
     values = np.asarray(column.to_numpy(zero_copy_only=False), dtype=np.float64)  # type: ignore[attr-defined]
     beyond = np.isfinite(values) & (np.abs(values) > LARGEST)
     return np.where(beyond, np.nan, values) if beyond.any() else values
-
-
-def _unreadable(path: Path, error: Exception) -> ResultError:
-    reason = str(error).partition("\n")[0]
-    return ResultError(f"{path}: cannot read it as Parquet ({reason}); identify again with this version")
 
 
 GOLDEN = 0.6180339887498949
