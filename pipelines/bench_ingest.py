@@ -2,7 +2,8 @@
 
 Usage: python -m pipelines.bench_ingest [FOLDER]
 
-Prints a Markdown table. Times are the best of several repetitions, page cache warm, imports excluded.
+Prints a Markdown table. Times are medians of rounds in which what is compared takes turns, page cache warm, imports
+excluded: a processor that drifts by a quarter within a run favours neither.
 """
 
 from __future__ import annotations
@@ -28,15 +29,16 @@ from pipelines import bench_files
 COLUMNS = ["stamp_ns", "theta1", "theta2", "tau1", "tau2", "omega1", "omega2"]
 
 
-def best(work: Callable[[], object], repetitions: int) -> float:
-    """Shortest time in s of several repetitions."""
-    times = []
-    for _ in range(repetitions):
-        gc.collect()
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
-    return min(times)
+def medians(rounds: int, *works: Callable[[], object]) -> list[float]:
+    """Of each work its median time in s, over rounds in which they take turns."""
+    times = np.empty((rounds, len(works)))
+    for own in times:
+        for place, work in enumerate(works):
+            gc.collect()
+            start = time.perf_counter()
+            work()
+            own[place] = time.perf_counter() - start
+    return [float(one) for one in np.median(times, axis=0)]
 
 
 def decompress(path: Path) -> int:
@@ -102,7 +104,7 @@ def joints(folder: Path) -> None:
     path = folder / "joints.mcap"
     if not path.exists():
         bench_files.joint_and_imu(path)
-    limit, ours = best(lambda: decompress(path), 7), best(lambda: read_log(path), 7)
+    limit, ours = medians(11, lambda: decompress(path), lambda: read_log(path))
     told = f"{ours:.3f} s, decompression {limit:.3f} s"
     row("1,000,000 JointState + 200,000 Imu, zstd, to decompression", "≤ 3", f"{ours / limit:.2f}", told)
     start = time.perf_counter()
@@ -120,7 +122,7 @@ def protobuf(folder: Path) -> None:
     path = folder / "protobuf.mcap"
     if not path.exists():
         bench_files.protobuf_states(path)
-    ours = best(lambda: read_log(path), 7)
+    (ours,) = medians(7, lambda: read_log(path))
     start = time.perf_counter()
     theirs = peer(path, DecoderFactory(), "/arm")
     slow = time.perf_counter() - start
@@ -155,9 +157,12 @@ def flat(folder: Path) -> None:
     bench_files.flat_files(folder)
     for kind, reader in (("parquet", pl.read_parquet), ("csv", pl.read_csv)):
         path = folder / f"arm.{kind}"
-        theirs = best(lambda path=path, reader=reader: reader(path, columns=COLUMNS), 11)  # type: ignore[misc]
-        ours = best(lambda path=path: read_log(path), 11)  # type: ignore[misc]
-        blocks = best(lambda path=path: [len(block) for block in open_log(path).blocks()], 11)  # type: ignore[misc]
+        theirs, ours, blocks = medians(
+            25,
+            lambda path=path, reader=reader: reader(path, columns=COLUMNS),  # type: ignore[misc]
+            lambda path=path: read_log(path),  # type: ignore[misc]
+            lambda path=path: [len(block) for block in open_log(path).blocks()],  # type: ignore[misc]
+        )
         told = f"{ours:.3f} s against {theirs:.3f} s; in blocks {blocks:.3f} s"
         row(f"1,000,000 rows of {kind}, to polars", "≤ 1.3", f"{ours / theirs:.2f}", told)
 

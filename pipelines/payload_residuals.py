@@ -145,8 +145,8 @@ def weighed(job: tuple[Path, str, int, float]) -> tuple[float, float, float]:
 class _Unexamined(Survey):
     """Logs without the named checks: signs and zeros of these are known, and the checks take half of the time."""
 
-    def _examined(self, log: LogSource, block: Log, alone: bool) -> list[Notice]:  # noqa: ARG002
-        return []
+    def _examined(self, log: LogSource, block: Log, alone: bool) -> tuple[Notice, ...]:  # noqa: ARG002
+        return ()
 
 
 def evaluate(folder: Path, draws: int, names: Sequence[str] = ("dfki", "kinova")) -> list[Row]:

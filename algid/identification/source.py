@@ -205,7 +205,7 @@ class Survey:
         self.logs = tuple(logs)
         self.told = told
         self._seen: dict[LogSource, Seen] = {}
-        self._findings: dict[LogSource, list[Notice]] = {}
+        self._findings: dict[LogSource, tuple[Notice, ...]] = {}
         self._digests: dict[LogSource, Beside[str]] = {}
         self._stage, self._over = "fitting", self.logs
         self._words = ""
@@ -278,21 +278,13 @@ class Survey:
             self._tell(log, rows)
         self._seen.setdefault(log, Seen(rows, first_ns, last_ns, tuple(notices)))
 
-    def _examined(self, log: LogSource, block: Log, alone: bool) -> list[Notice]:
+    def _examined(self, log: LogSource, block: Log, alone: bool) -> tuple[Notice, ...]:
         """What the named checks find in the first block; they refuse a log only where that is all of it."""
         if log not in self._findings:
-            from algid.inspection.checks import examine
+            from algid.inspection.checks import noticed
 
             block = block if alone else block.part(0, EXAMINED)
-            findings = examine(block, gravity=log.gravity)
-            refused = next((finding for finding in findings if finding.refuse), None)
-            if refused is not None and alone:
-                raise LogError(f"{log.name}: {refused.code}: {refused.text}")
-            place = "" if alone else f" (in its first {block.duration:.0f} s)"
-            self._findings[log] = [
-                Notice(finding.code, f"{finding.code}: {finding.text}{place}", flags=finding.flags)
-                for finding in findings
-            ]
+            self._findings[log] = noticed(block, gravity=log.gravity, whole=alone)
         return self._findings[log]
 
     def _tell(self, log: LogSource, rows: int) -> None:

@@ -1,6 +1,4 @@
-"""Figures of one signal and of a clock: noise floor, step, saturation, rate, jitter, gaps.
-
-Named checks of a log: what is wrong with it, and whether that forbids its use.
+"""Named checks of a log: what is wrong with it, and whether that forbids its use.
 
 ====================  =======  ==========================================================
 code                  refused  seen
@@ -14,6 +12,9 @@ ANGLE_CONSTANT        no       an angle that never changes
 STUCK_SENSOR          no       an angle freezes in motion and jumps when it comes back
 SPIKES                no       single samples far off their neighbours
 SATURATED_EFFORT      no       a torque clipped at its limit
+DEAD_EFFORT           no       a torque that keeps one value where others change all the time
+LOST_SAMPLES          no       steps twice as long as usual, though the stamps are even
+RESTS                 no       the arm stands still before it moves, or after
 GAPS                  no       samples are missing
 JITTER                no       uneven stamps
 SLOW_SAMPLING         no       fewer than ten samples in a period of the motion
@@ -40,92 +41,10 @@ from algid.arm import FloatArray
 from algid.errors import LogError
 from algid.inspection.conventions import Mend, mend
 from algid.inspection.dynamics import DynamicFigures, dynamic_figures
-from algid.log import Log, Notice, join
-from algid.signals.spacing import NEAR, near_stamps, spaced
+from algid.inspection.figures import clock_figures, robust_deviation, saturated_share, signal_figures
+from algid.log import Log, Notice
+from algid.signals.spacing import NEAR, near_stamps
 from algid.words import counted
-
-GAP_PERIODS = 2.5
-"""A step this many periods long is a gap: a jittering clock stays below, two lost samples lie above."""
-
-
-@dataclass(frozen=True)
-class SignalFigures:
-    """One channel, in its unit. `step` is 0 where values do not lie on a grid."""
-
-    low: float
-    high: float
-    noise: float
-    step: float
-    saturated: float
-
-
-@dataclass(frozen=True)
-class ClockFigures:
-    """The stamps: rate in Hz, jitter (standard deviation of steps without gaps) and longest gap in s."""
-
-    rows: int
-    duration: float
-    rate: float
-    jitter: float
-    gaps: int
-    longest_gap: float
-
-
-def signal_figures(values: FloatArray) -> SignalFigures:
-    """Figures of a channel (N,).
-
-    The noise floor is the robust deviation of its third differences over √20: smooth motion has none.
-    """
-    noise = robust_deviation(np.diff(values, 3)) / np.sqrt(20) if values.size > 3 else 0.0
-    low, high = float(values.min()), float(values.max())
-    return SignalFigures(low, high, float(noise), grid_step(values), saturated_share(values))
-
-
-def robust_deviation(values: FloatArray) -> float:
-    """Standard deviation of normal noise that outliers do not move: 1.4826 times the median deviation."""
-    if values.size == 0:
-        return 0.0
-    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
-
-
-def grid_step(values: FloatArray) -> float:
-    """The step of an encoder or converter: the smallest difference, if all are multiples of it; else 0."""
-    levels = np.unique(values[:20_000])
-    if levels.size <= 2:
-        return 0.0
-    steps = np.diff(levels)
-    smallest = float(steps[steps > 1e-9 * max(1e-300, float(np.abs(levels).max()))].min(initial=np.inf))
-    if not np.isfinite(smallest):
-        return 0.0
-    ratios = steps / smallest
-    return smallest if float(np.abs(ratios - np.rint(ratios)).max()) < 0.05 else 0.0
-
-
-def saturated_share(values: FloatArray) -> float:
-    """Share of samples within a run of three or more at the very highest or lowest value."""
-    if values.size < 3 or values.min() == values.max():
-        return 0.0
-    extreme = (values == values.max()) | (values == values.min())
-    inner = extreme[2:] & extreme[1:-1] & extreme[:-2]
-    return float(np.count_nonzero(inner) / values.size)
-
-
-def clock_figures(log: Log) -> ClockFigures:
-    """Figures of a log's stamps, two at least; gaps and jitter are those left once clusters are in their place."""
-    period, stamp_ns = log.period, log.stamp_ns
-    if near_stamps(stamp_ns, period):
-        stamp_ns = join(spaced([log], period)).stamp_ns
-    steps = np.diff(stamp_ns).astype(np.float64) * 1e-9
-    gaps = steps > GAP_PERIODS * period
-    return ClockFigures(
-        rows=len(log),
-        duration=log.duration,
-        rate=1 / period,
-        jitter=float(np.std(steps[~gaps])),
-        gaps=int(np.count_nonzero(gaps)),
-        longest_gap=float(steps.max()) if gaps.any() else 0.0,
-    )
-
 
 _DENORMAL = 1e-6
 _SPIKE = 30.0
@@ -135,6 +54,8 @@ _LOST, _LOST_SHARE, _AGAINST = 0.3, 0.003, 5.0
 _TURN = 2 * math.pi
 _SHORTEST = 1.0
 _FEWEST = 10.0
+_REST, _STILL = 0.5, 1e-3
+"""Seconds at rest that are worth a word; and of an angle's range, how far it may creep meanwhile."""
 _LEAST_PULL = 1.3
 """Weight in N m to inertia in kg m^2: a fifth of g/l for links of 1.5 m."""
 
@@ -145,19 +66,33 @@ REFUSED = ("EFFORT_ZERO", "EFFORT_DENORMAL", "EFFORT_CONSTANT", "WRAPPED_ANGLE",
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing seen: its code, what it means, whether the log is refused for it, and the flags that mend it."""
+    """One thing seen: its code, what it means, whether the log is refused for it, and the flags that mend it.
+
+    `note` tells that it may be right as it is, and is no reason to doubt a result.
+    """
 
     code: str
     text: str
     refuse: bool = False
     flags: tuple[str, ...] = ()
+    note: bool = False
 
 
-def examine(log: Log, *, gravity: float = 9.81) -> tuple[Finding, ...]:
-    """Everything that the checks above find in a log; `gravity` 0 for an arm in a horizontal plane."""
+def examine(log: Log, *, gravity: float = 9.81, whole: bool = True) -> tuple[Finding, ...]:
+    """Everything that the checks above find in a log.
+
+    Parameters
+    ----------
+    log : Log
+    gravity : float, m/s^2
+        0 for an arm in a horizontal plane.
+    whole : bool
+        False where `log` is the beginning of a longer one.
+    """
     if len(log) < 4:
         return ()
     every = (*_efforts(log), *_dead_efforts(log), *_angles(log), *_degrees(log), *_spikes(log), *_clock(log))
+    every = (*every, *_rests(log, whole))
     found = [_yielding(finding, log.origin.reading.accepted) for finding in every]
     if any(finding.refuse for finding in found):
         return tuple(found)
@@ -178,19 +113,20 @@ def _convention(mended: Mend) -> Finding:
     return Finding("WRONG_CONVENTION", text, flags=mended.flags)
 
 
-def admit(log: Log, *, gravity: float = 9.81) -> Log:
-    """The log with what was found as notices.
+def noticed(log: Log, *, gravity: float = 9.81, whole: bool = True) -> tuple[Notice, ...]:
+    """What `examine` finds, as notices.
 
     Raises
     ------
     LogError
-        If a check forbids the log's use.
+        If a check forbids the use of a log that is all there.
     """
-    found = examine(log, gravity=gravity)
-    for finding in found:
-        if finding.refuse:
-            raise LogError(f"{log.origin.path}: {finding.code}: {finding.text}")
-    return replace(log, notices=log.notices + tuple(Notice(one.code, one.text, flags=one.flags) for one in found))
+    findings = examine(log, gravity=gravity, whole=whole)
+    refused = next((finding for finding in findings if finding.refuse), None)
+    if refused is not None and whole:
+        raise LogError(f"{log.origin.path}: {refused.code}: {refused.text}")
+    place = "" if whole else f" (in its first {log.duration:.0f} s)"
+    return tuple(Notice(one.code, f"{one.code}: {one.text}{place}", flags=one.flags, note=one.note) for one in findings)
 
 
 def _yielding(finding: Finding, accepted: Collection[str]) -> Finding:
@@ -392,6 +328,44 @@ def _clock(log: Log) -> Iterator[Finding]:
         told = f"stamps jitter by {clock.jitter * 1e3:.3g} ms about a period of {1e3 / clock.rate:.4g} ms"
         bend = max(float(np.sqrt(np.mean(np.diff(row, 2) ** 2))) for row in log.theta) / 8
         yield Finding("JITTER", f"{told}; resampling moves angles by {bend:.2g} rad at most, linearly")
+
+
+def _rests(log: Log, whole: bool) -> Iterator[Finding]:
+    """A joint that stiction holds bears a torque of which the motion tells nothing: gravity's constants take it.
+
+    A posture that a motor holds freely tells more of gravity than any motion. The log cannot tell which it is: the
+    rest is named, with the flags that leave it out, and stays.
+    """
+    before = _still(log)
+    after = _still(_backwards(log)) if whole else 0.0
+    if before == log.duration or max(before, after) < _REST:
+        return
+    parts = [(before, f"for its first {before:.3g} s", f"--start {before:.4g}", f"start = {before:.4g}")]
+    end = log.duration - after
+    parts += [(after, f"for its last {after:.3g} s", f"--end {end:.4g}", f"end = {end:.4g}")]
+    _, words, flags, lines = zip(*(part for part in parts if part[0] >= _REST), strict=True)
+    text = (
+        f"the arm rests {' and '.join(words)}; where friction holds it there, the torque is not that of the weight: "
+        f"leave the rest out with {' '.join(flags)} (profile: {', '.join(lines)})"
+    )
+    yield Finding("RESTS", text, flags=flags, note=True)
+
+
+def _still(log: Log) -> float:
+    """Seconds from the first sample until a joint leaves its place, by more than noise and encoder let it."""
+    first = max(4, round(0.02 / log.period))
+    moved = len(log)
+    for theta in log.theta:
+        figures = signal_figures(theta)
+        room = max(8 * figures.noise, 2 * figures.step, _STILL * (figures.high - figures.low))
+        away = np.flatnonzero(np.abs(theta - np.median(theta[:first])) > room)
+        moved = min(moved, int(away[0]) if away.size else len(log))
+    return float(log.t[moved - 1]) if moved else 0.0
+
+
+def _backwards(log: Log) -> Log:
+    stamp_ns = log.stamp_ns[-1] - log.stamp_ns[::-1]
+    return replace(log, stamp_ns=stamp_ns, theta=log.theta[:, ::-1], tau=log.tau[:, ::-1], omega=None)
 
 
 def _lost(log: Log) -> int:

@@ -1,7 +1,7 @@
 """What of a Parquet file's structures no library tells without harm: Thrift's compact protocol, read by hand.
 
-Its footer (FileMetaData): whether it names encrypted columns, its row groups and where their pages lie. And whether a
-page's header holds a checksum.
+Its footer (FileMetaData): whether it names encrypted columns, its row groups and where their pages lie. And a page's
+header (PageHeader): its size, and its checksum, which polars does not look at.
 
 By hand: pyarrow ends the process (`std::terminate` in pyarrow 26) when it is asked for a column that is encrypted, or
 whose statistics contradict its type, and has no way to ask beforehand. The footer of a million rows of 7 columns takes
@@ -12,9 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-_STOP, _TRUE, _FALSE, _BYTE, _DOUBLE, _BINARY, _LIST, _SET, _MAP, _STRUCT = 0, 1, 2, 3, 7, 8, 9, 10, 11, 12
-_NEXT_NUMBER = 0x15
-"""The head of a field of 32 bits whose number is that of the last one and 1."""
+_STOP, _TRUE, _FALSE, _BYTE, _SHORT, _INT, _LONG, _DOUBLE, _BINARY, _LIST, _SET, _MAP, _STRUCT = range(13)
 _ENCRYPTION = {(8,), (4, 1, 8), (4, 1, 9)}
 """Fields: the file's encryption; of each row group's columns how they are encrypted, and their metadata so."""
 _GROUP, _PAGES = (4,), (4, 1, 3)
@@ -91,44 +89,82 @@ def parsed(footer: bytes) -> Footer:
 
 @dataclass(frozen=True)
 class PageHeader:
-    """What stands before a page: bytes of its header, of the page packed and unpacked, and its values."""
+    """What stands before a page: bytes of its header, of the page packed and unpacked, its values, its checksum."""
 
     length: int
     packed: int
     unpacked: int
     values: int
     dictionary: bool
+    crc: int | None
 
 
 def page_header(head: bytes) -> PageHeader:
     """The header (PageHeader) that `head` begins with.
+
+    A loop of its own: there is a header for every 20,000 values, and a reader as general as the footer's takes a third
+    of the time in which polars decodes them.
 
     Raises
     ------
     FooterError
         If it breaks off, or is none.
     """
-    reader = _PageReader(head)
+    kept: dict[tuple[int, int], int] = {}
+    outer: list[tuple[int, int]] = []
+    inside = number = place = 0  # `inside` the field of the structure that the place lies in
     try:
-        reader.struct((), 0)
+        while True:
+            byte = head[place]
+            place += 1
+            if byte == _STOP:
+                if not outer:
+                    break
+                inside, number = outer.pop()
+                continue
+            kind = byte & 15
+            if byte >> 4:
+                number += byte >> 4
+            else:
+                value, place = _varint(head, place)
+                number = value >> 1
+            if kind in (_SHORT, _INT, _LONG):
+                value, place = _varint(head, place)
+                kept[inside, number] = value >> 1 ^ -(value & 1)
+            elif kind == _STRUCT and len(outer) < _DEEPEST:
+                outer.append((inside, number))
+                inside, number = number if len(outer) == 1 else -1, 0
+            elif kind == _BINARY:
+                size, place = _varint(head, place)
+                place += size
+            elif kind == _BYTE:
+                place += 1
+            elif kind not in (_TRUE, _FALSE):
+                raise FooterError("what should be a page's header is none")
     except IndexError as error:
         raise FooterError("a page's header breaks off") from error
-    kept = reader.kept
-    values = next((kept[path] for path in _PAGE_VALUES if path in kept), 0)
-    return PageHeader(reader.place, kept.get((3,), -1), kept.get((2,), -1), values, _DICTIONARY_VALUES in kept)
+    values = next((kept[name] for name in _PAGE_VALUES if name in kept), 0)
+    crc = kept.get((0, 4))
+    return PageHeader(
+        length=place,
+        packed=kept.get((0, 3), -1),
+        unpacked=kept.get((0, 2), -1),
+        values=values,
+        dictionary=_DICTIONARY_VALUES in kept,
+        crc=None if crc is None else crc & 0xFFFFFFFF,
+    )
 
 
-def page_has_checksum(head: bytes) -> bool:
-    """Whether a page whose header (PageHeader) begins so carries a checksum: its field 4, behind three numbers."""
-    reader = _Reader(head)
-    try:
-        for _ in range(3):
-            if reader.byte() != _NEXT_NUMBER:
-                return False
-            reader.varint()
-        return reader.byte() == _NEXT_NUMBER
-    except (IndexError, FooterError):
-        return False
+def _varint(data: bytes, place: int) -> tuple[int, int]:
+    """The number that stands at a place, and the place behind it."""
+    value = shift = 0
+    while (byte := data[place]) & 0x80:
+        value |= (byte & 0x7F) << shift
+        shift += 7
+        place += 1
+        if shift > 63:
+            raise FooterError("it holds a number without an end")
+    return value | byte << shift, place + 1
 
 
 @dataclass
@@ -201,20 +237,5 @@ class _Reader:
         return self.data[self.place - 1]
 
     def varint(self) -> int:
-        value = shift = 0
-        while (byte := self.byte()) & 0x80:
-            value |= (byte & 0x7F) << shift
-            shift += 7
-            if shift > 63:
-                raise FooterError("it holds a number without an end")
-        return value | byte << shift
-
-
-@dataclass
-class _PageReader(_Reader):
-    """Keeps every whole number of a page's header by its field."""
-
-    kept: dict[tuple[int, ...], int] = field(default_factory=dict)
-
-    def _keep(self, path: tuple[int, ...], value: int) -> None:
-        self.kept[path] = value >> 1 ^ -(value & 1)
+        value, self.place = _varint(self.data, self.place)
+        return value

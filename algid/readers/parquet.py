@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +12,7 @@ from algid.errors import LogError
 from algid.log import CANONICAL_COLUMNS, KEY, Companion, Notice, loads
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign, check_written, tables
-from algid.readers.footer import Footer, FooterError, page_has_checksum, page_header, parsed
+from algid.readers.footer import Footer, FooterError, page_header, parsed
 from algid.readers.stated import in_metadata
 from algid.readers.table import Table
 from algid.words import counted
@@ -26,8 +27,6 @@ _MOST_COLUMNS = 4096
 _LARGEST_FOOTER = 1 << 26
 _NO_UNIT, _LONGEST_UNIT = ("", "-", "1", "none", "null", "unknown", "dimensionless"), 40
 _LARGEST_HEADER = 1 << 14
-_PAGE_HEAD = 64
-"""Bytes in which a page's checksum stands, if it has one."""
 _NO_SUMS = Notice("NO_CHECKSUM", "the file has no sums of its values, as algid's have: changes would go unseen")
 
 
@@ -132,7 +131,7 @@ def _flat_names(path: Path, schema: Mapping[str, pl.DataType]) -> dict[str, tupl
     names: dict[str, tuple[str, int | None]] = {}
     for column, kind in schema.items():
         if isinstance(kind, (pl.List, pl.Array)):
-            _check_headers(path, {column})
+            _check_pages(path, {column})
             first = pl.scan_parquet(path, glob=False).select(pl.col(column)).head(1).collect()
             width = len(first.item()) if first.height and first.item() is not None else 0
             names |= {f"{column}[{place}]": (column, place) for place in range(min(width, 64))}
@@ -198,15 +197,16 @@ def _check_types(
             raise LogError(f"{path}: column {source!r} for {name} holds {inner}; expected numbers")
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Groups:
-    """A Parquet file's row groups and the columns to take from them."""
+    """A Parquet file's row groups and the columns to take from them; their pages are `checked` by the first pass."""
 
     path: Path
     columns: Columns
     available: Mapping[str, tuple[str, int | None]]
     schema: Mapping[str, pl.DataType]
     sums: Mapping[str, int]
+    checked: bool = False
 
     def tables(self, rows: int) -> Iterator[Table]:
         """Tables of about `rows` rows."""
@@ -216,7 +216,9 @@ class _Groups:
         """Frames of `rows` rows, the last of fewer. Columns come in two lots, since one lot takes one core."""
         import polars as pl
 
-        _check_headers(self.path, self._roots)
+        if not self.checked:
+            _check_pages(self.path, self._roots, summed=self.sums)
+            self.checked = True
         frame = pl.scan_parquet(self.path, glob=False)
         numbers = [self._number(name, source) for name, source in self.columns.sources.items()]
         middle = (len(numbers) // 2 + 1) // 2 * 2  # both joints in one lot: they may share a list column
@@ -225,22 +227,7 @@ class _Groups:
             lots = [frame.select(lot).collect_batches(chunk_size=rows) for lot in (numbers[:middle], numbers[middle:])]
             for first, second in zip(*lots, strict=True):
                 yield first.hstack(second)
-            self._check_pages()
         except (pl.exceptions.PolarsError, OSError, ValueError, pl.exceptions.PanicException) as error:
-            raise _damaged(self.path, error) from error
-
-    def _check_pages(self) -> None:
-        """Have the pages' checksums verified, where they have any; polars does not look at them."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        roots = self._roots
-        try:
-            if _has_checksums(self.path, roots):
-                with pq.ParquetFile(self.path, page_checksum_verification=True, pre_buffer=False) as file:
-                    for _ in file.iter_batches(columns=sorted(roots)):
-                        pass
-        except (pa.ArrowException, OSError, ValueError) as error:
             raise _damaged(self.path, error) from error
 
     @property
@@ -272,8 +259,12 @@ class _Groups:
         return self.columns
 
 
-def _check_headers(path: Path, roots: Collection[str]) -> None:
-    """Refuse pages of columns among `roots` that claim values which cannot be: polars would end the process."""
+def _check_pages(path: Path, roots: Collection[str], summed: Collection[str] = ()) -> None:
+    """Refuse pages of columns among `roots` that claim values which cannot be, or whose checksum is wrong.
+
+    At the first polars would end the process, and at the second it does not look. The values of `summed` columns are
+    verified as they are read.
+    """
     with path.open("rb") as stream:
         for pages in (pages for group in _footer(path).groups for pages in group.columns):
             if not (pages.path and pages.path[0] in roots):
@@ -290,18 +281,12 @@ def _check_headers(path: Path, roots: Collection[str]) -> None:
                     raise _damaged(
                         path, FooterError(f"a page at byte {place} claims {counted(header.values, 'value')}")
                     )
-                place += header.length + header.packed
-
-
-def _has_checksums(path: Path, roots: Collection[str]) -> bool:
-    """Whether the first page of a column among `roots` carries a checksum, in any row group."""
-    with path.open("rb") as stream:
-        for pages in (pages for group in _footer(path).groups for pages in group.columns):
-            if pages.path[:1] and pages.path[0] in roots:
-                stream.seek(pages.first)
-                if page_has_checksum(stream.read(_PAGE_HEAD)):
-                    return True
-    return False
+                place += header.length
+                if header.crc is not None and pages.path[0] not in summed:
+                    stream.seek(place)
+                    if zlib.crc32(stream.read(header.packed)) != header.crc:
+                        raise _damaged(path, FooterError(f"the checksum of a page at byte {place} is wrong"))
+                place += header.packed
 
 
 def _damaged(path: Path, error: BaseException) -> LogError:

@@ -11,8 +11,9 @@ import pytest
 
 from algid.arm import Arm, FloatArray, inverse_dynamics
 from algid.errors import LogError
-from algid.inspection.checks import admit, examine, signal_figures
+from algid.inspection.checks import examine, noticed
 from algid.inspection.dynamics import dynamic_figures
+from algid.inspection.figures import signal_figures
 from algid.log import Log, Origin
 from algid.profile import Profile
 from algid.readers import read_log
@@ -46,7 +47,7 @@ def codes(log: Log) -> list[str]:
 def test_a_clean_log_raises_nothing() -> None:
     log = moving_log()
     assert codes(log) == []
-    assert admit(log).notices == ()
+    assert noticed(log) == ()
 
 
 def with_row(values: FloatArray, row: int, new: FloatArray | float) -> FloatArray:
@@ -118,9 +119,9 @@ def test_each_check_sees_what_it_is_for(code: str) -> None:
     assert code in codes(log)
     if code in REFUSED:
         with pytest.raises(LogError, match=f"arm.csv: {code}"):
-            admit(log)
+            noticed(log)
     else:
-        assert code in [notice.code for notice in admit(log).notices]
+        assert code in [notice.code for notice in noticed(log)]
 
 
 def test_an_arm_in_a_horizontal_plane_is_not_asked_for_weight() -> None:
@@ -230,3 +231,33 @@ def test_angles_of_motors_may_be_what_looks_like_degrees() -> None:
     log = moving()
     (told,) = [finding for finding in examine(replace(log, theta=30 * log.theta)) if finding.code == "DEGREES"]
     assert "--set theta1.gear_ratio=N" in told.text or "--set theta2.gear_ratio=N" in told.text
+
+
+def resting(before: float, after: float) -> Log:
+    """The moving log, held where it starts and where it ends for so many seconds."""
+    log = moving_log()
+    rows = [round(1000 * seconds) for seconds in (before, after)]
+    noise = np.random.default_rng(8).normal(0, 1e-4, (2, sum(rows)))
+    held = [np.repeat(log.theta[:, [end]], count, axis=1) for end, count in zip((0, -1), rows, strict=True)]
+    theta = np.hstack([held[0], log.theta, held[1]])
+    theta[:, : rows[0]] += noise[:, : rows[0]]
+    theta[:, theta.shape[1] - rows[1] :] += noise[:, rows[0] :]
+    tau = np.pad(log.tau, ((0, 0), rows), mode="edge")
+    stamps = np.arange(theta.shape[1]) * 1_000_000
+    return Log(stamps, theta, tau + np.random.default_rng(9).normal(0, 0.02, tau.shape), log.origin)
+
+
+@pytest.mark.parametrize(("before", "after"), [(0.8, 0), (0, 1.2), (0.8, 1.2)])
+def test_rest_is_told_with_the_flags_that_leave_it_out(before: float, after: float) -> None:
+    (found,) = (one for one in examine(resting(before, after)) if one.code == "RESTS")
+    told = {flag.split()[0]: float(flag.split()[1]) for flag in found.flags}
+    expected = {"--start": before} if before else {}
+    expected |= {"--end": before + 6.0} if after else {}
+    assert told == pytest.approx(expected, abs=0.03)  # it moves by no more than noise meanwhile
+    assert found.note
+    assert not found.refuse
+
+
+def test_a_short_rest_and_the_end_of_a_part_are_no_rest() -> None:
+    assert "RESTS" not in codes(resting(0.4, 0.3))
+    assert "RESTS" not in [one.code for one in examine(resting(0, 1.2), whole=False)]

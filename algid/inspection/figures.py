@@ -1,0 +1,93 @@
+"""Figures of one signal and of a clock: noise floor, step, saturation, rate, jitter, gaps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.log import Log, join
+from algid.signals.spacing import near_stamps, spaced
+
+GAP_PERIODS = 2.5
+"""A step this many periods long is a gap: a jittering clock stays below, two lost samples lie above."""
+
+
+@dataclass(frozen=True)
+class SignalFigures:
+    """One channel, in its unit. `step` is 0 where values do not lie on a grid."""
+
+    low: float
+    high: float
+    noise: float
+    step: float
+    saturated: float
+
+
+@dataclass(frozen=True)
+class ClockFigures:
+    """The stamps: rate in Hz, jitter (standard deviation of steps without gaps) and longest gap in s."""
+
+    rows: int
+    duration: float
+    rate: float
+    jitter: float
+    gaps: int
+    longest_gap: float
+
+
+def signal_figures(values: FloatArray) -> SignalFigures:
+    """Figures of a channel (N,).
+
+    The noise floor is the robust deviation of its third differences over √20: smooth motion has none.
+    """
+    noise = robust_deviation(np.diff(values, 3)) / np.sqrt(20) if values.size > 3 else 0.0
+    low, high = float(values.min()), float(values.max())
+    return SignalFigures(low, high, float(noise), grid_step(values), saturated_share(values))
+
+
+def robust_deviation(values: FloatArray) -> float:
+    """Standard deviation of normal noise that outliers do not move: 1.4826 times the median deviation."""
+    if values.size == 0:
+        return 0.0
+    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+
+
+def grid_step(values: FloatArray) -> float:
+    """The step of an encoder or converter: the smallest difference, if all are multiples of it; else 0."""
+    levels = np.unique(values[:20_000])
+    if levels.size <= 2:
+        return 0.0
+    steps = np.diff(levels)
+    smallest = float(steps[steps > 1e-9 * max(1e-300, float(np.abs(levels).max()))].min(initial=np.inf))
+    if not np.isfinite(smallest):
+        return 0.0
+    ratios = steps / smallest
+    return smallest if float(np.abs(ratios - np.rint(ratios)).max()) < 0.05 else 0.0
+
+
+def saturated_share(values: FloatArray) -> float:
+    """Share of samples within a run of three or more at the very highest or lowest value."""
+    if values.size < 3 or values.min() == values.max():
+        return 0.0
+    extreme = (values == values.max()) | (values == values.min())
+    inner = extreme[2:] & extreme[1:-1] & extreme[:-2]
+    return float(np.count_nonzero(inner) / values.size)
+
+
+def clock_figures(log: Log) -> ClockFigures:
+    """Figures of a log's stamps, two at least; gaps and jitter are those left once clusters are in their place."""
+    period, stamp_ns = log.period, log.stamp_ns
+    if near_stamps(stamp_ns, period):
+        stamp_ns = join(spaced([log], period)).stamp_ns
+    steps = np.diff(stamp_ns).astype(np.float64) * 1e-9
+    gaps = steps > GAP_PERIODS * period
+    return ClockFigures(
+        rows=len(log),
+        duration=log.duration,
+        rate=1 / period,
+        jitter=float(np.std(steps[~gaps])),
+        gaps=int(np.count_nonzero(gaps)),
+        longest_gap=float(steps.max()) if gaps.any() else 0.0,
+    )
