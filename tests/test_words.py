@@ -1,4 +1,4 @@
-"""Numbers and their nouns agree: 1 sample, 2 samples."""
+"""The words of messages: numbers and their nouns agree, and a flag stands before the line of a profile."""
 
 from __future__ import annotations
 
@@ -98,5 +98,43 @@ def test_what_the_walk_finds(source: str, found: list[str]) -> None:
 def test_no_number_stands_before_a_plural_of_its_own_making() -> None:
     found = [
         f"{path.relative_to(ROOT)}:{one}" for path in sorted(ROOT.rglob("*.py")) for one in unhelped(path.read_text())
+    ]
+    assert found == []
+
+
+def behind_a_profile(source: str) -> Iterator[str]:
+    """Every text that gives the line of a profile, and no flag or filled-in word before it."""
+    tree = ast.parse(source)
+    within = {id(part) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in ast.walk(node)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            text = "".join(str(part.value) if isinstance(part, ast.Constant) else "--x" for part in node.values)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in within:
+            text = node.value
+        else:
+            continue
+        place = text.find("(profile:")
+        if place >= 0 and not re.search(r"--[a-z]", text[:place]):
+            yield f"{node.lineno}: {text[:60]}"
+
+
+@pytest.mark.parametrize(
+    ("source", "found"),
+    [
+        ("'a (profile: start = 2)'", 1),
+        ("'--start 2 (profile: start = 2)'", 0),
+        ("f'{flag} (profile: {line})'", 0),
+        ("f'set (profile: {line}) or {flag}'", 1),
+    ],
+)
+def test_what_the_walk_finds_behind_a_profile(source: str, found: int) -> None:
+    assert len(list(behind_a_profile(source))) == found
+
+
+def test_a_message_names_the_flag_before_the_line_of_a_profile() -> None:
+    found = [
+        f"{path.relative_to(ROOT)}:{one}"
+        for path in sorted(ROOT.rglob("*.py"))
+        for one in behind_a_profile(path.read_text())
     ]
     assert found == []

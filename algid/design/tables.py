@@ -76,7 +76,7 @@ def limit_table(design: Design) -> Table:
                 significant(limit, 4),
                 SIGNS[row.limit],
                 percent(used, 1.0, 3),
-                "binds" if used >= BINDS * most else "",
+                "yes" if used >= BINDS * most else "",
             )
         )
     columns = (
@@ -85,7 +85,7 @@ def limit_table(design: Design) -> Table:
         Column("Allowed", "number"),
         Column("Unit", "text", 3),
         Column("%", "number"),
-        Column("", "text"),
+        Column("Binds", "text"),
     )
     note = (
         f"A margin of {percent(design.campaign.margin, 1.0)} % is left for what a controller overshoots. Torque is the "
