@@ -21,9 +21,9 @@ from algid.estimators.paper import (
     stage2_series,
     wanders,
 )
+from algid.identification.outcome import FAR_BEYOND, Identified, distrusted
 from algid.identification.series import series_blocks, write_columns
 from algid.identification.source import LogSource, Survey
-from algid.identification.summary import FAR_BEYOND, Identified, distrusted
 from algid.identification.velocities import with_velocities
 from algid.results import Estimate, Status
 from algid.settings import Settings

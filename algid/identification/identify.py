@@ -14,9 +14,10 @@ from algid.errors import LogError, ResultError, SettingError
 from algid.estimators.paper import SHORTEST
 from algid.files import remove_stale, result_folder, whole_folder
 from algid.identification.by_paper import run_paper
+from algid.identification.outcome import Identified
 from algid.identification.series import write_fit_series
 from algid.identification.source import LogLike, LogSource, Survey, open_sources, read_otherwise, tell_twins
-from algid.identification.summary import Identified, result_of
+from algid.identification.summary import result_of
 from algid.progress import Told
 from algid.results import Result, read_result, write_result
 from algid.runtime import one_blas_thread
@@ -173,7 +174,7 @@ def _by_likelihood(survey: Survey, settings: Settings, earlier: Earlier | None, 
         with_endogeneity,
         without_nothing,
     )
-    from algid.identification.summary import outcome_of
+    from algid.identification.outcome import outcome_of
 
     survey.begin("choosing terms")
     chosen = choose_model(survey, settings, None if earlier is None else earlier.result)

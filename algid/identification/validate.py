@@ -13,8 +13,8 @@ from algid.errors import ResultError
 from algid.estimators.prediction import PredictionScore, Shift, score
 from algid.estimators.rollout import RolloutScore, rollouts
 from algid.identification.by_likelihood import model_of
+from algid.identification.outcome import prediction
 from algid.identification.source import Role, Survey
-from algid.identification.summary import prediction
 from algid.model import Model
 from algid.results import Result, TorquePrediction
 from algid.settings import Settings

@@ -22,7 +22,7 @@ from algid.estimators.identifiability import examine
 from algid.estimators.parametrisation import Shared
 from algid.estimators.prediction import cross_validate, score
 from algid.estimators.weak import Source, WeakSettings
-from algid.identification.summary import fit_warnings
+from algid.identification.outcome import fit_warnings
 from algid.model import Model
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case

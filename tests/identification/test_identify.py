@@ -248,7 +248,7 @@ def test_constrain_obeys_every_bound(change: str, noisy: tuple[Log, Log]) -> Non
 
 
 def test_a_bound_broken_by_chance_is_no_failure() -> None:
-    from algid.identification.summary import is_implausible
+    from algid.identification.outcome import is_implausible
 
     def fit(sigma: float | None, r2: float, nrmse: float) -> results.FitSummary:
         predicted = results.TorquePrediction(rmse=(1, 1), nrmse=(0.1, nrmse), r2=(0.9, r2), filter="none")

@@ -11,8 +11,9 @@ import algid
 from algid.arm import FloatArray
 from algid.identification.by_likelihood import choose_model, run_fit
 from algid.identification.by_paper import run_paper
+from algid.identification.outcome import outcome_of
 from algid.identification.source import LogSource, Survey, open_source
-from algid.identification.summary import outcome_of, result_of
+from algid.identification.summary import result_of
 from algid.log import Log
 from algid.results import Result
 from algid.settings import Settings
