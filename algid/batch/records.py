@@ -36,11 +36,15 @@ FAILURES = (End.FAILED, End.KILLED)
 
 @dataclass(frozen=True)
 class Input:
-    """A log as it was when the job started: size in bytes, time of change in ns, and what was in it."""
+    """A log as it was when the job started: size in bytes, times of change in ns, and what was in it.
+
+    `ctime_ns` is the file system's own time of change, which no tool can set back; 0 for an object in a store.
+    """
 
     path: str
     size: int
     mtime_ns: int
+    ctime_ns: int = 0
     sha256: str | None = None
 
 
@@ -67,14 +71,15 @@ class Record:
 
 
 def stat_of(path: str) -> Input:
-    """Size and time of change of a log; of a folder, its files' total and their latest. Zeros where there is none."""
+    """Size and times of change of a log; of a folder, its files' total and latest. Zeros where there is none."""
     if is_url(path):
         return Input(path, *object_stat(path))
     try:
         found = [file.stat() for file in _files(Path(path))]
     except OSError:
         return Input(path, 0, 0)
-    return Input(path, sum(s.st_size for s in found), max((s.st_mtime_ns for s in found), default=0))
+    mtime, ctime = (max((getattr(s, name) for s in found), default=0) for name in ("st_mtime_ns", "st_ctime_ns"))
+    return Input(path, sum(s.st_size for s in found), mtime, ctime)
 
 
 def _files(path: Path) -> Iterator[Path]:

@@ -95,9 +95,9 @@ def _stands(record: Record, task: Task, store: Store) -> bool:
 
 
 def _unchanged(before: Input) -> bool:
-    """Whether a log holds what it held: by its size and time of change, and by its hash where that time moved."""
+    """Whether a log holds what it held: by its size and times of change, and by its hash where one of these moved."""
     now = stat_of(before.path)
-    if (now.size, now.mtime_ns) == (before.size, before.mtime_ns):
+    if replace(now, sha256=before.sha256) == before:
         return True
     if now.size != before.size or before.sha256 is None or is_url(before.path):
         return False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import os
 import shutil
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
@@ -126,6 +127,30 @@ def test_changed_logs_settings_and_lost_results_run_again(logs: Path) -> None:
     assert executor.ran == ["r1/b"]
     _run(logs, executor, replace(RECIPE, settings=Settings(estimator="weak", window=0.3)))
     assert executor.ran == ["r1/b", "bad", "r1/a", "r1/b"]
+
+
+@pytest.mark.parametrize("set_back", [False, True])
+def test_a_changed_log_of_equal_size_runs_again(logs: Path, *, set_back: bool) -> None:
+    """Whatever its time of change is set to: the file system keeps one of its own."""
+    _run(logs)
+    log = logs / "bad.csv"
+    before = log.stat()
+    log.write_text("not,a,log\n1,2,4\n")
+    if set_back:
+        os.utime(log, ns=(before.st_atime_ns, before.st_mtime_ns))
+        assert log.stat().st_mtime_ns == before.st_mtime_ns
+    assert log.stat().st_size == before.st_size
+    executor = Here()
+    _run(logs, executor)
+    assert executor.ran == ["bad"]
+
+
+def test_a_log_of_other_rights_alone_does_not_run_again(logs: Path) -> None:
+    _run(logs)
+    (logs / "r1/a-unloaded.parquet").chmod(0o600)
+    executor = Here()
+    _run(logs, executor)
+    assert executor.ran == []
 
 
 def test_a_job_that_kills_three_workers_is_set_aside(logs: Path) -> None:
