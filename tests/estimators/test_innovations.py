@@ -60,16 +60,21 @@ def test_the_density_holds_the_variance() -> None:
 
 def test_the_density_of_coloured_noise_is_that_of_its_filter() -> None:
     rng = np.random.default_rng(1)
-    e = rng.normal(size=(2, 60_000))
-    w = np.stack([np.convolve(row, [1.0, 0.8], "valid") for row in e])
-    found = spectra(residual_sums(w, DT))
-    exact = 2 * DT * np.abs(1 + 0.8 * np.exp(-2j * np.pi * found.frequency * DT)) ** 2
-    share = found.density / exact
-    # the bins are narrow beside the filter's shape but for the highest, where it falls to a hundredth
-    wide = found.frequency < 0.35 / DT
-    assert np.mean((share[:, wide] > found.low[wide]) & (share[:, wide] < found.high[wide])) > 0.9
-    r = autocorrelation(residual_sums(w, DT)).correlation
-    np.testing.assert_allclose(r[:, 0], 0.8 / 1.64, atol=0.02)  # five standard errors of 60,000 samples
+    count = inside = 0
+    for _ in range(30):
+        w = np.stack([np.convolve(row, [1.0, 0.8], "valid") for row in rng.normal(size=(2, 20_001))])
+        sums = residual_sums(w, DT)
+        found = spectra(sums)
+        exact = 2 * DT * np.abs(1 + 0.8 * np.exp(-2j * np.pi * found.frequency * DT)) ** 2
+        # the bins are narrow beside the filter's shape but for the highest, where it falls to a hundredth
+        wide = found.frequency < 0.35 / DT
+        share = (found.density / exact)[:, wide]
+        count, inside = count + share.size, inside + _inside(share, found.low[wide], found.high[wide])
+        # five standard errors of 20,000 samples
+        np.testing.assert_allclose(autocorrelation(sums).correlation[:, 0], 0.8 / 1.64, atol=0.035)
+    low, high = binom.interval(0.999, count, 0.95)
+    assert low <= inside <= high, (count, inside)
+    assert inside > binom.ppf(0.999, count, 0.90)
 
 
 def test_logs_of_another_rate_are_left_out() -> None:

@@ -4,11 +4,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from algid.arm import FloatArray
 from algid.estimators import weak
 from algid.estimators import weak as normal
 from algid.estimators.weak import WeakSettings
 from algid.model import Model
 from algid.signals.segments import Segment
+from algid.synth.cases import load_case
+from algid.synth.excitation import wide_multi_sine
+from algid.synth.simulator import simulate
+from tests.intervals import holds_95, in_axes
 
 from .conftest import Bench
 
@@ -48,10 +53,21 @@ def test_blocks_of_any_size_give_the_same_normal_equations(bench: Bench, monkeyp
     assert np.allclose(single.gram.sum(axis=0), whole.gram.sum(axis=0), rtol=1e-11)
 
 
-def test_errors_stay_within_the_error_bars(bench: Bench) -> None:
-    fits = [weak.fit([lambda seed=seed: [bench.log(sigma=1e-3, seed=seed)]]) for seed in range(20)]  # type: ignore[misc]
-    z = np.array([(fit.values - bench.truth[:7]) / fit.std for fit in fits])
-    assert 0.6 < np.sqrt(np.mean(z**2)) < 1.5  # 140 correlated ratios
+@pytest.mark.slow
+def test_intervals_of_a_long_log_hold() -> None:
+    """A minute has blocks enough for the sandwich; windows that overlap make its residuals coloured."""
+    case, dt = load_case("case1"), 4e-3
+    k = case.arm.constants()
+    motion = simulate(k, wide_multi_sine(case.arm, 3), np.arange(15_000) * dt)
+
+    def ratios(seed: int) -> FloatArray:
+        noise = np.random.default_rng(seed).standard_normal((2, *motion.theta.shape))
+        log = Segment(0.0, dt, motion.theta + 1e-4 * noise[0], motion.tau + 1e-2 * noise[1])
+        fit = weak.fit([lambda: [log]])
+        assert fit.intervals == "sandwich"
+        return in_axes(fit.values - k, fit.covariance, fit.quantile)
+
+    holds_95(np.array([ratios(seed) for seed in range(300)]))
 
 
 def test_a_gap_starts_new_windows(bench: Bench) -> None:

@@ -6,9 +6,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from algid.arm import with_payload
+from algid.arm import FloatArray, with_payload
 from algid.errors import SettingError
 from algid.estimators import refined
 from algid.identification.identify import identify
@@ -18,6 +17,7 @@ from algid.signals.segments import Segment
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import Motion, simulate
+from tests.intervals import holds_95, in_axes
 
 DT = 2e-3
 CONSTANT = 0.093  # N m/A
@@ -68,14 +68,14 @@ def test_without_a_payload_there_is_no_gain_to_tell() -> None:
 
 @pytest.mark.slow
 def test_intervals_hold_where_the_second_motor_stands_at_the_base() -> None:
-    """Both joints' torques share the noise of the second motor: 200 draws, 10 ± 3.1 misses of a constant by chance."""
+    """Both joints' torques share the noise of the second motor."""
     motion, k = moved(loaded=False), CASE.arm.constants()
 
-    def missed(seed: int) -> NDArray[np.bool_]:
+    def ratios(seed: int) -> FloatArray:
         noise = np.random.default_rng(seed).standard_normal((2, *motion.theta.shape))
         tau = motion.tau + 1e-2 * np.stack([noise[1, 0] + noise[1, 1], noise[1, 1]])
         log = Segment(0.0, DT, motion.theta + 1e-3 * noise[0], tau)
         fit = refined.fit([lambda: [log]])
-        return np.asarray(np.abs(fit.values - k) > fit.quantile * fit.std)
+        return in_axes(fit.values - k, fit.covariance, fit.quantile)
 
-    assert 4 <= np.sum([missed(seed) for seed in range(200)], axis=0).mean() <= 16
+    holds_95(np.array([ratios(seed) for seed in range(140)]))
