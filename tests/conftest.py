@@ -5,7 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, settings
+
+from algid.runtime import bound_by_environment
+
+bound_by_environment()  # as the command does, before anything loads numpy
+
+from hypothesis import HealthCheck, settings  # noqa: E402
 
 settings.register_profile("any-machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any-machine")  # no test judges a machine by its speed

@@ -9,8 +9,8 @@ import pytest
 
 from algid.inspection.checks import REFUSED
 from algid.writers import write_log
-from tests.cli.test_commands import Outcome
 from tests.inspection.test_checks import spoiled
+from tests.processes import Outcome
 
 
 @pytest.mark.parametrize("code", REFUSED)

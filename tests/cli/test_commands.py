@@ -15,15 +15,7 @@ import polars as pl
 import pytest
 
 from tests.cli.commands import app
-
-
-class Outcome:
-    """What a command printed and returned."""
-
-    def __init__(self, *arguments: str | Path, cwd: Path | None = None) -> None:
-        command = [sys.executable, "-m", "algid", *map(str, arguments)]
-        done = subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False)
-        self.code, self.out, self.err = done.returncode, done.stdout, done.stderr
+from tests.processes import Outcome
 
 
 @pytest.fixture(scope="module")

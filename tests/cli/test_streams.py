@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.processes import Outcome, begin
+
 ALGID = [sys.executable, "-m", "algid"]
 
 
@@ -16,20 +18,23 @@ ALGID = [sys.executable, "-m", "algid"]
 def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("result")
     noisy = ("--position-noise", "1e-3", "--torque-noise", "1e-2")
-    subprocess.run([*ALGID, "synth", "case1", "-o", folder, "--torque", "wide", "--duration", "4", *noisy], check=True)
-    subprocess.run([*ALGID, "identify", folder / "case1-unloaded.mcap", "-o", folder, "--no-report", "-q"], check=True)
+    assert Outcome("synth", "case1", "-o", folder, "--torque", "wide", "--duration", "4", *noisy).code == 0
+    assert Outcome("identify", folder / "case1-unloaded.mcap", "-o", folder, "--no-report", "-q").code == 0
     return folder / "case1-unloaded.algid"
 
 
 @pytest.mark.parametrize("errors_too", [False, True])
-def test_a_reader_that_leaves_is_no_error(result: Path, errors_too: bool) -> None:
+def test_a_reader_that_leaves_is_no_error(result: Path, errors_too: bool, tmp_path: Path) -> None:
     reading, writing = os.pipe()
     os.close(reading)  # as head does once it has seen enough
-    errors = writing if errors_too else subprocess.PIPE
-    for arguments in (["compare", result, result], ["check", result, "--max-error", "50"], ["--help"]):
-        done = subprocess.run([*ALGID, *arguments], stdout=writing, stderr=errors, check=False)
-        assert (done.returncode, done.stderr or b"") == (0, b""), arguments
+    with (tmp_path / "errors").open("w+b") as stream:
+        errors = writing if errors_too else stream.fileno()
+        for arguments in (["compare", result, result], ["check", result, "--max-error", "50"], ["--help"]):
+            assert begin(*arguments, stdout=writing, stderr=errors)() == 0, arguments
+        done = subprocess.run([*ALGID, "--help"], stdout=writing, stderr=errors, check=False)
+        assert done.returncode == 0
     os.close(writing)
+    assert not (tmp_path / "errors").read_bytes()
 
 
 def test_a_failure_is_one_for_a_reader_that_leaves_too(result: Path) -> None:

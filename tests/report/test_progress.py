@@ -5,8 +5,7 @@ from __future__ import annotations
 import os
 import pty
 import re
-import subprocess
-import sys
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from algid.log import Log, Origin
 from algid.report.progress import progress
 from algid.settings import Settings
 from algid.synth.cases import load_case
+from tests.processes import Outcome, begin
 from tests.report.folders import record
 
 COLOUR = re.compile(r"\x1b\[[0-9;]*3[0-9]")
@@ -40,11 +40,11 @@ def path(log: Log, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def on_a_terminal(*arguments: object, **environment: str) -> tuple[str, str]:
-    """What a command that ends well prints to a pipe as stdout and to a terminal as stderr."""
+    """What a command that ends well prints to a file as stdout and to a terminal as stderr."""
     ours, theirs = pty.openpty()
-    command = [sys.executable, "-m", "algid", *map(str, arguments)]
     settings = {"TERM": "xterm", **{k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "TERM")}}
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=theirs, env=settings | environment) as running:
+    with tempfile.TemporaryFile() as printed:
+        ended = begin(*arguments, stdout=printed.fileno(), stderr=theirs, env=settings | environment)
         os.close(theirs)
         seen = b""
         try:
@@ -52,10 +52,10 @@ def on_a_terminal(*arguments: object, **environment: str) -> tuple[str, str]:
                 seen += part
         except OSError:  # Linux: the other end is closed
             pass
-        printed = running.communicate()[0].decode()
-    os.close(ours)
-    assert running.returncode == 0, seen
-    return printed, seen.decode()
+        os.close(ours)
+        assert ended() == 0, seen
+        printed.seek(0)
+        return printed.read().decode(), seen.decode()
 
 
 def test_a_terminal_is_shown_stages_and_samples_and_is_left_clean(path: Path, tmp_path: Path) -> None:
@@ -87,14 +87,9 @@ def test_a_pipe_gets_none_of_it(command: str, path: Path, tmp_path: Path, case_f
         "convert": [path, tmp_path / "log.csv"],
         "validate": [case_folder, path],
     }
-    done = subprocess.run(
-        [sys.executable, "-m", "algid", command, *map(str, arguments[command])],
-        capture_output=True,
-        text=True,
-        check=True,
-        env={**os.environ, "FORCE_COLOR": "1"},  # asks for colour, not for a terminal's bars
-    )
-    assert done.stderr == ""
+    colour = {**os.environ, "FORCE_COLOR": "1"}  # asks for colour, not for a terminal's bars
+    done = Outcome(command, *arguments[command], env=colour)
+    assert (done.code, done.err) == (0, "")
 
 
 def test_nobody_is_told_where_nobody_looks(capsys: pytest.CaptureFixture[str]) -> None:
