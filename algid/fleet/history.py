@@ -111,16 +111,18 @@ def _regressed(summed: pl.DataFrame, parameter: str) -> pl.DataFrame:
     from scipy.stats import t as student
 
     w, wt, wtt, wy, wty, wyy, n = (summed[name].to_numpy() for name in _SUMS)
-    with np.errstate(divide="ignore", invalid="ignore"):  # windows with a single log have no slope
-        middle = wt / w
-        spread = wtt - wt * middle
-        slope = (wty - wy * middle) / spread
-        squares = wyy - wy * wy / w - slope * slope * spread
-        scale = np.sqrt(np.maximum(1.0, squares / np.maximum(n - 2, 1)))
-        slope_std = scale / np.sqrt(spread)
-        p = 2 * student.sf(np.abs(slope) / slope_std, np.maximum(n - 2, 1))
-    tested = (n >= FEWEST) & (spread > 1e-9 * w)
-    p = np.where(tested, p, np.nan)
+    middle = wt / w
+    sloped = wtt - wt * middle > 1e-9 * w  # logs of one instant, or a single one, have a mean and no slope
+    spread = np.where(sloped, wtt - wt * middle, np.inf)
+    rise = np.where(sloped, wty - wy * middle, 0.0)
+    slope = rise / spread
+    squares = wyy - wy * wy / w - slope * rise
+    freedom = np.maximum(n - 1 - sloped, 1)
+    scale = np.sqrt(np.maximum(1.0, squares / freedom))
+    slope_std = scale / np.sqrt(spread)
+    tested = (n >= FEWEST) & sloped
+    p = np.full(n.size, np.nan)
+    p[tested] = 2 * student.sf(np.abs(slope[tested]) / slope_std[tested], freedom[tested])
     return summed.select("robot", pl.lit(parameter).alias("parameter"), "month", "end").with_columns(
         logs=pl.Series(n.astype(np.int64)),
         mean=pl.Series(summed["centre"].to_numpy() + wy / w),

@@ -11,7 +11,7 @@ from urllib.parse import quote
 import numpy as np
 
 from algid import __version__
-from algid.fleet.history import ALPHA, SPAN
+from algid.fleet.history import ALPHA, SPAN, History
 from algid.model import UNITS
 from algid.report.document import Document
 from algid.report.figures.base import Figure, Panel, axis, label
@@ -21,13 +21,10 @@ from algid.report.sparkline import Course, sparklines
 from algid.report.table import Column, Table
 from algid.report.text import ABSENT, joined, significant, unit_text, visible
 from algid.report.verdict import LEVEL_WORDS, Level, Verdict
+from algid.words import counted
 
 if TYPE_CHECKING:
     import polars as pl
-
-    from algid import __version__
-from algid.fleet.history import History
-from algid.words import counted
 
 MADE = f"Made by algid {__version__}."
 READING = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from scipy.stats import t as student
 
 from algid.errors import ResultError
 from algid.fleet.history import History, history_of, write_history
-from algid.fleet.page import robot_table
+from algid.fleet.page import fleet_html, robot_table
 from tests.intervals import holds_95
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
@@ -111,6 +112,29 @@ def _payloads(values: list[float], std: float = 0.001) -> pl.DataFrame:
 def test_a_wrong_label_is_found_however_few_the_logs(values: list[float], wrong: list[str], tmp_path: Path) -> None:
     findings = _history(_payloads(values), tmp_path).findings
     assert findings.filter(pl.col("kind") == "payload")["job"].to_list() == wrong
+
+
+@pytest.mark.parametrize("days", [[0], [0, 0], [0, 0, 0, 0], [0, 20]])
+def test_few_logs_and_logs_of_one_instant_have_a_mean_with_its_error(days: list[int], tmp_path: Path) -> None:
+    jobs = _jobs(1, len(days), seed=12).with_columns(
+        time=pl.Series([START + timedelta(days=day) for day in days], dtype=pl.Datetime("us", "UTC"))
+    )
+    last = _history(jobs, tmp_path).windows.filter(parameter="k2").row(-1, named=True)
+    values, count = jobs["k2"].to_numpy(), len(days)
+    lines = 1 + (len(set(days)) > 1)
+    residual = values - (values.mean() if lines == 1 else values)
+    widened = max(1.0, np.sqrt(np.sum(residual**2) / 0.005**2 / max(count - lines, 1)))
+    assert last["mean"] == pytest.approx(values.mean(), rel=1e-12)
+    assert last["mean_std"] == pytest.approx(widened * 0.005 / np.sqrt(count), rel=1e-9)
+    assert not last["drift"]
+
+
+def test_the_page_of_robots_with_a_log_each_draws_no_point_that_is_none(tmp_path: Path) -> None:
+    page = fleet_html(_history(_jobs(3, 1, seed=13), tmp_path))
+    assert page.count('class="spark"') == 3 * len(NAMES)
+    places = re.findall(r' (?:points|cx|cy)="([^"]*)"', page)
+    assert places
+    assert "nan" not in " ".join(places)
 
 
 def test_the_scatter_about_the_line_widens_its_error(tmp_path: Path) -> None:
