@@ -38,7 +38,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from functools import cached_property
+from itertools import islice, product
 from math import copysign, pi, remainder
 
 import numpy as np
@@ -125,8 +126,9 @@ class Convention:
 AS_READ = Convention()
 
 
-def _size(left: FloatArray) -> float:
-    return float(np.log(left).sum())
+def _sizes(left: FloatArray) -> FloatArray:
+    """Sums of logarithms (…) of what is left of both torques (…, 2)."""
+    return np.asarray(np.log(left).sum(axis=-1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,21 +137,29 @@ class Candidate:
 
     Parameters
     ----------
+    family : Convention, the same without its zeros
     convention : Convention
-    k : (12,), `ZEROED`
+    names : of `ZEROED`, those that the log may tell
+    k : (q,), what is found for them
+    covariance : (q, q), of `k`
     left : (2,), share of each recorded torque's mean square that is not explained
-    demands : what physics demands, and how many standard deviations the log is on the right side
+    score : sum of the logarithms of what is left: less is better
+    speed : (2,), RMS of the joints' in rad/s
     """
 
+    family: Convention
     convention: Convention
+    names: tuple[str, ...]
     k: FloatArray
+    covariance: FloatArray
     left: FloatArray
-    demands: dict[str, float]
+    score: float
+    speed: FloatArray
 
-    @property
-    def score(self) -> float:
-        """Sum of the logarithms of what is left: less is better."""
-        return _size(np.maximum(self.left, LEAST))
+    @cached_property
+    def demands(self) -> dict[str, float]:
+        """What physics demands, and how many standard deviations the log is on the right side."""
+        return _demands(dict(zip(self.names, self.k.tolist(), strict=True)), self.covariance, self.speed)
 
     @property
     def broken(self) -> dict[str, float]:
@@ -197,11 +207,12 @@ def judge(theta: FloatArray, tau: FloatArray, dt: float, *, gravity: bool = True
 
 def _judged(found: Sequence[Candidate], apart: float) -> Judgement:
     as_read = next(one for one in found if one.convention == AS_READ)
-    possible = sorted((one for one in found if not one.broken), key=lambda one: one.score)
+    ranked = sorted(found, key=lambda one: one.score)
+    possible = list(islice((one for one in ranked if not one.broken), 2))
     if not possible:
         return Judgement(as_read, as_read, alone=False)
     best = possible[0]
-    alone = best.convincing and all(other.score - best.score > apart for other in possible[1:2])
+    alone = best.convincing and all(other.score - best.score > apart for other in possible[1:])
     return Judgement(as_read, best, alone)
 
 
@@ -230,20 +241,19 @@ class _Trials:
         self._free = np.eye(len(COLUMNS))[:, kept]
         self._zeros = [(turn, half) for half in (0.0, pi) for turn in (_QUARTERS if gravity else _QUARTERS[:1])]
         self._names = tuple(name for name in ZEROED if name not in ("k2", "k4") or gravity)
-        self.apart = max(APART, 2 * EVIDENCE * WINDOW / (self._fine[0].shape[1] * self._fine[2]))
+        self.apart = max(APART, 2 * EVIDENCE * WINDOW / (self._fine.theta.shape[1] * self._fine.dt))
         """By how much the scores of two conventions differ that are told apart."""
         self._passes: dict[Convention, tuple[_Sums, _Sums]] = {}
 
     def discrete(self) -> Iterator[Candidate]:
         """Every convention without a scale, its zeros by quarter and half turns."""
-        for swapped, sign, absolute in product((False, True), (1, -1), (False, True)):
-            for family in _families(Convention(swapped=swapped, signs=(1, sign), absolute=absolute)):
-                yield from self._with_zeros(family, self._zeros)
+        for families in _families():
+            yield from self._with_zeros(families, self._zeros)
 
     def shifted(self, found: Sequence[Candidate]) -> Iterator[Candidate]:
         """The conventions that leave least when both zeros are free, with the zeros that fit best."""
-        families = dict.fromkeys(replace(one.convention, zero=(0.0, 0.0)) for one in found)
-        for family in sorted(families, key=lambda family: self._score(family, self._fine))[:_SHIFTED]:
+        scored = [pair for each in _families() for pair in zip(self._scores(each, self._fine), each, strict=True)]
+        for _, family in sorted(scored, key=lambda pair: pair[0])[:_SHIFTED]:
             yield from self._with_free_zero(family, found)
 
     def scaled(self) -> Iterator[Candidate]:
@@ -252,36 +262,36 @@ class _Trials:
             family = self._scaled(joints)
             if family is None:
                 continue
-            found = list(self._with_zeros(family, self._zeros))
+            found = list(self._with_zeros([family], self._zeros))
             yield from found
             yield from self._with_free_zero(family, found)
 
-    def _with_zeros(self, family: Convention, zeros: Sequence[tuple[float, float]]) -> Iterator[Candidate]:
-        sums = self._sums(family, self._fine)
-        fitted = _solved(sums, family, np.stack([self._place(zero) for zero in zeros]))
-        for zero, c, left, covariance in zip(zeros, *fitted, strict=True):
-            demands = _demands(dict(zip(self._names, c, strict=True)), covariance, sums.speed)
-            yield Candidate(replace(family, zero=zero), c, left, demands)
+    def _with_zeros(self, families: Sequence[Convention], zeros: Sequence[tuple[float, float]]) -> Iterator[Candidate]:
+        """Each family of the same angles and drive with each of the zeros."""
+        sums = self._sums(families[0], self._fine)
+        fitted = _solved(sums, families, np.stack([self._place(zero) for zero in zeros]))
+        scores = _sizes(np.maximum(fitted[1], LEAST)).tolist()
+        for (family, zero), c, left, covariance, score in zip(product(families, zeros), *fitted, scores, strict=True):
+            yield Candidate(family, replace(family, zero=zero), self._names, c, covariance, left, score, sums.speed)
 
     def _with_free_zero(self, family: Convention, found: Sequence[Candidate]) -> Iterator[Candidate]:
         """The zeros that fit best, where they leave far less than those that were found."""
-        (free,) = self._with_zeros(family, [self._best_zero(family)])
-        own = [one.score for one in found if replace(one.convention, zero=(0.0, 0.0)) == family]
-        if free.score < min(own) - self.apart:
+        (free,) = self._with_zeros([family], [self._best_zero(family)])
+        if free.score < min(one.score for one in found if one.family == family) - self.apart:
             yield free
 
-    def _score(self, family: Convention, log: _Thinned) -> float:
-        """What is left with free zeros, a sum of logarithms."""
-        return _size(_solved(self._sums(family, log), family, self._free[None])[1])
+    def _scores(self, families: Sequence[Convention], log: _Thinned) -> list[float]:
+        """What is left with free zeros, sums of logarithms, for families of the same angles and drive."""
+        return _sizes(_solved(self._sums(families[0], log), families, self._free[None])[1]).tolist()
 
     def _best_zero(self, family: Convention) -> tuple[float, float]:
         """Zeros δ1 and δ2 in rad that leave least, with k1, k2 and k4 positive where the log tells."""
         sums = self._sums(family, self._fine)
-        c = self._free @ _solved(sums, family, self._free[None])[0][0]
+        c = self._free @ _solved(sums, [family], self._free[None])[0][0]
         start = np.array([np.arctan2(c[6], c[5]), np.arctan2(c[1], c[0])])
 
         def score(zero: FloatArray) -> float:
-            return _size(_solved(sums, family, self._place((zero[0], zero[1]))[None])[1])
+            return float(_sizes(_solved(sums, [family], self._place((zero[0], zero[1]))[None])[1][0]))
 
         from scipy.optimize import minimize
 
@@ -292,9 +302,9 @@ class _Trials:
         """What the angles of `joints` have to be divided by; None where no scale leaves far less than none."""
 
         def score(scale: float, log: _Thinned) -> float:
-            return self._score(_scaled_by(scale, joints), log)
+            return self._scores([_scaled_by(scale, joints)], log)[0]
 
-        grid = _grid(np.ptp(self._coarse[0], axis=1)[np.array(joints) == 1])
+        grid = _grid(np.ptp(self._coarse.theta, axis=1)[np.array(joints) == 1])
         scale = min(grid, key=lambda scale: score(scale, self._coarse))
         if score(scale, self._coarse) > score(1.0, self._coarse) - self.apart:
             return None
@@ -323,28 +333,44 @@ class _Trials:
         """Sums for a family's angles and drive; those of the last pass over the log serve the next one too."""
         angles = Convention(swapped=family.swapped, scale=family.scale, signs=family.signs, absolute=family.absolute)
         if angles not in self._passes or log is not self._fine:
-            passed = _summed(angles.angles(log[0]), log[1], log[2])
+            passed = _summed(angles, log)
             if log is not self._fine:
                 return passed[family.base]
             self._passes[angles] = passed
         return self._passes[angles][family.base]
 
 
-_Thinned = tuple[FloatArray, FloatArray, float]
+@dataclass(frozen=True, eq=False)
+class _Thinned:
+    """Angles and torques (2, N) as they were read, `dt` s apart, velocities (2, N - 2 `reach`) and windows' kernels."""
+
+    theta: FloatArray
+    omega: FloatArray
+    tau: FloatArray
+    dt: float
+    reach: int
+    windows: Windows
+    kernels: FloatArray
 
 
 def _thinned(theta: FloatArray, tau: FloatArray, dt: float, rate: float, longest: float) -> _Thinned:
-    """Means over as many samples as leave `rate` Hz, of the first `longest` s: angles, torques and their period."""
+    """Means over as many samples as leave `rate` Hz, of the first `longest` s."""
     width = max(1, round(1 / (rate * dt)))
     count = min(theta.shape[1], round(longest / dt)) // width
-    thin = (signal[:, : count * width].reshape(2, count, width).mean(axis=2) for signal in (theta, tau))
-    return next(thin), next(thin), dt * width
+    theta, tau = (signal[:, : count * width].reshape(2, count, width).mean(axis=2) for signal in (theta, tau))
+    dt *= width
+    bandwidth = max(min(_BANDWIDTH, 0.2 / dt), 6.0 / WINDOW)
+    windows = Windows(dt, WINDOW, 0.0, bandwidth)
+    omega = correlate(theta, differentiator(dt, bandwidth))
+    return _Thinned(theta, omega, tau, dt, half_length(dt, bandwidth), windows, windows.kernels())
 
 
-def _families(angles: Convention) -> Iterator[Convention]:
-    """Every order and sign of the torques, and both drives, beside angles mapped so."""
-    for base, swapped, first, second in product((False, True), (False, True), (1, -1), (1, -1)):
-        yield replace(angles, base=base, torques_swapped=swapped, torque_signs=(first, second))
+def _families() -> Iterator[list[Convention]]:
+    """Every convention without scale and zeros, those of the same angles and drive together."""
+    for swapped, sign, absolute, base in product((False, True), (1, -1), (False, True), (False, True)):
+        angles = Convention(swapped=swapped, signs=(1, sign), absolute=absolute, base=base)
+        torques = product((False, True), (1, -1), (1, -1))
+        yield [replace(angles, torques_swapped=swap, torque_signs=(one, two)) for swap, one, two in torques]
 
 
 def _scaled_by(scale: float, joints: tuple[int, int]) -> Convention:
@@ -361,14 +387,11 @@ def _grid(travel: FloatArray) -> list[float]:
     return grid
 
 
-def _summed(theta: FloatArray, tau: FloatArray, dt: float) -> tuple[_Sums, _Sums]:
+def _summed(angles: Convention, log: _Thinned) -> tuple[_Sums, _Sums]:
     """Sums with the second motor in its joint, and with it at the base."""
-    bandwidth = max(min(_BANDWIDTH, 0.2 / dt), 6.0 / WINDOW)
-    windows = Windows(dt, WINDOW, 0.0, bandwidth)
-    reach = half_length(dt, bandwidth)
-    omega = correlate(theta, differentiator(dt, bandwidth))
-    theta, tau = theta[:, reach:-reach], tau[:, reach:-reach]
-    weight, slope, bend = windows.kernels()
+    theta, omega = angles.angles(log.theta[:, log.reach : -log.reach]), angles.angles(log.omega)  # linear without zeros
+    tau, windows = log.tau[:, log.reach : -log.reach], log.windows
+    weight, slope, bend = log.kernels
     (s1, s2), (c1, c2) = sine_cosine(theta)
     friction = np.tanh(omega / _COULOMB_SPEED)
     centripetal = omega[0] * (omega[0] + omega[1])
@@ -412,19 +435,23 @@ def _summed(theta: FloatArray, tau: FloatArray, dt: float) -> tuple[_Sums, _Sums
     return sums[0], sums[1]
 
 
-def _solved(sums: _Sums, family: Convention, T: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Weighted least squares for each T of (Z, 15, q): c (Z, q), shares left (Z, 2) and covariances (Z, q, q)."""
-    order = [1, 0] if family.torques_swapped else [0, 1]
-    cross = np.stack([family.torque_signs[joint] * sums.cross[joint, :, order[joint]] for joint in (0, 1)])
-    power = sums.power[order]
-    gram = T.swapaxes(1, 2)[:, None] @ sums.gram @ T[:, None]
-    aimed = np.einsum("zxi,ax->zai", T, cross)
-    weight = np.broadcast_to(1 / power, (T.shape[0], 2))
+def _solved(sums: _Sums, families: Sequence[Convention], T: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Weighted least squares for each of F families with each T of (Z, 15, q), F Z fits.
+
+    Gives c (F Z, q), shares left (F Z, 2) and covariances (F Z, q, q).
+    """
+    order = np.array([[1, 0] if family.torques_swapped else [0, 1] for family in families])
+    signs = np.array([family.torque_signs for family in families])
+    cross = signs[:, :, None] * sums.cross[[0, 1], :, order]
+    power = np.repeat(sums.power[order], T.shape[0], axis=0)
+    gram = np.tile(T.swapaxes(1, 2)[:, None] @ sums.gram @ T[:, None], (len(families), 1, 1, 1))
+    aimed = np.einsum("zxi,fax->fzai", T, cross).reshape(len(power), 2, -1)
+    weight, ridge = 1 / power, 1e-12 * np.eye(T.shape[2])
     for _ in range(_REWEIGHTINGS):
         normal = np.einsum("za,zaij->zij", weight, gram)
         size = np.sqrt(np.maximum(np.einsum("zii->zi", normal), 1e-140))
-        unit = normal / (size[:, :, None] * size[:, None, :]) + 1e-12 * np.eye(T.shape[2])
-        inverse = np.linalg.inv(unit) / (size[:, :, None] * size[:, None, :])
+        scale = size[:, :, None] * size[:, None, :]
+        inverse = np.linalg.inv(normal / scale + ridge) / scale
         c = np.einsum("zij,za,zaj->zi", inverse, weight, aimed)
         squares = power - 2 * np.einsum("zai,zi->za", aimed, c) + np.einsum("zi,zaij,zj->za", c, gram, c)
         squares = np.maximum(squares, _FLOOR * power)
