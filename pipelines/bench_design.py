@@ -29,12 +29,12 @@ from algid.design.limits import Limits
 from algid.design.optimise import Stage, kept, optimise
 from algid.design.position import JUDGED_RATE, PositionProblem
 from algid.design.posture import resting
-from algid.design.prior import Knowns, of_case
+from algid.design.prior import KnownBefore, of_case
 from algid.estimators import refined
 from algid.estimators.whitening import NoiseLevels
 from algid.signals.segments import Segment
 from algid.synth.cases import Case
-from algid.synth.follow import Plan, follow
+from algid.synth.follow import Reference, follow
 from pipelines.accuracy_scenes import case_of
 
 NAMES = ("case1", "case2", "arm1", "arm2", "arm3", "arm4", "arm5")
@@ -70,7 +70,7 @@ def wrong(case: Case, m1: float, m2: float, m_p: float) -> Case:
 
 def campaign_of(prior: Case, limits: Limits) -> Campaign:
     """The campaign that is planned for a prior within limits."""
-    known = of_case(prior, prior.name, True, Knowns())
+    known = of_case(prior, prior.name, True, KnownBefore())
     experiment = Experiment(known.belief.shared, (1, 1), NOISE, RATE)
     return Campaign(experiment, known.belief, limits, asked_for(known.belief, None, prior.name), DURATION)
 
@@ -138,7 +138,7 @@ def rehearsed(name: str, error: tuple[float, float, float] | None, draws: int) -
     prior = case if error is None else wrong(case, *error)
     design = plan(campaign_of(prior, limits))
     k, t = case.arm.constants(), design.t
-    followed = Plan(t, design.motion.theta, design.motion.omega, design.torque[False], design.torque[True])
+    followed = Reference(t, design.motion.theta, design.motion.omega, design.torque[False], design.torque[True])
     motions = []
     for loaded in (False, True):
         own = with_payload(k, case.arm.payload_constants(case.payload * loaded))

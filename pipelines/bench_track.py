@@ -27,7 +27,7 @@ from algid.signals.segments import segments
 from algid.synth.cases import load_case
 from algid.synth.run import Recording, excitation, synthesise, with_schedule
 from algid.synth.simulator import simulate
-from algid.track.bins import Arm, arm_of
+from algid.track.bins import IdentifiedArm, arm_of
 from algid.track.payload import Track, track
 
 CASE = load_case("case1")
@@ -132,11 +132,11 @@ def drawn(log: Log, scene: Scene, rng: np.random.Generator) -> Log:
     return replace(log, theta=theta, tau=tau, omega=None)
 
 
-def arm_for(scene: Scene, log: Log, rng: np.random.Generator) -> tuple[Arm, FloatArray]:
+def arm_for(scene: Scene, log: Log, rng: np.random.Generator) -> tuple[IdentifiedArm, FloatArray]:
     """The arm as the scene knows it, and the covariance of what it knows."""
     if not scene.identified:
         noise = NoiseLevels(np.full(2, SIGMA_THETA), np.full(2, SIGMA_TAU))
-        return Arm(Model(), CASE.arm.constants(), CASE.arm.l1, CASE.arm.l2, noise), np.zeros((9, 9))
+        return IdentifiedArm(Model(), CASE.arm.constants(), CASE.arm.l1, CASE.arm.l2, noise), np.zeros((9, 9))
     settings = Settings(friction="coulomb") if scene.modelled else Settings()
     bare, burdened = (drawn(one, scene, rng) for one in calibration())
     result = identify(bare, burdened, settings, report=False)

@@ -25,7 +25,7 @@ from algid.log import Log, Origin
 from algid.report.verdict import LEVEL_WORDS, verdict
 from algid.results import Result
 from algid.synth.excitation import wide_multi_sine
-from algid.synth.simulator import Motion, simulate
+from algid.synth.simulator import SimulatedMotion, simulate
 from pipelines.accuracy_scenes import case_of
 
 ARMS = ("case1", "case2", "arm21", "arm22", "arm23")
@@ -92,7 +92,7 @@ INVISIBLE: dict[str, Spoil] = {
 }
 
 
-def motion_of(name: str, *, loaded: bool = False) -> tuple[FloatArray, Motion]:
+def motion_of(name: str, *, loaded: bool = False) -> tuple[FloatArray, SimulatedMotion]:
     """Constants (7,) of an arm by name, and its motion under a wide torque, with half of link 2's mass or without."""
     arm = case_of(name).arm
     t = np.arange(round(DURATION * RATE) + 1) / RATE
@@ -101,7 +101,7 @@ def motion_of(name: str, *, loaded: bool = False) -> tuple[FloatArray, Motion]:
     return k, simulate(moved, wide_multi_sine(arm, sum(name.encode()) + loaded), t)
 
 
-def log_of(motion: Motion, spoil: Spoil, *, friction: bool, seed: int = 0) -> Log:
+def log_of(motion: SimulatedMotion, spoil: Spoil, *, friction: bool, seed: int = 0) -> Log:
     """The log of a motion by noisy sensors, spoiled; the motors overcome Coulomb friction where there is some."""
     rng = np.random.default_rng(seed)
     tau = motion.tau
@@ -129,7 +129,9 @@ def furthest(result: Result, k: FloatArray) -> float:
     return max(errors, default=0.0)
 
 
-def row(name: str, spoil: Spoil, arm: str, k: FloatArray, motion: Motion, *, friction: bool) -> tuple[str, bool]:
+def row(
+    name: str, spoil: Spoil, arm: str, k: FloatArray, motion: SimulatedMotion, *, friction: bool
+) -> tuple[str, bool]:
     """A line of the table, and whether it passes."""
     log = log_of(motion, spoil, friction=friction)
     named = mend(log)

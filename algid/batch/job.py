@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from algid import __version__
 from algid.batch.fetch import naming, staged
 from algid.batch.jobs import Job
-from algid.batch.records import End, Input, Record, estimates_of, stat_of
+from algid.batch.records import End, Input, JobRecord, estimates_of, stat_of
 from algid.errors import chain_of, text_of
 from algid.files import temporary_folder
 from algid.identification.identify import identify
@@ -50,7 +50,7 @@ class Task:
     report: bool
 
 
-def run_task(task: Task) -> Record | DiskFull:
+def run_task(task: Task) -> JobRecord | DiskFull:
     """Identify one job and write its result folder.
 
     Whatever is raised on the way is the job's end: libraries panic by exceptions of any base.
@@ -82,13 +82,13 @@ def run_task(task: Task) -> Record | DiskFull:
     )
 
 
-def failed_record(task: Task, reason: str, status: End = End.FAILED, **known: Any) -> Record:
+def failed_record(task: Task, reason: str, status: End = End.FAILED, **known: Any) -> JobRecord:
     """The record of a task without result; `known` are other fields of it."""
     return _record(task, status=status, reason=reason, **{"inputs": inputs_of(task.job), **known})
 
 
-def _record(task: Task, **known: Any) -> Record:
-    return Record(job=task.job, basis=task.basis, settings=task.settings.as_json(), version=__version__, **known)
+def _record(task: Task, **known: Any) -> JobRecord:
+    return JobRecord(job=task.job, basis=task.basis, settings=task.settings.as_json(), version=__version__, **known)
 
 
 def inputs_of(job: Job) -> tuple[Input, ...]:

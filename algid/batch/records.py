@@ -49,7 +49,7 @@ class Input:
 
 
 @dataclass(frozen=True)
-class Record:
+class JobRecord:
     """A job's end: `basis` stands for settings, profile, known parameters and version; `seconds` is its duration.
 
     `estimates` holds estimate, standard deviation and status by name, `estimator` whose they are; `start_ns` and
@@ -94,13 +94,13 @@ def estimates_of(result: Result) -> dict[str, tuple[float | None, float | None, 
     return {name: (e.estimate, e.std, e.status.value) for name, e in result.estimates.items()}
 
 
-def write_record(store: Store, record: Record) -> None:
+def write_record(store: Store, record: JobRecord) -> None:
     """Write a record, whole or not at all. Raises `OutputError`."""
     text = json.dumps(asdict(record), ensure_ascii=False, indent=1)
     store.write(f"{FOLDER}/{record.job.name}.json", text.encode())
 
 
-def read_records(store: Store) -> dict[str, Record]:
+def read_records(store: Store) -> dict[str, JobRecord]:
     """All records by job; one that cannot be read counts as none, so that its job runs again."""
     found = {}
     for name in store.names(FOLDER):
@@ -110,11 +110,11 @@ def read_records(store: Store) -> dict[str, Record]:
     return found
 
 
-def _parsed(content: bytes) -> Record | None:
+def _parsed(content: bytes) -> JobRecord | None:
     try:
         fields = json.loads(content)
         job = fields.pop("job")
-        return Record(
+        return JobRecord(
             job=Job(**{**job, "logs": tuple(job["logs"]), "loaded": tuple(job["loaded"])}),
             status=End(fields.pop("status")),
             inputs=tuple(Input(**one) for one in fields.pop("inputs")),
@@ -132,14 +132,14 @@ TABLE = "jobs.parquet"
 FIRST_EPOCH_NS = 10**17  # stamps before 1973 count from some start, not from 1970
 
 
-def write_jobs(store: Store, records: Sequence[Record]) -> None:
+def write_jobs(store: Store, records: Sequence[JobRecord]) -> None:
     """Write ``jobs.parquet``, whole or not at all. Raises `OutputError`."""
     content = io.BytesIO()
     jobs_frame(records).write_parquet(content)
     store.write(TABLE, content.getvalue())
 
 
-def jobs_frame(records: Sequence[Record]) -> pl.DataFrame:
+def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
     """A row a record.
 
     Columns: job, robot, time, status, reason, seconds, log_seconds, estimator (whose numbers these are; the one
@@ -177,7 +177,7 @@ def jobs_frame(records: Sequence[Record]) -> pl.DataFrame:
     return pl.DataFrame(columns)
 
 
-def time_of(record: Record) -> datetime | None:
+def time_of(record: JobRecord) -> datetime | None:
     """When the job's logs were taken, in UTC: as its manifest says, or as its first stamp does."""
     if record.job.time is not None:
         told = datetime.fromisoformat(record.job.time)

@@ -16,7 +16,7 @@ from typing import Any
 
 from algid.batch.job import DiskFull, Task, basis_of, failed_record, run_task
 from algid.batch.jobs import Job
-from algid.batch.records import FAILURES, End, Input, Record, read_records, stat_of, write_jobs, write_record
+from algid.batch.records import FAILURES, End, Input, JobRecord, read_records, stat_of, write_jobs, write_record
 from algid.batch.workers import CallFailedError, WorkerDiedError
 from algid.errors import OutputError, SettingError, text_of
 from algid.identification.source import sha256_of
@@ -49,7 +49,7 @@ class Recipe:
             )
         return self._task(job, self.profile(job.profile))
 
-    def refused(self, job: Job, error: SettingError) -> Record:
+    def refused(self, job: Job, error: SettingError) -> JobRecord:
         """The record of a job that cannot be run."""
         return failed_record(self._task(job, None), str(error))
 
@@ -59,19 +59,19 @@ class Recipe:
 
 
 @dataclass(frozen=True)
-class Plan:
+class BatchPlan:
     """Tasks to run, records of jobs that cannot even start, and records that stand as they are."""
 
     tasks: list[Task]
-    refused: list[Record]
-    standing: list[Record]
+    refused: list[JobRecord]
+    standing: list[JobRecord]
 
 
 def plan(
-    jobs: Iterable[Job], records: Mapping[str, Record], recipe: Recipe, store: Store, retry_failed: bool = False
-) -> Plan:
+    jobs: Iterable[Job], records: Mapping[str, JobRecord], recipe: Recipe, store: Store, retry_failed: bool = False
+) -> BatchPlan:
     """Sort jobs by what is known of them; a job whose logs and settings are as they were is not run again."""
-    made = Plan([], [], [])
+    made = BatchPlan([], [], [])
     for job in jobs:
         try:
             task = recipe.task(job)
@@ -86,7 +86,7 @@ def plan(
     return made
 
 
-def _stands(record: Record, task: Task, store: Store) -> bool:
+def _stands(record: JobRecord, task: Task, store: Store) -> bool:
     if record.basis != task.basis or (record.job.logs, record.job.loaded) != (task.job.logs, task.job.loaded):
         return False
     if record.status not in FAILURES and not store.exists(f"{task.job.name}.algid/result.json"):
@@ -113,14 +113,14 @@ class Progress:
 
     done: int
     total: int
-    last: Record
+    last: JobRecord
 
 
 @dataclass(frozen=True)
 class Ended:
     """How a batch ended: its jobs' records, how many were run now, and how many are left where it was stopped."""
 
-    records: list[Record]
+    records: list[JobRecord]
     ran: int
     left: int
     full: str | None = None
@@ -191,10 +191,10 @@ class Batch:
             future.cancel()
         return len(waiting) + len(running)
 
-    def _record(self, task: Task, future: Future[Any]) -> Record | None:
+    def _record(self, task: Task, future: Future[Any]) -> JobRecord | None:
         """How the task ended, or None where it is to be run again."""
         try:
-            ended: Record | DiskFull = future.result()
+            ended: JobRecord | DiskFull = future.result()
         except WorkerDiedError as died:
             self._kills[task.job.name] += died.kills
             if self._kills[task.job.name] < MOST_KILLS:
@@ -209,7 +209,7 @@ class Batch:
             return None
         return ended
 
-    def _keep(self, record: Record) -> bool:
+    def _keep(self, record: JobRecord) -> bool:
         try:
             write_record(self._store, record)
         except OutputError as error:

@@ -14,7 +14,7 @@ from algid.cli.completion import cases
 
 if TYPE_CHECKING:
     from algid.design.campaign import Campaign, Design
-    from algid.design.prior import Prior
+    from algid.design.prior import BelievedArm
     from algid.design.request import Request
     from algid.estimators.whitening import NoiseLevels
 
@@ -93,7 +93,7 @@ def design(
     import shlex
 
     from algid.design.campaign import plan
-    from algid.design.prior import Knowns, prior_of
+    from algid.design.prior import KnownBefore, prior_of
     from algid.design.request import request
     from algid.design.write import Provenance, write_design
     from algid.files import refuse_existing, whole_folder
@@ -116,7 +116,7 @@ def design(
     names = _joints(joints)
     folder = out / f"{Path(prior).stem or 'arm'}.design"
     refuse_existing(folder, force)
-    known = prior_of(prior, _loaded(asked), Knowns(l1, l2, payload, prior_error))
+    known = prior_of(prior, _loaded(asked), KnownBefore(l1, l2, payload, prior_error))
     noise = _noise(known, position_noise, torque_noise, noise_from)
     campaign = _campaign(known, asked, noise, wanted, drive.value, margin, seed)
     with one_blas_thread(), progress("steps", quiet) as told:
@@ -149,7 +149,7 @@ def _loaded(asked: Request) -> bool | None:
 
 
 def _campaign(
-    prior: Prior,
+    prior: BelievedArm,
     asked: Request,
     noise: NoiseLevels,
     wanted: str | None,
@@ -177,7 +177,7 @@ def _campaign(
     )
 
 
-def _noise(prior: Prior, position: float | None, torque: float | None, log: Path | None) -> NoiseLevels:
+def _noise(prior: BelievedArm, position: float | None, torque: float | None, log: Path | None) -> NoiseLevels:
     """Noise of flags, else of a log, else of the logs behind the prior. Raises `SettingError` where none tells."""
     import numpy as np
 

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 
-class Topic(StrEnum):
+class GuideTopic(StrEnum):
     """The pages of the guide."""
 
     START = "start"
@@ -29,24 +29,24 @@ class Topic(StrEnum):
 
 
 SUMMARIES = {
-    Topic.START: "a first result from a real log",
-    Topic.ARM: "the drawing, the equation of motion, what each constant is",
-    Topic.LOGS: "formats, names, units, signs: a recipe for each awkward log",
-    Topic.MOTION: "which motion to record",
-    Topic.EXPORT: "the arm as URDF, SDF, MJCF, Python, C; the payload as YAML",
-    Topic.REPORT: "the report, figure by figure",
-    Topic.WARNINGS: "every warning and status: meaning, cause, what to do",
-    Topic.ESTIMATORS: "the estimators, the torque's terms, and what they assume",
-    Topic.PAYLOAD: "payloads, lengths, payload in time",
-    Topic.BATCH: "thousands of logs, fleets, clusters",
-    Topic.PYTHON: "the Python API",
-    Topic.MEASURED: "what was measured, with the command that measures it",
-    Topic.CONTRIBUTING: "the house and its rules",
+    GuideTopic.START: "a first result from a real log",
+    GuideTopic.ARM: "the drawing, the equation of motion, what each constant is",
+    GuideTopic.LOGS: "formats, names, units, signs: a recipe for each awkward log",
+    GuideTopic.MOTION: "which motion to record",
+    GuideTopic.EXPORT: "the arm as URDF, SDF, MJCF, Python, C; the payload as YAML",
+    GuideTopic.REPORT: "the report, figure by figure",
+    GuideTopic.WARNINGS: "every warning and status: meaning, cause, what to do",
+    GuideTopic.ESTIMATORS: "the estimators, the torque's terms, and what they assume",
+    GuideTopic.PAYLOAD: "payloads, lengths, payload in time",
+    GuideTopic.BATCH: "thousands of logs, fleets, clusters",
+    GuideTopic.PYTHON: "the Python API",
+    GuideTopic.MEASURED: "what was measured, with the command that measures it",
+    GuideTopic.CONTRIBUTING: "the house and its rules",
 }
 
 
 def guide(
-    topic: Annotated[Topic | None, typer.Argument(help="One of the topics; the list of them without.")] = None,
+    topic: Annotated[GuideTopic | None, typer.Argument(help="One of the topics; the list of them without.")] = None,
 ) -> None:
     """Read the guide in the terminal.
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from algid.synth.run import Recording
 
 
-class Format(StrEnum):
+class LogFormat(StrEnum):
     """Formats that logs are written in."""
 
     MCAP = "mcap"
@@ -46,7 +46,7 @@ def synth(
         ),
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write into.")] = Path(),
-    kind: Annotated[Format, typer.Option("--format", help="Format of the logs.")] = Format.MCAP,
+    kind: Annotated[LogFormat, typer.Option("--format", help="Format of the logs.")] = LogFormat.MCAP,
     rate: Annotated[float, typer.Option(help="Samples a second, Hz.", min=1e-3)] = 1000.0,
     duration: Annotated[
         float | None, typer.Option(help="Length of each log, s; 1, or as long as the motion.", min=1e-3)
@@ -117,7 +117,7 @@ def synth(
     _write(logs, out, kind)
 
 
-def _write(logs: Sequence[Log], out: Path, kind: Format) -> None:
+def _write(logs: Sequence[Log], out: Path, kind: LogFormat) -> None:
     from algid.writers import write_log
 
     for log in logs:
@@ -136,7 +136,7 @@ def _refuse_beside_motion(flags: dict[str, str | None]) -> None:
             )
 
 
-def _rehearse(case: Case, motion: Path, recording: Recording, out: Path, kind: Format) -> None:
+def _rehearse(case: Case, motion: Path, recording: Recording, out: Path, kind: LogFormat) -> None:
     from dataclasses import replace
 
     from algid.report.progress import progress

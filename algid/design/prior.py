@@ -27,7 +27,7 @@ NOISE = ("theta1", "theta2", "tau1", "tau2")
 
 
 @dataclass(frozen=True, eq=False)
-class Prior:
+class BelievedArm:
     """An arm as it is believed to be.
 
     Parameters
@@ -50,7 +50,7 @@ class Prior:
 
 
 @dataclass(frozen=True)
-class Knowns:
+class KnownBefore:
     """What the user knows better than the prior: link lengths and payload, and how wrong the rest may be."""
 
     l1: float | None = None
@@ -64,7 +64,7 @@ class Knowns:
         return {name: value for name, value in (("l1", self.l1), ("l2", self.l2)) if value is not None}
 
 
-def prior_of(source: str, loaded: bool | None, knowns: Knowns) -> Prior:
+def prior_of(source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedArm:
     """The prior that `source` describes.
 
     Parameters
@@ -91,7 +91,7 @@ def prior_of(source: str, loaded: bool | None, knowns: Knowns) -> Prior:
     return prior
 
 
-def of_case(case: Case, source: str, loaded: bool | None, knowns: Knowns) -> Prior:
+def of_case(case: Case, source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedArm:
     """The prior of a simulated or drawn arm: its masses and friction may be wrong, its lengths are right.
 
     Raises
@@ -105,10 +105,10 @@ def of_case(case: Case, source: str, loaded: bool | None, knowns: Knowns) -> Pri
     error = WRONG if knowns.error is None else knowns.error
     mean = _parameters(shared, arm, mass)
     spread = np.stack([_parameters(shared, *wrong) - mean for wrong in _wrong(arm, mass, error)], axis=1)
-    return Prior(source, Belief(shared, mean, spread, box=True), np.array([arm.l1, arm.l2]), None)
+    return BelievedArm(source, Belief(shared, mean, spread, box=True), np.array([arm.l1, arm.l2]), None)
 
 
-def _shared(model: Model, mass: float | None, loaded: bool | None, source: str, knowns: Knowns) -> Shared:
+def _shared(model: Model, mass: float | None, loaded: bool | None, source: str, knowns: KnownBefore) -> Shared:
     if loaded and not mass:
         raise SettingError(f"{source}: it knows no payload for the loaded runs; give --payload KG, or --runs 1,0")
     return Shared(model, payload=bool(mass) if loaded is None else loaded, lengths=knowns.lengths)
@@ -133,7 +133,7 @@ def _wrong(arm: Arm, mass: float, error: float) -> list[tuple[Arm, float]]:
     ]
 
 
-def _of_result(result: Result, source: str, loaded: bool | None, knowns: Knowns) -> Prior:
+def _of_result(result: Result, source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedArm:
     model, left_out = _planned(model_of(result))
     value = {name: found.estimate for name, found in result.estimates.items()}
     value |= {name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None}
@@ -151,7 +151,7 @@ def _of_result(result: Result, source: str, loaded: bool | None, knowns: Knowns)
     known = {**value, **lengths}
     reach = np.array([np.nan if known.get(name) is None else known[name] for name in ("l1", "l2")], dtype=np.float64)
     warnings = (*left_out, *contradictions(result, knowns.lengths))
-    return Prior(source, Belief(shared, mean, spread, box=False), reach, _noise(result), warnings)
+    return BelievedArm(source, Belief(shared, mean, spread, box=False), reach, _noise(result), warnings)
 
 
 def _planned(model: Model) -> tuple[Model, tuple[str, ...]]:
@@ -203,7 +203,7 @@ def _noise(result: Result) -> NoiseLevels | None:
     return NoiseLevels(levels[:2], levels[2:])
 
 
-def _check(prior: Prior) -> None:
+def _check(prior: BelievedArm) -> None:
     """Refuse a prior whose inertia matrix is not positive definite: no arm is like that, and none can be moved so."""
     belief = prior.belief
     value = dict(zip(belief.shared.names, belief.mean.tolist(), strict=True))

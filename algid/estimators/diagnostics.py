@@ -225,7 +225,7 @@ def payload_distance(fit: Fit) -> float | None:
 
 
 @dataclass(frozen=True, eq=False)
-class Repeatability:
+class MassScatter:
     """What each of n loaded logs weighs by itself (n,), in kg, and the standard deviation of that with its interval."""
 
     masses: FloatArray
@@ -233,7 +233,7 @@ class Repeatability:
     ci95: tuple[float, float]
 
 
-def repeatability(fit: Fit) -> Repeatability | None:
+def repeatability(fit: Fit) -> MassScatter | None:
     """How far the payload differs from run to run; None with fewer than two loaded logs, or none that tell it.
 
     Each loaded log is fitted for m_p, the arm and the lengths held as all logs tell them. The interval is that of the
@@ -255,7 +255,7 @@ def repeatability(fit: Fit) -> Repeatability | None:
     n = len(masses)
     std = float(np.std(masses, ddof=1))
     low, high = (std * float(np.sqrt((n - 1) / chdtri(n - 1, tail))) for tail in (0.025, 0.975))
-    return Repeatability(np.array(masses), std, (low, high))
+    return MassScatter(np.array(masses), std, (low, high))
 
 
 def _alone(logs: list[LogInformation]) -> tuple[FloatArray, FloatArray] | None:

@@ -41,7 +41,7 @@ from algid.signals.segments import Segment, pieces
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
+class IntegralColumns:
     """What multiplies each unknown after t² and two integrations, each (..., n); and the torque's own integral.
 
     `inertia1` and `inertia2` multiply θ̈1 and θ̈2, `viscous1` and `viscous2` θ̇1 and θ̇2.
@@ -63,13 +63,13 @@ class Columns:
         return np.stack([self.inertia1, self.coupling1, self.inertia2, self.viscous1, self.gravity1, self.gravity12])
 
 
-def columns(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> Columns:
-    """The integrals of eq. (3) and (4) over windows that start at the first sample: see `Columns`."""
+def columns(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> IntegralColumns:
+    """The integrals of eq. (3) and (4) over windows that start at the first sample: see `IntegralColumns`."""
     t = dt * np.arange(theta.shape[-1], dtype=np.float64)
     omega1, omega2 = omega
     c2, s2 = np.cos(theta[1]), np.sin(theta[1])
     moved = theta - theta[..., :1]
-    return Columns(
+    return IntegralColumns(
         inertia1=_of_acceleration(moved[0], t, dt),
         coupling1=_of_derivative(c2 * (2 * omega1 + omega2), t, dt),
         inertia2=_of_acceleration(moved[1], t, dt),
@@ -207,7 +207,7 @@ def stage1(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> 
     )
 
 
-def _solve_first_joint(terms: Columns, dt: float) -> Solutions:
+def _solve_first_joint(terms: IntegralColumns, dt: float) -> Solutions:
     """x_r of P_r x_r = q_r: eq. (3) and five more integrals of it."""
     rows = stack_rows(np.concatenate([terms.first_joint(), terms.torque1[None]]), dt, 6)
     return solve_scaled(rows[:, :-1], rows[:, -1])
@@ -267,7 +267,7 @@ Stage = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
-class Series:
+class PaperSeries:
     """Estimates (s, n) of one window, its times `t` (n,) in s, and how many samples at its end are settled."""
 
     t: FloatArray
@@ -275,7 +275,7 @@ class Series:
     settled: int
 
 
-def stage1_series(source: Iterable[Segment], window: float) -> Iterator[Series]:
+def stage1_series(source: Iterable[Segment], window: float) -> Iterator[PaperSeries]:
     """`STAGE1_SERIES` of a log of the arm without payload, by windows of `window` s; segments need velocities."""
 
     def stage(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> FloatArray:
@@ -286,7 +286,7 @@ def stage1_series(source: Iterable[Segment], window: float) -> Iterator[Series]:
     return _windows(source, window, stage)
 
 
-def stage2_series(source: Iterable[Segment], window: float, k: FloatArray, gravity: float) -> Iterator[Series]:
+def stage2_series(source: Iterable[Segment], window: float, k: FloatArray, gravity: float) -> Iterator[PaperSeries]:
     """`STAGE2_SERIES` of a log of the arm with payload, given its constants k1 … k7 (7,) without."""
 
     def stage(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> FloatArray:
@@ -296,7 +296,7 @@ def stage2_series(source: Iterable[Segment], window: float, k: FloatArray, gravi
     return _windows(source, window, stage)
 
 
-def _windows(source: Iterable[Segment], window: float, stage: Stage) -> Iterator[Series]:
+def _windows(source: Iterable[Segment], window: float, stage: Stage) -> Iterator[PaperSeries]:
     moving = iter(source)
     first = next(moving, None)
     if first is None:
@@ -308,7 +308,7 @@ def _windows(source: Iterable[Segment], window: float, stage: Stage) -> Iterator
         omega = np.stack([window.omega for window in batch if window.omega is not None], axis=1)
         values = stage(theta, omega, tau, dt)
         for index, piece in enumerate(batch):
-            yield Series(t=piece.t, values=values[:, index], settled=round(SETTLED / dt))
+            yield PaperSeries(t=piece.t, values=values[:, index], settled=round(SETTLED / dt))
 
 
 def _batches(windows: Iterable[Segment]) -> Iterator[list[Segment]]:
@@ -333,7 +333,7 @@ class Summary:
         self._quartiles: list[FloatArray] = []
         self._size = size
 
-    def add(self, series: Series) -> None:
+    def add(self, series: PaperSeries) -> None:
         """Take in one window; samples that are NaN (singular, before ε) do not count."""
         settled = series.values[:, -series.settled :]
         quartiles = np.full((3, self._size), np.nan)

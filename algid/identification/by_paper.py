@@ -15,7 +15,7 @@ from algid.estimators.paper import (
     STAGE1_SERIES,
     STAGE2_NAMES,
     STAGE2_SERIES,
-    Series,
+    PaperSeries,
     Summary,
     stage1_series,
     stage2_series,
@@ -108,7 +108,7 @@ def _is_no_arm(k: FloatArray, wander: FloatArray) -> bool:
     return bool(np.any(m22 <= 0) or np.any(m11 * m22 - m12**2 <= 0))
 
 
-def _series(survey: Survey, log: LogSource, settings: Settings, k: FloatArray | None) -> Iterator[Series]:
+def _series(survey: Survey, log: LogSource, settings: Settings, k: FloatArray | None) -> Iterator[PaperSeries]:
     window = settings.window if settings.window is not None and settings.estimator == "paper" else STAGE1_WINDOW
     moving = with_velocities(survey, log, settings, luenberger=settings.luenberger or settings.estimator != "paper")
     if k is None:
@@ -116,13 +116,13 @@ def _series(survey: Survey, log: LogSource, settings: Settings, k: FloatArray | 
     return stage2_series(moving, window, k, settings.gravity)
 
 
-def _watched(series: Iterable[Series], summary: Summary) -> Iterator[Series]:
+def _watched(series: Iterable[PaperSeries], summary: Summary) -> Iterator[PaperSeries]:
     for window in series:
         summary.add(window)
         yield window
 
 
-def _written(series: Iterable[Series], names: Sequence[str]) -> Iterator[dict[str, FloatArray]]:
+def _written(series: Iterable[PaperSeries], names: Sequence[str]) -> Iterator[dict[str, FloatArray]]:
     """Columns for the file; the sum k5+k3 is Table 4's and follows from the others."""
     for block in series_blocks(series, names):
         yield {name: column for name, column in block.items() if name != "k5+k3"}

@@ -16,7 +16,7 @@ from algid.arm import FloatArray
 from algid.estimators.fit import Fit
 from algid.estimators.innovations import ResidualSums, autocorrelation, spectra, whiteness_of
 from algid.estimators.noise import first_guess
-from algid.estimators.paper import Series
+from algid.estimators.paper import PaperSeries
 from algid.estimators.prediction import PredictionFilter
 from algid.estimators.running import has_running, running
 from algid.identification.source import Survey
@@ -105,9 +105,9 @@ def write_columns(path: Path, blocks: Iterable[Mapping[str, object]], start_ns: 
             writer.close()
 
 
-def series_blocks(series: Iterable[Series], names: Sequence[str]) -> Iterator[dict[str, FloatArray]]:
+def series_blocks(series: Iterable[PaperSeries], names: Sequence[str]) -> Iterator[dict[str, FloatArray]]:
     """Windows of estimates gathered into blocks of columns, `t` first; a window's values are (s, n)."""
-    gathered: list[Series] = []
+    gathered: list[PaperSeries] = []
     for window in series:
         gathered.append(window)
         if sum(part.t.size for part in gathered) >= ROWS:
@@ -117,7 +117,7 @@ def series_blocks(series: Iterable[Series], names: Sequence[str]) -> Iterator[di
         yield _columns(gathered, names)
 
 
-def _columns(windows: Sequence[Series], names: Sequence[str]) -> dict[str, FloatArray]:
+def _columns(windows: Sequence[PaperSeries], names: Sequence[str]) -> dict[str, FloatArray]:
     values = np.concatenate([window.values for window in windows], axis=1)
     return {"t": np.concatenate([window.t for window in windows]), **dict(zip(names, values, strict=True))}
 

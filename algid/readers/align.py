@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.log import IntArray, Notice
-from algid.readers.table import Table
+from algid.readers.table import SampleTable
 from algid.words import counted
 
 _GAP = 3.0
@@ -22,7 +22,7 @@ class Series:
     """A topic read as a whole: sorted stamps (M,) and its channels (M,)."""
 
     topic: str
-    table: Table
+    table: SampleTable
 
     @property
     def period(self) -> float:
@@ -53,7 +53,7 @@ class Series:
         return ", ".join(told)
 
 
-def aligned(main: Iterator[Table], others: Sequence[Series]) -> Iterator[Table]:
+def aligned(main: Iterator[SampleTable], others: Sequence[Series]) -> Iterator[SampleTable]:
     """The main topic's tables with the other topics' channels, where all cover it.
 
     The last table tells how many were dropped and what the interpolation costs, in the log's own units.
@@ -71,7 +71,7 @@ def aligned(main: Iterator[Table], others: Sequence[Series]) -> Iterator[Table]:
         for other in others:
             if len(kept):
                 columns |= other.at(kept.stamp_ns)
-        held = Table(kept.stamp_ns, columns, kept.notices)
+        held = SampleTable(kept.stamp_ns, columns, kept.notices)
     if held is not None:
         yield held.noting(*_told(others, lost))
 

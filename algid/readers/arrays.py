@@ -16,7 +16,7 @@ from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign, tables
 from algid.readers.names import TIMES
 from algid.readers.parquet import units_of_schema
-from algid.readers.table import Table
+from algid.readers.table import SampleTable
 from algid.words import counted
 
 if TYPE_CHECKING:
@@ -173,7 +173,7 @@ class _Whole:
     frame: pl.DataFrame
     columns: Columns
 
-    def tables(self, rows: int) -> Iterator[Table]:
+    def tables(self, rows: int) -> Iterator[SampleTable]:
         """Tables of `rows` rows."""
         return tables(str(self.path), self._frames(rows), self.columns, {})
 

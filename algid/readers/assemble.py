@@ -15,7 +15,7 @@ from algid.errors import LogError
 from algid.log import Log, Notice, Origin
 from algid.readers.convert import ROWS, Conversion, Gatherer, Room, channel_readings
 from algid.readers.order import Sorter
-from algid.readers.table import BLOCK_ROWS, Table, cut
+from algid.readers.table import BLOCK_ROWS, SampleTable, cut
 from algid.words import counted
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class TableReader:
     """A `Reader` over any format that yields tables of at most so many rows."""
 
     origin: Origin
-    tables: Callable[[int], Iterator[Table]]
+    tables: Callable[[int], Iterator[SampleTable]]
     conversion: Conversion
     notices: tuple[Notice, ...] = ()
     rows: int = 0
@@ -77,10 +77,10 @@ class TableReader:
         room = gatherer.filled()
         return Log(room.stamp_ns, room.theta, room.tau, self.origin, room.omega, notices)
 
-    def _samples(self, rows: int) -> Iterator[tuple[Table, tuple[Notice, ...]]]:
+    def _samples(self, rows: int) -> Iterator[tuple[SampleTable, tuple[Notice, ...]]]:
         """Checked and sorted tables that are not empty, with what is to be told of each."""
         notices, total = self.notices, 0
-        held: tuple[Table, tuple[Notice, ...]] | None = None
+        held: tuple[SampleTable, tuple[Notice, ...]] | None = None
         for table in cut(self._finite(self._within(Sorter(self.origin.path).run(self.tables(rows)))), rows):
             notices += table.notices
             if len(table):
@@ -95,14 +95,14 @@ class TableReader:
         if held is not None:  # what the last tables tell, also where they are empty
             yield held[0], held[1] + notices
 
-    def _within(self, tables: Iterator[Table]) -> Iterator[Table]:
+    def _within(self, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
         """The rows between the `start` and the `end` that the reading says; the last table tells of the cut."""
         start, end = self.origin.reading.start, self.origin.reading.end
         if start is None and end is None:
             yield from tables
             return
         first_ns, left_out = None, 0
-        held: Table | None = None
+        held: SampleTable | None = None
         for table in tables:
             if held is not None:
                 yield held
@@ -117,15 +117,15 @@ class TableReader:
             text = f"{counted(left_out, 'sample')} before {start or 0:g} s or behind {last}"
             yield held.noting(Notice("CUT", f"{text} left out, as told", note=True))
 
-    def _convert(self, table: Table, room: Room, unwrapper: Unwrapper) -> None:
+    def _convert(self, table: SampleTable, room: Room, unwrapper: Unwrapper) -> None:
         room.stamp_ns[:] = table.stamp_ns
         self.conversion.apply(table, room)
         unwrapper.run(room.theta)
 
-    def _finite(self, tables: Iterator[Table]) -> Iterator[Table]:
+    def _finite(self, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
         """Tables of finite numbers; where a user accepts others, their rows are left out and counted."""
         first, dropped = 0, 0
-        held: Table | None = None
+        held: SampleTable | None = None
         for table in tables:
             if held is not None:
                 yield held
@@ -144,7 +144,7 @@ class TableReader:
         if held is not None:
             yield held
 
-    def _measured(self, table: Table) -> Mapping[str, FloatArray]:
+    def _measured(self, table: SampleTable) -> Mapping[str, FloatArray]:
         """The columns of a table without the torque of a joint that has no motor."""
         without = f"tau{self.origin.reading.passive}"
         return {name: values for name, values in table.columns.items() if name != without}
@@ -169,7 +169,7 @@ class TableReader:
 
 def reader_of(
     origin: Origin,
-    tables: Callable[[int], Iterator[Table]],
+    tables: Callable[[int], Iterator[SampleTable]],
     profile: Profile | None,
     stated: Mapping[str, str],
     notices: tuple[Notice, ...] = (),

@@ -23,7 +23,7 @@ from algid.readers.joints import along_the_arm, order_notice
 from algid.readers.order import Sorter
 from algid.readers.rosbag2 import bag_files
 from algid.readers.sniff import SQLITE
-from algid.readers.table import BLOCK_ROWS, CHANNELS, JOINT_CHANNELS, VELOCITIES, Table, stack
+from algid.readers.table import BLOCK_ROWS, CHANNELS, JOINT_CHANNELS, VELOCITIES, SampleTable, stack
 from algid.words import counted
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def open_bag(path: Path, profile: Profile | None = None, notices: tuple[Notice, 
     mapping["t"] = f"{homes[0]}: header.stamp" if clock == "header" else "log time"
     origin = Origin(str(path), "bag", mapping, None, replace(reading, topics=tuple(homes), clock=clock))
 
-    def tables(rows: int) -> Iterator[Table]:
+    def tables(rows: int) -> Iterator[SampleTable]:
         main, *others = parts
         return aligned(main.tables(rows), [other.series() for other in others]) if others else main.tables(rows)
 
@@ -131,7 +131,7 @@ class _Part:
     fields: Mapping[str, str]
     clock: str
 
-    def tables(self, rows: int) -> Iterator[Table]:
+    def tables(self, rows: int) -> Iterator[SampleTable]:
         """Tables of `rows` rows; messages without the fields are left out and counted."""
         stamps: list[int] = []
         values: list[list[float]] = []
@@ -159,9 +159,9 @@ class _Part:
             raise LogError(f"{self.path}: topic {self.topic!r} holds no {', '.join(self.fields.values())}; {mend}")
         return Series(self.topic, stack(parts))
 
-    def _table(self, stamps: list[int], values: list[list[float]]) -> Table:
+    def _table(self, stamps: list[int], values: list[list[float]]) -> SampleTable:
         columns = np.array(values, np.float64).reshape(-1, len(self.fields)).T.copy()
-        return Table(np.array(stamps, np.int64), dict(zip(self.fields, columns, strict=True)))
+        return SampleTable(np.array(stamps, np.int64), dict(zip(self.fields, columns, strict=True)))
 
 
 def _value(message: Any, path: str) -> float | None:

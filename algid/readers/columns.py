@@ -17,8 +17,8 @@ from algid.errors import LogError
 from algid.log import IntArray, Notice, Origin, Reading, Teller, Truth, add, word_sum
 from algid.readers.assemble import TableReader, reader_of
 from algid.readers.joints import along_the_arm, order_notice
-from algid.readers.names import COMMANDED, CURRENTS, Choice, choose, on_motor_side, take_apart
-from algid.readers.table import CHANNELS, JOINT_CHANNELS, VELOCITIES, Table
+from algid.readers.names import COMMANDED, CURRENTS, ChannelChoice, choose, on_motor_side, take_apart
+from algid.readers.table import CHANNELS, JOINT_CHANNELS, VELOCITIES, SampleTable
 from algid.units import CURRENT, NANOSECONDS, TORQUE, unit_of
 from algid.words import counted
 
@@ -46,7 +46,7 @@ class Columns:
         path: str,
         kind: str,
         truth: Truth | None,
-        tables: Callable[[int], Iterator[Table]],
+        tables: Callable[[int], Iterator[SampleTable]],
         profile: Profile | None,
         rows: int,
     ) -> TableReader:
@@ -125,7 +125,7 @@ def _line_for(name: str) -> str:
 
 
 def _joints(
-    choice: Choice, named: Mapping[str, str], profile: Profile | None
+    choice: ChannelChoice, named: Mapping[str, str], profile: Profile | None
 ) -> tuple[tuple[str, str] | None, Teller, tuple[Notice, ...]]:
     """The joints, who said which is the first, and what to tell of it."""
     if profile is not None and profile.joints is not None:
@@ -308,7 +308,9 @@ if TYPE_CHECKING:
     import polars as pl
 
 
-def tables(path: str, frames: Iterator[pl.DataFrame], columns: Columns, sums: Mapping[str, int]) -> Iterator[Table]:
+def tables(
+    path: str, frames: Iterator[pl.DataFrame], columns: Columns, sums: Mapping[str, int]
+) -> Iterator[SampleTable]:
     """Tables out of frames that hold one column a channel, and "t".
 
     Raises
@@ -335,7 +337,7 @@ def tables(path: str, frames: Iterator[pl.DataFrame], columns: Columns, sums: Ma
             notices += _slow(columns.sources["t"], stamps, unit)
         channels = {name: frame[name].to_numpy() for name in frame.columns if name != "t"}
         done += frame.height
-        yield Table(stamps, channels, tuple(notices))
+        yield SampleTable(stamps, channels, tuple(notices))
     _verify(path, seen, expected)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.errors import LogError
 from algid.log import ChannelReading, IntArray
-from algid.readers.table import CHANNELS, JOINT_CHANNELS, VELOCITIES, Table
+from algid.readers.table import CHANNELS, JOINT_CHANNELS, VELOCITIES, SampleTable
 from algid.units import CURRENT, TORQUE, VELOCITY
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ class Conversion:
     base: bool = False
     passive: int | None = None
 
-    def apply(self, table: Table, room: Room) -> None:
+    def apply(self, table: SampleTable, room: Room) -> None:
         """Fill in a table's angles, torques and, where recorded, velocities in rad, N m, rad/s."""
         theta, omega = room.theta, room.omega
         self._joint_pair(table, JOINT_CHANNELS[:2], theta)
@@ -121,7 +121,7 @@ class Conversion:
         if self.base:
             room.tau[0] += room.tau[1]
 
-    def _joint_pair(self, table: Table, names: Sequence[str], both: FloatArray) -> None:
+    def _joint_pair(self, table: SampleTable, names: Sequence[str], both: FloatArray) -> None:
         for row, name in zip(both, names, strict=True):
             channel = self.channels[name]
             if channel.factor == 1:

@@ -15,7 +15,7 @@ from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign, check_written, tables
 from algid.readers.dialect import Dialect, detect
 from algid.readers.sniff import head_of, whole_lines
-from algid.readers.table import Table
+from algid.readers.table import SampleTable
 
 if TYPE_CHECKING:
     import polars as pl
@@ -99,7 +99,7 @@ class _Text:
     columns: Columns
     sums: Mapping[str, int]
 
-    def tables(self, rows: int) -> Iterator[Table]:
+    def tables(self, rows: int) -> Iterator[SampleTable]:
         """Tables of about `rows` rows."""
         return tables(str(self.path), self._frames(rows), self.columns, self.sums)
 

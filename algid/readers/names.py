@@ -104,7 +104,7 @@ class Name:
 
 
 @dataclass(frozen=True)
-class Choice:
+class ChannelChoice:
     """Columns chosen for a log: by canonical channel its column and, where the name tells, its unit.
 
     `joints` are the joints' own names, where they have any; `foreign` units that names state and algid does not know.
@@ -151,7 +151,7 @@ def choose(
     joints: tuple[str, str] | None = None,
     named: Collection[str] = (),
     passive: int | None = None,
-) -> Choice:
+) -> ChannelChoice:
     """Canonical channels found among `columns`; those not found are left out.
 
     Parameters
@@ -194,7 +194,7 @@ def choose(
             _refuse_twin(column, parts)
     units = {channel: unit for channel, column in chosen.items() if (unit := parts[column].unit)}
     foreign = {channel: unit for channel, column in chosen.items() if (unit := parts[column].foreign)}
-    return Choice(chosen, units, _named_joints(chosen, parts), foreign)
+    return ChannelChoice(chosen, units, _named_joints(chosen, parts), foreign)
 
 
 def _pairs(parts: dict[str, Name], joints: tuple[str, str] | None) -> dict[str, str]:

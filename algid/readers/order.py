@@ -8,7 +8,7 @@ import numpy as np
 
 from algid.errors import LogError
 from algid.log import Notice
-from algid.readers.table import Table, stack
+from algid.readers.table import SampleTable, stack
 from algid.words import counted
 
 HORIZON = 1024
@@ -25,7 +25,7 @@ class Sorter:
         self.late = 0
         self.repeated = 0
 
-    def run(self, tables: Iterator[Table]) -> Iterator[Table]:
+    def run(self, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
         """Tables with strictly increasing stamps, within and across; the last one tells what was mended.
 
         Raises
@@ -34,7 +34,7 @@ class Sorter:
             If time goes backwards by more than `HORIZON` rows or in a quarter of the rows, or stands still
             in half of them.
         """
-        pending: Table | None = None
+        pending: SampleTable | None = None
         for table in tables:
             if len(table) == 0 and pending is not None:
                 pending = pending.noting(*table.notices)
@@ -54,7 +54,7 @@ class Sorter:
         if pending is not None:
             yield pending.noting(*self._report())
 
-    def _sorted(self, table: Table) -> Table:
+    def _sorted(self, table: SampleTable) -> SampleTable:
         if np.all(table.stamp_ns[1:] > table.stamp_ns[:-1]):
             return table
         steps = np.diff(table.stamp_ns)
@@ -73,7 +73,7 @@ class Sorter:
         self.repeated += repeated
         return table.take(fresh) if repeated else table
 
-    def _reordered(self, table: Table, backward: int) -> Table:
+    def _reordered(self, table: SampleTable, backward: int) -> SampleTable:
         order = np.argsort(table.stamp_ns, kind="stable")
         moved = order - np.arange(order.size)
         place = int(np.flatnonzero(np.diff(table.stamp_ns) < 0)[0])

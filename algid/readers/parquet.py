@@ -14,7 +14,7 @@ from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign, check_written, tables
 from algid.readers.footer import Footer, FooterError, page_header, parsed
 from algid.readers.stated import in_metadata
-from algid.readers.table import Table
+from algid.readers.table import SampleTable
 from algid.words import counted
 
 if TYPE_CHECKING:
@@ -208,7 +208,7 @@ class _Groups:
     sums: Mapping[str, int]
     checked: bool = False
 
-    def tables(self, rows: int) -> Iterator[Table]:
+    def tables(self, rows: int) -> Iterator[SampleTable]:
         """Tables of about `rows` rows."""
         return tables(str(self.path), self._frames(rows), self._columns(), self.sums)
 

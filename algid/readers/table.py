@@ -20,7 +20,7 @@ CHANNELS = JOINT_CHANNELS + VELOCITIES
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class SampleTable:
     """A stretch of samples: stamps (N,) in ns and, by canonical name, channels (N,) in the file's units."""
 
     stamp_ns: IntArray
@@ -35,31 +35,31 @@ class Table:
         """Whether velocities were recorded."""
         return VELOCITIES[0] in self.columns
 
-    def part(self, first: int, last: int) -> Table:
+    def part(self, first: int, last: int) -> SampleTable:
         """Rows `first` to `last` - 1 as views; the notices stay with the first part."""
         columns = {name: values[first:last] for name, values in self.columns.items()}
-        return Table(self.stamp_ns[first:last], columns, self.notices if first == 0 else ())
+        return SampleTable(self.stamp_ns[first:last], columns, self.notices if first == 0 else ())
 
-    def take(self, rows: IntArray | np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Table:
+    def take(self, rows: IntArray | np.ndarray[tuple[int], np.dtype[np.bool_]]) -> SampleTable:
         """The rows of an index or mask, with all notices."""
         columns = {name: values[rows] for name, values in self.columns.items()}
-        return Table(self.stamp_ns[rows], columns, self.notices)
+        return SampleTable(self.stamp_ns[rows], columns, self.notices)
 
-    def noting(self, *notices: Notice) -> Table:
+    def noting(self, *notices: Notice) -> SampleTable:
         """The table with more notices."""
-        return Table(self.stamp_ns, self.columns, (*self.notices, *notices)) if notices else self
+        return SampleTable(self.stamp_ns, self.columns, (*self.notices, *notices)) if notices else self
 
 
-def stack(tables: Sequence[Table]) -> Table:
+def stack(tables: Sequence[SampleTable]) -> SampleTable:
     """One table out of several with the same channels, in their order."""
     if len(tables) == 1:
         return tables[0]
     columns = {name: np.concatenate([table.columns[name] for table in tables]) for name in tables[0].columns}
     notices = tuple(notice for table in tables for notice in table.notices)
-    return Table(np.concatenate([table.stamp_ns for table in tables]), columns, notices)
+    return SampleTable(np.concatenate([table.stamp_ns for table in tables]), columns, notices)
 
 
-def cut(tables: Iterator[Table], rows: int) -> Iterator[Table]:
+def cut(tables: Iterator[SampleTable], rows: int) -> Iterator[SampleTable]:
     """The same samples in tables of at most `rows` rows."""
     for table in tables:
         if len(table) <= rows:

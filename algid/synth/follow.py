@@ -26,7 +26,7 @@ import numpy as np
 from algid.arm import FloatArray, mass_matrix
 from algid.errors import SettingError
 from algid.files import read_text
-from algid.synth.simulator import Driven, Motion, steered
+from algid.synth.simulator import Driven, SimulatedMotion, steered
 
 STIFFNESS = 2 * np.pi * 10.0
 _KNOTS = 200.0  # a second, at most: a plan is smooth
@@ -35,7 +35,7 @@ LOADED_COLUMNS = ("loaded_tau1", "loaded_tau2")
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class Reference:
     """A motion to follow: times t (N,) in s, angles, velocities, torques without and with payload, each (2, N)."""
 
     t: FloatArray
@@ -50,7 +50,7 @@ class Plan:
         return float(self.t[-1] - self.t[0])
 
 
-def read_plan(path: Path) -> Plan:
+def read_plan(path: Path) -> Reference:
     """The plan in the folder of a design, or in its ``trajectory.csv``.
 
     Raises
@@ -77,12 +77,17 @@ def read_plan(path: Path) -> Plan:
     with_load = pairs["tau"] if loaded[0] is None or loaded[1] is None else np.stack([loaded[0], loaded[1]])
     if not np.all(np.isfinite(values)) or np.any(np.diff(column["t"]) <= 0):
         raise SettingError(f"{file}: expected finite numbers at increasing times; write the design anew")
-    return Plan(column["t"] - column["t"][0], pairs["theta"], pairs["omega"], pairs["tau"], with_load)
+    return Reference(column["t"] - column["t"][0], pairs["theta"], pairs["omega"], pairs["tau"], with_load)
 
 
 def follow(
-    k: FloatArray, plan: Plan, t: FloatArray, inertia: FloatArray, loaded: bool, reached: Callable[[float], None] | None
-) -> Motion:
+    k: FloatArray,
+    plan: Reference,
+    t: FloatArray,
+    inertia: FloatArray,
+    loaded: bool,
+    reached: Callable[[float], None] | None,
+) -> SimulatedMotion:
     """The motion of the arm `k` (7,) that a controller holds to the plan, at the times `t` (N,) in s.
 
     Parameters

@@ -13,9 +13,9 @@ from algid.log import Log, Truth
 from algid.progress import Told
 from algid.synth.cases import Case
 from algid.synth.excitation import Hold, SampledTorque, Torque, no_torque, wide_multi_sine
-from algid.synth.follow import Plan, follow
+from algid.synth.follow import Reference, follow
 from algid.synth.sensors import Sensors, record, sample_times
-from algid.synth.simulator import HANGING, Motion, simulate
+from algid.synth.simulator import HANGING, SimulatedMotion, simulate
 
 EXCITATIONS = ("case", "wide", "none")
 
@@ -62,12 +62,12 @@ def synthesise(case: Case, torque: Torque, recording: Recording, told: Told | No
     return unloaded, _one(case, torque, replace(recording, sensors=other), case.payload, told)
 
 
-def rehearse(case: Case, plan: Plan, recording: Recording, told: Told | None = None) -> list[Log]:
+def rehearse(case: Case, plan: Reference, recording: Recording, told: Told | None = None) -> list[Log]:
     """The unloaded and, with a payload, the loaded log of a case whose controller follows a plan from its start."""
     return [_followed(case, plan, recording, payload, told) for payload in dict.fromkeys((0.0, case.payload))]
 
 
-def _followed(case: Case, plan: Plan, recording: Recording, payload: float, told: Told | None) -> Log:
+def _followed(case: Case, plan: Reference, recording: Recording, payload: float, told: Told | None) -> Log:
     bare = case.arm.constants()
     k = with_payload(bare, case.arm.payload_constants(payload))
     role = "loaded" if payload else "unloaded"
@@ -112,8 +112,10 @@ def with_schedule(
         motion = simulate(k, torque, every, state[:2], state[2:], _counted(told, "schedule", recording))
         state = np.concatenate([motion.theta[:, -1], motion.omega[:, -1]])
         kept = np.isin(every, own)
-        parts.append(Motion(own, motion.theta[:, kept], motion.omega[:, kept], motion.tau[:, kept]))
-    whole = Motion(*(np.concatenate([getattr(p, n) for p in parts], axis=-1) for n in ("t", "theta", "omega", "tau")))
+        parts.append(SimulatedMotion(own, motion.theta[:, kept], motion.omega[:, kept], motion.tau[:, kept]))
+    whole = SimulatedMotion(
+        *(np.concatenate([getattr(p, n) for p in parts], axis=-1) for n in ("t", "theta", "omega", "tau"))
+    )
     truth = Truth(case.arm, 0.0, case.name, tuple((float(time), float(mass)) for time, mass in schedule))
     return record(whole, recording.sensors, truth, f"{case.name}-schedule")
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.log import Log, Origin, Truth
-from algid.synth.simulator import Motion
+from algid.synth.simulator import SimulatedMotion
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def sample_times(rate: float, duration: float, sensors: Sensors) -> FloatArray:
     return np.round(t * 1e9) * 1e-9
 
 
-def record(motion: Motion, sensors: Sensors, truth: Truth, name: str) -> Log:
+def record(motion: SimulatedMotion, sensors: Sensors, truth: Truth, name: str) -> Log:
     """The log of a motion as the sensors see it.
 
     Velocities are in it only where the angles are exact: an arm with encoders measures none.

@@ -30,7 +30,7 @@ HANGING = np.array([-np.pi / 2, 0.0])
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class SimulatedMotion:
     """What the arm did at the times `t`: see the table above."""
 
     t: FloatArray
@@ -46,7 +46,7 @@ def simulate(
     theta0: FloatArray = HANGING,
     omega0: FloatArray | None = None,
     reached: Callable[[float], None] | None = None,
-) -> Motion:
+) -> SimulatedMotion:
     """Move the arm `k` by `torque` from rest, or from `theta0` (2,) rad and `omega0` (2,) rad/s at `t[0]`.
 
     Parameters
@@ -79,7 +79,7 @@ def simulate(
 
     corners = torque.t if isinstance(torque, SampledTorque) else None
     states = _moved(k, driven, t, start, corners, reached)
-    return Motion(t=t, theta=states[:2], omega=states[2:], tau=torque(t))
+    return SimulatedMotion(t=t, theta=states[:2], omega=states[2:], tau=torque(t))
 
 
 def steered(
@@ -89,7 +89,7 @@ def steered(
     theta0: FloatArray,
     corners: FloatArray | None = None,
     reached: Callable[[float], None] | None = None,
-) -> Motion:
+) -> SimulatedMotion:
     """Move the arm `k` from rest at `theta0` (2,) rad by a torque that depends on time and state.
 
     Parameters and results as for `simulate`, save
@@ -102,7 +102,7 @@ def steered(
         Times at which a derivative of the torque jumps.
     """
     states = _moved(k, controller, t, np.concatenate([theta0, np.zeros(2)]), corners, reached)
-    return Motion(t=t, theta=states[:2], omega=states[2:], tau=controller(t)(states[:2], states[2:]))
+    return SimulatedMotion(t=t, theta=states[:2], omega=states[2:], tau=controller(t)(states[:2], states[2:]))
 
 
 def _moved(

@@ -42,7 +42,7 @@ _PAYLOAD_OF = {"k5": 0, "k3": 1, "k1": 2, "k4": 3, "k2": 4}  # which of z1 … z
 
 
 @dataclass(frozen=True, eq=False)
-class Arm:
+class IdentifiedArm:
     """The arm that carries the payload: its model, coefficients k (q,), link lengths in m, and noise levels."""
 
     model: Model
@@ -92,7 +92,7 @@ class Cells:
         """The payload in kg that fits all cells best."""
         return float(self.B.sum() / max(self.A.sum(), 1e-300))
 
-    def sensitivity(self, arm: Arm, mass: float | FloatArray) -> FloatArray:
+    def sensitivity(self, arm: IdentifiedArm, mass: float | FloatArray) -> FloatArray:
         """T (C, q + 2): how the scores of a payload of `mass` kg, one or (C,), shift with constants, l1 and l2."""
         g, l1, l2 = arm.model.gravity, arm.l1, arm.l2
         by_l1 = self.S @ arm.added(np.array([2 * l1, 0.0, l2, g, 0.0]))
@@ -109,13 +109,13 @@ def joined(parts: Sequence[Cells]) -> Cells:
     return Cells(*(np.concatenate([getattr(part, name) for part in parts]) for name in Cells.__dataclass_fields__))
 
 
-def cells_of(segments: Iterable[Segment], arm: Arm, mass: float, settle: int = 1) -> list[Cells]:
+def cells_of(segments: Iterable[Segment], arm: IdentifiedArm, mass: float, settle: int = 1) -> list[Cells]:
     """Cells of each piece of a log, linearised at a payload of `mass` kg and, `settle` times, at its trajectory."""
     long_enough = (piece for piece in pieces(segments, _PIECE_SAMPLES) if len(piece) >= 3 * POINTS)
     return [_cells(piece, arm, mass, settle) for piece in long_enough]
 
 
-def _cells(piece: Segment, arm: Arm, mass: float, settle: int) -> Cells:
+def _cells(piece: Segment, arm: IdentifiedArm, mass: float, settle: int) -> Cells:
     c = arm.k + mass * arm.unit
     stencil = Stencil(piece.dt, arm.shift)
     theta = smoothed(piece.theta, piece.dt, min(_SMOOTHING, 0.1 / piece.dt))
@@ -127,7 +127,7 @@ def _cells(piece: Segment, arm: Arm, mass: float, settle: int) -> Cells:
     return _sums(linear, piece, stencil, arm, mass)
 
 
-def _sums(linear: Linearised, piece: Segment, stencil: Stencil, arm: Arm, mass: float) -> Cells:
+def _sums(linear: Linearised, piece: Segment, stencil: Stencil, arm: IdentifiedArm, mass: float) -> Cells:
     Y, e = linear.columns[:-1], linear.columns[-1]
     g = arm.unit @ Y
     e = e + mass * g
@@ -151,7 +151,9 @@ def _sums(linear: Linearised, piece: Segment, stencil: Stencil, arm: Arm, mass: 
     )
 
 
-def arm_of(result: Result, first: Segment, l1: float | None = None, l2: float | None = None) -> tuple[Arm, FloatArray]:
+def arm_of(
+    result: Result, first: Segment, l1: float | None = None, l2: float | None = None
+) -> tuple[IdentifiedArm, FloatArray]:
     """The arm of a result with link lengths from it or given, and the covariance (q + 2, q + 2) of both.
 
     Noise levels are the result's; where it has none, the log's first stretch tells them.
@@ -173,7 +175,7 @@ def arm_of(result: Result, first: Segment, l1: float | None = None, l2: float | 
     rows = [(*prior.names, "l1", "l2").index(name) for name in names]
     covariance = np.zeros((len(prior.names) + 2,) * 2)
     covariance[np.ix_(rows, rows)] = np.array(result.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
-    known = Arm(
+    known = IdentifiedArm(
         model,
         prior.mean,
         _length(result, "l1", l1),

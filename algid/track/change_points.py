@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.track.bins import Arm, Cells
+from algid.track.bins import Cells, IdentifiedArm
 
 
 def cuts(A: FloatArray, B: FloatArray, penalty: float, shortest: int) -> list[int]:
@@ -191,7 +191,7 @@ class Edges:
     spans: list[tuple[int, int]]
 
 
-def edges(cells: Cells, arm: Arm) -> Edges:
+def edges(cells: Cells, arm: IdentifiedArm) -> Edges:
     """The changes of payload among `cells`.
 
     What a change would explain counts as an error at first, and no longer once the change is found: errors are
@@ -221,7 +221,7 @@ def _calm(cells: Cells, spans: Sequence[tuple[int, int]]) -> Cells:
     return replace(cells, A=calm * cells.A, B=calm * cells.B, S=calm[:, None] * cells.S, E=calm * cells.E)
 
 
-def variance(cells: Cells, masses: FloatArray, arm: Arm, covariance: FloatArray) -> float:
+def variance(cells: Cells, masses: FloatArray, arm: IdentifiedArm, covariance: FloatArray) -> float:
     """Variance of the rows about `masses` (C,), of the constants' errors freed, one at least."""
     T = cells.sensitivity(arm, masses)
     return max(_roughness(cells), excess(cells.A, cells.B - cells.A * masses, T, covariance))

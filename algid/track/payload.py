@@ -20,7 +20,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.signals.differences import Stencil
 from algid.signals.segments import Segment
-from algid.track.bins import CELL, Arm, Cells, cells_of, joined
+from algid.track.bins import CELL, Cells, IdentifiedArm, cells_of, joined
 from algid.track.change_points import CALM, GUARD, SHORTEST, Edges, edges, variance
 
 QUANTILE = 1.959964  # of the normal distribution, for 95 %
@@ -72,7 +72,7 @@ class Track:
     bare: float
 
 
-def track(source: Pass, arm: Arm, covariance: FloatArray) -> Track:
+def track(source: Pass, arm: IdentifiedArm, covariance: FloatArray) -> Track:
     """Find the payload's stretches in a log.
 
     Parameters
@@ -135,7 +135,7 @@ def _parts(cells: Cells, places: Sequence[int]) -> list[Cells]:
     return [cells.part(first, last) for first, last in pairwise(places)]
 
 
-def _settled(source: Pass, arm: Arm, rough: Sequence[Cells]) -> list[Cells]:
+def _settled(source: Pass, arm: IdentifiedArm, rough: Sequence[Cells]) -> list[Cells]:
     """Each stretch's cells, linearised again at its own mass, in one pass over the log."""
     found = list(rough)
     for place, own in groupby(_by_stretch(source(), arm, rough), key=itemgetter(0)):
@@ -144,7 +144,7 @@ def _settled(source: Pass, arm: Arm, rough: Sequence[Cells]) -> list[Cells]:
     return found
 
 
-def _by_stretch(log: Iterable[Segment], arm: Arm, rough: Sequence[Cells]) -> Iterator[tuple[int, Segment]]:
+def _by_stretch(log: Iterable[Segment], arm: IdentifiedArm, rough: Sequence[Cells]) -> Iterator[tuple[int, Segment]]:
     """The log's segments cut at the stretches' ends, each with its stretch's number."""
     for segment in log:
         end = segment.start + len(segment) * segment.dt
@@ -185,7 +185,7 @@ def _changes(cells: Cells, found: Edges) -> FloatArray:
     return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
 
-def _stretch(whole: Cells, cells: Cells, arm: Arm, covariance: FloatArray, colour: float) -> Stretch:
+def _stretch(whole: Cells, cells: Cells, arm: IdentifiedArm, covariance: FloatArray, colour: float) -> Stretch:
     mass, T = cells.mass, cells.sensitivity(arm, cells.mass).sum(axis=0)
     std = float(_std(np.array([cells.A.sum()]), T[None], _noise(cells, colour), covariance)[0])
     return Stretch(float(whole.start[0]), float(whole.end[-1]), mass, std)
@@ -196,7 +196,7 @@ def _noise(cells: Cells, colour: float) -> float:
     return max(colour, float(cells.squares(cells.mass).sum() / (cells.rows.sum() - 1)))
 
 
-def _curve(cells: Cells, arm: Arm, covariance: FloatArray, colour: float) -> FloatArray:
+def _curve(cells: Cells, arm: IdentifiedArm, covariance: FloatArray, colour: float) -> FloatArray:
     """Times, masses and their standard deviations (3, C), each cell from its neighbourhood within the stretch."""
     half = round(HALF_BAND / CELL)
     low = np.clip(np.arange(len(cells)) - half, 0, None)

@@ -18,7 +18,7 @@ from algid.design.information import Experiment, Information
 from algid.design.optimise import kept
 from algid.design.position import PositionProblem
 from algid.design.posture import resting
-from algid.design.prior import Knowns, prior_of
+from algid.design.prior import KnownBefore, prior_of
 from algid.design.request import limits_of, request
 from algid.errors import AlgidError, SettingError
 from algid.estimators.whitening import NoiseLevels
@@ -48,7 +48,7 @@ def one_start() -> Iterator[None]:
 
 
 def campaign(names: list[str] | None = None) -> Campaign:
-    prior = prior_of("case1", None, Knowns())
+    prior = prior_of("case1", None, KnownBefore())
     return Campaign(
         experiment=Experiment(prior.belief.shared, (1, 1), NOISE, 500.0),
         belief=prior.belief,
@@ -160,7 +160,7 @@ def test_the_folder_holds_the_trajectory_in_every_form(folder: Path) -> None:
         np.testing.assert_allclose(log.tau[1], table["tau2"], atol=1e-12)
         assert log.omega is not None
     motion = [table.select(f"{name}1", f"{name}2").to_numpy().T for name in ("theta", "omega", "alpha")]
-    k = prior_of("case1", None, Knowns()).belief.load(True).c
+    k = prior_of("case1", None, KnownBefore()).belief.load(True).c
     loaded = table.select("loaded_tau1", "loaded_tau2").to_numpy().T
     np.testing.assert_allclose(inverse_dynamics(k, *motion), loaded, atol=1e-9)
 
@@ -264,7 +264,7 @@ def test_limits_of_a_file_are_beaten_by_flags(tmp_path: Path) -> None:
 def test_an_arm_of_lengths_and_masses_has_uniform_links(tmp_path: Path) -> None:
     file = tmp_path / "arm.toml"
     file.write_text("[arm]\nm1 = 2.0\nm2 = 1.0\nl1 = 0.4\nl2 = 0.3\n", encoding="utf-8")
-    belief = prior_of(str(file), None, Knowns()).belief
+    belief = prior_of(str(file), None, KnownBefore()).belief
     value = dict(zip(belief.shared.names, belief.mean, strict=True))
     assert value["k3"] == pytest.approx(1.0 * 0.3**2 / 3)  # a rod about its end
     assert value["k5"] == pytest.approx(2.0 * 0.4**2 / 3 + 1.0 * 0.4**2)

@@ -12,7 +12,7 @@ from algid.design.fourier import Fourier
 from algid.design.information import Experiment, Information, Slopes
 from algid.design.limits import Limits, usage
 from algid.design.position import middles
-from algid.design.prior import Knowns, prior_of
+from algid.design.prior import KnownBefore, prior_of
 from algid.estimators.whitening import NoiseLevels
 from algid.model import Motion
 from pipelines.cramer_rao import Truth, joint_bound
@@ -22,7 +22,7 @@ FAMILY = Fourier(4.0)
 
 
 def belief_of(case: str) -> Belief:
-    return prior_of(case, None, Knowns()).belief
+    return prior_of(case, None, KnownBefore()).belief
 
 
 def experiment(belief: Belief, rate: float = 500.0) -> Experiment:

@@ -10,7 +10,7 @@ import pytest
 import algid
 from algid.design.belief import SURE
 from algid.design.criterion import asked_for
-from algid.design.prior import Knowns, prior_of
+from algid.design.prior import KnownBefore, prior_of
 from algid.errors import ResultError, SettingError
 from algid.results import Result, Status, write_result
 from algid.settings import Settings
@@ -30,7 +30,7 @@ def saved(result: Result, folder: Path, **changes: object) -> str:
 
 
 def test_a_result_is_believed_as_far_as_its_error_bars_go(result: Result, tmp_path: Path) -> None:
-    prior = prior_of(saved(result, tmp_path), None, Knowns())
+    prior = prior_of(saved(result, tmp_path), None, KnownBefore())
     assert prior.belief.shared.payload
     assert prior.noise is not None
     assert result.fit is not None
@@ -47,8 +47,8 @@ def test_a_result_is_believed_as_far_as_its_error_bars_go(result: Result, tmp_pa
 def test_a_result_without_error_bars_needs_to_be_told_how_wrong_it_is(result: Result, tmp_path: Path) -> None:
     file = saved(result, tmp_path, fit=None)
     with pytest.raises(ResultError, match=r"no error bars; .*--prior-error"):
-        prior_of(file, None, Knowns())
-    belief = prior_of(file, None, Knowns(error=0.2)).belief
+        prior_of(file, None, KnownBefore())
+    belief = prior_of(file, None, KnownBefore(error=0.2)).belief
     np.testing.assert_allclose(SURE * belief.std, 0.2 * np.abs(belief.mean), rtol=1e-6)
 
 
@@ -56,26 +56,26 @@ def test_what_a_result_leaves_open_is_named(result: Result, tmp_path: Path) -> N
     k7 = result.parameters["k7"].model_copy(update={"status": Status.NOT_IDENTIFIABLE, "std": None})
     file = saved(result, tmp_path, parameters={**result.parameters, "k7": k7})
     with pytest.raises(ResultError, match="leaves k7 without error bars"):
-        prior_of(file, None, Knowns())
+        prior_of(file, None, KnownBefore())
 
 
 def test_a_length_far_from_the_results_is_a_warning(result: Result, tmp_path: Path) -> None:
     file = saved(result, tmp_path)
-    (warning,) = prior_of(file, None, Knowns(l2=0.2)).warnings
+    (warning,) = prior_of(file, None, KnownBefore(l2=0.2)).warnings
     assert warning.startswith("--l2 0.2 lies ")
-    assert prior_of(file, None, Knowns(l2=result.payload["l2"].estimate)).warnings == ()
+    assert prior_of(file, None, KnownBefore(l2=result.payload["l2"].estimate)).warnings == ()
 
 
 def test_an_impossible_arm_is_refused(result: Result, tmp_path: Path) -> None:
     k1 = result.parameters["k1"].model_copy(update={"estimate": 0.1})
     with pytest.raises(SettingError, match="not positive definite"):
-        prior_of(saved(result, tmp_path, parameters={**result.parameters, "k1": k1}), None, Knowns())
+        prior_of(saved(result, tmp_path, parameters={**result.parameters, "k1": k1}), None, KnownBefore())
 
 
 def test_friction_of_a_real_arm_is_planned_for_and_what_cannot_be_is_said(tmp_path: Path) -> None:
     logs = algid.synthesise("case1", duration=2.0, rate=500.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
     settings = Settings(friction="coulomb", torque_offset=True)
-    belief = prior_of(saved(algid.identify(*logs, settings), tmp_path), None, Knowns()).belief
+    belief = prior_of(saved(algid.identify(*logs, settings), tmp_path), None, KnownBefore()).belief
     assert {"f1", "f2", "o1", "o2"} <= set(belief.shared.names)
     asked = asked_for(belief, None, "it")
     places = [belief.shared.names.index(name) for name in ("o1", "o2")]
@@ -86,5 +86,5 @@ def test_loaded_runs_need_a_payload(tmp_path: Path) -> None:
     file = tmp_path / "arm.toml"
     file.write_text("[arm]\nm1 = 2.0\nm2 = 1.0\nl1 = 0.4\nl2 = 0.3\n", encoding="utf-8")
     with pytest.raises(SettingError, match="give --payload KG, or --runs 1,0"):
-        prior_of(str(file), True, Knowns())
-    assert prior_of(str(file), True, Knowns(payload=0.5)).belief.shared.payload
+        prior_of(str(file), True, KnownBefore())
+    assert prior_of(str(file), True, KnownBefore(payload=0.5)).belief.shared.payload

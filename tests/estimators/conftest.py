@@ -11,7 +11,7 @@ from algid.arm import Arm, FloatArray, with_payload
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
-from algid.synth.simulator import Motion, simulate
+from algid.synth.simulator import SimulatedMotion, simulate
 
 DT = 1e-3
 
@@ -22,8 +22,8 @@ class Bench:
 
     arm: Arm
     payload: float
-    bare: Motion
-    burdened: Motion
+    bare: SimulatedMotion
+    burdened: SimulatedMotion
 
     @property
     def truth(self) -> FloatArray:

@@ -10,13 +10,13 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.estimators.conventions import AS_READ, ZEROED, Convention, Judgement, judge
-from algid.synth.simulator import Motion
+from algid.synth.simulator import SimulatedMotion
 from tests.estimators.conftest import DT, Bench
 
 Pair = tuple[FloatArray, FloatArray]
 
 
-def measured(motion: Motion, coulomb: float = 0.02, seed: int = 0) -> Pair:
+def measured(motion: SimulatedMotion, coulomb: float = 0.02, seed: int = 0) -> Pair:
     """Angles and torques with the sensors' noise, and Coulomb friction that the motors overcome, in N m."""
     rng = np.random.default_rng(seed)
     theta = motion.theta + 3e-4 * rng.standard_normal(motion.theta.shape)
@@ -93,7 +93,7 @@ def test_a_right_log_is_right(bench: Bench) -> None:
         assert found.best.convention == AS_READ
 
 
-def wrongs(motion: Motion) -> dict[str, Callable[[], Pair]]:
+def wrongs(motion: SimulatedMotion) -> dict[str, Callable[[], Pair]]:
     """What real arms and sensors do to a log whose convention is right."""
     theta, tau = measured(motion, 0.0)
     size = np.abs(tau).max(axis=1, keepdims=True)
@@ -117,7 +117,7 @@ def wrongs(motion: Motion) -> dict[str, Callable[[], Pair]]:
     }
 
 
-@pytest.mark.parametrize("wrong", sorted(wrongs(Motion(*np.zeros((4, 2, 4))))))
+@pytest.mark.parametrize("wrong", sorted(wrongs(SimulatedMotion(*np.zeros((4, 2, 4))))))
 def test_errors_of_arm_and_sensors_accuse_no_convention(bench: Bench, wrong: str) -> None:
     found = judged(*wrongs(bench.bare)[wrong]())
     assert not found.alone or found.best.convention == AS_READ

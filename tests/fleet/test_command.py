@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from algid.batch.jobs import Job
-from algid.batch.records import End, Record, write_jobs
+from algid.batch.records import End, JobRecord, write_jobs
 from algid.errors import ResultError
 from algid.stores import open_store
 from tests.cli.commands import app
@@ -20,7 +20,7 @@ from tests.cli.commands import app
 def _batch(folder: Path, robots: int = 2, logs: int = 10, start_ns: int = 1_700_000_000 * 10**9) -> Path:
     """A batch whose first robot's k6 doubles within its logs, one a day."""
     records = [
-        Record(
+        JobRecord(
             Job(f"r{robot}/{day}", ("a.csv",), robot=f"r{robot}", labels={"payload": 0.5}),
             End.OK, "", "", (), {}, "", 1.0, start_ns + day * 86_400 * 10**9, 10.0, "refined",
             {
@@ -102,7 +102,7 @@ def test_the_page_shows_every_robot_and_leads_to_its_reports(tmp_path: Path) -> 
 def test_a_fleet_that_stays_as_it_is_says_so_and_shows_it(tmp_path: Path) -> None:
     day = 86_400 * 10**9
     records = [
-        Record(
+        JobRecord(
             Job(f"r{robot}/{number}", ("a.csv",), robot=f"r{robot}"), End.OK, "", "", (), {}, "", 1.0,
             1_700_000_000 * 10**9 + number * day, 10.0, "refined",
             {"k1": (1.0 + 0.001 * ((7 * number) % 5 - 2), 0.01, "OK")},
@@ -121,7 +121,7 @@ def test_a_fleet_that_stays_as_it_is_says_so_and_shows_it(tmp_path: Path) -> Non
 
 
 def test_a_name_that_attacks_leads_nowhere(tmp_path: Path) -> None:
-    record = Record(
+    record = JobRecord(
         Job("javascript:alert(1)", ("a.csv",), robot="<b>r</b>"), End.OK, "", "", (), {}, "", 1.0,
         1_700_000_000 * 10**9, 10.0, "refined", {"k1": (1.0, 0.01, "OK")},
     )  # fmt: skip

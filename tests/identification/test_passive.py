@@ -23,7 +23,7 @@ from algid.settings import Settings
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
-from algid.synth.simulator import Motion, simulate
+from algid.synth.simulator import SimulatedMotion, simulate
 from tests.cli.commands import app
 from tests.intervals import holds_95, in_axes
 
@@ -32,14 +32,14 @@ SIGMA = 1e-3  # rad; ten times as much in N m
 
 
 @cache
-def moved(case: str, passive: int, duration: float = 5.0) -> Motion:
+def moved(case: str, passive: int, duration: float = 5.0) -> SimulatedMotion:
     arm = load_case(case).arm
     wide = wide_multi_sine(arm, 3)
     driven = np.array([[float(passive != 1)], [float(passive != 2)]])
     return simulate(arm.constants(), lambda t: wide(t) * driven, np.arange(round(duration / DT) + 1) * DT)
 
 
-def logged(motion: Motion, seed: int, sigma: float = SIGMA) -> Segment:
+def logged(motion: SimulatedMotion, seed: int, sigma: float = SIGMA) -> Segment:
     rng = np.random.default_rng(seed)
     noise = sigma * rng.standard_normal((2, *motion.theta.shape))
     return Segment(0.0, DT, motion.theta + noise[0], np.where(motion.tau != 0, motion.tau + 10 * noise[1], 0.0))

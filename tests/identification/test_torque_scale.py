@@ -16,7 +16,7 @@ from algid.settings import Settings
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
-from algid.synth.simulator import Motion, simulate
+from algid.synth.simulator import SimulatedMotion, simulate
 from tests.intervals import holds_95, in_axes
 
 DT = 2e-3
@@ -25,7 +25,7 @@ CASE = load_case("case1")
 
 
 @cache
-def moved(*, loaded: bool) -> Motion:
+def moved(*, loaded: bool) -> SimulatedMotion:
     k = CASE.arm.constants()
     k = with_payload(k, CASE.arm.payload_constants(CASE.payload)) if loaded else k
     return simulate(k, wide_multi_sine(CASE.arm, 3 + loaded), np.arange(2501) * DT)

@@ -14,7 +14,7 @@ from algid.readers import read_log
 from algid.readers.columns import time_unit, to_nanoseconds
 from algid.readers.names import choose, take_apart
 from algid.readers.order import Sorter
-from algid.readers.table import Table
+from algid.readers.table import SampleTable
 
 FIELD = {
     "t,q1,q2,tau1,tau2": "t q1 q2 tau1 tau2",
@@ -125,7 +125,7 @@ def test_list_columns_of_parquet(tmp_path: Path) -> None:
 
 
 def sorted_stamps(*tables: list[int]) -> tuple[list[int], list[str]]:
-    made = [Table(np.array(stamps), {"theta1": np.array(stamps, float)}) for stamps in tables]
+    made = [SampleTable(np.array(stamps), {"theta1": np.array(stamps, float)}) for stamps in tables]
     found = list(Sorter("log").run(iter(made)))
     for table in found:
         assert table.columns["theta1"].tolist() == table.stamp_ns.tolist()

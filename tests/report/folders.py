@@ -29,7 +29,7 @@ from algid.results import (
 )
 from algid.synth.cases import Case, load_case
 from algid.synth.excitation import wide_multi_sine
-from algid.synth.simulator import Motion, simulate
+from algid.synth.simulator import SimulatedMotion, simulate
 
 NOISE = 1e-2  # N m
 RATE = 1000.0
@@ -41,7 +41,7 @@ LOADED_START_NS = START_NS + 60_000_000_000
 class Recording:
     """A motion, its acceleration (2, N) and its torque as measured, with noise (2, N)."""
 
-    motion: Motion
+    motion: SimulatedMotion
     alpha: FloatArray
     measured: FloatArray
 
@@ -243,7 +243,7 @@ def build_recorded(folder: Path, csv: Path) -> Result:
     omega = np.gradient(theta, dt, axis=1)
     alpha = np.gradient(omega, dt, axis=1)
     raw = np.stack([np.interp(grid, t, run[f"tau_meas{joint}"].to_numpy()) for joint in (1, 2)])
-    recording = Recording(Motion(grid, theta, omega, raw), alpha, raw)
+    recording = Recording(SimulatedMotion(grid, theta, omega, raw), alpha, raw)
     y = regressor(theta, omega, alpha)
     k, covariance = _least_squares(y, smooth("tau_meas"))
     result = _result(load_case("case1"), k, 400 * covariance, recording).model_copy(

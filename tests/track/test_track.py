@@ -21,7 +21,7 @@ from algid.model import Model
 from algid.signals.segments import segments
 from algid.synth.run import Recording, excitation, with_schedule
 from algid.synth.sensors import Sensors
-from algid.track.bins import Arm
+from algid.track.bins import IdentifiedArm
 from algid.track.change_points import cuts
 from algid.track.payload import Track, track
 from algid.writers import write_log
@@ -34,7 +34,7 @@ NOISE = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
 
 
 def _track(log: Log, k: FloatArray | None = None, covariance: FloatArray | None = None) -> Track:
-    arm = Arm(Model(), CASE.arm.constants() if k is None else k, CASE.arm.l1, CASE.arm.l2, NOISE)
+    arm = IdentifiedArm(Model(), CASE.arm.constants() if k is None else k, CASE.arm.l1, CASE.arm.l2, NOISE)
     return track(lambda: segments([log]), arm, np.zeros((9, 9)) if covariance is None else covariance)
 
 
@@ -73,7 +73,7 @@ def test_an_uncertain_arm_widens_the_intervals_by_what_moves_the_masses(picking:
     before = _track(log)
     moves = []
     for k, (l1, l2) in ((known[:7] + step[:7], known[7:] + step[7:]) for step in spread):
-        after = track(lambda: segments([log]), Arm(Model(), k, l1, l2, NOISE), np.zeros((9, 9)))
+        after = track(lambda: segments([log]), IdentifiedArm(Model(), k, l1, l2, NOISE), np.zeros((9, 9)))
         moves.append([a.m_p - b.m_p for a, b in zip(after.stretches, before.stretches, strict=True)])
     wider = _track(log, covariance=spread.T @ spread)
     found = [a.std**2 - b.std**2 for a, b in zip(wider.stretches, before.stretches, strict=True)]

@@ -15,7 +15,7 @@ from algid.readers.mcap.catalogue import Catalogue, catalogue, truth_text
 from algid.readers.mcap.framing import DamagedError, File
 from algid.readers.mcap.topic import Topic
 from algid.readers.order import Sorter
-from algid.readers.table import BLOCK_ROWS, Table, stack
+from algid.readers.table import BLOCK_ROWS, SampleTable, stack
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -44,7 +44,7 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
     name = str(paths[0] if len(paths) == 1 else paths[0].parent)
     origin = Origin(name, "mcap", wanted.mapping, truth, wanted.reading)
 
-    def tables(rows: int) -> Iterator[Table]:
+    def tables(rows: int) -> Iterator[SampleTable]:
         main, *others = wanted.topics
         samples = _read(paths, main, rows, known)
         return aligned(samples, [_series(name, paths, other, known) for other in others]) if others else samples
@@ -52,7 +52,7 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
     return reader_of(origin, tables, profile, wanted.units, wanted.notices, rows)
 
 
-def _read(paths: Sequence[Path], topic: Topic, rows: int, known: Known) -> Iterator[Table]:
+def _read(paths: Sequence[Path], topic: Topic, rows: int, known: Known) -> Iterator[SampleTable]:
     for path in paths:
         with opened(path, known) as (file, found):
             yield from topic.tables(str(path), file, found, rows)

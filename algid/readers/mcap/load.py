@@ -25,7 +25,7 @@ _GROUP_BYTES, _GROUP_UNPACKED = 1 << 16, 1 << 21
 
 
 @dataclass(frozen=True)
-class Batch:
+class MessageBatch:
     """Messages of one span or of many small ones, or None and why those of one are lost.
 
     Of a torn chunk also how much is there.
@@ -45,7 +45,7 @@ def spans_of(catalogue: Catalogue, channels: frozenset[int]) -> list[Span]:
     return [span for span in catalogue.spans if span.channels is None or span.channels & channels]
 
 
-def batches(file: File, catalogue: Catalogue, channels: frozenset[int]) -> Iterator[Batch]:
+def batches(file: File, catalogue: Catalogue, channels: frozenset[int]) -> Iterator[MessageBatch]:
     """The messages of `channels` in file order, many small spans at once; a damaged span yields its reason."""
     waiting: deque[Future[_Loaded]] = deque()
     with executor(2) as pool:
@@ -78,11 +78,11 @@ def _groups(spans: Sequence[Span]) -> Iterator[Sequence[Span]]:
 class _Loaded:
     """Batches of the first spans of a group, and what loads the others, where these unpack to more than one holds."""
 
-    batches: list[Batch]
+    batches: list[MessageBatch]
     others: Callable[[], _Loaded] | None = None
 
 
-def _all_of(loaded: _Loaded) -> Iterator[Batch]:
+def _all_of(loaded: _Loaded) -> Iterator[MessageBatch]:
     """The batches of a whole group."""
     yield from loaded.batches
     while loaded.others is not None:
@@ -101,7 +101,7 @@ class _Sound:
 
 def _load(file: File, catalogue: Catalogue, spans: Sequence[Span], channels: frozenset[int]) -> _Loaded:
     """Batches of spans: a damaged or torn one by itself, those between two of them as one."""
-    found: list[Batch] = []
+    found: list[MessageBatch] = []
     sound: list[_Sound] = []
     size = 0
     others = None
@@ -110,9 +110,9 @@ def _load(file: File, catalogue: Catalogue, spans: Sequence[Span], channels: fro
             others = partial(_load, file, catalogue, spans[place:], channels)
             break
         one = _opened(file, catalogue, span, channels)
-        if isinstance(one, Batch) or one.torn is not None:
+        if isinstance(one, MessageBatch) or one.torn is not None:
             found += _joined(sound, channels)
-            found += [one] if isinstance(one, Batch) else _joined([one], channels)
+            found += [one] if isinstance(one, MessageBatch) else _joined([one], channels)
             sound = []
         else:
             sound.append(one)
@@ -120,17 +120,17 @@ def _load(file: File, catalogue: Catalogue, spans: Sequence[Span], channels: fro
     return _Loaded([*found, *_joined(sound, channels)], others)
 
 
-def _joined(sound: Sequence[_Sound], channels: frozenset[int]) -> list[Batch]:
+def _joined(sound: Sequence[_Sound], channels: frozenset[int]) -> list[MessageBatch]:
     """The messages of sound spans as one batch, or none."""
     if not sound:
         return []
     checked = all(one.checked or not one.records.offsets.size for one in sound)
     held, size = sound[0].records.content.size, sound[0].torn
     messages = joined([one.records for one in sound]).of(channels)
-    return [Batch(messages, checked, torn=None if size is None else (held, size))]
+    return [MessageBatch(messages, checked, torn=None if size is None else (held, size))]
 
 
-def _opened(file: File, catalogue: Catalogue, span: Span, channels: frozenset[int]) -> _Sound | Batch:
+def _opened(file: File, catalogue: Catalogue, span: Span, channels: frozenset[int]) -> _Sound | MessageBatch:
     """What a span holds, or the batch that says why it is lost."""
     content = b""
     try:
@@ -145,7 +145,7 @@ def _opened(file: File, catalogue: Catalogue, span: Span, channels: frozenset[in
         _check_meaning(catalogue, span, records, channels)
     except DamagedError as error:
         lost = sum(places.size for channel, places in entries(content[span.length :]) if channel in channels)
-        return Batch(None, checked=True, reason=f"{error} (at byte {span.start})", lost=lost)
+        return MessageBatch(None, checked=True, reason=f"{error} (at byte {span.start})", lost=lost)
     whole = torn is None or torn == len(records.content)
     return _Sound(records, not span.loose and (has_checksum(chunk) or not whole), None if whole else torn)
 
@@ -174,7 +174,7 @@ class Account:
     lost: int = 0
     torn: str = ""
 
-    def add(self, batch: Batch) -> None:
+    def add(self, batch: MessageBatch) -> None:
         """Count one batch."""
         if batch.messages is None:
             self.spans += 1

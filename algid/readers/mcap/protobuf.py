@@ -27,7 +27,7 @@ _LONGEST = 1 << 20
 
 
 @dataclass(frozen=True)
-class Field:
+class ProtobufField:
     """A field: its name, type number, message type where it is one, and whether it repeats."""
 
     name: str
@@ -36,7 +36,7 @@ class Field:
     repeated: bool
 
 
-Types = dict[str, dict[int, Field]]
+Types = dict[str, dict[int, ProtobufField]]
 
 
 def parse(root: str, data: bytes) -> Types:
@@ -80,8 +80,8 @@ def _messages(scope: str, messages: Any) -> Iterator[tuple[str, Any]]:
         yield from _messages(name, message.nested_type)
 
 
-def _field(one: Any) -> Field:
-    return Field(one.name, one.type, one.type_name.lstrip("."), one.label == _REPEATED)
+def _field(one: Any) -> ProtobufField:
+    return ProtobufField(one.name, one.type, one.type_name.lstrip("."), one.label == _REPEATED)
 
 
 def _entries(data: bytes, start: int, end: int) -> Iterator[tuple[int, int, int, int, int]]:
@@ -152,7 +152,7 @@ class _Absent:
         found = self._named(kind, last)
         return found is not None and not found.repeated and (found.type in _FIXED or found.type in _VARINTS)
 
-    def _named(self, kind: str, name: str) -> Field | None:
+    def _named(self, kind: str, name: str) -> ProtobufField | None:
         return next((one for one in self.types[kind].values() if one.name == name), None)
 
 
@@ -164,7 +164,7 @@ def _indexed(part: str) -> tuple[str, int | None]:
 def _walk(data: bytes, start: int, end: int, kind: str, prefix: str, shape: Shape, absent: _Absent, depth: int) -> None:
     if depth > _DEEPEST:
         raise MisfitError("messages nested too deep")
-    fields: Mapping[int, Field] = absent.types[kind]
+    fields: Mapping[int, ProtobufField] = absent.types[kind]
     seen: dict[str, int] = {}
     texts: dict[str, list[str]] = {}
     last = start
@@ -196,7 +196,7 @@ def _walk(data: bytes, start: int, end: int, kind: str, prefix: str, shape: Shap
     absent.lists.update(seen)
 
 
-def _number(first: int, stop: int, wire: int, field: Field, path: str, shape: Shape) -> None:
+def _number(first: int, stop: int, wire: int, field: ProtobufField, path: str, shape: Shape) -> None:
     if wire == 0 and field.type in _VARINTS:
         shape.flags.extend(range(first, stop))
         shape.numbers[path] = Numbers(first, "varint", 1, stop - first, field.type in _ZIGZAG)
@@ -206,7 +206,7 @@ def _number(first: int, stop: int, wire: int, field: Field, path: str, shape: Sh
         raise MisfitError(f"the field {field.name!r} is not encoded as its type says")
 
 
-def _packed(data: bytes, first: int, stop: int, field: Field, path: str, shape: Shape) -> None:
+def _packed(data: bytes, first: int, stop: int, field: ProtobufField, path: str, shape: Shape) -> None:
     if field.type in _FIXED:
         width = int(_FIXED[field.type][-1])
         if (stop - first) % width:

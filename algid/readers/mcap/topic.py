@@ -20,7 +20,7 @@ from algid.readers.mcap.columnar import ExcessError, Shape
 from algid.readers.mcap.framing import File
 from algid.readers.mcap.load import Account, batches
 from algid.readers.mcap.messages import Messages
-from algid.readers.table import VELOCITIES, Table, stack
+from algid.readers.table import VELOCITIES, SampleTable, stack
 from algid.words import counted
 
 JOINT_STATE = ("sensor_msgs/msg/JointState", "sensor_msgs/JointState")
@@ -112,7 +112,7 @@ class Topic:
     clock: str | None
     _chosen: str | None = field(default=None)
 
-    def tables(self, path: str, file: File, found: Catalogue, rows: int) -> Iterator[Table]:
+    def tables(self, path: str, file: File, found: Catalogue, rows: int) -> Iterator[SampleTable]:
         """The topic's samples in tables of about `rows` rows.
 
         Raises
@@ -123,10 +123,10 @@ class Topic:
         channels = channels_of(found, self.name, self.type)
         if not channels:
             told = f"{path}: topic {self.name!r} is not in this file"
-            yield Table(np.empty(0, np.int64), {}, (Notice("NO_TOPIC", told, lossy=True),))
+            yield SampleTable(np.empty(0, np.int64), {}, (Notice("NO_TOPIC", told, lossy=True),))
             return
         decoder, account = self._decoder(path, file, found, channels), Account()
-        parts: list[Table] = []
+        parts: list[SampleTable] = []
         size = 0
         for batch in batches(file, found, channels):
             account.add(batch)
@@ -140,7 +140,7 @@ class Topic:
             if size >= rows:
                 yield self._clocked(path, parts)
                 parts, size = [], 0
-        last = self._clocked(path, parts) if parts else Table(np.empty(0, np.int64), {})
+        last = self._clocked(path, parts) if parts else SampleTable(np.empty(0, np.int64), {})
         promised = sum(found.counts.get(channel, 0) for channel in channels) if found.counts else None
         said = (*account.notices(promised), *self._left_out(decoder), *self._others(found, channels))
         yield last.noting(*found.notices, *said)
@@ -156,7 +156,7 @@ class Topic:
             wanted |= dict(zip(_STAMP, self.fields.stamp, strict=True))
         return decoder_for(path, channel, found.schemas.get(channel.schema_id), wanted, file.works)
 
-    def _table(self, path: str, decoder: Decodes, messages: Messages) -> Table:
+    def _table(self, path: str, decoder: Decodes, messages: Messages) -> SampleTable:
         try:
             held, columns = decoder.columns(messages)
         except ExcessError as error:
@@ -164,9 +164,9 @@ class Topic:
         log_ns = messages.log_ns if held.all() else messages.log_ns[held]
         if not columns:
             columns = {name: np.empty(0) for name in decoder.wanted}
-        return Table(log_ns, columns)  # type: ignore[arg-type]
+        return SampleTable(log_ns, columns)  # type: ignore[arg-type]
 
-    def _clocked(self, path: str, parts: list[Table]) -> Table:
+    def _clocked(self, path: str, parts: list[SampleTable]) -> SampleTable:
         """The tables as one, with the stamps of the chosen clock and float64 columns."""
         table = stack(parts)
         columns = dict(table.columns)
@@ -184,7 +184,7 @@ class Topic:
                 ' (profile: clock = "header")'
             )
         floats = {name: np.asarray(values, np.float64) for name, values in columns.items()}
-        return Table(stamps, floats, table.notices + notices)
+        return SampleTable(stamps, floats, table.notices + notices)
 
     def _choice(self, header: IntArray) -> tuple[str, tuple[Notice, ...]]:
         if self.clock == "header" or header.size < 2 or np.any(header != header[0]):

@@ -32,7 +32,7 @@ LEGEND = (
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class RunningCourse:
     """One parameter's estimate and the half width of its 95 % interval (T,), NaN while it is open."""
 
     name: str
@@ -58,7 +58,7 @@ def running(path: Path, result: Result) -> Figure | Missing:
     def whole(name: str) -> FloatArray:
         return np.concatenate([block[name] for _, block in found])
 
-    courses = [Course(name, whole(name), whole(name + HALF)) for name in names if name in result.estimates]
+    courses = [RunningCourse(name, whole(name), whole(name + HALF)) for name in names if name in result.estimates]
     courses = [
         course
         for course in courses
@@ -79,7 +79,7 @@ def _ranges(found: list[tuple[int, Block]]) -> dict[int, LogRange]:
     return ranges
 
 
-def _panel(course: Course, t: FloatArray, final: Estimate, starts: list[Layout]) -> Panel:
+def _panel(course: RunningCourse, t: FloatArray, final: Estimate, starts: list[Layout]) -> Panel:
     name, value, half = course.name, course.value, course.half
     unit = unit_text(final.unit)
     hover = f"{label(name)} %{{y:.5g}} {unit}<br>by %{{x:.4g}} s<extra></extra>"
@@ -116,7 +116,7 @@ def _view(value: FloatArray, half: FloatArray) -> list[float]:
     return [min(low), max(high)]
 
 
-def _note(courses: list[Course], t: FloatArray) -> str:
+def _note(courses: list[RunningCourse], t: FloatArray) -> str:
     """When the last band missed its final estimate."""
     late = {course.name: float(t[course.strays[-1]]) for course in courses if course.strays.size}
     if not late:
@@ -126,7 +126,7 @@ def _note(courses: list[Course], t: FloatArray) -> str:
     return f"The last band to miss its final estimate was that of {latest}, at {when}."
 
 
-def _truths(courses: list[Course], result: Result) -> str:
+def _truths(courses: list[RunningCourse], result: Result) -> str:
     """How often the bands hold a truth that is known."""
     truth = {row.parameter: row.truth for row in result.table4 if row.truth is not None} | result.truth
     known = [course for course in courses if course.name in truth]

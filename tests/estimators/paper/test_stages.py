@@ -10,13 +10,13 @@ from algid.estimators.paper import EPSILON, STAGE1_SERIES, Summary, solve_scaled
 from algid.signals.segments import Segment
 from algid.synth.cases import Case, load_case
 from algid.synth.excitation import no_torque, wide_multi_sine
-from algid.synth.simulator import Motion, simulate
+from algid.synth.simulator import SimulatedMotion, simulate
 
 DT = 1e-3
 T = DT * np.arange(1001)
 
 
-def motion(case: Case, payload: float = 0.0) -> Motion:
+def motion(case: Case, payload: float = 0.0) -> SimulatedMotion:
     k = with_payload(case.arm.constants(), case.arm.payload_constants(payload))
     torque = case.torque
     assert torque is not None
