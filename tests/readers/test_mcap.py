@@ -591,3 +591,34 @@ def test_a_chunk_that_claims_to_be_empty_and_is_not_is_told(tmp_path: Path) -> N
     log = read_log(path)
     assert len(log) == 49
     assert [notice.code for notice in log.notices if notice.lossy] == ["DAMAGED_CHUNK"]
+
+
+@pytest.mark.parametrize("moved", [0.0, 0.3])
+def test_other_joints_that_move_are_told_with_how_far(moved: float, tmp_path: Path) -> None:
+    log = noise_log(400, start_ns=EPOCH_NS)
+    names = ("base", "a", "wrist", "b", "hand")
+    swing = moved * np.sin(np.linspace(0, 12, 400))
+    messages = [
+        (
+            TOPIC,
+            stamp,
+            joint_state(
+                stamp,
+                names if row % 7 else names[:4],  # a message may lack a joint
+                position=[0.5, log.theta[0, row], swing[row], log.theta[1, row], float("nan")][: 5 if row % 7 else 4],
+                effort=[0, log.tau[0, row], 0, log.tau[1, row], 0][: 5 if row % 7 else 4],
+            ).done(),
+        )
+        for row, stamp in enumerate(log.stamp_ns.tolist())
+    ]
+    write_mcap(tmp_path / "log.mcap", messages)
+    found = read_log(tmp_path / "log.mcap", Profile(joints=("a", "b")))
+    assert np.array_equal(found.theta, log.theta)
+    told = [notice.text for notice in found.notices if notice.code == "OTHER_JOINTS"]
+    if moved:
+        (text,) = told
+        assert "wrist by 0.6 rad" in text
+        assert "base" not in text
+        assert "hand" not in text
+    else:
+        assert told == []

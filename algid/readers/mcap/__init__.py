@@ -13,6 +13,7 @@ from algid.readers.align import Series, aligned
 from algid.readers.assemble import TableReader, reader_of
 from algid.readers.mcap.catalogue import Catalogue, catalogue, truth_text
 from algid.readers.mcap.framing import DamagedError, File
+from algid.readers.mcap.others import moving_joints
 from algid.readers.mcap.topic import Topic
 from algid.readers.order import Sorter
 from algid.readers.table import BLOCK_ROWS, SampleTable, stack
@@ -41,6 +42,7 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
             raise _blamed(paths[0], found, error) from error
         truth = _truth(paths[0], found)
         rows = wanted.topics[0].count(found)
+        beside = moving_joints(file, found, wanted.topics[0], wanted.others)
     name = str(paths[0] if len(paths) == 1 else paths[0].parent)
     origin = Origin(name, "mcap", wanted.mapping, truth, wanted.reading)
 
@@ -49,7 +51,7 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
         samples = _read(paths, main, rows, known)
         return aligned(samples, [_series(name, paths, other, known) for other in others]) if others else samples
 
-    return reader_of(origin, tables, profile, wanted.units, wanted.notices, rows)
+    return reader_of(origin, tables, profile, wanted.units, (*wanted.notices, *beside), rows)
 
 
 def _read(paths: Sequence[Path], topic: Topic, rows: int, known: Known) -> Iterator[SampleTable]:

@@ -22,6 +22,7 @@ from algid.readers.mcap.topic import (
     joint_fields,
     joint_names,
     names_in,
+    other_positions,
     repeated_name,
     stamp_paths,
 )
@@ -45,13 +46,17 @@ class NothingFoundError(LogError):
 
 @dataclass(frozen=True)
 class Plan:
-    """The topics to read, the main one first, where each channel comes from, and what was decided."""
+    """The topics to read, the main one first, where each channel comes from, and what was decided.
+
+    `others` has by joint the path of its position, of those that the main topic names and nobody asked for.
+    """
 
     topics: tuple[Topic, ...]
     mapping: dict[str, str]
     reading: Reading
     notices: tuple[Notice, ...]
     units: dict[str, str]
+    others: dict[str, str] = field(default_factory=dict)
 
 
 def plan(file: File, found: Catalogue, profile: Profile | None) -> Plan:
@@ -86,7 +91,8 @@ def plan(file: File, found: Catalogue, profile: Profile | None) -> Plan:
     mapping["t"] = f"{homes[0]}: {clock[0].rpartition('.')[0]}" if clock else "log time"
     reading = replace(reading, topics=tuple(homes), clock="header" if clock else "log")
     units = {} if usual is None else {name: one for name, one in usual.units.items() if name not in named}
-    return Plan(topics, mapping, reading, notices, units)
+    others = usual.others if usual is not None and usual.topic == topics[0].name else {}
+    return Plan(topics, mapping, reading, notices, units, others)
 
 
 def _joints_reading(usual: _Usual, profile: Profile | None) -> tuple[Reading, tuple[Notice, ...]]:
@@ -157,6 +163,7 @@ class _Usual:
     named: bool
     paths: dict[str, str]
     units: dict[str, str] = field(default_factory=dict)
+    others: dict[str, str] = field(default_factory=dict)
 
 
 def _flat(topic: str, shape: Shape, profile: Profile | None) -> _Usual | None:
@@ -189,7 +196,8 @@ def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> _Usua
                 chosen = _joints(joints, profile)
                 if chosen:
                     there = (joints[0], joints[1]) if len(joints) == 2 else chosen
-                    fitting.setdefault(name, _Usual(name, there, bool(names_in(shape)), joint_fields(shape, chosen)))
+                    usual = _Usual(name, there, bool(names_in(shape)), joint_fields(shape, chosen))
+                    fitting.setdefault(name, replace(usual, others=other_positions(shape, chosen)))
                     break
                 if repeated := repeated_name(shape):
                     refused.append(_repeated(file, name, repeated))

@@ -54,6 +54,12 @@ def joint_names(shape: Shape) -> list[str]:
     return [name for name in names if _paths(shape, name, "theta") and _paths(shape, name, "tau")]
 
 
+def other_positions(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:
+    """By joint the path of its position, of those that a message names beside `joints`."""
+    names = [name for name in names_in(shape) if name not in joints][:_MOST_OTHERS]
+    return {name: path for name in names if (path := _paths(shape, name, "theta")) is not None}
+
+
 def repeated_name(shape: Shape) -> str | None:
     """A joint that a message of this shape names twice, if any."""
     names = names_in(shape)
@@ -90,6 +96,7 @@ def _paths(shape: Shape, joint: str, quantity: str) -> str | None:
 _STAMP = ("sec", "nanosec")
 _MOST_SECONDS, _MOST_NANOSECONDS = 9.2e9, 9.2e18
 _MOST_JOINTS = 256
+_MOST_OTHERS = 32
 
 
 @dataclass
