@@ -21,9 +21,9 @@ from algid.model import Model
 from algid.signals.segments import segments
 from algid.synth.run import Recording, excitation, with_schedule
 from algid.synth.sensors import Sensors
-from algid.track.bins import IdentifiedArm
+from algid.track.bins import CELL, IdentifiedArm
 from algid.track.change_points import cuts
-from algid.track.payload import Track, track
+from algid.track.payload import HALF_BAND, Track, track
 from algid.writers import write_log
 from tests.cli.commands import app
 from tests.intervals import holds_95
@@ -49,7 +49,7 @@ def test_changes_of_50_g_are_found(picking: Log) -> None:
 
 @pytest.mark.slow
 def test_masses_lie_within_their_intervals() -> None:
-    """Those of stretches, and those of instants: m_p(t) one a stretch, far from its ends."""
+    """Those of stretches, and those of m_p(t) at two instants a stretch that have no cell in common."""
     log = with_schedule(CASE, excitation(CASE, "wide"), Recording(rate=500.0, duration=4.5), [(1.5, 0.05), (3.0, 0.0)])
     rng = np.random.default_rng(0)
     stretches, instants = [], []
@@ -59,8 +59,9 @@ def test_masses_lie_within_their_intervals() -> None:
         stretches += [(s.m_p - m) / (1.959964 * s.std) for s, m in zip(found.stretches, MASSES, strict=True)]
         for number, mass in enumerate(MASSES):
             own = np.flatnonzero(found.stretch == number)
-            middle = own[own.size // 2]
-            instants.append((found.m_p[middle] - mass) / (1.959964 * found.std[middle]))
+            apart = own[[own.size // 4, 3 * own.size // 4]]
+            assert np.diff(found.t[apart]) > 2 * HALF_BAND + CELL
+            instants += [*(found.m_p[apart] - mass) / (1.959964 * found.std[apart])]
     holds_95(np.array(stretches))
     holds_95(np.array(instants))
 
