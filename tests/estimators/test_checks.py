@@ -241,6 +241,37 @@ def test_constants_of_no_length_and_exchanged_logs_break_bounds(bench: Bench) ->
     assert not any(warning.startswith("EXCHANGED_LOGS") for warning in fit_warnings(right))
 
 
+@pytest.mark.parametrize("rotor", [0.0, 0.02])
+def test_a_mass_matrix_that_is_not_positive_definite_breaks_its_bound(bench: Bench, rotor: float) -> None:
+    """By the least eigenvalue of M(θ2), eq. (2), with the rotor in M22, over a turn."""
+    settings = WeakSettings(Model(("rotor",) if rotor else ()))
+    fit = weak.fit([partial(list, [bench.log(sigma=1e-3)])], settings=settings)
+    rng = np.random.default_rng(0)
+    seen = set()
+    for _ in range(200):
+        k1, k3, k5 = rng.uniform(-0.1, 0.1), rng.uniform(-0.05, 0.1), rng.uniform(-0.02, 0.1)
+        values = fit.values.copy()
+        values[[fit.names.index(name) for name in ("k1", "k3", "k5")]] = k1, k3, k5
+        if rotor:
+            values[fit.names.index("j2")] = rotor
+        inertial = [bound for bound in broken_bounds(replace(fit, values=values)) if " M" in f" {bound.bound}"]
+        c = np.cos(np.linspace(0, np.pi, 181))  # the least lies at an end: it may not fall between two of these
+        M = np.array([[k5 + k3 + 2 * k1 * c, k3 + k1 * c], [k3 + k1 * c, np.full_like(c, k3 + rotor)]])
+        least = np.linalg.eigvalsh(np.moveaxis(M, 2, 0))[:, 0]
+        assert bool(inertial) == bool(least.min() < 0)
+        by_name = {bound.bound: bound.value for bound in inertial}
+        ends = {"det M > 0 at theta2 = 0": 0, "det M > 0 at theta2 = pi": -1}
+        for name, place in ends.items():
+            determinant = float(np.linalg.det(M[:, :, place]))
+            assert (name in by_name) == (determinant < 0)
+            if name in by_name:
+                assert by_name[name] == pytest.approx(determinant, rel=1e-9)
+        if "M22 > 0" in by_name:
+            assert by_name["M22 > 0"] == pytest.approx(k3 + rotor)
+        seen |= set(by_name)
+    assert seen == {*ends, "M22 > 0"}
+
+
 def test_gravity_compensated_by_half_is_told_where_the_length_is_known(bench: Bench) -> None:
     """l1 = g k1 / k2 doubles then; with the whole torque it is the arm's own."""
     lengths = {"l1": bench.arm.l1, "l2": bench.arm.l2}
