@@ -1,9 +1,10 @@
 """How many small changes of the code the tests see: `make mutants`.
 
-mutmut changes one operator, number or argument at a time in the rooms whose numbers are believed, and runs the tests
-that touch the changed function, the quickest first. Of all mutants a sample is drawn room by room at a fixed seed: one
-for each is worth what it would catch, and all of them would take days. Prints the share that was killed, and every
-survivor as a patch, to be read: a survivor is a missing test, or a change that changes nothing.
+mutmut changes one operator, number or argument at a time in the rooms whose numbers are believed, and runs tests that
+touch the changed function, the quickest first: those of its own room, then others, as many as `BUDGET` holds. Of all
+mutants a sample is drawn room by room at a fixed seed: one for each is worth what it would catch, and all of them would
+take days. Prints the share that was killed, and every survivor as a patch, to be read: a survivor is a missing test, or
+a change that changes nothing.
 """
 
 from __future__ import annotations
@@ -16,35 +17,40 @@ import shutil
 import subprocess
 import sys
 from collections import Counter, defaultdict
+from collections.abc import Iterator
 from pathlib import Path
 
 CODE = (
-    *("arm", "model", "units", "check", "batch/plan"),
+    *("arm", "model", "units", "check", "batch/jobs"),
     *(f"{room}/*" for room in ("estimators", "signals", "track", "fleet", "inspection")),
 )
 TESTS = (
-    *("test_arm.py", "test_check.py", "estimators", "signals", "track", "fleet", "inspection"),
-    *("identification/test_identify.py", "readers/test_profile.py", "batch/test_run.py"),
+    *("test_arm.py", "test_check.py", "test_units.py", "estimators", "signals", "track", "fleet", "inspection"),
+    *("identification/test_identify.py", "readers/test_profile.py", "batch/test_run.py", "batch/test_discover.py"),
 )
 COPIED = ("tests", "pipelines", "data", "README.md", "CHANGELOG.md", "LICENSE", "constraints.txt")
-KILLED = {1, 3, 24, 36, -9, -11, -24}  # a test failed, the tests ended early, or they took far too long
-Names = dict[str, int | None]
+BUDGET = 20.0  # s of tests for a mutant
+LIMIT = 4  # times as much processor time as its tests took: a mutant that takes more never ends
 
 
 def prepare(folder: Path) -> None:
     """Make a copy of the project in `folder` that mutmut can work on."""
+    patterns = [f"algid/{name}" if name.endswith("*") else f"algid/{name}.py" for name in CODE]
+    nothing = [name for name in patterns if not any(Path().glob(name))]
+    nothing += [f"tests/{name}" for name in TESTS if not Path("tests", name).exists()]
+    if nothing:
+        raise SystemExit(f"{', '.join(nothing)}: names nothing; mend CODE and TESTS")
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     for name in ("algid", *COPIED):
         source = Path(name)
         (shutil.copytree if source.is_dir() else shutil.copy)(source, folder / name)
-    tests = [f"tests/{name}" for name in TESTS if Path("tests", name).exists()]
     options = {
         "source_paths": ["algid"],
-        "only_mutate": [f"algid/{name}" if name.endswith("*") else f"algid/{name}.py" for name in CODE],
+        "only_mutate": patterns,
         "also_copy": list(COPIED),
         "pytest_add_cli_args": ["-p", "no:xdist", "-o", "addopts=-q -m 'not slow'", "-o", "filterwarnings="],
-        "pytest_add_cli_args_test_selection": tests,
+        "pytest_add_cli_args_test_selection": [f"tests/{name}" for name in TESTS],
         "use_git_change_detection": False,
     }
     lines = [f"{key} = {json.dumps(value)}" for key, value in options.items()]
@@ -52,12 +58,50 @@ def prepare(folder: Path) -> None:
     (folder / "pyproject.toml").write_text(text + "\n[tool.mutmut]\n" + "\n".join(lines) + "\n", encoding="utf-8")
 
 
-def found(folder: Path) -> Names:
-    """Exit codes by the mutants' names; None for one that has not been tried."""
-    names: Names = {}
-    for path in sorted((folder / "mutants").rglob("*.py.meta")):
-        names |= json.loads(path.read_text(encoding="utf-8"))["exit_code_by_key"]
-    return names
+def chosen(tests: list[str], seconds: dict[str, float], own: str) -> list[str]:
+    """Of the tests that touch a function those of the room `own` first, the quickest first, within `BUDGET`."""
+    kept: list[str] = []
+    spent = 0.0
+    for test in sorted(
+        tests, key=lambda test: (not test.startswith((f"tests/{own}/", f"tests/test_{own}")), seconds[test])
+    ):
+        spent += seconds[test]
+        if kept and spent > BUDGET:
+            break
+        kept.append(test)
+    return kept
+
+
+def names_in(folder: Path) -> list[str]:
+    """The mutants' names."""
+    metas = sorted((folder / "mutants").rglob("*.py.meta"))
+    return [name for path in metas for name in json.loads(path.read_text(encoding="utf-8"))["exit_code_by_key"]]
+
+
+def jobs(folder: Path, drawn: list[str]) -> Iterator[tuple[str, list[str], int]]:
+    """Each mutant with its tests, by name, and the seconds of processor time that they may take."""
+    known = json.loads((folder / "mutants/mutmut-stats.json").read_text(encoding="utf-8"))
+    seconds = known["duration_by_test"]
+    for name in drawn:
+        touching = known["tests_by_mangled_function_name"].get(name.rpartition("__mutmut_")[0], [])
+        tests = chosen(touching, seconds, room(name))
+        yield name, tests, round(20 + LIMIT * sum(seconds[test] for test in tests))
+
+
+def tried(folder: Path, drawn: list[str]) -> Iterator[tuple[str, str]]:
+    """Each mutant with its end as soon as that is known: ``killed``, ``survived`` or ``no test``."""
+    known = list(jobs(folder, drawn))
+    yield from ((name, "no test") for name, tests, _ in known if not tests)
+    lines = "".join(json.dumps(job) + "\n" for job in known if job[1])
+    (folder / "jobs").write_text(lines, encoding="utf-8")
+    trial = [sys.executable, "-m", "pipelines.mutants_trial"]
+    with (folder / "jobs").open() as stdin:
+        running = subprocess.Popen(trial, cwd=folder / "mutants", stdin=stdin, stdout=subprocess.PIPE, text=True)
+        for line in running.stdout or ():
+            name, code = line.split()
+            yield name, "survived" if code == "0" else "killed"
+        if running.wait():
+            raise SystemExit("the trial broke off: see above")
 
 
 def room(name: str) -> str:
@@ -66,7 +110,7 @@ def room(name: str) -> str:
     return parts[1] if len(parts) > 2 else parts[0]
 
 
-def sample(names: Names, count: int, seed: int) -> list[str]:
+def sample(names: list[str], count: int, seed: int) -> list[str]:
     """About `count` of the names, each room's share its share of all mutants, at least two."""
     by_room: dict[str, list[str]] = defaultdict(list)
     for name in sorted(names):
@@ -83,25 +127,27 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--asked", type=float, default=0.85)
     parser.add_argument("--folder", type=Path, default=Path("build/mutants"))
+    parser.add_argument("--again", action="store_true", help="draw from the mutants that FOLDER holds from before")
     options = parser.parse_args()
-    prepare(options.folder)
     mutmut = [str(Path(sys.executable).with_name("mutmut"))]
-    # A name that none has: the mutants are made and the tests timed, nothing more.
-    subprocess.run([*mutmut, "run", "none of them"], cwd=options.folder, check=False, capture_output=True)
-    drawn = sample(found(options.folder), options.count, options.seed)
-    subprocess.run([*mutmut, "run", *drawn], cwd=options.folder, check=True, stdout=subprocess.DEVNULL)
-    codes = found(options.folder)
-    tried = [name for name in drawn if codes[name] is not None]
-    killed = Counter(room(name) for name in tried if codes[name] in KILLED)
-    for key, number in sorted(Counter(map(room, tried)).items()):
-        print(f"{key:12} {killed[key]:3} of {number:3}")
-    for name in tried:
-        if codes[name] not in KILLED:
+    if not options.again:
+        prepare(options.folder)
+        # A name that none has: the mutants are made and the tests timed, nothing more.
+        subprocess.run([*mutmut, "run", "none of them"], cwd=options.folder, check=False, capture_output=True)
+    drawn = sample(names_in(options.folder), options.count, options.seed)
+    ends: dict[str, str] = {}
+    for name, end in tried(options.folder, drawn):
+        ends[name] = end
+        print(f"{len(ends)} of {len(drawn)}", end="\r", file=sys.stderr, flush=True)
+        if end != "killed":
             shown = subprocess.run([*mutmut, "show", name], cwd=options.folder, capture_output=True, text=True)
             print(re.sub(r"^(?![-+@]).*\n", "", shown.stdout, flags=re.MULTILINE), end="")
-            print(f"# {name}: {'no test' if codes[name] == 33 else 'survived'}\n")
-    share = killed.total() / len(tried)
-    print(f"killed {killed.total()} of {len(tried)}: {100 * share:.0f} % (asked {100 * options.asked:.0f} %)")
+            print(f"# {name}: {end}\n", flush=True)
+    killed = Counter(room(name) for name, end in ends.items() if end == "killed")
+    for key, number in sorted(Counter(map(room, ends)).items()):
+        print(f"{key:12} {killed[key]:3} of {number:3}")
+    share = killed.total() / len(ends)
+    print(f"killed {killed.total()} of {len(ends)}: {100 * share:.0f} % (asked {100 * options.asked:.0f} %)")
     raise SystemExit(0 if share >= options.asked else 1)
 
 

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
+import pytest
 
 from algid.estimators import instruments, refined, weak
+from algid.estimators.modulating_functions import Windows
 from algid.estimators.refined import RefinedSettings
 from algid.estimators.weak import Source, WeakSettings
+from algid.model import Model
+from algid.signals.segments import Segment
+from algid.synth.cases import load_case
+from algid.synth.simulator import simulate
 from pipelines.accuracy_scenes import random_arm
 from pipelines.disturbance import logs
 
@@ -50,3 +57,91 @@ def test_a_payload_of_nothing_has_its_error_bar_where_lengths_are_known(bench: B
         assert fit.status[place] == "OK"
         assert abs(fit.values[place]) < 4 * fit.std[place]
         assert fit.std[place] < 0.02 * bench.payload
+
+
+def _rows(seed: int, q: int = 3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Z (2, q, R), X (2, q, R) with an error in common with y (2, R), which X at c = (1, 2, 3) explains."""
+    rng = np.random.default_rng(seed)
+    Z, error = rng.standard_normal((2, q, 90)), 0.5 * rng.standard_normal((2, 90))
+    X = Z + 0.3 * rng.standard_normal(Z.shape) + error[:, None]
+    y = np.einsum("q,aqr->ar", np.arange(1.0, q + 1), X) + error * np.array([[1.0], [3.0]])
+    return Z, X, y
+
+
+def test_the_estimate_is_that_of_two_stages_of_least_squares() -> None:
+    """Regress X on Z, then y on what that gives (Theil 1953), rows of each joint over its residual's deviation."""
+    logs_, stacked = [], []
+    start = np.array([1.1, 1.8, 3.3])
+    for seed in (1, 2):
+        Z, X, y = _rows(seed)
+        columns = np.concatenate([Z, X, y[:, None]], axis=1).reshape(2, 7, 9, 10)  # nine stretches of ten rows
+        logs_.append(instruments.Moments(np.einsum("axbr,aybr->baxy", columns, columns), 100, 10))
+        level = np.sqrt(np.sum((y - np.einsum("q,aqr->ar", start, X)) ** 2, axis=1) / 90)
+        stacked.append([part / level.reshape(2, *([1] * (part.ndim - 1))) for part in (Z, X, y)])
+    found, information = instruments.solve(logs_, start, True)
+    S, g = np.zeros((3, 3)), np.zeros(3)
+    for Z, X, y in stacked:
+        z, x = (np.concatenate(part, axis=1).T for part in (Z, X))
+        first = z @ np.linalg.lstsq(z, x, rcond=None)[0]
+        S, g = S + first.T @ first, g + first.T @ np.concatenate(y)
+    np.testing.assert_allclose(found, np.linalg.solve(S, g), rtol=1e-9)
+    for log, seed in zip(information, (1, 2), strict=True):  # weighed anew at what was found
+        Z, X, y = _rows(seed)
+        residual = y - np.einsum("q,aqr->ar", found, X)
+        level = np.sqrt(np.sum(residual**2, axis=1) / 90)
+        z, x = (np.concatenate(part / level[:, None, None], axis=1).T for part in (Z, X))
+        first = z @ np.linalg.lstsq(z, x, rcond=None)[0]
+        assert (log.loaded, log.S.shape) == (True, (9, 3, 3))
+        # windows overlap eight-fold, every second is taken: a window's worth of rows counts as two
+        np.testing.assert_allclose(log.total[0], 0.5 * first.T @ first, rtol=1e-9)
+        np.testing.assert_allclose(
+            log.total[1], 0.5 * first.T @ np.concatenate(residual / level[:, None]), atol=1e-9 * log.total[0].max()
+        )
+        np.testing.assert_array_equal(log.c0, found)
+
+
+@pytest.mark.parametrize(("late", "order"), [(0.0, 3.7), (3.0, 3.7), (2.4, 1.7)])
+def test_windows_are_simulated_to_the_order_of_their_torque(late: float, order: float) -> None:
+    """From the measured start, by the torque that acted: each sample against the simulator, whose steps are its own.
+
+    Between samples the torque is a straight line: then of second order, else of fourth.
+    """
+    k = load_case("case1").arm.constants() * np.array([1, 1, 1, 1, 1, 0.05, 0.01])  # less friction: a motion less stiff
+    errors = []
+    for dt in (5e-3, 2.5e-3):
+        t = np.arange(round(4 / dt)) * dt
+        motion = simulate(k, lambda now: np.stack([0.6 * np.sin(3 * now), 0.2 * np.cos(4 * now)]), t)
+        shift = late * dt
+        tau = np.stack([0.6 * np.sin(3 * (t + shift)), 0.2 * np.cos(4 * (t + shift))])  # acts `shift` after its stamp
+        piece = Segment(0.0, dt, motion.theta, tau, motion.omega)
+        windows = Windows(dt, 0.32, shift, None)
+        found = instruments._simulated(Model(), k, piece, windows)
+        assert found is not None
+        simulated, good = found
+        length, first = 8 * windows.step, windows.margin
+        starts = first + 2 * windows.step * np.arange(good.size)
+        at = (starts[:, None] + np.arange(length)).ravel()
+        assert good.all()
+        assert starts[-1] + length <= t.size - first < starts[-1] + length + 2 * windows.step
+        np.testing.assert_allclose(simulated.tau, motion.tau[:, at], atol=1e-9 if late % 1 == 0 else 6 * dt**2 / 8)
+        assert simulated.omega is not None
+        off = np.abs(np.stack([simulated.theta - motion.theta[:, at], simulated.omega - motion.omega[:, at]]))
+        errors.append([off[..., parity::2].max(axis=2) for parity in (0, 1)])  # steps, and what lies between them
+    slopes = np.log2(errors[0]) - np.log2(errors[1])
+    assert np.all(slopes > order), slopes
+
+
+def test_coefficients_that_move_no_arm_and_windows_that_run_away_are_told(bench: Bench) -> None:
+    k, log = bench.arm.constants(), bench.log()
+    windows = Windows(log.dt, 0.2, 0.0, None)
+    assert instruments._simulated(Model(), -k, log, windows) is None
+    wild = instruments._simulated(Model(), k * np.array([1, 1, 1, 1, 1, -500, -500]), log, windows)
+    assert wild is not None
+    assert not wild[1].any()
+    found = instruments.moments(lambda: [log], WeakSettings(), k * np.array([1, 1, 1, 1, 1, -500, -500]))
+    assert found is not None
+    assert found.astray == found.rows > 0
+    assert not found.gram.any()
+    least = weak.fit([lambda: [log]])
+    astray = instruments.fit([lambda: [log]], start=replace(least, values=-least.values))
+    assert (astray.converged, set(astray.status), astray.estimator) == (False, {"NOT_CONVERGED"}, "weak")

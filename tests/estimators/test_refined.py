@@ -12,6 +12,7 @@ from algid.estimators.combine import Prior
 from algid.estimators.refined import RefinedSettings
 from algid.estimators.whitening import NoiseLevels
 from algid.model import Model
+from algid.signals.differences import POINTS
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case
 from algid.synth.excitation import SampledTorque
@@ -162,6 +163,11 @@ def test_long_logs_take_one_more_pass_and_agree(bench: Bench, monkeypatch: pytes
     monkeypatch.setattr(evidence, "_TRAINED", 2)
     parts = refined.fit([lambda: [log]])
     assert np.allclose(whole.values, parts.values, atol=0.2 * whole.std.min() + 0.2 * whole.std)
+    for fit in (whole, parts):  # 4001 samples in pieces of 500, whose ends the stencil takes; white, of unit variance
+        (residual,) = fit.residual
+        assert residual.pairs[0] == pytest.approx(4001 - 9 * (POINTS - 1), abs=POINTS)
+        assert fit.freedom == pytest.approx(residual.pairs[0], abs=9)
+        assert residual.products[:, 0] / residual.pairs[0] == pytest.approx(1, abs=0.09)  # four standard errors
 
 
 def test_blocks_of_any_size_give_the_same_estimate(bench: Bench) -> None:

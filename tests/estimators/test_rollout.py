@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from algid.arm import FloatArray
+from algid.arm import Arm, FloatArray
 from algid.estimators.rollout import HORIZONS, RolloutScore, _angles_at_horizons, rollouts, time_step
 from algid.model import Model
 from algid.signals.segments import Segment
@@ -77,7 +77,27 @@ def test_short_logs_have_no_starts_and_wild_arms_no_bounds(segment: Segment) -> 
     assert np.isinf(wild.rmse[2]).all()
 
 
-def test_stiff_friction_shortens_the_step() -> None:
+def test_the_step_is_as_long_as_the_stiffest_friction_leaves_stable() -> None:
+    """h λ below 2.78, λ the largest eigenvalue of M⁻¹ D at rest over θ2, D friction's slopes: and not far below."""
+    rng = np.random.default_rng(0)
+    cos = np.cos(np.linspace(0, np.pi, 37))
+    steps = []
+    for _ in range(300):
+        m1, m2, l1, l2, i1, i2 = rng.uniform(0.05, 1.0, 6)
+        arm = Arm(5 * m1, 5 * m2, l1 / 2, l2 / 2, l1, l2, i1**4, i2**4, 0.0, 0.0)
+        k, f, j2 = arm.constants(), rng.uniform(0, 2, 4) ** 4, rng.uniform(0, 0.1)
+        k[5:] = f[:2]
+        speed = rng.uniform(0.02, 0.3)
+        model = Model(("coulomb", "rotor"), coulomb_speed=speed)
+        step = time_step(model, np.concatenate([k, f[2:] / 10, [j2]]))
+        M = np.array(
+            [[k[4] + k[2] + 2 * k[0] * cos, k[2] + k[0] * cos], [k[2] + k[0] * cos, np.full(cos.size, k[2] + j2)]]
+        )
+        D = np.diag(f[:2] + f[2:] / 10 / speed)
+        stiffest = np.abs(np.linalg.eigvals(np.linalg.solve(np.moveaxis(M, 2, 0), D))).max()
+        assert step in 2e-3 * 0.5 ** np.arange(8)
+        assert step * stiffest < 2.78 or step < 1e-4
+        assert step == 2e-3 or step * stiffest > 0.05
+        steps.append(step)
+    assert len(set(steps)) >= 3
     assert time_step(Model(), K) == 2e-3
-    stiff = Model(("coulomb",), coulomb_speed=0.01)
-    assert time_step(stiff, np.append(K, [0.3, 0.2])) < 1e-3

@@ -41,6 +41,15 @@ def test_the_width_of_friction_is_found(bench: Bench) -> None:
     assert chosen.model.coulomb_speed == pytest.approx(0.05, rel=0.5)  # velocities are smoothed: a widest guess
 
 
+def test_what_was_asked_for_and_what_was_not_is_said_term_by_term(bench: Bench) -> None:
+    chosen = _chosen(bench, ("coulomb",), candidates=("coulomb", "stribeck", "offset"), kept=("coulomb",))
+    trials = {trial.term: trial for trial in chosen.trials}
+    assert {term: trial.kept for term, trial in trials.items()} == {"coulomb": True, "stribeck": False, "offset": False}
+    assert trials["coulomb"].reason == "asked for"
+    assert min(trials["coulomb"].prediction, trials["coulomb"].evidence) > 0
+    assert all(trial.reason.startswith("left out: ") for term, trial in trials.items() if term != "coulomb")
+
+
 def test_terms_with_a_shape_are_those_of_friction() -> None:
     assert {term for term in TERMS if needs_shape([term])} == {"coulomb", "stribeck", "asymmetry", "load"}
 

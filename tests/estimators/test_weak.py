@@ -1,4 +1,5 @@
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -7,7 +8,8 @@ import pytest
 from algid.arm import FloatArray
 from algid.estimators import weak
 from algid.estimators import weak as normal
-from algid.estimators.weak import WeakSettings
+from algid.estimators.combine import Prior
+from algid.estimators.weak import Source, WeakSettings
 from algid.model import Model
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case
@@ -88,3 +90,37 @@ def test_further_columns_are_told_from_those_of_the_arm(bench: Bench) -> None:
 def test_too_short_a_log_is_refused(bench: Bench) -> None:
     with pytest.raises(ValueError, match="long enough"):
         weak.fit([lambda: [bench.log().part(0, 12)]])
+
+
+@pytest.mark.parametrize("delay", [False, True])
+@pytest.mark.parametrize("known", [False, True])
+def test_what_is_told_without_a_log_is_what_the_others_tell(bench: Bench, known: bool, delay: bool) -> None:
+    """The jackknife's estimates against fits of the other logs, with unloaded logs or an earlier result beside them."""
+    settings = WeakSettings(estimate_delay=delay)
+    cut = [0, 1300, 2600, 4001]
+    bare: list[Source] = [partial(list, [bench.log(False, 1e-4).part(*ends)]) for ends in pairwise(cut)]
+    burdened: list[Source] = [partial(list, [bench.log(True, 1e-4, seed).part(*cut[:3:2])]) for seed in range(4)]
+    prior = None
+    if known:
+        before = weak.fit(bare)
+        prior, bare = Prior.of(before.names, before.values, before.covariance), []
+    fit = weak.fit(bare, burdened, settings, prior=prior)
+    assert fit.intervals == "jackknife"
+    assert fit.without is not None
+    assert len(fit.without) == len(bare) + len(burdened)
+    for place, told in enumerate(fit.without):
+        rest = [source for number, source in enumerate(bare) if number != place]
+        rest_loaded = [source for number, source in enumerate(burdened) if len(bare) + number != place]
+        alone = weak.fit(rest, rest_loaded, settings, prior=prior)
+        # a delay found anew is linearised anew
+        assert np.all(np.abs(told - alone.values) < (0.02 if delay else 1e-4) * fit.std)
+
+
+def test_the_only_log_of_its_kind_is_left_where_it_is(bench: Bench) -> None:
+    bare: list[Source] = [partial(list, [bench.log(False, 1e-4)])]
+    burdened: list[Source] = [partial(list, [bench.log(True, 1e-4, seed)]) for seed in range(3)]
+    fit = weak.fit(bare, burdened)
+    assert fit.without is not None
+    assert np.all(np.abs(fit.without[0] - fit.values) < fit.std)
+    three = weak.fit(bare, burdened[:2])
+    assert three.intervals == "sandwich"
