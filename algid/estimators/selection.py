@@ -216,16 +216,21 @@ class _Search:
     candidates: tuple[str, ...]
     fixed: tuple[str, ...]
 
-    def worth(self, terms: Sequence[str], beside: Sequence[str]) -> tuple[float, float]:
-        """Evidence less its price, and the share by which the held-out squares fall."""
-        among = [*beside, *terms]
-        wald, stretches = self.grams.wald(terms, among)
+    def evidence(self, terms: Sequence[str], beside: Sequence[str]) -> float:
+        """Evidence of `terms` less its price."""
+        wald, stretches = self.grams.wald(terms, [*beside, *terms])
         count = sum(len(term_names(term)) for term in terms)
         price = count * (np.log(stretches) + 2 * np.log(max(2, len(self.candidates))))
-        before, after = (self.grams.held_out_squares(some) for some in (beside, among))
         # The noise is estimated too, from as many stretches.
-        evidence = stretches * np.log1p(max(wald, 0.0) / stretches)
-        return float(evidence - price), 1 - after / before
+        return float(stretches * np.log1p(max(wald, 0.0) / stretches) - price)
+
+    def gain(self, terms: Sequence[str], beside: Sequence[str]) -> float:
+        """The share by which the held-out squares fall."""
+        return 1 - self.grams.held_out_squares([*beside, *terms]) / self.grams.held_out_squares(beside)
+
+    def agreed(self, terms: Sequence[str], beside: Sequence[str]) -> bool:
+        """Whether what was left out, and physics, speak for `terms` too."""
+        return self.gain(terms, beside) > 0 and self.plausible(terms, beside)
 
     def plausible(self, terms: Sequence[str], among: Sequence[str]) -> bool:
         """Whether the coefficients of `terms` beside `among` are within `_PLAUSIBLE`."""
@@ -245,11 +250,8 @@ class _Search:
     def _addition(self, kept: list[str]) -> list[str]:
         left = [term for term in self.candidates if term not in kept and _need(term) in (None, *kept)]
         for count in range(1, _TOGETHER + 1):
-            found: list[tuple[float, list[str]]] = []
-            for terms in combinations(left, count):
-                evidence, gain = self.worth(terms, kept)
-                if evidence > 0 and gain > 0 and self.plausible(terms, kept):
-                    found.append((evidence, list(terms)))
+            found = [(self.evidence(terms, kept), list(terms)) for terms in combinations(left, count)]
+            found = [(evidence, terms) for evidence, terms in found if evidence > 0 and self.agreed(terms, kept)]
             if found:
                 return max(found)[1]
         return []
@@ -260,8 +262,8 @@ class _Search:
         poor = []
         for term in free:
             others = [other for other in kept if other != term]
-            evidence, gain = self.worth([term], others)
-            if evidence <= 0 or gain <= 0 or not self.plausible([term], others):
+            evidence = self.evidence([term], others)
+            if evidence <= 0 or not self.agreed([term], others):
                 poor.append((evidence, term))
         return min(poor)[1] if poor else None
 
@@ -269,12 +271,12 @@ class _Search:
         """What became of a term, beside those that were kept."""
         beside = [other for other in kept if other != term and _need(other) != term]
         if term in asked:
-            return TermTrial(term, True, *self._judged(term, beside), "asked for")
+            return TermTrial(term, True, self.gain([term], beside), self.evidence([term], beside), "asked for")
         if term not in self.candidates:
             return TermTrial(term, False, 0.0, 0.0, "left out: without gravity it has no effect")
         if _need(term) not in (None, *beside):
             return TermTrial(term, False, 0.0, 0.0, f"left out: no meaning without {_need(term)}")
-        gain, evidence = self._judged(term, beside)
+        gain, evidence = self.gain([term], beside), self.evidence([term], beside)
         if term in kept:
             reason = "kept: predicts better what was left out, and is evident"
         elif evidence <= 0:
@@ -286,10 +288,6 @@ class _Search:
         else:
             reason = "left out: other terms explain the same"
         return TermTrial(term, term in kept, gain, evidence, reason)
-
-    def _judged(self, term: str, beside: Sequence[str]) -> tuple[float, float]:
-        evidence, gain = self.worth([term], beside)
-        return gain, evidence
 
 
 def _need(term: str) -> str | None:

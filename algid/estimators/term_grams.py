@@ -118,6 +118,7 @@ class Grams:
             [part.sum(axis=0) for gram in self._logs for part in np.array_split(gram, parts) if len(part)]
         )
         self._total = self._folds.sum(axis=0)
+        self._squares: dict[tuple[int, ...], float] = {}
 
     def _weigh(self, normals: Sequence[tuple[bool, Normal]]) -> None:
         weights: list[FloatArray] = [np.ones(2) for _ in normals]
@@ -171,11 +172,14 @@ class Grams:
     def held_out_squares(self, terms: Iterable[str]) -> float:
         """Sum of the squared moments of logs, or of blocks of a log, each predicted from the others."""
         columns = self._columns(terms)
-        value = 0.0
-        for fold in self._folds:
-            v = np.append(-_solved(self._total - fold, columns), 1.0)
-            value += float(v @ fold @ v)
-        return value
+        key = tuple(columns.tolist())  # each sub-model is asked for beside every term that it lacks
+        if key not in self._squares:
+            value = 0.0
+            for fold in self._folds:
+                v = np.append(-_solved(self._total - fold, columns), 1.0)
+                value += float(v @ fold @ v)
+            self._squares[key] = value
+        return self._squares[key]
 
     def wald(self, terms: Sequence[str], among: Sequence[str]) -> tuple[float, float]:
         """How far the coefficients of `terms` are from nothing in the sub-model with the terms `among`.
