@@ -21,6 +21,7 @@ from algid.readers.align import Series, aligned
 from algid.readers.assemble import TableReader, reader_of
 from algid.readers.joints import along_the_arm, order_notice
 from algid.readers.order import Sorter
+from algid.readers.others import moving_joints
 from algid.readers.rosbag2 import bag_files
 from algid.readers.sniff import SQLITE
 from algid.readers.table import BLOCK_ROWS, CHANNELS, JOINT_CHANNELS, VELOCITIES, SampleTable, stack
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
     from algid.profile import Profile
 
 _TYPE = "sensor_msgs/msg/JointState"
+_LOOKED = 1 << 12
+"""Messages whose other joints are looked at."""
 _FIELDS = {"theta": "position", "tau": "effort", "omega": "velocity"}
 
 
@@ -108,7 +111,9 @@ def _usual(path: Path, profile: Profile | None) -> _Usual:
                 for quantity in quantities
                 for number, joint in enumerate(reading.joints or (), start=1)
             }
-            return _Usual(topic, sources, reading, said)
+            others = {name: f"position[{name}]" for name in names if name not in (reading.joints or ())}
+            beside = moving_joints(others, lambda paths: _Part(path, topic, paths, "log").tables(_LOOKED))  # noqa: B023
+            return _Usual(topic, sources, reading, said + beside)
         twice = ", two of one name" if len(set(names)) < len(names) else ""
         lacking = "" if len(message.effort) else ", whose effort is empty"
         seen.add(f"{topic!r} with the joints {', '.join(names[:8])}{twice}{lacking}")

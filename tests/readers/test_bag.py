@@ -109,3 +109,20 @@ def test_a_damaged_bag_is_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "log.bag").write_bytes(b"#ROSBAG V2.0\n" + np.arange(100).tobytes())
     with pytest.raises(LogError, match="bag cannot be read"):
         read_log(tmp_path / "log.bag")
+
+
+def test_other_joints_of_a_bag_that_move_are_told(tmp_path: Path) -> None:
+    log = noise_log(50, start_ns=EPOCH_NS)
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    with Writer2(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        channel = writer.add_connection("/joint_states", TYPE, typestore=store)
+        for row, stamp in enumerate(log.stamp_ns.tolist()):
+            own = message(store, log, row, first=False)
+            more = {"position": [0.1 * (row % 2), 0.0], "velocity": [0.0, 0.0], "effort": [0.0, 0.0]}
+            values = {key: np.append(getattr(own, key), more[key]) for key in more}
+            long = store.types[TYPE](header=own.header, name=["j1", "j2", "j3", "j4"], **values)
+            writer.write(channel, stamp, store.serialize_cdr(long, TYPE))
+    found = read_log(tmp_path / "bag", Profile(joints=("j1", "j2")))
+    assert same(found, log)
+    (text,) = (notice.text for notice in found.notices if notice.code == "OTHER_JOINTS")
+    assert "1 other joint moves meanwhile: j3 by 0.1 rad" in text

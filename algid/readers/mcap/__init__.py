@@ -13,13 +13,17 @@ from algid.readers.align import Series, aligned
 from algid.readers.assemble import TableReader, reader_of
 from algid.readers.mcap.catalogue import Catalogue, catalogue, truth_text
 from algid.readers.mcap.framing import DamagedError, File
-from algid.readers.mcap.others import moving_joints
-from algid.readers.mcap.topic import Topic
+from algid.readers.mcap.topic import Fields, Topic
 from algid.readers.order import Sorter
+from algid.readers.others import moving_joints
 from algid.readers.table import BLOCK_ROWS, SampleTable, stack
 
 if TYPE_CHECKING:
     from algid.profile import Profile
+
+
+_LOOKED = 1 << 14
+"""Messages whose other joints are looked at."""
 
 
 def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableReader:
@@ -42,7 +46,13 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
             raise _blamed(paths[0], found, error) from error
         truth = _truth(paths[0], found)
         rows = wanted.topics[0].count(found)
-        beside = moving_joints(file, found, wanted.topics[0], wanted.others)
+        main = wanted.topics[0]
+        beside = moving_joints(
+            wanted.others,
+            lambda paths: Topic(main.name, main.type, Fields(paths, None), "log").tables(
+                str(file.path), file, found, _LOOKED
+            ),
+        )
     name = str(paths[0] if len(paths) == 1 else paths[0].parent)
     origin = Origin(name, "mcap", wanted.mapping, truth, wanted.reading)
 

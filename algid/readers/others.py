@@ -2,34 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
 from algid.arm import FloatArray
 from algid.errors import LogError
 from algid.log import Notice
-from algid.readers.mcap.catalogue import Catalogue
-from algid.readers.mcap.framing import File
-from algid.readers.mcap.topic import Fields, Topic
+from algid.readers.table import SampleTable
 from algid.words import counted
 
-_LOOKED = 1 << 14
-"""Messages that are looked at."""
 _STILL = 0.02
 """In rad, or m: how far a joint that is held may creep."""
 _NAMED = 4
+Tables = Callable[[Mapping[str, str]], Iterator[SampleTable]]
+"""Tables of a topic's fields, whose paths are given by the columns' names."""
 
 
-def moving_joints(file: File, found: Catalogue, topic: Topic, others: Mapping[str, str]) -> tuple[Notice, ...]:
-    """Say which of the other joints of a topic move, and how far; `others` has by joint the path of its position."""
-    if not others:
+def moving_joints(positions: Mapping[str, str], tables: Tables) -> tuple[Notice, ...]:
+    """Say which of the other joints of a topic move, and how far, in its first table.
+
+    `positions` has by joint the path of its position.
+    """
+    joints = {f"joint {number}": joint for number, joint in enumerate(positions)}  # no name of which is a stamp's
+    if not joints:
         return ()
-    joints = {f"joint {number}": joint for number, joint in enumerate(others)}
-    paths = dict(zip(joints, others.values(), strict=True))
-    beside = Topic(topic.name, topic.type, Fields(paths, None), "log")
     try:
-        table = next((one for one in beside.tables(str(file.path), file, found, _LOOKED) if len(one)), None)
+        table = next((one for one in tables({name: positions[joints[name]] for name in joints}) if len(one)), None)
     except LogError:  # the joints that are read tell of what is wrong
         return ()
     if table is None:
