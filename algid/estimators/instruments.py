@@ -32,13 +32,13 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.arm import FloatArray
+from algid.arm import CONSTANT_NAMES, FloatArray, mass_matrix
 from algid.estimators import weak
 from algid.estimators.combine import BlockSums, LogInformation, Prior, long_run_variance, scaled_pinv
 from algid.estimators.fit import Fit, conclude
 from algid.estimators.modulating_functions import OVERLAP, Windows, row_weights
 from algid.estimators.weak import Source, WeakSettings
-from algid.model import Model, Motion, partials, torque
+from algid.model import Model, acceleration
 from algid.signals.filters import correlate, differentiator, half_length, smoother
 from algid.signals.segments import Segment
 
@@ -270,13 +270,12 @@ def _acceleration(
     model: Model, c: FloatArray, theta: FloatArray, omega: FloatArray, tau: FloatArray
 ) -> FloatArray | None:
     """Accelerations (2, R) under torques (2, R); None where the mass matrix is not positive definite."""
-    motion = Motion(theta, omega, np.zeros_like(theta))
-    free1, free2 = tau - torque(model, c, motion)
-    (m11, m12), (m21, m22) = partials(model, c, motion)[2]
-    determinant = m11 * m22 - m12 * m21
-    if np.any(determinant <= 0) or np.any(m11 <= 0):
+    value = model.values(c)
+    k = np.array([value[name] for name in CONSTANT_NAMES])
+    m11, m12, m22 = mass_matrix(k, theta + np.array([[value["zero1"]], [value["zero2"]]]))
+    if np.any(m11 <= 0) or np.any(m11 * (m22 + value["j2"]) <= m12**2):
         return None
-    return np.stack([m22 * free1 - m12 * free2, m11 * free2 - m21 * free1]) / determinant
+    return acceleration(model, c, theta, omega, tau)
 
 
 def endogeneity(unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings, fit: Fit) -> float | None:

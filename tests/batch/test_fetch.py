@@ -26,7 +26,7 @@ from algid.synth.sensors import Sensors
 from tests.objects import Served, s3, with_cameras
 from tests.readers.mcaps import NO_INDEX, joint_state, write_mcap
 
-WEAK = Settings(estimator="weak")
+WEAK = Settings(estimator="weak", model="plain")
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +36,24 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@dataclass(frozen=True)
+class Undisturbed:
+    """What a batch that nothing happens to leaves, and the seconds that it takes."""
+
+    digest: dict[str, str]
+    lasts: float
+
+
+@pytest.fixture(scope="module")
+def undisturbed(logs: Path, tmp_path_factory: pytest.TempPathFactory) -> Undisturbed:
+    out = tmp_path_factory.mktemp("undisturbed") / "out"
+    start = time.monotonic()
+    running = _start(logs, out)
+    running.communicate()
+    assert running.returncode == 0
+    return Undisturbed(_digest(out), time.monotonic() - start)
+
+
 # The command, and in each of its workers a reader that never ends on what is named so.
 HANGING = """
 import algid.readers as readers
@@ -53,7 +71,8 @@ if __name__ == "__main__":
 
 def _start(logs: Path, out: Path, *flags: str, program: Sequence[str] = ("-m", "algid")) -> subprocess.Popen[str]:
     where = flags or ("--workers", "2")
-    command = [sys.executable, *program, "batch", str(logs), "-o", str(out), "--no-report", *where]
+    quick = ("--no-report", "--estimator", "weak", "--model", "plain")
+    command = [sys.executable, *program, "batch", str(logs), "-o", str(out), *quick, *where]
     root = str(Path(__file__).parents[2])
     return subprocess.Popen(
         command,
@@ -76,23 +95,21 @@ def _wait_for_records(out: Path, count: int) -> None:
         time.sleep(0.005)
 
 
-def test_a_batch_killed_again_and_again_ends_as_an_undisturbed_one(logs: Path, tmp_path: Path) -> None:
-    undisturbed = _start(logs, tmp_path / "whole")
-    start = time.monotonic()
-    undisturbed.communicate()
-    assert undisturbed.returncode == 0
-    lasts = time.monotonic() - start
+@pytest.mark.parametrize("times", [1, pytest.param(4, marks=pytest.mark.slow)])
+def test_a_batch_killed_again_and_again_ends_as_an_undisturbed_one(
+    logs: Path, tmp_path: Path, undisturbed: Undisturbed, times: int
+) -> None:
     instants = random.Random(1)
-    for _ in range(2):
+    for _ in range(times):
         running = _start(logs, tmp_path / "out")
-        time.sleep(instants.uniform(0.4, 1.0) * lasts)
+        time.sleep(instants.uniform(0.4, 1.0) * undisturbed.lasts)
         running.kill()
         running.communicate()
     last = _start(logs, tmp_path / "out")
     told, _ = last.communicate()
     assert last.returncode == 0
     assert f"{JOBS} ok" in told
-    assert _digest(tmp_path / "out") == _digest(tmp_path / "whole")
+    assert _digest(tmp_path / "out") == undisturbed.digest
 
 
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
@@ -150,7 +167,7 @@ def _mounts(*flags: str) -> bool:
 
 
 def test_a_full_disk_stops_a_batch_that_ends_as_undisturbed_once_there_is_room(
-    logs: Path, tmp_path: Path, small_disk: Path
+    logs: Path, small_disk: Path, undisturbed: Undisturbed
 ) -> None:
     out = small_disk / "out"
     first = _start(logs, out)
@@ -168,9 +185,7 @@ def test_a_full_disk_stops_a_batch_that_ends_as_undisturbed_once_there_is_room(
     told, errors = second.communicate()
     assert (second.returncode, errors) == (0, "")
     assert f"{JOBS} ok" in told
-    whole = _start(logs, tmp_path / "whole")
-    whole.communicate()
-    assert _digest(out) == _digest(tmp_path / "whole")
+    assert _digest(out) == undisturbed.digest
 
 
 class Dask:
@@ -217,19 +232,24 @@ def dask(tmp_path: Path) -> Iterator[Dask]:
             process.wait()
 
 
-def test_on_dask_the_deaths_of_a_worker_and_of_the_batch_change_no_result(
-    logs: Path, tmp_path: Path, dask: Dask
+def test_on_dask_the_death_of_a_worker_changes_no_result(
+    logs: Path, tmp_path: Path, dask: Dask, undisturbed: Undisturbed
 ) -> None:
-    pool = _start(logs, tmp_path / "whole")
     victim, _ = dask.worker(), dask.worker()
-    pool.communicate()
     first = _start(logs, tmp_path / "out", "--scheduler", dask.address)
     _wait_for_records(tmp_path / "out", 1)
     victim.kill()
     told, errors = first.communicate()
     assert first.returncode == 0, errors
     assert f"{JOBS} ok" in told
-    assert _digest(tmp_path / "out") == _digest(tmp_path / "whole")
+    assert _digest(tmp_path / "out") == undisturbed.digest
+
+
+@pytest.mark.slow
+def test_on_dask_the_death_of_the_batch_changes_no_result(
+    logs: Path, tmp_path: Path, dask: Dask, undisturbed: Undisturbed
+) -> None:
+    dask.worker()
     second = _start(logs, tmp_path / "again", "--scheduler", dask.address)
     _wait_for_records(tmp_path / "again", 2)
     second.kill()
@@ -237,4 +257,4 @@ def test_on_dask_the_deaths_of_a_worker_and_of_the_batch_change_no_result(
     last = _start(logs, tmp_path / "again", "--scheduler", dask.address)
     _, errors = last.communicate()
     assert last.returncode == 0, errors
-    assert _digest(tmp_path / "again") == _digest(tmp_path / "whole")
+    assert _digest(tmp_path / "again") == undisturbed.digest

@@ -63,7 +63,8 @@ def logs(made: Path, tmp_path: Path) -> Path:
     return tmp_path / "logs"
 
 
-RECIPE = Recipe("", Settings(estimator="weak"), lambda _file: None, report=False)
+WEAK = Settings(estimator="weak", model="plain")
+RECIPE = Recipe("", WEAK, lambda _file: None, report=False)
 
 
 def _run(logs: Path, executor: Executor | None = None, recipe: Recipe = RECIPE, **more: bool) -> Ended:
@@ -100,7 +101,7 @@ def test_the_table_names_the_estimator_whose_numbers_are_reported(logs: Path, mo
         return identify(*args, **more).model_copy(update={"estimator": "weak"})
 
     monkeypatch.setattr("algid.batch.job.identify", handed_back)
-    _run(logs, recipe=replace(RECIPE, settings=Settings(estimator="refined")))
+    _run(logs, recipe=replace(RECIPE, settings=Settings(estimator="refined", model="plain")))
     table = pl.read_parquet(logs.parent / "out/jobs.parquet")
     assert table["estimator"].to_list() == [None, "weak", "weak"]
     assert '"estimator": "refined"' in table["settings"][1]
@@ -125,7 +126,7 @@ def test_changed_logs_settings_and_lost_results_run_again(logs: Path) -> None:
     shutil.rmtree(logs.parent / "out/r1/b.algid")
     _run(logs, executor)
     assert executor.ran == ["r1/b"]
-    _run(logs, executor, replace(RECIPE, settings=Settings(estimator="weak", window=0.3)))
+    _run(logs, executor, replace(RECIPE, settings=replace(WEAK, window=0.3)))
     assert executor.ran == ["r1/b", "bad", "r1/a", "r1/b"]
 
 

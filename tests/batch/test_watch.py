@@ -39,7 +39,7 @@ def _until(condition: Callable[[], object], running: subprocess.Popen[str]) -> N
 def _watching(logs: Path, out: Path) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "algid", "batch", str(logs), "-o", str(out), "--watch", "--workers", "1"]
     return subprocess.Popen(
-        [*command, "--no-report", "--estimator", "weak"],
+        [*command, "--no-report", "--estimator", "weak", "--model", "plain"],
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
         text=True,
         stdout=subprocess.PIPE,
