@@ -54,7 +54,9 @@ def test_synth_identify_check(logs: Path, tmp_path: Path) -> None:
 
 
 def test_export_writes_beside_the_result_what_report_would(logs: Path, tmp_path: Path) -> None:
-    found = Outcome("identify", logs / "case1-unloaded.csv", "-o", tmp_path, "-q", "--export", "mcap")
+    found = Outcome(
+        "identify", logs / "case1-unloaded.csv", "-o", tmp_path, "-q", "--export", "mcap", "--model", "plain"
+    )
     assert (found.code, found.out, found.err) == (0, "", "")
     exported = tmp_path / "case1-unloaded.algid" / "estimates.mcap"
     ours = exported.read_bytes()
@@ -223,7 +225,7 @@ def test_how_a_log_was_read_is_reused_and_compared(logs: Path, tmp_path: Path) -
     }
     for role, table in hanging.items():
         table.drop("omega1", "omega2").write_csv(tmp_path / f"{role}.csv")
-    quick = ("-o", tmp_path, "--estimator", "weak", "--no-report", "--format", "json")
+    quick = ("-o", tmp_path, "--estimator", "weak", "--model", "plain", "--no-report", "--format", "json")
     arm = Outcome("identify", tmp_path / "unloaded.csv", *quick, "--zero", "hanging")
     assert arm.code == 0, arm.err
     content = json.loads(arm.out)
@@ -264,7 +266,7 @@ def test_validate_predicts_another_log(tmp_path: Path) -> None:
             "--position-noise", "1e-4", "--torque-noise", "1e-2",
         )  # fmt: skip
     logs = [[tmp_path / name / f"case1-{role}.mcap" for role in ("unloaded", "loaded")] for name in ("one", "two")]
-    Outcome("identify", logs[0][0], "--loaded", logs[0][1], "-o", tmp_path, "--no-report")
+    Outcome("identify", logs[0][0], "--loaded", logs[0][1], "-o", tmp_path, "--no-report", "--model", "plain")
     folder = tmp_path / "case1-unloaded.algid"
     good = Outcome("validate", folder, logs[1][0], "--loaded", logs[1][1], "--max-nrmse", "0.3")
     assert good.code == 0, good.err + good.out
@@ -306,7 +308,8 @@ def test_a_stop_gets_one_line_and_leaves_nothing_half_written(
 
 
 def test_results_that_fit_no_arm_get_one_line(logs: Path, tmp_path: Path) -> None:
-    Outcome("identify", logs / "case1-unloaded.csv", "-o", tmp_path, "--no-report")
+    quick = ("--no-report", "--estimator", "weak", "--model", "plain")
+    Outcome("identify", logs / "case1-unloaded.csv", "-o", tmp_path, *quick)
     content = json.loads((tmp_path / "case1-unloaded.algid" / "result.json").read_text())
     crooked = {**content, "fit": {**content["fit"], "covariance": [[1.0]]}}
     empty = {**content, "parameters": {}}

@@ -12,7 +12,7 @@ from algid.estimators import instruments, refined, weak
 from algid.estimators.modulating_functions import Windows
 from algid.estimators.refined import RefinedSettings
 from algid.estimators.weak import Source, WeakSettings
-from algid.model import Model
+from algid.model import Model, Motion, torque
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case
 from algid.synth.simulator import simulate
@@ -145,3 +145,12 @@ def test_coefficients_that_move_no_arm_and_windows_that_run_away_are_told(bench:
     least = weak.fit([lambda: [log]])
     astray = instruments.fit([lambda: [log]], start=replace(least, values=-least.values))
     assert (astray.converged, set(astray.status), astray.estimator) == (False, {"NOT_CONVERGED"}, "weak")
+
+
+def test_windows_move_as_the_model_says_under_a_load_whose_sign_its_inertia_turns() -> None:
+    model = Model(("coulomb", "load"))
+    c = np.array([0.1, 0.4, 0.3, 3.0, 0.9, 0.1, 0.2, 0.15, 0.08, 0.05, 0.05])
+    theta, omega, tau = np.random.default_rng(0).normal(size=(3, 2, 200))
+    alpha = instruments._acceleration(model, c, theta, omega, tau)
+    assert alpha is not None
+    np.testing.assert_allclose(torque(model, c, Motion(theta, omega, alpha)), tau, atol=1e-12)

@@ -73,7 +73,7 @@ def test_short_logs_have_no_starts_and_wild_arms_no_bounds(segment: Segment) -> 
     assert isinstance(short, RolloutScore)
     assert not short.count.any()
     assert np.isnan(short.rmse).all()
-    wild = rollouts(Model(), K * np.array([1, 1, 1, 1, 1, -500, -500]), [segment], 8.0)
+    wild = rollouts(Model(), K * np.array([1, 1, 1, 1, 1, -20, -20]), [segment], 8.0)
     assert np.isinf(wild.rmse[2]).all()
 
 

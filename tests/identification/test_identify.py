@@ -95,7 +95,7 @@ def test_failure_leaves_nothing_behind(tmp_path: Path, wide: tuple[Log, Log]) ->
 @pytest.mark.parametrize("estimator", ["paper", "refined"])
 def test_loaded_log_alone_with_parameters(estimator: str, noisy: tuple[Log, Log], wide: tuple[Log, Log]) -> None:
     logs = wide if estimator == "paper" else noisy
-    settings = Settings(estimator=estimator)  # type: ignore[arg-type]
+    settings = PAPER if estimator == "paper" else Settings(model="plain")
     arm = identify(logs[0], None, settings)
     both = identify(*logs, settings)
     alone = identify(None, logs[1], settings, parameters=arm)
@@ -111,7 +111,7 @@ def test_swapped_logs_are_refused(wide: tuple[Log, Log]) -> None:
 def test_logs_of_two_arms_are_told() -> None:
     first, _ = algid.synthesise("case1", duration=2.0, excitation="wide")
     _, second = algid.synthesise("case2", duration=2.0, excitation="wide")
-    result = identify(first, second)
+    result = identify(first, second, Settings(model="plain"))
     assert any("another arm" in warning for warning in result.warnings)
     assert any("standard deviations from belonging to one arm" in warning for warning in result.warnings)
 
@@ -152,12 +152,13 @@ def test_other_schema_versions_are_refused(tmp_path: Path, wide: tuple[Log, Log]
 
 def test_blocks_change_no_estimate(tmp_path: Path, wide: tuple[Log, Log], monkeypatch: pytest.MonkeyPatch) -> None:
     algid.write_log(tmp_path / "log.parquet", wide[0], truth=wide[0].origin.truth)
-    whole = identify(wide[0], None, Settings(estimator="weak"))
+    settings = Settings(estimator="weak", model="plain")
+    whole = identify(wide[0], None, settings)
     from algid.readers.assemble import TableReader
 
     blocks = TableReader.blocks
     monkeypatch.setattr(TableReader, "blocks", lambda self, rows=0: blocks(self, 700))  # noqa: ARG005
-    parts = identify(tmp_path / "log.parquet", None, Settings(estimator="weak"))
+    parts = identify(tmp_path / "log.parquet", None, settings)
     for name, found in whole.parameters.items():
         assert parts.parameters[name].estimate == pytest.approx(found.estimate, rel=1e-12)
 

@@ -40,6 +40,12 @@ def moving_log(rows: int = 6000, pace: float = 1.0) -> Log:
     return Log(np.arange(rows) * 1_000_000, noisy, tau, Origin("arm.csv", "csv", {}), omega)
 
 
+@pytest.fixture
+def signals_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No convention is sought: for checks that look at signals."""
+    monkeypatch.setattr("algid.inspection.checks.mend", lambda *_, **__: None)
+
+
 def codes(log: Log) -> list[str]:
     return [finding.code for finding in examine(log)]
 
@@ -139,6 +145,13 @@ def test_encoder_step_and_noise_floor() -> None:
     assert signal_figures(smooth).step == 0
 
 
+def test_a_recorded_run_tells_its_zero(shared_data: Path) -> None:
+    run = sorted((shared_data / "dfki" / "C1_sysid").glob("*.csv"))[0]
+    assert {"WRONG_ZERO", "WRONG_CONVENTION"} & set(codes(read_log(run)))
+    assert not {"WRONG_ZERO", "WRONG_CONVENTION"} & set(codes(read_log(run, Profile(zero="hanging"))))
+
+
+@pytest.mark.slow
 def test_the_recorded_runs_tell_their_zero(shared_data: Path) -> None:
     runs = sorted((shared_data / "dfki" / "C1_sysid").glob("*.csv"))
     turned = {"WRONG_ZERO", "FLIPPED_SIGN", "GRAVITY_COMPENSATED", "WRONG_CONVENTION"}
@@ -160,6 +173,7 @@ def sine(rate: float, duration: float, frequency: float = 2.0) -> Log:
     return Log(np.rint(t * 1e9).astype(np.int64), theta, 3 * theta[::-1].copy(), Origin("arm.csv", "csv", {}))
 
 
+@pytest.mark.usefixtures("signals_alone")
 @pytest.mark.parametrize(("rate", "slow"), [(12.3, True), (17.3, True), (25.1, False), (1000, False)])
 def test_sampling_too_slow_for_the_motion_is_told(rate: float, slow: bool) -> None:
     found = {finding.code: finding.text for finding in examine(sine(rate, 20), gravity=0)}
@@ -169,6 +183,7 @@ def test_sampling_too_slow_for_the_motion_is_told(rate: float, slow: bool) -> No
         assert float(found["SLOW_SAMPLING"].split()[0]) == pytest.approx(rate / 2, rel=0.1)
 
 
+@pytest.mark.usefixtures("signals_alone")
 def test_logs_of_a_tenth_of_a_second_are_told() -> None:
     assert "SHORT_LOG" in codes(sine(1000, 0.1))
     assert "SHORT_LOG" not in codes(sine(1000, 1.1))
@@ -189,6 +204,7 @@ def found_codes(log: Log) -> set[str]:
     return {finding.code for finding in examine(log)}
 
 
+@pytest.mark.usefixtures("signals_alone")
 @pytest.mark.parametrize("value", [0.0, None])
 def test_a_torque_that_drops_out_is_told(value: float | None) -> None:
     log = moving()
@@ -199,6 +215,7 @@ def test_a_torque_that_drops_out_is_told(value: float | None) -> None:
     assert "tau2 stands still for 1 s from t = 1." in told[0].text
 
 
+@pytest.mark.usefixtures("signals_alone")
 def test_a_torque_that_is_slowly_published_or_at_its_limit_is_not_dead() -> None:
     log = moving()
     held = np.repeat(log.tau[:, ::120], 120, axis=1)[:, : len(log)]
@@ -207,6 +224,7 @@ def test_a_torque_that_is_slowly_published_or_at_its_limit_is_not_dead() -> None
         assert "DEAD_EFFORT" not in found_codes(replace(log, tau=tau))
 
 
+@pytest.mark.usefixtures("signals_alone")
 @pytest.mark.parametrize(("rate", "sigma"), [(1000.0, 3e-4), (200.0, 1e-3)])
 def test_lost_samples_with_new_numbers_are_told(rate: float, sigma: float) -> None:
     log = moving(rate, sigma)
@@ -219,6 +237,7 @@ def test_lost_samples_with_new_numbers_are_told(rate: float, sigma: float) -> No
     assert "LOST_SAMPLES" not in found_codes(told)
 
 
+@pytest.mark.usefixtures("signals_alone")
 def test_encoders_and_rest_make_no_lost_samples() -> None:
     log = moving()
     step = 2 * np.pi / 4096
@@ -247,6 +266,7 @@ def resting(before: float, after: float) -> Log:
     return Log(stamps, theta, tau + np.random.default_rng(9).normal(0, 0.02, tau.shape), log.origin)
 
 
+@pytest.mark.usefixtures("signals_alone")
 @pytest.mark.parametrize(("before", "after"), [(0.8, 0), (0, 1.2), (0.8, 1.2)])
 def test_rest_is_told_with_the_flags_that_leave_it_out(before: float, after: float) -> None:
     (found,) = (one for one in examine(resting(before, after)) if one.code == "RESTS")
@@ -258,6 +278,7 @@ def test_rest_is_told_with_the_flags_that_leave_it_out(before: float, after: flo
     assert not found.refuse
 
 
+@pytest.mark.usefixtures("signals_alone")
 def test_a_short_rest_and_the_end_of_a_part_are_no_rest() -> None:
     assert "RESTS" not in codes(resting(0.4, 0.3))
     assert "RESTS" not in [one.code for one in examine(resting(0, 1.2), whole=False)]
