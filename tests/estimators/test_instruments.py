@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -118,6 +119,7 @@ def test_windows_are_simulated_to_the_order_of_their_torque(late: float, order: 
         found = instruments._simulated(Model(), k, piece, windows)
         assert found is not None
         simulated, good = found
+        assert (simulated.start, simulated.dt) == (0.0, dt)
         length, first = 8 * windows.step, windows.margin
         starts = first + 2 * windows.step * np.arange(good.size)
         at = (starts[:, None] + np.arange(length)).ravel()
@@ -154,3 +156,19 @@ def test_windows_move_as_the_model_says_under_a_load_whose_sign_its_inertia_turn
     alpha = instruments._acceleration(model, c, theta, omega, tau)
     assert alpha is not None
     np.testing.assert_allclose(torque(model, c, Motion(theta, omega, alpha)), tau, atol=1e-12)
+
+
+def test_of_a_long_log_the_first_pieces_are_looked_at(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(weak, "PIECE_SAMPLES", 500)
+    log = bench.log(sigma=1e-3)
+    least = weak.fit([lambda: [log]])
+    taken = []
+
+    def source() -> Iterator[Segment]:
+        for place, first in enumerate(range(0, 4000, 500)):
+            taken.append(place)
+            yield replace(log.part(first, first + 500), continues=place > 0)
+
+    apart = instruments.endogeneity([source], [], WeakSettings(), least)
+    assert apart is not None
+    assert 4 <= max(taken) + 1 <= 6  # one more is asked for before a piece is known to be whole

@@ -5,10 +5,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from algid.arm import FloatArray
+from algid.arm import Arm, FloatArray, with_payload
 from algid.estimators import weak
 from algid.estimators import weak as normal
-from algid.estimators.combine import Prior
+from algid.estimators.combine import LogInformation, Prior
+from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import Model
 from algid.signals.segments import Segment
@@ -124,3 +125,21 @@ def test_the_only_log_of_its_kind_is_left_where_it_is(bench: Bench) -> None:
     assert np.all(np.abs(fit.without[0] - fit.values) < fit.std)
     three = weak.fit(bare, burdened[:2])
     assert three.intervals == "sandwich"
+
+
+@pytest.mark.parametrize("lengths", [{}, {"l1": None}, {"l1": None, "l2": None}], ids=len)
+def test_a_first_payload_is_the_one_that_the_loaded_constants_hold(lengths: dict[str, None]) -> None:
+    """Arms drawn at random, each with its payload: all its constants from the bare ones by Table 2."""
+    rng = np.random.default_rng(7)
+    for _ in range(40):
+        m1, m2, l1, l2, i1, i2 = rng.uniform(0.1, 1.0, 6)
+        arm = Arm(4 * m1, 4 * m2, l1 / 2, l2 / 2, l1, l2, i1 / 10, i2 / 10, 0.1, 0.1)
+        mass = float(10 ** rng.uniform(-1.5, 0.7))
+        known = {name: {"l1": l1, "l2": l2}[name] for name in lengths}
+        shared = Shared(Model(), False, True, known)
+        bare = arm.constants()
+        X = rng.standard_normal((40, 7)) / bare
+        S = X.T @ X * 1e6
+        loaded = LogInformation(True, with_payload(bare, arm.payload_constants(mass)), S[None], np.zeros((1, 7)))
+        truth = np.concatenate([bare, [{"m_p": mass, "l1": l1, "l2": l2}[name] for name in shared.names[7:]]])
+        np.testing.assert_allclose(weak.first_payload(shared, bare, loaded), truth, rtol=1e-3)
