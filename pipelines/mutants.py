@@ -1,7 +1,7 @@
 """How many small changes of the code the tests see: `make mutants`.
 
 mutmut changes one operator, number or argument at a time in the rooms whose numbers are believed, and runs tests that
-touch the changed function, the quickest first: those of its own room, then others, as many as `BUDGET` holds. Of all
+touch the changed function: those of its module, then of its room, then others, as many as `BUDGET` holds. Of all
 mutants a sample is drawn room by room at a fixed seed: one for each is worth what it would catch, and all of them would
 take days. Prints the share that was killed, and every survivor as a patch, to be read: a survivor is a missing test, or
 a change that changes nothing.
@@ -58,13 +58,18 @@ def prepare(folder: Path) -> None:
     (folder / "pyproject.toml").write_text(text + "\n[tool.mutmut]\n" + "\n".join(lines) + "\n", encoding="utf-8")
 
 
-def chosen(tests: list[str], seconds: dict[str, float], own: str) -> list[str]:
-    """Of the tests that touch a function those of the room `own` first, the quickest first, within `BUDGET`."""
+def chosen(tests: list[str], seconds: dict[str, float], name: str) -> list[str]:
+    """Of the tests that touch a mutant those of its module first, then those of its room, within `BUDGET`."""
+    module, own = name.split(".")[-2], room(name)
+    named = (f"test_{module}.py", f"test_{module}s.py")
     kept: list[str] = []
     spent = 0.0
-    for test in sorted(
-        tests, key=lambda test: (not test.startswith((f"tests/{own}/", f"tests/test_{own}")), seconds[test])
-    ):
+
+    def far(test: str) -> tuple[bool, bool, float]:
+        file = test.partition("::")[0]
+        return not file.endswith(named), not file.startswith((f"tests/{own}/", f"tests/test_{own}")), seconds[test]
+
+    for test in sorted(tests, key=far):
         spent += seconds[test]
         if kept and spent > BUDGET:
             break
@@ -84,7 +89,7 @@ def jobs(folder: Path, drawn: list[str]) -> Iterator[tuple[str, list[str], int]]
     seconds = known["duration_by_test"]
     for name in drawn:
         touching = known["tests_by_mangled_function_name"].get(name.rpartition("__mutmut_")[0], [])
-        tests = chosen(touching, seconds, room(name))
+        tests = chosen(touching, seconds, name)
         yield name, tests, round(20 + LIMIT * sum(seconds[test] for test in tests))
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from algid.arm import inverse_dynamics
+from algid.estimators import combine as combine_module
 from algid.estimators import refined, weak
 from algid.estimators.combine import MOST_BLOCKS, BlockSums, LogInformation, jackknife, long_run_variance
 from algid.estimators.diagnostics import (
@@ -129,6 +130,23 @@ def test_block_sums_stay_bounded_and_lose_nothing() -> None:
         total = total + block.sum(axis=0)
     assert sums.values().shape[0] <= 2 * MOST_BLOCKS + 1
     assert np.allclose(sums.values().sum(axis=0), total)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_block_sums_are_of_stretches_one_after_the_other(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Odd counts and even, a few at a time and many: each sum is of as many stretches as the others, or the last."""
+    monkeypatch.setattr(combine_module, "MOST_BLOCKS", 8)
+    rng = np.random.default_rng(seed)
+    sums, told = BlockSums(), []
+    for size in rng.integers(1, 12, 50):
+        block = rng.standard_normal((size, 1))
+        sums.add(block)
+        told += block[:, 0].tolist()
+    found = sums.values()[:, 0]
+    factor = next(f for f in (1, 2, 4, 8, 16, 32, 64) if len(told) <= f * found.size)
+    assert 8 < found.size <= 17
+    expected = [sum(told[first : first + factor]) for first in range(0, len(told), factor)]
+    np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 def test_long_run_variance_of_an_autoregression() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.estimators.conventions import AS_READ, ZEROED, Convention, Judgement, judge
+from algid.estimators.conventions import AS_READ, ZEROED, Convention, Judgement, _demands, judge
 from algid.synth.simulator import SimulatedMotion
 from tests.estimators.conftest import DT, Bench
 
@@ -155,3 +155,38 @@ def test_logs_that_cannot_tell() -> None:
     assert judge(theta, tau, 1e-3) is None
     assert judge(theta, tau, 1.0) is None
     assert judge(np.repeat(theta, 10, axis=1), np.zeros((2, 9000)), 1e-3) is None
+
+
+@pytest.mark.parametrize("gravity", [True, False])
+def test_demands_are_in_standard_deviations(gravity: bool) -> None:
+    """Each demand's value over its error by the slopes of differences, at random constants and covariances."""
+    names = [n for n in ZEROED if gravity or n not in ("k2", "k4")]
+    rng = np.random.default_rng(11)
+    speed = np.array([1.3, 2.1])
+
+    def values(c: np.ndarray) -> dict[str, float]:
+        k = dict(zip(names, c.tolist(), strict=True))
+        mass = np.array([[k["k5"], k["k1"]], [k["k1"], k["k3"] + k["j2"]]])
+        found = {
+            "M22 > 0": k["k3"] + k["j2"],
+            "k5 > 0": k["k5"],
+            # of M at the angle where k1 cos θ2 couples nothing else, and what the rotor adds to it
+            "det M > 0": float(np.linalg.det(mass)) + k["k3"] * k["j2"],
+            "that the friction of joint 1 brakes": k["k6"] * speed[0] + k["f1"],
+            "that the friction of joint 2 brakes": k["k7"] * speed[1] + k["f2"],
+        }
+        return found | {f"{name} > 0": k[name] for name in (("k2", "k4") if gravity else ("k1",))}
+
+    for _ in range(20):
+        c = rng.standard_normal(len(names))
+        root = rng.standard_normal((len(names), len(names)))
+        covariance = root @ root.T
+        expected = {}
+        for name, value in values(c).items():
+            slope = [(values(c + e)[name] - values(c - e)[name]) / 2e-6 for e in 1e-6 * np.eye(len(names))]
+            expected[name] = value / np.sqrt(slope @ covariance @ slope)
+        if gravity:
+            k1, k2 = (c[names.index(name)] / covariance[(names.index(name),) * 2] ** 0.5 for name in ("k1", "k2"))
+            expected["k1 k2 > 0"] = np.sign(k1 * k2) * min(abs(k1), abs(k2))
+        found = _demands(dict(zip(names, c.tolist(), strict=True)), covariance, speed)
+        assert found == pytest.approx(expected, rel=1e-5)

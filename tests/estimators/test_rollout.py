@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from algid.arm import Arm, FloatArray
-from algid.estimators.rollout import HORIZONS, RolloutScore, _angles_at_horizons, rollouts, time_step
+from algid.estimators.rollout import HORIZONS, RolloutScore, _angles_at_horizons, _starts, rollouts, time_step
 from algid.model import Model
 from algid.signals.segments import Segment
 from algid.synth.simulator import simulate
@@ -101,3 +101,29 @@ def test_the_step_is_as_long_as_the_stiffest_friction_leaves_stable() -> None:
         steps.append(step)
     assert len(set(steps)) >= 3
     assert time_step(Model(), K) == 2e-3
+
+
+@pytest.mark.parametrize("dt", [5e-4, 2e-3 / 3, 2e-3, 5e-3])
+def test_the_torque_of_a_start_is_what_acts_from_there_on(dt: float) -> None:
+    """At every half step, late by the shift; of a fast log the mean over a step, which errs by τ'' h² / 24."""
+    t = np.arange(round(4 / dt)) * dt
+    theta = np.stack([0.4 * np.sin(2 * t), 0.5 * np.cos(3 * t)])
+    step, shift = 2e-3, 0.013
+    x, u, y = _starts(Model(), K, Segment(0.0, dt, theta, push(t)), 0.1, step, shift)
+    edge = round(0.3 / dt)  # where filters ring
+    at = np.arange(edge, t.size - edge - round(0.1 / dt), round(0.1 / dt)) * dt
+    assert u.shape == (2 * round(HORIZONS[-1] / step) + 1, 2, at.size)
+    when = at + 0.5 * step * np.arange(len(u))[:, None] - shift
+    inside = (when > step) & (when < t[-1] - step)
+    # and between samples a straight line, which errs by τ'' dt² / 8
+    atol = 40 * (step**2 / 24 + dt**2 / 8)
+    for joint in range(2):
+        np.testing.assert_allclose(
+            u[:, joint][inside], push(when.ravel())[joint].reshape(when.shape)[inside], atol=atol
+        )
+    np.testing.assert_allclose(x[:2], np.stack([0.4 * np.sin(2 * at), 0.5 * np.cos(3 * at)]), atol=1e-3)
+    np.testing.assert_allclose(x[2:], np.stack([0.8 * np.cos(2 * at), -1.5 * np.sin(3 * at)]), atol=5e-3)
+    for horizon, angles in zip(HORIZONS, y, strict=True):
+        known = np.isfinite(angles[0])
+        np.testing.assert_array_equal(known, at + horizon < t[-1] - 0.3 + 1e-9)
+        np.testing.assert_allclose(angles[0, known], 0.4 * np.sin(2 * (at + horizon))[known], atol=1e-3)

@@ -4,7 +4,7 @@ import numpy as np
 
 from algid.estimators.whitening import NoiseLevels, adjoint, covariance_factor, forward, linearise, trajectory
 from algid.model import Model
-from algid.signals.differences import POINTS, Stencil
+from algid.signals.differences import HELD, POINTS, Stencil
 from algid.signals.segments import Segment
 
 from .conftest import Bench
@@ -31,6 +31,18 @@ def test_products_and_factor_agree_with_dense_algebra() -> None:
     band = covariance_factor(H)
     L = _lower(band, 40)
     assert np.allclose(L @ L.T, np.eye(40) + dense @ dense.T)
+
+
+def test_a_held_torques_noise_is_that_of_neighbouring_samples() -> None:
+    """F of three weights a row, written out; H of stencils: L Lᵀ = F Fᵀ + H Hᵀ, both joints each for itself in F."""
+    H = np.random.default_rng(1).standard_normal((2, 2, POINTS, 20))
+    dense = _dense(H, 0, 20 + POINTS - 1)
+    weights = np.zeros((20, 22))
+    for row in range(20):
+        weights[row, row : row + 3] = HELD
+    F = np.kron(weights @ weights.T, np.eye(2))
+    L = _lower(covariance_factor(H, held=True), 40)
+    np.testing.assert_allclose(L @ L.T, F + dense @ dense.T, atol=1e-12 * 40 * POINTS)
 
 
 def test_information_is_the_schur_complement_of_the_normal_equations(bench: Bench) -> None:
