@@ -68,7 +68,7 @@ def grid_step(values: FloatArray) -> float:
 
 
 def saturated_share(values: FloatArray) -> float:
-    """Share of samples within a run of three or more at the very highest or lowest value."""
+    """Share of samples at the very highest or lowest value whose neighbours on both sides are there too."""
     if values.size < 3 or values.min() == values.max():
         return 0.0
     extreme = (values == values.max()) | (values == values.min())

@@ -19,7 +19,7 @@ from algid.estimators.diagnostics import (
     term_worths,
 )
 from algid.estimators.fit import conclude, own_estimates
-from algid.estimators.identifiability import examine
+from algid.estimators.identifiability import examine, sizes
 from algid.estimators.parametrisation import Shared
 from algid.estimators.prediction import cross_validate, score
 from algid.estimators.weak import Source, WeakSettings
@@ -112,6 +112,22 @@ def test_directions_without_information_are_put_in_words() -> None:
     known = examine(("k1", "k3", "k5"), np.array([0.02, 0.05, 0.04]), S, np.array([1.0, 0.001]))
     assert known.sentences == ("k3 and k5 only as a sum: joint 2 never moved",)
     assert known.determined == (True, False, False)
+
+
+def test_a_parameters_size_is_the_largest_of_its_class() -> None:
+    """Of friction a tenth of √(inertia × gravity) at least, of a payload what loads the arm as it loads itself."""
+    names = ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "f1", "j2", "delay")
+    values = np.array([-0.02, 3.0, 0.05, -4.0, 0.03, 0.001, 0.002, 0.5, 1e-3, 1e-5])
+    inertia, gravity, damping = 0.05, 4.0, 0.1 * np.sqrt(0.05 * 4.0)
+    expected = [inertia, gravity, inertia, gravity, inertia, damping, damping, gravity, inertia, 1e-3]
+    np.testing.assert_allclose(sizes(names, values), expected, rtol=1e-12)
+    rubbing = values.copy()
+    rubbing[6] = -7.0
+    assert sizes(names, rubbing)[[5, 6]].tolist() == [7.0, 7.0]
+    turned = values[[2, 1, 4, 3, 0, *range(5, 10)]]  # whichever of its class is the largest
+    np.testing.assert_allclose(sizes(names, turned), expected, rtol=1e-12)
+    np.testing.assert_allclose(sizes(("k1", "k4", "m_p"), np.array([0.3, 9.81, 0.01])), [0.3, 9.81, 1.0])
+    np.testing.assert_allclose(sizes(("k1", "k4", "m_p", "l1"), np.array([0.3, 9.81, 0.01, 0.2]))[2:], [0.01, 0.2])
 
 
 def test_what_is_hardly_told_widens_what_it_mixes_with() -> None:

@@ -204,6 +204,8 @@ def test_a_table_without_robots_is_refused(tmp_path: Path) -> None:
         _history(_jobs(1, 3, seed=1).with_columns(robot=pl.lit(None, dtype=pl.String)), tmp_path)
     with pytest.raises(ResultError, match="there is no such file"):
         history_of(tmp_path / "absent.parquet")
+    with pytest.raises(ResultError, match=r": it is no regular file; expected jobs\.parquet of algid batch$"):
+        history_of(tmp_path)
 
 
 def test_each_parameter_is_told_as_it_is_followed(tmp_path: Path) -> None:

@@ -55,6 +55,8 @@ def result(files: tuple[Path, Path]) -> TrackResult:
 def test_the_sentence_tells_changes_and_masses(result: TrackResult) -> None:
     judged = verdict(result)
     assert judged.level == "good", judged
+    first, second = result.track.changes[:, 0]
+    assert f" at {first:.2f} and {second:.2f} s, " in judged.sentence
     assert re.fullmatch(
         r"Good: the payload changes twice at 1\.\d+ and [23]\.\d+ s, "
         r"weighing -?0\.00\d+, 0\.0[45]\d+ and -?0\.00\d+ kg, "
