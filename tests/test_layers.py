@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -70,6 +71,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
 }  # fmt: skip
 
 
+@cache
 def sources() -> dict[str, str]:
     """The text of every module of algid by its name."""
     found = {}

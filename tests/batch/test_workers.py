@@ -113,6 +113,7 @@ def test_a_worker_has_one_thread_and_the_parent_keeps_its_own(workers: Workers) 
 
 
 def test_memory_is_bounded_and_the_worker_lives_on(workers: Workers) -> None:
+    assert workers.submit(calls.add, 1, 1).result() == 2
     pids = workers.pids
     with pytest.raises(CallFailedError, match="MemoryError"):
         workers.submit(calls.fill, 4 << 30).result()
