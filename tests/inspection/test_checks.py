@@ -11,7 +11,7 @@ import pytest
 
 from algid.arm import Arm, FloatArray, inverse_dynamics
 from algid.errors import LogError
-from algid.inspection.checks import examine, noticed
+from algid.inspection.checks import Finding, _yielding, examine, noticed
 from algid.inspection.dynamics import dynamic_figures
 from algid.inspection.figures import signal_figures
 from algid.log import Log, Origin
@@ -282,3 +282,15 @@ def test_rest_is_told_with_the_flags_that_leave_it_out(before: float, after: flo
 def test_a_short_rest_and_the_end_of_a_part_are_no_rest() -> None:
     assert "RESTS" not in codes(resting(0.4, 0.3))
     assert "RESTS" not in [one.code for one in examine(resting(0, 1.2), whole=False)]
+
+
+def test_a_refusal_alone_names_what_overrides_it_and_yields_to_that() -> None:
+    refusal, warning = Finding("STILL", "joint 2 is still", refuse=True), Finding("RESTS", "the arm rests")
+    assert _yielding(warning, ()) == warning
+    assert _yielding(warning, ("RESTS",)) == warning
+    named = _yielding(refusal, ("RESTS",))
+    assert named.refuse
+    assert named.text == 'joint 2 is still; to use it nevertheless: --accept STILL (profile: accept = ["STILL"])'
+    accepted = _yielding(refusal, ("RESTS", "STILL"))
+    assert not accepted.refuse
+    assert accepted.text == "joint 2 is still; used nevertheless, as accept says"

@@ -55,6 +55,7 @@ def result(files: tuple[Path, Path]) -> TrackResult:
 def test_the_sentence_tells_changes_and_masses(result: TrackResult) -> None:
     judged = verdict(result)
     assert judged.level == "good", judged
+    assert "doubtful status" not in {column.kind for column in stretch_table(result).columns}
     first, second = result.track.changes[:, 0]
     assert f" at {first:.2f} and {second:.2f} s, " in judged.sentence
     assert re.fullmatch(
