@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,7 @@ from algid.errors import LogError
 from algid.estimators.conventions import AS_READ, judge
 from algid.identification.identify import identify
 from algid.inspection.conventions import mend
-from algid.log import Log, Origin
+from algid.log import Log, Origin, Reading
 from algid.report.verdict import LEVEL_WORDS, verdict
 from algid.results import Result
 from algid.synth.excitation import wide_multi_sine
@@ -139,7 +140,8 @@ def row(
     try:
         result = identify(log, report=False)
     except LogError as refusal:  # exit 2: a scale that no joint has
-        return _line(name, arm, friction, "", "Refused", str(refusal).partition(": ")[2], True)
+        right = name == "nothing" or name in INVISIBLE
+        return _line(name, arm, friction, "", "Refused", str(refusal).partition(": ")[2], not right)
     found = verdict(result)
     if name == "nothing" or name in INVISIBLE:
         passed = named is None and found.level != "failed"
@@ -163,9 +165,11 @@ def _line(name: str, arm: str, friction: bool, far: str, level: str, words: str,
 
 
 def exchanged(arm: str, k: FloatArray, *, friction: bool) -> tuple[str, bool]:
-    """The row of a loaded and an unloaded log in each other's place."""
+    """The row of a loaded and an unloaded log in each other's place; a joint may turn as often as it will."""
+    turning = Origin("arm.csv", "csv", {}, reading=Reading(accepted=("DEGREES",)))
     loaded, unloaded = (
-        log_of(motion_of(arm, loaded=kind)[1], ROWS["nothing"], friction=friction, seed=kind) for kind in (True, False)
+        replace(log_of(motion_of(arm, loaded=kind)[1], ROWS["nothing"], friction=friction, seed=kind), origin=turning)
+        for kind in (True, False)
     )
     result = identify(loaded, unloaded, report=False)
     passed = _told(result, "EXCHANGED_LOGS", k)

@@ -39,7 +39,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.errors import LogError
-from algid.inspection.conventions import Mend, mend
+from algid.inspection.conventions import Mend, is_right, mend
 from algid.inspection.dynamics import DynamicFigures, dynamic_figures
 from algid.inspection.figures import clock_figures, robust_deviation, saturated_share, signal_figures
 from algid.log import Log, Notice
@@ -91,7 +91,14 @@ def examine(log: Log, *, gravity: float = 9.81, whole: bool = True) -> tuple[Fin
     """
     if len(log) < 4:
         return ()
-    every = (*_efforts(log), *_dead_efforts(log), *_angles(log), *_degrees(log), *_spikes(log), *_clock(log))
+    every = (
+        *_efforts(log),
+        *_dead_efforts(log),
+        *_angles(log),
+        *_degrees(log, gravity > 0),
+        *_spikes(log),
+        *_clock(log),
+    )
     every = (*every, *_rests(log, whole))
     found = [_yielding(finding, log.origin.reading.accepted) for finding in every]
     if any(finding.refuse for finding in found):
@@ -236,7 +243,7 @@ def _frozen(steps: FloatArray, period: float) -> tuple[float, float] | None:
     return None
 
 
-def _degrees(log: Log) -> Iterator[Finding]:
+def _degrees(log: Log, gravity: bool) -> Iterator[Finding]:
     pairs = (("angles", "theta", 180 / math.pi), ("velocities", "omega", math.pi / 180))
     if log.omega is not None and len(log) > 20:
         for joint in (0, 1):
@@ -247,7 +254,8 @@ def _degrees(log: Log) -> Iterator[Finding]:
                     yield _in_degrees(log, f"{quantity}{joint + 1}", text)
     widest = np.abs(log.theta).max(axis=1)
     joint = int(np.argmax(widest))
-    if widest[joint] > 12 * math.pi and not any(_ratio(log, one) for one in (0, 1)):
+    unsaid = widest[joint] > 12 * math.pi and not any(_ratio(log, one) for one in (0, 1))
+    if unsaid and not is_right(log, gravity=gravity):  # a joint may turn as often as it will
         yield _in_degrees(log, f"theta{joint + 1}", f"angles reach {widest[joint]:.4g}: few arms turn that far in rad")
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from algid.estimators.conventions import AS_READ, Candidate, Convention, judge
+from algid.estimators.conventions import AS_READ, Candidate, Convention, Judgement, judge
 from algid.log import Log, Reading
 from algid.signals.segments import Segment, append, segments
 from algid.words import counted
@@ -74,10 +74,7 @@ def mend(log: Log, *, gravity: bool = True) -> Mend | None:
     log : Log, as it was read
     gravity : False for an arm in a horizontal plane
     """
-    longest = _longest_stretch(log)
-    if longest is None or not np.all(np.mean(longest.tau**2, axis=1) > 0):  # a torque that is none tells nothing
-        return None
-    judged = judge(longest.theta, longest.tau, longest.dt, gravity=gravity)
+    judged = _judged(log, gravity)
     if judged is None or not judged.alone or judged.best.convention == AS_READ:
         return None
     convention = min(
@@ -93,6 +90,19 @@ def mend(log: Log, *, gravity: bool = True) -> Mend | None:
         _settings(convention, log),
         another=not small or replace(convention, zero=(0.0, 0.0)) != AS_READ,
     )
+
+
+def is_right(log: Log, *, gravity: bool = True) -> bool:
+    """Whether physics holds for a log as it was read, and for no other convention."""
+    judged = _judged(log, gravity)
+    return judged is not None and judged.alone and judged.best.convention == AS_READ
+
+
+def _judged(log: Log, gravity: bool) -> Judgement | None:
+    longest = _longest_stretch(log)
+    if longest is None or not np.all(np.mean(longest.tau**2, axis=1) > 0):  # a torque that is none tells nothing
+        return None
+    return judge(longest.theta, longest.tau, longest.dt, gravity=gravity)
 
 
 def _longest_stretch(log: Log) -> Segment | None:

@@ -20,6 +20,7 @@ from algid.readers import read_log
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
+from pipelines.accuracy_scenes import random_arm
 
 K = Arm(6, 3, 0.15, 0.1, 0.3, 0.2, 0.1, 0.02, 1.5, 0.3).constants()
 
@@ -294,3 +295,15 @@ def test_a_refusal_alone_names_what_overrides_it_and_yields_to_that() -> None:
     accepted = _yielding(refusal, ("RESTS", "STILL"))
     assert not accepted.refuse
     assert accepted.text == "joint 2 is still; used nevertheless, as accept says"
+
+
+def test_joints_that_turn_many_times_are_read_where_physics_holds_for_radians() -> None:
+    arm = random_arm(22)[0]
+    t = np.arange(10_001) * 1e-3
+    motion = simulate(arm.constants(), wide_multi_sine(arm, sum(b"arm22")), t)
+    assert np.abs(motion.theta).max() > 12 * np.pi
+    draw = np.random.default_rng(11)
+    theta, tau = (values + 1e-3 * draw.standard_normal(values.shape) for values in (motion.theta, motion.tau))
+    log = Log(np.arange(t.size) * 1_000_000, theta, tau, Origin("arm.csv", "csv", {}))
+    assert codes(log) == []
+    assert codes(replace(log, theta=np.degrees(log.theta))) == ["DEGREES"]

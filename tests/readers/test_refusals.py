@@ -72,10 +72,12 @@ def found(code: str) -> Callable[[Path], Path]:
 
 
 def continuous(folder: Path) -> Path:
+    """Joints many turns from their zero, under torques of which no convention makes sense."""
     log = moving_log()
     theta = log.theta.copy()
     theta[0] += 2 * np.pi * 8
-    write_log(folder / "log.parquet", Log(log.stamp_ns, theta, log.tau, log.origin))
+    tau = np.random.default_rng(2).standard_normal(log.tau.shape)
+    write_log(folder / "log.parquet", Log(log.stamp_ns, theta, tau, log.origin))
     return folder / "log.parquet"
 
 
