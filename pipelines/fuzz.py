@@ -33,6 +33,7 @@ FILES = 20_000
 _BATCH = 500
 _SECONDS = 5.0
 _MEMORY = 1 << 30
+_QUICK = ("--estimator", "weak", "--model", "plain")  # it is the batch that is tried, not the choice of a model
 FAILURES = ("crash", "traceback", "hang", "silent")
 
 
@@ -83,7 +84,7 @@ def batches(files: int, seed: int) -> int:
             logs, out = Path(place, "logs"), Path(place, "out")
             logs.mkdir()
             names = {path.name for path, _ in corpus(logs, count, first)}
-            command = [sys.executable, "-m", "algid", "batch", str(logs), "-o", str(out), "--no-report", "-q"]
+            command = [sys.executable, "-m", "algid", "batch", str(logs), "-o", str(out), "--no-report", "-q", *_QUICK]
             done = subprocess.run(command, capture_output=True, text=True, timeout=_BATCH * _SECONDS, check=False)
             jobs = pl.read_parquet(out / "jobs.parquet") if (out / "jobs.parquet").exists() else pl.DataFrame()
             wrong = done.returncode not in (0, 1, 3) or "Traceback" in done.stderr or jobs.height != len(names)

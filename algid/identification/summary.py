@@ -20,8 +20,9 @@ SUSPICIOUS = (
     *("DEAD_EFFORT", "LOST_SAMPLES"),
 )
 """Named checks that say why estimates would be wrong."""
-CONTRADICTED = "WRONG_CONVENTION"
-"""The named check that says that estimates are wrong, unless the user accepts it."""
+CONTRADICTED = ("WRONG_CONVENTION", "LOST_SAMPLES")
+"""Named checks that say that estimates are wrong, unless the user accepts them: of a time base that is too short by the
+samples it lacks, accelerations are wrong by twice their share."""
 
 
 def result_of(outcome: Identified, settings: Settings, survey: Survey) -> Result:
@@ -103,7 +104,7 @@ def _suspicions(notices: Sequence[tuple[str, Notice]]) -> list[Cause]:
 
 def _is_contradicted(log: LogSource, survey: Survey) -> bool:
     accepted = log.origin.reading.accepted
-    return CONTRADICTED not in accepted and any(one.code == CONTRADICTED for one in survey.seen(log).notices)
+    return any(one.code in CONTRADICTED and one.code not in accepted for one in survey.seen(log).notices)
 
 
 def _truth(logs: Sequence[LogSource]) -> tuple[Truth | None, float | None]:

@@ -325,8 +325,9 @@ def _clock(log: Log) -> Iterator[Finding]:
     if lost:
         text = (
             f"{counted(lost, 'step of the angles is', 'steps of the angles are')} twice as long as usual, though "
-            " the stamps are even: samples "
-            "were lost and the others renumbered; take the stamps of the messages, or record without losses"
+            "the stamps are even: samples were lost and the others renumbered, so that no estimate can be right; take "
+            "the stamps of the messages, or record without losses; to use it nevertheless: --accept LOST_SAMPLES "
+            '(profile: accept = ["LOST_SAMPLES"])'
         )
         yield Finding("LOST_SAMPLES", text)
     if clock.gaps:

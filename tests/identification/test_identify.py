@@ -16,11 +16,13 @@ from algid import results
 from algid.errors import LogError, OutputError, ResultError, SettingError
 from algid.identification.identify import identify
 from algid.log import Log
+from algid.report.verdict import verdict
 from algid.results import Status, read_result, result_schema
 from algid.settings import Settings
 from algid.synth.sensors import Sensors
 
 PAPER = Settings(estimator="paper")
+WEAK = Settings(estimator="weak", model="plain")
 
 
 @pytest.fixture(scope="module")
@@ -264,3 +266,17 @@ def test_a_bound_broken_by_chance_is_no_failure() -> None:
     assert is_implausible(fit(3.1, 0.9, 0.3))
     assert is_implausible(fit(1.0, -0.01, 0.9))
     assert not is_implausible(fit(1.0, -0.01, 0.05))  # the torque hardly varies: there is nothing to explain
+
+
+def test_a_log_whose_lost_samples_were_renumbered_has_failed_unless_it_is_accepted() -> None:
+    log, _ = algid.synthesise("case1", duration=4.0, excitation="wide", sensors=Sensors(1e-4, 1e-3))
+    kept = np.random.default_rng(5).random(len(log)) > 0.05
+    some = int(kept.sum())
+    lost = replace(log, stamp_ns=log.stamp_ns[:some], theta=log.theta[:, kept], tau=log.tau[:, kept], omega=None)
+    found = algid.identify(lost, report=False, settings=WEAK)
+    assert verdict(found).level == "failed"
+    assert not any(one.status is Status.OK for one in found.parameters.values())
+    reading = replace(lost.origin.reading, accepted=("LOST_SAMPLES",))
+    accepted = algid.identify(replace(lost, origin=replace(lost.origin, reading=reading)), report=False, settings=WEAK)
+    assert any(one.status is Status.OK for one in accepted.parameters.values())
+    assert any("LOST_SAMPLES" in warning for warning in accepted.warnings)
