@@ -21,7 +21,7 @@ from algid.arm import CONSTANT_NAMES, FloatArray, with_payload
 from algid.errors import LogError
 from algid.estimators.conventions import AS_READ, judge
 from algid.identification.identify import identify
-from algid.inspection.conventions import mend
+from algid.inspection.conventions import judged, mend
 from algid.log import Log, Origin, Reading
 from algid.report.verdict import LEVEL_WORDS, verdict
 from algid.results import Result
@@ -135,7 +135,7 @@ def row(
 ) -> tuple[str, bool]:
     """A line of the table, and whether it passes."""
     log = log_of(motion, spoil, friction=friction)
-    named = mend(log)
+    named = mend(log, judged(log))
     words = "" if named is None else f"{named.words}: `{' '.join(named.flags)}`"
     try:
         result = identify(log, report=False)

@@ -20,6 +20,8 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
+from pipelines.mutants_trial import PYTEST
+
 CODE = (
     *("arm", "model", "units", "check", "batch/jobs"),
     *(f"{room}/*" for room in ("estimators", "signals", "track", "fleet", "inspection")),
@@ -49,7 +51,7 @@ def prepare(folder: Path) -> None:
         "source_paths": ["algid"],
         "only_mutate": patterns,
         "also_copy": list(COPIED),
-        "pytest_add_cli_args": ["-p", "no:xdist", "-o", "addopts=-q -m 'not slow'", "-o", "filterwarnings="],
+        "pytest_add_cli_args": PYTEST,
         "pytest_add_cli_args_test_selection": [f"tests/{name}" for name in TESTS],
         "use_git_change_detection": False,
     }

@@ -13,17 +13,8 @@ import sys
 
 import pytest
 
-_ALWAYS = [
-    "--rootdir=.",
-    "-p",
-    "no:xdist",
-    "-p",
-    "no:cacheprovider",
-    "-o",
-    "addopts=-q -m 'not slow'",
-    "-o",
-    "filterwarnings=",
-]
+PYTEST = ("-p", "no:xdist", "-o", "addopts=-q -m 'not slow'", "-o", "filterwarnings=")
+"""How the tests are run, by mutmut as it times them too."""
 
 
 def _quietly(arguments: list[str]) -> int:
@@ -33,7 +24,7 @@ def _quietly(arguments: list[str]) -> int:
     for stream in (1, 2):
         os.dup2(nothing, stream)
     try:
-        return int(pytest.main([*_ALWAYS, *arguments]))
+        return int(pytest.main(["--rootdir=.", "-p", "no:cacheprovider", *PYTEST, *arguments]))
     finally:
         for stream, was in zip((1, 2), kept, strict=True):
             os.dup2(was, stream)

@@ -32,14 +32,16 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 
 import numpy as np
 
 from algid.arm import FloatArray
 from algid.errors import LogError
-from algid.inspection.conventions import Mend, is_right, mend
+from algid.estimators.conventions import Judgement
+from algid.inspection.conventions import Mend, is_right, judged, mend
 from algid.inspection.dynamics import DynamicFigures, dynamic_figures
 from algid.inspection.figures import clock_figures, robust_deviation, saturated_share, signal_figures
 from algid.log import Log, Notice
@@ -91,19 +93,20 @@ def examine(log: Log, *, gravity: float = 9.81, whole: bool = True) -> tuple[Fin
     """
     if len(log) < 4:
         return ()
+    tried = cache(partial(judged, log, gravity=gravity > 0))
     every = (
         *_efforts(log),
         *_dead_efforts(log),
         *_angles(log),
-        *_degrees(log, gravity > 0),
+        *_degrees(log, tried),
         *_spikes(log),
         *_clock(log),
+        *_rests(log, whole),
     )
-    every = (*every, *_rests(log, whole))
     found = [_yielding(finding, log.origin.reading.accepted) for finding in every]
     if any(finding.refuse for finding in found):
         return tuple(found)
-    mended = mend(log, gravity=gravity > 0)
+    mended = mend(log, tried())
     if mended is not None:
         found.append(_convention(mended))
     elif gravity > 0:
@@ -243,7 +246,7 @@ def _frozen(steps: FloatArray, period: float) -> tuple[float, float] | None:
     return None
 
 
-def _degrees(log: Log, gravity: bool) -> Iterator[Finding]:
+def _degrees(log: Log, tried: Callable[[], Judgement | None]) -> Iterator[Finding]:
     pairs = (("angles", "theta", 180 / math.pi), ("velocities", "omega", math.pi / 180))
     if log.omega is not None and len(log) > 20:
         for joint in (0, 1):
@@ -255,7 +258,7 @@ def _degrees(log: Log, gravity: bool) -> Iterator[Finding]:
     widest = np.abs(log.theta).max(axis=1)
     joint = int(np.argmax(widest))
     unsaid = widest[joint] > 12 * math.pi and not any(_ratio(log, one) for one in (0, 1))
-    if unsaid and not is_right(log, gravity=gravity):  # a joint may turn as often as it will
+    if unsaid and not is_right(tried()):  # a joint may turn as often as it will
         yield _in_degrees(log, f"theta{joint + 1}", f"angles reach {widest[joint]:.4g}: few arms turn that far in rad")
 
 
@@ -345,8 +348,10 @@ def _rests(log: Log, whole: bool) -> Iterator[Finding]:
     A posture that a motor holds freely tells more of gravity than any motion. The log cannot tell which it is: the
     rest is named, with the flags that leave it out, and stays.
     """
-    before = _still(log)
-    after = _still(_backwards(log)) if whole else 0.0
+    rooms = [_room(theta) for theta in log.theta]
+    few = max(4, round(0.02 / log.period))
+    before = _still(log.t, log.theta, rooms, few)
+    after = _still(log.duration - log.t[::-1], log.theta[:, ::-1], rooms, few) if whole else 0.0
     if before == log.duration or max(before, after) < _REST:
         return
     parts = [(before, f"for its first {before:.3g} s", f"--start {before:.4g}", f"start = {before:.4g}")]
@@ -360,21 +365,18 @@ def _rests(log: Log, whole: bool) -> Iterator[Finding]:
     yield Finding("RESTS", text, flags=flags, note=True)
 
 
-def _still(log: Log) -> float:
-    """Seconds from the first sample until a joint leaves its place, by more than noise and encoder let it."""
-    first = max(4, round(0.02 / log.period))
-    moved = len(log)
-    for theta in log.theta:
-        figures = signal_figures(theta)
-        room = max(8 * figures.noise, 2 * figures.step, _STILL * (figures.high - figures.low))
-        away = np.flatnonzero(np.abs(theta - np.median(theta[:first])) > room)
-        moved = min(moved, int(away[0]) if away.size else len(log))
-    return float(log.t[moved - 1]) if moved else 0.0
+def _room(theta: FloatArray) -> float:
+    """How far noise and encoder let an angle (N,) be from its place."""
+    figures = signal_figures(theta)
+    return max(8 * figures.noise, 2 * figures.step, _STILL * (figures.high - figures.low))
 
 
-def _backwards(log: Log) -> Log:
-    stamp_ns = log.stamp_ns[-1] - log.stamp_ns[::-1]
-    return replace(log, stamp_ns=stamp_ns, theta=log.theta[:, ::-1], tau=log.tau[:, ::-1], omega=None)
+def _still(t: FloatArray, theta: FloatArray, rooms: Sequence[float], few: int) -> float:
+    """Seconds until one of the angles (2, N) at times t (N,) has left its place, the median of the first `few`."""
+    places = np.median(theta[:, :few], axis=1, keepdims=True)
+    away = np.flatnonzero(np.any(np.abs(theta - places) > np.array(rooms)[:, None], axis=0))
+    moved = int(away[0]) if away.size else t.size
+    return float(t[moved - 1]) if moved else 0.0
 
 
 def _lost(log: Log) -> int:

@@ -66,19 +66,37 @@ class Mend:
         return ", ".join(own)
 
 
-def mend(log: Log, *, gravity: bool = True) -> Mend | None:
-    """What sets a log right that physics contradicts as it was read; None where it is right, or the log does not tell.
+def judged(log: Log, *, gravity: bool = True) -> Judgement | None:
+    """Every convention tried on a log; None where it is too short or too slow to tell, or a torque is none.
 
     Parameters
     ----------
     log : Log, as it was read
     gravity : False for an arm in a horizontal plane
     """
-    judged = _judged(log, gravity)
-    if judged is None or not judged.alone or judged.best.convention == AS_READ:
+    longest = _longest_stretch(log)
+    if longest is None or not np.all(np.mean(longest.tau**2, axis=1) > 0):  # a torque that is none tells nothing
+        return None
+    return judge(longest.theta, longest.tau, longest.dt, gravity=gravity)
+
+
+def is_right(found: Judgement | None) -> bool:
+    """Whether physics holds for a log as it was read, and for no other convention."""
+    return found is not None and found.alone and found.best.convention == AS_READ
+
+
+def mend(log: Log, found: Judgement | None) -> Mend | None:
+    """What sets a log right that physics contradicts as it was read; None where it is right, or the log does not tell.
+
+    Parameters
+    ----------
+    log : Log, as it was read
+    found : what `judged` says of it
+    """
+    if found is None or not found.alone or found.best.convention == AS_READ:
         return None
     convention = min(
-        (judged.best.convention, judged.best.convention.mirrored()), key=lambda one: len(list(_clauses(one)))
+        (found.best.convention, found.best.convention.mirrored()), key=lambda one: len(list(_clauses(one)))
     )
     words = " and ".join(_clauses(convention))
     if convention.mirrored().zero == (0.0, 0.0) and replace(convention, zero=(0.0, 0.0)) == AS_READ:
@@ -86,23 +104,10 @@ def mend(log: Log, *, gravity: bool = True) -> Mend | None:
     small = all(abs(angle) < _SMALL for angle in convention.zero)
     return Mend(
         words,
-        _contradiction(judged.as_read, judged.best),
+        _contradiction(found.as_read, found.best),
         _settings(convention, log),
         another=not small or replace(convention, zero=(0.0, 0.0)) != AS_READ,
     )
-
-
-def is_right(log: Log, *, gravity: bool = True) -> bool:
-    """Whether physics holds for a log as it was read, and for no other convention."""
-    judged = _judged(log, gravity)
-    return judged is not None and judged.alone and judged.best.convention == AS_READ
-
-
-def _judged(log: Log, gravity: bool) -> Judgement | None:
-    longest = _longest_stretch(log)
-    if longest is None or not np.all(np.mean(longest.tau**2, axis=1) > 0):  # a torque that is none tells nothing
-        return None
-    return judge(longest.theta, longest.tau, longest.dt, gravity=gravity)
 
 
 def _longest_stretch(log: Log) -> Segment | None:

@@ -44,7 +44,7 @@ def moving_log(rows: int = 6000, pace: float = 1.0) -> Log:
 @pytest.fixture
 def signals_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """No convention is sought: for checks that look at signals."""
-    monkeypatch.setattr("algid.inspection.checks.mend", lambda *_, **__: None)
+    monkeypatch.setattr("algid.inspection.checks.judged", lambda *_, **__: None)
 
 
 def codes(log: Log) -> list[str]:

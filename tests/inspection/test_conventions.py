@@ -11,13 +11,19 @@ import pytest
 from algid.arm import FloatArray
 from algid.cli.settings import profile_from
 from algid.inspection.checks import examine
-from algid.inspection.conventions import mend
+from algid.inspection.conventions import Mend, judged, mend
+from algid.log import Log
 from algid.profile import Profile, with_settings
 from algid.readers import read_log
 from algid.writers import write_log
 from tests.inspection.test_checks import moving_log
 
 RIGHT = moving_log()
+
+
+def mended(log: Log) -> Mend | None:
+    """What sets a log right, by every convention tried on it."""
+    return mend(log, judged(log))
 
 
 def written(path: Path, theta: FloatArray, tau: FloatArray) -> Path:
@@ -65,11 +71,11 @@ ROWS = (
 @pytest.mark.parametrize("row", ROWS)
 def test_the_settings_named_mend_the_log(row: str, kind: str, tmp_path: Path) -> None:
     path = written(tmp_path / f"arm.{kind}", *recorded(row))
-    found = mend(read_log(path))
+    found = mended(read_log(path))
     assert found is not None
     assert found.another
     log = read_log(path, with_settings(Profile(), found.settings))
-    assert mend(log) is None
+    assert mended(log) is None
     turned = log.tau[1] @ RIGHT.tau[1] < 0  # from behind
     right = np.stack([np.pi - RIGHT.theta[0], -RIGHT.theta[1]]) if turned else RIGHT.theta
     # the settings have six digits, zeros and free scales are fitted to a thousandth
@@ -81,10 +87,10 @@ def test_settings_change_what_a_profile_said(tmp_path: Path) -> None:
     path = written(tmp_path / "arm.csv", RIGHT.theta, RIGHT.tau)
     wrong = {"signs": [-1, 1], "tau1": {"sign": -1}, "zero": "hanging", "offsets": [0.0, 3.0]}
     profile = with_settings(Profile(), wrong)
-    found = mend(read_log(path, profile))
+    found = mended(read_log(path, profile))
     assert found is not None
     log = read_log(path, with_settings(profile, found.settings))
-    assert mend(log) is None
+    assert mended(log) is None
 
 
 def test_a_finding_names_flags_that_the_command_line_takes(tmp_path: Path) -> None:
