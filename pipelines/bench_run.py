@@ -35,12 +35,15 @@ class Cost:
 def run(command: Sequence[str]) -> Cost:
     """Run a command to its end; BLAS keeps to one thread, for the peers' good as well as algid's.
 
+    Modules are compiled once, as they are where pip has installed them, even if the environment forbids it.
+
     Raises
     ------
     RuntimeError
         If it fails.
     """
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
     launcher = [sys.executable, "-I", "-S", "-c", _LAUNCH, *command]
     told = subprocess.run(launcher, capture_output=True, text=True, env=environment, check=True).stdout
     output, _, figures = told.rstrip().rpartition("\n")

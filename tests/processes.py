@@ -31,7 +31,7 @@ SERVER = "from tests.processes import serve; serve()"
 LARGEST = 1 << 20  # bytes of a request
 LOADED = (
     "polars", "pyarrow.csv", "pyarrow.fs", "pyarrow.parquet", "scipy.integrate", "scipy.interpolate", "scipy.linalg",
-    "scipy.optimize", "scipy.signal", "scipy.stats", "plotly.graph_objects", "plotly.subplots", "rich.progress",
+    "scipy.optimize", "scipy.stats", "plotly.graph_objects", "plotly.subplots", "rich.progress",
 )  # fmt: skip
 """What commands import where they need it, beside algid's own modules."""
 

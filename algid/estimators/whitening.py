@@ -33,6 +33,7 @@ from scipy.linalg import lapack
 from algid.arm import FloatArray, keep_arrays
 from algid.model import Model, Motion, partials, sensitivity, torque
 from algid.signals.differences import HELD, POINTS, Stencil, held_torque
+from algid.signals.filters import recursion
 from algid.signals.segments import Segment
 
 
@@ -137,8 +138,6 @@ def low_passed(signal: FloatArray, dt: float, lag: float) -> FloatArray:
         return signal.copy()
     if lag < 0:
         return low_passed(signal[..., ::-1], dt, -lag)[..., ::-1]
-    from scipy.signal import lfilter
-
     n = signal.shape[-1]
     reach = min(n - 1, 2 + int(12 * lag / dt))
     before = 2 * signal[..., :1] - signal[..., reach:0:-1]
@@ -147,7 +146,11 @@ def low_passed(signal: FloatArray, dt: float, lag: float) -> FloatArray:
     # Exact for a signal that is straight between its samples.
     decay = np.exp(-dt / lag)
     mean = (1 - decay) * lag / dt
-    passed = lfilter([1 - mean, mean - decay], [1, -decay], extended - extended[..., :1], axis=-1) + extended[..., :1]
+    numerator, denominator = np.array([1 - mean, mean - decay]), np.array([1.0, -decay])
+    passed = np.empty_like(extended)
+    for place in np.ndindex(extended.shape[:-1]):
+        origin = extended[place][0]
+        passed[place] = recursion(numerator, denominator, extended[place] - origin, np.zeros(1))[0] + origin
     whole = int(lag / dt)
     rest = lag / dt - whole
     start = reach + whole

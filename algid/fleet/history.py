@@ -108,7 +108,7 @@ def windows(jobs: pl.DataFrame, parameter: str) -> pl.DataFrame:
 
 def _regressed(summed: pl.DataFrame, parameter: str) -> pl.DataFrame:
     import polars as pl
-    from scipy.stats import t as student
+    from scipy.special import stdtr
 
     w, wt, wtt, wy, wty, wyy, n = (summed[name].to_numpy() for name in _SUMS)
     middle = wt / w
@@ -122,7 +122,7 @@ def _regressed(summed: pl.DataFrame, parameter: str) -> pl.DataFrame:
     slope_std = scale / np.sqrt(spread)
     tested = (n >= FEWEST) & sloped
     p = np.full(n.size, np.nan)
-    p[tested] = 2 * student.sf(np.abs(slope[tested]) / slope_std[tested], freedom[tested])
+    p[tested] = 2 * stdtr(freedom[tested], -np.abs(slope[tested]) / slope_std[tested])
     return summed.select("robot", pl.lit(parameter).alias("parameter"), "month", "end").with_columns(
         logs=pl.Series(n.astype(np.int64)),
         mean=pl.Series(summed["centre"].to_numpy() + wy / w),

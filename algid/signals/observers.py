@@ -20,6 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.signals.filters import recursion
 
 PAPER_POLES = (-80.0, -390.0, -391.0, -392.0, -393.0, -394.0)
 
@@ -56,7 +57,7 @@ class LuenbergerObserver:
 
         (l2 s + l3) s / (s³ + l1 s² + l2 s + l3),    s³ + l1 s² + l2 s + l3 = Π (s − p)
 
-    which runs as second-order sections, since close poles of a single third-order recursion would cost digits.
+    which runs as a recursion of third order.
 
     Parameters
     ----------
@@ -65,18 +66,11 @@ class LuenbergerObserver:
     """
 
     def __init__(self, dt: float, poles: tuple[complex, ...] = PAPER_POLES) -> None:
-        from scipy.signal import cont2discrete, zpk2sos
-
         gain = observer_gain(poles)
-        self._sections: list[FloatArray] = []
-        for joint in range(2):
-            own = slice(3 * joint, 3 * joint + 3)
-            l1, l2, l3 = gain[own, joint]
-            numerator, _, _ = cont2discrete(([l2, l3, 0.0], [1.0, l1, l2, l3]), dt, method="foh")
-            poles_z = np.exp(np.array(poles[own]) * dt)
-            self._sections.append(zpk2sos(np.roots(numerator[0]), poles_z, numerator[0, 0]))
+        joints = (slice(0, 3), slice(3, 6))
+        self._filters = [_differentiator(gain[own, joint], poles[own], dt) for joint, own in enumerate(joints)]
         self._rest: FloatArray | None = None
-        self._states: list[FloatArray] = []
+        self._states = np.zeros((2, 3))
 
     def reset(self) -> None:
         """Forget the state: the next call starts at rest."""
@@ -88,13 +82,33 @@ class LuenbergerObserver:
         The first call, and the first one after `reset`, starts at rest at the first angles; any other takes
         `theta` as following the last sample of the call before.
         """
-        from scipy.signal import sosfilt
-
         if self._rest is None:
             self._rest = theta[:, 0].copy()
-            self._states = [np.zeros((len(sections), 2)) for sections in self._sections]
+            self._states = np.zeros((2, 3))
         found = np.empty_like(theta)
-        for joint, sections in enumerate(self._sections):
+        for joint, (numerator, denominator) in enumerate(self._filters):
             moved = theta[joint] - self._rest[joint]
-            found[joint], self._states[joint] = sosfilt(sections, moved, zi=self._states[joint])
+            found[joint], self._states[joint] = recursion(numerator, denominator, moved, self._states[joint])
         return found
+
+
+def _differentiator(gain: FloatArray, poles: tuple[complex, ...], dt: float) -> tuple[FloatArray, FloatArray]:
+    """Numerator and denominator (4,) in z⁻¹ of a joint's velocity, for angles that are linear between samples.
+
+    The numerator is what makes the response to one sample, a triangle of ± dt around it (a first-order hold).
+    """
+    from scipy.linalg import expm
+
+    held = np.zeros((5, 5))
+    held[:3, :3] = (_CHAIN - np.outer(gain, np.eye(3)[0])) * dt
+    held[:3, 3] = gain * dt
+    held[3, 4] = 1.0
+    step = expm(held)
+    advance, ramp = step[:3, :3], step[:3, 4]
+    state = step[:3, 3] - ramp + advance @ ramp
+    response = [ramp[1]]
+    for _ in range(3):
+        response.append(state[1])
+        state = advance @ state
+    denominator = np.poly(np.exp(np.array(poles) * dt)).real
+    return np.convolve(response, denominator)[:4], denominator

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, lfilter, sosfiltfilt
 
-from algid.signals.filters import butterworth, correlate, differentiator, half_length, smoothed
+from algid.signals.filters import butterworth, correlate, differentiator, half_length, recursion, smoothed
 
 
 def test_a_ramp_has_its_slope() -> None:
@@ -57,3 +57,14 @@ def test_slow_sampling_keeps_what_the_kernel_promises(rate: float) -> None:
     moments = [float(kernel @ (n / rate) ** power) for power in range(7)]
     scale = (kernel.size / rate) ** np.arange(7) * rate
     assert np.allclose(np.array(moments) / scale, np.eye(7)[1] / scale[1], atol=1e-12)  # rounding
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 500])
+def test_a_recursion_is_scipys_and_leaves_its_state(n: int) -> None:
+    rng = np.random.default_rng(4)
+    x, state = rng.normal(size=n), rng.normal(size=3)
+    numerator, denominator = np.array([0.3, -0.1, 0.4, 0.2]), np.poly([0.9, 0.5 + 0.4j, 0.5 - 0.4j]).real
+    y, left = recursion(numerator, denominator, x, state)
+    expected, expected_left = lfilter(numerator, denominator, x, zi=state)
+    np.testing.assert_allclose(y, expected, atol=1e-12)
+    np.testing.assert_allclose(left, expected_left, atol=1e-12)
