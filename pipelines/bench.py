@@ -65,10 +65,16 @@ def contenders(folder: Path) -> list[Contender]:
     million = bench_logs.parquet(folder / "million.parquet", MILLION)
     hour = bench_logs.parquet(folder / "hour.parquet", HOUR)
     out = folder / "out"
-    weak = [identify(log, out, "--estimator", "weak", "--no-report") for log in (second, million)]
+    weak = ("--estimator", "weak", "--no-report")
     found = [
-        Contender("weak second", weak[0], times=_QUICK),
-        Contender("weak million", weak[1], times=_QUICK),
+        *(
+            Contender(f"weak {name}", identify(log, out, *weak, "--model", "plain"), times=_QUICK)
+            for name, log in (("second", second), ("million", million))
+        ),
+        *(
+            Contender(f"chosen {name}", identify(log, out, *weak))
+            for name, log in (("second", second), ("million", million))
+        ),
         Contender("polars", peer("polars", million), times=_QUICK),
         Contender("help", python("-m", "algid", "--help"), times=_QUICK),
         Contender("empty typer help", python("-c", EMPTY_APP, "--help"), times=_QUICK),

@@ -44,8 +44,11 @@ def _root(
     pass
 
 
-def gathered(names: Iterable[str]) -> typer.Typer:
-    """The application with the commands `names`, and with the profiles' where none of them is alone."""
+def gathered(names: Iterable[str], *, listed: bool = False) -> typer.Typer:
+    """The application with the commands `names`, and with the profiles' where none of them is alone.
+
+    Commands that are only `listed` have their help and none of their options.
+    """
     made = typer.Typer(
         help="Parameters and payload of a two-link arm, with honest error bars, from its torque and angle logs.",
         no_args_is_help=True,
@@ -55,7 +58,8 @@ def gathered(names: Iterable[str]) -> typer.Typer:
     made.callback()(_root)
     wanted = list(names)
     for name in wanted:
-        made.command(name)(COMMANDS[name]())
+        command = COMMANDS[name]()
+        made.command(name)(_without_options(command) if listed else command)
     if len(wanted) != 1:
         profiles = typer.Typer(help="Profiles tell what a log's names, units and signs mean.", no_args_is_help=True)
         profiles.command("new")(import_module("algid.cli.profile").new)
@@ -63,8 +67,18 @@ def gathered(names: Iterable[str]) -> typer.Typer:
     return made
 
 
+def _without_options(command: Callable[..., Any]) -> Callable[[], None]:
+    def named() -> None:
+        pass
+
+    named.__doc__ = command.__doc__
+    return named
+
+
 def called(arguments: Sequence[str]) -> typer.Typer:
     """The application with what a command line calls: typer takes a fifth of a second to read all commands' options."""
     first = arguments[0] if arguments else ""
     completing = any(name.startswith("_ALGID_COMPLETE") for name in os.environ)
-    return gathered([first] if first in COMMANDS and not completing else COMMANDS)
+    if completing:
+        return gathered(COMMANDS)
+    return gathered([first]) if first in COMMANDS else gathered(COMMANDS, listed=first in ("", "-h", "--help"))

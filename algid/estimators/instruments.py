@@ -225,10 +225,8 @@ def _simulated(
         x, v = theta, omega
         middle = sample + stride // 2
         for now, share in ((sample, 0.5), (middle, 0.5), (middle, 1.0), (sample + stride, 0.0)):
-            acceleration = _acceleration(model, c, x, v, tau[:, :, now])
-            if acceleration is None:
-                return None
-            rates.append((v, acceleration))
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # `_has_inertia` judges afterwards
+                rates.append((v, acceleration(model, c, x, v, tau[:, :, now])))
             x, v = theta + share * h * rates[-1][0], omega + share * h * rates[-1][1]
         (v1, a1), (v2, a2), (v3, a3), (v4, a4) = rates
         ahead = theta + h / 6 * (v1 + 2 * v2 + 2 * v3 + v4)
@@ -236,6 +234,8 @@ def _simulated(
         thetas[:, :, sample : sample + stride] = _cubic(theta, ahead, h * omega, h * faster, inside)
         omegas[:, :, sample : sample + stride] = _cubic(omega, faster, h * a1, h * a4, inside)
         theta, omega = (np.clip(signal, -1e6, 1e6) for signal in (ahead, faster))
+    if not _has_inertia(model, c, thetas[:, :, ::stride]):
+        return None
     off = np.abs(thetas - piece.theta[:, instants[:, :-1]]).max(axis=(0, 2))
     good = off < _ASTRAY
     angles, torques, velocities = (signal.reshape(2, -1) for signal in (thetas, tau[:, :, :-1], omegas))
@@ -266,16 +266,12 @@ def _started(piece: Segment, windows: Windows, starts: NDArray[np.int64]) -> tup
     return theta, omega
 
 
-def _acceleration(
-    model: Model, c: FloatArray, theta: FloatArray, omega: FloatArray, tau: FloatArray
-) -> FloatArray | None:
-    """Accelerations (2, R) under torques (2, R); None where the mass matrix is not positive definite."""
+def _has_inertia(model: Model, c: FloatArray, theta: FloatArray) -> bool:
+    """Whether the mass matrix is positive definite at the angles (2, ...)."""
     value = model.values(c)
     k = np.array([value[name] for name in CONSTANT_NAMES])
-    m11, m12, m22 = mass_matrix(k, theta + np.array([[value["zero1"]], [value["zero2"]]]))
-    if np.any(m11 <= 0) or np.any(m11 * (m22 + value["j2"]) <= m12**2):
-        return None
-    return acceleration(model, c, theta, omega, tau)
+    m11, m12, m22 = mass_matrix(k, np.stack([theta[0] + value["zero1"], theta[1] + value["zero2"]]))
+    return bool(np.all((m11 > 0) & (m11 * (m22 + value["j2"]) > m12**2)))
 
 
 def endogeneity(unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings, fit: Fit) -> float | None:

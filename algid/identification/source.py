@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 Role = Literal["unloaded", "loaded"]
 EXAMINED = 1 << 16
 """Samples at the start of a long log that the named checks look at."""
+MOST_KEPT = 1 << 20
+"""Samples of all logs together that are kept in memory, 64 bytes each, so that they are read once."""
 
 
 @dataclass(frozen=True)
@@ -193,6 +195,7 @@ class Survey:
     """Goes over logs as often as an estimator asks, and keeps what the first pass over each shows.
 
     Hashing and the named checks run beside the first pass; whoever wants to know how far a pass has come is told.
+    Logs of `MOST_KEPT` samples in all are read once and kept; longer ones are read again for each pass.
 
     Parameters
     ----------
@@ -207,6 +210,8 @@ class Survey:
         self._seen: dict[LogSource, Seen] = {}
         self._findings: dict[LogSource, tuple[Notice, ...]] = {}
         self._digests: dict[LogSource, Beside[str]] = {}
+        self._kept: dict[LogSource, tuple[Segment, ...]] = {}
+        self._room = MOST_KEPT
         self._stage, self._over = "fitting", self.logs
         self._words = ""
         self._done: dict[LogSource, int] = {}
@@ -227,7 +232,27 @@ class Survey:
 
     def segments(self, log: LogSource) -> Iterator[Segment]:
         """A fresh pass over a log: its uniform segments, from its start. Raises `LogError` where it is refused."""
-        return segments(self._counted(log))
+        return self._again(log) if log in self._kept else self._keeping(log)
+
+    def _keeping(self, log: LogSource) -> Iterator[Segment]:
+        held: list[Segment] = []
+        rows = 0
+        for piece in segments(self._counted(log)):
+            rows += len(piece)
+            if rows <= self._room:
+                held.append(piece)
+            yield piece
+        if rows <= self._room and log not in self._kept:
+            self._kept[log] = tuple(held)
+            self._room -= rows
+
+    def _again(self, log: LogSource) -> Iterator[Segment]:
+        rows = 0
+        self._tell(log, 0)
+        for piece in self._kept[log]:
+            yield piece
+            rows += len(piece)
+            self._tell(log, rows)
 
     def seen(self, log: LogSource) -> Seen:
         """What the log holds; goes over it where no estimator has done so to its end."""

@@ -13,7 +13,7 @@ from algid.estimators import instruments, refined, weak
 from algid.estimators.modulating_functions import Windows
 from algid.estimators.refined import RefinedSettings
 from algid.estimators.weak import Source, WeakSettings
-from algid.model import Model, Motion, torque
+from algid.model import Model, Motion, acceleration, torque
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case
 from algid.synth.simulator import simulate
@@ -153,8 +153,7 @@ def test_windows_move_as_the_model_says_under_a_load_whose_sign_its_inertia_turn
     model = Model(("coulomb", "load"))
     c = np.array([0.1, 0.4, 0.3, 3.0, 0.9, 0.1, 0.2, 0.15, 0.08, 0.05, 0.05])
     theta, omega, tau = np.random.default_rng(0).normal(size=(3, 2, 200))
-    alpha = instruments._acceleration(model, c, theta, omega, tau)
-    assert alpha is not None
+    alpha = acceleration(model, c, theta, omega, tau)
     np.testing.assert_allclose(torque(model, c, Motion(theta, omega, alpha)), tau, atol=1e-12)
 
 

@@ -9,6 +9,7 @@ import pytest
 
 import algid
 from algid.arm import FloatArray
+from algid.identification import source
 from algid.identification.by_likelihood import choose_model, run_fit
 from algid.identification.by_paper import run_paper
 from algid.identification.outcome import outcome_of
@@ -73,3 +74,26 @@ def test_blocks_do_not_show_in_the_estimates(name: str, uneven: Log) -> None:
             assert streamed.fit is not None
             assert streamed.fit.residual is not None
             np.testing.assert_allclose(streamed.fit.residual.rmse, result.fit.residual.rmse, rtol=1e-10)
+
+
+@pytest.mark.parametrize(("room", "readings"), [(1 << 20, 1), (1000, 3)])
+def test_logs_that_fit_in_memory_are_read_once(
+    room: int, readings: int, uneven: Log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(source, "MOST_KEPT", room)
+    begun: list[int] = []
+    log = chopped(uneven, 5000)
+    counting = replace(log, blocks=lambda: begun.append(1) or log.blocks())  # type: ignore[func-returns-value]
+    survey = Survey([counting])
+    passes = [list(survey.segments(counting)) for _ in range(3)]
+    assert len(begun) == readings
+    for again in passes[1:]:
+        assert [piece.start for piece in again] == [piece.start for piece in passes[0]]
+        assert all(np.array_equal(one.theta, other.theta) for one, other in zip(again, passes[0], strict=True))
+
+
+def test_a_pass_that_ends_early_is_not_taken_for_the_whole_log(uneven: Log) -> None:
+    log = chopped(uneven, 5000)
+    survey = Survey([log])
+    next(survey.segments(log))
+    assert sum(map(len, survey.segments(log))) == sum(map(len, Survey([log]).segments(log)))
