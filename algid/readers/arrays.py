@@ -44,7 +44,10 @@ def open_arrays(path: Path, kind: str, profile: Profile | None = None) -> TableR
             raise LogError(f"{path}: {source!r} for {name} holds {frame.schema[source]}; expected numbers")
     if frame.schema[columns.sources["t"]].is_temporal():
         columns = replace(columns, time_unit="ns", time_told=True)
-    return columns.reader(str(path), kind, None, _Whole(path, frame, columns).tables, profile, frame.height)
+    numbers = {joint: name for joint, name in columns.others.items() if frame.schema[name].is_numeric()}
+    columns = replace(columns, others=numbers)
+    tables_of = lambda chosen: _Whole(path, frame, chosen).tables  # noqa: E731
+    return columns.reader(str(path), kind, None, tables_of, profile, frame.height)
 
 
 def _units(path: Path, columns: Sequence[str]) -> dict[str, str]:

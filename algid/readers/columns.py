@@ -7,7 +7,7 @@ converted apart.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,20 +17,25 @@ from algid.errors import LogError
 from algid.log import IntArray, Notice, Origin, Reading, Teller, Truth, add, word_sum
 from algid.readers.assemble import TableReader, reader_of
 from algid.readers.joints import along_the_arm, order_notice
-from algid.readers.names import COMMANDED, CURRENTS, ChannelChoice, choose, on_motor_side, take_apart
+from algid.readers.names import COMMANDED, CURRENTS, ChannelChoice, choose, on_motor_side, other_joints, take_apart
+from algid.readers.others import moving_joints
 from algid.readers.table import CHANNELS, JOINT_CHANNELS, VELOCITIES, SampleTable
-from algid.units import CURRENT, NANOSECONDS, TORQUE, unit_of
+from algid.units import ANGLE, CURRENT, NANOSECONDS, TORQUE, unit_of
 from algid.words import counted
 
 if TYPE_CHECKING:
     from algid.profile import Profile
+
+_LOOKED = 1 << 14
+"""Samples in which the joints that are not read are looked at."""
 
 
 @dataclass(frozen=True)
 class Columns:
     """By canonical channel its column; the units that names state; the unit of time, where known.
 
-    `time_told`: a name or a profile states the unit of time; otherwise it is only taken to be so.
+    `time_told`: a name or a profile states the unit of time; otherwise it is only taken to be so. `others` has by
+    joint the column of its angle, of the joints that are not read.
     """
 
     sources: Mapping[str, str]
@@ -40,17 +45,12 @@ class Columns:
     time_told: bool = False
     joints: tuple[str, str] | None = None
     joints_told: Teller | None = None
+    others: Mapping[str, str] = field(default_factory=dict)
 
     def reader(
-        self,
-        path: str,
-        kind: str,
-        truth: Truth | None,
-        tables: Callable[[int], Iterator[SampleTable]],
-        profile: Profile | None,
-        rows: int,
+        self, path: str, kind: str, truth: Truth | None, tables_of: TablesOf, profile: Profile | None, rows: int
     ) -> TableReader:
-        """A reader of these columns out of `tables`; `rows` samples are to be expected.
+        """A reader of these columns out of the tables that are made of them; `rows` samples are to be expected.
 
         Raises
         ------
@@ -59,7 +59,18 @@ class Columns:
         """
         decided = Reading(joints=self.joints, joints_told=self.joints_told, clock="column", time_unit=self.time_unit)
         origin = Origin(path, kind, dict(self.sources), truth, decided)
-        return reader_of(origin, tables, profile, self.units, self.notices, rows)
+        unit = (profile.theta1.unit if profile else None) or self.units.get("theta1", "rad")
+        others = self.others if unit in ANGLE else {}  # of counts nobody knows how far they are
+        beside = moving_joints(
+            others,
+            lambda paths: tables_of(replace(self, sources={"t": self.sources["t"], **paths}))(_LOOKED),
+            ANGLE.get(unit, 1.0),
+        )
+        return reader_of(origin, tables_of(self), profile, self.units, (*self.notices, *beside), rows)
+
+
+TablesOf = Callable[[Columns], Callable[[int], Iterator[SampleTable]]]
+"""Makes of columns what gives a fresh pass over a file in tables of so many rows."""
 
 
 def assign(
@@ -113,6 +124,7 @@ def assign(
         time_told=time_told is not None,
         joints=joints,
         joints_told=by,
+        others=other_joints(available, [sources["theta1"], sources["theta2"]]),
     )
 
 

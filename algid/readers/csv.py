@@ -46,9 +46,10 @@ def open_csv(path: Path, profile: Profile | None = None, kind: str = "csv") -> T
     columns = assign(str(path), dialect.columns, profile, dialect.units)
     if columns.sources["t"] in dialect.dates:
         columns = replace(columns, time_unit="ns", time_told=True)
-    source = _Text(path, kind, dialect, columns, companion.sums if companion else {})
+    sums = companion.sums if companion else {}
     truth = companion.truth if companion else None
-    return columns.reader(str(path), "csv", truth, source.tables, profile, _rows(path, kind, head))
+    tables_of = lambda chosen: _Text(path, kind, dialect, chosen, sums).tables  # noqa: E731
+    return columns.reader(str(path), "csv", truth, tables_of, profile, _rows(path, kind, head))
 
 
 def head_bytes(path: Path, kind: str) -> bytes:

@@ -206,6 +206,25 @@ def _pairs(parts: dict[str, Name], joints: tuple[str, str] | None) -> dict[str, 
     return chosen
 
 
+def other_joints(columns: Iterable[str], angles: Collection[str]) -> dict[str, str]:
+    """By joint the column of its angle, of the joints that are not read: those named as the columns `angles` are."""
+    parts = {column: take_apart(column) for column in columns}
+    parts |= _worded(parts)
+    read = {_place(parts[column].joint) for column in angles}
+    kinds = {(parts[column].stem, where) for column in angles for where, _ in (_place(parts[column].joint),)}
+    found = {}
+    for column, name in parts.items():
+        if name.joint and _place(name.joint) not in read and (name.stem, _place(name.joint)[0]) in kinds:
+            found[name.joint.rsplit("/", 1)[-1]] = column
+    return found
+
+
+def _place(joint: str | None) -> tuple[str, str]:
+    """The topic before a joint's name, if any, and the name."""
+    where, _, name = (joint or "").rpartition("/")
+    return where, name
+
+
 def _worded(parts: dict[str, Name]) -> dict[str, Name]:
     """Columns named by a joint's own name and a stem, ``shoulder_pos`` or ``torque elbow``, taken apart so."""
     stems = sorted({stem for known in STEMS.values() for stem in known}, key=len, reverse=True)

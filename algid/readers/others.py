@@ -19,10 +19,10 @@ Tables = Callable[[Mapping[str, str]], Iterator[SampleTable]]
 """Tables of a topic's fields, whose paths are given by the columns' names."""
 
 
-def moving_joints(positions: Mapping[str, str], tables: Tables) -> tuple[Notice, ...]:
-    """Say which of the other joints of a topic move, and how far, in its first table.
+def moving_joints(positions: Mapping[str, str], tables: Tables, unit: float = 1.0) -> tuple[Notice, ...]:
+    """Say which of the other joints of a topic or table move, and how far, in its first table.
 
-    `positions` has by joint the path of its position.
+    `positions` has by joint the path of its position, in `unit` rad.
     """
     joints = {f"joint {number}": joint for number, joint in enumerate(positions)}  # no name of which is a stamp's
     if not joints:
@@ -33,7 +33,7 @@ def moving_joints(positions: Mapping[str, str], tables: Tables) -> tuple[Notice,
         return ()
     if table is None:
         return ()
-    travel = {joints[name]: _travel(values) for name, values in table.columns.items()}
+    travel = {joints[name]: unit * _travel(values) for name, values in table.columns.items()}
     moved = sorted((joint for joint in travel if travel[joint] > _STILL), key=lambda joint: -travel[joint])
     if not moved:
         return ()
@@ -41,7 +41,7 @@ def moving_joints(positions: Mapping[str, str], tables: Tables) -> tuple[Notice,
     more = f" and {len(moved) - _NAMED} more" if len(moved) > _NAMED else ""
     text = (
         f"{counted(len(moved), 'other joint moves', 'other joints move')} meanwhile: {told}{more} (in the first "
-        f"{counted(len(table), 'message')}); what that does to the torques is in no two-link model: hold them still"
+        f"{counted(len(table), 'sample')}); what that does to the torques is in no two-link model: hold them still"
     )
     return (Notice("OTHER_JOINTS", text),)
 

@@ -52,8 +52,9 @@ def open_parquet(path: Path, profile: Profile | None = None) -> TableReader:
     if companion is None and "stamp_ns" in schema and set(CANONICAL_COLUMNS) <= schema.keys():
         columns = replace(columns, notices=(*columns.notices, _NO_SUMS))
     _check_types(path, columns, available, schema)
-    source = _Groups(path, columns, available, schema, companion.sums if companion else {})
-    return columns.reader(str(path), "parquet", companion.truth if companion else None, source.tables, profile, rows)
+    sums = companion.sums if companion else {}
+    tables_of = lambda chosen: _Groups(path, chosen, available, schema, sums).tables  # noqa: E731
+    return columns.reader(str(path), "parquet", companion.truth if companion else None, tables_of, profile, rows)
 
 
 def schema_of(path: Path) -> dict[str, pl.DataType]:
