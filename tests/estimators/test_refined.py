@@ -7,8 +7,8 @@ import pytest
 
 from algid.arm import inverse_dynamics
 from algid.estimators import log_likelihood as evidence
-from algid.estimators import refined
-from algid.estimators.combine import Prior
+from algid.estimators import refined, weak
+from algid.estimators.combine import LogInformation, Prior
 from algid.estimators.refined import RefinedSettings
 from algid.estimators.whitening import NoiseLevels
 from algid.model import Model
@@ -192,3 +192,20 @@ def test_a_joint_at_rest_leaves_its_friction_open_and_the_rest_known() -> None:
     assert found.status == ("OK",) * 6 + ("NOT_IDENTIFIABLE",)
     assert found.unidentifiable == ("k7 is not determined: joint 2 never moved",)
     assert np.all(np.abs(found.values[:6] - k[:6]) < 4.5 * found.std[:6])
+
+
+def test_what_a_log_leaves_open_is_held_within_its_size(bench: Bench) -> None:
+    start = weak.fit([lambda: [bench.log()]])
+    size = 2.0
+    values = np.array([*start.values[:5], size, size])  # largest in k6 + k7, which the information leaves open
+    S = np.diag(1e4 / np.maximum(np.abs(values), 1e-3) ** 2)
+    S[5:, 5:] = 1e4 / size**2 * np.array([[1, -1], [-1, 1]])
+    information = LogInformation(False, values, S[None], np.zeros((1, 7)))
+    prior = refined._anchored(replace(start, values=values, logs=(information,)))
+    assert prior is not None
+    along = np.array([0, 0, 0, 0, 0, 1, 1]) / np.sqrt(2)
+    assert abs(along @ (prior.mean / size)) == pytest.approx(1.0)  # from √2
+    assert abs(along @ values / size) == pytest.approx(np.sqrt(2))
+    np.testing.assert_allclose(prior.mean[:5], values[:5], rtol=1e-9)
+    held = along / size / 1e-3  # to a thousandth of the size, and in this direction alone
+    np.testing.assert_allclose(prior.precision, np.outer(held, held), atol=1e-6 * held.max() ** 2)

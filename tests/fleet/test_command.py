@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import json
 import re
+from datetime import datetime
 from pathlib import Path
 
 import polars as pl
 import pytest
+from scipy.stats import norm
 from typer.testing import CliRunner
 
 from algid.batch.jobs import Job
 from algid.batch.records import End, JobRecord, write_jobs
 from algid.errors import ResultError
+from algid.fleet.history import history_of
+from algid.fleet.page import _figures
 from algid.stores import open_store
 from tests.cli.commands import app
 
@@ -67,6 +71,19 @@ def test_logs_whose_stamps_have_no_date_still_show_their_robots(tmp_path: Path) 
     assert "No drift was looked for in 2 logs without a date" in " ".join(done.stdout.split())
     assert "1 robot, 2 logs: 0 drifts and 1 finding" in done.stdout
     assert "not tested" in done.stdout
+
+
+def test_a_drift_is_drawn_with_its_intervals(tmp_path: Path) -> None:
+    _batch(tmp_path)
+    history = history_of(tmp_path / "jobs.parquet")
+    (figure,) = _figures(history)
+    (panel,) = figure.panels
+    (trace,) = panel.traces
+    means = history.windows.filter((pl.col("robot") == "r0") & (pl.col("parameter") == "k6"))
+    assert (panel.title, trace["type"], trace["mode"]) == ("r0: k6", "scatter", "lines+markers")
+    assert trace["y"] == means["mean"].to_list()
+    assert trace["error_y"]["array"] == pytest.approx((norm.ppf(0.975) * means["mean_std"]).to_list(), rel=1e-4)
+    assert [datetime.fromisoformat(end) for end in trace["x"]] == means["end"].to_list()
 
 
 def test_what_is_no_batch_is_refused(tmp_path: Path) -> None:
