@@ -9,7 +9,7 @@ help:
 	@echo "make demo       synthesise, identify and print Table 4 beside the paper's"
 	@echo "make test       set up and run the tests"
 	@echo "make test-processor  the numerical tests as another processor rounds"
-	@echo "make test-slow  the statistics: coverage of intervals and the like, some minutes"
+	@echo "make test-slow  statistics of intervals, kills of batches, pages in a browser: some minutes"
 	@echo "make check      format, lint, types, tests: what every commit passes"
 	@echo "make pipelines  both cases through every format, failing when a reported error grows"
 

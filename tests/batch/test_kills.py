@@ -24,6 +24,8 @@ from algid.synth.sensors import Sensors
 
 JOBS = 6
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -95,12 +97,11 @@ def _wait_for_records(out: Path, count: int) -> None:
         time.sleep(0.005)
 
 
-@pytest.mark.parametrize("times", [1, pytest.param(4, marks=pytest.mark.slow)])
 def test_a_batch_killed_again_and_again_ends_as_an_undisturbed_one(
-    logs: Path, tmp_path: Path, undisturbed: Undisturbed, times: int
+    logs: Path, tmp_path: Path, undisturbed: Undisturbed
 ) -> None:
     instants = random.Random(1)
-    for _ in range(times):
+    for _ in range(4):
         running = _start(logs, tmp_path / "out")
         time.sleep(instants.uniform(0.4, 1.0) * undisturbed.lasts)
         running.kill()
@@ -245,7 +246,6 @@ def test_on_dask_the_death_of_a_worker_changes_no_result(
     assert _digest(tmp_path / "out") == undisturbed.digest
 
 
-@pytest.mark.slow
 def test_on_dask_the_death_of_the_batch_changes_no_result(
     logs: Path, tmp_path: Path, dask: Dask, undisturbed: Undisturbed
 ) -> None:

@@ -17,6 +17,7 @@ import algid
 from algid.synth.sensors import Sensors
 
 PATIENCE = 60.0
+HASTY = "from algid.batch import run; run.LOOK_EVERY = 1.0; from algid.cli import main; main()"  # s, instead of 2
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +38,7 @@ def _until(condition: Callable[[], object], running: subprocess.Popen[str]) -> N
 
 
 def _watching(logs: Path, out: Path) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "algid", "batch", str(logs), "-o", str(out), "--watch", "--workers", "1"]
+    command = [sys.executable, "-c", HASTY, "batch", str(logs), "-o", str(out), "--watch", "--workers", "1"]
     return subprocess.Popen(
         [*command, "--no-report", "--estimator", "weak", "--model", "plain"],
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},

@@ -44,7 +44,7 @@ def assert_sound(seen: Seen, page: Path, title: str) -> None:
     assert seen.overflow <= 0
 
 
-@pytest.mark.parametrize(("width", "dark"), [(1400, False), (400, True)])
+@pytest.mark.parametrize(("width", "dark"), [(1400, False), pytest.param(400, True, marks=pytest.mark.slow)])
 def test_a_complete_report(browser: Browser, folder: Path, width: int, dark: bool) -> None:
     page = write_report(folder)
     seen = browser.look(page, width, dark)
@@ -55,6 +55,7 @@ def test_a_complete_report(browser: Browser, folder: Path, width: int, dark: boo
     assert seen.background == ("rgb(16, 21, 28)" if dark else "rgb(255, 255, 255)")
 
 
+@pytest.mark.slow
 def test_a_parameter_that_cannot_be_identified_and_the_library_beside(
     browser: Browser, folder: Path, result: Result
 ) -> None:
@@ -73,6 +74,7 @@ def test_a_parameter_that_cannot_be_identified_and_the_library_beside(
     assert_sound(replace(seen, requests=seen.requests[:1]), page, "case1-unloaded.mcap · algid")
 
 
+@pytest.mark.slow
 def test_a_log_whose_names_attack(browser: Browser, folder: Path, result: Result) -> None:
     write_result(hostile(result), folder / "result.json")
     page = write_report(folder)
@@ -89,6 +91,7 @@ def test_a_real_log(browser: Browser, tmp_path: Path) -> None:
     assert_sound(browser.look(page), page, f"{RUN.name} · algid")
 
 
+@pytest.mark.slow
 def test_figures_follow_legend_theme_keys_and_paper(browser: Browser, folder: Path) -> None:
     browser.look(write_report(folder))
     run = browser.driver.execute_script

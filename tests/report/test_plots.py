@@ -27,6 +27,7 @@ def test_figures_are_saved_in_the_form_that_is_asked_for(case_folder: Path, resu
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in written)
 
 
+@pytest.mark.slow  # matplotlib takes fonts apart for every file
 def test_the_command_saves_every_figure_of_the_page(case_folder: Path, result: Result, tmp_path: Path) -> None:
     folder = Path(shutil.copytree(case_folder, tmp_path / "case1.algid"))
     done = CliRunner().invoke(app, ["report", str(folder), "--save-plots", str(tmp_path / "figures")])
