@@ -22,6 +22,7 @@ import numpy as np
 
 from algid.arm import CONSTANT_NAMES
 from algid.estimators import refined
+from algid.estimators.hedged import hedged
 from algid.estimators.selection import Selection, select
 from algid.estimators.weak import WeakSettings
 from algid.model import Model
@@ -52,6 +53,8 @@ def draw(job: tuple[str, int, int, str]) -> Row:
     weak = replace(weak, model=chosen.model, estimate_delay=chosen.delay)
     settings = refined.RefinedSettings(model=chosen.model, estimate_delay=chosen.delay, weak=weak)
     fit = refined.fit(*logs, settings)
+    if fit.note and mode == MODES[0]:
+        fit = hedged(fit, *logs, weak)
     truth = _scenes[row, arm, False].truth
     names = [*CONSTANT_NAMES, "m_p"]
     places = [fit.names.index(name) for name in names]

@@ -28,6 +28,8 @@ from algid.model import TERMS
 
 _NOT_NEGATIVE = ("k6", "k7", "f1", "f2", "j2", "m_p", "l1", "l2")
 _NUDGE = 1e-6  # of a parameter's size: step of the differences
+FAR_BEYOND = 3.0
+"""Standard deviations past a bound of physics that chance does not explain."""
 _INSIDE = (1e-6, 1e-5, 1e-4, 1e-3)  # of a parameter's size: distance kept from a bound, until the solver keeps it
 
 

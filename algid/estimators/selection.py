@@ -31,7 +31,7 @@ from algid.model import TERMS, Model
 TIMING = ("delay", "lag")  # the same to first order: one column tells both
 CHOICE = (*(term for term in TERMS if term != "lag"), "delay")
 _OF_BOTH_TORQUES = ("gain",)  # where a joint has no motor, its gain is nothing and makes its equation vanish
-_FIRST_TERMS = ("coulomb", "offset", "rotor")
+FIRST_TERMS = ("coulomb", "offset", "rotor")  # the most common ones
 _WIDTHS = np.array([0.01, 0.02, 0.04, 0.08, 0.16, 0.32])  # rad/s
 _FADES = np.array([0.1, 0.3, 0.9])  # rad/s
 _NEAR = np.array([0.7, 0.84, 1.0, 1.2, 1.44])  # of a shape found before
@@ -180,10 +180,10 @@ def select(
 
 def _first_look(logs: tuple[Training, ...], settings: WeakSettings) -> _Look:
     """At the constants, and at the shapes of friction, that a model of the most common terms gives."""
-    look = _Look(logs, settings, {False: {}, True: {}}).shaped("coulomb_speed", _WIDTHS, _FIRST_TERMS)
-    at = look.grams(_FIRST_TERMS).coefficients((*_FIRST_TERMS, "delay"))
+    look = _Look(logs, settings, {False: {}, True: {}}).shaped("coulomb_speed", _WIDTHS, FIRST_TERMS)
+    at = look.grams(FIRST_TERMS).coefficients((*FIRST_TERMS, "delay"))
     linear = {kind: {name: c for name, c in values.items() if name != "delay"} for kind, values in at.items()}
-    return replace(look, at=linear).shaped("stribeck_speed", _FADES, (*_FIRST_TERMS, "stribeck"))
+    return replace(look, at=linear).shaped("stribeck_speed", _FADES, (*FIRST_TERMS, "stribeck"))
 
 
 def _lowest(x: FloatArray, y: Sequence[float]) -> float:

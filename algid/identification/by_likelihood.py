@@ -11,8 +11,9 @@ import numpy as np
 from algid.errors import LogError, ResultError
 from algid.estimators import instruments, refined, weak
 from algid.estimators.combine import Prior
-from algid.estimators.diagnostics import constrained
+from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, constrained
 from algid.estimators.fit import Fit
+from algid.estimators.hedged import hedged
 from algid.estimators.innovations import ResidualSums, pooled
 from algid.estimators.prediction import PredictionSums, cross_validate
 from algid.estimators.selection import CHOICE, Selection, needs_shape, select
@@ -118,6 +119,18 @@ def residual_of(survey: Survey, settings: Settings, chosen: Selection, fit: Fit)
         for log, moving in zip(survey.logs, _passes(survey, survey.logs, settings), strict=True)
     ]
     return pooled([one for one in sums if one is not None])
+
+
+def with_hedge(fit: Fit, survey: Survey, settings: Settings, chosen: Selection, prior: Prior | None) -> Fit:
+    """The fit; where its likelihood is refuted, with what left-out terms could hide in its error bars: see `hedged`.
+
+    One that physics contradicts stays as sure as it is, so that the contradiction is told.
+    """
+    contradicted = any(bound.distance is not None and bound.distance > FAR_BEYOND for bound in broken_bounds(fit))
+    if contradicted or not (fit.note and settings.chooses):
+        return fit
+    unloaded, loaded = (_passes(survey, logs, settings) for logs in (survey.unloaded, survey.loaded))
+    return hedged(fit, unloaded, loaded, _weak_settings(settings, chosen), settings.lengths, prior)
 
 
 def with_endogeneity(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) -> Fit:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from algid.arm import CONSTANT_NAMES, CONSTANT_UNITS, FloatArray, mass_matrix
 from algid.errors import LogError
+from algid.estimators.diagnostics import FAR_BEYOND
 from algid.estimators.paper import (
     SHORTEST,
     STAGE1_SERIES,
@@ -21,7 +22,7 @@ from algid.estimators.paper import (
     stage2_series,
     wanders,
 )
-from algid.identification.outcome import FAR_BEYOND, Identified, distrusted
+from algid.identification.outcome import Identified, distrusted
 from algid.identification.series import series_blocks, write_columns
 from algid.identification.source import LogSource, Survey
 from algid.identification.velocities import with_velocities

@@ -172,6 +172,7 @@ def _by_likelihood(survey: Survey, settings: Settings, earlier: Earlier | None, 
         residual_of,
         run_fit,
         with_endogeneity,
+        with_hedge,
         without_nothing,
     )
     from algid.identification.outcome import outcome_of
@@ -184,7 +185,7 @@ def _by_likelihood(survey: Survey, settings: Settings, earlier: Earlier | None, 
     fewer = without_nothing(chosen, fit, settings)
     if fewer != chosen:
         chosen, (fit, predictions) = fewer, run_fit(survey, settings, fewer, prior)
-    fit = with_endogeneity(fit, survey, settings, chosen)
+    fit = with_endogeneity(with_hedge(fit, survey, settings, chosen, prior), survey, settings, chosen)
     survey.begin("prediction")
     outcome = outcome_of(fit, predictions, survey, settings, chosen)
     if folder is not None:

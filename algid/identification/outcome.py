@@ -12,6 +12,7 @@ import numpy as np
 from algid import results
 from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.estimators.diagnostics import (
+    FAR_BEYOND,
     broken_bounds,
     length_by_constants,
     payload_distance,
@@ -37,7 +38,6 @@ ONE_RUN = "what differs from run to run is not in the intervals: give four logs 
 """Of intervals that rest on blocks of logs."""
 ONE_SIDED = 1.645  # standard deviations of a one-sided bound at 95 %
 FAR_APART = 5.0  # standard deviations past which two logs are not of one arm
-FAR_BEYOND = 3.0  # standard deviations past a bound of physics that chance does not explain
 NEAR_CONSTANT = 0.1  # of the torque's RMS: a residual this small passes, however little there was to explain
 
 

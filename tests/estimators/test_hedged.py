@@ -1,0 +1,85 @@
+"""Error bars where the evidence that chose the terms was refuted: as wide as if nothing had been left out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import algid
+from algid.estimators import weak
+from algid.estimators.fit import Fit
+from algid.estimators.hedged import hedged
+from algid.estimators.weak import WeakSettings
+from algid.log import Log
+from algid.model import Model
+from algid.results import Status
+from algid.settings import Settings
+from algid.synth.sensors import Sensors
+
+from .conftest import Bench
+
+EVERY = WeakSettings(model=Model(("coulomb", "offset", "rotor")), estimate_delay=True)
+
+
+def _general(fit: Fit, larger: Fit) -> np.ndarray:
+    return np.array([larger.std[larger.names.index(name)] for name in fit.names])
+
+
+def test_no_error_bar_is_narrower_than_with_every_common_term(bench: Bench) -> None:
+    log = bench.log(sigma=1e-3)
+    fit = replace(weak.fit([lambda: [log]]), note="refuted")
+    found = hedged(fit, [lambda: [log]], [], WeakSettings())
+    larger = weak.fit([lambda: [log]], settings=EVERY)
+    np.testing.assert_allclose(found.std, np.maximum(fit.std, _general(fit, larger)), rtol=1e-9)
+    assert np.any(found.std > 1.2 * fit.std)  # or the test would not tell
+    np.testing.assert_array_equal(found.values, fit.values)
+    assert found.quantile == max(fit.quantile, larger.quantile)
+    size, wide = np.outer(fit.std, fit.std), np.outer(found.std, found.std)
+    np.testing.assert_allclose(found.covariance / wide, fit.covariance / size, atol=1e-12)  # correlations stay
+    assert found.note is not None
+    assert "as wide as with coulomb, offset, rotor and delay" in found.note
+
+
+def test_a_fit_with_every_term_and_one_of_four_logs_stay_as_they_are(bench: Bench) -> None:
+    log = bench.log(sigma=1e-3)
+    fit = weak.fit([lambda: [log]], settings=EVERY)
+    np.testing.assert_allclose(hedged(fit, [lambda: [log]], [], EVERY).std, fit.std, rtol=1e-12)
+    four = [lambda part=part: [log.part(part, part + 1000)] for part in range(0, 4000, 1000)]
+    together = weak.fit(four)
+    assert hedged(together, four, [], WeakSettings()) is together
+
+
+def test_what_the_larger_model_leaves_open_keeps_its_error_bar(bench: Bench) -> None:
+    rest = bench.log(sigma=1e-3)
+    still = replace(rest, theta=np.stack([rest.theta[0], np.full(len(rest), 0.3)]))
+    fit = replace(weak.fit([lambda: [still]]), note="refuted")
+    larger = weak.fit([lambda: [still]], settings=EVERY)
+    found = hedged(fit, [lambda: [still]], [], WeakSettings())
+    assert "NOT_IDENTIFIABLE" in larger.status
+    for place, name in enumerate(fit.names):
+        if larger.status[larger.names.index(name)] != "OK":
+            assert found.covariance[place, place] == pytest.approx(fit.covariance[place, place])
+    assert np.all(np.isfinite(found.covariance))
+
+
+def _slow_error(log: Log) -> Log:
+    t = (log.stamp_ns - log.stamp_ns[0]) * 1e-9
+    return replace(log, tau=log.tau + 0.02 * np.sign(np.sin(2 * np.pi * 1.3 * t)), omega=None)
+
+
+def test_a_refuted_log_is_hedged_where_it_chose_its_terms_itself() -> None:
+    log, _ = algid.synthesise("case1", duration=4.0, excitation="wide", sensors=Sensors(1e-4, 1e-3))
+    log = _slow_error(log)
+    chosen = algid.identify(log, settings=Settings())
+    assert chosen.fit is not None
+    terms = chosen.fit.model.terms if chosen.fit.model else []
+    told = algid.identify(log, settings=Settings(model=",".join(terms) or "plain"))
+    own = [name for name in ("k1", "k2", "k3", "k4", "k5") if chosen.parameters[name].status is Status.OK]
+    assert own
+    stds = np.array([[one.parameters[name].std for name in own] for one in (chosen, told)], dtype=np.float64)
+    assert np.all(stds[0] >= stds[1] * (1 - 1e-9))
+    assert np.any(stds[0] > 1.05 * stds[1])
+    assert any("which the logs left out" in text for text in chosen.warnings)
+    assert not any("which the logs left out" in text for text in told.warnings)
