@@ -50,17 +50,21 @@ def test_a_source_that_is_not_there_is_refused(tmp_path: Path) -> None:
 
 
 def test_manifests_in_csv_and_toml_say_the_same(tmp_path: Path) -> None:
-    rows = "name,logs,loaded,robot,time,payload,site\nd1,a.csv;b.csv,/l/c.csv,r1,2026-01-31T12:00:00Z,0.5,Ulm\n"
+    rows = (
+        "name,logs,loaded,profile,robot,time,payload,site\n"
+        "d1,a.csv;b.csv,/l/c.csv,arm.toml,r1,2026-01-31T12:00:00Z,0.5,Ulm\n"
+    )
     (tmp_path / "m.csv").write_text(rows)
     (tmp_path / "m.toml").write_text(
-        '[[job]]\nname="d1"\nlogs=["a.csv", "b.csv"]\nloaded="/l/c.csv"\nrobot="r1"\ntime=2026-01-31T12:00:00Z\n'
-        'payload=0.5\nsite="Ulm"\n'
+        '[[job]]\nname="d1"\nlogs=["a.csv", "b.csv"]\nloaded="/l/c.csv"\nprofile="arm.toml"\nrobot="r1"\n'
+        'time=2026-01-31T12:00:00Z\npayload=0.5\nsite="Ulm"\n'
     )
     assert is_manifest(tmp_path / "m.csv")
     (first,) = read_manifest(tmp_path / "m.csv")
     (second,) = read_manifest(tmp_path / "m.toml")
     assert first == second
     assert first.logs == (str(tmp_path / "a.csv"), str(tmp_path / "b.csv"))
+    assert first.profile == str(tmp_path / "arm.toml")
     assert first.labels == {"payload": 0.5, "site": "Ulm"}
     assert first.time == "2026-01-31T12:00:00+00:00"
 

@@ -21,7 +21,7 @@ from algid.estimators.diagnostics import (
 from algid.estimators.fit import conclude, own_estimates
 from algid.estimators.identifiability import examine, sizes
 from algid.estimators.parametrisation import Shared
-from algid.estimators.prediction import cross_validate, score
+from algid.estimators.prediction import cross_validate, motion_of, score
 from algid.estimators.weak import Source, WeakSettings
 from algid.identification.outcome import fit_warnings
 from algid.model import Model
@@ -318,3 +318,14 @@ def test_gravity_compensated_by_half_is_told_where_the_length_is_known(bench: Be
         assert found is not None
         assert found[0] == pytest.approx(bench.arm.l1 / (1 - share), rel=0.05)
         assert any(warning.startswith("LENGTH_MISMATCH") for warning in fit_warnings(fit)) is told
+
+
+def test_motion_by_five_points_is_exact_for_a_cubic_and_repeats_itself_at_the_ends() -> None:
+    dt = 0.1
+    t = dt * np.arange(12)
+    motion = motion_of(np.stack([t**3 - t, 2 * t**2]), dt)
+    inner, ends = slice(2, -2), [0, 1, -2, -1]
+    np.testing.assert_allclose(motion.omega[:, inner], np.stack([3 * t**2 - 1, 4 * t])[:, inner], atol=1e-12)
+    np.testing.assert_allclose(motion.alpha[:, inner], np.stack([6 * t, np.full_like(t, 4)])[:, inner], atol=1e-10)
+    np.testing.assert_array_equal(motion.omega[:, ends], motion.omega[:, [2, 2, -3, -3]])
+    np.testing.assert_array_equal(motion.alpha[:, ends], motion.alpha[:, [2, 2, -3, -3]])

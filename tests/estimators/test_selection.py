@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import ClassVar
+
 import pytest
 
-from algid.estimators.selection import CHOICE, Selection, needs_shape, select
+from algid.estimators.selection import CHOICE, Selection, _Search, needs_shape, select
 from algid.estimators.weak import WeakSettings
 from algid.model import TERMS, Model
 from tests.estimators.conftest import Bench
@@ -57,3 +60,31 @@ def test_terms_with_a_shape_are_those_of_friction() -> None:
 def test_logs_too_short_for_a_window_are_refused() -> None:
     with pytest.raises(ValueError, match="no log is long enough"):
         select([list], [], SETTINGS)
+
+
+class _Told(_Search):
+    """A search whose evidence is a table: of terms, beside others; minus one where it has no entry."""
+
+    table: ClassVar[dict[tuple[str, str], float]] = {
+        ("rotor", ""): 5.0,
+        ("coulomb", ""): 3.0,
+        ("coulomb offset", "rotor"): 4.0,
+        ("rotor", "coulomb offset"): -2.0,
+        ("coulomb", "offset rotor"): 1.0,
+        ("offset", "coulomb rotor"): -0.5,
+        ("coulomb", "offset"): 2.0,
+        ("offset", "coulomb"): 2.0,
+    }
+
+    def evidence(self, terms: Sequence[str], beside: Sequence[str]) -> float:
+        return self.table.get((" ".join(sorted(terms)), " ".join(sorted(beside))), -1.0)
+
+    def agreed(self, *_: Sequence[str]) -> bool:
+        return True
+
+
+def test_a_term_that_a_pair_makes_needless_is_taken_out_again() -> None:
+    candidates = ("coulomb", "offset", "rotor")
+    # rotor first, the pair then, and of the two that are poor beside the others the poorer goes: rotor
+    assert sorted(_Told(None, candidates, ()).run()) == ["coulomb", "offset"]  # type: ignore[arg-type]
+    assert _Told(None, candidates, ("rotor",)).run() == ["rotor"]  # type: ignore[arg-type]  # it stays whatever it is worth

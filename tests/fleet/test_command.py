@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
@@ -16,9 +17,11 @@ from algid.batch.jobs import Job
 from algid.batch.records import End, JobRecord, write_jobs
 from algid.errors import ResultError
 from algid.fleet.history import history_of
-from algid.fleet.page import _figures
+from algid.fleet.page import _figures, drift_table, finding_table, robot_table, verdict
 from algid.stores import open_store
 from tests.cli.commands import app
+
+TABLES = (robot_table, drift_table, finding_table)
 
 
 def _batch(folder: Path, robots: int = 2, logs: int = 10, start_ns: int = 1_700_000_000 * 10**9) -> Path:
@@ -73,6 +76,51 @@ def test_logs_whose_stamps_have_no_date_still_show_their_robots(tmp_path: Path) 
     assert "not tested" in done.stdout
 
 
+def test_the_tables_have_their_columns_and_their_notes(tmp_path: Path) -> None:
+    _batch(tmp_path)
+    history = history_of(tmp_path / "jobs.parquet")
+    heads = [" | ".join(column.heading for column in table(history).columns) for table in TABLES]
+    assert heads == [
+        "Robot | Logs | From | To | Drift | Stand out",
+        "Robot | Parameter | Until | Logs | Mean | Slope, % a month | 95 % interval | p",
+        "Job | Robot | What | Parameter | Value | Expected | σ away",
+    ]
+    first, _ = robot_table(history).rows
+    assert first == ("r0", "10", "2023-11-14", "2023-11-23", "k6", "1")
+    (drift,) = drift_table(history).rows
+    assert drift[:4] == ("r0", "k6", "2023-11-23", "10")
+    assert drift_table(history).note == "1 found. A slope over 3 months is told from none at p < 0.001."
+    (finding,) = finding_table(history).rows
+    assert finding == ("r0/0", "r0", "payload unlike its label", "m_p", "0.90000", "0.50000", "+400.0")
+    assert finding_table(history).note == "1 found; the farthest 1 are shown."
+    # what a narrow terminal leaves out first
+    ranks = [{column.heading: column.rank for column in table(history).columns if column.rank} for table in TABLES]
+    assert ranks == [{"From": 2, "To": 1}, {"Until": 1, "Logs": 2, "Mean": 3, "p": 4}, {"Robot": 1}]
+
+
+def test_a_trend_is_told_in_percent_of_a_mean_that_is_not_zero(tmp_path: Path) -> None:
+    day, first = 86_400 * 10**9, 1_700_000_000 * 10**9
+    records = [
+        JobRecord(
+            Job(f"r/{number}", ("a.csv",), robot="r"), End.OK, "", "", (), {}, "", 1.0, first + number * day, 10.0,
+            "refined",
+            # k4 grows through zero and is the clearest; its mean is none to be a percentage of
+            {"k1": (1.0 + 0.002 * number, 0.01, "OK"), "k4": (0.1 * (number - 9), 0.01, "OK")},
+        )
+        for number in range(20)
+    ]  # fmt: skip
+    write_jobs(open_store(str(tmp_path)), records)
+    history = history_of(tmp_path / "jobs.parquet")
+    zeroed = replace(
+        history,
+        windows=history.windows.with_columns(
+            mean=pl.when(pl.col("parameter") == "k4").then(0.0).otherwise(pl.col("mean"))
+        ),
+    )
+    assert "the clearest trend is k4 of r" in verdict(history).sentence
+    assert "the clearest trend is k1 of r, +6" in verdict(zeroed).sentence  # 0.002 a day, 30.4 days a month
+
+
 def test_a_drift_is_drawn_with_its_intervals(tmp_path: Path) -> None:
     _batch(tmp_path)
     history = history_of(tmp_path / "jobs.parquet")
@@ -111,6 +159,11 @@ def test_the_page_shows_every_robot_and_leads_to_its_reports(tmp_path: Path) -> 
     assert robots is not None
     assert '<a href="./../batch/r0/9.algid/report.html">r0</a>' in robots[0]
     assert '<th scope="row">r1</th>' in robots[0]  # its latest log has no report
+    listed = re.search(
+        r'(?s)<details class="paper" id="reports"><summary>Reports</summary>\s*<dl>(.*?)</dl></details>', page
+    )
+    assert listed is not None
+    assert listed[1].startswith('<dt>r0</dt><dd><a href="./../batch/r0/9.algid/report.html">r0/9</a></dd><dt>r1</dt>')
     links = re.findall(r'href="(\./[^"]+)"', page)
     assert links
     assert all((tmp_path / "page" / link).is_file() for link in links)

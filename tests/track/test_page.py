@@ -20,6 +20,7 @@ import algid
 from algid.errors import ResultError
 from algid.identification.identify import identify
 from algid.synth.sensors import Sensors
+from algid.track.figures import figures
 from algid.track.page import markdown, page_html, write_track
 from algid.track.payload import Stretch
 from algid.track.read import read_track
@@ -75,6 +76,48 @@ def test_every_format_shows_the_same_digits(result: TrackResult) -> None:
     for row, stretch in zip(rows, json.loads(track_json(result))["stretches"], strict=False):
         assert row[3] == fixed(stretch["m_p"], stretch["std"])
         assert row[5:7] == (stretch["unit"], stretch["status"])
+
+
+def test_tables_and_figures_say_what_they_show(result: TrackResult) -> None:
+    changes = change_table(result)
+    assert [column.heading for column in changes.columns] == [
+        "Change",
+        "At, s",
+        "Between, s",
+        "By",
+        "Unit",
+        "Truth at, s",
+    ]
+    assert {column.heading: column.rank for column in changes.columns if column.rank} == {
+        "Between, s": 1,
+        "Truth at, s": 2,
+    }
+    assert changes.note == "Times between tell neither mass: a grasp jolts the arm."
+    assert [row[5] for row in changes.rows] == ["1.500", "3.000"]
+    assert [column.heading for column in stretch_table(result).columns] == [
+        "Stretch", "From, s", "To, s", "Payload", "± 95 %", "Unit", "Status", "95 % interval", "Truth", "Error",
+    ]  # fmt: skip
+    payload, left = figures(result)
+    whole = [result.track.stretches[0].start, result.track.stretches[2].end]
+    for figure in (payload, left):
+        assert figure.panels[0].layout["xaxis"]["range"] == whole
+    assert whole[1] > 4.3
+    hovers = [
+        trace["hovertemplate"]
+        for figure in (payload, left)
+        for trace in figure.panels[0].traces
+        if "hovertemplate" in trace
+    ]
+    assert hovers == [
+        "m_p %{y:.5g} kg at %{x:.3f} s<extra></extra>",
+        "stretch %{y:.6g} kg<extra></extra>",
+        "truth %{y:.6g} kg<extra></extra>",
+        "%{y:.3g} times the noise at %{x:.3f} s<extra></extra>",
+    ]
+    assert [entry.words for entry in payload.legend] == [
+        "m_p(t) from ± 0.25 s around, within its stretch", "its 95 % band", "mass of each stretch", "true schedule",
+        "times between which a change lies",
+    ]  # fmt: skip
 
 
 def test_the_schedule_stands_beside_the_stretches(result: TrackResult) -> None:
