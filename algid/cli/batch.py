@@ -56,9 +56,13 @@ def batch(
     """
     from algid.batch.lock import locked
     from algid.batch.run import Batch, Recipe, stopped_by_signals, sweep
+    from algid.errors import SettingError
     from algid.results import read_result
     from algid.stores import open_store
 
+    bytes_each = None if memory_limit is None else _bytes(memory_limit)
+    if scheduler is not None and (workers is not None or memory_limit is not None):
+        raise SettingError("--scheduler: workers and their memory are the cluster's; set them where it is started")
     known = None if parameters is None else read_result(parameters)
     recipe = Recipe(out, choice.settings(), _profiles(choice), known, report)
     recipe.profile(None)
@@ -68,7 +72,7 @@ def batch(
     with locked(out):
         sweep(store)
         with (
-            _workers(out, scheduler, workers, memory_limit, timeout) as (executor, slots),
+            _workers(out, scheduler, workers, bytes_each, timeout) as (executor, slots),
             _progress(quiet) as progress,
         ):
             running = Batch(store, recipe, executor, slots, progress)
@@ -97,21 +101,18 @@ def _profiles(choice: Choice) -> Callable[[str | None], Profile | None]:
 
 @contextmanager
 def _workers(
-    out: str, scheduler: str | None, workers: int | None, memory_limit: str | None, timeout: float
+    out: str, scheduler: str | None, workers: int | None, memory_limit: int | None, timeout: float
 ) -> Iterator[tuple[Executor, int]]:
     """The workers, and how many jobs to hand out at once; they end with the block."""
     from algid.batch.workers import Workers, cluster
-    from algid.errors import SettingError
     from algid.runtime import cores
 
     if scheduler is not None:
-        if workers is not None or memory_limit is not None:
-            raise SettingError("--scheduler: workers and their memory are the cluster's; set them where it is started")
         with cluster(scheduler, out, timeout) as found:
             yield found
         return
     count = workers or cores()
-    executor = Workers(count, None if memory_limit is None else _bytes(memory_limit), timeout)
+    executor = Workers(count, memory_limit, timeout)
     try:
         yield executor, 2 * count
     finally:

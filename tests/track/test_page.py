@@ -8,6 +8,7 @@ import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -19,6 +20,7 @@ from typer.testing import CliRunner
 import algid
 from algid.errors import ResultError
 from algid.identification.identify import identify
+from algid.report.verdict import Verdict
 from algid.synth.sensors import Sensors
 from algid.track.figures import figures
 from algid.track.page import markdown, page_html, write_track
@@ -234,3 +236,38 @@ def test_a_damaged_track_is_refused_in_one_line(result: TrackResult, tmp_path: P
     with pytest.raises(ResultError, match=r"track\.json: expected") as refused:
         read_track(folder)
     assert "\n" not in str(refused.value)
+
+
+def test_what_a_track_cannot_explain_is_told_by_how_much(result: TrackResult) -> None:
+    def judged(**changes: Any) -> Verdict:
+        return verdict(replace(result, track=replace(result.track, **changes)))
+
+    nothing = "arm and payload explain only 0 % of the torque: is it this arm, in these units?"
+    assert judged(explained=-0.3).sentence == f"Failed: {nothing}; do not use these masses."
+    strange = judged(explained=0.95, colour=250_000.0).sentence
+    assert strange.startswith("Failed: arm and payload miss the torque by 500 times its sensors' noise: is it this arm")
+    assert judged(explained=0.995, colour=250_000.0).level == "reservations"  # very quiet sensors
+    poor = judged(explained=0.8)
+    assert (poor.level, poor.reasons[0]) == ("reservations", "arm and payload explain only 80 % of the torque")
+    wider = judged(colour=9.0)
+    assert wider.reasons[0].startswith("the torque holds errors 3.0 times its sensors' noise")
+    lost = verdict(replace(result, data_lost=True, arm_sentence="Failed: no."))
+    assert lost.reasons == ("samples of the log are lost", "the arm's own result says: Failed: no.")
+    assert lost.sentence.endswith(", but samples of the log are lost, and 1 more reason below.")
+
+
+def test_one_stretch_and_many_are_told_in_words(result: TrackResult) -> None:
+    first = result.track.stretches[0]
+    alone = replace(result.track, stretches=[replace(first, m_p=0.2, std=0.001)], changes=np.zeros((0, 3)))
+    assert verdict(replace(result, track=alone)).sentence == (
+        "Good: the payload does not change: 0.2000 ± 0.0020 kg throughout."
+    )
+    many = [replace(first, m_p=0.1 * place, std=0.001) for place in range(1, 8)]
+    changes = np.stack([np.arange(1.0, 7.0)] * 3, axis=1)
+    told = verdict(replace(result, track=replace(result.track, stretches=many, changes=changes))).sentence
+    assert "the payload changes 6 times, in 7 stretches, the least certain to ± 0.0020 kg (95 %)" in told
+    still = [replace(first, m_p=0.1, std=3.0)]
+    weak = verdict(replace(result, track=replace(alone, stretches=still)))
+    assert weak.sentence.startswith("Failed: the arm moves too little to weigh anything")
+    light = verdict(replace(result, track=replace(alone, stretches=[replace(first, m_p=-0.2, std=0.001)])))
+    assert light.sentence.startswith("Failed: the payload weighs less than nothing: the arm's constants do not fit")

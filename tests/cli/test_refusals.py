@@ -1,0 +1,69 @@
+"""Flags that cannot be as they are given: one line that names the flag, what was expected and what to do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from algid.cli.batch import _bytes
+from algid.errors import SettingError
+from tests.processes import Outcome
+
+
+@pytest.mark.parametrize(
+    ("text", "size"),
+    [("2GB", 2 * 10**9), ("2 gb", 2 * 10**9), ("1.5GiB", 3 * 2**29), ("600MiB", 600 * 2**20), ("536870912", 2**29)],
+)
+def test_memory_is_read_in_the_units_of_memory(text: str, size: int) -> None:
+    assert _bytes(text) == size
+
+
+@pytest.mark.parametrize("text", ["", "GB", "2XB", "1e3GB", "511MiB", "-2GB", "inf", "nan", "1" + "0" * 400 + "GB"])
+def test_no_memory_and_too_little_is_refused(text: str) -> None:
+    with pytest.raises(SettingError, match=r"--memory-limit: expected at least 512MiB, like 2GB, found"):
+        _bytes(text)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (
+            ["batch", "logs", "-o", "out", "--scheduler", "tcp://127.0.0.1:1", "--workers", "2"],
+            "--scheduler: workers and their memory are the cluster's; set them where it is started",
+        ),
+        (
+            ["batch", "logs", "-o", "out", "--scheduler", "tcp://127.0.0.1:1", "--memory-limit", "2GB"],
+            "--scheduler: workers and their memory are the cluster's; set them where it is started",
+        ),
+        (["batch", "logs", "-o", "out", "--memory-limit", "1"], "--memory-limit: expected at least 512MiB"),
+        (["batch", "absent", "-o", "out"], "absent: there is no such file, folder or match; check the name"),
+        (["synth", "case1", "--payload-schedule", "1=0.1,0.5=0"], "increasing times"),
+        (["synth", "case1", "--payload-schedule", "what"], "--payload-schedule"),
+        (["synth", "case1", "--initial", "0,0"], "--initial"),
+        (["synth", "case9"], "case9"),
+        (["design", "case1", "--range", "nothing"], "--range"),
+        (["identify", "log.csv", "--delay", "soon"], "--delay"),
+        (["identify", "log.csv", "--model", "coulomb,magic"], "magic"),
+        (["identify", "log.csv", "--estimator", "paper", "--loaded", "a.csv", "--loaded", "b.csv"], "log.csv"),
+        (["identify", "log.csv", "--set", "theta1.colour=red"], "theta1.colour"),
+        (["identify", "log.csv", "--set", "theta1"], "--set"),
+        (["validate", "absent.algid", "log.csv"], "absent.algid"),
+        (["check", "absent.algid"], "absent.algid"),
+        (["track", "log.csv", "--parameters", "absent.algid"], "absent.algid"),
+        (["compare", "absent.algid", "other.algid"], "absent.algid"),
+        (["report", "absent.algid"], "absent.algid"),
+        (["export", "absent.algid", "--to", "urdf"], "absent.algid"),
+        (["fleet", "absent"], "absent"),
+        (["guide", "nothing"], "nothing"),
+    ],
+    ids=lambda value: " ".join(value[:4]) if isinstance(value, list) else None,
+)
+def test_what_cannot_be_is_one_line_and_leaves_nothing(arguments: list[str], told: str, tmp_path: Path) -> None:
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "logs/a.csv").write_text("t,theta1\n")
+    done = Outcome(*arguments, cwd=tmp_path)
+    assert done.code == 2, done.err
+    assert told in done.err
+    assert "Traceback" not in done.err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["logs"]
