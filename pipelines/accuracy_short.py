@@ -23,6 +23,7 @@ import numpy as np
 from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.estimators import refined
 from algid.estimators.fit import Fit
+from algid.estimators.hedged import hedged
 from algid.estimators.selection import Selection, select
 from algid.estimators.weak import Source, WeakSettings
 from algid.identification.by_likelihood import without_nothing
@@ -90,7 +91,10 @@ def _fitted(sources: Sequence[Source], kind: Kind) -> tuple[Fit, Selection]:
         return _refined(sources, Selection(Model(kind.terms), delay=False), weak)
     fit, chosen = _refined(sources, select(sources, (), weak), weak)
     fewer = without_nothing(chosen, fit, Settings())
-    return (fit, chosen) if fewer == chosen else _refined(sources, fewer, weak)
+    if fewer != chosen:
+        fit, chosen = _refined(sources, fewer, weak)
+    own = replace(weak, model=chosen.model, estimate_delay=chosen.delay)
+    return hedged(fit, sources, (), own) if fit.note else fit, chosen
 
 
 def _refined(sources: Sequence[Source], chosen: Selection, weak: WeakSettings) -> tuple[Fit, Selection]:
