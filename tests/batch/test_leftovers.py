@@ -9,9 +9,12 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
 from algid.files import FRESH, TEMPORARY
 
 
+@pytest.mark.slow
 def test_the_folder_of_a_killed_batch_is_removed_by_the_next_one_and_a_fresh_one_is_not(tmp_path: Path) -> None:
     place = tmp_path / "tmp"
     place.mkdir()

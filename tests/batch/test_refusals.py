@@ -8,10 +8,12 @@ import sys
 from pathlib import Path
 
 import polars as pl
+import pytest
 
 from tests.batch.refusals import write_refusals
 
 
+@pytest.mark.slow
 def test_every_refusal_fails_its_own_job_and_no_worker(tmp_path: Path) -> None:
     logs, out = tmp_path / "logs", tmp_path / "out"
     logs.mkdir()

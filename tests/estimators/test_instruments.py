@@ -23,6 +23,7 @@ from pipelines.disturbance import logs
 from .conftest import Bench
 
 
+@pytest.mark.slow
 def test_instruments_undo_most_of_what_a_disturbance_does() -> None:
     arm = random_arm(1)[0]
     sources: list[Source] = [partial(list, [log]) for log in logs(arm, 3, 21)]
