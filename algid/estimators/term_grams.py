@@ -119,6 +119,7 @@ class Grams:
         )
         self._total = self._folds.sum(axis=0)
         self._squares: dict[tuple[int, ...], float] = {}
+        self._spreads: dict[tuple[int, ...], tuple[FloatArray, tuple[FloatArray, FloatArray], int]] = {}
 
     def _weigh(self, normals: Sequence[tuple[bool, Normal]]) -> None:
         weights: list[FloatArray] = [np.ones(2) for _ in normals]
@@ -190,20 +191,26 @@ class Grams:
         stretches of log behind them
         """
         columns = self._columns(among)
-        p = _solved(self._total, columns)
+        key = tuple(columns.tolist())  # each sub-model is asked for by every term that it has
+        if key not in self._spreads:
+            self._spreads[key] = self._spread(columns)
+        value, covariances, stretches = self._spreads[key]
+        names = {name for term in terms for name in term_names(term)}
+        own = [place for place, column in enumerate(columns) if column in self._own(names)]
+        found = [float(value[own] @ scaled_pinv(S[np.ix_(own, own)]) @ value[own]) for S in covariances]
+        return min(found), float(stretches)
+
+    def _spread(self, columns: IntArray) -> tuple[FloatArray, tuple[FloatArray, FloatArray], int]:
+        """Least squares with `columns`, its covariance by white noise and as a sandwich, and independent stretches."""
         inverse = scaled_pinv(self._total[np.ix_(columns, columns)])
+        value = inverse @ self._total[columns, -1]
         meat, stretches = np.zeros_like(inverse), 0
         for gram in self._logs:
-            variance, lags = long_run_variance((gram[:, :-1, -1] - gram[:, :-1, :-1] @ p)[:, columns])
+            variance, lags = long_run_variance(gram[:, columns, -1] - gram[:, columns[:, None], columns] @ value)
             meat += variance
             stretches += len(gram) // (lags + 1)
         stretches = max(stretches, len(columns) + 2)
-        robust = inverse @ meat @ inverse * (stretches / (stretches - len(columns)))
-        names = {name for term in terms for name in term_names(term)}
-        own = [place for place, column in enumerate(columns) if column in self._own(names)]
-        value = p[columns[own]]
-        found = [float(value @ scaled_pinv(S[np.ix_(own, own)]) @ value) for S in (inverse, robust)]
-        return min(found), float(stretches)
+        return value, (inverse, inverse @ meat @ inverse * (stretches / (stretches - len(columns)))), stretches
 
     def _own(self, names: set[str]) -> set[int]:
         return {place for place, name in enumerate(self.names) if name in names}
