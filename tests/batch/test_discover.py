@@ -34,6 +34,8 @@ def test_results_and_hidden_files_are_passed_over(tmp_path: Path) -> None:
 def test_a_glob_and_a_file_name_jobs_by_their_stems(tmp_path: Path) -> None:
     _touch(tmp_path, "x/a.mcap", "y/b.mcap")
     assert [job.name for job in jobs_of([str(tmp_path / "*/*.mcap")], "out")] == ["a", "b"]
+    (job,) = jobs_of([str(tmp_path / "x/a.mcap")], "out")
+    assert job == Job("a", logs=(str(tmp_path / "x/a.mcap"),))
     (job,) = jobs_of([str(tmp_path / "x/a.mcap")], "out", alone="loaded")
     assert job == Job("a", loaded=(str(tmp_path / "x/a.mcap"),))
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from algid.estimators import instruments, refined, weak
+from algid.estimators.combine import Prior
 from algid.estimators.modulating_functions import Windows
 from algid.estimators.refined import RefinedSettings
 from algid.estimators.weak import Source, WeakSettings
@@ -156,6 +157,19 @@ def test_windows_move_as_the_model_says_under_a_load_whose_sign_its_inertia_turn
     theta, omega, tau = np.random.default_rng(0).normal(size=(3, 2, 200))
     alpha = acceleration(model, c, theta, omega, tau)
     np.testing.assert_allclose(torque(model, c, Motion(theta, omega, alpha)), tau, atol=1e-12)
+
+
+def test_what_start_and_prior_know_stays_known(bench: Bench) -> None:
+    log = bench.log(sigma=1e-3)
+    least = weak.fit([lambda: [log]])
+    found = instruments.fit([lambda: [log]], start=least)
+    np.testing.assert_array_equal(found.moved, least.moved)
+    k4 = float(least.values[3])
+    sure = Prior(("k1", "k2", "k3", "k4"), np.array([*least.values[:3], 1.01 * k4]), np.diag([0, 0, 0, 1e10 / k4**2]))
+    told = instruments.fit([lambda: [log]], prior=sure)
+    assert told.prior is sure
+    assert told.values[3] == pytest.approx(1.01 * k4, rel=1e-3)
+    assert told.std[3] < 2e-5 * k4
 
 
 def test_of_a_long_log_the_first_pieces_are_looked_at(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
