@@ -6,6 +6,7 @@ import ast
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 
 PURE = frozenset(
     {
@@ -64,9 +65,15 @@ def _room(module: str) -> str:
     return [*module.split("."), ""][1]
 
 
+@cache
+def parsed(text: str) -> ast.Module:
+    """The syntax of a module, taken apart once for all that is asked of it."""
+    return ast.parse(text)
+
+
 def imported(module: str, text: str, sources: Mapping[str, str]) -> Iterator[str]:
     """What a module's text imports, anywhere in it, by exact names; "?" where a name is computed."""
-    for node in ast.walk(ast.parse(text)):
+    for node in ast.walk(parsed(text)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

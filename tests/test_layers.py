@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import algid
-from tests.layers import PURE, Room, breaches, cycles, imported, room
+from tests.layers import PURE, Room, breaches, cycles, imported, parsed, room
 
 ROOT = Path(algid.__file__).parent
 TABLE: dict[str, Room] = {  # lower rooms first
@@ -164,7 +164,7 @@ def test_importing_algid_loads_nothing_heavy() -> None:
 def test_a_public_class_has_a_name_of_its_own() -> None:
     found: dict[str, list[str]] = {}
     for path in sorted(ROOT.rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(parsed(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 found.setdefault(node.name, []).append(str(path.relative_to(ROOT)))
     assert {name: places for name, places in found.items() if len(places) > 1} == {}

@@ -17,6 +17,8 @@ import algid
 from algid.synth.sensors import Sensors
 
 PATIENCE = 60.0
+
+pytestmark = pytest.mark.slow
 HASTY = "from algid.batch import run; run.LOOK_EVERY = 1.0; from algid.cli import main; main()"  # s, instead of 2
 
 

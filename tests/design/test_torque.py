@@ -40,6 +40,7 @@ def test_swings_are_those_of_the_simulator() -> None:
         np.testing.assert_allclose(swings.theta[:, :, place].T, exact.theta, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_no_limit_breaks_for_arms_that_the_search_has_not_seen(design: Design) -> None:
     limits, belief = design.campaign.limits, design.campaign.belief
     torque = SampledTorque(design.t, design.torque[False], "foh")

@@ -16,10 +16,13 @@ from tests.report.folders import build_recorded, hostile
 
 RUN = Path(__file__).parents[3] / "shared/data/dfki/C1_sysid/20230629-143601.csv"
 
-pytestmark = pytest.mark.skipif(
-    DRIVER is None or shutil.which("chromium") is None,
-    reason="chromium and chromium-driver are not installed",
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        DRIVER is None or shutil.which("chromium") is None,
+        reason="chromium and chromium-driver are not installed",
+    ),
+]
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +47,7 @@ def assert_sound(seen: Seen, page: Path, title: str) -> None:
     assert seen.overflow <= 0
 
 
-@pytest.mark.parametrize(("width", "dark"), [(1400, False), pytest.param(400, True, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("width", "dark"), [(1400, False), (400, True)])
 def test_a_complete_report(browser: Browser, folder: Path, width: int, dark: bool) -> None:
     page = write_report(folder)
     seen = browser.look(page, width, dark)
@@ -55,7 +58,6 @@ def test_a_complete_report(browser: Browser, folder: Path, width: int, dark: boo
     assert seen.background == ("rgb(16, 21, 28)" if dark else "rgb(255, 255, 255)")
 
 
-@pytest.mark.slow
 def test_a_parameter_that_cannot_be_identified_and_the_library_beside(
     browser: Browser, folder: Path, result: Result
 ) -> None:
@@ -74,7 +76,6 @@ def test_a_parameter_that_cannot_be_identified_and_the_library_beside(
     assert_sound(replace(seen, requests=seen.requests[:1]), page, "case1-unloaded.mcap · algid")
 
 
-@pytest.mark.slow
 def test_a_log_whose_names_attack(browser: Browser, folder: Path, result: Result) -> None:
     write_result(hostile(result), folder / "result.json")
     page = write_report(folder)
@@ -91,7 +92,6 @@ def test_a_real_log(browser: Browser, tmp_path: Path) -> None:
     assert_sound(browser.look(page), page, f"{RUN.name} · algid")
 
 
-@pytest.mark.slow
 def test_figures_follow_legend_theme_keys_and_paper(browser: Browser, folder: Path) -> None:
     browser.look(write_report(folder))
     run = browser.driver.execute_script

@@ -190,6 +190,7 @@ def browser() -> Iterator[Browser]:
     opened.close()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     DRIVER is None or shutil.which("chromium") is None, reason="chromium and chromium-driver are not installed"
 )
