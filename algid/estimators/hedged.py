@@ -20,8 +20,6 @@ from algid.estimators.fit import Fit
 from algid.estimators.selection import FIRST_TERMS
 from algid.estimators.weak import Source, WeakSettings
 
-_TOLD = f"its error bars are as wide as with {', '.join(FIRST_TERMS)} and delay, which the logs left out"
-
 
 def hedged(
     fit: Fit,
@@ -58,9 +56,12 @@ def hedged(
     own = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     floor = np.array([told.get(name, 0.0) for name in fit.names])
     factor = np.divide(np.maximum(own, floor), own, out=np.ones_like(own), where=own > 0)
+    added = [term for term in terms if term not in settings.model.terms]
+    if delayed and not settings.estimate_delay:
+        added.append("delay")
+    widened = fit.note and np.any(factor > 1)
     return replace(
         fit,
         covariance=fit.covariance * np.outer(factor, factor),
-        quantile=max(fit.quantile, general.quantile),
-        note=f"{fit.note}; {_TOLD}" if np.any(factor > 1) and fit.note else fit.note,
+        note=f"{fit.note}, with error bars as wide as beside {', '.join(added)}" if widened else fit.note,
     )
