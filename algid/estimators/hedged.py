@@ -63,5 +63,5 @@ def hedged(
     return replace(
         fit,
         covariance=fit.covariance * np.outer(factor, factor),
-        note=f"{fit.note}, with error bars as wide as beside {', '.join(added)}" if widened else fit.note,
+        note=f"{fit.note}, with error bars as if it had {', '.join(added)} too" if widened else fit.note,
     )

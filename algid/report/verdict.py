@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from algid.report.text import joined, significant, visible
+from algid.report.text import LONGEST, joined, significant, visible
 from algid.results import Bound, Estimate, FitSummary, Result, Status, TorquePrediction
 from algid.words import counted
 
@@ -204,7 +204,7 @@ def _reasons(result: Result) -> Iterator[str]:
     yield from _far_from_truth(result)
     told = {f"{name} is not determined" for name, found in result.estimates.items() if found.estimate is None}
     told |= {warning for warning in result.warnings if _is_implausible(result) and warning.startswith(BREAKS)}
-    yield from (f"algid warns: {visible(warning)}" for warning in result.warnings if warning not in told)
+    yield from (f"algid warns: {visible(warning, 2 * LONGEST)}" for warning in result.warnings if warning not in told)
 
 
 def _bad_statuses(result: Result) -> Iterator[str]:

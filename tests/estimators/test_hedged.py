@@ -38,10 +38,10 @@ def test_no_error_bar_is_narrower_than_with_every_common_term(bench: Bench) -> N
     assert found.quantile == fit.quantile
     size, wide = np.outer(fit.std, fit.std), np.outer(found.std, found.std)
     np.testing.assert_allclose(found.covariance / wide, fit.covariance / size, atol=1e-12)  # correlations stay
-    assert found.note == "refuted, with error bars as wide as beside coulomb, offset, rotor, delay"
+    assert found.note == "refuted, with error bars as if it had coulomb, offset, rotor, delay too"
     rubbing = WeakSettings(model=Model(("coulomb",)))
     known = hedged(replace(weak.fit([lambda: [log]], settings=rubbing), note="refuted"), [lambda: [log]], [], rubbing)
-    assert known.note == "refuted, with error bars as wide as beside offset, rotor, delay"
+    assert known.note == "refuted, with error bars as if it had offset, rotor, delay too"
 
 
 def test_a_fit_with_every_term_and_one_of_four_logs_stay_as_they_are(bench: Bench) -> None:
@@ -83,5 +83,5 @@ def test_a_refuted_log_is_hedged_where_it_chose_its_terms_itself() -> None:
     stds = np.array([[one.parameters[name].std for name in own] for one in (chosen, told)], dtype=np.float64)
     assert np.all(stds[0] >= stds[1] * (1 - 1e-9))
     assert np.any(stds[0] > 1.05 * stds[1])
-    assert any("with error bars as wide as beside" in text for text in chosen.warnings)
-    assert not any("with error bars as wide as beside" in text for text in told.warnings)
+    assert any("with error bars as if it had" in text for text in chosen.warnings)
+    assert not any("with error bars as if it had" in text for text in told.warnings)
