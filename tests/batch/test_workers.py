@@ -72,6 +72,7 @@ def test_a_call_past_its_time_fails_alone_and_its_worker_is_replaced() -> None:
         assert futures[1].result(timeout=60) == 2
 
 
+@pytest.mark.skipif(sys.gettrace() is not None, reason="a traced call is not interrupted as a call is")
 def test_a_call_that_goes_on_on_a_cluster_is_interrupted_or_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     assert pickle.loads(answered_within(pickle.dumps((calls.add, (1, 1), {})), 60.0)) == (True, 2)
     spinning = pickle.dumps((calls.spin, (), {}))
