@@ -67,14 +67,6 @@ def contenders(folder: Path) -> list[Contender]:
     out = folder / "out"
     weak = ("--estimator", "weak", "--no-report")
     found = [
-        *(
-            Contender(f"weak {name}", identify(log, out, *weak, "--model", "plain"), times=_QUICK)
-            for name, log in (("second", second), ("million", million))
-        ),
-        *(
-            Contender(f"chosen {name}", identify(log, out, *weak))
-            for name, log in (("second", second), ("million", million))
-        ),
         Contender("polars", peer("polars", million), times=_QUICK),
         Contender("help", python("-m", "algid", "--help"), times=_QUICK),
         Contender("empty typer help", python("-c", EMPTY_APP, "--help"), times=_QUICK),
@@ -82,6 +74,8 @@ def contenders(folder: Path) -> list[Contender]:
         Contender("second, report", identify(second, out)),
     ]
     for name, log in (("second", second), ("million", million)):
+        found.append(Contender(f"weak {name}", identify(log, out, *weak, "--model", "plain"), times=_QUICK))
+        found.append(Contender(f"chosen {name}", identify(log, out, *weak), times=_QUICK))
         found.append(Contender(f"paper {name}", identify(log, out, "--estimator", "paper", "--no-report")))
         found += [Contender(f"{p} {name}", peer(p, log), rounds=3) for p in ("least_squares", "pysindy")]
         found.append(Contender(f"pinocchio {name}", peer("pinocchio", log), rounds=1))

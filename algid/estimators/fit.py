@@ -171,12 +171,12 @@ def conclude(
     if coloured:
         robust, freedom = _robust(shared, logs, beta, known, prior)
         # The long-run variance of a short log errs low; white noise alone is the least there can be.
-        covariance = robust if estimator != "refined" else _widened(robust, covariance)
+        covariance = robust if estimator != "refined" else widened(robust, covariance)
         quantile, intervals = _quantile(freedom), "sandwich"
         without = left_out(shared, logs, beta, prior) if without is None else without
         repeated = jackknife(logs, without)
         if repeated is not None:
-            wide = _widened(covariance, repeated)
+            wide = widened(covariance, repeated)
             quantile = _quantile(_satterthwaite(covariance, wide, freedom, _repeats(logs)))
             covariance, intervals = wide, "jackknife"
     return Fit(
@@ -228,7 +228,7 @@ def _repeats(logs: Sequence[LogInformation]) -> int:
     return sum(count - 1 for count in kinds if count > 0)
 
 
-def _widened(robust: FloatArray, least: FloatArray) -> FloatArray:
+def widened(robust: FloatArray, least: FloatArray) -> FloatArray:
     """The robust covariance with no standard deviation below that of `least`, correlations kept."""
     size, floor = np.sqrt(np.maximum(np.diag(robust), 0.0)), np.sqrt(np.maximum(np.diag(least), 0.0))
     factor = np.divide(np.maximum(size, floor), size, out=np.ones_like(size), where=size > 0)

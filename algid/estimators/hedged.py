@@ -16,7 +16,7 @@ import numpy as np
 
 from algid.estimators import weak
 from algid.estimators.combine import FEWEST_LOGS, Prior
-from algid.estimators.fit import Fit
+from algid.estimators.fit import Fit, widened
 from algid.estimators.selection import FIRST_TERMS
 from algid.estimators.weak import Source, WeakSettings
 
@@ -48,20 +48,13 @@ def hedged(
     delayed = settings.estimate_delay or (settings.delay == 0 and "lag" not in terms)
     larger = replace(settings, model=replace(settings.model, terms=terms), estimate_delay=delayed)
     general = weak.fit(unloaded, loaded, larger, dict(lengths or {}), prior)
-    told = {
-        name: std
-        for name, std, status in zip(general.names, general.std, general.status, strict=True)
-        if status == "OK"
-    }
-    own = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    floor = np.array([told.get(name, 0.0) for name in fit.names])
-    factor = np.divide(np.maximum(own, floor), own, out=np.ones_like(own), where=own > 0)
+    stds = zip(general.names, general.std, general.status, strict=True)
+    told = {name: std for name, std, status in stds if status == "OK"}
+    least = np.array([told.get(name, 0.0) for name in fit.names])
+    covariance = widened(fit.covariance, np.diag(least**2))
+    if not fit.note or np.array_equal(covariance, fit.covariance):
+        return replace(fit, covariance=covariance)
     added = [term for term in terms if term not in settings.model.terms]
     if delayed and not settings.estimate_delay:
         added.append("delay")
-    widened = fit.note and np.any(factor > 1)
-    return replace(
-        fit,
-        covariance=fit.covariance * np.outer(factor, factor),
-        note=f"{fit.note}, with error bars as if it had {', '.join(added)} too" if widened else fit.note,
-    )
+    return replace(fit, covariance=covariance, note=f"{fit.note}, with error bars as if it had {', '.join(added)} too")

@@ -195,8 +195,8 @@ class Grams:
         if key not in self._spreads:
             self._spreads[key] = self._spread(columns)
         value, covariances, stretches = self._spreads[key]
-        names = {name for term in terms for name in term_names(term)}
-        own = [place for place, column in enumerate(columns) if column in self._own(names)]
+        asked = self._own({name for term in terms for name in term_names(term)})
+        own = [place for place, column in enumerate(columns) if column in asked]
         found = [float(value[own] @ scaled_pinv(S[np.ix_(own, own)]) @ value[own]) for S in covariances]
         return min(found), float(stretches)
 

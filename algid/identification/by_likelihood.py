@@ -126,8 +126,9 @@ def with_hedge(fit: Fit, survey: Survey, settings: Settings, chosen: Selection, 
 
     One that physics contradicts stays as sure as it is, so that the contradiction is told.
     """
-    contradicted = any(bound.distance is not None and bound.distance > FAR_BEYOND for bound in broken_bounds(fit))
-    if contradicted or not (fit.note and settings.chooses):
+    if not (fit.note and settings.chooses):
+        return fit
+    if any(bound.distance is not None and bound.distance > FAR_BEYOND for bound in broken_bounds(fit)):
         return fit
     unloaded, loaded = (_passes(survey, logs, settings) for logs in (survey.unloaded, survey.loaded))
     return hedged(fit, unloaded, loaded, _weak_settings(settings, chosen), settings.lengths, prior)

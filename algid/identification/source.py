@@ -25,7 +25,7 @@ Role = Literal["unloaded", "loaded"]
 EXAMINED = 1 << 16
 """Samples at the start of a long log that the named checks look at."""
 MOST_KEPT = 1 << 20
-"""Samples of all logs together that are kept in memory, 64 bytes each, so that they are read once."""
+"""Samples of all logs together that are kept in memory, 48 bytes each with velocities, so that they are read once."""
 
 
 @dataclass(frozen=True)
@@ -241,6 +241,8 @@ class Survey:
             rows += len(piece)
             if rows <= self._room:
                 held.append(piece)
+            else:
+                held.clear()
             yield piece
         if rows <= self._room and log not in self._kept:
             self._kept[log] = tuple(held)

@@ -46,8 +46,9 @@ def open_arrays(path: Path, kind: str, profile: Profile | None = None) -> TableR
         columns = replace(columns, time_unit="ns", time_told=True)
     numbers = {joint: name for joint, name in columns.others.items() if frame.schema[name].is_numeric()}
     columns = replace(columns, others=numbers)
-    tables_of = lambda chosen: _Whole(path, frame, chosen).tables  # noqa: E731
-    return columns.reader(str(path), kind, None, tables_of, profile, frame.height)
+    return columns.reader(
+        str(path), kind, None, lambda chosen: _Whole(path, frame, chosen).tables, profile, frame.height
+    )
 
 
 def _units(path: Path, columns: Sequence[str]) -> dict[str, str]:

@@ -48,8 +48,10 @@ def open_csv(path: Path, profile: Profile | None = None, kind: str = "csv") -> T
         columns = replace(columns, time_unit="ns", time_told=True)
     sums = companion.sums if companion else {}
     truth = companion.truth if companion else None
-    tables_of = lambda chosen: _Text(path, kind, dialect, chosen, sums).tables  # noqa: E731
-    return columns.reader(str(path), "csv", truth, tables_of, profile, _rows(path, kind, head))
+    rows = _rows(path, kind, head)
+    return columns.reader(
+        str(path), "csv", truth, lambda chosen: _Text(path, kind, dialect, chosen, sums).tables, profile, rows
+    )
 
 
 def head_bytes(path: Path, kind: str) -> bytes:

@@ -210,19 +210,19 @@ def other_joints(columns: Iterable[str], angles: Collection[str]) -> dict[str, s
     """By joint the column of its angle, of the joints that are not read: those named as the columns `angles` are."""
     parts = {column: take_apart(column) for column in columns}
     parts |= _worded(parts)
-    read = {_place(parts[column].joint) for column in angles}
-    kinds = {(parts[column].stem, where) for column in angles for where, _ in (_place(parts[column].joint),)}
-    found = {}
-    for column, name in parts.items():
-        if name.joint and _place(name.joint) not in read and (name.stem, _place(name.joint)[0]) in kinds:
-            found[name.joint.rsplit("/", 1)[-1]] = column
-    return found
+    read = [parts[column] for column in angles]
+    kinds = {(name.stem, _topic(name)) for name in read}
+    joints = {name.joint for name in read}
+    return {
+        name.joint.rsplit("/", 1)[-1]: column
+        for column, name in parts.items()
+        if name.joint and name.joint not in joints and (name.stem, _topic(name)) in kinds
+    }
 
 
-def _place(joint: str | None) -> tuple[str, str]:
-    """The topic before a joint's name, if any, and the name."""
-    where, _, name = (joint or "").rpartition("/")
-    return where, name
+def _topic(name: Name) -> str:
+    """What stands before a joint's own name, as in ``/joint_states/elbow``."""
+    return (name.joint or "").rpartition("/")[0]
 
 
 def _worded(parts: dict[str, Name]) -> dict[str, Name]:

@@ -53,8 +53,10 @@ def open_parquet(path: Path, profile: Profile | None = None) -> TableReader:
         columns = replace(columns, notices=(*columns.notices, _NO_SUMS))
     _check_types(path, columns, available, schema)
     sums = companion.sums if companion else {}
-    tables_of = lambda chosen: _Groups(path, chosen, available, schema, sums).tables  # noqa: E731
-    return columns.reader(str(path), "parquet", companion.truth if companion else None, tables_of, profile, rows)
+    truth = companion.truth if companion else None
+    return columns.reader(
+        str(path), "parquet", truth, lambda chosen: _Groups(path, chosen, available, schema, sums).tables, profile, rows
+    )
 
 
 def schema_of(path: Path) -> dict[str, pl.DataType]:

@@ -125,8 +125,8 @@ def recursion(
     """A signal x (n,) after the filter Σ b_k z^-k / Σ a_k z^-k, b and a (m + 1,), a_0 = 1, and the state it leaves.
 
     The recursion Σ a_k y[i - k] = Σ b_k x[i - k] is one triangular banded system. `state` (m,) is what the samples
-    before add to its right side; zeros are a filter at rest. (`scipy.signal.sosfilt` does the same; its package takes
-    twice as long to import as a short log to identify.)
+    before add to its right side; zeros are a filter at rest. (`scipy.signal.lfilter` does the same; its package takes
+    a second to import, which a short log does not take to identify.)
     """
     from scipy.linalg import lapack
 

@@ -69,12 +69,12 @@ class LuenbergerObserver:
         gain = observer_gain(poles)
         joints = (slice(0, 3), slice(3, 6))
         self._filters = [_differentiator(gain[own, joint], poles[own], dt) for joint, own in enumerate(joints)]
-        self._rest: FloatArray | None = None
-        self._states = np.zeros((2, 3))
+        self.reset()
 
     def reset(self) -> None:
         """Forget the state: the next call starts at rest."""
-        self._rest = None
+        self._rest: FloatArray | None = None
+        self._states = np.zeros((2, 3))
 
     def velocities(self, theta: FloatArray) -> FloatArray:
         """Observed joint velocities (2, N) in rad/s of the angles `theta` (2, N) in rad.
@@ -84,7 +84,6 @@ class LuenbergerObserver:
         """
         if self._rest is None:
             self._rest = theta[:, 0].copy()
-            self._states = np.zeros((2, 3))
         found = np.empty_like(theta)
         for joint, (numerator, denominator) in enumerate(self._filters):
             moved = theta[joint] - self._rest[joint]
