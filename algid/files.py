@@ -126,7 +126,9 @@ def first_misfit(error: ValidationError) -> str:
     first, *others = error.errors(include_url=False, include_context=False)
     place = ".".join(str(part) for part in first["loc"]) or "top level"
     more = f" (and {len(others)} more)" if others else ""
-    return f"{place}: {first['msg'].lower()}, found {reprlib.repr(first['input']):.60}{more}"
+    # The same misfit has other words in a dataclass than in a model.
+    said = "extra inputs are not permitted" if first["type"] == "unexpected_keyword_argument" else first["msg"].lower()
+    return f"{place}: {said}, found {reprlib.repr(first['input']):.60}{more}"
 
 
 FRESH = 60.0  # s; a folder may be younger than the hold on it

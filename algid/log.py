@@ -22,9 +22,9 @@ from __future__ import annotations
 import json
 import math
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +65,10 @@ class Notice:
     note: bool = False
 
 
+SAME_OFFSET = 1e-9
+"""rad or N m: offsets this close are one, written in different units."""
+STRICT = {"extra": "forbid"}
+"""For pydantic, which reads readings from results: a field of another name is refused."""
 Teller = Literal["flag", "profile", "names", "order"]
 
 
@@ -75,6 +79,8 @@ class ChannelReading:
     `unit` is that of the recorded values; `told` by a flag or a profile, by the channel's own name, or not at all
     ("assumed"). `offset` is in rad, N m or rad/s.
     """
+
+    __pydantic_config__: ClassVar = STRICT
 
     source: str
     unit: str
@@ -110,6 +116,8 @@ class Reading:
     accepted : codes of the checks that may not refuse the log
     """
 
+    __pydantic_config__: ClassVar = STRICT
+
     channels: Mapping[str, ChannelReading] = field(default_factory=dict)
     joints: tuple[str, str] | None = None
     joints_told: Teller | None = None
@@ -130,6 +138,22 @@ class Reading:
     def told(self, name: str) -> bool:
         """Whether the user said the unit of the canonical channel `name`."""
         return name in self.channels and self.channels[name].told in ("flag", "profile")
+
+    def differences(self, other: Reading) -> Iterator[str]:
+        """What decides the estimates and is read otherwise here than in `other`, in clauses."""
+        for name in ("zero", "second_angle", "drive", "joints"):
+            mine, others = getattr(self, name), getattr(other, name)
+            if mine != others and mine is not None and others is not None:
+                words = (one if isinstance(one, str) else ",".join(one) for one in (mine, others))
+                yield f"{name} {' instead of '.join(words)}"
+        for name in self.channels.keys() & other.channels.keys():
+            mine, others = self.channels[name], other.channels[name]
+            if mine.unit != others.unit:
+                yield f"{name} in {mine.unit} instead of {others.unit}"
+            if mine.factor * others.factor < 0:
+                yield f"{name} with the other sign"
+            if abs(mine.offset - others.offset) > SAME_OFFSET:
+                yield f"{name} offset by {mine.offset:.6g} instead of {others.offset:.6g}"
 
 
 @dataclass(frozen=True)

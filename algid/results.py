@@ -19,6 +19,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from algid.errors import ResultError
 from algid.files import first_misfit, read_text, whole_file
+from algid.log import Reading
 from algid.words import counted
 
 SCHEMA_VERSION: Literal[2] = 2
@@ -67,63 +68,6 @@ class Table4Row(_Model):
     paper_error_percent: float | None = None
 
 
-class ChannelRecord(_Model):
-    """How one channel was read: algid's value is `factor` times the recorded one, in `unit`, plus `offset` in SI.
-
-    `told` is who said so: a flag, a profile, the channel's name, or nobody ("assumed").
-    """
-
-    source: str
-    unit: str
-    told: str = "assumed"
-    factor: float = 1.0
-    offset: float = 0.0
-
-
-class LogReading(_Model):
-    """How a log was read: see `algid.log.Reading`, whose fields these are."""
-
-    channels: dict[str, ChannelRecord] = {}
-    joints: tuple[str, str] | None = None
-    joints_told: str | None = None
-    topics: list[str] = []
-    clock: str | None = None
-    time_unit: str | None = None
-    zero: str = "horizontal"
-    second_angle: str = "relative"
-    drive: str = "joint"
-    passive: int | None = None
-    signs: tuple[int, int] = (1, 1)
-    offsets: tuple[float, float] = (0.0, 0.0)
-    unwrap: tuple[bool, bool] = (False, False)
-    start: float | None = None
-    end: float | None = None
-    accepted: list[str] = []
-
-    def differences(self, other: LogReading) -> Iterator[str]:
-        """What decides the estimates and is read otherwise here than in `other`, in clauses."""
-        for name in ("zero", "second_angle", "drive", "joints"):
-            mine, others = getattr(self, name), getattr(other, name)
-            if mine != others and mine is not None and others is not None:
-                yield f"{name} {_words(mine)} instead of {_words(others)}"
-        for name in self.channels.keys() & other.channels.keys():
-            mine, others = self.channels[name], other.channels[name]
-            if mine.unit != others.unit:
-                yield f"{name} in {mine.unit} instead of {others.unit}"
-            if mine.factor * others.factor < 0:
-                yield f"{name} with the other sign"
-            if abs(mine.offset - others.offset) > SAME_OFFSET:
-                yield f"{name} offset by {mine.offset:.6g} instead of {others.offset:.6g}"
-
-
-def _words(value: str | tuple[str, str]) -> str:
-    return value if isinstance(value, str) else ",".join(value)
-
-
-SAME_OFFSET = 1e-9
-"""rad or N m: offsets this close are one, written in different units."""
-
-
 class LogSummary(_Model):
     """A log that was used: first stamp in ns, duration in s, rate in Hz, each signal's channel, how it was read.
 
@@ -140,7 +84,7 @@ class LogSummary(_Model):
     duration: float
     rate: float
     mapping: dict[str, str]
-    reading: LogReading | None = None
+    reading: Reading | None = None
 
 
 class WhitenessTest(_Model):

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
+
+import pytest
 
 import algid
+from algid.errors import ResultError
 from algid.identification.identify import identify
 from algid.log import ChannelReading, Reading
-from algid.results import ChannelRecord, LogReading, Result, Status
+from algid.results import Result, Status, write_result
 from tests.report.folders import build
 
 
@@ -54,6 +58,93 @@ def test_a_result_of_the_first_schema_is_still_read(tmp_path: Path) -> None:
     assert old.parameters["k1"].status is Status.OK
 
 
-def test_a_result_keeps_all_that_a_reader_decided() -> None:
-    assert {field.name for field in fields(Reading)} == set(LogReading.model_fields)
-    assert {field.name for field in fields(ChannelReading)} == set(ChannelRecord.model_fields)
+READING = Reading(
+    channels={"tau1": ChannelReading("effort", "mN m", "flag", -1e-3, 0.25)},
+    joints=("shoulder", "elbow"),
+    joints_told="order",
+    topics=("/one", "/two"),
+    clock="log",
+    time_unit="ns",
+    zero="hanging",
+    second_angle="absolute",
+    drive="base",
+    passive=2,
+    signs=(1, -1),
+    offsets=(0.5, -0.125),
+    unwrap=(False, True),
+    start=0.5,
+    end=2.0,
+    accepted=("LOST_SAMPLES",),
+)
+
+
+def test_a_result_keeps_all_that_a_reader_decided(tmp_path: Path) -> None:
+    assert all(getattr(READING, field.name) != getattr(Reading(), field.name) for field in fields(Reading))
+    made = build(tmp_path / "a.algid", duration=1.0)
+    made = made.model_copy(update={"log": made.log.model_copy(update={"reading": READING})})
+    write_result(made, tmp_path / "result.json")
+    assert algid.read_result(tmp_path / "result.json").log.reading == READING
+    held = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))["log"]["reading"]
+    assert held["channels"]["tau1"] == {
+        "source": "effort",
+        "unit": "mN m",
+        "told": "flag",
+        "factor": -1e-3,
+        "offset": 0.25,
+    }
+    assert list(held) == [field.name for field in fields(Reading)]
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "expected"),
+    [
+        ("nonsense", 1, "log.reading.nonsense: extra inputs are not permitted, found 1"),
+        ("passive", "a", "log.reading.passive: input should be a valid integer, unable to parse .* found 'a'"),
+        ("offsets", [1.0], r"log.reading.offsets.1: field required, found \[1.0\]"),
+        ("channels.tau1.nonsense", 1, "log.reading.channels.tau1.nonsense: extra inputs are not permitted, found 1"),
+        ("channels.tau1.factor", "x", "log.reading.channels.tau1.factor: input should be a valid number, .* found 'x'"),
+        ("joints_told", "nobody", "log.reading.joints_told: input should be 'flag', 'profile', 'names' or 'order', .*"),
+    ],
+)
+def test_a_reading_that_is_none_is_refused_by_its_place(
+    tmp_path: Path, place: str, value: object, expected: str
+) -> None:
+    made = build(tmp_path / "a.algid", duration=1.0)
+    content = made.model_copy(update={"log": made.log.model_copy(update={"reading": READING})}).model_dump(mode="json")
+    *folders, name = place.split(".")
+    inner = content["log"]["reading"]
+    for folder in folders:
+        inner = inner[folder]
+    inner[name] = value
+    file = tmp_path / "result.json"
+    file.write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(ResultError, match=rf"^{file}: {expected}; identify again with this version$"):
+        algid.read_result(file)
+
+
+def other(**changes: Any) -> list[str]:
+    """The clauses that tell `READING` from one with `changes`; those of a channel are its own."""
+    channel = {name: changes.pop(name) for name in list(changes) if name in ("unit", "factor", "offset")}
+    channels = {"tau1": replace(READING.channels["tau1"], **channel)}
+    return list(READING.differences(replace(READING, channels=channels, **changes)))
+
+
+def test_readings_differ_by_what_decides_the_estimates() -> None:
+    assert other() == []
+    assert other(zero="horizontal", joints=("elbow", "shoulder")) == [
+        "zero hanging instead of horizontal",
+        "joints shoulder,elbow instead of elbow,shoulder",
+    ]
+    assert other(second_angle="relative") == ["second_angle absolute instead of relative"]
+    assert other(drive="joint") == ["drive base instead of joint"]
+    assert other(unit="N m") == ["tau1 in mN m instead of N m"]
+    assert other(factor=1e-3) == ["tau1 with the other sign"]
+    assert other(offset=0.5) == ["tau1 offset by 0.25 instead of 0.5"]
+
+
+def test_readings_of_other_words_for_the_same_numbers_do_not_differ() -> None:
+    assert other(joints=None, topics=("/three",), clock="header", start=None, accepted=()) == []
+    assert other(factor=-2.0) == []
+    assert other(offset=0.25 + 5e-10) == []
+    assert other(offset=0.25 + 2e-9) == ["tau1 offset by 0.25 instead of 0.25"]
+    assert list(READING.differences(Reading(zero="hanging", second_angle="absolute", drive="base"))) == []

@@ -30,7 +30,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "stores": room("errors files", "pyarrow"),
     "profile": room("errors files units", "pydantic"),
     "settings": room("errors model signals"),
-    "results": room("errors files words", "pydantic"),
+    "results": room("errors files log words", "pydantic"),
     "synth": room("arm errors files log progress", "numpy pydantic scipy"),
     "table4": room("arm log results synth", "numpy"),
     "writers": room("errors files log ros2", "mcap numpy polars pyarrow"),

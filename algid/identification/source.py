@@ -5,16 +5,16 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from itertools import chain
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Literal
 
 from algid.errors import LogError
-from algid.log import Log, Notice, Origin, Reading
+from algid.log import Log, Notice, Origin
 from algid.progress import Told
-from algid.results import ChannelRecord, LogReading, LogSummary, Result
+from algid.results import LogSummary, Result
 from algid.runtime import Beside, ahead
 from algid.signals.segments import Segment, segments
 
@@ -277,7 +277,7 @@ class Survey:
             duration=duration,
             rate=(seen.rows - 1) / duration if duration > 0 else 0.0,
             mapping=dict(log.origin.mapping),
-            reading=_reading(log.origin.reading),
+            reading=log.origin.reading,
         )
 
     def _sha256(self, log: LogSource) -> str | None:
@@ -324,13 +324,6 @@ class Survey:
         self._done[log] = rows
         expected = [self._seen[one].rows if one in self._seen else one.promised for one in self._over]
         self.told(words, sum(self._done.values()), sum(expected) if all(expected) else 0)
-
-
-def _reading(reading: Reading) -> LogReading:
-    return LogReading(
-        **{f.name: getattr(reading, f.name) for f in fields(reading) if f.name != "channels"},
-        channels={name: ChannelRecord(**asdict(one)) for name, one in reading.channels.items()},
-    )
 
 
 def read_otherwise(logs: Sequence[LogSummary], earlier: Result, file: str) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from algid.report.table import Column, Table
 from algid.report.tables import flat_settings
@@ -144,7 +144,7 @@ def _readings(result: Result) -> dict[str, str]:
         f"{role} log: {name}": value
         for role, log in firsts.items()
         if log.reading is not None
-        for name, value in flat_settings(log.reading.model_dump()).items()
+        for name, value in flat_settings(asdict(log.reading)).items()
     }
 
 
