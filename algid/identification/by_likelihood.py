@@ -48,20 +48,16 @@ def choose_model(survey: Survey, settings: Settings, earlier: Result | None = No
     if not settings.chooses and not needs_shape(settings.terms):
         return _given(plain, settings.terms)
     candidates = [term for term in CHOICE if term != "delay" or settings.delay == 0] if settings.chooses else []
-    unloaded, loaded = (_passes(survey, logs, settings) for logs in (survey.unloaded, survey.loaded))
+    unloaded, loaded = _passes(survey, settings)
     try:
         return select(unloaded, loaded, _weak_settings(settings, _given(plain, ())), candidates, settings.terms)
     except ValueError as error:
-        raise _too_short(survey, error) from error
+        raise LogError(f"{', '.join(log.name for log in survey.logs)}: {error}; record longer") from error
 
 
 def _given(model: Model, terms: Sequence[str]) -> Selection:
     wanted = tuple(term for term in (*model.terms, *terms) if term != "delay")
     return Selection(replace(model, terms=wanted), "delay" in terms)
-
-
-def _too_short(survey: Survey, error: ValueError) -> LogError:
-    return LogError(f"{', '.join(log.name for log in survey.logs)}: {error}; record longer")
 
 
 def run_fit(survey: Survey, settings: Settings, chosen: Selection, prior: Prior | None) -> tuple[Fit, Predictions]:
@@ -87,19 +83,29 @@ def run_fit(survey: Survey, settings: Settings, chosen: Selection, prior: Prior 
         If no log is long enough.
     """
     sums: dict[LogSource, PredictionSums] = {}
-    weak_settings = _weak_settings(settings, chosen)
-    unloaded, loaded = (_watching(survey, logs, settings, chosen, sums) for logs in (survey.unloaded, survey.loaded))
+    ours = _weak_settings(settings, chosen)
+    scored = chosen.model.linear and not chosen.delay and "lag" not in chosen.model.terms  # depends on no estimate
+    unloaded, loaded = _passes(survey, settings, partial(_scored, chosen.model, settings, sums) if scored else None)
     try:
         if settings.estimator == "weak":
-            fit = weak.fit(unloaded, loaded, weak_settings, settings.lengths, prior)
+            fit = weak.fit(unloaded, loaded, ours, settings.lengths, prior)
         elif settings.estimator == "instruments":
-            fit = instruments.fit(unloaded, loaded, weak_settings, settings.lengths, prior)
+            fit = instruments.fit(unloaded, loaded, ours, settings.lengths, prior)
         else:
-            fit = refined.fit(unloaded, loaded, _refined_settings(settings, weak_settings, prior), survey.told)
+            refining = refined.RefinedSettings(
+                model=ours.model,
+                hold=ours.hold,
+                delay=ours.delay,
+                estimate_delay=ours.estimate_delay,
+                lengths=settings.lengths,
+                prior=prior,
+                weak=ours,
+            )
+            fit = refined.fit(unloaded, loaded, refining, survey.told)
             if fit.note:
-                fit = _foretelling(fit, unloaded, loaded, weak_settings, settings, prior)
+                fit = _foretelling(fit, unloaded, loaded, ours, settings, prior)
     except ValueError as error:
-        raise _too_short(survey, error) from error
+        raise LogError(f"{', '.join(log.name for log in survey.logs)}: {error}; record longer") from error
     return constrained(fit) if settings.constrain else fit, sums
 
 
@@ -114,9 +120,11 @@ def residual_of(survey: Survey, settings: Settings, chosen: Selection, fit: Fit)
     if fit.shared.delay:
         found = float(fit.values[fit.names.index("delay")])
         weak_settings = replace(weak_settings, delay=found, estimate_delay=False)
+    unloaded, loaded = _passes(survey, settings)
     sums = [
-        weak.residuals(moving, weak_settings, torque_coefficients(fit, log.role))
-        for log, moving in zip(survey.logs, _passes(survey, survey.logs, settings), strict=True)
+        weak.residuals(moving, weak_settings, torque_coefficients(fit, role))
+        for role, passes in (("unloaded", unloaded), ("loaded", loaded))
+        for moving in passes
     ]
     return pooled([one for one in sums if one is not None])
 
@@ -130,13 +138,13 @@ def with_hedge(fit: Fit, survey: Survey, settings: Settings, chosen: Selection, 
         return fit
     if any(bound.distance is not None and bound.distance > FAR_BEYOND for bound in broken_bounds(fit)):
         return fit
-    unloaded, loaded = (_passes(survey, logs, settings) for logs in (survey.unloaded, survey.loaded))
+    unloaded, loaded = _passes(survey, settings)
     return hedged(fit, unloaded, loaded, _weak_settings(settings, chosen), settings.lengths, prior)
 
 
 def with_endogeneity(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) -> Fit:
     """The fit with how far instruments and least squares are apart on its logs."""
-    unloaded, loaded = (_passes(survey, logs, settings) for logs in (survey.unloaded, survey.loaded))
+    unloaded, loaded = _passes(survey, settings)
     return replace(fit, endogeneity=instruments.endogeneity(unloaded, loaded, _weak_settings(settings, chosen), fit))
 
 
@@ -204,49 +212,26 @@ def _weak_settings(settings: Settings, chosen: Selection) -> weak.WeakSettings:
     return ours if settings.window is None else replace(ours, window=settings.window)
 
 
-def _refined_settings(
-    settings: Settings, weak_settings: weak.WeakSettings, prior: Prior | None
-) -> refined.RefinedSettings:
-    return refined.RefinedSettings(
-        model=weak_settings.model,
-        hold=weak_settings.hold,
-        delay=weak_settings.delay,
-        estimate_delay=weak_settings.estimate_delay,
-        lengths=settings.lengths,
-        prior=prior,
-        weak=weak_settings,
-    )
+def _passes(
+    survey: Survey, settings: Settings, watched: Callable[[LogSource, Pass], Iterator[Segment]] | None = None
+) -> tuple[list[Pass], list[Pass]]:
+    """A callable a log, unloaded and loaded, that gives a fresh pass, `watched` where someone looks on.
 
-
-def _passes(survey: Survey, logs: Sequence[LogSource], settings: Settings) -> list[Pass]:
-    """A callable a log that gives a fresh pass, with velocities only where they are not observed on the way."""
+    Segments have velocities only where they are not observed on the way.
+    """
     own = settings.velocity == "measured" or settings.luenberger
-    return [
-        partial(with_velocities, survey, log, settings, luenberger=settings.luenberger)
-        if own
-        else partial(survey.segments, log)
-        for log in logs
-    ]
+
+    def passed(log: LogSource) -> Pass:
+        moving: Pass = partial(survey.segments, log)
+        if own:
+            moving = partial(with_velocities, survey, log, settings, luenberger=settings.luenberger)
+        return moving if watched is None else partial(watched, log, moving)
+
+    return [passed(log) for log in survey.unloaded], [passed(log) for log in survey.loaded]
 
 
-def _watching(
-    survey: Survey,
-    logs: Sequence[LogSource],
-    settings: Settings,
-    chosen: Selection,
-    sums: dict[LogSource, PredictionSums],
-) -> list[Pass]:
-    """`_passes` that gather what the prediction will be scored by, where that depends on no estimate."""
-    passes = _passes(survey, logs, settings)
-    if chosen.delay or not chosen.model.linear or "lag" in chosen.model.terms:
-        return passes
-    return [
-        partial(_watched, log, moving, settings, chosen.model, sums) for log, moving in zip(logs, passes, strict=True)
-    ]
-
-
-def _watched(
-    log: LogSource, moving: Pass, settings: Settings, model: Model, sums: dict[LogSource, PredictionSums]
+def _scored(
+    model: Model, settings: Settings, sums: dict[LogSource, PredictionSums], log: LogSource, moving: Pass
 ) -> Iterator[Segment]:
     """A pass that also gathers, once, what the prediction will be scored by."""
     if log in sums:
