@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from algid.arm import CONSTANT_NAMES, FloatArray
+from algid.arm import CONSTANT_NAMES
 from algid.errors import LogError, ResultError, SettingError
 from algid.estimators.paper import SHORTEST
 from algid.files import remove_stale, result_folder, whole_folder
@@ -98,7 +98,8 @@ def identify(
     settings, out = settings or Settings(), None if out is None else Path(out)
     earlier = Earlier.of(parameters)
     profile = profile if earlier is None else reused(profile, earlier.result)
-    settings = _with_gravity(settings, profile)
+    if profile is not None and "gravity" in profile.model_fields_set and settings.gravity == Settings.gravity:
+        settings = replace(settings, gravity=profile.gravity)
     sources = tell_twins(
         open_sources(unloaded, "unloaded", profile, settings.gravity),
         open_sources(loaded, "loaded", profile, settings.gravity),
@@ -111,27 +112,22 @@ def identify(
         kind = "unloaded" if len(survey.unloaded) == 1 else "loaded"
         raise SettingError(f"--cross-validate: expected two {kind} logs or more, found one; give more, or leave it out")
     if out is None:
-        return _complete(_identify(survey, settings, earlier, None, report), earlier, said)
+        return _identified(survey, settings, earlier, said)
     folder = result_folder(sources[0].name, out, name)
     if name is None:  # a batch sweeps its whole output once
         remove_stale(folder)
     with whole_folder(folder, force) as temporary:
-        result = _complete(_identify(survey, settings, earlier, temporary, report), earlier, said)
+        result = _identified(survey, settings, earlier, said, temporary, series=report)
         if command is not None:
             result = result.model_copy(update={"settings": result.settings | {"command": command}})
         write_result(result, temporary / "result.json")
         if report:
             _write_pages(temporary, result, shared_library, told)
         if export:
-            _export(temporary, told)
+            from algid.report.export import export_mcap
+
+            export_mcap(temporary, told)
     return result
-
-
-def _with_gravity(settings: Settings, profile: Profile | None) -> Settings:
-    """The settings with the profile's gravity, where it names one and the settings leave theirs as it is."""
-    if profile is None or "gravity" not in profile.model_fields_set or settings.gravity != Settings.gravity:
-        return settings
-    return replace(settings, gravity=profile.gravity)
 
 
 def reused(profile: Profile | None, earlier: Result) -> Profile | None:
@@ -141,31 +137,47 @@ def reused(profile: Profile | None, earlier: Result) -> Profile | None:
     return over(profile, earlier.profile)
 
 
-def _complete(result: Result, earlier: Earlier | None, said: dict[str, Any]) -> Result:
-    """The result with what the user said about its logs, and a warning where they were read otherwise than before."""
+def _identified(
+    survey: Survey,
+    settings: Settings,
+    earlier: Earlier | None,
+    said: dict[str, Any],
+    folder: Path | None = None,
+    *,
+    series: bool = False,
+) -> Result:
+    """The result with what the user `said` about its logs, and a warning where they were read otherwise than before.
+
+    Time series go into `folder`: the paper's always, those of a likelihood where `series` asks for them.
+    """
+    with one_blas_thread():
+        if settings.estimator == "paper":
+            outcome = _by_the_paper(survey, settings, earlier, folder)
+        else:
+            outcome = _by_likelihood(survey, settings, earlier, folder if series else None)
+        result = result_of(outcome, settings, survey)
     otherwise = [] if earlier is None else read_otherwise(result.logs, earlier.result, earlier.file)
     return result.model_copy(update={"profile": said, "warnings": [*otherwise, *result.warnings]})
 
 
-def _identify(survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None, report: bool) -> Result:
-    with one_blas_thread():
-        if settings.estimator == "paper":
-            return _by_the_paper(survey, settings, earlier, folder)
-        return _by_likelihood(survey, settings, earlier, folder if report else None)
-
-
-def _by_the_paper(survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None) -> Result:
+def _by_the_paper(survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None) -> Identified:
     for logs in (survey.unloaded, survey.loaded):
         if len(logs) > 1:
             raise LogError(
                 f"{logs[1].name}: the paper's method takes one log of each kind; "
                 "give one, or use --estimator refined or weak"
             )
-    known = None if earlier is None else known_constants(earlier)
-    return result_of(run_paper(survey, *_firsts(survey), settings, known, folder), settings, survey)
+    known = None
+    if earlier is not None:
+        constants = [earlier.result.parameters.get(name) for name in CONSTANT_NAMES]
+        values = [None if found is None else found.estimate for found in constants]
+        if None in values:
+            raise ResultError(f"{earlier.file}: the result lacks a constant; identify the arm from a better log first")
+        known = np.array(values, dtype=np.float64)
+    return run_paper(survey, *_firsts(survey), settings, known, folder)
 
 
-def _by_likelihood(survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None) -> Result:
+def _by_likelihood(survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None) -> Identified:
     from algid.identification.by_likelihood import (
         choose_model,
         prior_of,
@@ -193,7 +205,7 @@ def _by_likelihood(survey: Survey, settings: Settings, earlier: Earlier | None, 
         write_fit_series(folder, fit, survey, settings, residual_of(survey, settings, chosen, fit))
         if settings.estimator == "refined":
             outcome = _with_the_papers(outcome, survey, settings, folder)
-    return result_of(outcome, settings, survey)
+    return outcome
 
 
 def _with_the_papers(outcome: Identified, survey: Survey, settings: Settings, folder: Path) -> Identified:
@@ -208,8 +220,7 @@ def _with_the_papers(outcome: Identified, survey: Survey, settings: Settings, fo
 
 
 def _firsts(survey: Survey) -> tuple[LogSource | None, LogSource | None]:
-    unloaded, loaded = survey.unloaded, survey.loaded
-    return unloaded[0] if unloaded else None, loaded[0] if loaded else None
+    return next(iter(survey.unloaded), None), next(iter(survey.loaded), None)
 
 
 def _write_pages(folder: Path, result: Result, shared_library: bool, told: Told | None) -> None:
@@ -218,26 +229,5 @@ def _write_pages(folder: Path, result: Result, shared_library: bool, told: Told 
 
     if told is not None:
         told("report", 0, 0)
-
     (folder / "report.md").write_text(markdown(result), encoding="utf-8")
     write_report(folder, shared_library, told)
-
-
-def _export(folder: Path, told: Told | None) -> None:
-    from algid.report.export import export_mcap
-
-    export_mcap(folder, told)
-
-
-def known_constants(earlier: Earlier) -> FloatArray:
-    """k1 … k7 (7,) of an earlier result.
-
-    Raises
-    ------
-    ResultError
-        If one of them has no estimate.
-    """
-    values = [found.estimate if (found := earlier.result.parameters.get(name)) else None for name in CONSTANT_NAMES]
-    if any(value is None for value in values):
-        raise ResultError(f"{earlier.file}: the result lacks a constant; identify the arm from a better log first")
-    return np.array(values, dtype=np.float64)
