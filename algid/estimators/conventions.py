@@ -137,8 +137,8 @@ class Candidate:
 
     Parameters
     ----------
-    family : Convention, the same without its zeros
-    convention : Convention
+    family : Convention, without its zeros
+    zero : those, in rad
     names : of `ZEROED`, those that the log may tell
     k : (q,), what is found for them
     covariance : (q, q), of `k`
@@ -148,13 +148,18 @@ class Candidate:
     """
 
     family: Convention
-    convention: Convention
+    zero: tuple[float, float]
     names: tuple[str, ...]
     k: FloatArray
     covariance: FloatArray
     left: FloatArray
     score: float
     speed: FloatArray
+
+    @property
+    def convention(self) -> Convention:
+        """The convention, zeros included."""
+        return replace(self.family, zero=self.zero)
 
     @cached_property
     def demands(self) -> dict[str, float]:
@@ -206,7 +211,7 @@ def judge(theta: FloatArray, tau: FloatArray, dt: float, *, gravity: bool = True
 
 
 def _judged(found: Sequence[Candidate], apart: float) -> Judgement:
-    as_read = next(one for one in found if one.convention == AS_READ)
+    as_read = next(one for one in found if one.family == AS_READ and one.zero == AS_READ.zero)
     ranked = sorted(found, key=lambda one: one.score)
     possible = list(islice((one for one in ranked if not one.broken), 2))
     if not possible:
@@ -272,7 +277,7 @@ class _Trials:
         fitted = _solved(sums, families, np.stack([self._place(zero) for zero in zeros]))
         scores = _sizes(np.maximum(fitted[1], LEAST)).tolist()
         for (family, zero), c, left, covariance, score in zip(product(families, zeros), *fitted, scores, strict=True):
-            yield Candidate(family, replace(family, zero=zero), self._names, c, covariance, left, score, sums.speed)
+            yield Candidate(family, zero, self._names, c, covariance, left, score, sums.speed)
 
     def _with_free_zero(self, family: Convention, found: Sequence[Candidate]) -> Iterator[Candidate]:
         """The zeros that fit best, where they leave far less than those that were found."""

@@ -48,6 +48,7 @@ _STRIDE = 2  # windows overlap four-fold: more tell hardly more, and each is sim
 _STEP = 4e-3  # s: of the simulation, in which motions of 10 Hz turn by a quarter of a radian
 _ASTRAY = 100.0  # rad: a simulated window that ends so far from the measured one has run away
 _FEWEST = 0.5  # share of the windows that must not go astray
+_TOGETHER = 8  # pieces whose windows are simulated side by side
 _EXAMINED = 4  # pieces of each log that `endogeneity` looks at
 ENDOGENEOUS = 3.0
 """Statistic of `endogeneity` beyond which the unmodelled torque drives the motion."""
@@ -183,50 +184,70 @@ def moments(source: Source, settings: WeakSettings, c: FloatArray, most: int | N
     sums = BlockSums()
     rows = astray = 0
     linear = c[: len(settings.model.names)]
-    for piece, windows, _ in islice(weak.overlapping(source(), settings), most):
-        X = windows.equations(settings.model, piece, settings.estimate_delay, linear)
-        X = X[:, :, ::_STRIDE]
-        if not X.shape[2]:
+    looked_at = islice(weak.overlapping(source(), settings), most)
+    while batch := list(islice(looked_at, _TOGETHER)):
+        windows = batch[0][1]
+        columns = [
+            windows.equations(settings.model, piece, settings.estimate_delay, linear)[:, :, ::_STRIDE]
+            for piece, _, _ in batch
+        ]
+        cut = [_cut(piece, windows) for (piece, _, _), X in zip(batch, columns, strict=True) if X.shape[2]]
+        if not cut:
             continue
-        simulated = _simulated(settings.model, linear, piece, windows)
+        side_by_side = (np.concatenate(part, axis=1) for part in zip(*cut, strict=True))
+        simulated = _simulated(settings.model, linear, windows, *side_by_side)
         if simulated is None:
             return None
         motion, good = simulated
-        plain = Windows(piece.dt, windows.length, 0.0, None)
+        plain = Windows(windows.dt, windows.length, 0.0, None)
         Z = plain.equations(settings.model, motion, settings.estimate_delay, linear)[:, :-1, ::OVERLAP]
-        both = np.where(good, np.concatenate([Z, X], axis=1), 0.0)
-        rows += both.shape[2]
+        both = np.where(good, np.concatenate([Z, np.concatenate(columns, axis=2)], axis=1), 0.0)
+        rows += good.size
         astray += int(np.sum(np.logical_not(good)))
-        sums.add(weak.grams(both, OVERLAP // _STRIDE))
+        for part in np.split(both, np.cumsum([X.shape[2] for X in columns])[:-1], axis=2):
+            sums.add(weak.grams(part, OVERLAP // _STRIDE))
     return Moments(sums.values(), rows, astray) if rows else Moments(np.zeros((0, 2, 1, 1)), 0, 0)
 
 
-def _simulated(
-    model: Model, c: FloatArray, piece: Segment, windows: Windows
-) -> tuple[Segment, NDArray[np.bool_]] | None:
-    """Every `_STRIDE`-th window's simulated motion, end to end, and which of them (R,) have not run away.
+def _cut(piece: Segment, windows: Windows) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Every `_STRIDE`-th window of L samples, R in all.
 
-    Runge-Kutta's fourth order in steps of some `_STEP` s, all windows side by side, from the measured start. (To
-    start earlier, so that what the unmodelled torque did before has faded, made the instruments too weak.)
+    Gives angles and velocities (2, R) at their starts, torques (2, R, L + 1) and angles (2, R, L).
     """
     length, margin = OVERLAP * windows.step, windows.margin
     starts = margin + np.arange(0, len(piece) - 2 * margin - length + 1, windows.step * _STRIDE, dtype=np.int64)
-    theta, omega = _started(piece, windows, starts)
     instants = starts[:, None] + np.arange(length + 1)
     at = np.clip(instants - windows.shift / windows.dt, 0, len(piece) - 1)
     before = np.minimum(at.astype(np.int64), len(piece) - 2)
     tau = piece.tau[:, before] + (at - before) * (piece.tau[:, before + 1] - piece.tau[:, before])
-    stride = _samples_a_step(piece.dt)
-    h = stride * piece.dt
+    return *_started(piece, windows, starts), tau, piece.theta[:, instants[:, :-1]]
+
+
+def _simulated(
+    model: Model,
+    c: FloatArray,
+    windows: Windows,
+    theta: FloatArray,
+    omega: FloatArray,
+    tau: FloatArray,
+    measured: FloatArray,
+) -> tuple[Segment, NDArray[np.bool_]] | None:
+    """The motion that windows cut from a log would have had, end to end, and which of them (R,) have not run away.
+
+    Runge-Kutta's fourth order in steps of some `_STEP` s, all windows side by side, from the measured start. (To
+    start earlier, so that what the unmodelled torque did before has faded, made the instruments too weak.)
+    """
+    stride = _samples_a_step(windows.dt)
+    h = stride * windows.dt
     inside = np.arange(stride) / stride
-    thetas, omegas = (np.empty((2, starts.size, length)) for _ in range(2))
-    for sample in range(0, length, stride):
+    acts = np.ascontiguousarray(np.moveaxis(tau[:, :, :: stride // 2], 2, 0))  # where the method asks for it
+    thetas, omegas = np.empty_like(measured), np.empty_like(measured)
+    for step, sample in enumerate(range(0, measured.shape[2], stride)):
         rates = []
         x, v = theta, omega
-        middle = sample + stride // 2
-        for now, share in ((sample, 0.5), (middle, 0.5), (middle, 1.0), (sample + stride, 0.0)):
+        for now, share in ((0, 0.5), (1, 0.5), (1, 1.0), (2, 0.0)):
             with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # `_has_inertia` judges afterwards
-                rates.append((v, acceleration(model, c, x, v, tau[:, :, now])))
+                rates.append((v, acceleration(model, c, x, v, acts[2 * step + now])))
             x, v = theta + share * h * rates[-1][0], omega + share * h * rates[-1][1]
         (v1, a1), (v2, a2), (v3, a3), (v4, a4) = rates
         ahead = theta + h / 6 * (v1 + 2 * v2 + 2 * v3 + v4)
@@ -236,10 +257,9 @@ def _simulated(
         theta, omega = (np.clip(signal, -1e6, 1e6) for signal in (ahead, faster))
     if not _has_inertia(model, c, thetas[:, :, ::stride]):
         return None
-    off = np.abs(thetas - piece.theta[:, instants[:, :-1]]).max(axis=(0, 2))
-    good = off < _ASTRAY
+    good = np.abs(thetas - measured).max(axis=(0, 2)) < _ASTRAY
     angles, torques, velocities = (signal.reshape(2, -1) for signal in (thetas, tau[:, :, :-1], omegas))
-    return Segment(0.0, piece.dt, angles, torques, velocities), good
+    return Segment(0.0, windows.dt, angles, torques, velocities), good
 
 
 def _samples_a_step(dt: float) -> int:

@@ -158,12 +158,14 @@ def _filtered(model: Model, piece: Segment, shift: float, by: PredictionFilter, 
         return np.zeros((2, len(model.names) + 1, 0))
     theta = butterworth(signals[:2], dt, min(by.motion, 0.45 / dt), by.order)
     Y = regressor(model, motion_of(theta, dt), at)
-    place = np.arange(signals.shape[1]) + shift / dt
-    whole = np.clip(np.floor(place).astype(np.int64), 0, signals.shape[1] - 2)
-    Y = Y[:, :, whole] + (place - whole) * (Y[:, :, whole + 1] - Y[:, :, whole])
+    if shift:
+        place = np.arange(signals.shape[1]) + shift / dt
+        whole = np.clip(np.floor(place).astype(np.int64), 0, signals.shape[1] - 2)
+        Y = Y[:, :, whole] + (place - whole) * (Y[:, :, whole + 1] - Y[:, :, whole])
     X = np.concatenate([Y, signals[2:, None]], axis=1)
-    passed = butterworth(X.reshape(-1, X.shape[2]), dt, min(by.cutoff, 0.45 / dt), by.order).reshape(X.shape)
-    return passed[:, :, edge : signals.shape[1] - edge]
+    felt = X.any(axis=2)  # k4 is nothing to joint 2, k7 to joint 1
+    X[felt] = butterworth(X[felt], dt, min(by.cutoff, 0.45 / dt), by.order)
+    return X[:, :, edge : signals.shape[1] - edge]
 
 
 def _decimated(piece: Segment, by: PredictionFilter) -> tuple[FloatArray, float]:

@@ -118,7 +118,7 @@ def test_windows_are_simulated_to_the_order_of_their_torque(late: float, order: 
         tau = np.stack([0.6 * np.sin(3 * (t + shift)), 0.2 * np.cos(4 * (t + shift))])  # acts `shift` after its stamp
         piece = Segment(0.0, dt, motion.theta, tau, motion.omega)
         windows = Windows(dt, 0.32, shift, None)
-        found = instruments._simulated(Model(), k, piece, windows)
+        found = instruments._simulated(Model(), k, windows, *instruments._cut(piece, windows))
         assert found is not None
         simulated, good = found
         assert (simulated.start, simulated.dt) == (0.0, dt)
@@ -138,8 +138,9 @@ def test_windows_are_simulated_to_the_order_of_their_torque(late: float, order: 
 def test_coefficients_that_move_no_arm_and_windows_that_run_away_are_told(bench: Bench) -> None:
     k, log = bench.arm.constants(), bench.log()
     windows = Windows(log.dt, 0.2, 0.0, None)
-    assert instruments._simulated(Model(), -k, log, windows) is None
-    wild = instruments._simulated(Model(), k * np.array([1, 1, 1, 1, 1, -500, -500]), log, windows)
+    cut = instruments._cut(log, windows)
+    assert instruments._simulated(Model(), -k, windows, *cut) is None
+    wild = instruments._simulated(Model(), k * np.array([1, 1, 1, 1, 1, -500, -500]), windows, *cut)
     assert wild is not None
     assert not wild[1].any()
     found = instruments.moments(lambda: [log], WeakSettings(), k * np.array([1, 1, 1, 1, 1, -500, -500]))
