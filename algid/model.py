@@ -177,7 +177,9 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
     ValueError
         If the model is not linear and `c` is not given.
     """
-    value = _values(model, c)
+    if c is None and not model.linear:
+        raise ValueError(f"the regressor of {', '.join(model.terms)} depends on the coefficients, got none")
+    value = model.values(np.zeros(len(model.names)) if c is None else c)
     motion = motion.turned(_zeros(value))
     Y = np.zeros((2, len(model.names), motion.theta.shape[1]))
     column = {name: Y[:, place] for place, name in enumerate(model.names)}
@@ -335,14 +337,6 @@ def _load(model: Model, Y: FloatArray, value: dict[str, float]) -> FloatArray:
     rigid = [place for place, name in enumerate(model.names) if name in _RIGID]
     k = np.array([value[model.names[place]] for place in rigid])
     return np.einsum("aqn,q->an", Y[:, rigid], k)
-
-
-def _values(model: Model, c: FloatArray | None) -> dict[str, float]:
-    if c is not None:
-        return model.values(c)
-    if not model.linear:
-        raise ValueError(f"the regressor of {', '.join(model.terms)} depends on the coefficients, got none")
-    return dict.fromkeys(COLUMN_NAMES, 0.0)
 
 
 def _zeros(value: dict[str, float]) -> FloatArray:

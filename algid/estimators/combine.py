@@ -7,12 +7,9 @@ S       information on a log's coefficients, by stretch      (B, q, q)  1 / (uni
 g       score at the coefficients `c0`, by stretch           (B, q)     1 / unit
 ======  ===================================================  =========  =================
 
-Near c0 the log-likelihood is g·(c − c0) − ½ (c − c0)ᵀ S (c − c0).
-
-Sums over stretches of a log, in bounded memory.
-
-Score and information of an estimate are kept by stretch, because what the stretches disagree about tells the
-error that white noise does not explain. When the stretches become too many, neighbours are added up.
+Near c0 the log-likelihood is g·(c − c0) − ½ (c − c0)ᵀ S (c − c0). Both are kept by stretch, in bounded memory,
+because what the stretches disagree about tells the error that white noise does not explain. When the stretches
+become too many, neighbours are added up.
 """
 
 from __future__ import annotations
@@ -67,7 +64,19 @@ class Prior:
 
 
 def scaled_pinv(S: FloatArray, tolerance: float = RANK_TOLERANCE) -> FloatArray:
-    """Pseudo-inverse of an information matrix after scaling to unit diagonal."""
+    """Pseudo-inverse of a symmetric matrix after scaling to unit diagonal, whatever the units of its rows.
+
+    Parameters
+    ----------
+    S : (Q, Q)
+        A row whose diagonal is not positive counts as nothing.
+    tolerance : float
+        Eigenvalues of the scaled matrix below this share of the largest count as nothing.
+
+    Returns
+    -------
+    (Q, Q), zero along what counts as nothing
+    """
     size = np.sqrt(np.maximum(np.diag(S), 0.0))
     inverse = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
     values, vectors = np.linalg.eigh(S * np.outer(inverse, inverse))
@@ -82,7 +91,13 @@ def combine(
 ) -> tuple[FloatArray, FloatArray, float]:
     """Most likely shared parameters by damped Gauss-Newton on the sum of quadratic likelihoods.
 
-    Directions without information keep the values they have in `beta`.
+    Parameters
+    ----------
+    shared : Shared
+    logs : each log's quadratic likelihood
+    beta : (Q,)
+        Where it starts; directions without information keep these values.
+    prior : Prior, optional
 
     Returns
     -------
@@ -109,7 +124,13 @@ def combine(
 def likelihood(
     shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None
 ) -> tuple[float, FloatArray, FloatArray]:
-    """Log-likelihood at `beta` less that at the logs' own coefficients, its gradient (Q,), information (Q, Q)."""
+    """Log-likelihood of shared parameters `beta` (Q,).
+
+    Returns
+    -------
+    Its value less that at the logs' own coefficients c0, its gradient Tᵀ (g − S (c − c0)) of shape (Q,), and its
+    information Tᵀ S T of shape (Q, Q), T = dc/dβ; the prior's with them.
+    """
     size = len(shared.names)
     value, gradient, S = 0.0, np.zeros(size), np.zeros((size, size))
     for log in logs:
@@ -132,8 +153,16 @@ def likelihood(
 def sandwich(
     shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None = None
 ) -> tuple[FloatArray, int]:
-    """Covariance (Q, Q) of the score at `beta`, allowing for coloured residuals, and its degrees of freedom.
+    """Covariance of the score at `beta` (Q,), allowing for coloured residuals.
 
+    Returns
+    -------
+    meat : (Q, Q), in the units of the information
+    freedom : int
+        Independent stretches of log less parameters, at least 2; the covariance is larger by their ratio.
+
+    Notes
+    -----
     Between the inverses of the information it makes the sandwich of White 1982 and Newey & West 1987.
     """
     meat = np.zeros((len(shared.names), len(shared.names)))

@@ -1,9 +1,8 @@
-"""What physics demands of the estimates: a positive definite mass matrix, no negative friction, mass or length.
+"""What tells that estimates are wrong: bounds of physics, terms without worth, logs of another arm.
 
-M(θ) is positive definite for every θ2 where M22 > 0 and det M > 0; the determinant is concave in cos θ2, so its
-least value lies at θ2 = 0 or θ2 = π. Eq. (2), with the rotor inertia j2 in M22.
-
-Do the optional terms of the model earn their place, and does a loaded log belong to the unloaded arm?
+Physics demands a positive definite mass matrix, no negative friction, mass or length. M(θ) is positive definite for
+every θ2 where M22 > 0 and det M > 0; the determinant is concave in cos θ2, so its least value lies at θ2 = 0 or
+θ2 = π. Eq. (2), with the rotor inertia j2 in M22.
 
 A term's worth is the fall of the likelihood when its coefficients are set to zero, which near the estimate is
 the Wald statistic. It is formed with the covariance that the error bars rest on, so that coloured residuals do
@@ -14,14 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from functools import partial
 
 import numpy as np
 from scipy.special import chdtrc, chdtri, ndtri
 
 from algid.arm import FloatArray
 from algid.estimators.combine import LogInformation, Prior, combine, likelihood, long_run_variance, scaled_pinv
-from algid.estimators.fit import Fit
+from algid.estimators.fit import Fit, Status
 from algid.estimators.identifiability import sizes
 from algid.estimators.parametrisation import Shared
 from algid.model import TERMS
@@ -46,7 +45,10 @@ class BrokenBound:
 
 
 def bounds(shared: Shared) -> dict[str, Callable[[FloatArray], float]]:
-    """Functions of the shared parameters (Q,) that must not be negative, by name."""
+    """Functions of the shared parameters that must not be negative, by name.
+
+    Each takes (Q,) and gives a float in the bound's own unit: kg m², its square, the parameter's, or k1 k2's.
+    """
     found: dict[str, Callable[[FloatArray], float]] = {
         "M22 > 0": lambda beta: _mass(shared, beta)[0],
         "det M > 0 at theta2 = 0": lambda beta: _mass(shared, beta)[1],
@@ -108,11 +110,18 @@ def _slope(bound: Callable[[FloatArray], float], beta: FloatArray, size: FloatAr
 
 
 def constrained(fit: Fit) -> Fit:
-    """The most likely parameters within the bounds; the fit itself where it breaks none.
+    """The most likely parameters within the bounds.
 
-    Standard deviations stay those of the free fit: a bound that holds says nothing about the other parameters'
-    noise. The note names the bounds that had to be enforced, or that no point could be found within: then the free
-    estimates stand, with status NOT_CONVERGED.
+    Parameters
+    ----------
+    fit : Fit
+
+    Returns
+    -------
+    Fit
+        `fit` itself where it breaks no bound. Else the note names the bounds that had to be enforced; or those that
+        no point was found within: then the free estimates stand, with status NOT_CONVERGED. Standard deviations
+        stay those of the free fit: a bound that holds says nothing about the other parameters' noise.
     """
     enforced = broken_bounds(fit)
     if not enforced:
@@ -123,24 +132,22 @@ def constrained(fit: Fit) -> Fit:
     S = likelihood(fit.shared, fit.logs, fit.values, fit.prior)[2]
     scale = 1 / np.sqrt(np.maximum(np.diag(S), 1 / size**2))
 
-    def cost(x: FloatArray) -> tuple[float, FloatArray]:
+    def cost(x: FloatArray, unit: float) -> tuple[float, FloatArray]:
         value, gradient, _ = likelihood(fit.shared, fit.logs, fit.values + scale * x, fit.prior)
-        return -value, -gradient * scale
+        return -value / unit, -gradient * scale / unit
 
+    def margin(bound: Callable[[FloatArray], float], slope: float, inside: float, x: FloatArray) -> float:
+        return bound(fit.values + scale * x) / slope - inside
+
+    held = [
+        (bound, float(np.linalg.norm(_slope(bound, fit.values, size) * size))) for bound in bounds(fit.shared).values()
+    ]
     x, disobeyed = np.zeros(scale.size), enforced
+    options = {"maxiter": 500, "ftol": 1e-12}
     for inside in _INSIDE:
-        demands = [
-            {"type": "ineq", "fun": _demand(bound, fit.values, scale, size, inside)}
-            for bound in bounds(fit.shared).values()
-        ]
-        unit = 1 + abs(cost(x)[0])  # the solver's tolerances are absolute
-
-        def scaled(x: FloatArray, unit: float = unit) -> tuple[float, FloatArray]:
-            value, slope = cost(x)
-            return value / unit, slope / unit
-
-        options = {"maxiter": 500, "ftol": 1e-12}
-        solution = minimize(scaled, x, jac=True, method="SLSQP", constraints=demands, options=options)
+        demands = [{"type": "ineq", "fun": partial(margin, bound, slope or 1.0, inside)} for bound, slope in held]
+        unit = 1 + abs(cost(x, 1.0)[0])  # the solver's tolerances are absolute
+        solution = minimize(partial(cost, unit=unit), x, jac=True, method="SLSQP", constraints=demands, options=options)
         if not np.all(np.isfinite(solution.x)):
             break
         x = solution.x
@@ -150,7 +157,8 @@ def constrained(fit: Fit) -> Fit:
             note = f"--constrain enforces {_named(enforced)}, which the logs contradict"
             return replace(moved, note=_noted(fit, note))
     note = f"--constrain cannot obey {_named(disobeyed)}: no estimates within the bounds were found"
-    return replace(fit, converged=False, status=_failed(fit.status), note=_noted(fit, note))
+    status: tuple[Status, ...] = tuple("NOT_CONVERGED" if word == "OK" else "NOT_IDENTIFIABLE" for word in fit.status)
+    return replace(fit, converged=False, status=status, note=_noted(fit, note))
 
 
 def _named(bounds: Sequence[BrokenBound]) -> str:
@@ -162,22 +170,6 @@ def _named(bounds: Sequence[BrokenBound]) -> str:
 
 def _noted(fit: Fit, note: str) -> str:
     return note if fit.note is None else f"{fit.note}; {note}"
-
-
-def _demand(
-    bound: Callable[[FloatArray], float], start: FloatArray, scale: FloatArray, size: FloatArray, inside: float
-) -> Callable[[FloatArray], float]:
-    """The bound in the solver's coordinates, in units of its own slope, kept `inside` of it."""
-    slope = float(np.linalg.norm(_slope(bound, start, size) * size)) or 1.0
-
-    def demand(x: FloatArray) -> float:
-        return bound(start + scale * x) / slope - inside
-
-    return demand
-
-
-def _failed(status: Sequence[str]) -> tuple[Literal["OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED"], ...]:
-    return tuple("NOT_CONVERGED" if word == "OK" else "NOT_IDENTIFIABLE" for word in status)
 
 
 _OPTIONAL = {**{term: content.names for term, content in TERMS.items()}, "delay": ("delay",)}
@@ -197,7 +189,7 @@ class TermWorth:
 
 
 def term_worths(fit: Fit) -> list[TermWorth]:
-    """Worth of each optional term of a fit's model."""
+    """Worth of each optional term of a fit's model: n log N − W, Schwarz 1978, W the Wald statistic of its n values."""
     worths = []
     for term, names in _OPTIONAL.items():
         places = [fit.names.index(name) for name in names if name in fit.names]
@@ -210,10 +202,18 @@ def term_worths(fit: Fit) -> list[TermWorth]:
 
 
 def payload_distance(fit: Fit) -> float | None:
-    """How far the loaded logs are from the unloaded arm with any payload, in standard deviations.
+    """How far the loaded logs are from the unloaded arm with any payload.
 
-    None where the logs of either kind do not determine their own constants. The statistic compares the arm's
-    constants with the loaded arm's, less the payload that fits best; it is chi-squared where they agree.
+    Returns
+    -------
+    float or None
+        In standard deviations of a normal variable as unlikely; None where the logs of either kind do not determine
+        their own constants.
+
+    Notes
+    -----
+    The statistic compares the arm's constants with the loaded arm's, less the payload that fits best; it is χ² where
+    they agree, with as many degrees of freedom as constants less those of the payload.
     """
     sides = [_alone([log for log in fit.logs if log.loaded is loaded]) for loaded in (False, True)]
     if not fit.shared.payload or any(side is None for side in sides):
@@ -264,13 +264,11 @@ def _alone(logs: list[LogInformation]) -> tuple[FloatArray, FloatArray] | None:
     """Coefficients (q,) that logs of one kind give by themselves, and their robust covariance (q, q)."""
     if not logs:
         return None
-    S = sum((log.total[0] for log in logs[1:]), logs[0].total[0])
-    g = sum(
-        (log.total[1] + log.total[0] @ log.c0 for log in logs[1:]), logs[0].total[1] + logs[0].total[0] @ logs[0].c0
-    )
+    S = np.sum([log.total[0] for log in logs], axis=0)
+    g = np.sum([log.total[1] + log.total[0] @ log.c0 for log in logs], axis=0)
     inverse = scaled_pinv(S)
     if np.linalg.matrix_rank(inverse @ S) < S.shape[0]:
         return None
     c = inverse @ g
-    meat = sum((long_run_variance(log.g - log.S @ (c - log.c0))[0] for log in logs), np.zeros_like(S))
+    meat = np.sum([long_run_variance(log.g - log.S @ (c - log.c0))[0] for log in logs], axis=0)
     return c, inverse @ meat @ inverse

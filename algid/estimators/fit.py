@@ -21,8 +21,8 @@ from algid.estimators.combine import (
     sandwich,
     scaled_pinv,
 )
-from algid.estimators.identifiability import Identifiability, Whiteness, examine, open_directions
-from algid.estimators.innovations import ResidualSums
+from algid.estimators.identifiability import Whiteness, examine, open_directions
+from algid.estimators.innovations import NORMAL, ResidualSums
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
 
@@ -159,26 +159,48 @@ def conclude(
     samples: int = 1,
     without: FloatArray | None = None,
 ) -> Fit:
-    """Solve for the shared parameters from `beta` and attach error bars and statuses.
+    """Solve for the shared parameters, and attach error bars and statuses.
 
-    `without` (n, Q) are the estimates without each of the logs, where the estimator has made them itself.
+    Parameters
+    ----------
+    estimator : "weak", "instruments" or "refined"
+    shared : Shared
+    logs : each log's quadratic likelihood
+    beta : (Q,)
+        Where the solver starts, and what a direction without information keeps.
+    moved : (2,), rad
+        How far each joint travelled.
+    prior : Prior, optional
+    coloured : bool
+        Whether the residuals are not white: error bars then rest on a sandwich, and with `FEWEST_LOGS` logs on the
+        larger of that and of a jackknife.
+    samples : int
+        Independent samples behind error bars that rest on white noise.
+    without : (n, Q), optional
+        The estimates without each of the logs, where the estimator has made them itself.
+
+    Notes
+    -----
+    Where both a sandwich and a jackknife have a part in the variance, Student's quantile is that of the degrees of
+    freedom of Satterthwaite 1946, with the parts' mean share over the parameters.
     """
     beta, S, _ = combine(shared, logs, beta, prior)
     known = examine(shared.names, beta, S, moved)
-    covariance, quantile = known.covariance, 1.959963984540054
+    covariance, quantile = known.covariance, NORMAL
     intervals: Intervals = "likelihood"
     freedom = samples
     if coloured:
-        robust, freedom = _robust(shared, logs, beta, known, prior)
+        meat, freedom = sandwich(shared, logs, beta, prior)
+        robust = known.covariance @ meat @ known.covariance
         # The long-run variance of a short log errs low; white noise alone is the least there can be.
         covariance = robust if estimator != "refined" else widened(robust, covariance)
-        quantile, intervals = _quantile(freedom), "sandwich"
+        squares, intervals = float(freedom), "sandwich"
         without = left_out(shared, logs, beta, prior) if without is None else without
         repeated = jackknife(logs, without)
         if repeated is not None:
-            wide = widened(covariance, repeated)
-            quantile = _quantile(_satterthwaite(covariance, wide, freedom, _repeats(logs)))
-            covariance, intervals = wide, "jackknife"
+            within, covariance, intervals = covariance, widened(covariance, repeated), "jackknife"
+            squares = _satterthwaite(within, covariance, freedom, logs)
+        quantile = float(stdtrit(max(2, squares), 0.975))
     return Fit(
         estimator=estimator,
         shared=shared,
@@ -196,40 +218,19 @@ def conclude(
     )
 
 
-def _robust(
-    shared: Shared,
-    logs: Sequence[LogInformation],
-    beta: FloatArray,
-    known: Identifiability,
-    prior: Prior | None,
-) -> tuple[FloatArray, int]:
-    meat, freedom = sandwich(shared, logs, beta, prior)
-    return known.covariance @ meat @ known.covariance, freedom
+def _satterthwaite(within: FloatArray, wide: FloatArray, freedom: int, logs: Sequence[LogInformation]) -> float:
+    """Independent squares behind variances of which `within` rests on `freedom` and the rest on what repeats.
 
-
-def _quantile(freedom: float) -> float:
-    """Half width of a 95 % interval in standard deviations that `freedom` independent squares estimate."""
-    return float(stdtrit(max(2, freedom), 0.975))
-
-
-def _satterthwaite(within: FloatArray, wide: FloatArray, freedom: int, repeats: int) -> float:
-    """Independent squares behind variances of which a part, `within`, rests on `freedom` and the rest on `repeats`.
-
-    Satterthwaite 1946, with the parts' mean share over the parameters.
+    What repeats are the logs of each kind, less one.
     """
     told = np.diag(wide) > 0
     share = float(np.mean(1 - np.diag(within)[told] / np.diag(wide)[told])) if told.any() else 0.0
+    repeats = sum(max(0, sum(log.loaded is loaded for log in logs) - 1) for loaded in (False, True))
     return float(1 / (share**2 / max(1, repeats) + (1 - share) ** 2 / max(1, freedom)))
 
 
-def _repeats(logs: Sequence[LogInformation]) -> int:
-    """Independent squares behind a jackknife over logs: those of each kind, less one."""
-    kinds = [sum(log.loaded is loaded for log in logs) for loaded in (False, True)]
-    return sum(count - 1 for count in kinds if count > 0)
-
-
 def widened(robust: FloatArray, least: FloatArray) -> FloatArray:
-    """The robust covariance with no standard deviation below that of `least`, correlations kept."""
+    """The covariance `robust` (Q, Q) with no standard deviation below that of `least` (Q, Q), correlations kept."""
     size, floor = np.sqrt(np.maximum(np.diag(robust), 0.0)), np.sqrt(np.maximum(np.diag(least), 0.0))
     factor = np.divide(np.maximum(size, floor), size, out=np.ones_like(size), where=size > 0)
     return robust * np.outer(factor, factor)

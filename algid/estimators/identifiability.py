@@ -1,14 +1,23 @@
-"""Which parameters, and which combinations of them, the logs determine.
+"""Which parameters, and which combinations of them, the logs determine; and whether innovations are white.
 
 A direction counts as undetermined when its standard deviation reaches the size of the parameters it mixes:
 the information matrix is scaled by the largest parameter of each physical class (inertia, gravity, friction …),
 and its small eigenvalues name the directions.
 
-Are the innovations white and Gaussian, as the error bars of the likelihood suppose?
+The error bars of the likelihood suppose innovations that are white and Gaussian: Ljung & Box's test on those of
+each joint, as they are and summed over 16 and 64 samples, so that slow colour is seen as well as fast. The smallest
+p-value counts three times over (Bonferroni), and a correlation too faint to matter counts as none. The excess
+kurtosis tells heavy tails.
 
-Ljung & Box's test on the innovations of each joint, as they are and summed over 16 and 64 samples, so that slow
-colour is seen as well as fast. The smallest p-value counts three times over (Bonferroni), and a correlation too
-faint to matter counts as none. The excess kurtosis tells heavy tails.
+======  ===================================================  ===============  ===============
+symbol  name                                                 shape            unit
+======  ===================================================  ===============  ===============
+S       information on the parameters                        (Q, Q)           1 / (unit unit)
+size    what a parameter's standard deviation compares with  (Q,)             unit
+null    directions over the sizes that S leaves open         (Q, m)           1
+w       innovations of a piece                               (2, n)           1
+rho     their autocorrelations, by scale and joint           (3, 2, lags)     1
+======  ===================================================  ===============  ===============
 """
 
 from __future__ import annotations
@@ -61,7 +70,23 @@ class Identifiability:
 
 
 def examine(names: Sequence[str], values: FloatArray, S: FloatArray, moved: FloatArray) -> Identifiability:
-    """Examine the information S (Q, Q) on parameters `values` (Q,); `moved` (2,) is each joint's travel in rad."""
+    """Which parameters and combinations the information determines.
+
+    Parameters
+    ----------
+    names : Q names in `algid.model.UNITS`
+    values : (Q,)
+    S : (Q, Q)
+        Information on them.
+    moved : (2,), rad
+        Each joint's travel: why something is open.
+
+    Returns
+    -------
+    Identifiability
+        A parameter is open that has a share of `_SHARE` or more in an open direction. The covariance is the inverse
+        of S, as wide along open directions as S has it.
+    """
     size = sizes(names, values)
     eigenvalues, vectors, lost = _spectrum(S, size)
     null = vectors[:, lost]
@@ -73,7 +98,13 @@ def examine(names: Sequence[str], values: FloatArray, S: FloatArray, moved: Floa
 
 
 def open_directions(names: Sequence[str], values: FloatArray, S: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Directions (Q, m) of the parameters over their sizes that S leaves open, orthonormal, and the sizes (Q,)."""
+    """Directions that the information S (Q, Q) on parameters `values` (Q,) leaves open.
+
+    Returns
+    -------
+    null : (Q, m), orthonormal, of the parameters over their sizes
+    size : (Q,)
+    """
     size = sizes(names, values)
     _, vectors, lost = _spectrum(S, size)
     return vectors[:, lost], size
@@ -107,9 +138,9 @@ def sizes(names: Sequence[str], values: FloatArray) -> FloatArray:
 
 
 def _sentences(names: Sequence[str], null: FloatArray, size: FloatArray, moved: FloatArray) -> list[str]:
-    if null.shape[1] == 0:
-        return []
-    reason = _reason(moved)
+    """What the directions `null` leave open, in words; `moved` (2,) in rad is why."""
+    still = [str(joint + 1) for joint in range(2) if moved[joint] < STILL]
+    reason = ": neither joint moved" if len(still) == 2 else f": joint {still[0]} never moved" if still else ""
     sentences = []
     for group in _groups(null):
         part = null[group]
@@ -154,13 +185,6 @@ def _relation(direction: FloatArray) -> str:
     return f"as {-ratio:.3g} times the first plus the second"
 
 
-def _reason(moved: FloatArray) -> str:
-    still = [str(joint + 1) for joint in range(2) if moved[joint] < STILL]
-    if len(still) == 2:
-        return ": neither joint moved"
-    return f": joint {still[0]} never moved" if still else ""
-
-
 SCALES = (1, 16, 64)
 _LAGS = 10
 P_VALUE = 1e-3
@@ -200,22 +224,37 @@ class Whiteness:
 
 
 def correlations(w: FloatArray) -> Correlations:
-    """Sums for the innovations w (2, n) of one piece."""
+    """Sums over the innovations of one piece, which add up over pieces.
+
+    Parameters
+    ----------
+    w : (2, n), of unit variance where the model holds
+    """
     counts, products = [], []
     for scale in SCALES:
         whole = w.shape[1] // scale
         x = w if scale == 1 else w[:, : whole * scale].reshape(2, whole, scale).sum(axis=2) / np.sqrt(scale)
         counts.append(float(whole))
-        products.append([_lag_products(row) for row in x])
+        products.append([[row[lag:] @ row[: max(0, whole - lag)] for lag in range(_LAGS + 1)] for row in x])
     return Correlations(np.array(counts), np.array(products), np.sum(w**4, axis=1))
 
 
-def _lag_products(x: FloatArray) -> FloatArray:
-    return np.array([x[lag:] @ x[: x.size - lag] if lag < x.size else 0.0 for lag in range(_LAGS + 1)])
-
-
 def judge(sums: Correlations) -> Whiteness:
-    """Test the innovations whose sums are given."""
+    """Test innovations for whiteness.
+
+    Parameters
+    ----------
+    sums : Correlations
+
+    Returns
+    -------
+    Whiteness
+        A joint is white with a p-value of `P_VALUE` at least, and without heavy tails.
+
+    Notes
+    -----
+    Ljung & Box 1978: n (n + 2) Σ ρ_l² / (n − l) over the lags l is χ² with as many degrees of freedom.
+    """
     power = np.maximum(sums.products[:, :, :1], 1e-300)
     rho = sums.products[:, :, 1:] / power
     n = sums.count[:, None, None]

@@ -6,8 +6,10 @@ passes of the training stay the pieces' trajectories and the log's noise levels,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
+from operator import add
 
 import numpy as np
 
@@ -29,7 +31,7 @@ from algid.estimators.weak import Source
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.filters import smoothed
-from algid.signals.segments import Segment, pieces
+from algid.signals.segments import Segment, pieces, spread_pieces
 
 PIECE_SAMPLES = 16384
 _TRAINED = 4  # pieces of a log in the training set, up to twice as many
@@ -38,9 +40,8 @@ _STRETCH = 64  # samples over which scores are summed
 _SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
 _FINEST = 1e-10  # relative noise that no sensor undercuts, and floating point can still weigh
 _EXCESS = 10.0  # torque error beyond the sensor's noise that tells unmodelled dynamics
-_SURE = (
-    0.9  # of what neighbouring torques differ by is noise of the torque: a short log may hide it in its angles' noise
-)
+# Of what neighbouring torques differ by is noise of the torque: a short log may hide it in its angles' noise.
+_SURE = 0.9
 _NEGLIGIBLE = 1e-3  # torque error relative to the torque that no one need worry about
 
 
@@ -83,18 +84,24 @@ class LogEvidence:
         self._shared = shared
         self._stencil = stencil
         self._known = known
-        self.kept, self.whole = _training_set(source())
-        if self.kept:
-            self._start()
-
-    def _start(self) -> None:
+        usable = (replace(piece, omega=None) for piece in self._pieces())
+        self.kept, self.whole = spread_pieces(usable, _TRAINED)
+        if not self.kept:
+            return
         self._trajectories = [_first_trajectory(piece) for piece in self.kept]
-        self._floor = _floor(self.kept)
-        guess = _guessed_noise(self.kept, self._floor)
-        self.noise = self._known or guess
+        floor = _digitisation(self.kept)
+        guesses = [first_guess(piece.theta, piece.tau) for piece in self.kept]
+        theta, tau = (np.median([getattr(level, name) for level in guesses], axis=0) for name in ("theta", "tau"))
+        guess = floored(NoiseLevels(theta, tau), floor)
+        self.noise = known or guess
         self._sensor = guess.tau
-        self._floor = replace(self._floor, tau=np.maximum(self._floor.tau, _SURE * guess.tau))
-        self._least = _NEGLIGIBLE * _loads(self.kept)
+        self._floor = replace(floor, tau=np.maximum(floor.tau, _SURE * guess.tau))
+        rms = np.max([np.sqrt(np.mean(piece.tau**2, axis=1)) for piece in self.kept], axis=0)
+        # A joint without a motor bears a load of the size of the other's.
+        self._least = _NEGLIGIBLE * np.where(rms > 0, rms, rms.max())
+
+    def _pieces(self) -> Iterator[Segment]:
+        return (piece for piece in pieces(self._source(), PIECE_SAMPLES) if len(piece) >= _SHORTEST)
 
     @property
     def trained(self) -> int:
@@ -116,15 +123,12 @@ class LogEvidence:
             self._trajectories[seed] = trajectory(piece, linear, multiplier, self.noise)
             if self._known is None:
                 scores.append(variance_score(linear, len(piece), seed))
-        score = sum(scores[1:], scores[0]) if scores else None
-        return gathered.outcome(self.loaded, c, score)
+        return gathered.outcome(self.loaded, c, reduce(add, scores) if scores else None)
 
     def run(self, c: FloatArray) -> Outcome:
         """Pass over the whole log at the coefficients `c`, settling each piece's trajectory by itself."""
         gathered = _Gathered()
-        for piece in pieces(self._source(), PIECE_SAMPLES):
-            if len(piece) < _SHORTEST:
-                continue
+        for piece in self._pieces():
             first = self._linearise(c, _first_trajectory(piece), piece)
             multiplier = first.solve_transposed(first.columns[-1:])[0]
             theta = trajectory(piece, first, multiplier, self.noise)
@@ -147,45 +151,11 @@ class LogEvidence:
         return linearise(shared.model, columns, theta, piece, stencil, self.noise, shared.delay)
 
 
-def _training_set(segments: Iterable[Segment]) -> tuple[list[Segment], bool]:
-    """Evenly spread pieces of a log, and whether they are all of it."""
-    kept: list[Segment] = []
-    stride = 1
-    whole = True
-    usable = (piece for piece in pieces(segments, PIECE_SAMPLES) if len(piece) >= _SHORTEST)
-    for index, piece in enumerate(usable):
-        if index % stride:
-            continue
-        kept.append(_copied(piece))
-        if len(kept) > 2 * _TRAINED:
-            kept, stride, whole = kept[::2], 2 * stride, False
-    return kept, whole
-
-
-def _copied(piece: Segment) -> Segment:
-    """The piece without hold on the block it was cut from."""
-    return replace(piece, theta=piece.theta.copy(), tau=piece.tau.copy(), omega=None)
-
-
 def _first_trajectory(piece: Segment) -> FloatArray:
     return smoothed(piece.theta, piece.dt, min(_SMOOTHING, 0.1 / piece.dt))
 
 
-def _loads(kept: Sequence[Segment]) -> FloatArray:
-    """RMS torque (2,) of each joint; a joint without a motor bears a load of the size of the other's."""
-    rms = np.max([np.sqrt(np.mean(piece.tau**2, axis=1)) for piece in kept], axis=0)
-    return np.where(rms > 0, rms, rms.max())
-
-
-def _guessed_noise(kept: Sequence[Segment], floor: NoiseLevels) -> NoiseLevels:
-    guesses = [first_guess(piece.theta, piece.tau) for piece in kept]
-    guess = NoiseLevels(
-        np.median([level.theta for level in guesses], axis=0), np.median([level.tau for level in guesses], axis=0)
-    )
-    return floored(guess, floor)
-
-
-def _floor(kept: Sequence[Segment]) -> NoiseLevels:
+def _digitisation(kept: Sequence[Segment]) -> NoiseLevels:
     """What the digitisation of angles and torques alone contributes: step / √12, and floating point's own."""
     theta = np.concatenate([piece.theta for piece in kept[:2]], axis=1)
     tau = np.concatenate([piece.tau for piece in kept[:2]], axis=1)
@@ -220,10 +190,4 @@ class _Gathered:
     def outcome(self, loaded: bool, c: FloatArray, score: VarianceScore | None = None) -> Outcome:
         """What the pass at the coefficients `c` has given."""
         information = LogInformation(loaded, c, self._S.values(), self._g.values())
-        residual = sum(self._residual[1:], self._residual[0])
-        return Outcome(information, score, added(self._innovations), residual)
-
-
-def added(innovations: Sequence[Correlations]) -> Correlations:
-    """The sums of several passes."""
-    return sum(innovations[1:], innovations[0])
+        return Outcome(information, score, reduce(add, self._innovations), reduce(add, self._residual))

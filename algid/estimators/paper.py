@@ -1,4 +1,4 @@
-"""Columns of the paper's linear systems: Páez-García et al. 2023, eq. (3), (4) and (5).
+"""The paper's method: Páez-García et al. 2023, stage 1 (eq. 3), k7 (eq. 4), stage 2 (eq. 5) and the payload.
 
 ======  ========================================  ============  ==========
 symbol  name                                      shape         unit
@@ -7,23 +7,18 @@ t       time since the window's start             (n,)          s
 theta   joint angles θ1, θ2                       (2, ..., n)   rad
 omega   joint velocities θ̇1, θ̇2                   (2, ..., n)   rad/s
 tau     joint torques τ1, τ2                      (2, ..., n)   N m
+P_r, q  system of stage 1 and its right side      (6, 6, ..., n), (6, ..., n)
+P_m, q  system of stage 2 and its right side      (5, 5, ..., n), (5, ..., n)
 ======  ========================================  ============  ==========
 
 Each equation is t² times a row of eq. (1), integrated twice from the window's start; t² removes the initial
 conditions. The angles enter linear terms as differences to their first value, which changes nothing (those
 terms vanish for a constant) and keeps digits.
 
-Many small linear systems at once, scaled, each with its condition number.
-
-The paper's two stages on windows: stage 1 (eq. 3), k7 (eq. 4), stage 2 (eq. 5) and the payload.
-
 Every series is (..., n) like the windows it is computed from, in the units of `algid.arm`, and NaN where the
-system is singular or less than ε has passed since the window's start.
-
-The paper's method over a whole log: stages on windows, in blocks, and one estimate from each series.
-
-A series' estimate is the median over its settled samples, the last 0.2 s of each window; with several windows,
-the median of the windows' medians. An estimate that wanders by more than its own size has status weak.
+system is singular or less than ε has passed since the window's start. A series' estimate is the median over its
+settled samples, the last 0.2 s of each window; with several windows, the median of the windows' medians. An
+estimate that wanders by more than its own size is not to be trusted.
 """
 
 from __future__ import annotations
@@ -64,7 +59,18 @@ class IntegralColumns:
 
 
 def columns(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> IntegralColumns:
-    """The integrals of eq. (3) and (4) over windows that start at the first sample: see `IntegralColumns`."""
+    """The integrals of eq. (3) and (4) over windows that start at their first sample.
+
+    Parameters
+    ----------
+    theta, omega, tau : (2, ..., n), rad, rad/s and N m
+    dt : float, s
+
+    Returns
+    -------
+    IntegralColumns
+        In the unit of what is integrated, times s⁴.
+    """
     t = dt * np.arange(theta.shape[-1], dtype=np.float64)
     omega1, omega2 = omega
     c2, s2 = np.cos(theta[1]), np.sin(theta[1])
@@ -94,7 +100,19 @@ def _of_derivative(signal: FloatArray, t: FloatArray, dt: float) -> FloatArray:
 
 
 def stack_rows(first: FloatArray, dt: float, rows: int) -> FloatArray:
-    """Rows (rows, ..., n): the first row, then each the integral of the one before (P_r and P_m's build)."""
+    """The rows of P_r and P_m, right sides with them: each is the integral of the one before.
+
+    Parameters
+    ----------
+    first : (..., n)
+    dt : float, s
+    rows : int
+
+    Returns
+    -------
+    (rows, ..., n)
+        `first`, then its integrals from the first sample.
+    """
     stacked = np.empty((rows, *first.shape))
     stacked[0] = first
     for row in range(1, rows):
@@ -136,7 +154,12 @@ def solve_scaled(matrix: FloatArray, rhs: FloatArray) -> Solutions:
     p = p * row
     column = _scale(np.abs(p).max(axis=-2, keepdims=True))
     p = p * column
-    inverse, regular = _inverse(p)
+    regular = np.asarray((p != 0).any(axis=-1).all(axis=-1))  # windows start with rows of zeros
+    try:
+        inverse = _inverse_where(p, regular)
+    except np.linalg.LinAlgError:  # LAPACK refuses a whole batch for one singular matrix
+        regular = np.asarray(np.linalg.slogdet(p).sign != 0)  # the same factors, the same zero pivots
+        inverse = _inverse_where(p, regular)
     with np.errstate(over="ignore", invalid="ignore"):  # next to singular: caught by the condition number
         scaled = inverse @ (q * row)
         scaled += inverse @ (q * row - p @ scaled)
@@ -152,16 +175,6 @@ def _scale(largest: FloatArray) -> FloatArray:
 def _norm1(matrix: FloatArray) -> FloatArray:
     norms: FloatArray = np.abs(matrix).sum(axis=-2).max(axis=-1)
     return norms
-
-
-def _inverse(p: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Inverses (..., u, u) and where they exist; LAPACK refuses a whole batch for one singular matrix."""
-    regular = np.asarray((p != 0).any(axis=-1).all(axis=-1))  # windows start with rows of zeros
-    try:
-        return _inverse_where(p, regular), regular
-    except np.linalg.LinAlgError:
-        regular = np.asarray(np.linalg.slogdet(p).sign != 0)  # the same factors, the same zero pivots
-        return _inverse_where(p, regular), regular
 
 
 def _inverse_where(p: FloatArray, regular: NDArray[np.bool_]) -> FloatArray:
@@ -194,9 +207,21 @@ class Stage2:
 
 
 def stage1(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> Stage1:
-    """Constants of the arm without payload from windows of angles, velocities and torques (2, ..., n)."""
+    """Constants of the arm without payload: P_r x_r = q_r of eq. (3) and five more integrals, then k7 by eq. (4).
+
+    Parameters
+    ----------
+    theta, omega, tau : (2, ..., n), rad, rad/s and N m
+        Windows, each from its own start.
+    dt : float, s
+
+    Returns
+    -------
+    Stage1
+        NaN in the first ε of each window, and where a system is singular.
+    """
     terms = columns(theta, omega, tau, dt)
-    solution = _late(_solve_first_joint(terms, dt), dt)
+    solution = _solved_late(np.concatenate([terms.first_joint(), terms.torque1[None]]), dt)
     k5_k3, k1, k3, k6, k4, k2 = solution.x
     known = k3 * (terms.inertia1 + terms.inertia2) + k1 * terms.coupling2 + k2 * terms.gravity12
     k7, k7_condition = _single_unknown(terms.viscous2, terms.torque2 - known)
@@ -207,22 +232,12 @@ def stage1(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> 
     )
 
 
-def _solve_first_joint(terms: IntegralColumns, dt: float) -> Solutions:
-    """x_r of P_r x_r = q_r: eq. (3) and five more integrals of it."""
-    rows = stack_rows(np.concatenate([terms.first_joint(), terms.torque1[None]]), dt, 6)
-    return solve_scaled(rows[:, :-1], rows[:, -1])
-
-
-def _late(solution: Solutions, dt: float) -> Solutions:
-    """The solution with NaN in the first ε of each window."""
-    x = solution.x.copy()
-    x[..., : _arbitrary(dt)] = np.nan
-    return Solutions(x=x, condition=solution.condition)
-
-
-def _arbitrary(dt: float) -> int:
-    """Samples before ε."""
-    return int(np.ceil(EPSILON / dt - 1e-6))
+def _solved_late(first: FloatArray, dt: float) -> Solutions:
+    """Solution x (u, ..., n) of the system whose first row and right side are `first` (u + 1, ..., n): NaN before ε."""
+    rows = stack_rows(first, dt, len(first) - 1)
+    solution = solve_scaled(rows[:, :-1], rows[:, -1])
+    solution.x[..., : int(np.ceil(EPSILON / dt - 1e-6))] = np.nan
+    return solution
 
 
 def _single_unknown(coefficient: FloatArray, rhs: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -235,18 +250,43 @@ def _single_unknown(coefficient: FloatArray, rhs: FloatArray) -> tuple[FloatArra
 
 
 def stage2(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float, k: FloatArray, gravity: float) -> Stage2:
-    """Constants of the loaded arm and the payload, given k1 … k7 (7,) of the arm and g in m/s²."""
+    """Constants of the loaded arm, and the payload: P_m x_m = q_m of eq. (5) and four more integrals.
+
+    Parameters
+    ----------
+    theta, omega, tau : (2, ..., n), rad, rad/s and N m
+        Windows of the loaded arm, each from its own start.
+    dt : float, s
+    k : (7,), in `algid.arm.CONSTANT_UNITS`
+        Of the arm without payload.
+    gravity : float, m/s²
+
+    Returns
+    -------
+    Stage2
+        NaN in the first ε of each window, and where a system is singular.
+    """
     terms = columns(theta, omega, tau, dt)
     unknown = np.stack([terms.inertia1, terms.coupling1, terms.inertia2, terms.gravity1, terms.gravity12])
     rest = terms.torque1 - k[5] * terms.viscous1
-    rows = stack_rows(np.concatenate([unknown, rest[None]]), dt, 5)
-    solution = _late(solve_scaled(rows[:, :-1], rows[:, -1]), dt)
+    solution = _solved_late(np.concatenate([unknown, rest[None]]), dt)
     l1, m_p = payload(solution.x, k, gravity)
     return Stage2(x=solution.x, l1=l1, m_p=m_p, condition=solution.condition)
 
 
 def payload(x: FloatArray, k: FloatArray, gravity: float) -> tuple[FloatArray, FloatArray]:
-    """l1 = z1 g / z4 in m and m_p = z1 / l1² in kg from x_m (5, ...) and k (7,): the paper's route."""
+    """l1 = z1 g / z4 and m_p = z1 / l1², the paper's route.
+
+    Parameters
+    ----------
+    x : (5, ...), in the order of `STAGE2_NAMES`
+    k : (7,), in `algid.arm.CONSTANT_UNITS`
+    gravity : float, m/s²
+
+    Returns
+    -------
+    l1 (...) in m and m_p (...) in kg; NaN where there is no payload.
+    """
     z2 = x[2] - k[2]
     z4 = x[3] - k[3]
     z1 = x[0] - k[4] - k[2] - z2
@@ -276,7 +316,14 @@ class PaperSeries:
 
 
 def stage1_series(source: Iterable[Segment], window: float) -> Iterator[PaperSeries]:
-    """`STAGE1_SERIES` of a log of the arm without payload, by windows of `window` s; segments need velocities."""
+    """`STAGE1_SERIES` of a log of the arm without payload.
+
+    Parameters
+    ----------
+    source : iterable of `Segment`, with velocities
+    window : float, s
+        What is left over at the end of a segment is a window too, down to eight samples.
+    """
 
     def stage(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> FloatArray:
         found = stage1(theta, omega, tau, dt)
@@ -287,7 +334,14 @@ def stage1_series(source: Iterable[Segment], window: float) -> Iterator[PaperSer
 
 
 def stage2_series(source: Iterable[Segment], window: float, k: FloatArray, gravity: float) -> Iterator[PaperSeries]:
-    """`STAGE2_SERIES` of a log of the arm with payload, given its constants k1 … k7 (7,) without."""
+    """`STAGE2_SERIES` of a log of the arm with payload.
+
+    Parameters
+    ----------
+    source, window : see `stage1_series`
+    k : (7,), in `algid.arm.CONSTANT_UNITS`, of the arm without payload
+    gravity : float, m/s²
+    """
 
     def stage(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> FloatArray:
         found = stage2(theta, omega, tau, dt, k, gravity)
@@ -349,16 +403,16 @@ class Summary:
         if not self._quartiles:
             return np.full(self._size, np.nan), np.full(self._size, np.nan)
         low, middle, high = np.stack(self._quartiles, axis=-1)
-        estimate, wander = np.full(self._size, np.nan), np.full(self._size, np.nan)
+        estimate, wander = np.full((2, self._size), np.nan)
         some = np.isfinite(middle).any(axis=1)
-        estimate[some] = np.nanmedian(middle[some], axis=1)
-        within = np.nanmedian(high[some] - low[some], axis=1)
         if some.any():
+            estimate[some] = np.nanmedian(middle[some], axis=1)
+            within = np.nanmedian(high[some] - low[some], axis=1)
             between = np.subtract(*np.nanquantile(middle[some], [0.75, 0.25], axis=1))
             wander[some] = 0.5 * np.maximum(within, between)
         return estimate, wander
 
 
 def wanders(estimate: FloatArray, wander: FloatArray) -> NDArray[np.bool_]:
-    """Where an estimate is not to be trusted: there is none, or it wanders by more than its own size."""
+    """Where estimates (s,) are not to be trusted: there is none, or it wanders (s,) by more than its own size."""
     return ~(wander <= np.abs(estimate))

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
+from operator import add
 from typing import Literal
 
 import numpy as np
@@ -18,7 +20,7 @@ from algid.arm import FloatArray
 from algid.estimators.combine import Prior, combine
 from algid.estimators.fit import Fit, conclude
 from algid.estimators.identifiability import judge, open_directions
-from algid.estimators.log_likelihood import LogEvidence, Outcome, added
+from algid.estimators.log_likelihood import LogEvidence, Outcome
 from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Source, WeakSettings
 from algid.estimators.weak import fit as weak_fit
@@ -76,15 +78,7 @@ class RefinedSettings:
         return 0.5 * dt if self.hold == "zoh" else 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class _Training:
-    """How the alternation ended: whether it settled, or the data refuted white torque noise."""
-
-    beta: FloatArray
-    outcomes: list[Outcome]
-    iterations: int
-    settled: bool = False
-    refuted: bool = False
+End = Literal["settled", "refuted", "unsettled"]
 
 
 def fit(
@@ -114,47 +108,41 @@ def fit(
         If there is no log, or no log long enough, or a known noise level is not positive.
     """
     settings = settings or RefinedSettings()
-    _check_noise(settings.noise)
-    start = weak_fit(unloaded, loaded, _weak_settings(settings), settings.lengths, settings.prior)
+    noise = settings.noise
+    if noise is not None and not (np.all(noise.theta > 0) and np.all(noise.tau > 0)):
+        raise ValueError(f"known noise levels must be positive, got {noise.theta} rad and {noise.tau} N m")
+    same = {name: getattr(settings, name) for name in ("model", "hold", "delay", "estimate_delay")}
+    start = weak_fit(unloaded, loaded, replace(settings.weak, **same), settings.lengths, settings.prior)
     shared = start.shared
     settings, prior = replace(settings, prior=_anchored(start)), settings.prior
     logs = [*_opened(unloaded, False, shared, settings), *_opened(loaded, True, shared, settings)]
     try:
-        training = _train(shared, logs, start.values, settings, told)
-        if training.refuted:
-            return replace(start, note=_REFUTED, iterations=training.iterations)
-        if not training.settled or not np.all(np.isfinite(training.beta)):
-            return _not_converged(start, training.iterations)
-        beta, outcomes = training.beta, training.outcomes
-        if not all(log.whole for log in logs):
+        beta, outcomes, iterations, end = _train(shared, logs, start.values, settings, told)
+        if end == "refuted":
+            return replace(start, note=_REFUTED, iterations=iterations)
+        settled = end == "settled" and bool(np.all(np.isfinite(beta)))
+        if settled and not all(log.whole for log in logs):
             beta, outcomes = _finish(shared, logs, beta, settings)
     except np.linalg.LinAlgError:
-        return _not_converged(start, 0)
-    whiteness = judge(added([outcome.innovations for outcome in outcomes]))
+        settled, iterations = False, 0
+    if not settled:
+        failed = tuple("NOT_CONVERGED" if word == "OK" else word for word in start.status)
+        return replace(start, status=failed, converged=False, iterations=iterations)
+    whiteness = judge(reduce(add, [outcome.innovations for outcome in outcomes]))
     informations = [outcome.information for outcome in outcomes]
+    samples = int(_count(outcomes))
     coloured = not whiteness.white
-    fitted = conclude(
-        "refined",
-        shared,
-        informations,
-        beta,
-        start.moved,
-        prior,
-        coloured=coloured,
-        samples=int(_count(outcomes)),
-    )
-    noise = tuple(log.noise for log in logs)
-    fitted = _no_surer(fitted, start)
-    residual = tuple(outcome.residual for outcome in outcomes)
-    return replace(fitted, noise=noise, whiteness=whiteness, residual=residual, iterations=training.iterations)
-
-
-def _no_surer(fitted: Fit, start: Fit) -> Fit:
-    """The fit without what the weak estimate leaves open: a joint at rest trembles in noise, which is no motion."""
+    fitted = conclude("refined", shared, informations, beta, start.moved, prior, coloured=coloured, samples=samples)
+    # No surer than the weak estimate: a joint at rest trembles in noise, which is no motion.
     pairs = zip(fitted.status, start.status, strict=True)
-    status = tuple(first if second == "OK" else second for first, second in pairs)
     return replace(
-        fitted, status=status, unidentifiable=tuple(dict.fromkeys(fitted.unidentifiable + start.unidentifiable))
+        fitted,
+        status=tuple(own if before == "OK" else before for own, before in pairs),
+        unidentifiable=tuple(dict.fromkeys(fitted.unidentifiable + start.unidentifiable)),
+        noise=tuple(log.noise for log in logs),
+        whiteness=whiteness,
+        residual=tuple(outcome.residual for outcome in outcomes),
+        iterations=iterations,
     )
 
 
@@ -177,11 +165,6 @@ def _anchored(start: Fit) -> Prior | None:
     return Prior(start.names, mean, precision)
 
 
-def _check_noise(noise: NoiseLevels | None) -> None:
-    if noise is not None and not (np.all(noise.theta > 0) and np.all(noise.tau > 0)):
-        raise ValueError(f"known noise levels must be positive, got {noise.theta} rad and {noise.tau} N m")
-
-
 def _opened(
     sources: Sequence[Source], loaded: bool, shared: Shared, settings: RefinedSettings
 ) -> Iterator[LogEvidence]:
@@ -196,24 +179,10 @@ def _opened(
             yield log
 
 
-def _not_converged(start: Fit, iterations: int) -> Fit:
-    status = tuple("NOT_CONVERGED" if word == "OK" else word for word in start.status)
-    return replace(start, status=status, converged=False, iterations=iterations)
-
-
-def _weak_settings(settings: RefinedSettings) -> WeakSettings:
-    return replace(
-        settings.weak,
-        model=settings.model,
-        hold=settings.hold,
-        delay=settings.delay,
-        estimate_delay=settings.estimate_delay,
-    )
-
-
 def _train(
     shared: Shared, logs: Sequence[LogEvidence], beta: FloatArray, settings: RefinedSettings, tell: Told | None
-) -> _Training:
+) -> tuple[FloatArray, list[Outcome], int, End]:
+    """Parameters, the last pass over each log, steps taken, and how the alternation ended."""
     total = sum(log.trained for log in logs)
     for iteration in range(1, _STEPS + 1):
         outcomes: list[Outcome] = []
@@ -229,10 +198,10 @@ def _train(
         moved = _distance(better - beta, S)
         beta = better
         if settings.noise is None and any(log.refuted for log in logs):
-            return _Training(beta, outcomes, iteration, refuted=True)
+            return beta, outcomes, iteration, "refuted"
         if iteration > 1 and moved < _SETTLED and told < _NOISE_SETTLED:
-            return _Training(beta, outcomes, iteration, settled=True)
-    return _Training(beta, outcomes, _STEPS)
+            return beta, outcomes, iteration, "settled"
+    return beta, outcomes, _STEPS, "unsettled"
 
 
 def _finish(

@@ -41,12 +41,27 @@ class Running:
 
 
 def running(fit: Fit, durations: Sequence[float], moments: int = MOMENTS) -> Running:
-    """Estimates of `fit`'s parameters as its logs, `durations` s long each, are gone over one after the other.
+    """Estimates of a fit's parameters as its logs are gone over one after the other.
 
+    Parameters
+    ----------
+    fit : Fit
+    durations : s, of each of its logs
+    moments : int
+        About how many there are in all; each log has two at least, and no more than stretches.
+
+    Returns
+    -------
+    Running
+
+    Notes
+    -----
     The band is that of the information so far, wider by the factor that the fit's own intervals are wider than the
     information of all logs has it: that of coloured residuals and of what differs from run to run.
     """
-    widening = _widening(fit)
+    _, plain = _estimate(fit, fit.logs)
+    known = np.isfinite(fit.std) & (plain > 0)
+    widening = np.divide(fit.std, plain, out=np.ones_like(plain), where=known)
     places, shares, betas, halves = [], [], [], []
     for number, log in enumerate(fit.logs):
         count = max(2, round(moments * durations[number] / sum(durations)))
@@ -57,31 +72,24 @@ def running(fit: Fit, durations: Sequence[float], moments: int = MOMENTS) -> Run
             S, g = S + log.S[begin:end].sum(axis=0), g + log.g[begin:end].sum(axis=0)
             begin = int(end)
             so_far = [*fit.logs[:number], LogInformation(log.loaded, log.c0, S[None], g[None])]
-            beta, half = _estimate(fit, so_far, widening)
+            beta, std = _estimate(fit, so_far)
             places.append(number)
             shares.append(end / log.S.shape[0])
             betas.append(beta)
-            halves.append(half)
+            halves.append(fit.quantile * widening * std)
     return Running(np.array(places, dtype=np.int32), np.array(shares), np.array(betas), np.array(halves))
 
 
-def _estimate(fit: Fit, logs: Sequence[LogInformation], widening: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _estimate(fit: Fit, logs: Sequence[LogInformation]) -> tuple[FloatArray, FloatArray]:
+    """Parameters (Q,) that some of the fit's logs tell, and their standard deviations (Q,); NaN where they are open."""
     beta, S, _ = combine(fit.shared, logs, fit.values, fit.prior)
     if not S.any():  # a joint at rest, and nothing else so far
         return np.full(beta.shape, np.nan), np.full(beta.shape, np.nan)
     known = examine(fit.names, beta, S, fit.moved)
     std = np.sqrt(np.maximum(np.diag(known.covariance), 0.0))
     lost = np.array([status == "NOT_IDENTIFIABLE" for status in fit.status])  # the fit may know better than its sums
-    open_ones = np.logical_not(known.determined) | lost
-    return np.where(open_ones, np.nan, beta), np.where(open_ones, np.nan, fit.quantile * widening * std)
-
-
-def _widening(fit: Fit) -> FloatArray:
-    """Reported standard deviations (Q,) over those of the information alone."""
-    _, S, _ = combine(fit.shared, fit.logs, fit.values, fit.prior)
-    plain = np.sqrt(np.maximum(np.diag(examine(fit.names, fit.values, S, fit.moved).covariance), 0.0))
-    known = np.isfinite(fit.std) & (plain > 0)
-    return np.divide(fit.std, plain, out=np.ones_like(plain), where=known)
+    told = np.array(known.determined) & ~lost
+    return np.where(told, beta, np.nan), np.where(told, std, np.nan)
 
 
 def has_running(fit: Fit) -> bool:

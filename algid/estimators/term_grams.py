@@ -26,7 +26,7 @@ from algid.estimators.combine import long_run_variance, scaled_pinv
 from algid.estimators.modulating_functions import OVERLAP, row_weights
 from algid.estimators.weak import Normal, Source, WeakSettings, normal_equations
 from algid.model import TERMS
-from algid.signals.segments import Segment, pieces
+from algid.signals.segments import Segment, pieces, spread_pieces
 
 IntArray = NDArray[np.int64]
 Coefficients = Mapping[str, float]
@@ -54,15 +54,7 @@ class Training:
     @classmethod
     def of(cls, source: Source, loaded: bool) -> Training:
         """The pieces of one pass over a log."""
-        kept: list[Segment] = []
-        stride = 1
-        for index, piece in enumerate(pieces(source(), _PIECE_SAMPLES)):
-            if index % stride:
-                continue
-            kept.append(_copied(piece, piece.continues and stride == 1))
-            if len(kept) > 2 * _PIECES:
-                kept, stride = [replace(piece, continues=False) for piece in kept[::2]], 2 * stride
-        return cls(tuple(kept), loaded)
+        return cls(tuple(spread_pieces(pieces(source(), _PIECE_SAMPLES), _PIECES)[0]), loaded)
 
     @property
     def driven(self) -> bool:
@@ -72,12 +64,6 @@ class Training:
     def segments(self) -> Iterable[Segment]:
         """The pieces, as a source gives them."""
         return self.pieces
-
-
-def _copied(piece: Segment, continues: bool) -> Segment:
-    """The piece without hold on the block it was cut from."""
-    omega = None if piece.omega is None else piece.omega.copy()
-    return replace(piece, theta=piece.theta.copy(), tau=piece.tau.copy(), omega=omega, continues=continues)
 
 
 class Grams:
@@ -165,7 +151,10 @@ class Grams:
         return np.array([*basic, *range(len(self.names), self.size)])
 
     def coefficients(self, terms: Iterable[str]) -> dict[bool, dict[str, float]]:
-        """Coefficients by name of the sub-model with `terms`, of each kind of log there is."""
+        """Coefficients by name of the sub-model with `terms`, of unloaded (False) and of loaded logs (True).
+
+        A kind of which there is no log has those of the other.
+        """
         p = _solved(self._total, self._columns(terms))
         found = {kind: dict(zip(self.names, p[self._places(kind)].tolist(), strict=True)) for kind in self.kinds}
         return {kind: found.get(kind, next(iter(found.values()))) for kind in (False, True)}
@@ -187,16 +176,16 @@ class Grams:
 
         Returns
         -------
-        The smaller of the Wald statistics by the plain and by the sandwich covariance, and the independent
-        stretches of log behind them
+        The smaller of the Wald statistics bᵀ V⁻¹ b by the plain and by the sandwich covariance V, and the
+        independent stretches of log behind them.
         """
         columns = self._columns(among)
         key = tuple(columns.tolist())  # each sub-model is asked for by every term that it has
         if key not in self._spreads:
             self._spreads[key] = self._spread(columns)
         value, covariances, stretches = self._spreads[key]
-        asked = self._own({name for term in terms for name in term_names(term)})
-        own = [place for place, column in enumerate(columns) if column in asked]
+        names = {name for term in terms for name in term_names(term)}
+        own = np.flatnonzero(np.isin(columns, [place for place, name in enumerate(self.names) if name in names]))
         found = [float(value[own] @ scaled_pinv(S[np.ix_(own, own)]) @ value[own]) for S in covariances]
         return min(found), float(stretches)
 
@@ -211,9 +200,6 @@ class Grams:
             stretches += len(gram) // (lags + 1)
         stretches = max(stretches, len(columns) + 2)
         return value, (inverse, inverse @ meat @ inverse * (stretches / (stretches - len(columns)))), stretches
-
-    def _own(self, names: set[str]) -> set[int]:
-        return {place for place, name in enumerate(self.names) if name in names}
 
 
 def _solved(gram: FloatArray, columns: IntArray) -> FloatArray:

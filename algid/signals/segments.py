@@ -197,6 +197,32 @@ def pieces(source: Iterable[Segment], rows: int) -> Iterator[Segment]:
     yield from cutter.finish()
 
 
+def spread_pieces(usable: Iterable[Segment], count: int) -> tuple[list[Segment], bool]:
+    """Copies of evenly spread pieces of a log, from one pass over it.
+
+    Parameters
+    ----------
+    usable : iterable of `Segment`
+    count : int
+        How many are kept of a long log, up to twice as many. What was cut from a block does not hold it.
+
+    Returns
+    -------
+    The pieces, and whether they are all there were. Where some were left out none continues the one before.
+    """
+    kept: list[Segment] = []
+    stride = 1
+    for index, piece in enumerate(usable):
+        if index % stride:
+            continue
+        omega = None if piece.omega is None else piece.omega.copy()
+        continues = piece.continues and stride == 1
+        kept.append(replace(piece, theta=piece.theta.copy(), tau=piece.tau.copy(), omega=omega, continues=continues))
+        if len(kept) > 2 * count:
+            kept, stride = [replace(other, continues=False) for other in kept[::2]], 2 * stride
+    return kept, stride == 1
+
+
 class Cutter:
     """Cuts each stretch into pieces of `rows` samples; a rest shorter than half a piece joins the last one.
 
