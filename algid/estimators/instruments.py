@@ -104,29 +104,19 @@ def fit(
     settings = replace(settings, delay=base)
     logs: list[LogInformation] = []
     for kind, sources in ((False, unloaded), (True, loaded)):
-        if sources:
-            found = _solved(sources, settings, _coefficients(start, kind), kind)
-            if found is None:
-                return _failed(start)
-            logs += found
+        if not sources:
+            continue
+        c = shared.coefficients(start.values, kind)
+        if shared.delay:  # the windows are shifted by what is known of it: its column tells a change
+            c[-1] = 0.0
+        found = _solved(sources, settings, c, kind)
+        if found is None:
+            status = tuple("NOT_CONVERGED" if word == "OK" else word for word in start.status)
+            return replace(start, status=status, converged=False)
+        logs += found
     if shared.delay:
-        logs = [replace(log, c0=_with_delay(log.c0, base)) for log in logs]
+        logs = [replace(log, c0=np.append(log.c0[:-1], log.c0[-1] + base)) for log in logs]
     return conclude("instruments", shared, logs, start.values, start.moved, prior, coloured=True)
-
-
-def _coefficients(start: Fit, loaded: bool) -> FloatArray:
-    """Those of a log at `start`; a delay as its change from the one found."""
-    c = start.shared.coefficients(start.values, loaded)
-    return _with_delay(c, -float(c[-1])) if start.shared.delay else c
-
-
-def _with_delay(c: FloatArray, change: float) -> FloatArray:
-    return np.append(c[:-1], c[-1] + change)
-
-
-def _failed(start: Fit) -> Fit:
-    status = tuple("NOT_CONVERGED" if word == "OK" else word for word in start.status)
-    return replace(start, status=status, converged=False)
 
 
 def _solved(
@@ -237,7 +227,8 @@ def _simulated(
     Runge-Kutta's fourth order in steps of some `_STEP` s, all windows side by side, from the measured start. (To
     start earlier, so that what the unmodelled torque did before has faded, made the instruments too weak.)
     """
-    stride = _samples_a_step(windows.dt)
+    # Samples that a step spans: every window is a multiple of it.
+    stride = int(np.clip(2 ** np.floor(np.log2(max(_STEP / windows.dt, 1.0))), 2, OVERLAP))
     h = stride * windows.dt
     inside = np.arange(stride) / stride
     acts = np.ascontiguousarray(np.moveaxis(tau[:, :, :: stride // 2], 2, 0))  # where the method asks for it
@@ -260,11 +251,6 @@ def _simulated(
     good = np.abs(thetas - measured).max(axis=(0, 2)) < _ASTRAY
     angles, torques, velocities = (signal.reshape(2, -1) for signal in (thetas, tau[:, :, :-1], omegas))
     return Segment(0.0, windows.dt, angles, torques, velocities), good
-
-
-def _samples_a_step(dt: float) -> int:
-    """Samples that a step of the simulation spans: 2, 4 or 8, which every window is a multiple of."""
-    return int(np.clip(2 ** np.floor(np.log2(max(_STEP / dt, 1.0))), 2, OVERLAP))
 
 
 def _cubic(start: FloatArray, end: FloatArray, rise: FloatArray, last: FloatArray, s: FloatArray) -> FloatArray:
