@@ -19,7 +19,7 @@ from algid.log import Log
 from algid.profile import Profile
 from algid.readers import read_log
 from algid.readers.mcap import cdr, protobuf
-from algid.readers.mcap.columnar import Decoder, ExcessError, MisfitError
+from algid.readers.mcap.columnar import ColumnDecoder, ExcessError, MisfitError
 from algid.readers.mcap.definitions import DefinitionError, parse_idl, parse_msg
 from algid.readers.mcap.framing import DamagedError, File
 from algid.readers.mcap.messages import records_in
@@ -157,7 +157,7 @@ def test_messages_each_of_another_layout_are_read_as_far_as_a_file_may_ask() -> 
         spent[0] += steps
         return spent[0] < 1_000_000
 
-    decoder = Decoder(lambda payload: cdr.walk(payload, JOINT_STATE, types), wanted, frozenset(wanted), works)
+    decoder = ColumnDecoder(wanted, works, walk=lambda payload: cdr.walk(payload, JOINT_STATE, types))
     found = records_in(content).of({1})
     held, columns = decoder.columns(found)
     assert held.all()

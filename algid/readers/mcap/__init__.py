@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from algid.errors import LogError
-from algid.log import Origin, Truth, loads
+from algid.log import Origin
 from algid.readers.align import Series, aligned
 from algid.readers.assemble import TableReader, reader_of
-from algid.readers.mcap.catalogue import Catalogue, catalogue, truth_text
+from algid.readers.mcap.catalogue import Catalogue, catalogue
 from algid.readers.mcap.framing import DamagedError, File
 from algid.readers.mcap.topic import Fields, Topic
 from algid.readers.order import Sorter
@@ -43,10 +43,14 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
         except NothingFoundError as error:
             if not found.damage:
                 raise
-            raise _blamed(paths[0], found, error) from error
-        truth = _truth(paths[0], found)
-        rows = wanted.topics[0].count(found)
+            places = list(dict.fromkeys(found.damage))
+            where = "; ".join(places[:3]) + (f"; {len(places) - 3} more" if len(places) > 3 else "")
+            left = str(error).removeprefix(f"{paths[0]}: ")
+            told = f"the MCAP file is damaged ({where}); copy it again; in what is left: {left}"
+            raise LogError(f"{paths[0]}: {told}") from error
+        truth = found.truth(paths[0])
         main = wanted.topics[0]
+        rows = main.count(found)
         beside = moving_joints(
             wanted.others,
             lambda paths: Topic(main.name, main.type, Fields(paths, None), "log").tables(
@@ -57,8 +61,7 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
     origin = Origin(name, "mcap", wanted.mapping, truth, wanted.reading)
 
     def tables(rows: int) -> Iterator[SampleTable]:
-        main, *others = wanted.topics
-        samples = _read(paths, main, rows, known)
+        samples, others = _read(paths, main, rows, known), wanted.topics[1:]
         return aligned(samples, [_series(name, paths, other, known) for other in others]) if others else samples
 
     return reader_of(origin, tables, profile, wanted.units, (*wanted.notices, *beside), rows)
@@ -106,21 +109,3 @@ def opened(path: Path, known: Known | None = None) -> Iterator[tuple[File, Catal
             known[path, file.size, file.changed_ns] = found
             found = found.copy()
         yield file, found
-
-
-def _blamed(path: Path, found: Catalogue, error: LogError) -> LogError:
-    """The error, with the damage to the file first."""
-    places = list(dict.fromkeys(found.damage))
-    where = "; ".join(places[:3]) + (f"; {len(places) - 3} more" if len(places) > 3 else "")
-    left = str(error).removeprefix(f"{path}: ")
-    return LogError(f"{path}: the MCAP file is damaged ({where}); copy it again; in what is left: {left}")
-
-
-def _truth(path: Path, found: Catalogue) -> Truth | None:
-    text = truth_text(found)
-    if text is None:
-        return None
-    try:
-        return loads(text).truth
-    except ValueError as error:
-        raise LogError(f"{path}: the truth in the file's metadata cannot be read ({error})") from error

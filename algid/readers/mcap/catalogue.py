@@ -11,12 +11,14 @@ import struct
 import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
-from algid.log import KEY, Notice
+from algid.errors import LogError
+from algid.log import KEY, Notice, Truth, loads
 from algid.readers.mcap import framing
-from algid.readers.mcap.framing import ChunkIndex, DamagedError, File, claimed, parse, unpack, unpack_torn
-from algid.readers.mcap.messages import records_in
+from algid.readers.mcap.framing import ChunkIndex, DamagedError, File, claimed, parse, unpack
+from algid.readers.mcap.messages import Records, records_in
 from algid.readers.mcap.salvage import Gap, salvaged
 from algid.words import counted
 
@@ -26,8 +28,6 @@ _MOST_INDEXES = 2_000_000
 _MOST_SPANS = 100_000
 _SPAN = 1 << 23
 _LOOSE, _TORN = -1, -2
-_EMPTY_CHUNK = bytes(40)
-"""A chunk of nothing, not packed, without a time or a checksum."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,20 @@ class Span:
     channels: frozenset[int] | None = None
     loose: bool = False
     torn: bool = False
+
+    def records(self, file: File, content: bytes) -> Records:
+        """The records within, out of the span's bytes and those of the indexes behind it.
+
+        Raises
+        ------
+        DamagedError
+            If they are not what the format says, or more than in any honest file.
+        """
+        inside, index = content[: self.length], content[self.length :]
+        if self.loose:
+            return records_in(inside, works=file.works)
+        file.unpacks(claimed(inside))
+        return records_in(unpack(inside, torn=self.torn), index, file.works)
 
 
 @dataclass
@@ -64,16 +78,23 @@ class Catalogue:
     _agreed: dict[tuple[int, bytes], Any] = field(default_factory=dict, repr=False)
 
     def copy(self) -> Catalogue:
-        """One that reading may add to."""
-        return replace(
-            self,
-            schemas=dict(self.schemas),
-            channels=dict(self.channels),
-            metadata=dict(self.metadata),
-            notices=list(self.notices),
-            damage=list(self.damage),
-            redefined=dict(self.redefined),
-        )
+        """One that reading may add to: damage that it meets, and ids that are redefined on the way."""
+        return replace(self, damage=list(self.damage), redefined=dict(self.redefined))
+
+    def truth(self, path: Path) -> Truth | None:
+        """What the metadata record "algid" tells of the simulated arm, None without one.
+
+        Raises
+        ------
+        LogError
+            If the record is there and cannot be read.
+        """
+        if KEY not in self.metadata:
+            return None
+        try:
+            return loads(self.metadata[KEY].get(KEY, "")).truth
+        except ValueError as error:
+            raise LogError(f"{path}: the truth in the file's metadata cannot be read ({error})") from error
 
     def define(self, code: int, content: bytes) -> None:
         """Take in the content of a schema's or a channel's record; the first of an id holds.
@@ -97,14 +118,12 @@ class Catalogue:
         kind, known = (records.Schema, self.schemas) if code == framing.SCHEMA else (records.Channel, self.channels)
         one = parse(kind, content)
         if known.get(one.id, one) != one:
-            changed = [one.id] if code == framing.CHANNEL else self._channels_of_schema(one.id)
-            raise RedefinedError(f"{kind.__name__.lower()} {one.id} is defined anew and differently", changed)
+            told = f"{kind.__name__.lower()} {one.id} is defined anew and differently"
+            using = (channel.id for channel in self.channels.values() if channel.schema_id == one.id)
+            raise RedefinedError(told, [one.id] if code == framing.CHANNEL else using)
         if one.id in known:
             self._agreed[code, content] = one
         return one
-
-    def _channels_of_schema(self, number: int) -> list[int]:
-        return [channel.id for channel in self.channels.values() if channel.schema_id == number]
 
 
 class RedefinedError(DamagedError):
@@ -135,12 +154,10 @@ def catalogue(file: File) -> Catalogue:
 
 
 def _from_summary(file: File) -> Catalogue | None:
+    """What a summary says that can be trusted, None where there is none that tells enough."""
     from mcap import records
 
-    place = _summary(file)
-    if place is None:
-        return None
-    content = file.read(*place)
+    start, content = _summary(file)
     found, statistics, metadata = Catalogue(), None, []
     chunks: list[ChunkIndex] = []
     for record in framing.walk_bytes(content, 0, len(content)):
@@ -156,18 +173,20 @@ def _from_summary(file: File) -> Catalogue | None:
     if statistics is None or not chunks or not found.channels:
         return None
     chunks.sort(key=lambda one: one.chunk_start_offset)
+    _check_listed(file, chunks, statistics, start)
     found.counts = dict(statistics.channel_message_counts)
-    found.spans = [_chunk_span(file, chunk) for chunk in chunks]
-    _check_counts(file, chunks, statistics)
-    _check_between(file, chunks, place[0])
+    for chunk in chunks:
+        channels = frozenset(chunk.message_index_offsets) if chunk.message_index_length else None
+        place, length = chunk.chunk_start_offset + 9, chunk.chunk_length - 9
+        found.spans.append(Span(place, length, chunk.message_index_length, channels))
     for one in metadata:
         if one.name == KEY and KEY not in found.metadata:
             _keep_metadata(file, framing.Record(framing.METADATA, one.offset + 9, one.length - 9), found)
     return found
 
 
-def _summary(file: File) -> tuple[int, int] | None:
-    """First byte and length of the summary, None where the footer names none; its checksum is verified."""
+def _summary(file: File) -> tuple[int, bytes]:
+    """Where the summary starts, and its bytes, none where the footer names no summary; its checksum is verified."""
     tail = file.read(max(0, file.size - _FOOTER_SIZE), min(_FOOTER_SIZE, file.size))
     if len(tail) < _FOOTER_SIZE or tail[-8:] != framing.MAGIC:
         raise DamagedError("the file has no end: it was cut off")
@@ -176,40 +195,44 @@ def _summary(file: File) -> tuple[int, int] | None:
     if code != framing.FOOTER or length != 20:
         raise DamagedError("its footer is damaged")
     if start == 0:
-        return None
+        return 0, b""
     if not 8 <= start <= end or end - start > _LARGEST_SUMMARY:
         raise DamagedError(f"its footer claims a summary at byte {start}")
-    if crc and zlib.crc32(tail[:25], zlib.crc32(file.read(start, end - start))) != crc:
+    content = file.read(start, end - start)
+    if crc and zlib.crc32(tail[:25], zlib.crc32(content)) != crc:
         raise DamagedError("its checksum is wrong")
-    return start, end - start
+    return start, content
 
 
-def _chunk_span(file: File, chunk: ChunkIndex) -> Span:
-    start, length = chunk.chunk_start_offset + 9, chunk.chunk_length - 9
-    if not (length > 0 and start + length + chunk.message_index_length <= file.size):
-        raise DamagedError(f"it claims a chunk at byte {chunk.chunk_start_offset}")
-    channels = frozenset(chunk.message_index_offsets) if chunk.message_index_length else None
-    return Span(start, length, chunk.message_index_length, channels)
+def _check_listed(file: File, chunks: list[ChunkIndex], statistics: Any, end: int) -> None:
+    """Hold what a summary lists against its own counts and against the file, up to the summary at `end`.
 
-
-def _check_counts(file: File, chunks: list[ChunkIndex], statistics: Any) -> None:
-    """Compare the messages that the indexes list with those that the statistics count, for every channel."""
+    Chunks lie in the file and do not overlap, their indexes list as many messages as the statistics count, for every
+    channel, and no message or chunk stands beside those that are listed.
+    """
+    for chunk in chunks:
+        last = chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length
+        if not (chunk.chunk_length > 9 and last <= file.size):
+            raise DamagedError(f"it claims a chunk at byte {chunk.chunk_start_offset}")
     if statistics.chunk_count != len(chunks):
         raise DamagedError(f"it lists {len(chunks)} of {counted(statistics.chunk_count, 'chunk')}")
-    if any(not chunk.message_index_length for chunk in chunks):
-        return
-    if sum(len(chunk.message_index_offsets) for chunk in chunks) > _MOST_INDEXES:
-        raise DamagedError(f"it claims more than {_MOST_INDEXES} message indexes")
-    listed: dict[int, int] = {}
-    for chunk in chunks:
-        for channel, offset in chunk.message_index_offsets.items():
+    if all(chunk.message_index_length for chunk in chunks):
+        if sum(len(chunk.message_index_offsets) for chunk in chunks) > _MOST_INDEXES:
+            raise DamagedError(f"it claims more than {_MOST_INDEXES} message indexes")
+        listed: dict[int, int] = {}
+        for channel, offset in (pair for chunk in chunks for pair in chunk.message_index_offsets.items()):
             code, _, named, size = struct.unpack("<BQHI", file.read(offset, 15))
             if code != framing.MESSAGE_INDEX or named != channel or size % 16:
                 raise DamagedError(f"it claims a message index at byte {offset}")
             listed[channel] = listed.get(channel, 0) + size // 16
-    promised = {channel: count for channel, count in statistics.channel_message_counts.items() if count}
-    if listed != promised:
-        raise DamagedError("its indexes and its statistics count different numbers of messages")
+        if listed != {channel: count for channel, count in statistics.channel_message_counts.items() if count}:
+            raise DamagedError("its indexes and its statistics count different numbers of messages")
+    for start, stop in between(chunks, end):
+        if start > stop:
+            raise DamagedError(f"its chunks overlap at byte {stop}")
+        for record in framing.walk(file, start, stop):
+            if record.code in (framing.CHUNK, framing.MESSAGE):
+                raise DamagedError(f"it does not list what stands at byte {record.start - 9}")
 
 
 def between(chunks: list[ChunkIndex], end: int) -> list[tuple[int, int]]:
@@ -217,16 +240,6 @@ def between(chunks: list[ChunkIndex], end: int) -> list[tuple[int, int]]:
     ends = [chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length for chunk in chunks]
     starts = [chunk.chunk_start_offset for chunk in chunks]
     return [pair for pair in zip([len(framing.MAGIC), *ends], [*starts, end], strict=True) if pair[0] != pair[1]]
-
-
-def _check_between(file: File, chunks: list[ChunkIndex], end: int) -> None:
-    """Chunks must not overlap, and no message or chunk stand beside those that are listed."""
-    for first, last in between(chunks, end):
-        if first > last:
-            raise DamagedError(f"its chunks overlap at byte {last}")
-        for record in framing.walk(file, first, last):
-            if record.code in (framing.CHUNK, framing.MESSAGE):
-                raise DamagedError(f"it does not list what stands at byte {record.start - 9}")
 
 
 def _walked(file: File) -> Catalogue:
@@ -251,7 +264,17 @@ def _walked(file: File) -> Catalogue:
         gaps.append(Gap(file.size, file.size))
         found.damage.append(str(error))
     found.notices += _missing(file, gaps, ended, found)
-    found.spans = [_looked_into(file, span, found) for span in spans.all()]
+    for span in spans.all():
+        try:
+            records = span.records(file, file.read(span.start, span.length + span.index_length))
+        except DamagedError as error:  # told of when it is read
+            found.damage.append(f"{error} (at byte {span.start})")
+            found.spans.append(span)
+            continue
+        found.spans.append(replace(span, channels=records.channels_seen))
+        for code, body in records.others:
+            if code in (framing.SCHEMA, framing.CHANNEL):
+                _define(found, code, body, span.start)
     return found
 
 
@@ -330,31 +353,6 @@ def _define(found: Catalogue, code: int, content: bytes, place: int) -> None:
         found.damage.append(str(error))
 
 
-def _looked_into(file: File, span: Span, found: Catalogue) -> Span:
-    """The span with the channels of its messages; definitions that stand within a chunk are taken in.
-
-    Damaged chunks are told of when they are read.
-    """
-    try:
-        content = file.read(span.start, span.length + span.index_length)
-        if span.loose:
-            records = records_in(content, works=file.works)
-        else:
-            chunk = content[: span.length]
-            if chunk == _EMPTY_CHUNK:
-                return replace(span, channels=frozenset())
-            file.unpacks(claimed(chunk))
-            unpacked = unpack_torn(chunk)[0] if span.torn else unpack(chunk)
-            records = records_in(unpacked, content[span.length :], file.works)
-        for code, body in records.others:
-            if code in (framing.SCHEMA, framing.CHANNEL):
-                _define(found, code, body, span.start)
-        return replace(span, channels=records.channels_seen)
-    except DamagedError as error:
-        found.damage.append(f"{error} (at byte {span.start})")
-    return span
-
-
 def _keep_metadata(file: File, record: framing.Record, found: Catalogue) -> None:
     from mcap import records
 
@@ -365,11 +363,6 @@ def _keep_metadata(file: File, record: framing.Record, found: Catalogue) -> None
         found.metadata.setdefault(metadata.name, metadata.metadata)
     except DamagedError as error:
         found.notices.append(Notice("DAMAGED_RECORD", f"{error}; left out"))
-
-
-def truth_text(found: Catalogue) -> str | None:
-    """The JSON text of the metadata record "algid", None without one, empty where the record is damaged."""
-    return found.metadata[KEY].get(KEY, "") if KEY in found.metadata else None
 
 
 def channels_of(found: Catalogue, topic: str, type_name: str) -> frozenset[int]:

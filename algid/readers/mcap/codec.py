@@ -3,50 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
 from algid.errors import LogError
 from algid.readers.mcap import cdr, protobuf
 from algid.readers.mcap import json as jsontext
-from algid.readers.mcap.columnar import Decoder, Fields, Walk
+from algid.readers.mcap.columnar import ColumnDecoder, Decoder, Walk
 from algid.readers.mcap.definitions import DefinitionError, parse_idl, parse_msg
-from algid.readers.mcap.messages import Messages
 
 _DEFINITIONS = {"ros2msg": parse_msg, "ros2idl": parse_idl}
-
-
-class Decodes(Protocol):
-    """Reads wanted numbers out of batches of messages.
-
-    Counts the messages that lack a needed one, and those that do not fit their schema, with why the first does not.
-    """
-
-    @property
-    def wanted(self) -> Mapping[str, str]:
-        """The fields wanted, by name: where each stands in a message."""
-        ...
-
-    @property
-    def skipped(self) -> int:
-        """Messages that lack a field that is needed."""
-        ...
-
-    @property
-    def misfits(self) -> int:
-        """Messages that do not fit their schema."""
-        ...
-
-    @property
-    def misfit(self) -> str:
-        """Why the first of them does not; empty where all fit."""
-        ...
-
-    def columns(self, messages: Messages) -> tuple[NDArray[np.bool_], Fields]:
-        """Which messages hold what is needed (N,), and the numbers of those, by name."""
-        ...
 
 
 def walk_for(path: str, channel: Any, schema: Any) -> Walk:
@@ -78,7 +43,7 @@ def walk_for(path: str, channel: Any, schema: Any) -> Walk:
 
 def decoder_for(
     path: str, channel: Any, schema: Any, wanted: Mapping[str, str], works: Callable[[int], bool]
-) -> Decodes:
+) -> Decoder:
     """What reads the numbers `wanted`, by name a path each, out of a channel's messages; `works` as in `Decoder`.
 
     Raises
@@ -88,5 +53,5 @@ def decoder_for(
     """
     walk = walk_for(path, channel, schema)
     if channel.message_encoding == "json":
-        return jsontext.JsonDecoder(wanted, frozenset(wanted), works)
-    return Decoder(walk, wanted, frozenset(wanted), works)
+        return jsontext.JsonDecoder(wanted, works)
+    return ColumnDecoder(wanted, works, walk=walk)

@@ -9,6 +9,7 @@ Columns out of messages: one scalar walk for each layout, NumPy for every messag
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
@@ -23,9 +24,8 @@ MOST_PARTS = 100_000
 """Fields, structures and strings a message may be made of; a list of numbers is one."""
 LARGEST_MESSAGE = 1 << 24
 """Bytes; a joint state has some hundred."""
-_REPEATED = -1
-"""The place of a name that stands in a list twice."""
 _WORK_A_WALK, _WORK_A_SIZE = 200, 20
+_TOO_MANY = "messages of so many layouts that no recorder writes them"
 _MOST_WORDS = 1 << 22
 """Words that all remembered layouts may fix together."""
 
@@ -86,9 +86,16 @@ class Shape:
 
         A name in brackets stands for its place in a list of strings beside the indexed one.
         """
-        place = self._numbered(path)
-        if place is None:
-            return None
+        place = ""
+        for part in re.split(r"(\[[^\]]*\])", path):
+            names = self._beside(place, part[1:-1]) if part.startswith("[") else ()
+            if names:  # a name first: joints may be called "1" and "2"
+                if names.count(part[1:-1]) > 1:
+                    return None
+                part = f"[{names.index(part[1:-1])}]"
+            elif part.startswith("[") and not part[1:-1].isdigit():
+                return None
+            place += part
         if place in self.numbers:
             found = self.numbers[place]
             return found if found.count == 1 else None
@@ -98,27 +105,13 @@ class Shape:
         found, index = self.numbers[array[1]], int(array[2])
         if index >= found.count or found.kind[0] not in "<>|":
             return None
-        width = int(found.kind[-1])
-        return Numbers(found.offset + index * width, found.kind, 1, found.width, found.zigzag)
+        return Numbers(found.offset + index * int(found.kind[-1]), found.kind)
 
-    def _numbered(self, path: str) -> str | None:
-        done = ""
-        for part in re.split(r"(\[[^\]]*\])", path):
-            if not part.startswith("["):
-                done += part
-                continue
-            index = self._index(done, part[1:-1])  # a name first: joints may be called "1" and "2"
-            if index == _REPEATED or (index is None and not part[1:-1].isdigit()):
-                return None
-            done += part if index is None else f"[{index}]"
-        return done
-
-    def _index(self, array: str, name: str) -> int | None:
+    def _beside(self, array: str, name: str) -> tuple[str, ...]:
+        """The first list of strings beside a list that has a name, empty where none has."""
         parent = array.rpartition(".")[0]
-        for path, texts in self.texts.items():
-            if path.rpartition(".")[0] == parent and name in texts:
-                return texts.index(name) if texts.count(name) == 1 else _REPEATED
-        return None
+        lists = (texts for path, texts in self.texts.items() if path.rpartition(".")[0] == parent and name in texts)
+        return next(lists, ())
 
 
 MOST_LAYOUTS = 256
@@ -153,12 +146,30 @@ class Layout:
 
     def read(self, table: NDArray[np.uint64]) -> Fields:
         """The wanted numbers of messages (N, words), each (N,)."""
-        octets = table.view(np.uint8)
-        return {name: _column(octets, self.lead, at) for name, at in (self.fields or {}).items()}
+        octets, columns = table.view(np.uint8), Fields()
+        for name, at in (self.fields or {}).items():
+            start, rows = self.lead + at.offset, octets.shape[0]
+            if at.kind == "varint":
+                columns[name] = _varint(octets[:, start : start + at.width], at.zigzag)
+            elif at.kind == "zero":  # a number that protobuf leaves out because it is zero
+                columns[name] = np.zeros(rows)
+            else:
+                columns[name] = np.ndarray(rows, np.dtype(at.kind), octets.data, start, (octets.strides[0],))
+        return columns
 
 
-def layout(payload: bytes, shape: Shape, wanted: Mapping[str, str], needed: frozenset[str]) -> Layout:
-    """The layout of a message; its fields are None where it lacks one of `needed`."""
+def _varint(octets: NDArray[np.uint8], zigzag: bool) -> NDArray[np.int64]:
+    """Numbers in base 128, the lowest seven bits first (N, bytes)."""
+    total = np.zeros(octets.shape[0], np.uint64)
+    for place in range(octets.shape[1]):
+        total |= (octets[:, place] & 0x7F).astype(np.uint64) << np.uint64(7 * place)
+    if zigzag:
+        return (total >> np.uint64(1)).view(np.int64) ^ -(total & np.uint64(1)).view(np.int64)
+    return total.view(np.int64)
+
+
+def layout(payload: bytes, shape: Shape, wanted: Mapping[str, str]) -> Layout:
+    """The layout of a message; its fields are None where it lacks one of those `wanted`."""
     lead = _lead(len(payload))
     mask = np.zeros(lead + len(payload), np.uint8)
     for start, end in shape.fixed:
@@ -168,66 +179,108 @@ def layout(payload: bytes, shape: Shape, wanted: Mapping[str, str], needed: froz
     words = np.flatnonzero(masks)
     whole = np.frombuffer(bytes(lead) + payload, np.uint64)
     found = {name: at for name, path in wanted.items() if (at := shape.find(path)) is not None}
-    complete = needed <= found.keys()
+    complete = len(found) == len(wanted)
     return Layout(lead, words, masks[words], whole[words] & masks[words], found if complete else None)
 
 
+def _lead(size: int) -> int:
+    """Bytes to gather before a payload of `size` bytes: whole words, one at least."""
+    return -size % 8 if size else 8
+
+
 @dataclass
-class Decoder:
-    """Reads the wanted numbers out of batches of messages; remembers the layouts it met.
+class Decoder(ABC):
+    """Reads the wanted numbers out of batches of messages.
 
     Parameters
     ----------
-    walk : callable
-        The shape of one payload; raises `MisfitError`.
     wanted : mapping
-        By name the path of a number.
-    needed : frozenset of str
-        A message without one of these is skipped and counted.
+        By name the path of a number; a message without one of them is left out.
     works : callable
         Counts steps of some microsecond; False where these are too many.
+
+    Attributes
+    ----------
+    skipped, misfits : int
+        Messages left out so far: those that lack a number wanted, and those that do not fit their schema.
+    misfit : str
+        Why the first of these does not; empty where all fit.
     """
 
-    walk: Walk
     wanted: Mapping[str, str]
-    needed: frozenset[str]
     works: Callable[[int], bool]
     skipped: int = 0
     misfits: int = 0
     misfit: str = ""
-    _known: dict[int, list[Layout]] = field(default_factory=dict)
-    _words: int = 0
 
     def columns(self, messages: Messages) -> tuple[NDArray[np.bool_], Fields]:
-        """Which messages hold what is needed (N,), and the numbers of those, by name.
-
-        Messages that do not fit their schema are left out and counted.
+        """Which messages hold what is wanted (N,), and the numbers of those, by name, in file order.
 
         Raises
         ------
         ExcessError
-            If the messages ask for more work than any honest ones.
+            If the messages ask for more work than any recorder's.
         """
-        held = np.zeros(len(messages), np.bool_)
         misfits = self.misfits
+        held = np.zeros(len(messages), np.bool_)
+        fields = self.read(messages, held)
+        self.skipped += int(held.size - np.count_nonzero(held)) - (self.misfits - misfits)
+        return held, fields
+
+    @abstractmethod
+    def read(self, messages: Messages, held: NDArray[np.bool_]) -> Fields:
+        """The numbers of the messages that hold what is wanted, by name; notes in `held` (N,) which do."""
+
+    def misfitting(self, why: str, messages: int = 1) -> None:
+        """Count messages that do not fit their schema."""
+        self.misfits += messages
+        self.misfit = self.misfit or why
+
+    def spend(self, steps: int, what: str) -> None:
+        """Count work; `what` asks for too much of it is what the error says."""
+        if not self.works(steps):
+            raise ExcessError(what)
+
+
+@dataclass
+class ColumnDecoder(Decoder):
+    """The decoder of encodings in which a number's place is known by its message's layout; remembers those it met.
+
+    `walk` gives the shape of one payload, or raises `MisfitError`.
+    """
+
+    walk: Walk = field(kw_only=True)
+    _known: dict[int, list[Layout]] = field(default_factory=dict)
+    _words: int = 0
+
+    def read(self, messages: Messages, held: NDArray[np.bool_]) -> Fields:
+        """The numbers of the messages that hold what is wanted, by name; notes in `held` (N,) which do."""
         parts: list[tuple[NDArray[np.intp], Fields]] = []
         for size, rows in _by_size(messages.sizes):
-            self._spend(_WORK_A_SIZE)
+            self.spend(_WORK_A_SIZE, _TOO_MANY)
+            if size > LARGEST_MESSAGE:
+                self.misfitting(f"messages of {counted(size, 'byte')}", rows.size)
+                continue
             for chosen, fields in self._of_one_size(messages, size, rows):
                 held[chosen] = True
                 parts.append((chosen, fields))
-        self.skipped += int(held.size - np.count_nonzero(held)) - (self.misfits - misfits)
-        return held, _in_order(held, parts)
+        if len(parts) < 2:
+            return parts[0][1] if parts else {name: np.empty(0) for name in self.wanted}
+        order = np.argsort(np.concatenate([chosen for chosen, _ in parts]))
+        return {name: np.concatenate([fields[name] for _, fields in parts])[order] for name in parts[0][1]}
 
     def _of_one_size(
         self, messages: Messages, size: int, rows: NDArray[np.intp]
     ) -> Iterator[tuple[NDArray[np.intp], Fields]]:
-        if size > LARGEST_MESSAGE:
-            self.misfits += rows.size
-            self.misfit = self.misfit or f"messages of {counted(size, 'byte')}"
-            return
+        """The numbers of messages of one size, layout by layout, each with the messages that have it."""
         lead = _lead(size)
-        table = _gathered(messages, size + lead, messages.starts[rows] - lead)
+        window: NDArray[np.void] = np.ndarray(  # every row lies within the records, behind a head
+            messages.content.size - size - lead + 1,
+            np.dtype((np.void, size + lead)),
+            messages.content.data,
+            strides=(1,),
+        )
+        table = window[messages.starts[rows] - lead].view(np.uint64).reshape(rows.size, -1)
         known = self._known.setdefault(size, [])
         left, tried = np.arange(rows.size), 0
         while left.size:
@@ -235,25 +288,20 @@ class Decoder:
             if one is None:
                 left = left[1:]
                 continue
-            if tried == len(known) and not self._remembers(one, known):
-                if one.fields is not None:
-                    yield rows[left[:1]], one.read(table[left[:1]])
-                left = left[1:]  # one by one from here: what is remembered must not grow with the file
-                continue
+            if tried == len(known):
+                if len(known) == MOST_LAYOUTS or self._words > _MOST_WORDS:
+                    if one.fields is not None:
+                        yield rows[left[:1]], one.read(table[left[:1]])
+                    left = left[1:]  # one by one from here: what is remembered must not grow with the file
+                    continue
+                known.append(one)
+                self._words += one.words.size
             fits = one.matches(table, left)
             tried += 1
             if one.fields is not None and fits.any():
                 whole = fits.all() and left.size == rows.size
                 yield (rows, one.read(table)) if whole else (rows[left[fits]], one.read(table[left[fits]]))
             left = left[~fits]
-
-    def _remembers(self, one: Layout, known: list[Layout]) -> bool:
-        """Take a layout in among the `known` ones of its size, where there is room."""
-        if len(known) == MOST_LAYOUTS or self._words > _MOST_WORDS:
-            return False
-        known.append(one)
-        self._words += one.words.size
-        return True
 
     def _new(self, messages: Messages, row: int) -> Layout | None:
         """The layout of a message, None where it does not fit its schema."""
@@ -262,16 +310,11 @@ class Decoder:
         try:
             shape = self.walk(payload)
         except MisfitError as error:
-            self.misfits += 1
-            self.misfit = self.misfit or str(error)
-            self._spend(_WORK_A_WALK)
+            self.misfitting(str(error))
+            self.spend(_WORK_A_WALK, _TOO_MANY)
             return None
-        self._spend(_WORK_A_WALK + shape.parts)
-        return layout(payload, shape, self.wanted, self.needed)
-
-    def _spend(self, steps: int) -> None:
-        if not self.works(steps):
-            raise ExcessError("messages of so many layouts that no recorder writes them")
+        self.spend(_WORK_A_WALK + shape.parts, _TOO_MANY)
+        return layout(payload, shape, self.wanted)
 
 
 def _by_size(sizes: IntArray) -> Iterator[tuple[int, NDArray[np.intp]]]:
@@ -283,55 +326,3 @@ def _by_size(sizes: IntArray) -> Iterator[tuple[int, NDArray[np.intp]]]:
     for rows in np.split(order, np.flatnonzero(np.diff(sizes[order])) + 1):
         if rows.size:
             yield int(sizes[rows[0]]), rows
-
-
-def _lead(size: int) -> int:
-    """Bytes to gather before a payload of `size` bytes: whole words, one at least."""
-    return -size % 8 if size else 8
-
-
-def _gathered(messages: Messages, width: int, starts: NDArray[np.int64]) -> NDArray[np.uint64]:
-    """Bytes of messages of one size as rows of words; every row lies within the records, behind a head."""
-    content = messages.content
-    window: NDArray[np.void] = np.ndarray(
-        content.size - width + 1, np.dtype((np.void, width)), content.data, strides=(1,)
-    )
-    return window[starts].view(np.uint64).reshape(starts.size, width // 8)
-
-
-def _column(octets: NDArray[np.uint8], lead: int, at: Numbers) -> NDArray[np.generic]:
-    start = lead + at.offset
-    if at.kind == "varint":
-        return _varint(octets[:, start : start + at.width], at.zigzag)
-    if at.kind == "zero":  # a number that protobuf leaves out because it is zero
-        return np.zeros(octets.shape[0])
-    return np.ndarray(octets.shape[0], np.dtype(at.kind), octets.data, start, (octets.strides[0],))
-
-
-def _varint(octets: NDArray[np.uint8], zigzag: bool) -> NDArray[np.generic]:
-    total = np.zeros(octets.shape[0], np.uint64)
-    for place in range(octets.shape[1]):
-        total |= (octets[:, place] & 0x7F).astype(np.uint64) << np.uint64(7 * place)
-    if zigzag:
-        return (total >> np.uint64(1)).view(np.int64) ^ -(total & np.uint64(1)).view(np.int64)
-    return total.view(np.int64)
-
-
-def _in_order(held: NDArray[np.bool_], parts: list[tuple[NDArray[np.intp], Fields]]) -> Fields:
-    """Columns of all held messages in file order; NaN where a message lacks a number that others hold."""
-    if not parts:
-        return {}
-    if len(parts) == 1:
-        return parts[0][1]
-    names = list(dict.fromkeys(name for _, fields in parts for name in fields))
-    place = np.cumsum(held) - 1
-    columns: Fields = {}
-    for name in names:
-        kinds = [fields[name].dtype for _, fields in parts if name in fields]
-        full = len(kinds) == len(parts)
-        column = np.full(place[-1] + 1, 0 if full else np.nan, np.result_type(*kinds) if full else np.float64)
-        for chosen, fields in parts:
-            if name in fields:
-                column[place[chosen]] = fields[name]
-        columns[name] = column
-    return columns

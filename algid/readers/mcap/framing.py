@@ -12,6 +12,7 @@ import os
 import struct
 import zlib
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
@@ -231,27 +232,6 @@ def chunk_index(content: bytes) -> ChunkIndex:
         raise DamagedError(f"a ChunkIndex record cannot be read ({error})") from error
 
 
-@dataclass(frozen=True)
-class _Chunk:
-    """A chunk record's head and what is there of its packed records."""
-
-    size: int
-    crc: int
-    compression: bytes
-    packed_size: int
-    packed: memoryview
-
-
-def _chunk(content: bytes) -> _Chunk:
-    size = claimed(content)
-    crc, name_length = struct.unpack_from("<II", content, 24)
-    if name_length > 32 or 32 + name_length + 8 > len(content):
-        raise DamagedError("a chunk's compression has no name")
-    name = content[32 : 32 + name_length]
-    (packed_size,) = struct.unpack_from("<Q", content, 32 + name_length)
-    return _Chunk(size, crc, name, packed_size, memoryview(content)[40 + name_length :])
-
-
 def claimed(content: bytes) -> int:
     """The bytes that a chunk record claims to unpack to.
 
@@ -268,50 +248,36 @@ def claimed(content: bytes) -> int:
     return int(size)
 
 
-def unpack(content: bytes) -> bytes:
-    """The records within a chunk record's content.
+def unpack(content: bytes, *, torn: bool = False) -> bytes:
+    """The records within a chunk record's content; of a `torn` one that breaks off the whole records at its start.
+
+    Those of a torn chunk can be checked only where all are there: its CRC covers all of it.
 
     Raises
     ------
     DamagedError
         If the chunk is larger than `LARGEST_CHUNK`, packed in an unknown way, or not what its CRC says.
     """
-    chunk = _chunk(content)
-    if chunk.packed_size != len(chunk.packed):
-        raise DamagedError(f"a chunk claims {counted(chunk.packed_size, 'byte')} and has {len(chunk.packed)}")
-    unpacked = _unpacked(chunk.compression, chunk.packed, chunk.size)
-    if len(unpacked) != chunk.size:
-        raise DamagedError(f"a chunk of {counted(chunk.size, 'byte')} unpacks to {len(unpacked)}")
-    _check_sum(chunk, unpacked)
-    return unpacked
-
-
-def _check_sum(chunk: _Chunk, unpacked: bytes) -> None:
-    if chunk.crc and zlib.crc32(unpacked) != chunk.crc:
+    size = claimed(content)
+    crc, name_length = struct.unpack_from("<II", content, 24)
+    if name_length > 32 or 40 + name_length > len(content):
+        raise DamagedError("a chunk's compression has no name")
+    (packed_size,) = struct.unpack_from("<Q", content, 32 + name_length)
+    packed = memoryview(content)[40 + name_length :]
+    if not torn and packed_size != len(packed):
+        raise DamagedError(f"a chunk claims {counted(packed_size, 'byte')} and has {len(packed)}")
+    unpacked = _decompressed(content[32 : 32 + name_length], packed[:packed_size], size, torn)
+    if len(unpacked) != size and not torn:
+        raise DamagedError(f"a chunk of {counted(size, 'byte')} unpacks to {len(unpacked)}")
+    if len(unpacked) == size and crc and zlib.crc32(unpacked) != crc:
         raise DamagedError("a chunk's checksum is wrong")
-
-
-def unpack_torn(content: bytes) -> tuple[bytes, int]:
-    """The whole records at the start of a chunk that breaks off, and the size that all of them would have.
-
-    They can be checked only where all are there: the chunk's CRC covers all of it.
-
-    Raises
-    ------
-    DamagedError
-        As `unpack`.
-    """
-    chunk = _chunk(content)
-    unpacked = _start(chunk.compression, chunk.packed[: chunk.packed_size], chunk.size)
-    if len(unpacked) == chunk.size:
-        _check_sum(chunk, unpacked)
+    if not torn:
+        return unpacked
     end = 0
-    try:
+    with suppress(BrokenOffError):
         for record in walk_bytes(unpacked, 0, len(unpacked)):
             end = record.end
-    except BrokenOffError:
-        pass
-    return unpacked[:end], chunk.size
+    return unpacked[:end]
 
 
 def has_checksum(content: bytes) -> bool:
@@ -319,62 +285,29 @@ def has_checksum(content: bytes) -> bool:
     return len(content) >= 28 and content[24:28] != b"\0\0\0\0"
 
 
-def _unpacked(name: bytes, packed: memoryview, size: int) -> bytes:
+def _decompressed(name: bytes, packed: memoryview, size: int, torn: bool) -> bytes:
+    """What is packed by the method `name`, in memory bounded by the `size` claimed; a torn one as far as it goes."""
     if name == b"":
-        return bytes(packed)
-    if name == b"zstd":
-        return _zstd(packed, size)
-    if name == b"lz4":
-        return _lz4(packed, size)
-    raise _unknown(name)
-
-
-def _start(name: bytes, packed: memoryview, size: int) -> bytes:
-    """As `_unpacked`, but as far as it goes, at most `size` bytes."""
-    if name == b"":
-        return bytes(packed[:size])
-    if name == b"zstd":
-        return _zstd_start(packed, size)
-    if name == b"lz4":
-        return _lz4(packed, size)[:size]  # this one goes as far as it can anyway
-    raise _unknown(name)
-
-
-def _unknown(name: bytes) -> DamagedError:
-    return DamagedError(f"a chunk is packed with {name.decode(errors='replace')!r}; expected zstd, lz4 or nothing")
-
-
-def _zstd(packed: memoryview, size: int) -> bytes:
-    import zstandard
-
-    try:
-        # the frame's own claim is what the library would allocate
-        claimed = zstandard.frame_content_size(packed) if size else -1
-        if claimed > size:
-            raise DamagedError(f"a chunk of {counted(size, 'byte')} holds a zstd frame of {claimed}")
-        return zstandard.ZstdDecompressor().decompress(packed, max_output_size=size or 1)
-    except zstandard.ZstdError as error:
-        raise DamagedError(f"a chunk cannot be unpacked ({error})") from error
-
-
-def _zstd_start(packed: memoryview, size: int) -> bytes:
-    import zstandard
-
-    unpacked = bytearray()
-    try:
-        stream = zstandard.ZstdDecompressor().stream_reader(packed)
-        while piece := stream.read(min(_PIECE, size - len(unpacked))):
-            unpacked += piece
-    except zstandard.ZstdError as error:
-        raise DamagedError(f"a chunk cannot be unpacked ({error})") from error
-    return bytes(unpacked)
-
-
-def _lz4(packed: memoryview, size: int) -> bytes:
+        return bytes(packed[:size] if torn else packed)
+    if name not in (b"zstd", b"lz4"):
+        raise DamagedError(f"a chunk is packed with {name.decode(errors='replace')!r}; expected zstd, lz4 or nothing")
     import lz4.frame
+    import zstandard
 
     try:
-        unpacked = lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size + 1)
-    except (RuntimeError, EOFError, ValueError) as error:
+        if name == b"lz4":  # this one goes as far as it can anyway
+            found = bytes(lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size + 1))
+            return found[:size] if torn else found
+        if torn:
+            unpacked = bytearray()
+            stream = zstandard.ZstdDecompressor().stream_reader(packed)
+            while piece := stream.read(min(_PIECE, size - len(unpacked))):
+                unpacked += piece
+            return bytes(unpacked)
+        # the frame's own claim is what the library would allocate
+        frame_size = zstandard.frame_content_size(packed) if size else -1
+        if frame_size > size:
+            raise DamagedError(f"a chunk of {counted(size, 'byte')} holds a zstd frame of {frame_size}")
+        return zstandard.ZstdDecompressor().decompress(packed, max_output_size=size or 1)
+    except (zstandard.ZstdError, RuntimeError, EOFError, ValueError) as error:
         raise DamagedError(f"a chunk cannot be unpacked ({error})") from error
-    return bytes(unpacked)

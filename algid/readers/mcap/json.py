@@ -5,20 +5,24 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.readers.mcap.columnar import ExcessError, Fields, MisfitError, Numbers, Shape
+from algid.readers.mcap.columnar import Decoder, Fields, MisfitError, Numbers, Shape
 from algid.readers.mcap.messages import Messages
 from algid.words import counted
 
 _LARGEST = 1 << 20
 _BYTES_A_STEP, _COMMAS_A_STEP, _STEPS_A_COLON = 64, 8, 2
 """What parsing takes: bytes of text, numbers of a list, fields of an object; the last are by far the slowest."""
+_TOO_MUCH = "more text than any recorder's file of this size"
+_BEYOND = 2**1024 - 2**970
+"""From here on an integer rounds to more than the largest float64."""
 
 
 def walk(payload: bytes) -> Shape:
@@ -61,64 +65,37 @@ def _walk(value: Any, path: str, shape: Shape) -> None:
 
 
 @dataclass
-class JsonDecoder:
-    """Reads the wanted numbers out of JSON messages: the `Decoder` of this encoding."""
+class JsonDecoder(Decoder):
+    """The decoder of JSON messages."""
 
-    wanted: Mapping[str, str]
-    needed: frozenset[str]
-    works: Callable[[int], bool]
-    skipped: int = 0
-    misfits: int = 0
-    misfit: str = ""
-
-    def columns(self, messages: Messages) -> tuple[NDArray[np.bool_], Fields]:
-        """Which messages hold what is needed (N,), and the numbers of those, by name.
-
-        Messages that are no JSON object are left out and counted.
-
-        Raises
-        ------
-        ExcessError
-            If they are more than in any honest file of this size.
-        """
-        self._spend(int(messages.sizes.sum()) // _BYTES_A_STEP)
-        misfits = self.misfits
-        held = np.zeros(len(messages), np.bool_)
+    def read(self, messages: Messages, held: NDArray[np.bool_]) -> Fields:
+        """The numbers of the messages that hold what is wanted, by name; notes in `held` (N,) which do."""
+        self.spend(int(messages.sizes.sum()) // _BYTES_A_STEP, _TOO_MUCH)
         paths = [_PART.findall(path) for path in self.wanted.values()]
         rows: list[list[Any]] = []
         for row, (start, size) in enumerate(zip(messages.starts, messages.sizes, strict=True)):
             payload = messages.content[start : start + size].tobytes()
-            self._spend(payload.count(b":") * _STEPS_A_COLON + payload.count(b",") // _COMMAS_A_STEP)
+            self.spend(payload.count(b":") * _STEPS_A_COLON + payload.count(b",") // _COMMAS_A_STEP, _TOO_MUCH)
             try:
                 found = _object(payload)
             except MisfitError as error:
-                self.misfits += 1
-                self.misfit = self.misfit or str(error)
+                self.misfitting(str(error))
                 continue
             values = list(map(_Paths(found).value, paths))
-            held[row] = all(
-                value is not None or name not in self.needed for name, value in zip(self.wanted, values, strict=True)
-            )
+            held[row] = None not in values
             if held[row]:
                 rows.append(values)
-        self.skipped += int(held.size - np.count_nonzero(held)) - (self.misfits - misfits)
-        return held, {name: _column([row[place] for row in rows]) for place, name in enumerate(self.wanted)}
-
-    def _spend(self, steps: int) -> None:
-        if not self.works(steps):
-            raise ExcessError("more text than any recorder's file of this size")
+        return {name: _column([row[place] for row in rows]) for place, name in enumerate(self.wanted)}
 
 
-def _column(values: list[Any]) -> NDArray[np.generic]:
-    whole = bool(values) and all(isinstance(value, int) and abs(value) < 2**63 for value in values)
-    return np.array(values, np.int64) if whole else np.array([_float(value) for value in values], np.float64)
-
-
-def _float(value: float | None) -> float:
-    try:
-        return math.nan if value is None else float(value)
-    except OverflowError:  # an integer of more than 308 digits
-        return math.inf
+def _column(values: list[int | float]) -> NDArray[np.int64] | NDArray[np.float64]:
+    """Numbers as int64 where all of them are whole and that small; infinite where beyond float64."""
+    if values and all(isinstance(value, int) and abs(value) < 2**63 for value in values):
+        return np.array(values, np.int64)
+    with suppress(OverflowError):
+        return np.array(values, np.float64)
+    beyond = [math.inf if isinstance(value, int) and abs(value) >= _BEYOND else value for value in values]
+    return np.array(beyond, np.float64)
 
 
 _PART = re.compile(r"\[[^\]]*\]|[^.\[\]]+")
@@ -132,7 +109,7 @@ class _Paths:
         self._lists: dict[int, list[list[Any]]] = {}
         """Lists that stand side by side, by the object that holds them: an object may have very many other fields."""
 
-    def value(self, parts: Sequence[str]) -> Any:
+    def value(self, parts: Sequence[str]) -> int | float | None:
         """The number at a path, or None."""
         found: Any = self._message
         parent: Any = None
@@ -140,18 +117,15 @@ class _Paths:
             if not part.startswith("["):
                 parent, found = found, found.get(part) if isinstance(found, dict) else None
                 continue
-            index = self._place(parent, part[1:-1])
+            index = self._place(parent, part[1:-1]) if isinstance(parent, dict) else None
             if index is None and part[1:-1].isdigit():
                 index = int(part[1:-1])
             found = found[index] if isinstance(found, list) and index is not None and index < len(found) else None
         return found if isinstance(found, (int, float)) and not isinstance(found, bool) else None
 
-    def _place(self, parent: Any, name: str) -> int | None:
+    def _place(self, parent: dict[str, Any], name: str) -> int | None:
         """Where a name stands in a list beside; behind its end, where nothing is, for one that stands there twice."""
-        if not isinstance(parent, dict):
-            return None
-        lists = self._lists.get(id(parent))
-        if lists is None:
-            lists = self._lists[id(parent)] = [one for one in parent.values() if isinstance(one, list)]
-        named = next((one for one in lists if name in one), [])
-        return None if not named else named.index(name) if named.count(name) == 1 else len(named)
+        if id(parent) not in self._lists:
+            self._lists[id(parent)] = [one for one in parent.values() if isinstance(one, list)]
+        named = next((one for one in self._lists[id(parent)] if name in one), None)
+        return None if named is None else named.index(name) if named.count(name) == 1 else len(named)

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
-from functools import partial
 
 from algid.log import Notice
 from algid.readers.mcap import framing
 from algid.readers.mcap.catalogue import Catalogue, RedefinedError, Span
-from algid.readers.mcap.framing import DamagedError, File, claimed, has_checksum, unpack, unpack_torn
-from algid.readers.mcap.messages import Messages, Records, entries, joined, records_in
+from algid.readers.mcap.framing import DamagedError, File, claimed, has_checksum
+from algid.readers.mcap.messages import Messages, Records, entries, joined
 from algid.runtime import executor
 from algid.words import counted
 
@@ -48,15 +47,23 @@ def spans_of(catalogue: Catalogue, channels: frozenset[int]) -> list[Span]:
 def batches(file: File, catalogue: Catalogue, channels: frozenset[int]) -> Iterator[MessageBatch]:
     """The messages of `channels` in file order, many small spans at once; a damaged span yields its reason."""
     waiting: deque[Future[_Loaded]] = deque()
+
+    def first() -> Iterator[MessageBatch]:
+        found, left = waiting.popleft().result()
+        yield from found
+        while left:
+            found, left = _load(file, catalogue, left, channels)
+            yield from found
+
     with executor(2) as pool:
         try:
             for spans in _groups(spans_of(catalogue, channels)):
                 ahead = _AHEAD if spans[0].length <= _AHEAD_BYTES else 0
                 while len(waiting) > ahead:
-                    yield from _all_of(waiting.popleft().result())
+                    yield from first()
                 waiting.append(pool.submit(_load, file, catalogue, spans, channels))
             while waiting:
-                yield from _all_of(waiting.popleft().result())
+                yield from first()
         finally:
             for future in waiting:
                 future.cancel()
@@ -74,20 +81,8 @@ def _groups(spans: Sequence[Span]) -> Iterator[Sequence[Span]]:
         yield spans[first:]
 
 
-@dataclass(frozen=True)
-class _Loaded:
-    """Batches of the first spans of a group, and what loads the others, where these unpack to more than one holds."""
-
-    batches: list[MessageBatch]
-    others: Callable[[], _Loaded] | None = None
-
-
-def _all_of(loaded: _Loaded) -> Iterator[MessageBatch]:
-    """The batches of a whole group."""
-    yield from loaded.batches
-    while loaded.others is not None:
-        loaded = loaded.others()
-        yield from loaded.batches
+_Loaded = tuple[list[MessageBatch], Sequence[Span]]
+"""Batches of the first spans of a group, and the others where the first unpack to as much as is held at once."""
 
 
 @dataclass(frozen=True)
@@ -103,11 +98,10 @@ def _load(file: File, catalogue: Catalogue, spans: Sequence[Span], channels: fro
     """Batches of spans: a damaged or torn one by itself, those between two of them as one."""
     found: list[MessageBatch] = []
     sound: list[_Sound] = []
-    size = 0
-    others = None
+    size, left = 0, spans[len(spans) :]
     for place, span in enumerate(spans):
         if size > _GROUP_UNPACKED:
-            others = partial(_load, file, catalogue, spans[place:], channels)
+            left = spans[place:]
             break
         one = _opened(file, catalogue, span, channels)
         if isinstance(one, MessageBatch) or one.torn is not None:
@@ -117,7 +111,7 @@ def _load(file: File, catalogue: Catalogue, spans: Sequence[Span], channels: fro
         else:
             sound.append(one)
             size += one.records.content.size
-    return _Loaded([*found, *_joined(sound, channels)], others)
+    return [*found, *_joined(sound, channels)], left
 
 
 def _joined(sound: Sequence[_Sound], channels: frozenset[int]) -> list[MessageBatch]:
@@ -131,36 +125,29 @@ def _joined(sound: Sequence[_Sound], channels: frozenset[int]) -> list[MessageBa
 
 
 def _opened(file: File, catalogue: Catalogue, span: Span, channels: frozenset[int]) -> _Sound | MessageBatch:
-    """What a span holds, or the batch that says why it is lost."""
+    """What a span holds, or the batch that says why it is lost.
+
+    No message is read behind a record that gives its channel another meaning.
+    """
     content = b""
     try:
         content = file.read(span.start, span.length + span.index_length)
-        chunk, index = content[: span.length], content[span.length :]
-        if span.loose:
-            records, torn = records_in(chunk, works=file.works), None
-        else:
-            file.unpacks(claimed(chunk))
-            unpacked, torn = unpack_torn(chunk) if span.torn else (unpack(chunk), None)
-            records = records_in(unpacked, index, file.works)
-        _check_meaning(catalogue, span, records, channels)
+        records = span.records(file, content)
+        for code, body in records.others:
+            if code in (framing.SCHEMA, framing.CHANNEL):
+                try:
+                    catalogue.checked(code, body)
+                except RedefinedError as error:
+                    for channel in error.channels:
+                        catalogue.redefined.setdefault(channel, span.start)
+        if any(catalogue.redefined.get(channel, span.start + 1) <= span.start for channel in channels):
+            raise DamagedError("a channel or its schema is defined anew and differently")
     except DamagedError as error:
         lost = sum(places.size for channel, places in entries(content[span.length :]) if channel in channels)
         return MessageBatch(None, checked=True, reason=f"{error} (at byte {span.start})", lost=lost)
-    whole = torn is None or torn == len(records.content)
-    return _Sound(records, not span.loose and (has_checksum(chunk) or not whole), None if whole else torn)
-
-
-def _check_meaning(catalogue: Catalogue, span: Span, records: Records, channels: frozenset[int]) -> None:
-    """No message is read behind a record that gives its channel another meaning."""
-    for code, content in records.others:
-        if code in (framing.SCHEMA, framing.CHANNEL):
-            try:
-                catalogue.checked(code, content)
-            except RedefinedError as error:
-                for channel in error.channels:
-                    catalogue.redefined.setdefault(channel, span.start)
-    if any(catalogue.redefined.get(channel, span.start + 1) <= span.start for channel in channels):
-        raise DamagedError("a channel or its schema is defined anew and differently")
+    size = claimed(content) if span.torn else None
+    broken = size is not None and size != records.content.size
+    return _Sound(records, not span.loose and (has_checksum(content) or broken), size if broken else None)
 
 
 @dataclass
@@ -172,7 +159,8 @@ class Account:
     unchecked: bool = False
     found: int = 0
     lost: int = 0
-    torn: str = ""
+    torn: tuple[int, int, int] | None = None
+    """Of a torn chunk the messages taken, and the bytes of its records that are there and that should be."""
 
     def add(self, batch: MessageBatch) -> None:
         """Count one batch."""
@@ -184,7 +172,7 @@ class Account:
             self.found += len(batch.messages)
             self.unchecked |= not batch.checked and len(batch.messages) > 0
             if batch.torn:
-                self.torn = _torn(len(batch.messages), *batch.torn)
+                self.torn = (len(batch.messages), *batch.torn)
 
     def notices(self, promised: int | None) -> list[Notice]:
         """What to say; `promised` is how many messages the statistics promise."""
@@ -198,21 +186,18 @@ class Account:
             text = f"the file counts {counted(promised, 'message')} and holds {self.found}"
             said.append(Notice("MISSING_MESSAGES", text, lossy=True))
         if self.torn:
-            said.append(Notice("TORN_CHUNK", self.torn, lossy=True))
+            taken, held, size = self.torn
+            lost = (  # counted by the share of bytes
+                f"about {counted(round(taken * (size - held) / held), 'is lost', 'are lost')}"
+                if taken
+                else "the rest is lost"
+            )
+            text = (
+                f"the last chunk breaks off: {counted(taken, 'message')} taken from its first "
+                f"{held} of {counted(size, 'byte')}, {lost}; "
+                "they could not be checked, since the chunk's checksum covers all of it"
+            )
+            said.append(Notice("TORN_CHUNK", text, lossy=True))
         if self.unchecked:
             said.append(Notice("NO_CHECKSUM", "the file has no checksums: damaged values would go unseen"))
         return said
-
-
-def _torn(messages: int, held: int, size: int) -> str:
-    """What to say of a chunk that breaks off; the lost messages are counted by the share of bytes."""
-    lost = (
-        f"about {counted(round(messages * (size - held) / held), 'is lost', 'are lost')}"
-        if messages
-        else "the rest is lost"
-    )
-    return (
-        f"the last chunk breaks off: {counted(messages, 'message')} taken from its first "
-        f"{held} of {counted(size, 'byte')}, {lost}; "
-        "they could not be checked, since the chunk's checksum covers all of it"
-    )

@@ -67,14 +67,20 @@ def plan(file: File, found: Catalogue, profile: Profile | None) -> Plan:
     LogError
         If no topic holds the joints, several do, or a message cannot be read.
     """
-    named = _named(profile)
+    places = {name: profile.place(name) for name in (*JOINT_CHANNELS, *VELOCITIES)} if profile else {}
+    named = {name: (topic, source) for name, (topic, source) in places.items() if source}
     usual = _usual_topic(file, found, profile) if len(named) < len(JOINT_CHANNELS) else None
     sources: dict[str, tuple[str, str]] = {}
     reading = Reading(joints_told="profile")
     notices: tuple[Notice, ...] = ()
     if usual is not None:
         sources = {channel: (usual.topic, path) for channel, path in usual.paths.items()}
-        reading, notices = _joints_reading(usual, profile)
+        if profile is not None and profile.joints is not None:
+            reading = Reading(joints=profile.joints, joints_told=profile.told_by("joints"))
+        else:
+            joints, told = along_the_arm(usual.joints)
+            reading = Reading(joints=joints, joints_told=told)
+            notices = order_notice(usual.joints, joints, told) if usual.named else ()
     for channel, (topic, path) in named.items():
         home = topic or (usual.topic if usual else None) or (profile.topic if profile else None)
         if home is None:
@@ -95,63 +101,35 @@ def plan(file: File, found: Catalogue, profile: Profile | None) -> Plan:
     return Plan(topics, mapping, reading, notices, units, others)
 
 
-def _joints_reading(usual: _Usual, profile: Profile | None) -> tuple[Reading, tuple[Notice, ...]]:
-    """Who said which joint is the first, and what to tell of it."""
-    if profile is not None and profile.joints is not None:
-        return Reading(joints=profile.joints, joints_told=profile.told_by("joints")), ()
-    joints, told = along_the_arm(usual.joints)
-    said = order_notice(usual.joints, joints, told) if usual.named else ()
-    return Reading(joints=joints, joints_told=told), said
-
-
-def _named(profile: Profile | None) -> dict[str, tuple[str | None, str]]:
-    if profile is None:
-        return {}
-    places = {name: profile.place(name) for name in (*JOINT_CHANNELS, *VELOCITIES)}
-    return {name: (topic, source) for name, (topic, source) in places.items() if source}
-
-
 def _topic(
     file: File, found: Catalogue, name: str, sources: dict[str, tuple[str, str]], profile: Profile | None
 ) -> Topic:
+    """A topic by its name, with those of `sources` that are its own, of the type that misses the fewest of them."""
     paths = {channel: path for channel, (topic, path) in sources.items() if topic == name}
-    types = {type_name: _shown(file, found, name, type_name, paths) for type_name in _types(found, name)}
-    types = {type_name: shown for type_name, shown in types.items() if shown.messages}
-    if not types:
+    best: tuple[str, list[str], list[str], tuple[str, str] | None] | None = None
+    for topic, kind in kinds(found):
+        missing, known, stamp, messages = list(paths), list[str](), None, 0
+        for shape in _shapes(file, found, topic, kind) if topic == name else ():
+            messages += 1
+            missing = [channel for channel in missing if not shape.find(paths[channel])]
+            known = known or [*shape.numbers][:12]
+            stamp = stamp or stamp_paths(shape)
+        if messages and (best is None or len(missing) < len(best[1])):
+            best = (kind, missing, known, stamp)
+    if best is None:
         mend = '--topic NAME, or --set CHANNEL.topic=NAME for one channel (profile: topic = "NAME")'
         told = f"there is no message on topic {name!r}; found {listed(found)}; name another: {mend}"
         raise NothingFoundError(f"{file.path}: {told}")
-    type_name = min(types, key=lambda one: len(types[one].missing))
-    shown = types[type_name]
-    for channel in shown.missing:
+    kind, missing, known, stamp = best
+    for channel in missing:
         raise LogError(
             f"{file.path}: messages on {name!r} have no {paths[channel]!r} for {channel}; found "
-            f"{', '.join(shown.known)}; name another: --set {channel}.source=FIELD (profile: source of [{channel}])"
+            f"{', '.join(known)}; name another: --set {channel}.source=FIELD (profile: source of [{channel}])"
         )
     clock = profile.clock if profile else None
-    if clock == "header" and shown.stamp is None:
+    if clock == "header" and stamp is None:
         raise LogError(f'{file.path}: messages on {name!r} carry no stamp: --clock log (profile: clock = "log")')
-    return Topic(name, type_name, Fields(paths, shown.stamp), clock)
-
-
-@dataclass(frozen=True)
-class _Shown:
-    """What the first messages of a topic and type show: the channels they miss, some of their paths, their stamp."""
-
-    messages: int
-    missing: tuple[str, ...]
-    known: list[str]
-    stamp: tuple[str, str] | None
-
-
-def _shown(file: File, found: Catalogue, topic: str, type_name: str, paths: dict[str, str]) -> _Shown:
-    missing, known, stamp, messages = tuple(paths), list[str](), None, 0
-    for shape in _shapes(file, found, topic, type_name):
-        messages += 1
-        missing = tuple(channel for channel in missing if not shape.find(paths[channel]))
-        known = known or [*shape.numbers][:12]
-        stamp = stamp or stamp_paths(shape)
-    return _Shown(messages, missing, known, stamp)
+    return Topic(name, kind, Fields(paths, stamp), clock)
 
 
 @dataclass(frozen=True)
@@ -164,6 +142,66 @@ class _Usual:
     paths: dict[str, str]
     units: dict[str, str] = field(default_factory=dict)
     others: dict[str, str] = field(default_factory=dict)
+
+
+def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> _Usual | None:
+    """The one topic with joint states; None where there is none and a profile names the fields."""
+    fitting: dict[str, _Usual] = {}
+    many: dict[str, list[str]] = {}
+    lacking: list[str] = []
+    refused: list[LogError] = []
+    for name, kind in _candidates(file, found, profile):
+        try:
+            for shape in _shapes(file, found, name, kind):
+                joints, names = joint_names(shape), names_in(shape)
+                if usual := _fitting(name, shape, joints, profile):
+                    fitting.setdefault(name, usual)
+                    break
+                if repeated := repeated_name(shape):
+                    told = f"messages on {name!r} name the joint {repeated!r} twice; name the fields by their places, "
+                    mend = '--set theta1.source="position[0]" … (profile: source = "position[0]" of [theta1] …)'
+                    refused.append(LogError(f"{file.path}: {told}{mend}"))
+                if len(joints) > 2 or (joints and profile and profile.joints):
+                    many[name] = joints
+                elif not joints and names:
+                    empty = [what for what in ("position", "effort") if shape.find(f"{what}[0]") is None]
+                    stays = " and ".join(empty) or "fields"
+                    lacking.append(f"{name!r} with the joints {', '.join(names[:8])}, whose {stays} stay empty")
+        except LogError as error:  # another topic may still hold the joints
+            refused.append(error)
+    if _USUAL in fitting:
+        return fitting[_USUAL]
+    if len(fitting) == 1:
+        return next(iter(fitting.values()))
+    if fitting:
+        raise LogError(
+            f'{file.path}: joint states on {", ".join(fitting)}; choose: --topic NAME (profile: topic = "NAME")'
+        )
+    if many:
+        name, joints = next(iter(many.items()))
+        told = f"{name!r} has {counted(len(joints), 'joint')} ({', '.join(joints[:12])})"
+        raise LogError(f"{file.path}: {told}; choose: --joints A,B (profile: joints = […])")
+    if refused:
+        raise refused[0]
+    if profile is not None and all(profile.channel(name).source for name in JOINT_CHANNELS):
+        return None
+    wanted = f"the joints {profile.joints}" if profile and profile.joints else "positions and efforts of two joints"
+    mend = "--topic NAME --joints A,B, or --set tau1.topic=NAME --set tau1.source=FIELD … (profile: topic, joints, …)"
+    told = "; ".join([*dict.fromkeys(lacking)][:4]) or listed(found)
+    raise NothingFoundError(f"{file.path}: no topic holds {wanted}; found {told}; name topics and fields: {mend}")
+
+
+def _fitting(topic: str, shape: Shape, joints: list[str], profile: Profile | None) -> _Usual | None:
+    """Two of a message's `joints` and their fields; None where it has not both, or of more nobody chose two."""
+    if profile is not None and profile.joints is not None:
+        chosen = profile.joints if set(profile.joints) <= set(joints) else None
+    else:
+        chosen = along_the_arm(joints)[0] if len(joints) == 2 else None
+    if chosen:
+        there = (joints[0], joints[1]) if len(joints) == 2 else chosen
+        named = bool(names_in(shape))
+        return _Usual(topic, there, named, joint_fields(shape, chosen), others=other_positions(shape, chosen))
+    return None if joints or repeated_name(shape) else _flat(topic, shape, profile)
 
 
 def _flat(topic: str, shape: Shape, profile: Profile | None) -> _Usual | None:
@@ -183,65 +221,23 @@ def _flat(topic: str, shape: Shape, profile: Profile | None) -> _Usual | None:
     return _Usual(topic, joints, choice.joints is not None, found, {**choice.units, **currents})
 
 
-def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> _Usual | None:
-    """The one topic with joint states."""
-    fitting: dict[str, _Usual] = {}
-    many: dict[str, list[str]] = {}
-    lacking: list[str] = []
-    refused: list[LogError] = []
-    for name, type_name in _candidates(file, found, profile):
-        try:
-            for shape in _shapes(file, found, name, type_name):
-                joints = joint_names(shape)
-                chosen = _joints(joints, profile)
-                if chosen:
-                    there = (joints[0], joints[1]) if len(joints) == 2 else chosen
-                    usual = _Usual(name, there, bool(names_in(shape)), joint_fields(shape, chosen))
-                    fitting.setdefault(name, replace(usual, others=other_positions(shape, chosen)))
-                    break
-                if repeated := repeated_name(shape):
-                    refused.append(_repeated(file, name, repeated))
-                elif not joints and (flat := _flat(name, shape, profile)):
-                    fitting.setdefault(name, flat)
-                    break
-                if len(joints) > 2 or (joints and profile and profile.joints):
-                    many[name] = joints
-                elif not joints and (lack := _lack(name, shape)) and lack not in lacking:
-                    lacking.append(lack)
-        except LogError as error:  # another topic may still hold the joints
-            refused.append(error)
-    if _USUAL in fitting:
-        return fitting[_USUAL]
-    if len(fitting) == 1:
-        return next(iter(fitting.values()))
-    if fitting:
+def _candidates(file: File, found: Catalogue, profile: Profile | None) -> list[tuple[str, str]]:
+    """Topics, each with a type of its messages, that may hold joint states; a profile's alone, where it names one."""
+    places = kinds(found)
+    if profile and profile.topic:
+        return [place for place in places if place[0] == profile.topic]
+    some = []
+    for place, numbers in places.items():
+        channel: Any = found.channels[min(numbers)]
+        schema = found.schemas.get(channel.schema_id)
+        known = schema is not None and (schema.name in JOINT_STATE + DYNAMIC_JOINT_STATE or b"effort" in schema.data)
+        if known or channel.message_encoding == "json":
+            some.append(place)
+    if len(some) > _MOST_CANDIDATES:
         raise LogError(
-            f'{file.path}: joint states on {", ".join(fitting)}; choose: --topic NAME (profile: topic = "NAME")'
+            f"{file.path}: {counted(len(some), 'topic')} may hold joint states: --topic NAME (profile: topic = …)"
         )
-    if many:
-        name, joints = next(iter(many.items()))
-        told = ", ".join(joints[:12])
-        raise LogError(
-            f"{file.path}: {name!r} has {counted(len(joints), 'joint')} ({told}); choose: "
-            "--joints A,B (profile: joints = […])"
-        )
-    if refused:
-        raise refused[0]
-    if profile is not None and all(profile.channel(name).source for name in JOINT_CHANNELS):
-        return None
-    wanted = f"the joints {profile.joints}" if profile and profile.joints else "positions and efforts of two joints"
-    mend = "--topic NAME --joints A,B, or --set tau1.topic=NAME --set tau1.source=FIELD … (profile: topic, joints, …)"
-    told = "; ".join(lacking[:4]) or listed(found)
-    raise NothingFoundError(f"{file.path}: no topic holds {wanted}; found {told}; name topics and fields: {mend}")
-
-
-def _lack(topic: str, shape: Shape) -> str | None:
-    """What a message with named joints lacks."""
-    joints = names_in(shape)
-    if not joints:
-        return None
-    empty = [what for what in ("position", "effort") if shape.find(f"{what}[0]") is None]
-    return f"{topic!r} with the joints {', '.join(joints[:8])}, whose {' and '.join(empty) or 'fields'} stay empty"
+    return some
 
 
 def fields_shown(file: File, found: Catalogue, number: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -262,43 +258,6 @@ def _paths_of(name: str, count: int, joints: tuple[str, ...]) -> list[str]:
     if count < 2:
         return [name if count else f"{name} (empty)"]
     return [f"{name}[{place}]" for place in (joints if len(joints) == count else range(min(count, 64)))]
-
-
-def _joints(names: list[str], profile: Profile | None) -> tuple[str, str] | None:
-    if profile is not None and profile.joints is not None:
-        return profile.joints if set(profile.joints) <= set(names) else None
-    return along_the_arm(names)[0] if len(names) == 2 else None
-
-
-def _repeated(file: File, topic: str, joint: str) -> LogError:
-    return LogError(
-        f"{file.path}: messages on {topic!r} name the joint {joint!r} twice; name the fields by their places, "
-        '--set theta1.source="position[0]" … (profile: source = "position[0]" of [theta1] …)'
-    )
-
-
-def _candidates(file: File, found: Catalogue, profile: Profile | None) -> list[tuple[str, str]]:
-    """Topics, each with a type of its messages, that may hold joint states; a profile's alone, where it names one."""
-    places = kinds(found)
-    if profile and profile.topic:
-        return [place for place in places if place[0] == profile.topic]
-    some = [place for place, numbers in places.items() if _may_hold(found, min(numbers))]
-    if len(some) > _MOST_CANDIDATES:
-        raise LogError(
-            f"{file.path}: {counted(len(some), 'topic')} may hold joint states: --topic NAME (profile: topic = …)"
-        )
-    return some
-
-
-def _may_hold(found: Catalogue, number: int) -> bool:
-    channel = found.channels[number]
-    schema = found.schemas.get(channel.schema_id)
-    known = schema is not None and (schema.name in JOINT_STATE + DYNAMIC_JOINT_STATE or b"effort" in schema.data)
-    return known or channel.message_encoding == "json"
-
-
-def _types(found: Catalogue, topic: str) -> list[str]:
-    return [type_name for name, type_name in kinds(found) if name == topic]
 
 
 def _shapes(file: File, found: Catalogue, topic: str, type_name: str) -> Iterator[Shape]:

@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 from algid.errors import LogError
 from algid.log import IntArray, Notice
 from algid.readers.mcap.catalogue import Catalogue, channels_of, schema_name
-from algid.readers.mcap.codec import Decodes, decoder_for
-from algid.readers.mcap.columnar import ExcessError, Shape
+from algid.readers.mcap.codec import decoder_for
+from algid.readers.mcap.columnar import Decoder, ExcessError, Shape
 from algid.readers.mcap.framing import File
 from algid.readers.mcap.load import Account, batches
-from algid.readers.mcap.messages import Messages
 from algid.readers.table import VELOCITIES, SampleTable, stack
 from algid.words import counted
 
 JOINT_STATE = ("sensor_msgs/msg/JointState", "sensor_msgs/JointState")
 DYNAMIC_JOINT_STATE = ("control_msgs/msg/DynamicJointState", "control_msgs/DynamicJointState")
 _QUANTITIES = {"theta": "position", "tau": "effort", "omega": "velocity"}
+_MOST_JOINTS, _MOST_OTHERS = 256, 32
 _STAMPS = ("header.stamp", "stamp", "timestamp", "time", "header.timestamp")
 _PARTS = (("sec", "nanosec"), ("sec", "nsec"), ("seconds", "nanos"), ("secs", "nsecs"))
 
@@ -51,13 +51,13 @@ def stamp_paths(shape: Shape) -> tuple[str, str] | None:
 def joint_names(shape: Shape) -> list[str]:
     """The joints that a message of this shape has both a position and an effort for."""
     names = names_in(shape) or tuple(str(place) for place in range(64))
-    return [name for name in names if _paths(shape, name, "theta") and _paths(shape, name, "tau")]
+    return [name for name in names if _path(shape, name, "theta") and _path(shape, name, "tau")]
 
 
 def other_positions(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:
     """By joint the path of its position, of those that a message names beside `joints`."""
     names = [name for name in names_in(shape) if name not in joints][:_MOST_OTHERS]
-    return {name: path for name in names if (path := _paths(shape, name, "theta")) is not None}
+    return {name: path for name in names if (path := _path(shape, name, "theta")) is not None}
 
 
 def repeated_name(shape: Shape) -> str | None:
@@ -74,29 +74,26 @@ def names_in(shape: Shape) -> tuple[str, ...]:
 
 def joint_fields(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:
     """By canonical channel the path of its number for two joints; without velocities where one lacks them."""
-    found = {}
-    for quantity in _QUANTITIES:
-        for number, joint in enumerate(joints, start=1):
-            path = _paths(shape, joint, quantity)
-            if path:
-                found[f"{quantity}{number}"] = path
+    found = {
+        f"{quantity}{number}": path
+        for quantity in _QUANTITIES
+        for number, joint in enumerate(joints, start=1)
+        if (path := _path(shape, joint, quantity))
+    }
     if not all(name in found for name in VELOCITIES):
         found = {name: path for name, path in found.items() if name not in VELOCITIES}
     return found
 
 
-def _paths(shape: Shape, joint: str, quantity: str) -> str | None:
+def _path(shape: Shape, joint: str, quantity: str) -> str | None:
+    """Where a message of this shape has a joint's number: in a list beside its name, or among its interfaces."""
     field = _QUANTITIES[quantity]
-    for path in (f"{field}[{joint}]", f"interface_values[{joint}].values[{field}]"):
-        if shape.find(path) is not None:
-            return path
-    return None
+    paths = (f"{field}[{joint}]", f"interface_values[{joint}].values[{field}]")
+    return next((path for path in paths if shape.find(path) is not None), None)
 
 
 _STAMP = ("sec", "nanosec")
 _MOST_SECONDS, _MOST_NANOSECONDS = 9.2e9, 9.2e18
-_MOST_JOINTS = 256
-_MOST_OTHERS = 32
 
 
 @dataclass
@@ -132,46 +129,37 @@ class Topic:
             told = f"{path}: topic {self.name!r} is not in this file"
             yield SampleTable(np.empty(0, np.int64), {}, (Notice("NO_TOPIC", told, lossy=True),))
             return
-        decoder, account = self._decoder(path, file, found, channels), Account()
+        channel: Any = found.channels[min(channels)]
+        wanted = dict(self.fields.paths)
+        if self.fields.stamp is not None and self.clock != "log":
+            wanted |= dict(zip(_STAMP, self.fields.stamp, strict=True))
+        decoder = decoder_for(path, channel, found.schemas.get(channel.schema_id), wanted, file.works)
+        account = Account()
         parts: list[SampleTable] = []
         size = 0
         for batch in batches(file, found, channels):
             account.add(batch)
             if batch.messages is None or not len(batch.messages):
                 continue
-            table = self._table(path, decoder, batch.messages)
+            try:
+                held, columns = decoder.columns(batch.messages)
+            except ExcessError as error:
+                raise LogError(f"{path}: topic {self.name!r} has {error}; write it anew with fewer") from error
             if decoder.misfits > account.found / 2:
                 raise LogError(f"{path}: topic {self.name!r}: {decoder.misfit}; it cannot be read without guessing")
-            parts.append(table)
-            size += len(table)
+            log_ns = batch.messages.log_ns
+            parts.append(SampleTable(log_ns if held.all() else log_ns[held], columns))  # type: ignore[arg-type]
+            size += len(parts[-1])
             if size >= rows:
                 yield self._clocked(path, parts)
                 parts, size = [], 0
         last = self._clocked(path, parts) if parts else SampleTable(np.empty(0, np.int64), {})
         promised = sum(found.counts.get(channel, 0) for channel in channels) if found.counts else None
-        said = (*account.notices(promised), *self._left_out(decoder), *self._others(found, channels))
-        yield last.noting(*found.notices, *said)
+        yield last.noting(*found.notices, *account.notices(promised), *self._left_out(decoder, found, channels))
 
     def count(self, found: Catalogue) -> int:
         """Messages that the file's statistics promise, 0 without them."""
         return sum((found.counts or {}).get(channel, 0) for channel in channels_of(found, self.name, self.type))
-
-    def _decoder(self, path: str, file: File, found: Catalogue, channels: frozenset[int]) -> Decodes:
-        channel: Any = found.channels[min(channels)]
-        wanted = dict(self.fields.paths)
-        if self.fields.stamp is not None and self.clock != "log":
-            wanted |= dict(zip(_STAMP, self.fields.stamp, strict=True))
-        return decoder_for(path, channel, found.schemas.get(channel.schema_id), wanted, file.works)
-
-    def _table(self, path: str, decoder: Decodes, messages: Messages) -> SampleTable:
-        try:
-            held, columns = decoder.columns(messages)
-        except ExcessError as error:
-            raise LogError(f"{path}: topic {self.name!r} has {error}; write it anew with fewer") from error
-        log_ns = messages.log_ns if held.all() else messages.log_ns[held]
-        if not columns:
-            columns = {name: np.empty(0) for name in decoder.wanted}
-        return SampleTable(log_ns, columns)  # type: ignore[arg-type]
 
     def _clocked(self, path: str, parts: list[SampleTable]) -> SampleTable:
         """The tables as one, with the stamps of the chosen clock and float64 columns."""
@@ -180,9 +168,13 @@ class Topic:
         notices: tuple[Notice, ...] = ()
         stamps = table.stamp_ns
         if _STAMP[0] in columns:
-            header = self._nanoseconds(path, columns.pop(_STAMP[0]), columns.pop(_STAMP[1]))
+            header = self._nanoseconds(path, *(columns.pop(part) for part in _STAMP))
             if self._chosen is None and len(table):
-                self._chosen, notices = self._choice(header)
+                still = self.clock != "header" and len(table) > 1 and not np.any(header != header[0])
+                self._chosen = "log" if still else "header"
+                if still:
+                    told = f"header stamps of {self.name!r} stand still at {header[0]} ns"
+                    notices = (Notice("LOG_TIME", f"{told}: the recorder's times are taken"),)
             stamps = header if self._chosen == "header" else stamps
         if stamps is table.stamp_ns and len(table) and stamps.min() < 0:
             raise LogError(
@@ -192,12 +184,6 @@ class Topic:
             )
         floats = {name: np.asarray(values, np.float64) for name, values in columns.items()}
         return SampleTable(stamps, floats, table.notices + notices)
-
-    def _choice(self, header: IntArray) -> tuple[str, tuple[Notice, ...]]:
-        if self.clock == "header" or header.size < 2 or np.any(header != header[0]):
-            return "header", ()
-        text = f"header stamps of {self.name!r} stand still at {header[0]} ns: the recorder's times are taken"
-        return "log", (Notice("LOG_TIME", text),)
 
     def _nanoseconds(self, path: str, seconds: NDArray[Any], nanoseconds: NDArray[Any]) -> IntArray:
         """Stamps (N,) of headers in ns."""
@@ -213,7 +199,8 @@ class Topic:
         rest = nanoseconds + np.rint((seconds - whole) * 1e9) if seconds.dtype.kind == "f" else nanoseconds
         return whole.astype(np.int64) * 1_000_000_000 + rest.astype(np.int64)
 
-    def _left_out(self, decoder: Decodes) -> list[Notice]:
+    def _left_out(self, decoder: Decoder, found: Catalogue, channels: frozenset[int]) -> list[Notice]:
+        """What to say of messages that lack a field, do not fit, or are of another type, encoding or definition."""
         said = []
         if decoder.skipped:
             lacking = "velocities too" if any(name in decoder.wanted for name in VELOCITIES) else "both joints"
@@ -225,19 +212,13 @@ class Topic:
                 f"schema says; the first: {decoder.misfit}"
             )
             said.append(Notice("MISFIT_MESSAGES", text, lossy=True))
-        return said
-
-    def _others(self, found: Catalogue, channels: frozenset[int]) -> list[Notice]:
-        """What to say of the topic's messages that are of another type, or encoded or defined in another way."""
         others = {number for number, channel in found.channels.items() if channel.topic == self.name} - channels
-        if found.counts is None:
-            others = {
-                one for one in others if any(span.channels is None or one in span.channels for span in found.spans)
-            }
-        else:
+        if found.counts is not None:
             others = {one for one in others if found.counts.get(one)}
-        if not others:
-            return []
-        types = ", ".join(sorted({schema_name(found, found.channels[one]) or "no schema" for one in others})[:4])
-        text = f"topic {self.name!r} also carries messages of another type or definition ({types}); they were not read"
-        return [Notice("OTHER_TYPE", text, lossy=True)]
+        elif all(span.channels is not None for span in found.spans):
+            others &= frozenset[int]().union(*(span.channels or () for span in found.spans))
+        if others:
+            types = ", ".join(sorted({schema_name(found, found.channels[one]) or "no schema" for one in others})[:4])
+            told = f"topic {self.name!r} also carries messages of another type or definition ({types})"
+            said.append(Notice("OTHER_TYPE", f"{told}; they were not read", lossy=True))
+        return said
