@@ -22,13 +22,12 @@ from typing import Any
 import numpy as np
 
 from algid.arm import Arm, FloatArray, with_payload
+from algid.design.belief import Asked, asked_for
 from algid.design.campaign import Campaign, plan
-from algid.design.criterion import Asked, asked_for
 from algid.design.information import Experiment, Information, Slopes
-from algid.design.limits import Limits
+from algid.design.limits import Limits, resting
 from algid.design.optimise import Stage, kept, optimise
 from algid.design.position import JUDGED_RATE, PositionProblem
-from algid.design.posture import resting
 from algid.design.prior import KnownBefore, of_case
 from algid.estimators import refined
 from algid.estimators.whitening import NoiseLevels

@@ -157,8 +157,8 @@ def _campaign(
     margin: float,
     seed: int,
 ) -> Campaign:
+    from algid.design.belief import asked_for
     from algid.design.campaign import Campaign
-    from algid.design.criterion import asked_for
     from algid.design.information import Experiment
     from algid.design.request import limits_of
 

@@ -9,13 +9,11 @@ from typing import Literal
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.design.belief import Belief
-from algid.design.criterion import Asked
+from algid.design.belief import Asked, Belief
 from algid.design.information import Experiment, Slopes, informations
-from algid.design.limits import Limits, Row, Usage, usage
+from algid.design.limits import HANGING, Limits, Row, Usage, resting, usage
 from algid.design.optimise import optimise
 from algid.design.position import JUDGED_RATE, PositionProblem
-from algid.design.posture import HANGING, resting
 from algid.design.swing import sampled
 from algid.design.torque import TorqueProblem, search
 from algid.model import Motion
@@ -148,7 +146,7 @@ def _guided(campaign: Campaign, t: FloatArray, told: Told | None) -> Design:
     rest = resting(kept, experiment.shared.model, loads)
     problem = PositionProblem(experiment, belief, kept, campaign.asked, campaign.duration, rest)
     found = optimise(problem, experiment.rate, campaign.seed, told)
-    motion = problem.motion(found.x, t)
+    motion = problem.family.motion(found.x, problem.family.basis(t))
     slopes = Slopes(experiment.shared.model, motion, experiment.rate)
     kinds = (False, True) if experiment.shared.payload else (False,)
     torque = {loaded: np.einsum("aqn,q->an", slopes.Y, belief.load(loaded).c) for loaded in kinds}
@@ -167,8 +165,7 @@ def _swung(campaign: Campaign, t: FloatArray, told: Told | None) -> Design:
     swung = problem.checked(x)
     motions = {loaded: sampled(swung.t, motion, t) for loaded, motion in swung.motions.items()}
     torque = dict.fromkeys(motions, problem.torques(swung.x, t))
-    share = 1 - campaign.margin
-    used = Usage(swung.usage.rows, swung.usage.u * share)
+    used = Usage(swung.usage.rows, swung.usage.u * (1 - campaign.margin))
     return _judged(campaign, t, motions, torque, used, interrupted)
 
 
@@ -185,13 +182,10 @@ def _judged(
     recorded = {loaded: motions[loaded] for loaded in experiment.kinds}
     every = max(1, round(experiment.rate / JUDGED_RATE))
     whole = informations(experiment, recorded, belief.mean, 1, experiment.rate)
-    C = campaign.asked.covariance(np.sum([one.S for one in whole], axis=0))
     drawn = [
-        campaign.asked.covariance(
-            np.sum([one.S for one in informations(experiment, recorded, arm, every, experiment.rate)], axis=0)
-        )
-        for arm in belief.draws(ARMS, campaign.seed)
+        informations(experiment, recorded, arm, every, experiment.rate) for arm in belief.draws(ARMS, campaign.seed)
     ]
+    C, *others = (campaign.asked.covariance(np.sum([one.S for one in arm], axis=0)) for arm in [whole, *drawn])
     parts = np.sum([one.parts(round(SECOND * experiment.rate)) for one in whole], axis=0)
     return Design(
         campaign=campaign,
@@ -199,7 +193,7 @@ def _judged(
         motions=motions,
         torque=torque,
         std=np.sqrt(np.diag(C)),
-        worst=np.sqrt(np.max([np.diag(one) for one in [C, *drawn]], axis=0)),
+        worst=np.sqrt(np.max([np.diag(one) for one in [C, *others]], axis=0)),
         shares=np.einsum("pi,bij,jp->pb", C, parts, C) / np.diag(C)[:, None],
         usage=used,
         interrupted=interrupted,

@@ -21,7 +21,7 @@ instant, so six differences at all instants at once give the derivative by the w
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -64,10 +64,6 @@ class Experiment:
         """Whether there are runs of each kind, as `loaded`."""
         return tuple(loaded for loaded, runs in zip((False, True), self.runs, strict=True) if runs)
 
-    def weight(self, rate: float) -> float:
-        """By how much samples at `rate` weigh more than those that are recorded."""
-        return self.rate / rate
-
 
 class Slopes:
     """Regressor and torque derivatives along a motion at `rate` Hz, and their derivatives by the motion."""
@@ -83,45 +79,28 @@ class Slopes:
     @cached_property
     def dY(self) -> FloatArray:
         """Its derivatives (6, 2, q, N)."""
-        return np.stack(
-            [
-                (regressor(self.model, ahead) - regressor(self.model, behind)) / (2 * _STEP)
-                for ahead, behind in self._beside
-            ]
-        )
+        return self._differences(lambda motion: regressor(self.model, motion))
 
     def dP(self, c: FloatArray) -> FloatArray:
         """Derivatives (6, 3, 2, 2, N) of the torque's derivatives at the coefficients `c` (q,)."""
-        return np.stack(
-            [
-                (partials(self.model, c, ahead) - partials(self.model, c, behind)) / (2 * _STEP)
-                for ahead, behind in self._beside
-            ]
-        )
+        return self._differences(lambda motion: partials(self.model, c, motion))
+
+    def _differences(self, function: Callable[[Motion], FloatArray]) -> FloatArray:
+        """Central differences (6, ...) of a function of the motion by each of its components."""
+        return np.stack([(function(ahead) - function(behind)) / (2 * _STEP) for ahead, behind in self._beside])
 
     @cached_property
-    def _beside(self) -> list[tuple[Motion, Motion]]:
-        return list(_neighbours(self.motion))
-
-
-def _neighbours(motion: Motion) -> Iterator[tuple[Motion, Motion]]:
-    """The motion with each of its six components a step ahead, and a step behind."""
-    signals = (motion.theta, motion.omega, motion.alpha)
-    for order in range(3):
-        for joint in range(2):
-            pair = []
-            for step in (_STEP, -_STEP):
-                moved = [signal if place != order else signal.copy() for place, signal in enumerate(signals)]
-                moved[order][joint] += step
-                pair.append(Motion(*moved))
-            yield pair[0], pair[1]
+    def _beside(self) -> list[list[Motion]]:
+        """The motion with each of its six components a step ahead, and a step behind."""
+        moves = np.eye(COMPONENTS).reshape(COMPONENTS, 3, 2, 1)
+        signals = np.stack([self.motion.theta, self.motion.omega, self.motion.alpha])
+        return [[Motion(*(signals + step * move)) for step in (_STEP, -_STEP)] for move in moves]
 
 
 @dataclass(frozen=True, eq=False)
 class _Log:
     """One kind of run, whitened: its W over σ_τ, H, and what its information counts for."""
 
-    loaded: bool
     c: FloatArray
     T: FloatArray
     count: float
@@ -150,10 +129,10 @@ class Information:
         self._logs = []
         for loaded in experiment.kinds:
             c, T = shared.coefficients(beta, loaded), shared.jacobian(beta, loaded)
-            count = experiment.runs[loaded] * experiment.weight(slopes.rate)
-            self._logs.append(self._whitened(loaded, c, T, count))
+            # samples at another rate than is recorded weigh as many times more
+            self._logs.append(self._whitened(c, T, experiment.runs[loaded] * (experiment.rate / slopes.rate)))
 
-    def _whitened(self, loaded: bool, c: FloatArray, T: FloatArray, count: float) -> _Log:
+    def _whitened(self, c: FloatArray, T: FloatArray, count: float) -> _Log:
         slopes = self._slopes
         P = partials(slopes.model, c, slopes.motion)
         H = along_stencil(P, self._weights) * self._ratio[:, :, None, None]
@@ -165,49 +144,38 @@ class Information:
         if failed or failed_too:
             raise np.linalg.LinAlgError("banded substitution failed")
         by_joint = np.ascontiguousarray(W.T.reshape(q, n, 2).transpose(0, 2, 1))
-        return _Log(loaded, c, T, count, by_joint, H, Z.T)
+        return _Log(c, T, count, by_joint, H, Z.T)
 
     @cached_property
     def S(self) -> FloatArray:
         """Information (Q, Q) of all runs."""
-        return sum(
-            (log.count * log.T.T @ (log.Z @ log.Z.T) @ log.T for log in self._logs[1:]),
-            self._logs[0].count * self._logs[0].T.T @ (self._logs[0].Z @ self._logs[0].Z.T) @ self._logs[0].T,
-        )
+        return np.sum([log.count * log.T.T @ (log.Z @ log.Z.T) @ log.T for log in self._logs], axis=0)
 
     def parts(self, samples: int) -> FloatArray:
         """Information (B, Q, Q) of each `samples` samples of the motion; the last part may be shorter."""
         total = []
         for log in self._logs:
-            q = log.Z.shape[0]
-            starts = np.arange(0, log.Z.shape[1], 2 * samples)
-            Z = log.Z.reshape(q, -1)
-            part = np.stack([Z[:, a : a + 2 * samples] @ Z[:, a : a + 2 * samples].T for a in starts])
-            total.append(log.count * log.T.T @ part @ log.T)
+            pieces = [log.Z[:, a : a + 2 * samples] for a in range(0, log.Z.shape[1], 2 * samples)]
+            total.append(log.count * log.T.T @ np.stack([Z @ Z.T for Z in pieces]) @ log.T)
         return np.sum(total, axis=0)
 
     def gradient(self, A: FloatArray) -> FloatArray:
         """Derivative (6, N) of tr(A S) by the motion, for a symmetric A (Q, Q)."""
         slopes = self._slopes
-        to_Y = np.zeros_like(slopes.Y)
-        total = np.zeros((COMPONENTS, slopes.Y.shape[2]))
+        n = slopes.Y.shape[2]
+        to_Y, total = np.zeros_like(slopes.Y), np.zeros((COMPONENTS, n))
         for log in self._logs:
             inner = log.count * log.T @ A @ log.T.T
             AW = np.tensordot(inner, log.W, axes=1)
             to_Y += 2 * AW.transpose(1, 0, 2) / self._sigma[:, None, None]
-            to_P = self._by_partials(AW, log)
+            back = np.zeros((AW.shape[0], 2, n + POINTS - 1))  # Gᵀ W
+            for point in range(POINTS):
+                back[:, :, point : point + n] += np.einsum("abn,qan->qbn", log.H[:, :, point], log.W)
+            windows = np.lib.stride_tricks.sliding_window_view(back, n, axis=2)
+            along = np.tensordot(self._weights, windows, axes=(1, 2))
+            to_P = -2 * np.einsum("qan,oqbn->oabn", AW, along) * self._ratio[None, :, :, None]
             total += np.einsum("oabn,coabn->cn", to_P, slopes.dP(log.c))
         return total + np.einsum("aqn,caqn->cn", to_Y, slopes.dY)
-
-    def _by_partials(self, AW: FloatArray, log: _Log) -> FloatArray:
-        """Derivative (3, 2, 2, N) by the torque's derivatives."""
-        n = AW.shape[2]
-        back = np.zeros((AW.shape[0], 2, n + POINTS - 1))
-        for point in range(POINTS):
-            back[:, :, point : point + n] += np.einsum("abn,qan->qbn", log.H[:, :, point], log.W)
-        windows = np.lib.stride_tricks.sliding_window_view(back, n, axis=2)
-        along = np.tensordot(self._weights, windows, axes=(1, 2))
-        return -2 * np.einsum("qan,oqbn->oabn", AW, along) * self._ratio[None, :, :, None]
 
 
 def informations(

@@ -8,6 +8,7 @@ with is drawn back to the resting start until it keeps every limit exactly.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -153,13 +154,12 @@ class _Search:
         """The motion that a stage ends with."""
         from scipy.optimize import minimize
 
-        last: list[tuple[bytes, Evaluation]] = []
+        @lru_cache(maxsize=1)  # SLSQP asks for the figure, the limits and their gradients at one x after another
+        def evaluated(key: bytes) -> Evaluation:
+            return self._evaluated(np.frombuffer(key), stage)
 
         def at(x: FloatArray) -> Evaluation:
-            key = x.tobytes()
-            if not last or last[0][0] != key:
-                last[:] = [(key, self._evaluated(x, stage))]
-            return last[0][1]
+            return evaluated(x.tobytes())
 
         start = self._done
 
@@ -191,8 +191,8 @@ class _Search:
         if found is not None and np.isfinite(found.figure) and np.all(np.isfinite(found.room)):
             self._rows = found.room.size
             return found
-        rows = self._rows
-        return Evaluation(_HOPELESS, np.zeros(x.size), np.full(rows, -_HOPELESS), np.zeros((rows, x.size)))
+        room = np.full(self._rows, -_HOPELESS)
+        return Evaluation(_HOPELESS, np.zeros(x.size), room, np.zeros((self._rows, x.size)))
 
 
 def soft_maximum(u: FloatArray, hardness: float) -> tuple[FloatArray, FloatArray]:

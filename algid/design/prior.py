@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -73,21 +72,27 @@ def prior_of(source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedA
         A result's folder or file, the name of a shipped case, or a TOML file of an arm.
     loaded : bool or None
         Whether there are to be runs with the payload; None where there are if a payload is known.
-    knowns : Knowns
+    knowns : KnownBefore
 
     Raises
     ------
     ResultError
         If a result has no error bars where they are needed.
     SettingError
-        If what is known contradicts itself, or a payload is to be carried of which nothing is known.
+        If no arm has such an inertia matrix, or a payload is to be carried of which nothing is known.
     """
     path = Path(source)
     if path.is_dir() or path.suffix == ".json":
         prior = _of_result(read_result(path), source, loaded, knowns)
     else:
         prior = of_case(load_case(source), source, loaded, knowns)
-    _check(prior)
+    value = dict(zip(prior.belief.shared.names, prior.belief.mean.tolist(), strict=True))
+    k1, k3, k5 = value["k1"], value["k3"], value["k5"]
+    if min(k3, k5) <= 0 or k3 * k5 <= k1**2:
+        raise SettingError(
+            f"{source}: its inertia matrix is not positive definite (k1 {k1:.3g}, k3 {k3:.3g}, k5 {k5:.3g} "
+            "kg m²); no arm is like that: identify it anew, or describe the arm in a TOML file"
+        )
     return prior
 
 
@@ -102,9 +107,16 @@ def of_case(case: Case, source: str, loaded: bool | None, knowns: KnownBefore) -
     arm = replace(case.arm, **knowns.lengths)
     mass = case.payload if knowns.payload is None else knowns.payload
     shared = _shared(Model(gravity=arm.g), mass or None, loaded, source, knowns)
-    error = WRONG if knowns.error is None else knowns.error
+    more = 1 + (WRONG if knowns.error is None else knowns.error)
+    wrong = [  # the parameters are linear in each mass and friction
+        (replace(arm, m1=more * arm.m1, I1=more * arm.I1), mass),
+        (replace(arm, m2=more * arm.m2, I2=more * arm.I2), mass),
+        (replace(arm, b1=more * arm.b1), mass),
+        (replace(arm, b2=more * arm.b2), mass),
+        (arm, more * mass),
+    ]
     mean = _parameters(shared, arm, mass)
-    spread = np.stack([_parameters(shared, *wrong) - mean for wrong in _wrong(arm, mass, error)], axis=1)
+    spread = np.stack([_parameters(shared, *other) - mean for other in wrong], axis=1)
     return BelievedArm(source, Belief(shared, mean, spread, box=True), np.array([arm.l1, arm.l2]), None)
 
 
@@ -121,26 +133,14 @@ def _parameters(shared: Shared, arm: Arm, mass: float) -> FloatArray:
     return np.array([value[name] for name in shared.names])
 
 
-def _wrong(arm: Arm, mass: float, error: float) -> list[tuple[Arm, float]]:
-    """The arm with each of its masses and frictions too large by that share: the parameters are linear in them."""
-    more = 1 + error
-    return [
-        (replace(arm, m1=more * arm.m1, I1=more * arm.I1), mass),
-        (replace(arm, m2=more * arm.m2, I2=more * arm.I2), mass),
-        (replace(arm, b1=more * arm.b1), mass),
-        (replace(arm, b2=more * arm.b2), mass),
-        (arm, more * mass),
-    ]
-
-
 def _of_result(result: Result, source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedArm:
     model, left_out = _planned(model_of(result))
-    value = {name: found.estimate for name, found in result.estimates.items()}
-    value |= {name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None}
-    lengths = {name: value[name] for name in ("l1", "l2") if result.settings.get(name) is not None} | knowns.lengths
+    told = {name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None}
+    lengths = told | knowns.lengths
+    value = {name: found.estimate for name, found in result.estimates.items()} | lengths
     mass = value.get("m_p") if knowns.payload is None else knowns.payload
     shared = _shared(model, mass, loaded, source, replace(knowns, **lengths))
-    value |= lengths | ({} if mass is None else {"m_p": mass})
+    value |= {} if mass is None else {"m_p": mass}
     missing = next((name for name in shared.names if value.get(name) is None), None)
     if missing is not None:
         remedy = f"give --{missing}" if missing in ("l1", "l2") else "identify it from logs that tell it"
@@ -148,10 +148,11 @@ def _of_result(result: Result, source: str, loaded: bool | None, knowns: KnownBe
     mean = np.array([value[name] for name in shared.names], dtype=np.float64)
     given = {"m_p"} if knowns.payload is not None else set()
     spread = _spread(result, source, shared.names, mean, given, knowns.error)
-    known = {**value, **lengths}
-    reach = np.array([np.nan if known.get(name) is None else known[name] for name in ("l1", "l2")], dtype=np.float64)
+    reach = np.array([np.nan if value.get(name) is None else value[name] for name in ("l1", "l2")], dtype=np.float64)
+    levels = [0.0 if result.fit is None else result.fit.noise.get(name) or 0.0 for name in NOISE]
+    noise = NoiseLevels(np.array(levels[:2]), np.array(levels[2:])) if min(levels) > 0 else None
     warnings = (*left_out, *contradictions(result, knowns.lengths))
-    return BelievedArm(source, Belief(shared, mean, spread, box=False), reach, _noise(result), warnings)
+    return BelievedArm(source, Belief(shared, mean, spread, box=False), reach, noise, warnings)
 
 
 def _planned(model: Model) -> tuple[Model, tuple[str, ...]]:
@@ -187,29 +188,6 @@ def _spread(
     for name in bare:
         row = names.index(name)
         covariance[row, row] = ((WRONG if error is None else error) * mean[row] / SURE) ** 2
-    eigenvalues, vectors = np.linalg.eigh(covariance / np.outer(_size(mean), _size(mean)))
-    return _size(mean)[:, None] * vectors * np.sqrt(np.maximum(eigenvalues, 0.0))
-
-
-def _size(mean: FloatArray) -> FloatArray:
-    return np.maximum(np.abs(mean), 1e-12)
-
-
-def _noise(result: Result) -> NoiseLevels | None:
-    noise: Mapping[str, Any] = {} if result.fit is None else result.fit.noise
-    if not all((noise.get(name) or 0) > 0 for name in NOISE):
-        return None
-    levels = np.array([noise[name] for name in NOISE])
-    return NoiseLevels(levels[:2], levels[2:])
-
-
-def _check(prior: BelievedArm) -> None:
-    """Refuse a prior whose inertia matrix is not positive definite: no arm is like that, and none can be moved so."""
-    belief = prior.belief
-    value = dict(zip(belief.shared.names, belief.mean.tolist(), strict=True))
-    k1, k3, k5 = value["k1"], value["k3"], value["k5"]
-    if min(k3, k5) <= 0 or k3 * k5 <= k1**2:
-        raise SettingError(
-            f"{prior.source}: its inertia matrix is not positive definite (k1 {k1:.3g}, k3 {k3:.3g}, k5 {k5:.3g} "
-            "kg m²); no arm is like that: identify it anew, or describe the arm in a TOML file"
-        )
+    size = np.maximum(np.abs(mean), 1e-12)
+    eigenvalues, vectors = np.linalg.eigh(covariance / np.outer(size, size))
+    return size[:, None] * vectors * np.sqrt(np.maximum(eigenvalues, 0.0))

@@ -12,12 +12,12 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from algid.arm import FloatArray
-from algid.design.limits import Limits
-from algid.design.posture import HANGING
+from algid.design.limits import HANGING, Limits
 from algid.errors import SettingError
 from algid.files import read_toml
 
 Positive = Annotated[float, Field(gt=0)]  # inf is no limit
+NonNegative = Annotated[float, Field(ge=0)]  # nothing is a joint without a drive
 Pair = Positive | tuple[Positive, Positive]
 Span = tuple[float, float]
 
@@ -30,9 +30,7 @@ class LimitsFile(BaseModel):
     range: Positive | tuple[Positive, Positive] | tuple[Span, Span] | None = None
     speed: Pair | None = None
     acceleration: Pair | None = None
-    torque: (
-        Annotated[float, Field(ge=0)] | tuple[Annotated[float, Field(ge=0)], Annotated[float, Field(ge=0)]] | None
-    ) = None
+    torque: NonNegative | tuple[NonNegative, NonNegative] | None = None
     tip_height: float | None = None
     duration: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
     rate: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
@@ -62,8 +60,11 @@ def request(file: Path | None, flags: Mapping[str, str | float | None]) -> Reque
     """
     content = {} if file is None else read_toml(file, LimitsFile).model_dump(exclude_none=True)
     for name, value in flags.items():
-        if value is not None:
-            content[name] = _parsed(name, value)
+        if value is None:
+            continue
+        content[name] = _parsed(name, value) if isinstance(value, str) else value
+        if content[name] is None:
+            raise SettingError(f"--{name.replace('_', '-')}: expected {_LIKE[name]}, found {value!r}")
     return Request(content, "the flags" if file is None else str(file))
 
 
@@ -103,15 +104,9 @@ def _both(value: Any) -> FloatArray:
 
 
 def _range(value: Any) -> tuple[FloatArray, FloatArray]:
-    pair = value if isinstance(value, tuple | list) else (value, value)
-    if isinstance(pair[0], tuple | list):
-        low, high = np.array(pair, dtype=np.float64).T
-    else:
-        half, home = (
-            np.array(pair, dtype=np.float64),
-            np.array(HANGING),
-        )  # what a range of one number a joint is to both sides of
-        low, high = home - half, home + half
+    ends = _both(value)
+    # one number a joint is to both sides of hanging
+    low, high = ends.T if ends.ndim == 2 else (np.array(HANGING) - ends, np.array(HANGING) + ends)
     for joint in range(2):
         if not low[joint] < high[joint]:
             raise SettingError(
@@ -130,37 +125,21 @@ _LIKE = {
 }
 
 
-def _parsed(name: str, value: str | float) -> Any:
-    if not isinstance(value, str):
-        return value
-    flag = f"--{name.replace('_', '-')}"
+def _parsed(name: str, text: str) -> Any:
+    """A number, a pair of them, or a pair of spans; None where the flag cannot mean that."""
     try:
-        found = _numbers(value)
-        if name == "runs":
-            return _runs(found)
-        least_fits = name == "torque"
-        for number in found:
-            if not isinstance(number, tuple) and not (number > 0 or (least_fits and number == 0)):
-                raise ValueError
-        if any(isinstance(number, tuple) for number in found) and (name != "range" or len(found) != 2):
-            raise ValueError
+        parts = [tuple(float(number) for number in part.split(":")) for part in text.split(",")]
     except ValueError:
-        raise SettingError(f"{flag}: expected {_LIKE[name]}, found {value!r}") from None
-    return found[0] if len(found) == 1 else found
-
-
-def _numbers(text: str) -> tuple[Any, ...]:
-    """One or two numbers, or spans LOW:HIGH, between commas."""
-    parts = [part.split(":") for part in text.split(",")]
-    if len(parts) > 2 or len({len(part) for part in parts}) != 1 or len(parts[0]) > 2:
-        raise ValueError
-    numbers = [tuple(float(number) for number in part) for part in parts]
-    if any(math.isnan(number) for part in numbers for number in part):
-        raise ValueError
-    return tuple(part if len(part) == 2 else part[0] for part in numbers)
-
-
-def _runs(found: tuple[Any, ...]) -> tuple[int, int]:
-    if len(found) != 2 or any(isinstance(n, tuple) or n < 0 or n != int(n) for n in found) or not any(found):
-        raise ValueError
-    return int(found[0]), int(found[1])
+        return None
+    numbers = [part[0] for part in parts]
+    if [len(part) for part in parts] == [2, 2]:
+        spans = name == "range" and not any(math.isnan(number) for part in parts for number in part)
+        return tuple(parts) if spans else None
+    if len(parts) > 2 or any(len(part) != 1 for part in parts) or any(math.isnan(number) for number in numbers):
+        return None
+    if name == "runs":
+        whole = len(numbers) == 2 and all(number >= 0 and number.is_integer() for number in numbers)
+        return (int(numbers[0]), int(numbers[1])) if whole and any(numbers) else None
+    if not all(number > 0 or (number == 0 and name == "torque") for number in numbers):
+        return None
+    return numbers[0] if len(numbers) == 1 else tuple(numbers)

@@ -1,6 +1,6 @@
 """Open loop: a multi-sine of torques swings the arm from rest, and limits hold for arms drawn from the belief.
 
-τ_i(t) = w(t) τ̂_i Σ_l (a_il sin ω_l t + b_il cos ω_l t), with the window w of `algid.design.fourier` and amplitudes in
+τ_i(t) = w(t) τ̂_i Σ_l (a_il sin ω_l t + b_il cos ω_l t), with the window w of `algid.design.position` and amplitudes in
 shares of the torque's limit τ̂. Where the arm goes depends on the arm: each candidate is simulated for the believed arm
 and for arms drawn from the belief, without and with the payload, all in one batch. An evolution strategy (recombination
 of the better half, step sizes by the spread of it) needs no derivatives of that. A joint whose limit is zero has no
@@ -14,11 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.design.belief import Belief
-from algid.design.criterion import Asked
-from algid.design.fourier import Fourier
+from algid.design.belief import Asked, Belief
 from algid.design.information import Experiment, Slopes, informations
 from algid.design.limits import Limits, Row, Usage, usage
+from algid.design.position import Fourier
 from algid.design.swing import Swings, step_for, swing
 from algid.errors import SettingError
 from algid.model import Motion
@@ -129,35 +128,29 @@ class TorqueProblem:
             motions = [swings.motion(column) for column in columns]
             most = max(float(row.u.max()) for row in self._used(x, swings.t, motions))
             beyond = max(0.0, most - 1.0)
-            told = self._figure(dict(zip(kinds, motions, strict=False))) if beyond < _LOST else 0.0
-            found.append(told + _PENALTY * min(beyond, 1e3))
+            told = self._bound(dict(zip(kinds, motions, strict=False))) if beyond < _LOST else 1.0
+            found.append(np.log(told) + _PENALTY * min(beyond, 1e3))
         return np.array(found)
 
-    def _figure(self, motions: dict[bool, Motion]) -> float:
-        try:
-            figure = np.log(self._asked.largest(self.information(motions, self._belief.mean)))
-        except np.linalg.LinAlgError:
-            return float("inf")
-        return float(figure) if np.isfinite(figure) else float("inf")
-
-    def information(self, motions: dict[bool, Motion], beta: FloatArray) -> FloatArray:
-        """S (Q, Q) of all runs of an arm `beta` (Q,) whose kinds move differently."""
+    def _bound(self, motions: dict[bool, Motion]) -> float:
+        """The believed arm's largest relative bound; infinite where nothing can be said of the motion."""
         every = max(1, int(1 / (self._step * _INFORMATION_RATE)))
-        return np.sum([one.S for one in informations(self._experiment, motions, beta, every, 1 / self._step)], axis=0)
+        try:
+            runs = informations(self._experiment, motions, self._belief.mean, every, 1 / self._step)
+            bound = self._asked.largest(np.sum([one.S for one in runs], axis=0))
+        except np.linalg.LinAlgError:
+            return np.inf
+        return bound if np.isfinite(bound) else np.inf
 
     def _used(self, x: FloatArray, t: FloatArray, motions: list[Motion]) -> list[Usage]:
         """Usages of limits by motions: kinematic ones, the torque itself, rest at the end of the believed arm."""
         model = self._experiment.shared.model
-        torque = self.torques(x, t)
         found = [usage(self._limits, Slopes(model, motion, 1.0), (), derivatives=False) for motion in motions]
-        rows, values = [], []
-        for joint in self._driven.tolist():
-            rows.append(Row("torque", joint))
-            values.append(np.abs(torque[joint]) / self._limits.torque[joint])
-        found.append(Usage(tuple(rows), np.array(values)))
-        calm = [_unrest(motion) for motion in motions[: len(self._experiment.kinds)]]
-        rest = np.max(calm, axis=0)[:, None]
-        found.append(Usage(tuple(Row("rest", joint) for joint in range(2)), rest))
+        share = np.abs(self.torques(x, t)[self._driven]) / self._limits.torque[self._driven, None]
+        found.append(Usage(tuple(Row("torque", joint) for joint in self._driven.tolist()), share))
+        believed = np.abs([motion.omega for motion in motions[: len(self._experiment.kinds)]])
+        left = believed[:, :, -1] / (END * np.maximum(believed.max(axis=2), 1e-9))
+        found.append(Usage(tuple(Row("rest", joint) for joint in range(2)), left.max(axis=0)[:, None]))
         return found
 
     def checked(self, x: FloatArray) -> Swung:
@@ -169,21 +162,12 @@ class TorqueProblem:
             used = self._used(shrunk, swings.t, motions)
             if max(float(one.u.max()) for one in used) <= 1.0 or not shrunk.any():
                 break
-        return Swung(shrunk, swings.t, dict(zip(kinds, motions, strict=False)), _worst(used))
-
-
-def _unrest(motion: Motion) -> FloatArray:
-    """Velocities (2,) left at the end over what may be left."""
-    return np.abs(motion.omega[:, -1]) / (END * np.maximum(np.abs(motion.omega).max(axis=1), 1e-9))
-
-
-def _worst(used: list[Usage]) -> Usage:
-    """The largest usage of each row among the arms."""
-    most: dict[Row, float] = {}
-    for one in used:
-        for row, value in zip(one.rows, one.most.tolist(), strict=True):
-            most[row] = max(most.get(row, 0.0), value)
-    return Usage(tuple(most), np.array(list(most.values()))[:, None])
+        most: dict[Row, float] = {}
+        for one in used:
+            for row, value in zip(one.rows, one.most.tolist(), strict=True):
+                most[row] = max(most.get(row, 0.0), value)
+        worst = Usage(tuple(most), np.array(list(most.values()))[:, None])
+        return Swung(shrunk, swings.t, dict(zip(kinds, motions, strict=False)), worst)
 
 
 def search(problem: TorqueProblem, seed: int, told: Told | None = None) -> tuple[FloatArray, bool]:

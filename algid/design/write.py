@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -38,8 +38,18 @@ class Provenance:
 
 def write_design(design: Design, folder: Path, origin: Provenance) -> None:
     """Write everything into `folder`. Raises `OutputError`."""
-    _write_tables(design, folder)
-    _write_mcap(design, folder / "trajectory.mcap")
+    import polars as pl
+
+    from algid.writers import write_log
+
+    frame = pl.DataFrame(trajectory(design))
+    with whole_file(folder / "trajectory.csv") as temporary:
+        frame.write_csv(temporary)
+    with whole_file(folder / "trajectory.parquet") as temporary:
+        frame.write_parquet(temporary)
+    stamps, tau = np.round(design.t * 1e9).astype(np.int64), design.torque[min(design.torque)]
+    log = Log(stamps, design.motion.theta, tau, Origin("trajectory.mcap", "design", {}), design.motion.omega)
+    write_log(folder / "trajectory.mcap", log, kind="mcap")
     texts = {
         "design.json": design_json(design, origin),
         "report.html": page_html(design, origin.source, origin.warnings),
@@ -65,28 +75,6 @@ def trajectory(design: Design) -> dict[str, FloatArray]:
 
 def _signals(motion: Motion, names: Sequence[str]) -> dict[str, FloatArray]:
     return {f"{name}{joint + 1}": getattr(motion, name)[joint] for name in names for joint in range(2)}
-
-
-def _write_tables(design: Design, folder: Path) -> None:
-    import polars as pl
-
-    frame = pl.DataFrame(trajectory(design))
-    with whole_file(folder / "trajectory.csv") as temporary:
-        frame.write_csv(temporary)
-    with whole_file(folder / "trajectory.parquet") as temporary:
-        frame.write_parquet(temporary)
-
-
-def _write_mcap(design: Design, path: Path) -> None:
-    from algid.writers import write_log
-
-    origin = Origin(path=path.name, format="design", mapping={})
-    stamps = np.round(design.t * 1e9).astype(np.int64)
-    write_log(
-        path,
-        Log(stamps, design.motion.theta, design.torque[min(design.torque)], origin, design.motion.omega),
-        kind="mcap",
-    )
 
 
 def joint_trajectory(design: Design, joints: tuple[str, str]) -> str:
@@ -154,14 +142,25 @@ def content(design: Design, origin: Provenance) -> dict[str, Any]:
             "tip_height": limits.height if np.isfinite(limits.height) else None,
             "margin": campaign.margin,
         },
-        "used": [_used(design, place) for place in range(len(design.binding))],
+        "used": [
+            {
+                "limit": row.limit,
+                "joint": None if row.joint is None else row.joint + 1,
+                "loaded": row.loaded,
+                "allowed": limit,
+                "most": value,
+                "share": used,
+            }
+            for row, used in design.binding
+            for limit, value in [amounts(design, row, used)]
+        ],
         "start": design.motion.theta[:, 0].tolist(),
         "joints": list(origin.joints),
         "warnings": list(origin.warnings),
     }
 
 
-def _parameter(design: Design, place: int) -> Mapping[str, Any]:
+def _parameter(design: Design, place: int) -> dict[str, Any]:
     asked = design.campaign.asked
     known = bool(asked.known[place])
     return {
@@ -173,19 +172,6 @@ def _parameter(design: Design, place: int) -> Mapping[str, Any]:
         "unit": UNITS[design.names[place]],
         "asked": bool(asked.wanted[place]),
         "information_by_second": [round(float(share), 4) for share in design.shares[place]],
-    }
-
-
-def _used(design: Design, place: int) -> dict[str, Any]:
-    row, used = design.binding[place]
-    limit, value = amounts(design, row, used)
-    return {
-        "limit": row.limit,
-        "joint": None if row.joint is None else row.joint + 1,
-        "loaded": row.loaded,
-        "allowed": limit,
-        "most": value,
-        "share": used,
     }
 
 

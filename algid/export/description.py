@@ -1,18 +1,85 @@
-"""All that an export writes: the arm, and where each of its numbers comes from."""
+"""All that an export writes: the arm's coefficients, its links, and where each of its numbers comes from.
+
+k1 = m2 l1 lc2 and k2 = m2 g lc2 leave l1 = g k1 / k2 to a model made of links. Where l1 is known, the estimates are
+conditioned on it: with their covariance C and a the gradient of g k1 - l1 k2,
+
+    c' = c - C a (g k1 - l1 k2) / (aᵀ C a),   C' = C - C a aᵀ C / (aᵀ C a)
+"""
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
+from algid.arm import FloatArray
 from algid.errors import ResultError, SettingError
-from algid.export.coefficients import Coefficients, coefficients_of
 from algid.export.links import Knowns, Link, links_of
-from algid.identification.lengths import contradictions, first_length
-from algid.model import TERMS, UNITS
+from algid.identification.by_likelihood import model_of
+from algid.identification.lengths import contradictions, first_length, has_error_bar
+from algid.identification.validate import torque_constants
+from algid.model import TERMS, UNITS, Model
 from algid.report.text import joined
 from algid.results import Estimate, Result, Status
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """The torque's model, its coefficients by name, and the standard deviation of each that has one.
+
+    `value` holds a zero for every coefficient that the model lacks; `conditioned` says whether l1 moved them.
+    """
+
+    model: Model
+    value: Mapping[str, float]
+    std: Mapping[str, float]
+    conditioned: bool = False
+
+
+def coefficients_of(result: Result, file: str, l1: float | None = None) -> Coefficients:
+    """The coefficients of the result in `file`, conditioned on the length `l1` in m of link 1 where it is given.
+
+    Raises
+    ------
+    ResultError
+        If a coefficient has no estimate, or no arm has such an inertia matrix.
+    """
+    model = model_of(result)
+    c = torque_constants(result, model, "unloaded", file)
+    C: FloatArray = np.zeros((c.size, c.size))  # nothing where the result has no error bar
+    known = [name for name in model.names if has_error_bar(result, name)]
+    if known and result.fit is not None:
+        places = [result.fit.covariance_names.index(name) for name in known]
+        rows = [model.names.index(name) for name in known]
+        C[np.ix_(rows, rows)] = np.array(result.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
+    conditioned = l1 is not None and model.gravity > 0
+    if l1 is not None and conditioned:
+        c, C = _conditioned(model, c, C, l1)
+    value = model.values(c)
+    spread = dict(zip(model.names, np.sqrt(np.maximum(np.diag(C), 0.0)).tolist(), strict=True))
+    k1, k3, k5 = value["k1"], value["k3"], value["k5"]
+    if min(k3, k5) <= 0 or k3 * k5 <= k1**2:
+        raise ResultError(
+            f"{file}: its inertia matrix is not positive definite (k1 {k1:.3g}, k3 {k3:.3g}, k5 {k5:.3g} kg m²), so "
+            "that masses would come out negative; "
+            + ("check --l1" if conditioned else "identify it from logs that tell more")
+        )
+    return Coefficients(model, value, {name: spread[name] for name in known}, conditioned)
+
+
+def _conditioned(model: Model, c: FloatArray, C: FloatArray, l1: float) -> tuple[FloatArray, FloatArray]:
+    first, second = model.names.index("k1"), model.names.index("k2")
+    a = np.zeros(c.size)
+    a[first], a[second] = model.gravity, -l1
+    if a @ C @ a > 0:
+        gain = C @ a / (a @ C @ a)
+        return c - gain * (a @ c), C - np.outer(gain, a @ C)
+    equally = np.zeros(c.size)  # without error bars, k1 and k2 are taken as equally wrong for their size
+    equally[[first, second]] = c[[first, second]] ** 2 * a[[first, second]]
+    return c - equally * (a @ c) / (a @ equally), C
 
 
 @dataclass(frozen=True)
@@ -65,16 +132,16 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
         If what is known leaves no positive mass or inertia.
     """
     told = {name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None}
-    given = {**told, **{name: value for name, value in knowns.given.items() if name in ("l1", "l2")}}
+    given = told | {name: value for name, value in knowns.given.items() if name in ("l1", "l2")}
     coefficients = coefficients_of(result, file, given.get("l1"))
     numbers = _identified(coefficients)
     chosen = None
     if links:
-        found = _length(result.payload.get("l2"))
-        full = Knowns(given.get("l1"), given.get("l2", found), knowns.m1, knowns.m2, knowns.rotor1)
-        l1 = _first_length(coefficients, full.l1, file)
+        known = Knowns(**{**knowns.given, **given})
+        full = replace(known, l2=given.get("l2", _length(result.payload.get("l2"))))
+        l1 = _first_length(coefficients, file) if known.l1 is None else known.l1
         chosen = links_of(coefficients.value, coefficients.model.gravity, l1, full, file)
-        numbers += _chosen(chosen, coefficients, Knowns(**{**knowns.given, **given}), result)
+        numbers += _chosen(chosen, coefficients, known, result)
     delay = result.parameters.get("delay")
     return Description(
         name=re.sub(r"\W|^(?=\d)", "_", Path(file if Path(file).name != "result.json" else Path(file).parent).stem),
@@ -92,9 +159,7 @@ def _length(found: Estimate | None) -> float | None:
     return None if found is None or found.status is not Status.OK else found.estimate
 
 
-def _first_length(coefficients: Coefficients, given: float | None, file: str) -> float:
-    if given is not None:
-        return given
+def _first_length(coefficients: Coefficients, file: str) -> float:
     gravity = coefficients.model.gravity
     if gravity == 0:
         raise SettingError(f"--l1: {file}: an arm in a horizontal plane does not tell its length; give --l1")
@@ -109,14 +174,11 @@ def _first_length(coefficients: Coefficients, given: float | None, file: str) ->
 
 def _identified(coefficients: Coefficients) -> tuple[Number, ...]:
     after = ", conditioned on the given l1" if coefficients.conditioned else ""
-
-    def origin(name: str) -> str:
-        std = coefficients.std.get(name)
-        return f"identified{'' if std is None else f', ± {std:.2g}'}{after}"
-
-    value, names = coefficients.value, coefficients.model.names
-    gravity = Number("g", coefficients.model.gravity, "m/s^2", "given")
-    return (*(Number(name, value[name], UNITS[name], origin(name)) for name in names), gravity)
+    found = []
+    for name in coefficients.model.names:
+        std = "" if name not in coefficients.std else f", ± {coefficients.std[name]:.2g}"
+        found.append(Number(name, coefficients.value[name], UNITS[name], f"identified{std}{after}"))
+    return (*found, Number("g", coefficients.model.gravity, "m/s^2", "given"))
 
 
 def _chosen(links: tuple[Link, Link], coefficients: Coefficients, knowns: Knowns, result: Result) -> tuple[Number, ...]:

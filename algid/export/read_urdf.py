@@ -141,7 +141,16 @@ class _Robot:
         ]  # fmt: skip
 
     def _body(self, link: str) -> _Body:
-        body = _body_of(self._links[link])
+        """A link with all that is fixed to it, in its frame."""
+        body = _NOTHING
+        inertial = self._links[link].find("inertial")
+        if inertial is not None:
+            mass = float(inertial.find("mass").attrib["value"])  # type: ignore[union-attr]
+            told = inertial.find("inertia").attrib  # type: ignore[union-attr]
+            xx, yy, zz, xy, xz, yz = (float(told[name]) for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
+            inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+            body = _Body(mass, np.zeros(3), second).moved(*_origin(inertial))
         for joint in self._fixed(link):
             body = body + self._body(self._child(joint)).moved(*_origin(joint))
         return body
@@ -174,18 +183,6 @@ class _Robot:
         along = float(line @ centre)
         second = float(np.trace(body.second) - about @ body.second @ about)  # about the joint
         return length, (body.mass, along, second - body.mass * along**2)
-
-
-def _body_of(link: ET.Element) -> _Body:
-    inertial = link.find("inertial")
-    if inertial is None:
-        return _NOTHING
-    mass = float(inertial.find("mass").attrib["value"])  # type: ignore[union-attr]
-    told = inertial.find("inertia").attrib  # type: ignore[union-attr]
-    xx, yy, zz, xy, xz, yz = (float(told[name]) for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
-    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-    return _Body(mass, np.zeros(3), second).moved(*_origin(inertial))
 
 
 def _origin(element: ET.Element) -> tuple[FloatArray, FloatArray]:

@@ -82,6 +82,15 @@ class _TorqueTable(_Table):
     joint1: _JointTorque
     joint2: _JointTorque
 
+    def multi_sine(self) -> MultiSine:
+        """The torque of both joints."""
+        joints = (self.joint1, self.joint2)
+        return MultiSine(
+            amplitude=tuple(tuple(joint.amplitude) for joint in joints),
+            frequency=tuple(tuple(joint.frequency) for joint in joints),
+            phase=tuple(tuple(joint.phase) for joint in joints),
+        )
+
 
 class _CaseFile(_Table):
     arm: _ArmTable
@@ -123,15 +132,6 @@ def _read_case(path: Path) -> Case:
         name=path.stem,
         arm=content.arm.arm(),
         payload=content.payload.m_p,
-        torque=None if content.torque is None else _multi_sine(content.torque),
+        torque=None if content.torque is None else content.torque.multi_sine(),
         paper_error_percent=dict(content.paper_error_percent),
-    )
-
-
-def _multi_sine(table: _TorqueTable) -> MultiSine:
-    joints = (table.joint1, table.joint2)
-    return MultiSine(
-        amplitude=tuple(tuple(joint.amplitude) for joint in joints),
-        frequency=tuple(tuple(joint.frequency) for joint in joints),
-        phase=tuple(tuple(joint.phase) for joint in joints),
     )

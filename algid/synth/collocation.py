@@ -62,13 +62,6 @@ def _integrals(x: FloatArray) -> FloatArray:
 _TO_NODES = _integrals(_X) @ _COEFFICIENTS
 
 
-def _from_start(half: FloatArray) -> FloatArray:
-    """Q (Ps, Ps) for pieces of half lengths `half` (P,), s."""
-    earlier = np.tri(half.size, k=-1)[:, None, :, None] * _WEIGHTS
-    own = np.eye(half.size)[:, None, :, None] * _TO_NODES[None, :, None, :]
-    return ((earlier + own) * half[:, None]).reshape(2 * (half.size * NODES,))
-
-
 @dataclass(frozen=True)
 class Window:
     """The polynomials that the iteration of a window found: rates (2n, P, s) of the state (2n,) at `edges` (P + 1,)."""
@@ -140,7 +133,11 @@ def integrate(
     longest, done, now = LONGEST, 1, float(t[0])
     while done < t.size:
         with np.errstate(over="ignore", invalid="ignore"):  # a window that is too long may leave all bounds
-            window, turns = _solved(accelerate_at, state, _edges(now, breaks, longest))
+            # the breaks ahead within its length, at most so many, or its own end before the first
+            ahead = breaks[np.searchsorted(breaks, now, side="right") :][:MOST_PIECES]
+            within = ahead[ahead <= now + longest]
+            edges = np.concatenate([[now], within if within.size else [now + longest]])
+            window, turns = _solved(accelerate_at, state, edges)
         if window is None:
             longest *= 0.5
             if longest < SHORTEST:
@@ -156,14 +153,6 @@ def integrate(
     return states
 
 
-def _edges(now: float, breaks: FloatArray, longest: float) -> FloatArray:
-    """The next window's edges: the breaks within its length, at most so many, or its own end before the first."""
-    first = int(np.searchsorted(breaks, now, side="right"))
-    ahead = breaks[first : first + MOST_PIECES]
-    within = ahead[ahead <= now + longest]
-    return np.concatenate([[now], within if within.size else [now + longest]])
-
-
 def _solved(
     accelerate_at: Callable[[FloatArray], Acceleration], state: FloatArray, edges: FloatArray
 ) -> tuple[Window | None, int]:
@@ -171,7 +160,10 @@ def _solved(
     n = state.size // 2
     half = 0.5 * np.diff(edges)
     times = (edges[:-1] + half)[:, None] + half[:, None] * _X
-    accelerate, Q = accelerate_at(times.ravel()), _from_start(half)
+    accelerate = accelerate_at(times.ravel())
+    earlier = np.tri(half.size, k=-1)[:, None, :, None] * _WEIGHTS
+    own = np.eye(half.size)[:, None, :, None] * _TO_NODES[None, :, None, :]
+    Q = ((earlier + own) * half[:, None]).reshape(2 * (times.size,))
     by_theta, by_omega = _slopes(accelerate_at, float(edges[0]), state)
     newton = np.linalg.inv(np.eye(n * times.size) - np.kron(by_omega, Q) - np.kron(by_theta, Q @ Q))
     omega = np.broadcast_to(state[n:, None], (n, times.size))

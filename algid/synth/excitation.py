@@ -29,12 +29,7 @@ class MultiSine:
     def __call__(self, t: FloatArray) -> FloatArray:
         """Torque (2, M) in N m at the times `t` (M,) in s."""
         joints = zip(self.amplitude, self.frequency, self.phase, strict=True)
-        return np.stack([_sines(t, np.array(a), np.array(f), np.array(p)) for a, f, p in joints])
-
-
-def _sines(t: FloatArray, amplitude: FloatArray, frequency: FloatArray, phase: FloatArray) -> FloatArray:
-    waves: FloatArray = np.sin(2 * np.pi * np.multiply.outer(t, frequency) + phase) @ amplitude
-    return waves
+        return np.stack([np.sin(2 * np.pi * np.multiply.outer(t, f) + np.array(p)) @ np.array(a) for a, f, p in joints])
 
 
 def wide_multi_sine(arm: Arm, seed: int = 0) -> MultiSine:

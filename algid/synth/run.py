@@ -57,24 +57,30 @@ def held(torque: Torque, rate: float, duration: float, hold: Hold) -> SampledTor
 
 def synthesise(case: Case, torque: Torque, recording: Recording, told: Told | None = None) -> tuple[Log, Log]:
     """The unloaded and the loaded log of a case; the loaded one has noise of its own. `told` hears how far each is."""
-    unloaded = _one(case, torque, recording, 0.0, told)
-    other = replace(recording.sensors, seed=recording.sensors.seed + 1)
-    return unloaded, _one(case, torque, replace(recording, sensors=other), case.payload, told)
+    initial = np.array(recording.initial)
+    logs: list[Log] = []
+    for payload in (0.0, case.payload):
+        role = "loaded" if payload else "unloaded"
+        sensors = replace(recording.sensors, seed=recording.sensors.seed + len(logs))
+        k = with_payload(case.arm.constants(), case.arm.payload_constants(payload))
+        t = sample_times(recording.rate, recording.duration, sensors)
+        motion = simulate(k, torque, t, initial[:2], initial[2:], _counted(told, role, recording))
+        logs.append(record(motion, sensors, Truth(case.arm, payload, case.name), f"{case.name}-{role}"))
+    return logs[0], logs[1]
 
 
 def rehearse(case: Case, plan: Reference, recording: Recording, told: Told | None = None) -> list[Log]:
     """The unloaded and, with a payload, the loaded log of a case whose controller follows a plan from its start."""
-    return [_followed(case, plan, recording, payload, told) for payload in dict.fromkeys((0.0, case.payload))]
-
-
-def _followed(case: Case, plan: Reference, recording: Recording, payload: float, told: Told | None) -> Log:
+    logs: list[Log] = []
     bare = case.arm.constants()
-    k = with_payload(bare, case.arm.payload_constants(payload))
-    role = "loaded" if payload else "unloaded"
-    sensors = replace(recording.sensors, seed=recording.sensors.seed + bool(payload))
-    t = sample_times(recording.rate, recording.duration, sensors)
-    motion = follow(k, plan, t, bare, bool(payload), _counted(told, role, recording))
-    return record(motion, sensors, Truth(case.arm, payload, case.name), f"{case.name}-{role}")
+    for payload in dict.fromkeys((0.0, case.payload)):
+        role = "loaded" if payload else "unloaded"
+        k = with_payload(bare, case.arm.payload_constants(payload))
+        sensors = replace(recording.sensors, seed=recording.sensors.seed + bool(payload))
+        t = sample_times(recording.rate, recording.duration, sensors)
+        motion = follow(k, plan, t, bare, bool(payload), _counted(told, role, recording))
+        logs.append(record(motion, sensors, Truth(case.arm, payload, case.name), f"{case.name}-{role}"))
+    return logs
 
 
 def with_schedule(
@@ -118,16 +124,6 @@ def with_schedule(
     )
     truth = Truth(case.arm, 0.0, case.name, tuple((float(time), float(mass)) for time, mass in schedule))
     return record(whole, recording.sensors, truth, f"{case.name}-schedule")
-
-
-def _one(case: Case, torque: Torque, recording: Recording, payload: float, told: Told | None) -> Log:
-    k = with_payload(case.arm.constants(), case.arm.payload_constants(payload))
-    t = sample_times(recording.rate, recording.duration, recording.sensors)
-    initial = np.array(recording.initial)
-    role = "loaded" if payload else "unloaded"
-    motion = simulate(k, torque, t, initial[:2], initial[2:], _counted(told, role, recording))
-    truth = Truth(arm=case.arm, payload=payload, case=case.name)
-    return record(motion, recording.sensors, truth, f"{case.name}-{role}")
 
 
 def _counted(told: Told | None, stage: str, recording: Recording) -> Callable[[float], None] | None:

@@ -12,12 +12,12 @@ import pytest
 from typer.testing import CliRunner
 
 from algid.arm import FloatArray, inverse_dynamics
+from algid.design.belief import asked_for
 from algid.design.campaign import Campaign, Design, plan
-from algid.design.criterion import asked_for
 from algid.design.information import Experiment, Information
+from algid.design.limits import resting
 from algid.design.optimise import kept
 from algid.design.position import PositionProblem
-from algid.design.posture import resting
 from algid.design.prior import KnownBefore, prior_of
 from algid.design.request import limits_of, request
 from algid.errors import AlgidError, SettingError

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from algid.arm import FloatArray, inverse_dynamics
-from algid.design.belief import Belief
-from algid.design.criterion import Asked
-from algid.design.fourier import Fourier
+from algid.design.belief import Asked, Belief
 from algid.design.information import Experiment, Information, Slopes
 from algid.design.limits import Limits, usage
-from algid.design.position import middles
+from algid.design.position import Fourier, middles
 from algid.design.prior import KnownBefore, prior_of
 from algid.estimators.whitening import NoiseLevels
 from algid.model import Motion
@@ -154,3 +154,12 @@ def test_a_motion_is_at_rest_at_both_ends_and_its_derivatives_are_its_own(durati
     scale = np.abs(here.alpha).max()
     np.testing.assert_allclose((ahead.theta - behind.theta) / (2 * h), here.omega, atol=1e-6 * scale)
     np.testing.assert_allclose((ahead.omega - behind.omega) / (2 * h), here.alpha, atol=1e-5 * scale)
+
+
+@pytest.mark.parametrize("box", [True, False])
+def test_an_arm_that_asks_for_no_torque_has_no_largest_torque_and_no_slope(box: bool) -> None:
+    belief = replace(belief_of("case1"), box=box)
+    torque, more, slope = belief.load(False).largest(np.zeros((2, 7, 3)))  # at rest in a horizontal plane
+    np.testing.assert_array_equal(torque, 0.0)
+    assert np.all(more < 1e-90)
+    np.testing.assert_array_equal(slope, 0.0)

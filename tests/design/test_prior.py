@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import algid
-from algid.design.belief import SURE
-from algid.design.criterion import asked_for
+from algid.design.belief import SURE, asked_for
 from algid.design.prior import KnownBefore, prior_of
 from algid.errors import ResultError, SettingError
 from algid.results import Result, Status, write_result

@@ -13,8 +13,7 @@ from typer.testing import CliRunner
 
 from algid.arm import Arm
 from algid.errors import AlgidError, ResultError, SettingError
-from algid.export.coefficients import coefficients_of
-from algid.export.description import describe
+from algid.export.description import coefficients_of, describe
 from algid.export.formats import FORMATS, exported
 from algid.export.links import Knowns, Link, links_of
 from algid.model import Model
@@ -232,3 +231,11 @@ def test_the_command_warns_refuses_and_never_overwrites(tmp_path: Path, monkeypa
         f"{tmp_path / 'arm.json'}: the result has no k1; identify it from logs that tell it",
         {"arm.urdf"},
     )
+
+
+@pytest.mark.parametrize("to", ["c", "python"])
+def test_words_of_the_templates_stay_as_they_are_in_a_files_name(to: str) -> None:
+    for name in ("ROTOR.algid", "ANGLE1.algid", "$SIGNS.algid", "${M11}.algid", "K3ROTOR"):
+        text = exported(result_of(values_of(ODD, j2=0.004), Model(("rotor",))), name, to, Knowns())[0]
+        assert f"Two-link arm by algid export, from {name}, estimator refined.\n" in text
+        assert "$" not in text.replace(name, "")
