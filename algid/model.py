@@ -72,7 +72,7 @@ UNITS = {
     "l2": "m",
 }
 _WITH_GRAVITY = ("k2", "k4", "zero1")
-_RIGID = ("k1", "k2", "k3", "k4", "k5")
+RIGID = ("k1", "k2", "k3", "k4", "k5")
 _SIGN_TRIALS = 4  # as many patterns as the signs of two loads have
 
 
@@ -256,7 +256,7 @@ def sensitivity(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
                 J[:, place[f"zero{joint + 1}"]] = slope[:, joint]
     if "load" in model.terms:
         turned = motion.turned(_zeros(value))
-        rigid = [place[name] for name in _RIGID if name in place]
+        rigid = [place[name] for name in RIGID if name in place]
         e = np.array([value["e1"], value["e2"]])
         # The gain scales joint 2's load, which leaves its sign.
         share = e[:, None] * _sign(model, turned.omega) * np.sign(_load(model, J, value))
@@ -288,7 +288,7 @@ def partials(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
 
 def _rigid_partials(value: dict[str, float], motion: Motion) -> FloatArray:
     """`partials` of inertia, Coriolis and gravity."""
-    k1, k2, k3, k4, k5 = (value[name] for name in _RIGID)
+    k1, k2, k3, k4, k5 = (value[name] for name in RIGID)
     s1, _, s2, c2, s12, _ = motion.trigonometry
     omega1, omega2 = motion.omega
     alpha1, alpha2 = motion.alpha
@@ -334,7 +334,7 @@ def _sign(model: Model, omega: FloatArray) -> FloatArray:
 
 def _load(model: Model, Y: FloatArray, value: dict[str, float]) -> FloatArray:
     """L (2, N), from the columns of eq. (1) in Y."""
-    rigid = [place for place, name in enumerate(model.names) if name in _RIGID]
+    rigid = [place for place, name in enumerate(model.names) if name in RIGID]
     k = np.array([value[model.names[place]] for place in rigid])
     return np.einsum("aqn,q->an", Y[:, rigid], k)
 
@@ -353,7 +353,7 @@ def acceleration(model: Model, c: FloatArray, theta: FloatArray, omega: FloatArr
     The signs of L are those of the torque left for it, and found again until they are their own.
     """
     value = model.values(c)
-    k = np.array([value[name] for name in _RIGID] + [0.0, 0.0])
+    k = np.array([value[name] for name in RIGID] + [0.0, 0.0])
     turned = theta + _zeros(value)[:, None]
     left = np.array(tau, dtype=np.float64)
     left[1] /= 1 + value["gain2"]

@@ -23,6 +23,7 @@ from algid.estimators.combine import LogInformation, Prior, combine, likelihood,
 from algid.estimators.fit import Fit, Status
 from algid.estimators.identifiability import sizes
 from algid.estimators.parametrisation import Shared
+from algid.estimators.weak import Normal
 from algid.model import TERMS
 
 _NOT_NEGATIVE = ("k6", "k7", "f1", "f2", "j2", "m_p", "l1", "l2")
@@ -170,6 +171,59 @@ def _named(bounds: Sequence[BrokenBound]) -> str:
 
 def _noted(fit: Fit, note: str) -> str:
     return note if fit.note is None else f"{fit.note}; {note}"
+
+
+_UNLIKE = 0.5  # of the larger of two values: more than any error of a model that is of use
+
+
+@dataclass(frozen=True)
+class JointsApart:
+    """A constant that the equation of joint 1 and that of joint 2, each by itself, tell differently, in its unit."""
+
+    name: str
+    first: float
+    second: float
+
+
+def joints_apart(normals: Sequence[Normal], names: Sequence[str]) -> JointsApart | None:
+    """Whether the equations of the two joints contradict each other about k1, k2 or k3, which stand in both.
+
+    Parameters
+    ----------
+    normals : normal equations of logs of one kind
+    names : names of their columns, the torque's aside
+
+    Returns
+    -------
+    JointsApart or None
+        The constant whose difference has the most standard deviations, `FAR_BEYOND` at least, among those that differ
+        by more than half of the larger value.
+
+    Notes
+    -----
+    Where one joint is hardly driven, what moves it is friction and play that the model lacks, and its equation is
+    solved by constants near nothing. Its residual is small then, so that it outweighs the joint that is driven. The
+    standard deviations are those of the sandwich, as for a fit.
+    """
+    both = [place for place, name in enumerate(names) if name in ("k1", "k2", "k3")]
+    found = []
+    for joint in range(2):
+        grams = [normal.gram[:, joint] for normal in normals]
+        total = np.sum([gram.sum(axis=0) for gram in grams], axis=0)
+        inverse = scaled_pinv(total[:-1, :-1])
+        v = np.append(-inverse @ total[:-1, -1], 1.0)
+        meats = [long_run_variance((gram @ v)[:, :-1]) for gram in grams]
+        stretches = sum(len(gram) // (lags + 1) for gram, (_, lags) in zip(grams, meats, strict=True))
+        freedom = max(2, stretches - int(np.count_nonzero(np.diag(total)[:-1])))
+        variance = np.diag(inverse @ np.sum([meat for meat, _ in meats], axis=0) @ inverse)
+        found.append((-v[both], variance[both] * max(1.0, stretches / freedom)))
+    (first, of_first), (second, of_second) = found
+    distance = np.abs(first - second) / np.sqrt(of_first + of_second + 1e-300)
+    unlike = np.abs(first - second) > _UNLIKE * np.maximum(np.abs(first), np.abs(second))
+    worst = int(np.argmax(np.where(unlike, distance, 0.0)))
+    if not unlike[worst] or distance[worst] < FAR_BEYOND:
+        return None
+    return JointsApart(names[both[worst]], float(first[worst]), float(second[worst]))
 
 
 _OPTIONAL = {**{term: content.names for term, content in TERMS.items()}, "delay": ("delay",)}

@@ -26,7 +26,7 @@ from algid.estimators.innovations import NORMAL, ResidualSums
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
 
-Status = Literal["OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED"]
+Status = Literal["OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED", "WEAK_EXCITATION"]
 Estimator = Literal["weak", "instruments", "refined"]
 Intervals = Literal["likelihood", "sandwich", "jackknife"]
 
@@ -48,7 +48,7 @@ class Fit:
         four logs or more, in which what differs from run to run is.
     quantile : float
         Half width of a 95 % interval in standard deviations, normal or Student's.
-    status : Q of "OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED"
+    status : Q of "OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED", "WEAK_EXCITATION"
     unidentifiable : sentences that name what the logs leave open
     logs : each log's quadratic likelihood, unloaded ones first
     noise : each log's noise levels; None for the weak estimator

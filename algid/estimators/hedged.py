@@ -16,9 +16,12 @@ import numpy as np
 
 from algid.estimators import weak
 from algid.estimators.combine import FEWEST_LOGS, Prior
-from algid.estimators.fit import Fit, widened
+from algid.estimators.diagnostics import joints_apart
+from algid.estimators.fit import Fit, Status, widened
+from algid.estimators.identifiability import STILL
 from algid.estimators.selection import FIRST_TERMS
 from algid.estimators.weak import Source, WeakSettings
+from algid.model import RIGID, UNITS
 
 
 def hedged(
@@ -30,6 +33,8 @@ def hedged(
     prior: Prior | None = None,
 ) -> Fit:
     """The fit with no error bar narrower than that of the model with a delay and `FIRST_TERMS` too.
+
+    Where a joint stood still, or the joints' equations contradict each other, k1 … k5 have status WEAK_EXCITATION.
 
     Parameters
     ----------
@@ -52,9 +57,37 @@ def hedged(
     told = {name: std for name, std, status in stds if status == "OK"}
     least = np.array([told.get(name, 0.0) for name in fit.names])
     covariance = widened(fit.covariance, np.diag(least**2))
-    if not fit.note or np.array_equal(covariance, fit.covariance):
-        return replace(fit, covariance=covariance)
-    added = [term for term in terms if term not in settings.model.terms]
-    if delayed and not settings.estimate_delay:
-        added.append("delay")
-    return replace(fit, covariance=covariance, note=f"{fit.note}, with error bars as if it had {', '.join(added)} too")
+    note = fit.note
+    if note and not np.array_equal(covariance, fit.covariance):
+        added = [term for term in terms if term not in settings.model.terms]
+        if delayed and not settings.estimate_delay:
+            added.append("delay")
+        note = f"{note}, with error bars as if it had {', '.join(added)} too"
+    doubt = _doubt(fit, unloaded, loaded, settings)
+    if doubt is None:
+        return replace(fit, covariance=covariance, note=note)
+    status: tuple[Status, ...] = tuple(
+        "WEAK_EXCITATION" if word == "OK" and name in RIGID else word
+        for name, word in zip(fit.names, fit.status, strict=True)
+    )
+    return replace(fit, covariance=covariance, status=status, note=f"{note}; {doubt}" if note else doubt)
+
+
+def _doubt(fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings) -> str | None:
+    """Why no error bar stands for k1 … k5: a joint that stood still, or whose torque contradicts the other's."""
+    still = [f"joint {joint + 1}" for joint in range(2) if fit.moved[joint] < STILL]
+    if still:
+        return f"{' and '.join(still)} never moved: give a log in which both joints do"
+    names, value = settings.model.names, dict(zip(fit.names, fit.values.tolist(), strict=True))
+    settings = replace(settings, estimate_delay=False, delay=value.get("delay", settings.delay))
+    for sources, kind in ((unloaded, False), (loaded, True)):
+        if not sources:
+            continue
+        at = None if settings.model.linear else fit.shared.coefficients(fit.values, kind)[: len(names)]
+        every = [weak.normal_equations(source, settings, at) for source in sources]
+        normals = [normal for normal in every if normal is not None]
+        apart = joints_apart(normals, names) if normals else None
+        if apart is not None:
+            told = f"joint 1 by itself tells {apart.name} as {apart.first:.2g} {UNITS[apart.name]} and joint 2 as"
+            return f"{told} {apart.second:.2g}: one of them is hardly driven, give a log in which both are"
+    return None

@@ -25,7 +25,7 @@ from algid.arm import FloatArray
 from algid.estimators.combine import long_run_variance, scaled_pinv
 from algid.estimators.modulating_functions import OVERLAP, row_weights
 from algid.estimators.weak import Normal, Source, WeakSettings, normal_equations
-from algid.model import TERMS
+from algid.model import RIGID, TERMS
 from algid.signals.segments import Segment, pieces, spread_pieces
 
 IntArray = NDArray[np.int64]
@@ -36,7 +36,6 @@ _PIECE_SAMPLES = 16384
 _FOLDS = 5  # blocks of a log, where there are too few logs to leave whole ones out
 _FEWEST_LOGS = 3
 _REWEIGHTINGS = 4
-_RIGID = ("k1", "k2", "k3", "k4", "k5")
 
 
 def term_names(term: str) -> tuple[str, ...]:
@@ -85,7 +84,7 @@ class Grams:
     def __init__(self, logs: Sequence[Training], settings: WeakSettings, at: Mapping[bool, Coefficients]) -> None:
         self.settings = settings = replace(settings, estimate_delay=True)
         self.names = (*settings.model.names, "delay")
-        self._rigid = [place for place, name in enumerate(self.names) if name in _RIGID]
+        self._rigid = [place for place, name in enumerate(self.names) if name in RIGID]
         normals = []
         for log in logs:
             here = np.array([at[log.loaded].get(name, 0.0) for name in settings.model.names])
