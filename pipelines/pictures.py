@@ -19,8 +19,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.text import Text
 
-from algid.report.page import write_report
-from algid.report.terminal import print_table
+from algid.report.page import result_document, write_report
+from algid.report.terminal import print_document
 from algid.results import Result, read_result
 
 SCREEN = "1280,1945"  # down to the end of the torques
@@ -51,7 +51,7 @@ def terminal_svg(result: Result, folder: Path) -> str:
     """What `algid report` prints, as SVG without the web font that rich asks for."""
     console = Console(record=True, width=112, file=io.StringIO(), force_terminal=True, color_system="truecolor")
     console.print(Text(f"$ algid report {folder.name}\n"))
-    print_table(result, console)
+    print_document(result_document(result), console)
     svg = console.export_svg(title="algid", unique_id="algid")
     return re.sub(r"@font-face\s*{[^}]*}", "", svg)
 

@@ -11,7 +11,7 @@ from algid.cli.report import ResultFormat
 from algid.errors import SettingError
 
 if TYPE_CHECKING:
-    from algid.report.table import Table
+    from algid.report.document import Table
 
 
 def compare(
@@ -58,9 +58,9 @@ def labels(paths: list[Path]) -> list[str]:
 def _print(tables: tuple[Table, ...]) -> None:
     from rich.console import Console
 
-    from algid.report.terminal import print_one
+    from algid.report.terminal import print_table
 
     console = Console()
     for table in tables:
-        print_one(table, console)
+        print_table(table, console)
         console.print()

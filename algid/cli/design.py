@@ -219,7 +219,7 @@ def _print(planned: Design, origin: object, form: Shown) -> None:
 
     from algid.design.tables import bound_table, limit_table, sentence
     from algid.design.write import Provenance, design_json
-    from algid.report.terminal import print_one
+    from algid.report.terminal import print_table
 
     assert isinstance(origin, Provenance)
     if form is Shown.JSON:
@@ -229,4 +229,4 @@ def _print(planned: Design, origin: object, form: Shown) -> None:
     print(sentence(planned))
     for table in (bound_table(planned), limit_table(planned)):
         console.print()
-        print_one(table, console)
+        print_table(table, console)

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from algid.cli.report import ResultFormat
-
-if TYPE_CHECKING:
-    from algid.fleet.history import History
+from algid.cli.report import ResultFormat, print_report
 
 
 def fleet(
@@ -27,26 +24,12 @@ def fleet(
     Example: algid fleet results
     """
     from algid.fleet.history import history_of, write_history
+    from algid.fleet.page import fleet_document
     from algid.report.progress import progress
 
     with progress("parameters") as followed:
         history = history_of(batch / "jobs.parquet", followed)
         written = write_history(history, batch if out is None else out, batch)
-    _print(history, form)
+    print_report(fleet_document(history), lambda: json.dumps(history.as_dict(), indent=2, allow_nan=False) + "\n", form)
     for path in written:
         typer.echo(f"wrote {path}", err=True)
-
-
-def _print(history: History, form: ResultFormat) -> None:
-    from rich.console import Console
-
-    from algid.fleet.page import fleet_document
-    from algid.report.markdown import document_markdown
-    from algid.report.terminal import print_document
-
-    if form is ResultFormat.JSON:
-        typer.echo(json.dumps(history.as_dict(), indent=2, allow_nan=False))
-    elif form is ResultFormat.MARKDOWN:
-        typer.echo(document_markdown(fleet_document(history)), nl=False)
-    else:
-        print_document(fleet_document(history), Console(highlight=False))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from algid.report.document import Document
     from algid.report.figures.base import Figure, Missing
     from algid.results import Result
     from algid.track.result import TrackResult
@@ -86,8 +87,7 @@ def _identification(folder: Path, form: ResultFormat, shared_library: bool, *, m
     """Write a result's pages and print it."""
     from algid.report.export import export_mcap
     from algid.report.gallery import gallery
-    from algid.report.markdown import write_markdown
-    from algid.report.page import write_report
+    from algid.report.page import write_markdown, write_report
     from algid.report.progress import progress
     from algid.results import read_result
 
@@ -114,28 +114,28 @@ def _track(folder: Path, form: ResultFormat, *, mcap: bool) -> Written:
 
 def print_track(result: TrackResult, form: ResultFormat) -> None:
     """Print a track to stdout."""
-    from algid.track.page import markdown, track_document
+    from algid.track.page import track_document
     from algid.track.result import track_json
 
-    if form is not ResultFormat.TABLE:
-        typer.echo(track_json(result) if form is ResultFormat.JSON else markdown(result), nl=False)
-        return
-    from rich.console import Console
-
-    from algid.report.terminal import print_document
-
-    print_document(track_document(result), Console())
+    print_report(track_document(result), lambda: track_json(result), form)
 
 
 def print_result(result: Result, form: ResultFormat) -> None:
-    """Print a result to stdout: nothing but the result, so that it can be piped."""
+    """Print a result to stdout."""
+    from algid.report.page import result_document
+    from algid.results import result_json
+
+    print_report(result_document(result), lambda: result_json(result), form)
+
+
+def print_report(document: Document, json: Callable[[], str], form: ResultFormat) -> None:
+    """Print `document`, or what `json` gives, to stdout: nothing but it, so that it can be piped."""
     from rich.console import Console
 
     from algid.report.markdown import markdown
-    from algid.report.terminal import print_table
-    from algid.results import result_json
+    from algid.report.terminal import print_document
 
     if form is ResultFormat.TABLE:
-        print_table(result, Console())
+        print_document(document, Console())
     else:
-        typer.echo(markdown(result) if form is ResultFormat.MARKDOWN else result_json(result), nl=False)
+        typer.echo(json() if form is ResultFormat.JSON else markdown(document), nl=False)

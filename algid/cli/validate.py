@@ -17,7 +17,7 @@ from algid.words import counted
 if TYPE_CHECKING:
     from algid.estimators.rollout import RolloutScore
     from algid.identification.validate import Simulation
-    from algid.report.table import Table
+    from algid.report.document import Table
     from algid.results import TorquePrediction
 
 
@@ -93,7 +93,7 @@ def validate(
 
 
 def _table(found: Mapping[str, TorquePrediction | None]) -> Table:
-    from algid.report.table import Column, Table
+    from algid.report.document import Column, Table
     from algid.report.text import ABSENT, significant, visible
 
     headings = ("Log", "Joint", "RMSE, N m", "RMSE / RMS", "R²")
@@ -146,7 +146,7 @@ def _number(value: float | None) -> str:
 
 
 def _simulated_table(simulation: Simulation) -> Table:
-    from algid.report.table import Column, Table
+    from algid.report.document import Column, Table
     from algid.report.text import visible
 
     headings = ("Log", "Horizon, s", "States", "Joint", "RMSE, rad", "Moved, rad")

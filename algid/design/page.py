@@ -10,56 +10,48 @@ from algid import __version__
 from algid.design.campaign import Design
 from algid.design.figures import figures
 from algid.design.tables import bound_table, limit_table, sentence
-from algid.report.arm import ArmDrawing, arm_html, arm_script
-from algid.report.frame import bullets, figures_html, framed, links_of, section
-from algid.report.html import table_html
+from algid.report.arm import ArmDrawing
+from algid.report.document import Bullets, Document, Section
+from algid.report.frame import page
 from algid.report.text import file_name, significant
-from algid.report.verdict import Level, Verdict
+from algid.report.verdict import Verdict
 
 _READING = "Play the motion: is the space around the arm free? The grey line is the tip's path, the red one its limit."
 
 
 def page_html(design: Design, source: str, warnings: Sequence[str]) -> str:
     """The page's text."""
-    drawn = figures(design)
-    campaign = design.campaign
-    facts = (
-        f"{significant(campaign.duration, 4)} s under {campaign.drive} control · logged at "
-        f"{significant(campaign.experiment.rate, 4)} Hz · prior {file_name(source)}"
-    )
-    body = [
-        table_html(bound_table(design)),
-        table_html(limit_table(design)),
-        _arm(design),
-        *figures_html(drawn),
-        *section("warnings", "Warnings", [], bullets(warnings, "") if warnings else ""),
-    ]
-    return framed(
-        "a planned identification",
-        file_name(source),
-        facts,
-        _verdict(design),
-        [("arm", "The arm"), *links_of(drawn)] if body[2] else links_of(drawn),
-        body,
-        drawn,
-        f"Made by algid {__version__}.",
-        tab=f"Design for {file_name(source)}",
-        scripts=[arm_script()],
+    return page(design_document(design, source, warnings))
+
+
+def design_document(design: Design, source: str, warnings: Sequence[str]) -> Document:
+    """The report of a design for the arm that `source` tells of."""
+    campaign, name = design.campaign, file_name(source)
+    told = sentence(design)
+    return Document(
+        title=f"Design for {name}",
+        verdict=Verdict("reservations" if design.open_parameters else "good", told[0].lower() + told[1:].rstrip(".")),
+        sections=(
+            Section((bound_table(design), limit_table(design), *_arm(design), *figures(design))),
+            Section((Bullets(tuple(warnings)),) if warnings else (), "warnings", "Warnings"),
+        ),
+        kicker="a planned identification",
+        name=name,
+        facts=f"{significant(campaign.duration, 4)} s under {campaign.drive} control · logged at "
+        f"{significant(campaign.experiment.rate, 4)} Hz · prior {name}",
+        made=f"Made by algid {__version__}.",
+        tab=f"Design for {name}",
     )
 
 
-def _verdict(design: Design) -> Verdict:
-    level: Level = "reservations" if design.open_parameters else "good"
-    return Verdict(level, sentence(design))
-
-
-def _arm(design: Design) -> str:
+def _arm(design: Design) -> list[ArmDrawing]:
     """The arm's drawing; nothing where its lengths are not known."""
-    limits, experiment = design.campaign.limits, design.campaign.experiment
+    limits = design.campaign.limits
     if not np.all(np.isfinite(limits.lengths)):
-        return ""
+        return []
     l1, l2 = limits.lengths.tolist()
-    value = dict(zip(design.names, design.campaign.belief.mean.tolist(), strict=True))
-    payload = f"payload of {significant(value['m_p'], 3)} kg" if experiment.runs[1] else ""
-    arm = ArmDrawing("arm", l1, l2, design.t, design.motion.theta, payload=payload, height=limits.height)
-    return arm_html(arm, "The arm", _READING)
+    payload = ""
+    if design.campaign.experiment.runs[1]:
+        mass = float(design.campaign.belief.mean[list(design.names).index("m_p")])
+        payload = f"payload of {significant(mass, 3)} kg"
+    return [ArmDrawing(l1, l2, design.t, design.motion.theta, _READING, payload, limits.height)]

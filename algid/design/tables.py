@@ -8,7 +8,7 @@ from algid.design.campaign import Design
 from algid.design.limits import Row
 from algid.design.torque import END
 from algid.model import UNITS
-from algid.report.table import Column, Table
+from algid.report.document import Column, Table
 from algid.report.text import ABSENT, percent, resolved, significant, unit_text
 
 BINDS = 0.98  # of what the margin leaves: a limit that is used as far is what keeps the error bars from being less

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
@@ -13,24 +14,20 @@ import numpy as np
 from algid import __version__
 from algid.fleet.history import ALPHA, SPAN, History
 from algid.model import UNITS
-from algid.report.document import Document
+from algid.report.document import Column, Depth, Document, Drawn, ReadingAid, References, Section, Table, filled
+from algid.report.drawings import Course, sparklines
 from algid.report.figures.base import Figure, Panel, axis, label
-from algid.report.frame import figures_html, framed, links_of
-from algid.report.html import Drawn, escaped, table_html
-from algid.report.sparkline import Course, sparklines
-from algid.report.table import Column, Table
+from algid.report.frame import page
 from algid.report.text import ABSENT, joined, significant, unit_text, visible
-from algid.report.verdict import LEVEL_WORDS, Level, Verdict
+from algid.report.verdict import Level, Verdict
 from algid.words import counted
 
 if TYPE_CHECKING:
     import polars as pl
 
-MADE = f"Made by algid {__version__}."
 READING = (
-    '<p class="reading">Read: each parameter has one scale of change for all robots; the band is the 95 % interval of '
-    f"the mean over {SPAN} months. Level within its band is steady, orange drifts. A robot's name leads to its latest "
-    "report.</p>"
+    "Read: each parameter has one scale of change for all robots; the band is the 95 % interval of the mean over "
+    f"{SPAN} months. Level within its band is steady, orange drifts. A robot's name leads to its latest report."
 )
 MOST_ROBOTS = 40  # whose table is printed
 MOST_ROWS = 200
@@ -39,21 +36,40 @@ MOST_PANELS = 12
 
 def fleet_html(history: History, reports: Mapping[str, str] | None = None) -> str:
     """The page's text; `reports` says where the report of each job is."""
-    reports = reports or {}
-    figures = _figures(history)
-    facts = f"{counted(history.robots, 'robot')} · {counted(history.logs, 'log')}"
-    latest = {visible(robot): reports[job] for robot, job in _latest(history) if job in reports}
-    jobs = {visible(job): place for job, place in reports.items()}
-    body = [
-        table_html(robot_table(history), _courses(history), latest),
-        READING,
-        *(table_html(table, (), latest) for table in [drift_table(history)] if table.rows),
-        *(table_html(table, (), jobs) for table in [finding_table(history)] if table.rows),
-        *figures_html(figures),
-        *_reports(history, reports),
-    ]
-    links = [*links_of(figures), *([("reports", "Reports")] if reports else [])]
-    return framed("a fleet's history", "Fleet", facts, verdict(history), links, body, figures, MADE)
+    return page(fleet_document(history, reports or {}))
+
+
+def fleet_document(history: History, reports: Mapping[str, str] | None = None) -> Document:
+    """The report of a fleet; `reports`, which only a page has, say where the report of each job is.
+
+    A long list of robots is left to the page.
+    """
+    robots = robot_table(history).at(Depth.TERMINAL if history.robots <= MOST_ROBOTS else Depth.PAGE)
+    drifts, findings = drift_table(history), finding_table(history)
+    figures: list[Figure] = []
+    groups: dict[str, list[tuple[str, str]]] = {}
+    if reports is not None:
+        ends = history.roster.select("robot", "latest").iter_rows()
+        latest = {visible(robot): reports[job] for robot, job in ends if job in reports}
+        robots = replace(robots, drawn=tuple(_courses(history)), links=latest)
+        drifts = replace(drifts, links=latest)
+        findings = replace(findings, links={visible(job): place for job, place in reports.items()})
+        figures = _figures(history)
+        if reports and history.jobs is not None:
+            for (robot,), part in history.jobs.group_by("robot", maintain_order=True):
+                groups[str(robot)] = [(job, reports[job]) for job in part["job"].to_list() if job in reports]
+    return Document(
+        title="Fleet",
+        verdict=verdict(history),
+        sections=(
+            Section((robots, ReadingAid(READING), *filled(drifts, findings), *figures)),
+            Section((References(groups, MOST_ROWS),) if groups else (), "reports", "Reports", fold="closed"),
+        ),
+        kicker="a fleet's history",
+        name="Fleet",
+        facts=f"{counted(history.robots, 'robot')} · {counted(history.logs, 'log')}",
+        made=f"Made by algid {__version__}.",
+    )
 
 
 def reports_of(history: History, batch: Path, out: Path) -> dict[str, str]:
@@ -67,10 +83,6 @@ def reports_of(history: History, batch: Path, out: Path) -> dict[str, str]:
             there = os.path.relpath(page.resolve(), out.resolve()).replace(os.sep, "/")
             found[job] = "./" + quote(there)  # a name such as javascript: leads nowhere else
     return found
-
-
-def _latest(history: History) -> list[tuple[str, str]]:
-    return list(history.roster.select("robot", "latest").iter_rows())
 
 
 def _courses(history: History) -> list[Drawn]:
@@ -99,54 +111,21 @@ def _course(parameter: str, rows: pl.DataFrame, drifts: bool) -> Course:
     return Course(t, mean, half, f"{parameter} {ends}{', drifts' if drifts else ''}", drifts)
 
 
-def _reports(history: History, reports: Mapping[str, str]) -> list[str]:
-    """Links to every log's report, by robot, the latest first."""
-    if not reports or history.jobs is None:
-        return []
-    lists = [
-        f"<dt>{escaped(robot)}</dt><dd>{_listed(part['job'].to_list(), reports)}</dd>"
-        for (robot,), part in history.jobs.group_by("robot", maintain_order=True)
-    ]
-    return [
-        '<details class="paper" id="reports"><summary>Reports</summary>',
-        f"<dl>{''.join(lists)}</dl></details>",
-    ]
-
-
-def _listed(jobs: list[str], reports: Mapping[str, str]) -> str:
-    known = [job for job in jobs if job in reports]
-    links = [f'<a href="{escaped(reports[job])}">{escaped(job)}</a>' for job in known[:MOST_ROWS]]
-    more = f" and {len(known) - MOST_ROWS:,} more" if len(known) > MOST_ROWS else ""
-    return ", ".join(links) + more or "none"
-
-
 def verdict(history: History) -> Verdict:
     """Whether anything drifts or stands out; what could not be tested is the reason to doubt it."""
-    drifts, findings = history.drifts.height, history.findings.height
-    level: Level = "reservations" if drifts or findings or history.untested else "good"
-    told = f"{counted(history.robots, 'robot')}, {counted(history.logs, 'log')}"
-    found = f"{counted(drifts, 'drift')} and {counted(findings, 'finding')}"
-    return Verdict(level, f"{LEVEL_WORDS[level]}: {told}: {found}{_clearest(history)}.", tuple(history.untested))
-
-
-def _clearest(history: History) -> str:
-    """The clearest trend of all that were tested, whether it drifts or not."""
     import polars as pl
 
+    drifts, findings = history.drifts.height, history.findings.height
+    level: Level = "reservations" if drifts or findings or history.untested else "good"
+    statement = f"{counted(history.robots, 'robot')}, {counted(history.logs, 'log')}: "
+    statement += f"{counted(drifts, 'drift')} and {counted(findings, 'finding')}"
     tested = history.windows.filter(pl.col("p").is_not_nan() & (pl.col("mean") != 0.0))
-    if not tested.height:
-        return ""
-    row = tested.sort("p", "robot", "parameter").row(0, named=True)
-    slope = 100 * row["slope"] / abs(row["mean"])
-    what = f"{row['parameter']} of {visible(row['robot'])}, {slope:+.2g} % a month (p = {significant(row['p'], 2)})"
-    return f"; the clearest trend is {what}" + ("" if row["drift"] else f", which does not pass p < {ALPHA:g}")
-
-
-def fleet_document(history: History) -> Document:
-    """The report of a fleet; a long list of robots of which nothing was found is left to the page."""
-    found = [table for table in (drift_table(history), finding_table(history)) if table.rows]
-    robots = [robot_table(history)] if history.robots <= MOST_ROBOTS else []
-    return Document("Fleet", verdict(history), (*found, *robots))
+    if tested.height:  # the clearest trend of all that were tested, whether it drifts or not
+        row = tested.sort("p", "robot", "parameter").row(0, named=True)
+        slope, p = 100 * row["slope"] / abs(row["mean"]), significant(row["p"], 2)
+        statement += f"; the clearest trend is {row['parameter']} of {visible(row['robot'])}, {slope:+.2g} % a month"
+        statement += f" (p = {p})" + ("" if row["drift"] else f", which does not pass p < {ALPHA:g}")
+    return Verdict(level, statement, tuple(history.untested))
 
 
 def robot_table(history: History) -> Table:

@@ -225,9 +225,9 @@ def _firsts(survey: Survey) -> tuple[LogSource | None, LogSource | None]:
 
 def _write_pages(folder: Path, result: Result, shared_library: bool, told: Told | None) -> None:
     from algid.report.markdown import markdown
-    from algid.report.page import write_report
+    from algid.report.page import result_document, write_report
 
     if told is not None:
         told("report", 0, 0)
-    (folder / "report.md").write_text(markdown(result), encoding="utf-8")
+    (folder / "report.md").write_text(markdown(result_document(result)), encoding="utf-8")
     write_report(folder, shared_library, told)

@@ -6,20 +6,23 @@ plays, the document hears an event ``arm-time`` whose detail is the time in s.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import resources
 
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.report.html import escaped, script_json
-from algid.report.text import significant
+from algid.report.series import TorqueLog
+from algid.report.text import escaped, script_json, significant
+from algid.results import Result
 
 FRAMES = 30.0  # a second
 MOST_FRAMES = 6_000
 MARGIN = 0.12  # of the reach, around the drawing
 DIGITS = 4
+READING = (
+    "Play it: does this arm move as yours did? Hanging must look like hanging, and the links must turn the right way; "
+    "the line in the torques shows the moment."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,60 +31,101 @@ class ArmDrawing:
 
     Parameters
     ----------
-    key : str
-        The drawing's name on the page.
     l1, l2 : float, m
     t : (N,), s, increasing
     theta : (2, N), rad, θ1 from the horizontal, θ2 from link 1
-    centres : two of float or None, m
-        From each joint to its link's centre of mass, where known.
+    reading : str
+        One line that tells what to look at.
     payload : str
         What hangs at the tip, in words; empty where nothing does.
     height : float, m, or None
         Below which the tip may not come.
     """
 
-    key: str
     l1: float
     l2: float
     t: FloatArray
     theta: FloatArray
-    centres: Sequence[float | None] = (None, None)
+    reading: str
     payload: str = ""
     height: float | None = None
+    key = "arm"
+    title = "The arm"
 
 
-def arm_html(arm: ArmDrawing, title: str, reading: str) -> str:
+def arm_of(result: Result, torque: TorqueLog | None) -> ArmDrawing | None:
+    """The arm of a result, to scale as far as its lengths are known, moved through the first log.
+
+    None where l1 follows from nothing, or no motion is at hand.
+    """
+    l1, l2 = (_length(result, name) for name in ("l1", "l2"))
+    l1 = _coupling_length(result) if l1 is None else l1
+    motion = None if torque is None else _motion(torque)
+    if l1 is None or motion is None:
+        return None
+    mass = result.payload["m_p"].estimate if "m_p" in result.payload else None
+    payload = "" if mass is None else f"payload of {significant(mass, 3)} kg"
+    unknown = "" if l2 is not None else " Link 2's length is not known: it is drawn as long as link 1 (give --l2)."
+    reading = f"{READING} l1 is {significant(l1, 3)} m.{unknown}"
+    return ArmDrawing(l1, l1 if l2 is None else l2, *motion, reading, payload)
+
+
+def _length(result: Result, name: str) -> float | None:
+    """A link's length in m: estimated with the payload, or given."""
+    found = result.payload.get(name)
+    value = found.estimate if found is not None else result.settings.get(name)
+    return float(value) if isinstance(value, int | float) and value > 0 else None
+
+
+def _coupling_length(result: Result) -> float | None:
+    """l1 = g k1 / k2 (Table 1), in m; None where gravity does not act or the constants are no arm's."""
+    k1, k2 = (result.parameters[name].estimate if name in result.parameters else None for name in ("k1", "k2"))
+    gravity = result.settings.get("gravity")
+    if not k1 or not k2 or not isinstance(gravity, int | float):
+        return None
+    length = gravity * k1 / k2
+    return length if length > 0 else None
+
+
+def _motion(torque: TorqueLog) -> tuple[FloatArray, FloatArray] | None:
+    """Times (n,) and angles (2, n) of the first log, out of its reduced series."""
+    series = torque.series[min(torque.series)] if torque.series else {}
+    both = [series[name] for name in ("theta1", "theta2") if name in series]
+    kept = [(x[np.isfinite(y)], y[np.isfinite(y)]) for x, y in both]
+    if len(kept) < 2 or any(x.size < 2 for x, _ in kept):
+        return None
+    t = np.union1d(kept[0][0], kept[1][0])
+    return t, np.stack([np.interp(t, x, y) for x, y in kept])
+
+
+def arm_html(arm: ArmDrawing) -> str:
     """The drawing, its player and its frames, as a figure of the page."""
     t, theta = _frames(arm)
-    tip = _tip(arm, theta)
-    reach = arm.l1 + arm.l2
-    left, top, width, height = _frame(arm, theta, tip)
+    elbow = arm.l1 * np.stack([np.cos(theta[0]), np.sin(theta[0])])
+    both = theta[0] + theta[1]
+    tip = elbow + arm.l2 * np.stack([np.cos(both), np.sin(both)])
+    left, top, width, height = _frame(arm, elbow, tip)
     says = f"Arm of {significant(arm.l1, 3)} m and {significant(arm.l2, 3)} m links"
-    frames = {
-        "t": np.round(t, DIGITS).tolist(),
-        "theta1": np.round(theta[0], DIGITS).tolist(),
-        "theta2": np.round(theta[1], DIGITS).tolist(),
-    }
-    name = escaped(arm.key)
+    frames = dict(zip(("t", "theta1", "theta2"), np.round([t, *theta], DIGITS).tolist(), strict=True))
+    levels = [("level", 0.0), *([] if arm.height is None or not np.isfinite(arm.height) else [("limit", -arm.height)])]
+    ground = "".join(
+        f'<line class="{kind}" x1="{left:.5g}" y1="{y:.5g}" x2="{left + width:.5g}" y2="{y:.5g}"/>'
+        for kind, y in levels
+    )
+    path = " ".join(f"{x:.4g},{-y:.4g}" for x, y in tip.T)
     return (
-        f'<figure class="arm" id="{name}-figure" aria-labelledby="{name}"><h2 id="{name}">{escaped(title)}</h2>\n'
+        f'<figure class="arm" id="{arm.key}-figure" aria-labelledby="{arm.key}"><h2 id="{arm.key}">{arm.title}</h2>\n'
         f'<svg viewBox="{left:.5g} {top:.5g} {width:.5g} {height:.5g}" role="img" '
-        f'aria-label="{escaped(says)}">\n'
-        f"{_ground(arm, left, left + width)}{_path(tip)}{_links(arm, theta[:, 0], reach)}</svg>\n"
+        f'aria-label="{escaped(says)}">\n{ground}<polyline class="path" points="{path}"/>\n'
+        f"{_links(arm, *(-np.degrees(theta[:, 0])))}</svg>\n"
         f'<div class="player"><button type="button" aria-pressed="false" data-play>Play</button>'
         f'<input type="range" min="{t[0]:.6g}" max="{t[-1]:.6g}" value="{t[0]:.6g}" step="0.01" '
         f'aria-label="Time, s"><output>{t[0]:.2f} s</output>'
         '<label>speed <select><option value="0.25">¼</option><option value="1" selected>1</option>'
         '<option value="4">4</option></select></label></div>\n'
         f'<script type="application/json">{script_json(frames)}</script>\n'
-        f'<figcaption><p class="reading">{escaped(reading)}</p></figcaption></figure>\n'
+        f'<figcaption><p class="reading">{escaped(arm.reading)}</p></figcaption></figure>\n'
     )
-
-
-def arm_script() -> str:
-    """The player's script; a page takes it once, beside any number of drawings."""
-    return (resources.files("algid.report") / "assets" / "arm.js").read_text(encoding="utf-8")
 
 
 def _frames(arm: ArmDrawing) -> tuple[FloatArray, FloatArray]:
@@ -92,17 +136,10 @@ def _frames(arm: ArmDrawing) -> tuple[FloatArray, FloatArray]:
     return t, np.stack([np.interp(t, arm.t, row) for row in arm.theta])
 
 
-def _tip(arm: ArmDrawing, theta: FloatArray) -> FloatArray:
-    both = theta[0] + theta[1]
-    return np.stack(
-        [arm.l1 * np.cos(theta[0]) + arm.l2 * np.cos(both), arm.l1 * np.sin(theta[0]) + arm.l2 * np.sin(both)]
-    )
-
-
-def _frame(arm: ArmDrawing, theta: FloatArray, tip: FloatArray) -> tuple[float, float, float, float]:
+def _frame(arm: ArmDrawing, elbow: FloatArray, tip: FloatArray) -> tuple[float, float, float, float]:
     """Left, top, width and height that hold the arm all along its motion; at least as wide as the arm is long."""
     reach = arm.l1 + arm.l2
-    points = np.concatenate([np.zeros((2, 1)), arm.l1 * np.stack([np.cos(theta[0]), np.sin(theta[0])]), tip], axis=1)
+    points = np.concatenate([np.zeros((2, 1)), elbow, tip], axis=1)
     if arm.height is not None and np.isfinite(arm.height):
         points = np.concatenate([points, [[0.0], [arm.height]]], axis=1)
     low, high = points.min(axis=1) - MARGIN * reach, points.max(axis=1) + MARGIN * reach
@@ -110,37 +147,19 @@ def _frame(arm: ArmDrawing, theta: FloatArray, tip: FloatArray) -> tuple[float, 
     return left, float(-high[1]), right - left, float(high[1] - low[1])
 
 
-def _ground(arm: ArmDrawing, left: float, right: float) -> str:
-    lines = f'<line class="level" x1="{left:.5g}" y1="0" x2="{right:.5g}" y2="0"/>'
-    if arm.height is not None and np.isfinite(arm.height):
-        below = -arm.height
-        lines += f'<line class="limit" x1="{left:.5g}" y1="{below:.5g}" x2="{right:.5g}" y2="{below:.5g}"/>'
-    return lines
-
-
-def _path(tip: FloatArray) -> str:
-    points = " ".join(f"{x:.4g},{-y:.4g}" for x, y in tip.T)
-    return f'<polyline class="path" points="{points}"/>\n'
-
-
-def _links(arm: ArmDrawing, theta: FloatArray, reach: float) -> str:
-    """Link 2 stands in link 1's frame, both turned by SVG, whose y points down."""
-    first, second = (-np.degrees(angle) for angle in theta)
-    radius = 0.028 * reach
+def _links(arm: ArmDrawing, first: float, second: float) -> str:
+    """Link 2 stands in link 1's frame, both turned by SVG, in degrees, whose y points down."""
+    radius = 0.028 * (arm.l1 + arm.l2)
     payload = (
         f'<circle class="payload" cx="{arm.l2:.5g}" cy="0" r="{1.6 * radius:.4g}"><title>{escaped(arm.payload)}</title>'
         "</circle>"
         if arm.payload
         else ""
     )
-    marks = [
-        "" if centre is None else f'<circle class="centre" cx="{centre:.5g}" cy="0" r="{0.6 * radius:.4g}"/>'
-        for centre in arm.centres
-    ]
     return (
         f'<g class="link1" transform="rotate({first:.4f})"><line class="link" x1="0" y1="0" x2="{arm.l1:.5g}" y2="0"/>'
-        f'{marks[0]}<g class="link2" transform="translate({arm.l1:.5g} 0) rotate({second:.4f})" '
-        f'data-at="{arm.l1:.5g}"><line class="link second" x1="0" y1="0" x2="{arm.l2:.5g}" y2="0"/>{marks[1]}{payload}'
+        f'<g class="link2" transform="translate({arm.l1:.5g} 0) rotate({second:.4f})" '
+        f'data-at="{arm.l1:.5g}"><line class="link second" x1="0" y1="0" x2="{arm.l2:.5g}" y2="0"/>{payload}'
         f'<circle class="joint" cx="0" cy="0" r="{radius:.4g}"/></g></g>'
         f'<circle class="joint" cx="0" cy="0" r="{1.2 * radius:.4g}"/>\n'
     )

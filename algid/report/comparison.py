@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
-from algid.report.table import Column, Table
+from algid.report.document import Column, Table
 from algid.report.tables import flat_settings
 from algid.report.text import ABSENT, file_name, resolved, significant, unit_text, visible
 from algid.results import Estimate, Result

@@ -10,9 +10,9 @@ import numpy as np
 from algid import __version__
 from algid.files import whole_file
 from algid.report.comparison import Comparison
+from algid.report.document import Document, Section
 from algid.report.figures.base import Figure, Layout, Legend, Panel, Trace, axis, label, packed
-from algid.report.frame import figures_html, framed, links_of
-from algid.report.html import table_html
+from algid.report.frame import page
 from algid.report.text import joined, significant, visible
 from algid.report.verdict import Verdict
 from algid.results import Estimate, Result
@@ -30,23 +30,22 @@ def write_comparison(found: Comparison, results: Sequence[Result], folder: Path)
     """Write `compare.html` into `folder`. Raises `OutputError`."""
     path = folder / NAME
     with whole_file(path) as temporary:
-        temporary.write_text(comparison_html(found, results), encoding="utf-8")
+        temporary.write_text(page(comparison_document(found, results)), encoding="utf-8")
     return path
 
 
-def comparison_html(found: Comparison, results: Sequence[Result]) -> str:
-    """The page's text."""
+def comparison_document(found: Comparison, results: Sequence[Result]) -> Document:
+    """The report of a comparison."""
+    names, count = found.labels, counted(len(results), "result")
     figures = [figure for figure in (_intervals(found, results), _distances(found)) if figure.panels]
-    body = [*figures_html(figures), table_html(found.estimates), table_html(found.settings)]
-    return framed(
-        "results side by side",
-        joined(list(found.labels)) if len(found.labels) < 4 else f"{found.labels[0]} and {len(found.labels) - 1} more",
-        f"{counted(len(results), 'result')} · measured against {found.labels[0]}",
-        verdict(found),
-        links_of(figures),
-        body,
-        figures,
-        f"Made by algid {__version__}.",
+    return Document(
+        title="Comparison",
+        verdict=verdict(found),
+        sections=(Section((*figures, found.estimates, found.settings)),),
+        kicker="results side by side",
+        name=joined(list(names)) if len(names) < 4 else f"{names[0]} and {len(names) - 1} more",
+        facts=f"{count} · measured against {names[0]}",
+        made=f"Made by algid {__version__}.",
     )
 
 
@@ -59,15 +58,15 @@ def verdict(found: Comparison) -> Verdict:
         if distance is not None
     ]
     if not distances:
-        return Verdict("reservations", "With reservations: no parameter has error bars in two results.")
+        return Verdict("reservations", "no parameter has error bars in two results")
     far = [words for size, words in sorted(distances, reverse=True) if size > FAR]
     if far:
         more = f" and {len(far) - 3} more" if len(far) > 3 else ""
-        return Verdict("reservations", f"With reservations: {joined(far[:3])}{more} lie beyond {FAR:g} σ.")
+        return Verdict("reservations", f"{joined(far[:3])}{more} lie beyond {FAR:g} σ")
     inside = sum(size <= CHANCE for size, _ in distances)
     largest = max(distances)[1]
-    told = f"{inside} of {counted(len(distances), 'difference')} within {CHANCE:g} σ"
-    return Verdict("good", f"Good: {told}; the largest is {largest}.")
+    within = f"{inside} of {counted(len(distances), 'difference')} within {CHANCE:g} σ"
+    return Verdict("good", f"{within}; the largest is {largest}")
 
 
 def _colour(place: int) -> str:

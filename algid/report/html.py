@@ -1,86 +1,109 @@
-"""How every panel looks: plotly's template, in the page's colours.
-
-Pieces of HTML: foreign text escaped, tables, figures, and data inside a script.
-"""
+"""A document's parts as HTML: foreign text escaped, tables with their drawings, places that the page's script fills."""
 
 from __future__ import annotations
 
-import html
-import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator
 
-from algid.report.figures.base import Figure, Legend, Missing
-from algid.report.table import Column, Table
-from algid.report.text import visible
+from algid.report.arm import ArmDrawing, arm_html
+from algid.report.document import Bullets, Column, Content, Document, Drawn, ReadingAid, References, Section, Table
+from algid.report.figures.base import Figure, Missing, Panel
+from algid.report.text import escaped
+from algid.report.verdict import Verdict
 from algid.results import Status
 
-_AXIS: dict[str, Any] = {
-    "gridcolor": "@grid",
-    "linecolor": "@line",
-    "zerolinecolor": "@line",
-    "zerolinewidth": 1,
-    "tickcolor": "@line",
-    "tickfont": {"color": "@muted", "size": 12},
-    "title": {"font": {"color": "@muted", "size": 12}, "standoff": 6},
-    "automargin": True,
-    "exponentformat": "power",
-}
-
-TEMPLATE: dict[str, Any] = {
-    "layout": {
-        "font": {"family": "system-ui, -apple-system, Segoe UI, Roboto, sans-serif", "size": 12, "color": "@ink"},
-        "paper_bgcolor": "@page",
-        "plot_bgcolor": "@page",
-        "margin": {"l": 58, "r": 12, "t": 22, "b": 40},
-        "showlegend": False,
-        "hoverlabel": {"bgcolor": "@card", "bordercolor": "@line", "font": {"color": "@ink", "size": 12}},
-        "modebar": {"bgcolor": "@page/0", "color": "@muted", "activecolor": "@ink"},
-        "xaxis": _AXIS,
-        "yaxis": _AXIS,
-        "coloraxis": {},
-    },
-    "data": {"heatmap": [{"colorbar": {"tickfont": {"color": "@muted"}}}]},
-}
-
-
-LONGEST_TEXT = 4_000
 CARDED = 3  # columns; a row of a wider table stands as a card on a phone, so that no column is out of sight
 ANSWERS = ("yes", "no", "none")
 LONG_CELL = 40  # beyond, a cell breaks into lines
 KEYS = "Arrow keys move, plus and minus zoom, 0 resets."
+SIGNS = {"good": "✓", "reservations": "!", "failed": "✕"}
 
 
-def escaped(text: str) -> str:
-    """`text` as the content of an element or of a quoted attribute, every control character shown."""
-    return html.escape(visible(text, LONGEST_TEXT), quote=True)
+def banner(judged: Verdict) -> str:
+    """The verdict's sentence, what to run first, and the reasons that it does not tell itself, in its colour."""
+    cause = f'<p class="cause">Likely cause: {escaped(judged.cause)}</p>' if judged.cause else ""
+    if judged.command:
+        cause += f'<p class="cause">Run first: <code>{escaped(judged.command)}</code></p>'
+    reasons = f"<ul>{_listed(judged.untold)}</ul>" if judged.untold else ""
+    return (
+        f'<div class="verdict {judged.level}"><span class="sign" aria-hidden="true">{SIGNS[judged.level]}</span>'
+        f"<div><p><strong>{judged.word}</strong>{escaped(judged.rest)}</p>{cause}{reasons}</div></div>"
+    )
 
 
-def script_json(value: object) -> str:
-    """`value` as JSON that cannot end the script element it stands in."""
-    text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
-    return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
+def _listed(sentences: tuple[str, ...]) -> str:
+    return "".join(f"<li>{escaped(sentence)}</li>" for sentence in sentences)
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """A column of drawings by the name of their row, after the column `after`, or last; `small` ones share a line."""
-
-    heading: str
-    rows: Mapping[str, str]
-    after: str = ""
-    small: bool = False
+def contents(document: Document) -> str:
+    """The page's contents: the numbers first, then its sections, and the figures of those without a heading."""
+    links = [("numbers", "Numbers"), *(link for section in document.sections for link in _links(section))]
+    listed = "".join(f'<li><a href="#{key}">{escaped(title)}</a></li>' for key, title in links)
+    return f'<nav aria-label="Contents"><details open><summary>Contents</summary><ul>{listed}</ul></details></nav>'
 
 
-def table_html(table: Table, drawn: Sequence[Drawn] = (), links: Mapping[str, str] | None = None) -> str:
-    """A table that scrolls sideways by itself where the page is narrow.
+def _links(section: Section) -> Iterator[tuple[str, str]]:
+    if section.key and section.content:
+        yield section.key, section.title
+    elif not section.key:
+        yield from ((one.key, one.title) for one in section.content if isinstance(one, Figure | Missing | ArmDrawing))
 
-    `links` holds where the names of rows lead.
-    """
-    slots = _slots(table.columns, drawn)
+
+def section_html(section: Section) -> str:
+    """A part of the page; nothing where it would be empty."""
+    if not section.content:
+        return ""
+    inner = "\n".join(map(content_html, section.content))
+    key, title = section.key, escaped(section.title)
+    if section.fold:
+        opened = " open" if section.fold == "open" else ""
+        return f'<details class="paper" id="{key}"{opened}><summary>{title}</summary>\n{inner}</details>'
+    if key:
+        return f'<section aria-labelledby="{key}"><h2 id="{key}">{title}</h2>\n{inner}\n</section>'
+    beside = "" if section.beside is None else arm_html(section.beside)
+    return f'<div class="first"><div>\n{inner}\n</div>{beside}</div>' if beside else inner
+
+
+def content_html(content: Content) -> str:
+    """One part of a section."""
+    match content:
+        case Table():
+            return table_html(content)
+        case Figure() | Missing():
+            return figure_html(content)
+        case ArmDrawing():
+            return arm_html(content)
+        case ReadingAid(text):
+            return f'<p class="reading">{escaped(text)}</p>'
+        case Bullets(sentences, otherwise):
+            return f"<ul>{_listed(sentences)}</ul>" if sentences else f'<p class="note">{escaped(otherwise)}</p>'
+        case References():
+            return references_html(content)
+
+
+def references_html(references: References) -> str:
+    """The links of each group, as many as are shown."""
+    groups = []
+    for name, links in references.groups.items():
+        shown = [f'<a href="{escaped(place)}">{escaped(words)}</a>' for words, place in links[: references.most]]
+        more = f" and {len(links) - references.most:,} more" if len(links) > references.most else ""
+        groups.append(f"<dt>{escaped(name)}</dt><dd>{', '.join(shown) + more or 'none'}</dd>")
+    return f"<dl>{''.join(groups)}</dl>"
+
+
+Slot = tuple[int, Column] | Drawn
+"""A column of the table with its place in a row, or one of drawings."""
+
+
+def table_html(table: Table) -> str:
+    """A table with its drawings that scrolls sideways by itself where the page is narrow."""
+    slots: list[Slot] = []
+    for place, column in enumerate(table.columns):
+        slots += [(place, column), *(one for one in table.drawn if one.after == column.heading)]
+    slots += [one for one in table.drawn if one not in slots]
     head = "".join(map(_heading, slots))
-    body = "".join(f"<tr{_doubtful(table, row)}>{_row(slots, row, links or {})}</tr>\n" for row in table.rows)
+    body = "".join(
+        f"<tr{_doubtful(table, row)}>{''.join(_cell(table, slot, row) for slot in slots)}</tr>\n" for row in table.rows
+    )
     note = f'<p class="note">{escaped(table.note)}</p>' if table.note else ""
     cards = " cards" if len(slots) > CARDED else ""
     return (
@@ -90,31 +113,11 @@ def table_html(table: Table, drawn: Sequence[Drawn] = (), links: Mapping[str, st
     )
 
 
-Slot = tuple[int, Column] | Drawn
-"""A column of the table with its place in a row, or one of drawings."""
-
-
-def _slots(columns: Sequence[Column], drawn: Sequence[Drawn]) -> list[Slot]:
-    slots: list[Slot] = []
-    for place, column in enumerate(columns):
-        slots += [(place, column), *(one for one in drawn if one.after == column.heading)]
-    return [*slots, *(one for one in drawn if one not in slots)]
-
-
 def _heading(slot: Slot) -> str:
     if isinstance(slot, Drawn):
         return f'<th scope="col" class="drawn">{escaped(slot.heading)}</th>'
-    return f'<th scope="col"{_class(slot[1])}>{escaped(slot[1].heading)}</th>'
-
-
-def _row(slots: Sequence[Slot], row: tuple[str, ...], links: Mapping[str, str]) -> str:
-    return "".join(
-        f'<td class="drawn{" small" if slot.small else ""}" data-label="{escaped(slot.heading)}">'
-        f"{slot.rows.get(row[0], '')}</td>"
-        if isinstance(slot, Drawn)
-        else _cell(slot[1], row[slot[0]], links)
-        for slot in slots
-    )
+    right = ' class="number"' if slot[1].kind == "number" else ""
+    return f'<th scope="col"{right}>{escaped(slot[1].heading)}</th>'
 
 
 def _doubtful(table: Table, row: tuple[str, ...]) -> str:
@@ -124,24 +127,26 @@ def _doubtful(table: Table, row: tuple[str, ...]) -> str:
     return ' class="doubtful"' if poor else ""
 
 
-def _cell(column: Column, text: str, links: Mapping[str, str]) -> str:
+def _cell(table: Table, slot: Slot, row: tuple[str, ...]) -> str:
+    if isinstance(slot, Drawn):
+        small = " small" if slot.small else ""
+        drawing = slot.rows.get(row[0], "")
+        return f'<td class="drawn{small}" data-label="{escaped(slot.heading)}">{drawing}</td>'
+    column, text = slot[1], row[slot[0]]
+    shown = escaped(text)
     if column.kind == "name":
-        shown = f'<a href="{escaped(links[text])}">{escaped(text)}</a>' if text in links else escaped(text)
-        return f'<th scope="row">{shown}</th>'
-    if column.kind == "doubtful status":
-        return f'<td class="status">{escaped(text)}</td>'
-    if column.kind == "status":
-        return f'<td class="status{" ok" if text == Status.OK.value else ""}">{escaped(text)}</td>'
+        place = (table.links or {}).get(text)
+        named = shown if place is None else f'<a href="{escaped(place)}">{shown}</a>'
+        return f'<th scope="row">{named}</th>'
+    if column.kind in ("status", "doubtful status"):
+        fine = column.kind == "status" and text == Status.OK.value
+        return f'<td class="status{" ok" if fine else ""}">{shown}</td>'
     main = " estimate" if column.heading == "Estimate" else ""
     long = " long" if column.kind == "text" and len(text) > LONG_CELL else ""
-    heading = escaped(column.heading.removesuffix(" std"))  # beside an estimate ± is enough
     bare = column.kind == "number" or text in ANSWERS  # says nothing on a card without its heading
+    heading = escaped(column.heading.removesuffix(" std"))  # beside an estimate ± is enough
     label = f' data-label="{heading}"' if bare and not main else ""
-    return f'<td class="{column.kind}{main}{long}"{label}>{escaped(text)}</td>'
-
-
-def _class(column: Column) -> str:
-    return ' class="number"' if column.kind == "number" else ""
+    return f'<td class="{column.kind}{main}{long}"{label}>{shown}</td>'
 
 
 def figure_html(figure: Figure | Missing) -> str:
@@ -149,7 +154,7 @@ def figure_html(figure: Figure | Missing) -> str:
     head = f'<h2 id="{figure.key}">{escaped(figure.title)}</h2>\n'
     if isinstance(figure, Missing):
         return f'{head}<p class="missing">Not shown: {escaped(figure.why)}.</p>\n'
-    panels = "".join(_panel(figure, place) for place in range(len(figure.panels)))
+    panels = "".join(_panel(panel, panel_id(figure, place)) for place, panel in enumerate(figure.panels))
     note = f'<p class="note">{escaped(figure.note)}</p>' if figure.note else ""
     columns = " two" if figure.columns == 2 else ""
     return (
@@ -164,11 +169,10 @@ def panel_id(figure: Figure, place: int) -> str:
     return f"{figure.key}-{place}"
 
 
-def _panel(figure: Figure, place: int) -> str:
-    panel = figure.panels[place]
+def _panel(panel: Panel, key: str) -> str:
     title = f"<h3>{escaped(panel.title)}</h3>" if panel.title else ""
     return (
-        f'<div class="panel">{title}<div class="plot" id="{panel_id(figure, place)}" role="img" tabindex="0" '
+        f'<div class="panel">{title}<div class="plot" id="{key}" role="img" tabindex="0" '
         f'style="min-height:{panel.height}px" aria-label="{escaped(panel.says)}. {KEYS}"></div></div>'
     )
 
@@ -187,19 +191,17 @@ def _views(figure: Figure) -> str:
 
 
 def _legend(figure: Figure) -> str:
-    if not figure.legend:
-        return ""
-    entries = "".join(f"<li>{_entry(figure.key, entry)}</li>" for entry in figure.legend)
-    return f'<ul class="legend" aria-label="Legend">{entries}</ul>'
-
-
-def _entry(key: str, entry: Legend) -> str:
-    name, _, opacity = entry.colour.removeprefix("@").partition("/")
-    style = f"--tint:var(--{name});opacity:{opacity or 1}"
-    words = (
-        f'<span class="swatch {entry.mark}" style="{style}"></span><span class="words">{escaped(entry.words)}</span>'
-    )
-    if not entry.group:
-        return f'<span class="entry">{words}</span>'
-    data = f'data-figure="{key}" data-group="{escaped(entry.group)}"'
-    return f'<button type="button" aria-pressed="true" {data}>{words}</button>'
+    """The figure's legend; an entry with a group is a button that shows and hides it."""
+    entries = []
+    for entry in figure.legend:
+        name, _, opacity = entry.colour.removeprefix("@").partition("/")
+        swatch = f'<span class="swatch {entry.mark}" style="--tint:var(--{name});opacity:{opacity or 1}"></span>'
+        words = f'{swatch}<span class="words">{escaped(entry.words)}</span>'
+        data = f'data-figure="{figure.key}" data-group="{escaped(entry.group)}"'
+        entries.append(
+            f'<button type="button" aria-pressed="true" {data}>{words}</button>'
+            if entry.group
+            else f'<span class="entry">{words}</span>'
+        )
+    listed = "".join(f"<li>{entry}</li>" for entry in entries)
+    return f'<ul class="legend" aria-label="Legend">{listed}</ul>' if listed else ""

@@ -1,4 +1,4 @@
-"""`report.html`: one file that opens offline, without a request to any host."""
+"""The report of an identification: what it contains, and the files `report.html` and `report.md`."""
 
 from __future__ import annotations
 
@@ -8,21 +8,18 @@ from pathlib import Path
 
 from algid.files import whole_file
 from algid.progress import Told
-from algid.report.arm import arm_script
-from algid.report.bars import bars
-from algid.report.forest import forest
-from algid.report.frame import LIBRARY, bullets, figures_html, framed, links_of, section
-from algid.report.gallery import gallery
-from algid.report.html import Drawn, table_html
-from algid.report.library import library
-from algid.report.posture import arm_of
-from algid.report.table import Table
+from algid.report.arm import arm_of
+from algid.report.document import Bullets, Document, Drawn, Fold, ReadingAid, Section, Table
+from algid.report.drawings import bars, forest
+from algid.report.frame import LIBRARY, library, page
+from algid.report.gallery import Gallery, gallery
+from algid.report.markdown import markdown
 from algid.report.tables import (
     estimate_tables,
     fit_tables,
     log_tables,
-    provenance_table,
     quality_tables,
+    result_provenance,
     settings_table,
     terms_tables,
 )
@@ -33,9 +30,11 @@ from algid.words import counted
 
 FIRST = ("Parameters", "Payload")
 SECOND = ("Torque prediction",)
-TOLD_ELSEWHERE = ("± std, %", "Paper %")  # by the forest plot, and by Table 4
-PAPER = ("paper", "The paper's tables and convergence")
-TERMS = ("terms", "What the model lacks")
+TOLD_ELSEWHERE = ("± std, %", "Paper %")  # on a page: by the forest plot, and by Table 4
+TERMS_READING = (
+    "Read: a bar to the left lowers the error of torque that was held out; a term is kept where it does so and its "
+    "odds are good. What is left out would gain no more than stands here."
+)
 
 
 def write_report(folder: Path, shared_library: bool = False, told: Told | None = None) -> Path:
@@ -60,80 +59,83 @@ def write_report(folder: Path, shared_library: bool = False, told: Told | None =
         If the page cannot be written.
     """
     result = read_result(folder)
-    page = folder / "report.html"
-    if shared_library:
-        _write_once(folder.parent / LIBRARY, library().script)
-    text = page_html(folder, result, shared_library, told)
-    with whole_file(page) as temporary:
+    script = folder.parent / LIBRARY
+    if shared_library and not (script.is_file() and script.stat().st_size == len(library().script.encode())):
+        _write(script, library().script)
+    return _write(folder / "report.html", page_html(folder, result, shared_library, told))
+
+
+def write_markdown(folder: Path) -> Path:
+    """Write `report.md` into the result folder `folder`. Raises `ResultError`, `OutputError`."""
+    return _write(folder / "report.md", markdown(result_document(read_result(folder))))
+
+
+def _write(path: Path, text: str) -> Path:
+    with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    return page
-
-
-def _write_once(path: Path, text: str) -> None:
-    content = text.encode()
-    if not path.is_file() or path.stat().st_size != len(content):
-        with whole_file(path) as temporary:
-            temporary.write_bytes(content)
+    return path
 
 
 def page_html(folder: Path, result: Result, shared_library: bool = False, told: Told | None = None) -> str:
-    """The page's text; with `shared_library` it asks for the library beside the folder."""
-    shown = gallery(folder, result, told)
-    tables = {table.title: table for table in estimate_tables(result)}
-    first = _first_screen(result, tables)
-    arm = arm_of(result, shown.torque)
-    terms = _terms(result)
-    quality = [*quality_tables(shown.torque, result), *log_tables(result)]
-    notes = bullets(result.notes, "What the readers and the estimator warn of stands at the top of the page.")
-    body = [
-        '<div class="first"><div>',
-        *first,
-        f"</div>{arm}</div>",
-        *figures_html(shown.figures[:1]),
-        *terms,
-        *figures_html(shown.figures[1:]),
-        *section("fit", "What the estimator knows of the logs", fit_tables(result)),
-        *section("data", "Data quality", quality, notes),
-        *section("settings", "Settings and provenance", [settings_table(result.settings), provenance_table(result)]),
-        _paper(result, [*map(table_html, tables.values()), *figures_html(shown.paper)]),
-    ]
-    links = [
-        *links_of(shown.figures[:1]),
-        *([TERMS] if terms else []),
-        *links_of(shown.figures[1:]),
-        ("data", "Data quality"),
-        ("settings", "Settings and provenance"),
-        PAPER,
-    ]
-    more = "" if not result.more_logs else f" and {len(result.more_logs)} more"
-    return framed(
-        "identification of a two-link arm",
-        f"{file_name(result.log.path)}{more}",
-        _facts(result),
-        verdict(result),
-        links,
-        body,
-        [*shown.figures, *shown.paper],
-        f"Made by algid {result.version} from result.json.",
-        tab=file_name(result.log.path),
-        shared_library=shared_library,
-        scripts=[arm_script()] if arm else [],
+    """The text of the page of `result`; with `shared_library` it asks for the library beside the folder."""
+    return page(result_document(result, gallery(folder, result, told)), shared_library)
+
+
+def result_document(result: Result, shown: Gallery | None = None) -> Document:
+    """The report of an identification; `shown` holds its figures, which only a page has."""
+    tables = estimate_tables(result)
+    first = [table for table in tables if table.title in FIRST]
+    paper = [table for table in tables if table.title not in (*FIRST, *SECOND)]
+    terms = list(terms_tables(result))
+    torque = None if shown is None else shown.torque
+    figures, convergence = ([], []) if shown is None else (shown.figures, shown.paper)
+    data = (*quality_tables(torque, result), *log_tables(result.logs))
+    notes = Bullets(tuple(result.notes), "What the readers and the estimator warn of stands at the top of the page.")
+    opened: Fold = "open" if result.estimator == "paper" or _truth(result) else "closed"
+    sections = (
+        Section(
+            (
+                *(first if shown is None else _with_intervals(first, result)),
+                *(table for table in tables if table.title in SECOND),
+            ),
+            beside=arm_of(result, torque),
+        ),
+        Section(tuple(figures[:1])),
+        Section(tuple(terms if shown is None else _with_gains(terms, result)), "terms", "What the model lacks"),
+        Section(tuple(figures[1:])),
+        Section(fit_tables(result), "fit", "What the estimator knows of the logs"),
+        Section((notes, *data), "data", "Data quality"),
+        Section((settings_table(result.settings), result_provenance(result)), "settings", "Settings and provenance"),
+        # open where the paper is the matter, folded where a real log is
+        Section((*paper, *convergence), "paper", "The paper's tables and convergence", fold=opened),
+    )
+    name = file_name(result.log.path)
+    seconds, samples = sum(log.duration for log in result.logs), sum(log.rows for log in result.logs)
+    return Document(
+        title=f"Identification of {name}",
+        verdict=verdict(result),
+        sections=sections,
+        kicker="identification of a two-link arm",
+        name=f"{name} and {len(result.more_logs)} more" if result.more_logs else name,
+        facts=f"{result.estimator} estimator · {significant(seconds, 4)} s of log at "
+        f"{significant(result.log.rate, 4)} Hz · {counted(samples, 'sample')}",
+        made=f"Made by algid {result.version} from result.json.",
+        tab=name,
     )
 
 
-def _first_screen(result: Result, tables: dict[str, Table]) -> list[str]:
-    """The estimates with their forest plot, and how they predict; what is shown is taken out of `tables`."""
-    logs = _own(result)
-    drawn = forest({**result.parameters, **result.payload}, _truth(result), logs)
-    column = [Drawn(drawn.heading, drawn.rows, after="Unit")] if drawn.rows else []
-    first = [tables.pop(title).without(TOLD_ELSEWHERE) for title in FIRST if title in tables]
-    if first and drawn.rows:
-        marks = [f"Drawn: the 95 % interval on a scale of ± {significant(drawn.limit, 1)} % of the estimate"]
-        marks += ["grey dots: each unloaded log's own estimate"] if logs else []
-        marks += ["ring: the truth"] if _truth(result) else []
-        first[-1] = replace(first[-1], note="; ".join([*([first[-1].note] if first[-1].note else []), *marks]) + ".")
-    shown = [table_html(table, column) for table in first]
-    return [*shown, *(table_html(tables.pop(title)) for title in SECOND if title in tables)]
+def _with_intervals(tables: Sequence[Table], result: Result) -> list[Table]:
+    """The first tables of estimates with their forest plot, less what it tells; the last one says what is drawn."""
+    logs, truth = _own(result), _truth(result)
+    drawn = forest({**result.parameters, **result.payload}, truth, logs)
+    shown = [table.without(TOLD_ELSEWHERE) for table in tables]
+    if not shown or not drawn.rows:
+        return shown
+    marks = [f"Drawn: the 95 % interval on a scale of ± {significant(drawn.limit, 1)} % of the estimate"]
+    marks += ["grey dots: each unloaded log's own estimate"] if logs else []
+    marks += ["ring: the truth"] if truth else []
+    shown[-1] = replace(shown[-1], note="; ".join(marks) + ".")
+    return [replace(table, drawn=(Drawn(drawn.heading, drawn.rows, after="Unit"),)) for table in shown]
 
 
 def _own(result: Result) -> dict[str, list[float]]:
@@ -143,52 +145,22 @@ def _own(result: Result) -> dict[str, list[float]]:
         return {}
     own = [one for one, log in zip(found, result.logs, strict=True) if log.role == "unloaded"]
     values = {
-        name: [one[name].estimate for one in own if name in one and one[name].estimate is not None]
+        name: [value for one in own if name in one and (value := one[name].estimate) is not None]
         for name in result.parameters
     }
-    return {name: kept for name, kept in values.items() if len(kept) > 1}  # type: ignore[misc]
-
-
-def _terms(result: Result) -> list[str]:
-    """The terms that were tried, each with what it gains drawn; nothing where none was."""
-    key, title = TERMS
-    reading = (
-        '<p class="reading">Read: a bar to the left lowers the error of torque that was held out; a term is kept where '
-        "it does so and its odds are good. What is left out would gain no more than stands here.</p>"
-    )
-    tables = terms_tables(result)
-    if not tables:
-        return []
-    gains = (
-        {}
-        if result.fit is None
-        else {term.term: -100 * term.gain_heldout for term in result.fit.terms if term.gain_heldout is not None}
-    )
-    column = [Drawn("error held out", bars(gains), after="Held-out error, %")] if gains else []
-    return [
-        f'<section aria-labelledby="{key}"><h2 id="{key}">{title}</h2>',
-        *(table_html(table, column) for table in tables),
-        reading if gains else "",
-        "</section>",
-    ]
-
-
-def _facts(result: Result) -> str:
-    seconds = significant(sum(log.duration for log in result.logs), 4)
-    samples, rate = sum(log.rows for log in result.logs), significant(result.log.rate, 4)
-    return f"{result.estimator} estimator · {seconds} s of log at {rate} Hz · {counted(samples, 'sample')}"
+    return {name: kept for name, kept in values.items() if len(kept) > 1}
 
 
 def _truth(result: Result) -> dict[str, float]:
     """What a synthetic log was made with, by parameter."""
-    rows = {row.parameter: row.truth for row in result.table4 if row.truth is not None}
-    return {**rows, **result.truth}
+    return {row.parameter: row.truth for row in result.table4 if row.truth is not None} | result.truth
 
 
-def _paper(result: Result, content: Sequence[str]) -> str:
-    """The paper's tables and convergence: open where the paper is the matter, folded where a real log is."""
-    if not content:
-        return ""
-    key, title = PAPER
-    opened = " open" if result.estimator == "paper" or _truth(result) else ""
-    return f'<details class="paper" id="{key}"{opened}><summary>{title}</summary>\n{"".join(content)}</details>'
+def _with_gains(terms: Sequence[Table], result: Result) -> list[Table | ReadingAid]:
+    """The terms that were tried, each with what it gains drawn; nothing where none was."""
+    tried = [] if result.fit is None else result.fit.terms
+    gains = {term.term: -100 * term.gain_heldout for term in tried if term.gain_heldout is not None}
+    if not gains:
+        return list(terms)
+    column = Drawn("error held out", bars(gains), after="Held-out error, %")
+    return [*(replace(table, drawn=(column,)) for table in terms), ReadingAid(TERMS_READING)]

@@ -1,78 +1,78 @@
-"""The tables of what is known beside the estimates: the fit, the logs, the settings, the provenance.
-
-The tables of a result's estimates: rows of finished text, which the terminal, Markdown and HTML merely set.
+"""The tables of a result: its estimates, then what is known beside them: fit, logs, settings, provenance.
 
 A column that holds nothing but dashes is dropped, so that a table says only what is known.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from algid.report.document import Column, Depth, Table, filled
 from algid.report.series import TorqueLog
-from algid.report.table import Column, Table
 from algid.report.text import ABSENT, digits_of, file_name, interval, percent, resolved, significant, unit_text, visible
 from algid.report.verdict import replaced_estimator, verdict
-from algid.results import Estimate, LogSummary, Result, Table4Row, TermCriterion, TorquePrediction
+from algid.results import Estimate, FitSummary, LogSummary, Result, Table4Row
 from algid.words import counted
 
 LONGEST_VALUE = 4_000  # characters: a command that names many logs is there to be copied
 
 
-def fit_tables(result: Result) -> list[Table]:
+def fit_tables(result: Result) -> tuple[Table, ...]:
     """What a statistical estimator knows beside the estimates: noise, whiteness, bounds."""
-    if result.fit is None:
-        return []
-    tables = [_noise(result), _whiteness(result), _bounds(result)]
-    return [table for table in tables if table.rows]
-
-
-def terms_tables(result: Result) -> list[Table]:
-    """The optional terms of the torque that were tried or given, and what each is worth."""
-    tables = [] if result.fit is None else [_terms(result)]
-    return [table for table in tables if table.rows]
-
-
-def _noise(result: Result) -> Table:
-    assert result.fit is not None
+    fit = result.fit
+    if fit is None:
+        return ()
     units = {"theta1": "rad", "theta2": "rad", "tau1": "N m", "tau2": "N m"}
-    rows = tuple((visible(n), significant(std, 3), units.get(n, ABSENT)) for n, std in result.fit.noise.items())
-    columns = (Column("Signal", "name"), Column("Noise, std", "number"), Column("Unit", "text"))
-    return Table("Noise that the logs carry", columns, rows)
-
-
-def _whiteness(result: Result) -> Table:
-    assert result.fit is not None
-    rows = tuple(
-        (visible(name), "yes" if test.white else "no", significant(test.p_value, 2), f"{test.lag1_correlation:.3f}")
-        for name, test in result.fit.whiteness.items()
-    )
-    columns = (
-        Column("Residual", "name"),
-        Column("White", "text"),
-        Column("p-value", "number"),
-        Column("Lag-one correlation", "number"),
+    noise = Table(
+        "Noise that the logs carry",
+        (Column("Signal", "name"), Column("Noise, std", "number"), Column("Unit", "text")),
+        tuple((visible(name), significant(std, 3), units.get(name, ABSENT)) for name, std in fit.noise.items()),
     )
     how = {
         "likelihood": "the likelihood, which takes it to be white",
         "sandwich": "a sandwich, which lets it be coloured; what differs from run to run is not in it: give four logs",
         "jackknife": "the larger of a sandwich, which lets it be coloured, and a jackknife over the logs",
     }
-    note = f"The intervals rest on {how[result.fit.intervals]}."
-    return Table("Whiteness of the residual", columns, rows, note).without_empty()
+    whiteness = Table(
+        "Whiteness of the residual",
+        (
+            Column("Residual", "name"),
+            Column("White", "text"),
+            Column("p-value", "number"),
+            Column("Lag-one correlation", "number"),
+        ),
+        tuple(
+            (visible(name), "yes" if test.white else "no", significant(test.p_value, 2), f"{test.lag1_correlation:.3f}")
+            for name, test in fit.whiteness.items()
+        ),
+        f"The intervals rest on {how[fit.intervals]}.",
+    )
+    bounds = Table(
+        "Physical bounds that are broken",
+        (Column("Bound", "name"), Column("Value", "number"), Column("Broken by, σ", "number")),
+        tuple((visible(b.bound), significant(b.value, 4), significant(b.distance_sigma, 2)) for b in fit.broken_bounds),
+    )
+    shown = filled(noise, whiteness.without_empty(), bounds.without_empty())
+    return tuple(table.at(Depth.MARKDOWN) for table in shown)
 
 
-def chosen_terms(result: Result) -> list[Table]:
-    """What became of each term of the torque, where the logs chose."""
-    if result.fit is None or result.fit.model is None or result.fit.model.chosen_by != "logs":
-        return []
-    return [_terms(result)]
-
-
-def _terms(result: Result) -> Table:
-    assert result.fit is not None
-    rows = tuple(_term_row(term) for term in result.fit.terms)
+def terms_tables(result: Result) -> tuple[Table, ...]:
+    """The optional terms of the torque that were tried or given, and what each is worth: first where the logs chose."""
+    fit = result.fit
+    if fit is None:
+        return ()
+    rows = tuple(
+        (
+            visible(term.term),
+            ABSENT if term.delta_bic is None else f"{term.delta_bic:+.1f}",
+            ABSENT if term.gain_heldout is None else f"{-100 * term.gain_heldout:+.2f}",
+            ABSENT if term.evidence is None else f"{term.evidence:+.1f}",
+            "yes" if term.kept else "no",
+            visible(term.why),
+        )
+        for term in fit.terms
+    )
     columns = (
         Column("Term", "name"),
         Column("Change of BIC", "number"),
@@ -81,43 +81,18 @@ def _terms(result: Result) -> Table:
         Column("Kept", "text"),
         Column("Why", "text"),
     )
-    model = result.fit.model
-    if model is not None and model.held_out is not None:
+    note = "A negative change says that the term earns its place."
+    if fit.model is not None and fit.model.held_out is not None:
         note = (
-            f"Held-out error: squared, of whole {model.held_out}, each predicted from the others, with the term beside"
+            f"Held-out error: squared, of whole {fit.model.held_out}, each predicted from the others, with the term "
+            "beside those kept against without. Log odds: of the term, its price taken off."
         )
-        note += " those kept against without. Log odds: of the term, its price taken off."
-    else:
-        note = "A negative change says that the term earns its place."
-    return Table("Terms tried", columns, rows, note).without_empty()
+    chosen = fit.model is not None and fit.model.chosen_by == "logs"
+    table = Table("Terms tried", columns, rows, note, Depth.TERMINAL if chosen else Depth.MARKDOWN)
+    return filled(table.without_empty())
 
 
-def _term_row(term: TermCriterion) -> tuple[str, ...]:
-    return (
-        visible(term.term),
-        ABSENT if term.delta_bic is None else f"{term.delta_bic:+.1f}",
-        ABSENT if term.gain_heldout is None else f"{-100 * term.gain_heldout:+.2f}",
-        ABSENT if term.evidence is None else f"{term.evidence:+.1f}",
-        "yes" if term.kept else "no",
-        visible(term.why),
-    )
-
-
-def _bounds(result: Result) -> Table:
-    assert result.fit is not None
-    rows = tuple(
-        (visible(b.bound), significant(b.value, 4), significant(b.distance_sigma, 2)) for b in result.fit.broken_bounds
-    )
-    columns = (Column("Bound", "name"), Column("Value", "number"), Column("Broken by, σ", "number"))
-    return Table("Physical bounds that are broken", columns, rows).without_empty()
-
-
-def log_tables(result: Result) -> list[Table]:
-    """The logs that were used and which channel each signal was taken from."""
-    return tables_of(result.logs)
-
-
-def tables_of(logs: list[LogSummary]) -> list[Table]:
+def log_tables(logs: list[LogSummary]) -> tuple[Table, Table]:
     """`logs` and which channel each signal was taken from."""
     columns = (
         Column("Log", "name"),
@@ -127,33 +102,24 @@ def tables_of(logs: list[LogSummary]) -> list[Table]:
         Column("Duration, s", "number"),
         Column("Rate, Hz", "number"),
     )
-    channels = (Column("Signal", "name"), Column("Taken from", "text"), Column("Log", "text"))
-    return [
-        Table("Logs", columns, tuple(_log_row(log) for log in logs)),
-        Table("Channels", channels, _channel_rows(logs)),
-    ]
-
-
-def _log_row(log: LogSummary) -> tuple[str, ...]:
-    return file_name(log.path), log.role, visible(log.format), f"{log.rows:,}", f"{log.duration:.6g}", f"{log.rate:.6g}"
-
-
-def _channel_rows(logs: list[LogSummary]) -> tuple[tuple[str, ...], ...]:
-    """A row a signal; a log is named only where its channels differ from the first one's."""
-    first = tuple((visible(signal), visible(source), "all logs") for signal, source in logs[0].mapping.items())
-    others = tuple(
-        (visible(signal), visible(source), file_name(log.path))
-        for log in logs[1:]
-        if log.mapping != logs[0].mapping
+    rows = tuple(
+        (file_name(log.path), log.role, visible(log.format), f"{log.rows:,}", f"{log.duration:.6g}", f"{log.rate:.6g}")
+        for log in logs
+    )
+    channels = tuple(
+        (visible(signal), visible(source), file_name(log.path) if place else "all logs")
+        for place, log in enumerate(logs)
+        if not place or log.mapping != logs[0].mapping  # named only where its channels differ from the first one's
         for signal, source in log.mapping.items()
     )
-    return first + others
+    heads = (Column("Signal", "name"), Column("Taken from", "text"), Column("Log", "text"))
+    return Table("Logs", columns, rows, depth=Depth.FOLDED), Table("Channels", heads, channels, depth=Depth.PAGE)
 
 
 def settings_table(settings: Mapping[str, Any]) -> Table:
     """The settings, nested ones by their dotted names."""
     rows = tuple((visible(name), visible(value, LONGEST_VALUE)) for name, value in flat_settings(settings).items())
-    return Table("Settings", (Column("Setting", "name"), Column("Value", "text")), rows)
+    return Table("Settings", (Column("Setting", "name"), Column("Value", "text")), rows, depth=Depth.PAGE)
 
 
 def flat_settings(settings: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
@@ -180,25 +146,25 @@ def setting_text(value: object) -> str:
     return str(value)
 
 
-def _estimator(result: Result) -> str:
-    asked = replaced_estimator(result)
-    return visible(result.estimator) + ("" if asked is None else f", in place of {visible(asked)}")
+def provenance_table(rows: Sequence[tuple[str, str]]) -> Table:
+    """What made a result, from what: `rows` of names and values, made visible here."""
+    shown = tuple((visible(name), visible(value)) for name, value in rows)
+    return Table("Provenance", (Column("What", "name"), Column("Value", "text")), shown, depth=Depth.FOLDED)
 
 
-def provenance_table(result: Result) -> Table:
+def result_provenance(result: Result) -> Table:
     """What made the result, from what."""
-    rows = [("algid", visible(result.version)), ("estimator", _estimator(result))]
-    rows += [
-        (f"sha256 of {file_name(log.path)}", visible(log.sha256 or "unknown, fetched in part")) for log in result.logs
-    ]
-    rows += [(f"path of {file_name(log.path)}", visible(log.path)) for log in result.logs]
-    return Table("Provenance", (Column("What", "name"), Column("Value", "text")), tuple(rows))
+    asked = replaced_estimator(result)
+    estimator = result.estimator if asked is None else f"{result.estimator}, in place of {asked}"
+    hashes = [(f"sha256 of {file_name(log.path)}", log.sha256 or "unknown, fetched in part") for log in result.logs]
+    paths = [(f"path of {file_name(log.path)}", log.path) for log in result.logs]
+    return provenance_table([("algid", result.version), ("estimator", estimator), *hashes, *paths])
 
 
-def quality_tables(torque: TorqueLog | None, result: Result) -> list[Table]:
+def quality_tables(torque: TorqueLog | None, result: Result) -> tuple[Table, ...]:
     """What the stamps and the samples of each log look like."""
     if torque is None:
-        return []
+        return ()
     columns = (
         Column("Log", "name"),
         Column("Samples used", "number"),
@@ -221,12 +187,9 @@ def quality_tables(torque: TorqueLog | None, result: Result) -> list[Table]:
         )
         for log, span in sorted(torque.ranges.items())
     )
-    note = (
-        f"{counted(torque.unpredicted, 'sample has', 'samples have')} no predicted torque."
-        if torque.unpredicted
-        else ""
-    )
-    return [Table("Samples that were used", columns, rows, note)]
+    lacking = counted(torque.unpredicted, "sample has", "samples have")
+    note = f"{lacking} no predicted torque." if torque.unpredicted else ""
+    return (Table("Samples that were used", columns, rows, note, Depth.PAGE),)
 
 
 ESTIMATE_COLUMNS = (
@@ -253,38 +216,74 @@ PREDICTION_COLUMNS = (
 )
 
 
-def estimate_tables(result: Result) -> list[Table]:
+def estimate_tables(result: Result) -> tuple[Table, ...]:
     """What was identified: the arm, its payload, the paper's route to it, the loaded arm, Table 4, how it predicts."""
-    groups = [
-        ("Parameters", result.parameters),
-        ("Payload", result.payload),
-        ("Payload by the paper's route", result.paper_payload),
-        ("Loaded arm", result.loaded),
+    groups = {
+        "Parameters": result.parameters,
+        "Payload": result.payload,
+        "Payload by the paper's route": result.paper_payload,
+        "Loaded arm": result.loaded,
+    }
+    tables = [
+        Table(title, ESTIMATE_COLUMNS, tuple(_estimate_row(name, found, result) for name, found in group.items()))
+        for title, group in groups.items()
     ]
-    tables = [_estimates(title, group, result) for title, group in groups if group]
     if any(row.truth is not None for row in result.table4):
         known = [row for row in result.table4 if row.estimate is not None or row.truth is not None]
-        rows = tuple(map(_table4_row, known))
+        rows = tuple(
+            (*_number(row.parameter, row.estimate, row.std, row.unit), *_against(row, row.estimate, row.std))
+            for row in known
+        )
         note = "Names and order of the paper's Table 4; Paper % is the error it reports."
-        tables.append(Table("Table 4", TABLE4_COLUMNS, rows, note).without_empty())
+        tables.append(Table("Table 4", TABLE4_COLUMNS, rows, note))
+    shown = filled(*(table.without_empty() for table in tables))
     if verdict(result).level == "failed":
-        tables = [table.doubted() for table in tables]
-    prediction = _prediction(result)
-    return [*tables, prediction] if prediction.rows else tables
+        shown = tuple(table.doubted() for table in shown)
+    return shown + filled(_prediction(result.fit))
 
 
-def _prediction(result: Result) -> Table:
+def _estimate_row(name: str, found: Estimate, result: Result) -> tuple[str, ...]:
+    """An estimate with what is known against it.
+
+    Truth and errors are Table 4's where it has the parameter, else (k5, k7, l1, l2) the truth alone; where Table 4
+    holds another estimate of the same name, the error is this one's own.
+    """
+    known = next((row for row in result.table4 if row.parameter == name), None)
+    if known is None and name in result.truth:
+        known = Table4Row(parameter=name, unit=found.unit, estimate=None, truth=result.truth[name])
+    if known is not None and known.estimate != found.estimate:
+        error = None
+        if known.truth and found.estimate is not None:
+            error = 100 * abs(found.estimate - known.truth) / abs(known.truth)
+        known = known.model_copy(update={"error_percent": error})
+    return (
+        *_number(name, found.estimate, found.std, found.unit),
+        found.status.value,
+        ABSENT if found.ci95 is None else interval(*found.ci95, found.std),
+        *_against(known, found.estimate, found.std),
+    )
+
+
+def _number(name: str, value: float | None, std: float | None, unit: str) -> tuple[str, ...]:
+    """Name, number, standard deviation, the same in percent, unit."""
+    return visible(name), resolved(value, std), significant(std, 2), percent(std, value), unit_text(unit)
+
+
+def _against(known: Table4Row | None, value: float | None, std: float | None) -> tuple[str, str, str]:
+    """The truth, the error against it, and the paper's."""
+    if known is None:
+        return ABSENT, ABSENT, ABSENT
+    return (
+        significant(known.truth, max(digits_of(value, std), 5)),
+        significant(known.error_percent, 4),
+        significant(known.paper_error_percent, 4),
+    )
+
+
+def _prediction(fit: FitSummary | None) -> Table:
     """How well the model predicts the torque: of the logs used, and of each log by the others."""
-    fit = result.fit
     pairs = [("logs used", fit.residual), ("each log by the others", fit.cross_validation)] if fit else []
-    found = [(where, prediction) for where, prediction in pairs if prediction is not None]
-    rows = tuple(row for where, prediction in found for row in _joints(where, prediction))
-    notes = dict.fromkeys(visible(prediction.filter) for _, prediction in found)
-    return Table("Torque prediction", PREDICTION_COLUMNS, rows, f"Filter: {'; '.join(notes)}.")
-
-
-def _joints(where: str, found: TorquePrediction) -> list[tuple[str, ...]]:
-    return [
+    rows = tuple(
         (
             where,
             str(joint + 1),
@@ -292,63 +291,9 @@ def _joints(where: str, found: TorquePrediction) -> list[tuple[str, ...]]:
             significant(100 * found.nrmse[joint], 3),
             f"{found.r2[joint]:.5f}",
         )
+        for where, found in pairs
+        if found is not None
         for joint in range(2)
-    ]
-
-
-def _estimates(title: str, group: Mapping[str, Estimate], result: Result) -> Table:
-    rows = tuple(_estimate_row(name, estimate, _known(name, estimate, result)) for name, estimate in group.items())
-    return Table(title, ESTIMATE_COLUMNS, rows).without_empty()
-
-
-def _known(name: str, found: Estimate, result: Result) -> Table4Row | None:
-    """Truth and errors: Table 4's where it has the parameter, else (k5, k7, l1, l2) the truth alone."""
-    row = next((row for row in result.table4 if row.parameter == name), None)
-    if row is None and name in result.truth:
-        row = Table4Row(parameter=name, unit=found.unit, estimate=None, truth=result.truth[name])
-    return None if row is None else _of_this(row, found)
-
-
-def _estimate_row(name: str, found: Estimate, known: Table4Row | None) -> tuple[str, ...]:
-    digits = digits_of(found.estimate, found.std)
-    return (
-        visible(name),
-        resolved(found.estimate, found.std),
-        significant(found.std, 2),
-        percent(found.std, found.estimate),
-        unit_text(found.unit),
-        found.status.value,
-        ABSENT if found.ci95 is None else interval(*found.ci95, found.std),
-        *_against(known, digits),
     )
-
-
-def _table4_row(row: Table4Row) -> tuple[str, ...]:
-    return (
-        visible(row.parameter),
-        resolved(row.estimate, row.std),
-        significant(row.std, 2),
-        percent(row.std, row.estimate),
-        unit_text(row.unit),
-        *_against(row, digits_of(row.estimate, row.std)),
-    )
-
-
-def _of_this(known: Table4Row, found: Estimate) -> Table4Row:
-    """What is known of `found`: where Table 4 holds another estimate of the same name, the error is its own."""
-    if known.estimate == found.estimate:
-        return known
-    if known.truth is None or found.estimate is None:
-        return known.model_copy(update={"error_percent": None})
-    error = 100 * abs(found.estimate - known.truth) / abs(known.truth) if known.truth else None
-    return known.model_copy(update={"error_percent": error})
-
-
-def _against(known: Table4Row | None, digits: int) -> tuple[str, str, str]:
-    if known is None:
-        return ABSENT, ABSENT, ABSENT
-    return (
-        significant(known.truth, max(digits, 5)),
-        significant(known.error_percent, 4),
-        significant(known.paper_error_percent, 4),
-    )
+    filters = dict.fromkeys(visible(found.filter) for _, found in pairs if found is not None)
+    return Table("Torque prediction", PREDICTION_COLUMNS, rows, f"Filter: {'; '.join(filters)}.")

@@ -1,14 +1,13 @@
-"""A result on the terminal. Foreign text never passes as markup; colours follow the console (`NO_COLOR`)."""
+"""A document on the terminal. Foreign text never passes as markup; colours follow the console (`NO_COLOR`)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from algid.report.document import Document, result_document
-from algid.report.table import Column, Table
-from algid.report.verdict import LEVEL_WORDS, Level, Verdict
-from algid.results import Result, Status
+from algid.report.document import Column, Depth, Document, Table
+from algid.report.verdict import Level, Verdict
+from algid.results import Status
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -18,68 +17,53 @@ LONGEST_WORD = 24  # columns; what is longer, like a path, breaks where it must
 LEVEL_STYLES: dict[Level, str] = {"good": "bold green", "reservations": "bold yellow", "failed": "bold red"}
 
 
-def print_table(result: Result, console: Console) -> None:
-    """Print the verdict, the estimates and what is known against them to `console`."""
-    print_document(result_document(result), console)
-
-
 def print_document(document: Document, console: Console) -> None:
-    """Print a report's verdict and its tables."""
+    """Print the verdict, what was found, and what is known against it, to `console`."""
     print_verdict(document.verdict, console)
-    for table in document.tables:
+    for table in document.tables(Depth.TERMINAL):
         console.print()
-        print_one(table, console)
+        print_table(table, console)
 
 
 def print_verdict(judged: Verdict, console: Console) -> None:
-    """Print the sentence and the reasons behind it."""
-    from rich.text import Text
-
-    word = LEVEL_WORDS[judged.level]
-    console.print(Text.assemble((word, LEVEL_STYLES[judged.level]), judged.sentence.removeprefix(word)))
-    for heading, text in (("Likely cause: ", judged.cause), ("Run first:    ", judged.command)):
-        if text:
-            console.print(Text.assemble((heading, "bold"), text), soft_wrap=heading.startswith("Run"))
-    if judged.untold:
-        console.print(_points(judged.untold))
-
-
-def _points(reasons: Sequence[str]) -> RichTable:
-    """Reasons as a list whose longer points stay clear of the bullets."""
+    """Print the sentence and the reasons behind it, as a list whose longer points stay clear of the bullets."""
     from rich.table import Table as RichTable
     from rich.text import Text
 
-    points = RichTable.grid(padding=(0, 1))
-    points.add_column()
-    points.add_column(overflow="fold")
-    for reason in reasons:
-        points.add_row(" •", Text(reason))
-    return points
+    console.print(Text.assemble((judged.word, LEVEL_STYLES[judged.level]), judged.rest))
+    if judged.cause:
+        console.print(Text.assemble(("Likely cause: ", "bold"), judged.cause))
+    if judged.command:
+        console.print(Text.assemble(("Run first:    ", "bold"), judged.command), soft_wrap=True)
+    if judged.untold:
+        points = RichTable.grid(padding=(0, 1))
+        points.add_column()
+        points.add_column(overflow="fold")
+        for reason in judged.untold:
+            points.add_row(" •", Text(reason))
+        console.print(points)
 
 
-def print_one(table: Table, console: Console) -> None:
+def print_table(table: Table, console: Console) -> None:
     """Print one table, less the columns that the console has no room for; no digit is ever cut off."""
     from rich.cells import cell_len
     from rich.measure import Measurement
     from rich.text import Text
 
     while True:
-        widths = [max(map(cell_len, column)) for column in _columns(table)]
+        columns = [(column.heading, *cells) for column, *cells in zip(table.columns, *table.rows, strict=True)]
+        widths = [max(map(cell_len, column)) for column in columns]
         wanted = Measurement.get(console, console.options.update(width=10_000), rich_table(table, widths)).maximum
         room = sum(widths) - max(wanted - console.width, 0)
-        narrowed = _narrowed(widths, list(map(_least, table.columns, _columns(table))), room)
+        narrowed = _narrowed(widths, list(map(_least, table.columns, columns)), room)
         fewer = table.narrower()
-        if sum(widths) <= room or fewer is None or (sum(narrowed) <= room and table.most_missed):
+        most_missed = all(column.rank <= 1 for column in table.columns)
+        if sum(widths) <= room or fewer is None or (sum(narrowed) <= room and most_missed):
             break
         table = fewer
     console.print(rich_table(table, narrowed))
     if table.note:
         console.print(Text(table.note, "dim"))
-
-
-def _columns(table: Table) -> list[tuple[str, ...]]:
-    """What each column holds, its heading first."""
-    return [(column.heading, *cells) for column, *cells in zip(table.columns, *table.rows, strict=True)]
 
 
 def _least(column: Column, cells: tuple[str, ...]) -> int:

@@ -5,27 +5,39 @@ How a number is written: the one place, so that every format shows the same digi
 
 from __future__ import annotations
 
+import html
+import json
 import math
 import unicodedata
 
 LONGEST = 300
+LONGEST_ON_PAGE = 4_000
 # Controls drive a terminal, format characters reorder what is read, separators break lines.
 _HIDDEN = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}
 
 
 def visible(text: str, longest: int = LONGEST) -> str:
     """`text` with every character that cannot be seen written as an escape, and cut to a sane length."""
-    shown = "".join(_escape(character) if _is_hidden(character) else character for character in text[:longest])
+    shown = "".join(map(_shown, text[:longest]))
     return shown if len(text) <= longest else shown + "…"
 
 
-def _is_hidden(character: str) -> bool:
-    return unicodedata.category(character) in _HIDDEN
-
-
-def _escape(character: str) -> str:
+def _shown(character: str) -> str:
+    if unicodedata.category(character) not in _HIDDEN:
+        return character
     code = ord(character)
     return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
+
+
+def escaped(text: str) -> str:
+    """`text` as the content of a page's element or of a quoted attribute, every control character shown."""
+    return html.escape(visible(text, LONGEST_ON_PAGE), quote=True)
+
+
+def script_json(value: object) -> str:
+    """`value` as JSON that cannot end the script element it stands in."""
+    text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
 
 
 def file_name(path: str) -> str:
@@ -57,7 +69,7 @@ def significant(value: float | None, digits: int = 5) -> str:
         return "∞" if value > 0 else "−∞"
     if value == 0:
         return "0"
-    exponent = _exponent(value, digits)
+    exponent = int(f"{value:.{digits - 1}e}".partition("e")[2])  # once rounded
     if SMALLEST_FIXED <= abs(value) < LARGEST_FIXED:
         return f"{value:.{max(digits - 1 - exponent, 0)}f}"
     mantissa = f"{value / 10.0**exponent:.{digits - 1}f}" if abs(exponent) < 300 else f"{value:.{digits - 1}e}"
@@ -89,8 +101,3 @@ def interval(low: float | None, high: float | None, std: float | None) -> str:
     left = "−∞" if low is None else resolved(low, std)
     right = "∞" if high is None else resolved(high, std)
     return f"[{left}, {right}]"
-
-
-def _exponent(value: float, digits: int) -> int:
-    """Decimal exponent of `value` once rounded to `digits` digits."""
-    return int(f"{value:.{digits - 1}e}".partition("e")[2])

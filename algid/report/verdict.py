@@ -38,17 +38,32 @@ UNKNOWN_CAUSE = (
 
 @dataclass(frozen=True)
 class Verdict:
-    """How far to trust a result, in one sentence.
+    """How far to trust what a report is about, in one sentence: the word of its level, then the `statement`.
 
     `cause` is a clause that says what probably lies behind a poor result, `command` what to run first to find out
     or to mend it; `reasons` are the reservations, each a clause.
     """
 
     level: Level
-    sentence: str
+    statement: str
     reasons: tuple[str, ...] = ()
     cause: str | None = None
     command: str | None = None
+
+    @property
+    def word(self) -> str:
+        """The word of its level."""
+        return LEVEL_WORDS[self.level]
+
+    @property
+    def rest(self) -> str:
+        """The sentence after the word of its level."""
+        return f": {self.statement}."
+
+    @property
+    def sentence(self) -> str:
+        """The whole sentence."""
+        return self.word + self.rest
 
     @property
     def untold(self) -> tuple[str, ...]:
@@ -57,30 +72,47 @@ class Verdict:
         return tuple(reason for reason in self.reasons if reason not in self.sentence and cause not in reason)
 
 
+def judged(
+    statement: str,
+    reasons: tuple[str, ...],
+    failure: str | None,
+    *,
+    things: str = "numbers",
+    first: str = "",
+    cause: str | None = None,
+    command: str | None = None,
+) -> Verdict:
+    """The verdict on `statement`: failed where there is a `failure`, with reservations where there are `reasons`.
+
+    `things` must not be used after a failure; `first` stands in the sentence in place of the first reason.
+    """
+    if failure is not None:
+        return Verdict("failed", f"{failure}; do not use these {things}", reasons, cause, command)
+    if not reasons:
+        return Verdict("good", statement)
+    more = len(reasons) - 1
+    rest = {0: "", 1: ", and there is one more reason below"}.get(more, f", and {more:,} more reasons below")
+    return Verdict("reservations", f"{statement}, but {first or reasons[0]}{rest}", reasons, cause, command)
+
+
 def verdict(result: Result) -> Verdict:
     """Judge `result` by its statuses, its intervals, its residual and its warnings."""
     failure = _failure(result)
     reasons = tuple(reason for reason in _reasons(result) if reason != failure)
     cause, command = _cause(result, failed=failure is not None)
-    if failure is not None:
-        return Verdict("failed", f"Failed: {failure}; do not use these numbers.", reasons, cause, command)
-    if reasons:
-        return Verdict("reservations", _reserved(result, reasons), reasons, cause, command)
-    return Verdict("good", f"Good: {'; '.join(_praise(result))}.")
+    statement = _identified(result) if reasons else "; ".join(_praise(result))
+    return judged(statement, reasons, failure, cause=cause, command=command)
 
 
 def _cause(result: Result, *, failed: bool) -> tuple[str | None, str | None]:
     """What probably lies behind a poor result, and the command to run first."""
+    inspect = visible(shlex.join(["algid", "inspect", result.log.path]), LONGEST_COMMAND)
     if result.causes:
         first = result.causes[0]
-        return visible(first.cause), again(result, first.flags) if first.flags else _inspect(result)
-    if failed and (_is_implausible(result) or next(_unexplained(_prediction(result.fit), WORST_R2), None)):
-        return UNKNOWN_CAUSE, _inspect(result)
+        return visible(first.cause), again(result, first.flags) if first.flags else inspect
+    if failed and (_is_implausible(result) or next(_unexplained(result.fit, WORST_R2), None)):
+        return UNKNOWN_CAUSE, inspect
     return None, None
-
-
-def _inspect(result: Result) -> str:
-    return visible(shlex.join(["algid", "inspect", result.log.path]), LONGEST_COMMAND)
 
 
 def again(result: Result, flags: Sequence[str]) -> str:
@@ -97,11 +129,11 @@ def _is_implausible(result: Result) -> bool:
     return any(found.status is Status.IMPLAUSIBLE for found in result.estimates.values())
 
 
-def _contradiction(result: Result) -> str:
+def _contradiction(fit: FitSummary | None) -> str:
     """Why the statuses are IMPLAUSIBLE."""
-    bounds = [] if result.fit is None else result.fit.broken_bounds
+    bounds = [] if fit is None else fit.broken_bounds
     worst = max(bounds, key=lambda bound: bound.distance_sigma or 0.0, default=None)
-    poor = next(_unexplained(_prediction(result.fit), 0.0), None)
+    poor = next(_unexplained(fit, 0.0), None)
     if poor is not None and (worst is None or not worst.distance_sigma):
         return poor
     return "physics forbids these estimates" if worst is None else f"{BREAKS} {_beyond(worst)}"
@@ -118,39 +150,28 @@ def _failure(result: Result) -> str | None:
     if any(found.status is Status.NOT_CONVERGED for found in result.estimates.values()):
         return "the estimator did not converge"
     if _is_implausible(result):
-        return _contradiction(result)
-    if not any(_usable(found) for found in result.estimates.values()):
+        return _contradiction(result.fit)
+    usable, count = sum(map(_usable, result.estimates.values())), len(result.estimates)
+    if not usable:
         words = sorted({STATUS_WORDS.get(found.status, "absent") for found in result.estimates.values()})
         return f"no parameter could be identified ({joined(words)})"
-    usable, count = sum(_usable(found) for found in result.estimates.values()), len(result.estimates)
     if usable < LEAST_USABLE * count:
         return f"only {usable} of {counted(count, 'parameter')} could be identified"
-    return next(_unexplained(_prediction(result.fit), WORST_R2), None)
+    return next(_unexplained(result.fit, WORST_R2), None)
 
 
 def _usable(found: Estimate) -> bool:
     return found.status is Status.OK and found.estimate is not None
 
 
-def _reserved(result: Result, reasons: tuple[str, ...]) -> str:
-    usable = sum(_usable(found) for found in result.estimates.values())
-    count = len(result.estimates)
-    have = (
-        f"all {counted(count, 'parameter')} are"
-        if usable == count
-        else f"{usable} of {counted(count, 'parameter')} are"
-    )
+def _identified(result: Result) -> str:
+    """How many parameters are identified, and by which estimator where it is not the one that was asked for."""
+    usable, count = sum(map(_usable, result.estimates.values())), len(result.estimates)
+    have = f"{'all' if usable == count else f'{usable} of'} {counted(count, 'parameter')} are identified"
     asked = replaced_estimator(result)
-    by = "" if asked is None else f" by the {visible(result.estimator)} estimator in place of the {visible(asked)} one"
-    more = len(reasons) - 1
-    rest = (
-        ", and there is one more reason below"
-        if more == 1
-        else f", and {counted(more, 'more reason')} below"
-        if more
-        else ""
-    )
-    return f"With reservations: {have} identified{by}, but {reasons[0]}{rest}."
+    if asked is None:
+        return have
+    return f"{have} by the {visible(result.estimator)} estimator in place of the {visible(asked)} one"
 
 
 def replaced_estimator(result: Result) -> str | None:
@@ -170,7 +191,7 @@ def _praise(result: Result) -> list[str]:
         praise[0] += f", without error bars, which the {visible(result.estimator)} estimator does not give"
     prediction = _prediction(result.fit)
     if prediction is not None:
-        one, two = (_share(r2) for r2 in prediction.r2)
+        one, two = map(share_text, prediction.r2)
         where = "of the torque of both joints" if one == two else f"of joint 1's torque and {two} of joint 2's"
         praise.append(f"the model explains {one} {where}")
     errors = {row.parameter: abs(row.error_percent) for row in result.table4 if row.error_percent is not None}
@@ -180,9 +201,9 @@ def _praise(result: Result) -> list[str]:
     return praise
 
 
-def _share(r2: float) -> str:
-    """R² in percent, never rounded up to all."""
-    return f"{100 * r2:.2f} %" if r2 <= 0.9999 else "over 99.99 %"
+def share_text(share: float) -> str:
+    """A share such as R² in percent, never rounded up to all."""
+    return f"{100 * share:.2f} %" if share <= 0.9999 else "over 99.99 %"
 
 
 def _spread(found: Estimate) -> float:
@@ -197,31 +218,21 @@ def _prediction(fit: FitSummary | None) -> TorquePrediction | None:
 
 
 def _reasons(result: Result) -> Iterator[str]:
-    yield from _bad_statuses(result)
-    yield from _wide_intervals(result)
+    estimates = result.estimates
+    for status, words in STATUS_WORDS.items():
+        names = [visible(name) for name, found in estimates.items() if found.status is status]
+        if names and status is not Status.IMPLAUSIBLE:  # which is the headline's
+            yield f"{joined(names)} {'is' if len(names) == 1 else 'are'} {words}"
+    wide = {name: _spread(found) for name, found in estimates.items() if _usable(found)}
+    shown = [f"{visible(n)} (±{significant(100 * s, 2)} %)" for n, s in wide.items() if s > LARGEST_SPREAD]
+    if shown:
+        yield f"the standard deviation of {joined(shown)} is large"
     if result.fit is not None:
         yield from _fit_reasons(result.fit, " ".join(result.warnings))
     yield from _far_from_truth(result)
-    told = {f"{name} is not determined" for name, found in result.estimates.items() if found.estimate is None}
+    told = {f"{name} is not determined" for name, found in estimates.items() if found.estimate is None}
     told |= {warning for warning in result.warnings if _is_implausible(result) and warning.startswith(BREAKS)}
     yield from (f"algid warns: {visible(warning, 2 * LONGEST)}" for warning in result.warnings if warning not in told)
-
-
-def _bad_statuses(result: Result) -> Iterator[str]:
-    """What each status but IMPLAUSIBLE says, which is the headline's."""
-    for status, words in STATUS_WORDS.items():
-        if status is Status.IMPLAUSIBLE:
-            continue
-        names = [visible(name) for name, found in result.estimates.items() if found.status is status]
-        if names:
-            yield f"{joined(names)} {'is' if len(names) == 1 else 'are'} {words}"
-
-
-def _wide_intervals(result: Result) -> Iterator[str]:
-    wide = {n: _spread(e) for n, e in result.estimates.items() if _usable(e) and _spread(e) > LARGEST_SPREAD}
-    if wide:
-        shown = [f"{visible(name)} (±{significant(100 * spread, 2)} %)" for name, spread in wide.items()]
-        yield f"the standard deviation of {joined(shown)} is large"
 
 
 def _fit_reasons(fit: FitSummary, told: str) -> Iterator[str]:
@@ -231,10 +242,11 @@ def _fit_reasons(fit: FitSummary, told: str) -> Iterator[str]:
     coloured = [visible(name) for name, test in fit.whiteness.items() if not test.white]
     if coloured and fit.intervals == "likelihood":
         yield f"the residual of {joined(coloured)} is not white, though the intervals take it to be"
-    yield from _unexplained(_prediction(fit), LEAST_R2)
+    yield from _unexplained(fit, LEAST_R2)
 
 
-def _unexplained(prediction: TorquePrediction | None, least: float) -> Iterator[str]:
+def _unexplained(fit: FitSummary | None, least: float) -> Iterator[str]:
+    prediction = _prediction(fit)
     for joint, r2 in enumerate(prediction.r2 if prediction else (), start=1):
         if r2 < 0:
             yield f"the model predicts the torque of joint {joint} worse than its mean does"

@@ -1,6 +1,6 @@
-"""A track's `report.html` and `report.md`, out of the same tables and sentence.
+"""The report of a track: what it contains, and its folder's files.
 
-A track's folder: ``track.json``, ``track.parquet``, ``stretches.parquet``, the pages, and ``track.mcap``.
+``track.json``, ``track.parquet``, ``stretches.parquet``, the pages `report.html` and `report.md`, and ``track.mcap``.
 """
 
 from __future__ import annotations
@@ -10,56 +10,39 @@ from pathlib import Path
 import numpy as np
 
 from algid.files import whole_file
-from algid.report.document import Document
+from algid.report.document import Bullets, Document, Section, filled
 from algid.report.export import START_KEY, write_series
-from algid.report.frame import bullets, figures_html, framed, links_of, section
-from algid.report.html import table_html
-from algid.report.markdown import document_markdown
+from algid.report.frame import page
+from algid.report.markdown import markdown
+from algid.report.tables import settings_table
 from algid.report.text import file_name, significant
 from algid.track.figures import figures
 from algid.track.payload import QUANTILE
 from algid.track.result import TrackResult, track_json
-from algid.track.tables import change_table, fit_table, provenance_tables, quality_tables, stretch_table, verdict
+from algid.track.tables import change_table, quality_tables, stretch_table, track_provenance, verdict
 from algid.words import counted
-
-
-def page_html(result: TrackResult) -> str:
-    """The page's text: one file that opens offline."""
-    drawn = figures(result)
-    name = file_name(result.log.path)
-    seconds, rate = significant(result.log.duration, 4), significant(result.log.rate, 4)
-    facts = f"arm of {file_name(result.arm)} · {seconds} s of log at {rate} Hz · {counted(result.log.rows, 'sample')}"
-    body = [
-        table_html(stretch_table(result)),
-        *figures_html(drawn),
-        *(table_html(table) for table in [change_table(result)] if table.rows),
-        *section("data", "Data quality", [fit_table(result), *quality_tables(result)], _warnings(result)),
-        *section("settings", "Settings and provenance", provenance_tables(result)),
-    ]
-    links = [*links_of(drawn), ("data", "Data quality"), ("settings", "Settings and provenance")]
-    made = f"Made by algid {result.version}."
-    return framed("a payload in time", name, facts, verdict(result), links, body, drawn, made)
-
-
-def _warnings(result: TrackResult) -> str:
-    return bullets(result.warnings, "The readers gave no warning.")
 
 
 def track_document(result: TrackResult) -> Document:
     """The report of a track."""
-    return Document(
-        f"Payload in time of {file_name(result.log.path)}",
-        verdict(result),
-        tuple(table for table in (stretch_table(result), change_table(result)) if table.rows),
-        (fit_table(result),),
-        "Log and provenance",
-        (quality_tables(result)[0], provenance_tables(result)[1]),
+    name = file_name(result.log.path)
+    seconds, rate = significant(result.log.duration, 4), significant(result.log.rate, 4)
+    warnings = Bullets(tuple(result.warnings), "The readers gave no warning.")
+    sections = (
+        Section((stretch_table(result), *figures(result), *filled(change_table(result)))),
+        Section((warnings, *quality_tables(result)), "data", "Data quality"),
+        Section((settings_table(result.settings), track_provenance(result)), "settings", "Settings and provenance"),
     )
-
-
-def markdown(result: TrackResult) -> str:
-    """The track as GitHub's Markdown."""
-    return document_markdown(track_document(result))
+    return Document(
+        title=f"Payload in time of {name}",
+        verdict=verdict(result),
+        sections=sections,
+        kicker="a payload in time",
+        name=name,
+        facts=f"arm of {file_name(result.arm)} · {seconds} s of log at {rate} Hz · "
+        f"{counted(result.log.rows, 'sample')}",
+        made=f"Made by algid {result.version}.",
+    )
 
 
 TOPIC = "/algid/payload"
@@ -80,7 +63,8 @@ def write_track(result: TrackResult, folder: Path, mcap: bool = False) -> None:
 
 def write_pages(result: TrackResult, folder: Path, mcap: bool = False) -> list[Path]:
     """Write the pages of a track into its `folder`, `track.mcap` where asked. Raises `OutputError`."""
-    pages = {"report.html": page_html(result), "report.md": markdown(result)}
+    document = track_document(result)
+    pages = {"report.html": page(document), "report.md": markdown(document)}
     for name, text in pages.items():
         _write_text(folder / name, text)
     if mcap:

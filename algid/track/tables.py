@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from algid.report.table import Column, Table
-from algid.report.tables import settings_table, tables_of
+from algid.report.document import Column, Depth, Table, filled
+from algid.report.tables import log_tables, provenance_table
 from algid.report.text import ABSENT, file_name, joined, significant, visible
-from algid.report.verdict import LEAST_R2, WORST_R2, Verdict
+from algid.report.verdict import LEAST_R2, WORST_R2, Verdict, judged, share_text
 from algid.track.payload import Stretch
 from algid.track.result import StretchStatus, TrackResult
 from algid.words import counted
@@ -87,42 +87,34 @@ def _true_change(result: TrackResult, moment: float) -> float | None:
     return min(times, key=lambda time: abs(time - moment), default=None)
 
 
-def quality_tables(result: TrackResult) -> list[Table]:
-    """The log, its channels, and where it has no samples."""
-    log, channels = tables_of([result.log])
-    kept = [i for i, column in enumerate(log.columns) if column.heading != "Arm"]
-    holes = tuple((f"{start:.3f}", f"{end:.3f}") for start, end in result.track.holes.tolist())
-    table = Table("Times without samples", (Column("From, s", "name"), Column("To, s", "number")), holes)
-    return [log.only(kept), channels.only([0, 1]), *([table] if holes else [])]
-
-
-def fit_table(result: TrackResult) -> Table:
-    """What the track leaves of the torque."""
-    rows = (
-        ("torque explained by arm and payload, noise aside", _percent(result.track.explained)),
+def quality_tables(result: TrackResult) -> tuple[Table, ...]:
+    """What the track leaves of the torque, the log, its channels, and where it has no samples."""
+    fit = (
+        ("torque explained by arm and payload, noise aside", share_text(result.track.explained)),
         ("slow errors and noise over the sensors' noise", significant(math.sqrt(result.track.colour), 3)),
     )
-    return Table("Fit", (Column("What", "name"), Column("Value", "number")), rows)
-
-
-def _percent(share: float) -> str:
-    """A share in percent, never rounded up to all."""
-    return f"{100 * share:.2f} %" if share <= 0.9999 else "over 99.99 %"
-
-
-def provenance_tables(result: TrackResult) -> list[Table]:
-    """What the track was made with, from what."""
-    rows = (
-        ("algid", visible(result.version)),
-        ("arm's result", visible(result.arm)),
-        ("sha256 of the arm's result", visible(result.arm_sha256)),
-        ("path of the log", visible(result.log.path)),
-        (f"sha256 of {file_name(result.log.path)}", visible(result.log.sha256 or "unknown, fetched in part")),
+    log, channels = log_tables([result.log])
+    holes = tuple((f"{start:.3f}", f"{end:.3f}") for start, end in result.track.holes.tolist())
+    ends = (Column("From, s", "name"), Column("To, s", "number"))
+    return (
+        Table("Fit", (Column("What", "name"), Column("Value", "number")), fit, depth=Depth.MARKDOWN),
+        log.without(["Arm"]),
+        channels.without(["Log"]),
+        *filled(Table("Times without samples", ends, holes, depth=Depth.PAGE)),
     )
-    return [
-        settings_table(result.settings),
-        Table("Provenance", (Column("What", "name"), Column("Value", "text")), rows),
-    ]
+
+
+def track_provenance(result: TrackResult) -> Table:
+    """What the track was made from."""
+    return provenance_table(
+        [
+            ("algid", result.version),
+            ("arm's result", result.arm),
+            ("sha256 of the arm's result", result.arm_sha256),
+            ("path of the log", result.log.path),
+            (f"sha256 of {file_name(result.log.path)}", result.log.sha256 or "unknown, fetched in part"),
+        ]
+    )
 
 
 def mass_text(stretch: Stretch) -> str:
@@ -161,22 +153,11 @@ STATUS_WORDS = {
 def verdict(result: TrackResult) -> Verdict:
     """Judge a track by its stretches, what it explains of the torque, and the arm's own result."""
     reasons = tuple(_reasons(result))
-    told = _told(result)
-    failure = _failure(result)
-    if failure is not None:
-        return Verdict("failed", f"Failed: {failure}; do not use these masses.", reasons)
-    if reasons:
-        return Verdict("reservations", f"With reservations: {told}, but {_counted(reasons)}.", reasons)
-    return Verdict("good", f"Good: {told}.")
+    first = reasons[0].partition(": ")[0] if reasons else ""
+    return judged(_weighed(result), reasons, _failure(result), things="masses", first=first)
 
 
-def _counted(reasons: tuple[str, ...]) -> str:
-    more = len(reasons) - 1
-    rest = "" if more == 0 else f", and {counted(more, 'more reason')} below"
-    return reasons[0].partition(": ")[0] + rest
-
-
-def _told(result: TrackResult) -> str:
+def _weighed(result: TrackResult) -> str:
     stretches, changes = result.track.stretches, result.track.changes
     if len(stretches) == 1:
         return f"the payload does not change: {mass_text(stretches[0])} ± {half_text(stretches[0])} kg throughout"

@@ -11,7 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 from algid.report.comparison import compare
-from algid.report.comparison_page import _distances, _intervals, comparison_html, verdict
+from algid.report.comparison_page import _distances, _intervals, comparison_document, verdict
+from algid.report.frame import page
 from algid.results import Result, write_result
 from tests.cli.commands import app
 from tests.report.folders import HOSTILE
@@ -71,6 +72,6 @@ def test_the_command_writes_the_page(result: Result, tmp_path: Path) -> None:
 
 def test_a_name_that_attacks_stays_text(result: Result) -> None:
     results = [result, _moved(result, 1.0)]
-    page = comparison_html(compare(results, [HOSTILE, "b"]), results)
-    assert "<img" not in page
-    assert page.count("<script") == 3
+    text = page(comparison_document(compare(results, [HOSTILE, "b"]), results))
+    assert "<img" not in text
+    assert text.count("<script") == 3

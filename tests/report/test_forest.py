@@ -6,8 +6,7 @@ import re
 
 import pytest
 
-from algid.report.bars import bars
-from algid.report.forest import EDGE, WIDTH, forest
+from algid.report.drawings import EDGE, WIDTH, bars, forest
 from algid.results import Estimate
 
 GROUP = {

@@ -21,12 +21,12 @@ from algid.arm import FloatArray
 from algid.errors import ResultError
 from algid.report.figures.base import Figure, Missing
 from algid.report.figures.timeline import views
-from algid.report.frame import banner
+from algid.report.frame import library
 from algid.report.gallery import gallery
-from algid.report.html import escaped, script_json
-from algid.report.library import library
+from algid.report.html import banner
 from algid.report.page import page_html, write_report
 from algid.report.series import LogRange, read_torque
+from algid.report.text import escaped, script_json
 from algid.report.verdict import Verdict
 from algid.results import Estimate, Result, Status, TermCriterion, read_result, write_result
 from tests.report.folders import HOSTILE, hostile
@@ -318,10 +318,10 @@ def test_what_was_tried_stands_second_with_what_it_gains(folder: Path, result: R
 
 
 def test_a_reason_that_the_verdict_tells_is_not_listed_again() -> None:
-    told = "With reservations: k1 is known, but k2 is singular."
+    told = "k1 is known, but k2 is singular"
     one = Verdict("reservations", told, ("k2 is singular", "it jitters"))
     assert one.untold == ("it jitters",)
     assert banner(one).count("k2 is singular") == 1
     cause = "θ1 is zero hanging; use --zero hanging"
-    other = Verdict("failed", "Failed: M is not positive.", (f"algid warns: a.csv: {cause}", "it jitters"), cause)
+    other = Verdict("failed", "M is not positive", (f"algid warns: a.csv: {cause}", "it jitters"), cause)
     assert other.untold == ("it jitters",)

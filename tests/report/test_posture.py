@@ -8,10 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from algid.report.arm import ArmDrawing, arm_html
-from algid.report.posture import arm_of
-from algid.report.series import read_torque
+from algid.report.arm import ArmDrawing, arm_html, arm_of
+from algid.report.series import TorqueLog, read_torque
 from algid.results import Estimate, Result
+
+
+def drawn(result: Result, torque: TorqueLog) -> str:
+    """The drawing of the arm of that result."""
+    arm = arm_of(result, torque)
+    assert arm is not None
+    return arm_html(arm)
 
 
 def links(drawing: str) -> tuple[float, float]:
@@ -23,22 +29,22 @@ def links(drawing: str) -> tuple[float, float]:
 def test_links_are_as_long_as_the_payload_tells_or_as_the_constants_do(result: Result, case_folder: Path) -> None:
     torque = read_torque(case_folder / "torque.parquet")
     known = {name: Estimate(estimate=value, unit="m") for name, value in (("l1", 0.3), ("l2", 0.2))}
-    assert links(arm_of(result.model_copy(update={"payload": known}), torque)) == (0.3, 0.2)
+    assert links(drawn(result.model_copy(update={"payload": known}), torque)) == (0.3, 0.2)
     k1, k2 = (Estimate(estimate=value, unit="") for value in (0.2, 9.81 * 0.2 / 0.25))
     bare = {"payload": {}, "settings": {"gravity": 9.81}, "parameters": {**result.parameters, "k1": k1, "k2": k2}}
-    drawing = arm_of(result.model_copy(update=bare), torque)
+    drawing = drawn(result.model_copy(update=bare), torque)
     assert links(drawing)[0] == pytest.approx(0.25)  # l1 = g k1 / k2
     assert "not known" in drawing
     upside_down = k2.model_copy(update={"estimate": -7.0})
     bare["parameters"] = {**result.parameters, "k1": k1, "k2": upside_down}
-    assert arm_of(result.model_copy(update=bare), torque) == ""
-    assert arm_of(result, None) == ""
+    assert arm_of(result.model_copy(update=bare), torque) is None
+    assert arm_of(result, None) is None
 
 
 def test_the_arm_stands_as_the_log_begins(result: Result, case_folder: Path) -> None:
     torque = read_torque(case_folder / "torque.parquet")
     known = {name: Estimate(estimate=0.5, unit="m") for name in ("l1", "l2")}
-    drawing = arm_of(result.model_copy(update={"payload": known}), torque)
+    drawing = drawn(result.model_copy(update={"payload": known}), torque)
     turned = re.search(r'class="link1" transform="rotate\(([-\d.]+)\)"', drawing)
     assert turned is not None
     first = torque.series[0]["theta1"][1]
@@ -48,7 +54,7 @@ def test_the_arm_stands_as_the_log_begins(result: Result, case_folder: Path) -> 
 def test_the_drawing_holds_the_arm_all_along_its_motion_and_its_limit_and_little_more() -> None:
     t = np.linspace(0.0, 4.0, 200)
     hanging = np.stack([-np.pi / 2 + 0.3 * np.sin(3 * t), 0.4 * np.cos(2 * t)])
-    drawing = arm_html(ArmDrawing("arm", 0.3, 0.2, t, hanging, height=-0.6), "The arm", "Read it.")
+    drawing = arm_html(ArmDrawing(0.3, 0.2, t, hanging, "Read it.", height=-0.6))
     box = re.search(r'viewBox="([-\d.e]+) ([-\d.e]+) ([-\d.e]+) ([-\d.e]+)"', drawing)
     assert box is not None
     left, top, width, height = map(float, box.groups())

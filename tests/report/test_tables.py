@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
+from algid.report.document import Table
 from algid.report.markdown import escaped, markdown
-from algid.report.page import FIRST, TOLD_ELSEWHERE, page_html, write_report
-from algid.report.table import Table
+from algid.report.page import FIRST, TOLD_ELSEWHERE, page_html, result_document, write_report
 from algid.report.tables import estimate_tables, flat_settings, log_tables, settings_table
-from algid.report.terminal import print_table
+from algid.report.terminal import print_document
 from algid.report.text import digits_of, resolved, significant
 from algid.results import Estimate, Result, Status, TorquePrediction, result_json
 from tests.report.folders import estimate, hostile
@@ -21,7 +21,7 @@ from tests.report.folders import estimate, hostile
 
 def terminal(result: Result, width: int = 200, **options: object) -> str:
     stream = io.StringIO()
-    print_table(result, Console(file=stream, width=width, **options))  # type: ignore[arg-type]
+    print_document(result_document(result), Console(file=stream, width=width, **options))  # type: ignore[arg-type]
     return stream.getvalue()
 
 
@@ -54,7 +54,7 @@ def test_every_format_shows_the_same_digits_and_json_holds_them(result: Result, 
     first = [list(row) for row in parameters.without(TOLD_ELSEWHERE).rows]
     page = from_html(write_report(case_folder, shared_library=True).read_text(encoding="utf-8"))
     assert [row for row in page if row in first][: len(first)] == first
-    assert from_markdown(markdown(result))[1 : 1 + len(expected)] == expected
+    assert from_markdown(markdown(result_document(result)))[1 : 1 + len(expected)] == expected
     assert from_terminal(terminal(result), "Parameters") == expected
     stored = json.loads(result_json(result))["parameters"]
     for name, shown, std, *_ in expected:
@@ -66,7 +66,7 @@ def test_every_format_shows_the_same_digits_and_json_holds_them(result: Result, 
 
 def test_every_table_reaches_html_and_markdown_alike(result: Result, case_folder: Path) -> None:
     page = from_html(write_report(case_folder).read_text(encoding="utf-8"))
-    text = from_markdown(markdown(result))
+    text = from_markdown(markdown(result_document(result)))
     for table in estimate_tables(result):
         first = table.without(TOLD_ELSEWHERE) if table.title in FIRST else table
         for made, found in ((first, page), (table, text)):
@@ -102,7 +102,7 @@ def test_cross_validation_stands_beside_the_residual_in_every_format(result: Res
     changed = result.model_copy(update={"fit": result.fit.model_copy(update={"cross_validation": crossed})})
     expected = ["each log by the others", "1", "0.250", "50.0", "0.75000"]
     assert expected in from_terminal(terminal(changed), "Torque prediction")
-    assert expected in from_markdown(markdown(changed))
+    assert expected in from_markdown(markdown(result_document(changed)))
     assert expected in from_html(page_html(case_folder, changed))
 
 
@@ -134,10 +134,10 @@ def test_settings_are_flat_and_plain() -> None:
 
 
 def test_channels_name_a_log_only_where_they_differ(result: Result) -> None:
-    channels = log_tables(result)[1]
+    channels = log_tables(result.logs)[1]
     assert {row[2] for row in channels.rows} == {"all logs"}
     other = result.more_logs[0].model_copy(update={"mapping": {"theta1": "q1"}})
-    differing = log_tables(result.model_copy(update={"more_logs": [other]}))[1]
+    differing = log_tables(result.model_copy(update={"more_logs": [other]}).logs)[1]
     assert differing.rows[-1] == ("theta1", "q1", "case1-loaded.mcap")
 
 
@@ -166,10 +166,10 @@ def test_where_nothing_can_be_dropped_cells_fold(result: Result) -> None:
 
 
 def test_foreign_text_is_neither_markup_nor_escape_sequence(result: Result) -> None:
-    text = terminal(hostile(result)) + markdown(hostile(result))
+    text = terminal(hostile(result)) + markdown(result_document(hostile(result)))
     assert "\x1b" not in text
     assert "\u202e" not in text
-    shown = markdown(hostile(result))
+    shown = markdown(result_document(hostile(result)))
     assert not re.search(r"(?<!\\)<(?!/?(details|summary)>)", shown)
     assert "\n```" not in shown
     assert "\\@everyone" in shown

@@ -7,15 +7,15 @@ import io
 import pytest
 from rich.console import Console
 
-from algid.report.table import Column, Table
+from algid.report.document import Column, Table
 from algid.report.tables import ESTIMATE_COLUMNS
-from algid.report.terminal import print_one
+from algid.report.terminal import print_table
 
 
 def printed(table: Table, width: int) -> str:
     """The table on a terminal of that width."""
     console = Console(file=io.StringIO(), width=width)
-    print_one(table, console)
+    print_table(table, console)
     assert isinstance(console.file, io.StringIO)
     text = console.file.getvalue()
     assert max(map(len, text.splitlines())) <= width

@@ -3,11 +3,12 @@ from __future__ import annotations
 import pytest
 from rich.console import Console
 
-from algid.report.document import result_document
+from algid.report.document import Depth
 from algid.report.html import table_html
 from algid.report.markdown import markdown
+from algid.report.page import result_document
 from algid.report.tables import estimate_tables
-from algid.report.terminal import print_table
+from algid.report.terminal import print_document
 from algid.report.verdict import verdict
 from algid.results import Bound, Cause, Estimate, Result, Status, TorquePrediction, WhitenessTest
 from tests.report.folders import estimate
@@ -171,20 +172,23 @@ def test_nothing_of_a_failed_result_is_green(result: Result) -> None:
     failed = with_fit(result, residual=poor)
     for shown, green in ((result, True), (failed, False)):
         with console.capture() as printed:
-            print_table(shown, console)
+            print_document(result_document(shown), console)
         assert ("\x1b[32mOK" in printed.get()) is green
         assert ('class="status ok"' in "".join(map(table_html, estimate_tables(shown)))) is green
-    assert "✅" not in markdown(failed)
+    assert "✅" not in markdown(result_document(failed))
 
 
 def test_one_document_holds_what_every_format_shows(result: Result) -> None:
     made = result_document(result)
     console = Console(width=200)
     with console.capture() as printed:
-        print_table(result, console)
+        print_document(made, console)
     shown = printed.get()
-    text = markdown(result)
-    for table in (*made.tables, *made.more, *made.details):
-        assert f"**{table.title}**" in text
-        assert (table.title in shown) is (table in made.tables)
+    text = markdown(made)
+    folded = text.partition("<details>")[2]
+    for table in made.tables(*Depth):
+        assert (f"**{table.title}**" in text) is (table.depth <= Depth.FOLDED)
+        assert (f"**{table.title}**" in folded) is (table.depth is Depth.FOLDED)
+        assert (table.title in shown) is (table.depth is Depth.TERMINAL)
+    assert {table.depth for table in made.tables(*Depth)} == set(Depth)
     assert made.verdict.sentence.partition(":")[0] in shown

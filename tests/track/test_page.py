@@ -20,10 +20,12 @@ from typer.testing import CliRunner
 import algid
 from algid.errors import ResultError
 from algid.identification.identify import identify
+from algid.report.frame import page
+from algid.report.markdown import markdown
 from algid.report.verdict import Verdict
 from algid.synth.sensors import Sensors
 from algid.track.figures import figures
-from algid.track.page import markdown, page_html, write_track
+from algid.track.page import track_document, write_track
 from algid.track.payload import Stretch
 from algid.track.read import read_track
 from algid.track.result import StretchStatus, TrackResult, track_json
@@ -71,9 +73,10 @@ def test_the_sentence_tells_changes_and_masses(result: TrackResult) -> None:
 
 def test_every_format_shows_the_same_digits(result: TrackResult) -> None:
     rows = [*stretch_table(result).rows, *change_table(result).rows]
-    page, text = page_html(result), markdown(result).replace("\\", "")
+    document = track_document(result)
+    shown, text = page(document), markdown(document).replace("\\", "")
     for cell in {cell for row in rows for cell in row}:
-        assert f">{cell}<" in page
+        assert f">{cell}<" in shown
         assert f" {cell} |" in text
     for row, stretch in zip(rows, json.loads(track_json(result))["stretches"], strict=False):
         assert row[3] == fixed(stretch["m_p"], stretch["std"])
@@ -165,7 +168,7 @@ def test_the_arm_of_another_log_is_told(files: tuple[Path, Path], tmp_path: Path
 
 def test_names_that_attack_stay_text(result: TrackResult) -> None:
     hostile = replace(result, arm=HOSTILE, log=result.log.model_copy(update={"path": HOSTILE}), warnings=(HOSTILE,))
-    own = re.sub(r"<(script|style)[^>]*>.*?</\1>", "", page_html(hostile), flags=re.DOTALL)
+    own = re.sub(r"<(script|style)[^>]*>.*?</\1>", "", page(track_document(hostile)), flags=re.DOTALL)
     assert "<img" not in own
     assert "<script" not in own
 
@@ -197,9 +200,9 @@ def browser() -> Iterator[Browser]:
 @pytest.mark.parametrize(("width", "dark"), [(1400, False), (400, True)])
 def test_the_page_is_drawn_whole(browser: Browser, result: TrackResult, tmp_path: Path, width: int, dark: bool) -> None:
     write_track(result, tmp_path)
-    page = tmp_path / "report.html"
-    seen = browser.look(page, width, dark)
-    assert_sound(seen, page, "picking.mcap · algid")
+    path = tmp_path / "report.html"
+    seen = browser.look(path, width, dark)
+    assert_sound(seen, path, "picking.mcap · algid")
     assert seen.drawn == 2
 
 
@@ -254,7 +257,7 @@ def test_what_a_track_cannot_explain_is_told_by_how_much(result: TrackResult) ->
     assert wider.reasons[0].startswith("the torque holds errors 3.0 times its sensors' noise")
     lost = verdict(replace(result, data_lost=True, arm_sentence="Failed: no."))
     assert lost.reasons == ("samples of the log are lost", "the arm's own result says: Failed: no.")
-    assert lost.sentence.endswith(", but samples of the log are lost, and 1 more reason below.")
+    assert lost.sentence.endswith(", but samples of the log are lost, and there is one more reason below.")
 
 
 def test_one_stretch_and_many_are_told_in_words(result: TrackResult) -> None:
