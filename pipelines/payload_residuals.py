@@ -31,7 +31,8 @@ from algid.estimators.prediction import PredictionFilter, motion_of
 from algid.estimators.selection import select
 from algid.estimators.weak import Source, WeakSettings
 from algid.identification.by_likelihood import choose_model, run_fit
-from algid.identification.source import LogSource, Survey, open_sources
+from algid.identification.source import LogSource, open_sources
+from algid.identification.survey import Survey
 from algid.log import Log, Notice, Origin
 from algid.model import torque
 from algid.readers import open_log

@@ -40,7 +40,8 @@ def validate(
     Example: algid validate run1-unloaded.algid run2-unloaded.mcap --max-nrmse 0.3
     """
     from algid.identification.identify import reused
-    from algid.identification.source import Survey, open_sources, read_otherwise
+    from algid.identification.source import open_sources, read_otherwise
+    from algid.identification.survey import Survey
     from algid.identification.validate import predictor_of
     from algid.identification.validate import simulate as roll
     from algid.identification.validate import validate as judge

@@ -13,8 +13,7 @@ from algid.design.belief import SURE, Belief
 from algid.errors import ResultError, SettingError
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
-from algid.identification.by_likelihood import model_of
-from algid.identification.lengths import contradictions, has_error_bar
+from algid.identification.known import contradictions, has_error_bar, model_of
 from algid.model import TERMS, Model
 from algid.report.text import joined
 from algid.results import Result, read_result

@@ -18,9 +18,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.errors import ResultError, SettingError
 from algid.export.links import Knowns, Link, links_of
-from algid.identification.by_likelihood import model_of
-from algid.identification.lengths import contradictions, first_length, has_error_bar
-from algid.identification.validate import torque_constants
+from algid.identification.known import contradictions, first_length, has_error_bar, model_of, torque_constants
 from algid.model import TERMS, UNITS, Model
 from algid.report.text import joined
 from algid.results import Estimate, Result, Status

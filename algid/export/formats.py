@@ -11,7 +11,7 @@ from algid.export.description import Description, describe
 from algid.export.links import Knowns
 from algid.export.programs import c99, python_module
 from algid.export.robots import mjcf, sdf, urdf
-from algid.identification.lengths import contradictions
+from algid.identification.known import contradictions
 from algid.results import Result, Status
 
 

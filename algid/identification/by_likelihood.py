@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from algid.errors import LogError, ResultError
+from algid.errors import LogError
 from algid.estimators import instruments, refined, weak
 from algid.estimators.combine import Prior
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, constrained
@@ -17,8 +17,10 @@ from algid.estimators.hedged import hedged
 from algid.estimators.innovations import ResidualSums, pooled
 from algid.estimators.prediction import PredictionSums, cross_validate
 from algid.estimators.selection import CHOICE, Selection, needs_shape, select
+from algid.identification.known import model_of
 from algid.identification.series import torque_coefficients
-from algid.identification.source import LogSource, Survey
+from algid.identification.source import LogSource
+from algid.identification.survey import Survey
 from algid.identification.velocities import with_velocities
 from algid.model import TERMS, Model
 from algid.results import Result
@@ -191,15 +193,6 @@ def _foretelling(
     return replace(other, note=fit.note and fit.note.replace("weak estimate", "estimate by instruments"))
 
 
-def model_of(result: Result) -> Model:
-    """The torque's model behind a result; a result that names none was made with what its settings ask for."""
-    settings = Settings.of(result.settings)
-    found = None if result.fit is None else result.fit.model
-    if found is None:
-        return _given(Model(gravity=settings.gravity), settings.terms).model
-    return Model(tuple(found.terms), settings.gravity, found.coulomb_speed, found.stribeck_speed)
-
-
 def _weak_settings(settings: Settings, chosen: Selection) -> weak.WeakSettings:
     own_velocities = settings.velocity == "measured" or settings.luenberger
     ours = weak.WeakSettings(
@@ -241,29 +234,3 @@ def _scored(
     yield from beside(moving(), gathered.push)
     gathered.finish()
     sums[log] = gathered
-
-
-def prior_of(result: Result, model: Model, file: str | None = None) -> Prior:
-    """What an earlier result knows of the arm's `model`; where it is wrong, its `file` is named, or its log.
-
-    Raises
-    ------
-    ResultError
-        If its estimator gives no error bars, or it does not determine all constants of the model.
-    """
-    file = file or result.log.path
-    if result.fit is None:
-        raise ResultError(
-            f"{file}: the result of --estimator {result.estimator} has no error bars; "
-            "identify with --estimator refined or weak, or use --estimator paper here too"
-        )
-    known = set(result.fit.covariance_names) & set(result.parameters)
-    missing = [name for name in model.names if name not in known]
-    if missing:
-        raise ResultError(f"{file}: the result has no {', '.join(missing)}; use the flags it was made with")
-    places = [result.fit.covariance_names.index(name) for name in model.names]
-    covariance = np.array(result.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
-    mean = np.array([result.parameters[name].estimate for name in model.names], dtype=np.float64)
-    if not (np.isfinite(covariance).all() and np.isfinite(mean).all()):
-        raise ResultError(f"{file}: the result leaves constants undetermined; identify from more logs first")
-    return Prior.of(model.names, mean, covariance)

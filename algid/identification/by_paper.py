@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +24,8 @@ from algid.estimators.paper import (
 )
 from algid.identification.outcome import Identified, distrusted
 from algid.identification.series import series_blocks, write_columns
-from algid.identification.source import LogSource, Survey
+from algid.identification.source import LogSource
+from algid.identification.survey import Survey
 from algid.identification.velocities import with_velocities
 from algid.results import Estimate, Status
 from algid.settings import Settings
@@ -81,16 +82,27 @@ def _estimate(
     survey: Survey, log: LogSource, settings: Settings, k: FloatArray | None, folder: Path | None
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
     """Estimates from one log's series, how far they wander, and which can be used; writes the series on the way."""
-    names = STAGE1_SERIES if k is None else STAGE2_SERIES
+    window = settings.window if settings.window is not None and settings.estimator == "paper" else STAGE1_WINDOW
+    moving = with_velocities(survey, log, settings, luenberger=settings.luenberger or settings.estimator != "paper")
+    names: Sequence[str] = STAGE1_SERIES if k is None else STAGE2_SERIES
+    series = stage1_series(moving, window) if k is None else stage2_series(moving, window, k, settings.gravity)
     summary = Summary(len(names))
-    series = _series(survey, log, settings, k)
-    watched = _watched(series, summary)
+
+    def watched() -> Iterator[PaperSeries]:
+        for one in series:
+            summary.add(one)
+            yield one
+
     if folder is None:
-        for _ in watched:
+        for _ in watched():
             pass
     else:
-        path = folder / (STAGE1_FILE if k is None else STAGE2_FILE)
-        write_columns(path, _written(watched, names), [survey.seen(log).first_ns])
+        # the sum k5+k3 is Table 4's and follows from the others
+        columns = (
+            {name: column for name, column in block.items() if name != "k5+k3"}
+            for block in series_blocks(watched(), names)
+        )
+        write_columns(folder / (STAGE1_FILE if k is None else STAGE2_FILE), columns, [survey.seen(log).first_ns])
     duration = survey.summary(log).duration
     if duration < SHORTEST - 1e-9:
         raise LogError(
@@ -107,26 +119,6 @@ def _is_no_arm(k: FloatArray, wander: FloatArray) -> bool:
         return True
     m11, m12, m22 = mass_matrix(k, np.array([[0.0, 0.0], [0.0, np.pi]]))
     return bool(np.any(m22 <= 0) or np.any(m11 * m22 - m12**2 <= 0))
-
-
-def _series(survey: Survey, log: LogSource, settings: Settings, k: FloatArray | None) -> Iterator[PaperSeries]:
-    window = settings.window if settings.window is not None and settings.estimator == "paper" else STAGE1_WINDOW
-    moving = with_velocities(survey, log, settings, luenberger=settings.luenberger or settings.estimator != "paper")
-    if k is None:
-        return stage1_series(moving, window)
-    return stage2_series(moving, window, k, settings.gravity)
-
-
-def _watched(series: Iterable[PaperSeries], summary: Summary) -> Iterator[PaperSeries]:
-    for window in series:
-        summary.add(window)
-        yield window
-
-
-def _written(series: Iterable[PaperSeries], names: Sequence[str]) -> Iterator[dict[str, FloatArray]]:
-    """Columns for the file; the sum k5+k3 is Table 4's and follows from the others."""
-    for block in series_blocks(series, names):
-        yield {name: column for name, column in block.items() if name != "k5+k3"}
 
 
 def _named(

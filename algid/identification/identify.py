@@ -16,8 +16,9 @@ from algid.files import remove_stale, result_folder, whole_folder
 from algid.identification.by_paper import run_paper
 from algid.identification.outcome import Identified
 from algid.identification.series import write_fit_series
-from algid.identification.source import LogLike, LogSource, Survey, open_sources, read_otherwise, tell_twins
+from algid.identification.source import LogLike, LogSource, open_sources, read_otherwise, tell_twins
 from algid.identification.summary import result_of
+from algid.identification.survey import Survey
 from algid.progress import Told
 from algid.results import Result, read_result, write_result
 from algid.runtime import one_blas_thread
@@ -180,13 +181,13 @@ def _by_the_paper(survey: Survey, settings: Settings, earlier: Earlier | None, f
 def _by_likelihood(survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None) -> Identified:
     from algid.identification.by_likelihood import (
         choose_model,
-        prior_of,
         residual_of,
         run_fit,
         with_endogeneity,
         with_hedge,
         without_nothing,
     )
+    from algid.identification.known import prior_of
     from algid.identification.outcome import outcome_of
 
     survey.begin("choosing terms")

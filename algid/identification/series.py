@@ -19,7 +19,7 @@ from algid.estimators.noise import first_guess
 from algid.estimators.paper import PaperSeries
 from algid.estimators.prediction import PredictionFilter
 from algid.estimators.running import has_running, running
-from algid.identification.source import Survey
+from algid.identification.survey import Survey
 from algid.model import Model, Motion, torque
 from algid.settings import Settings
 from algid.signals.filters import half_length, smoothed

@@ -9,7 +9,8 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.errors import LogError
-from algid.identification.source import LogSource, Survey
+from algid.identification.source import LogSource
+from algid.identification.survey import Survey
 from algid.settings import Settings
 from algid.signals.filters import correlate, differentiator, half_length
 from algid.signals.observers import PAPER_POLES, LuenbergerObserver
@@ -24,40 +25,27 @@ def with_velocities(survey: Survey, log: LogSource, settings: Settings, *, luenb
     LogError
         If measured velocities are asked for and the log has none.
     """
-    if settings.velocity == "measured":
-        return _measured(survey.segments(log), log.name)
-    if luenberger:
-        return _observed(survey.segments(log), settings)
-    return _differentiated(survey.segments(log), settings)
-
-
-def _measured(segments: Iterator[Segment], name: str) -> Iterator[Segment]:
-    for segment in segments:
-        if segment.omega is None:
-            raise LogError(
-                f"{name}: expected velocities omega1, omega2 for --velocity measured, found none; "
-                "leave the flag out to observe them"
-            )
-        yield segment
-
-
-def _observed(segments: Iterator[Segment], settings: Settings) -> Iterator[Segment]:
     observer: LuenbergerObserver | None = None
-    for segment in segments:
-        observer = observer or LuenbergerObserver(segment.dt, settings.poles or PAPER_POLES)
-        if not segment.continues:
-            observer.reset()
-        yield replace(segment, omega=observer.velocities(segment.theta))
-
-
-def _differentiated(segments: Iterator[Segment], settings: Settings) -> Iterator[Segment]:
     filters: _Differentiator | None = None
-    for segment in segments:
-        if filters is not None and not segment.continues:
-            yield from filters.finish()
-            filters = None
-        filters = filters or _Differentiator(segment.dt, settings.bandwidth)
-        yield from filters.push(segment)
+    for segment in survey.segments(log):
+        if settings.velocity == "measured":
+            if segment.omega is None:
+                raise LogError(
+                    f"{log.name}: expected velocities omega1, omega2 for --velocity measured, found none; "
+                    "leave the flag out to observe them"
+                )
+            yield segment
+        elif luenberger:
+            observer = observer or LuenbergerObserver(segment.dt, settings.poles or PAPER_POLES)
+            if not segment.continues:
+                observer.reset()
+            yield replace(segment, omega=observer.velocities(segment.theta))
+        else:
+            if filters is not None and not segment.continues:
+                yield from filters.finish()
+                filters = None
+            filters = filters or _Differentiator(segment.dt, settings.bandwidth)
+            yield from filters.push(segment)
     if filters is not None:
         yield from filters.finish()
 

@@ -28,7 +28,7 @@ from algid.arm import FloatArray, payload_constants
 from algid.errors import ResultError
 from algid.estimators.noise import first_guess
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
-from algid.identification.by_likelihood import model_of, prior_of
+from algid.identification.known import model_of, prior_of, shift_of
 from algid.model import Model
 from algid.results import Result
 from algid.signals.differences import POINTS, Stencil
@@ -111,20 +111,19 @@ def joined(parts: Sequence[Cells]) -> Cells:
 
 def cells_of(segments: Iterable[Segment], arm: IdentifiedArm, mass: float, settle: int = 1) -> list[Cells]:
     """Cells of each piece of a log, linearised at a payload of `mass` kg and, `settle` times, at its trajectory."""
-    long_enough = (piece for piece in pieces(segments, _PIECE_SAMPLES) if len(piece) >= 3 * POINTS)
-    return [_cells(piece, arm, mass, settle) for piece in long_enough]
-
-
-def _cells(piece: Segment, arm: IdentifiedArm, mass: float, settle: int) -> Cells:
-    c = arm.k + mass * arm.unit
-    stencil = Stencil(piece.dt, arm.shift)
-    theta = smoothed(piece.theta, piece.dt, min(_SMOOTHING, 0.1 / piece.dt))
-    linear = linearise(arm.model, c, theta, piece, stencil, arm.noise)
-    for _ in range(settle):
-        multiplier = linear.solve_transposed(linear.columns[-1:])[0]
-        theta = trajectory(piece, linear, multiplier, arm.noise)
+    c, found = arm.k + mass * arm.unit, []
+    for piece in pieces(segments, _PIECE_SAMPLES):
+        if len(piece) < 3 * POINTS:
+            continue
+        stencil = Stencil(piece.dt, arm.shift)
+        theta = smoothed(piece.theta, piece.dt, min(_SMOOTHING, 0.1 / piece.dt))
         linear = linearise(arm.model, c, theta, piece, stencil, arm.noise)
-    return _sums(linear, piece, stencil, arm, mass)
+        for _ in range(settle):
+            multiplier = linear.solve_transposed(linear.columns[-1:])[0]
+            theta = trajectory(piece, linear, multiplier, arm.noise)
+            linear = linearise(arm.model, c, theta, piece, stencil, arm.noise)
+        found.append(_sums(linear, piece, stencil, arm, mass))
+    return found
 
 
 def _sums(linear: Linearised, piece: Segment, stencil: Stencil, arm: IdentifiedArm, mass: float) -> Cells:
@@ -170,18 +169,22 @@ def arm_of(
         )
     model = model_of(result)
     prior = prior_of(result, model)
-    names = [*prior.names, *(n for n, given in (("l1", l1), ("l2", l2)) if given is None and _free(result, n))]
-    places = [result.fit.covariance_names.index(name) for name in names]
+    fitted = result.fit.covariance_names
+    names = [*prior.names, *(n for n, given in (("l1", l1), ("l2", l2)) if given is None and n in fitted)]
+    places = [fitted.index(name) for name in names]
     rows = [(*prior.names, "l1", "l2").index(name) for name in names]
     covariance = np.zeros((len(prior.names) + 2,) * 2)
     covariance[np.ix_(rows, rows)] = np.array(result.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
+    noise = [result.fit.noise.get(name, 0.0) for name in ("theta1", "theta2", "tau1", "tau2")]
     known = IdentifiedArm(
         model,
         prior.mean,
         _length(result, "l1", l1),
         _length(result, "l2", l2),
-        _noise(result, first),
-        _shift(result, first.dt),
+        NoiseLevels(np.array(noise[:2]), np.array(noise[2:]))
+        if min(noise) > 0
+        else first_guess(first.theta, first.tau),
+        shift_of(result)(first.dt),
     )
     return known, covariance
 
@@ -192,23 +195,3 @@ def _length(result: Result, name: str, given: float | None) -> float:
     if found is None:
         raise ResultError(f"{result.log.path}: its result has no {name}; give the link's length with --{name}")
     return float(found)
-
-
-def _free(result: Result, name: str) -> bool:
-    return result.fit is not None and name in result.fit.covariance_names
-
-
-def _noise(result: Result, first: Segment) -> NoiseLevels:
-    noise = {} if result.fit is None else result.fit.noise
-    if not all(noise.get(name, 0) > 0 for name in ("theta1", "theta2", "tau1", "tau2")):
-        return first_guess(first.theta, first.tau)
-    return NoiseLevels(np.array([noise["theta1"], noise["theta2"]]), np.array([noise["tau1"], noise["tau2"]]))
-
-
-def _shift(result: Result, dt: float) -> float:
-    """After how long a logged torque acts: the hold's half sample and the delay, in s."""
-    delay = result.settings.get("delay") or 0.0
-    if delay == "estimate":
-        found = result.parameters.get("delay")
-        delay = 0.0 if found is None or found.estimate is None else found.estimate
-    return float(delay) + (0.5 * dt if result.settings.get("torque_hold") == "zoh" else 0.0)

@@ -12,7 +12,8 @@ from algid import __version__
 from algid.errors import LogError
 from algid.files import read_whole
 from algid.identification.identify import reused
-from algid.identification.source import LogLike, Survey, open_source, read_otherwise
+from algid.identification.source import LogLike, open_source, read_otherwise
+from algid.identification.survey import Survey
 from algid.report.verdict import verdict
 from algid.results import read_result
 from algid.runtime import one_blas_thread

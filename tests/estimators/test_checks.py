@@ -23,7 +23,7 @@ from algid.estimators.identifiability import examine, sizes
 from algid.estimators.parametrisation import Shared
 from algid.estimators.prediction import cross_validate, motion_of, score
 from algid.estimators.weak import Source, WeakSettings
-from algid.identification.outcome import fit_warnings
+from algid.identification.sentences import fit_warnings
 from algid.model import Model
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case

@@ -9,12 +9,13 @@ import pytest
 
 import algid
 from algid.arm import FloatArray
-from algid.identification import source
+from algid.identification import survey as surveys
 from algid.identification.by_likelihood import choose_model, run_fit
 from algid.identification.by_paper import run_paper
 from algid.identification.outcome import outcome_of
-from algid.identification.source import LogSource, Survey, open_source
+from algid.identification.source import LogSource, open_source
 from algid.identification.summary import result_of
+from algid.identification.survey import Survey
 from algid.log import Log
 from algid.results import Result
 from algid.settings import Settings
@@ -80,7 +81,7 @@ def test_blocks_do_not_show_in_the_estimates(name: str, uneven: Log) -> None:
 def test_logs_that_fit_in_memory_are_read_once(
     room: int, readings: int, uneven: Log, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(source, "MOST_KEPT", room)
+    monkeypatch.setattr(surveys, "MOST_KEPT", room)
     begun: list[int] = []
     log = chopped(uneven, 5000)
     counting = replace(log, blocks=lambda: begun.append(1) or log.blocks())  # type: ignore[func-returns-value]

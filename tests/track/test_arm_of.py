@@ -105,6 +105,15 @@ def test_the_torque_acts_after_its_delay_and_half_its_hold(result: Result, first
     assert arm_of(estimated, first)[0].shift == 0.007
 
 
+def test_a_delay_that_the_logs_chose_shifts_the_torque_as_one_that_was_asked_for(
+    result: Result, first: Segment
+) -> None:
+    delay = result.parameters["k1"].model_copy(update={"estimate": 0.007, "unit": "s"})
+    chosen = result.model_copy(update={"parameters": {**result.parameters, "delay": delay}})
+    assert chosen.settings["delay"] == 0.0
+    assert arm_of(chosen, first)[0].shift == 0.007
+
+
 def test_what_the_log_tells_stands_in_the_track(weighed: Path, picking: algid.Log, tmp_path: Path) -> None:
     log = noisy(picking, np.random.default_rng(4))
     write_log(tmp_path / "log.mcap", log, truth=log.origin.truth)

@@ -1,0 +1,122 @@
+"""What an earlier result knows of its arm: model, constants and their prior, when its torque acts, link lengths."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+
+import numpy as np
+
+from algid.arm import FloatArray, payload_constants, with_payload
+from algid.errors import ResultError
+from algid.estimators.combine import Prior
+from algid.identification.source import Role
+from algid.model import Model
+from algid.results import Result, Status
+from algid.settings import Settings
+
+FAR = 5.0  # standard deviations beyond which two statements contradict each other
+
+
+def model_of(result: Result) -> Model:
+    """The torque's model behind a result; a result that names none was made with what its settings ask for."""
+    settings = Settings.of(result.settings)
+    found = None if result.fit is None else result.fit.model
+    if found is None:
+        return Model(tuple(term for term in settings.terms if term != "delay"), settings.gravity)
+    return Model(tuple(found.terms), settings.gravity, found.coulomb_speed, found.stribeck_speed)
+
+
+def shift_of(result: Result) -> Callable[[float], float]:
+    """Time in s after which a logged torque acts, for the time between samples: hold, and delay set or found."""
+    delay = result.parameters.get("delay")
+    found = None if delay is None else delay.estimate
+    return partial(Settings.of(result.settings).torque_shift, found_delay=found)
+
+
+def prior_of(result: Result, model: Model, file: str | None = None) -> Prior:
+    """What an earlier result knows of the arm's `model`; where it is wrong, its `file` is named, or its log.
+
+    Raises
+    ------
+    ResultError
+        If its estimator gives no error bars, or it does not determine all constants of the model.
+    """
+    file = file or result.log.path
+    if result.fit is None:
+        raise ResultError(
+            f"{file}: the result of --estimator {result.estimator} has no error bars; "
+            "identify with --estimator refined or weak, or use --estimator paper here too"
+        )
+    known = set(result.fit.covariance_names) & set(result.parameters)
+    missing = [name for name in model.names if name not in known]
+    if missing:
+        raise ResultError(f"{file}: the result has no {', '.join(missing)}; use the flags it was made with")
+    places = [result.fit.covariance_names.index(name) for name in model.names]
+    covariance = np.array(result.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
+    mean = np.array([result.parameters[name].estimate for name in model.names], dtype=np.float64)
+    if not (np.isfinite(covariance).all() and np.isfinite(mean).all()):
+        raise ResultError(f"{file}: the result leaves constants undetermined; identify from more logs first")
+    return Prior.of(model.names, mean, covariance)
+
+
+def torque_constants(result: Result, model: Model, role: Role, file: str) -> FloatArray:
+    """Coefficients of the model's columns for a log of that role, from the result of that file.
+
+    Raises
+    ------
+    ResultError
+        If one of them has no estimate.
+    """
+    values = {name: found.estimate for name, found in {**result.parameters, **result.payload}.items()}
+    wanted = [*model.names, *(("m_p", "l1", "l2") if role == "loaded" else ())]
+    values |= {name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None}
+    missing = next((name for name in wanted if values.get(name) is None), None)
+    if missing is not None:
+        raise ResultError(f"{file}: the result has no {missing}; identify it from logs that tell it")
+    known = {name: float(value) for name, value in values.items() if value is not None}
+    if role == "loaded":
+        z = payload_constants(known["m_p"], known["l1"], known["l2"], model.gravity)
+        k = with_payload(np.array([known.get(f"k{number}", 0.0) for number in range(1, 8)]), z)
+        known |= {f"k{number + 1}": float(value) for number, value in enumerate(k)}
+    return np.array([known[name] for name in model.names])
+
+
+def has_error_bar(result: Result, name: str) -> bool:
+    """Whether an estimate is sound and the result's covariance holds it."""
+    found = result.estimates.get(name)
+    ok = found is not None and found.status is Status.OK and found.std is not None
+    return ok and result.fit is not None and name in result.fit.covariance_names
+
+
+def first_length(result: Result) -> tuple[float, float] | None:
+    """l1 = g k1 / k2 and its standard deviation, in m; None where the result tells neither."""
+    gravity = Settings.of(result.settings).gravity
+    k1, k2 = (result.parameters.get(name) for name in ("k1", "k2"))
+    if not gravity or result.fit is None or k1 is None or k2 is None or not k1.estimate or not k2.estimate:
+        return None
+    if not all(has_error_bar(result, name) for name in ("k1", "k2")):
+        return None
+    places = [result.fit.covariance_names.index(name) for name in ("k1", "k2")]
+    covariance = np.array(result.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
+    slope = gravity * np.array([1 / k2.estimate, -k1.estimate / k2.estimate**2])
+    return gravity * k1.estimate / k2.estimate, float(np.sqrt(slope @ covariance @ slope))
+
+
+def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[str, ...]:
+    """Sentences about given lengths far from what the result says of them: by itself, and by l1 = g k1 / k2."""
+    told = {name: (found.estimate, found.std) for name, found in result.payload.items() if name in ("l1", "l2")}
+    by_constants = first_length(result)
+    if by_constants is not None:
+        told["l1"] = by_constants
+    sentences = []
+    for name, given in lengths.items():
+        estimate, std = told.get(name, (None, None))
+        if estimate is None or not std:
+            continue
+        distance = abs(given - estimate) / std
+        if distance > FAR:
+            sentences.append(
+                f"--{name} {given:g} lies {distance:.0f} σ from the result's {estimate:.5g} ± {std:.2g} m; one is wrong"
+            )
+    return tuple(sentences)

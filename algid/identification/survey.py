@@ -1,0 +1,163 @@
+"""Passes over logs, one way for all estimators, and what the first of them shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import chain, islice
+
+from algid.identification.source import LogSource
+from algid.log import Log, Notice
+from algid.progress import Told
+from algid.results import LogSummary
+from algid.runtime import Beside
+from algid.signals.segments import Segment, segments
+
+EXAMINED = 1 << 16
+"""Samples at the start of a long log that the named checks look at."""
+MOST_KEPT = 1 << 20
+"""Samples of all logs together that are kept in memory, 48 bytes each with velocities, so that they are read once."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a pass over a whole log has shown: its samples, its first and last stamp in ns, and what was noticed."""
+
+    rows: int
+    first_ns: int
+    last_ns: int
+    notices: tuple[Notice, ...]
+
+
+class Survey:
+    """Goes over logs as often as an estimator asks, and keeps what the first pass over each shows.
+
+    Hashing and the named checks run beside the first pass; whoever wants to know how far a pass has come is told.
+    Logs of `MOST_KEPT` samples in all are read once and kept; longer ones are read again for each pass.
+
+    Parameters
+    ----------
+    logs : the logs, unloaded ones first
+    told : callable
+        Called with the stage and how many samples of how many it has gone over.
+    """
+
+    def __init__(self, logs: Sequence[LogSource], told: Told | None = None) -> None:
+        self.logs = tuple(logs)
+        self.told = told
+        self._seen: dict[LogSource, Seen] = {}
+        self._findings: dict[LogSource, tuple[Notice, ...]] = {}
+        self._digests: dict[LogSource, Beside[str]] = {}
+        self._kept: dict[LogSource, tuple[Segment, ...]] = {}
+        self._room = MOST_KEPT
+        self._stage, self._over = "fitting", self.logs
+        self._words = ""
+        self._done: dict[LogSource, int] = {}
+
+    @property
+    def unloaded(self) -> list[LogSource]:
+        """The logs of the arm without payload."""
+        return [log for log in self.logs if log.role == "unloaded"]
+
+    @property
+    def loaded(self) -> list[LogSource]:
+        """The logs of the arm with its payload."""
+        return [log for log in self.logs if log.role == "loaded"]
+
+    def begin(self, stage: str, logs: Sequence[LogSource] | None = None) -> None:
+        """The passes from here on are over `logs`, by default all, and of that stage."""
+        self._stage, self._over, self._words = stage, self.logs if logs is None else tuple(logs), ""
+
+    def segments(self, log: LogSource) -> Iterator[Segment]:
+        """A fresh pass over a log: its uniform segments, from its start. Raises `LogError` where it is refused."""
+        rows = 0
+        if log in self._kept:
+            self._tell(log, 0)
+            for piece in self._kept[log]:
+                yield piece
+                rows += len(piece)
+                self._tell(log, rows)
+            return
+        held: list[Segment] = []
+        for piece in segments(self._counted(log)):
+            rows += len(piece)
+            if rows <= self._room:
+                held.append(piece)
+            else:
+                held.clear()
+            yield piece
+        if rows <= self._room and log not in self._kept:
+            self._kept[log] = tuple(held)
+            self._room -= rows
+
+    def seen(self, log: LogSource) -> Seen:
+        """What the log holds; goes over it where no estimator has done so to its end."""
+        if log not in self._seen:
+            for _ in self._counted(log):
+                pass
+        return self._seen[log]
+
+    def summary(self, log: LogSource) -> LogSummary:
+        """The log as a result names it."""
+        seen = self.seen(log)
+        duration = (seen.last_ns - seen.first_ns) * 1e-9
+        return LogSummary(
+            path=log.name,
+            sha256=self._digests[log].result() if log in self._digests else None,
+            role=log.role,
+            format=log.origin.format,
+            rows=seen.rows,
+            start_ns=seen.first_ns,
+            duration=duration,
+            rate=(seen.rows - 1) / duration if duration > 0 else 0.0,
+            mapping=dict(log.origin.mapping),
+            reading=log.origin.reading,
+        )
+
+    def _counted(self, log: LogSource) -> Iterator[Log]:
+        """The log's blocks, each counted; the first is examined, and refuses a log only where that is all of it."""
+        if log.digest is not None and log not in self._digests:
+            self._digests[log] = Beside(log.digest)
+        rows, first_ns, last_ns = 0, 0, 0
+        notices: list[Notice] = list(log.notices)
+        self._tell(log, 0)
+        for block, alone in _with_end(log.blocks(), log.promised):
+            if len(block) and not rows:
+                first_ns = int(block.stamp_ns[0])
+                if log not in self._findings:
+                    from algid.inspection.checks import noticed
+
+                    begin = block if alone else block.part(0, EXAMINED)
+                    self._findings[log] = noticed(begin, gravity=log.gravity, whole=alone)
+                notices += self._findings[log]
+            if len(block):
+                last_ns = int(block.stamp_ns[-1])
+            rows += len(block)
+            notices += block.notices
+            yield block
+            self._tell(log, rows)
+        self._seen.setdefault(log, Seen(rows, first_ns, last_ns, tuple(notices)))
+
+    def _tell(self, log: LogSource, rows: int) -> None:
+        """A pass over `log` has come as far as `rows` samples; 0 starts one. The first over a log reads it."""
+        if self.told is None:
+            return
+        words = self._stage if log in self._seen else "reading"
+        if words != self._words or (rows == 0 and log in self._done):
+            self._words, self._done = words, {}
+        self._done[log] = rows
+        expected = [self._seen[one].rows if one in self._seen else one.promised for one in self._over]
+        self.told(words, sum(self._done.values()), sum(expected) if all(expected) else 0)
+
+
+def _with_end(blocks: Iterator[Log], promised: int) -> Iterator[tuple[Log, bool]]:
+    """Each block, and whether it is the only one.
+
+    Where more than twice its samples are promised it is not, and need not wait for the second one: a reader
+    refuses a log of which it would have to drop half.
+    """
+    for first in islice(blocks, 1):
+        waited = [] if promised > 2 * len(first) else list(islice(blocks, 1))
+        yield first, not waited and promised <= 2 * len(first)
+        for block in chain(waited, blocks):
+            yield block, False
