@@ -1,31 +1,124 @@
-"""Where a regression's coefficient changes: the best cut into stretches, by pruned dynamic programming.
+"""Where a log's stretches of constant payload begin and end.
 
-A stretch from cell a to b costs −(ΣB)²/ΣA, twice its log likelihood ratio against nothing; each cut costs a
-penalty. Cuts that can never be the last one again are dropped (Killick, Fearnhead & Eckley 2012).
+The best cut into stretches comes by pruned dynamic programming. A stretch from cell a to b costs −(ΣB)²/ΣA, twice its
+log likelihood ratio against nothing; each cut costs a penalty. Cuts that can never be the last one again are dropped
+(Killick, Fearnhead & Eckley 2012).
 
-How far a log's rows are from white: what the arm's model lacks makes neighbouring cells err alike.
+A penalty holds for white rows; what the arm's model lacks makes neighbouring cells err alike. Masses of neighbouring
+blocks of cells differ by 1/A + 1/A' in variance where rows are white. Slow errors (friction that the model lacks,
+play, a gear's ripple) make long blocks differ by far more; the largest excess over block lengths up to a second is
+what intervals and changes have to stand up to. Medians are taken, so that a few changes of payload do not pass for
+errors.
 
-Masses of neighbouring blocks of cells differ by 1/A + 1/A' in variance where rows are white. Slow errors
-(friction that the model lacks, play, a gear's ripple) make long blocks differ by far more; the largest excess
-over block lengths up to a second is what intervals and changes have to stand up to. Medians are taken, so that
-a few changes of payload do not pass for errors.
-
-What a grasp does to the cells it falls among: no stencil follows the jump of the acceleration.
-
-A grasp is one change, wherever its jolt would put one; cells within `GUARD` of it tell neither mass.
-
-Where a log's stretches of constant payload begin and end.
+A grasp jolts the cells it falls among: no stencil follows the jump of the acceleration. It is one change, wherever its
+jolt would put one; cells within `GUARD` of it tell neither mass.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from algid.arm import FloatArray
 from algid.track.bins import Cells, IdentifiedArm
+
+SPANS = (1, 2, 3, 5, 8, 12, 18, 25, 35, 50)  # cells: 0.02 to 1 s
+LIGHTEST = 1e-6  # information of a block that tells anything, of the largest
+FEWEST = 8  # pairs of blocks that tell a variance
+_MEDIAN = 0.454936  # of a squared standard normal
+_SPREAD = 2.33  # standard deviation of the median of n squares over _MEDIAN, times √n
+_SURE = 4.0  # of those standard deviations: white rows pass once in 30,000 spans
+
+GUARD = 3  # cells left out on both sides of a change, which lies somewhere among them
+UNLIKELY = 25.0  # of a change's place: squares beyond those of the best one, noise of the cells left out included
+REACH = 15  # cells: how far a jolt may have put a change from its place
+CALM = 2  # cells more on both sides of a change's surest ends, over which the smoothed trajectory settles
+NARROW = 20  # cells: changes this close may be one with its jolt
+
+SHORTEST = 10  # cells: no object is carried for less than 0.2 s
+PENALTY = 60.0  # of a change: 7.7 standard deviations, far beyond what white rows reach
+MOST_ROUNDS = 6
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Cells at which stretches begin, and the last one's end; the cells between which each change surely lies."""
+
+    places: list[int]
+    spans: list[tuple[int, int]]
+
+
+def edges(cells: Cells, arm: IdentifiedArm) -> Edges:
+    """The changes of payload among `cells`.
+
+    What a change would explain counts as an error at first, and no longer once the change is found: errors are
+    told again from what the stretches leave, until the changes stay.
+    """
+    places: list[int] = [0, len(cells)]
+    spans: list[tuple[int, int]] = []
+    masses: FloatArray = np.zeros(len(cells))
+    exact = np.zeros((arm.k.size + 2,) * 2)
+    for _ in range(MOST_ROUNDS):
+        calm = np.ones(len(cells))  # cells around changes: their jolts are no errors of the arm's model
+        for low, high in spans:
+            calm[max(low - GUARD - CALM, 0) : high + GUARD + CALM] = 0.0
+        still = replace(cells, A=calm * cells.A, B=calm * cells.B, S=calm[:, None] * cells.S, E=calm * cells.E)
+        # a change must stand up to slow errors whatever their reason, wrong constants of the arm included
+        penalty = PENALTY * variance(still, masses, arm, exact)
+        before = places
+        places = [0, *cuts(cells.A, cells.B, penalty, SHORTEST), len(cells)]
+        places, spans = placed(_needed(fused(places, cells, penalty), cells, penalty), cells)
+        if places == before:
+            break
+        starts = places[:-1]
+        own = np.add.reduceat(cells.B, starts) / np.maximum(np.add.reduceat(cells.A, starts), 1e-300)
+        masses = np.repeat(own, np.diff(places))
+    return Edges(places, spans)
+
+
+def variance(cells: Cells, masses: FloatArray, arm: IdentifiedArm, covariance: FloatArray) -> float:
+    """Variance of the rows about `masses` (C,), of the constants' errors freed, one at least.
+
+    Rows scatter about masses that hold for a few cells, and err alike over longer blocks: the larger of both.
+    """
+    groups = len(cells) // SHORTEST
+    A, B, E, rows = (
+        x[: groups * SHORTEST].reshape(groups, -1).sum(axis=1) for x in (cells.A, cells.B, cells.E, cells.rows)
+    )
+    rough = float(np.median((E - B**2 / np.maximum(A, 1e-300)) / rows))  # groups that hold a change are few
+    T = cells.sensitivity(arm, masses)
+    return max(1.0, rough, excess(cells.A, cells.B - cells.A * masses, T, covariance))
+
+
+def excess(A: FloatArray, B: FloatArray, T: FloatArray, covariance: FloatArray) -> float:
+    """Variance of the masses of neighbouring blocks over what white rows would give; 1 where they pass for white.
+
+    Parameters
+    ----------
+    A, B : (C,) float64
+        Information of each cell and its score, less what is known of the mass.
+    T : (C, p) float64
+        How the scores shift with the arm's constants.
+    covariance : (p, p) float64
+        Of these constants: their errors are no excess.
+    """
+    found = 1.0
+    for span in SPANS:
+        count = A.size // span
+        information, score, shift = (
+            x[: count * span].reshape(count, span, *x.shape[1:]).sum(axis=1) for x in (A, B, T)
+        )
+        heavy = information > LIGHTEST * information.max(initial=0.0)
+        information, score, shift = information[heavy], score[heavy], shift[heavy]
+        if information.size <= FEWEST:
+            continue
+        J = np.diff(shift / information[:, None], axis=0)
+        white = 1 / information[1:] + 1 / information[:-1] + np.einsum("cx,xy,cy->c", J, covariance, J)
+        ratio = float(np.median(np.diff(score / information) ** 2 / white)) / _MEDIAN
+        if ratio > 1 + _SURE * _SPREAD / np.sqrt(information.size - 1):
+            found = max(found, ratio)
+    return found
 
 
 def cuts(A: FloatArray, B: FloatArray, penalty: float, shortest: int) -> list[int]:
@@ -53,63 +146,10 @@ def cuts(A: FloatArray, B: FloatArray, penalty: float, shortest: int) -> list[in
         best[end], last[end] = value[place] + penalty, starts[place]
         kept = value <= best[end]
         open_ = starts[kept].tolist()
-    return _traced(last)
-
-
-def _traced(last: np.ndarray[tuple[int, ...], np.dtype[np.int64]]) -> list[int]:
-    found: list[int] = []
-    place = int(last[-1])
-    while place > 0:
-        found.append(place)
-        place = int(last[place])
-    return found[::-1]
-
-
-SPANS = (1, 2, 3, 5, 8, 12, 18, 25, 35, 50)  # cells: 0.02 to 1 s
-LIGHTEST = 1e-6  # information of a block that tells anything, of the largest
-FEWEST = 8  # pairs of blocks that tell a variance
-_MEDIAN = 0.454936  # of a squared standard normal
-_SPREAD = 2.33  # standard deviation of the median of n squares over _MEDIAN, times √n
-_SURE = 4.0  # of those standard deviations: white rows pass once in 30,000 spans
-
-
-def excess(A: FloatArray, B: FloatArray, T: FloatArray, covariance: FloatArray) -> float:
-    """Variance of the masses of neighbouring blocks over what white rows would give; 1 where they pass for white.
-
-    Parameters
-    ----------
-    A, B : (C,) float64
-        Information of each cell and its score, less what is known of the mass.
-    T : (C, p) float64
-        How the scores shift with the arm's constants.
-    covariance : (p, p) float64
-        Of these constants: their errors are no excess.
-    """
-    return max([1.0, *(_told(A, B, T, covariance, span) for span in SPANS)])
-
-
-def _told(A: FloatArray, B: FloatArray, T: FloatArray, covariance: FloatArray, span: int) -> float:
-    count = A.size // span
-    information, score, shift = (_blocks(x, count, span) for x in (A, B, T))
-    heavy = information > LIGHTEST * information.max(initial=0.0)
-    information, score, shift = information[heavy], score[heavy], shift[heavy]
-    if information.size <= FEWEST:
-        return 1.0
-    J = np.diff(shift / information[:, None], axis=0)
-    variance = 1 / information[1:] + 1 / information[:-1] + np.einsum("cx,xy,cy->c", J, covariance, J)
-    ratio = float(np.median(np.diff(score / information) ** 2 / variance)) / _MEDIAN
-    return ratio if ratio > 1 + _SURE * _SPREAD / np.sqrt(information.size - 1) else 1.0
-
-
-def _blocks(x: FloatArray, count: int, span: int) -> FloatArray:
-    return np.asarray(x[: count * span].reshape(count, span, *x.shape[1:]).sum(axis=1))
-
-
-GUARD = 3  # cells left out on both sides of a change, which lies somewhere among them
-UNLIKELY = 25.0  # of a change's place: squares beyond those of the best one, noise of the cells left out included
-REACH = 15  # cells: how far a jolt may have put a change from its place
-CALM = 2  # cells more on both sides of a change's surest ends, over which the smoothed trajectory settles
-NARROW = 20  # cells: changes this close may be one with its jolt
+    found = [int(last[-1])]
+    while found[-1] > 0:
+        found.append(int(last[found[-1]]))
+    return found[-2::-1]
 
 
 def fused(places: list[int], cells: Cells, penalty: float) -> list[int]:
@@ -119,10 +159,39 @@ def fused(places: list[int], cells: Cells, penalty: float) -> list[int]:
         first, left, right, last = places[place - 1 : place + 3]
         close = right - left <= NARROW
         one = left + int(np.argmin(_costs(cells, first, left, right, last))) if close else left
-        if close and _gain(cells, (first, left, right, last), one) < penalty:
+        if close and _gain(cells.part(first, last), left - first, right - first, one - first) < penalty:
             places = [*places[:place], one, *places[place + 2 :]]
         else:
             place += 1
+    return places
+
+
+def _gain(cells: Cells, left: int, right: int, one: int) -> float:
+    """What the stretch between two changes explains beyond `one` change, cells around that one left out."""
+    kept = np.abs(np.arange(len(cells)) + 0.5 - one) > GUARD
+    A, B = np.where(kept, cells.A, 0.0), np.where(kept, cells.B, 0.0)
+    worths = [
+        np.sum(np.add.reduceat(B, cut) ** 2 / np.maximum(np.add.reduceat(A, cut), 1e-300))
+        for cut in ([0, left, right], [0, one])
+    ]
+    return float(worths[0] - worths[1])
+
+
+def _needed(places: list[int], cells: Cells, penalty: float) -> list[int]:
+    """Edges less those that cells away from them do not need: a grasp jolts the cells it falls among."""
+
+    def worth(first: int, cut: int, last: int) -> float:
+        """Squared difference of the masses on both sides of a cut over its variance."""
+        sides = (cells.part(first + GUARD, cut - GUARD), cells.part(cut + GUARD, last - GUARD))
+        A, B = np.maximum([side.A.sum() for side in sides], 1e-300), np.array([side.B.sum() for side in sides])
+        return float(np.diff(B / A)[0] ** 2 / np.sum(1 / A))
+
+    while len(places) > 2:
+        worths = [worth(*places[place : place + 3]) for place in range(len(places) - 2)]
+        weakest = int(np.argmin(worths))
+        if worths[weakest] > penalty:
+            break
+        places = places[: weakest + 1] + places[weakest + 2 :]
     return places
 
 
@@ -152,112 +221,11 @@ def _costs(cells: Cells, first: int, low: int, high: int, last: int) -> FloatArr
 
 def _misfit(cells: Cells, start: int, stop: int | None) -> FloatArray:
     """Each cell's squares about the mass of those from `start` to `stop`, less what these usually have (C,)."""
-    known = slice(start, stop)
     # medians: the stretch's other end may hold a jolt too, and cells of the next mass
-    mass = _median(cells.B[known] / np.maximum(cells.A[known], 1e-300), cells.A[known])
+    A, B, rows = cells.A[start:stop], cells.B[start:stop], cells.rows[start:stop]
+    own = B / np.maximum(A, 1e-300)
+    order = np.argsort(own)
+    told = np.cumsum(A[order])
+    mass = float(own[order][min(np.searchsorted(told, told[-1] / 2), own.size - 1)])
     squares = cells.squares(mass)
-    return np.asarray(squares - cells.rows * np.median(squares[known] / cells.rows[known]))
-
-
-def _median(values: FloatArray, weights: FloatArray) -> float:
-    order = np.argsort(values)
-    total = np.cumsum(weights[order])
-    return float(values[order][min(np.searchsorted(total, total[-1] / 2), values.size - 1)])
-
-
-def _gain(cells: Cells, ends: tuple[int, int, int, int], one: int) -> float:
-    """What the stretch between two changes explains beyond `one` change, cells around that one left out."""
-    first, left, right, last = ends
-    kept = np.abs(np.arange(first, last) + 0.5 - one) > GUARD
-    A, B = np.where(kept, cells.A[first:last], 0.0), np.where(kept, cells.B[first:last], 0.0)
-    return _jolt_worth(A, B, (left - first, right - first)) - _jolt_worth(A, B, (one - first,))
-
-
-def _jolt_worth(A: FloatArray, B: FloatArray, cuts: tuple[int, ...]) -> float:
-    edges = [0, *cuts]
-    return float(np.sum(np.add.reduceat(B, edges) ** 2 / np.maximum(np.add.reduceat(A, edges), 1e-300)))
-
-
-SHORTEST = 10  # cells: no object is carried for less than 0.2 s
-PENALTY = 60.0  # of a change: 7.7 standard deviations, far beyond what white rows reach
-MOST_ROUNDS = 6
-
-
-@dataclass(frozen=True)
-class Edges:
-    """Cells at which stretches begin, and the last one's end; the cells between which each change surely lies."""
-
-    places: list[int]
-    spans: list[tuple[int, int]]
-
-
-def edges(cells: Cells, arm: IdentifiedArm) -> Edges:
-    """The changes of payload among `cells`.
-
-    What a change would explain counts as an error at first, and no longer once the change is found: errors are
-    told again from what the stretches leave, until the changes stay.
-    """
-    places: list[int] = [0, len(cells)]
-    spans: list[tuple[int, int]] = []
-    masses: FloatArray = np.zeros(len(cells))
-    exact = np.zeros((arm.k.size + 2,) * 2)
-    for _ in range(MOST_ROUNDS):
-        # a change must stand up to slow errors whatever their reason, wrong constants of the arm included
-        penalty = PENALTY * variance(_calm(cells, spans), masses, arm, exact)
-        before = places
-        places = [0, *cuts(cells.A, cells.B, penalty, SHORTEST), len(cells)]
-        places, spans = placed(_merged(fused(places, cells, penalty), cells, penalty), cells)
-        if places == before:
-            break
-        masses = _masses(cells, places)
-    return Edges(places, spans)
-
-
-def _calm(cells: Cells, spans: Sequence[tuple[int, int]]) -> Cells:
-    """The cells, those around changes emptied: their jolts are no errors of the arm's model."""
-    calm = np.ones(len(cells))
-    for low, high in spans:
-        calm[max(low - GUARD - CALM, 0) : high + GUARD + CALM] = 0.0
-    return replace(cells, A=calm * cells.A, B=calm * cells.B, S=calm[:, None] * cells.S, E=calm * cells.E)
-
-
-def variance(cells: Cells, masses: FloatArray, arm: IdentifiedArm, covariance: FloatArray) -> float:
-    """Variance of the rows about `masses` (C,), of the constants' errors freed, one at least."""
-    T = cells.sensitivity(arm, masses)
-    return max(_roughness(cells), excess(cells.A, cells.B - cells.A * masses, T, covariance))
-
-
-def _masses(cells: Cells, places: list[int]) -> FloatArray:
-    """Mass of each cell's stretch (C,)."""
-    starts = places[:-1]
-    masses = np.add.reduceat(cells.B, starts) / np.maximum(np.add.reduceat(cells.A, starts), 1e-300)
-    return np.repeat(masses, np.diff(places))
-
-
-def _roughness(cells: Cells) -> float:
-    """Variance of the rows about masses that hold for a few cells, one at least."""
-    groups = len(cells) // SHORTEST
-    A, B, E, rows = (
-        x[: groups * SHORTEST].reshape(groups, -1).sum(axis=1) for x in (cells.A, cells.B, cells.E, cells.rows)
-    )
-    left = (E - B**2 / np.maximum(A, 1e-300)) / rows
-    return max(1.0, float(np.median(left)))  # groups that hold a change are few
-
-
-def _merged(places: list[int], cells: Cells, penalty: float) -> list[int]:
-    """Edges less those that cells away from them do not need: a grasp jolts the cells it falls among."""
-    while len(places) > 2:
-        worths = [_worth(cells, *places[place : place + 3]) for place in range(len(places) - 2)]
-        weakest = int(np.argmin(worths))
-        if worths[weakest] > penalty:
-            break
-        places = places[: weakest + 1] + places[weakest + 2 :]
-    return places
-
-
-def _worth(cells: Cells, first: int, cut: int, last: int) -> float:
-    """Squared difference of the masses on both sides of a cut over its variance."""
-    left, right = cells.part(first + GUARD, cut - GUARD), cells.part(cut + GUARD, last - GUARD)
-    A, B = (np.array([x.A.sum() for x in (left, right)]), np.array([x.B.sum() for x in (left, right)]))
-    A = np.maximum(A, 1e-300)
-    return float(np.diff(B / A)[0] ** 2 / np.sum(1 / A))
+    return np.asarray(squares - cells.rows * np.median(squares[start:stop] / rows))

@@ -94,45 +94,41 @@ def track(source: Pass, arm: IdentifiedArm, covariance: FloatArray) -> Track:
     cells = joined(parts)
     found = edges(cells, arm)
     for _ in range(ROUNDS):
-        cells = joined(_settled(source, arm, _parts(cells, found.places)))
+        cells = joined(_settled(source, arm, [cells.part(*ends) for ends in pairwise(found.places)]))
         found = edges(cells, arm)
     # whitening remembers: what a stretch is weighed by starts behind the jolt at its beginning
-    own, inner = _parts(cells, found.places), _settled(source, arm, _inner_parts(cells, found))
+    return _weigh(cells, found, _settled(source, arm, _inner_parts(cells, found)), arm, covariance)
+
+
+def _weigh(cells: Cells, found: Edges, inner: Sequence[Cells], arm: IdentifiedArm, covariance: FloatArray) -> Track:
+    """The track whose stretches are `found` among `cells`, each weighed by its `inner` ones."""
     counts, calm = [len(part) for part in inner], joined(inner)
     masses = np.repeat([part.mass for part in inner], counts)
-    colour = variance(calm, masses, arm, covariance)
-    stretches = [_stretch(whole, kept, arm, covariance, colour) for whole, kept in zip(own, inner, strict=True)]
-    t, m_p, std = np.concatenate([_curve(part, arm, covariance, colour) for part in inner], axis=1)
-    squares = calm.squares(masses)
-    return Track(
-        stretches,
-        t,
-        m_p,
-        std,
-        np.repeat(np.arange(len(inner)), counts).astype(np.float64),
-        np.sqrt(np.maximum(squares, 0.0) / calm.rows),
-        _changes(cells, found),
-        colour,
-        _explained(calm, squares),
-        _holes(cells),
-        arm.bare,
-    )
-
-
-def _explained(cells: Cells, squares: FloatArray) -> float:
-    signal = cells.Q.sum() - cells.rows.sum()
-    left = max(squares.sum() - cells.rows.sum(), 0.0)
-    return float(1 - left / signal) if signal > 0 else 0.0
-
-
-def _holes(cells: Cells) -> FloatArray:
-    """Times (h, 2) from and to which there are no samples."""
+    colour, squares = variance(calm, masses, arm, covariance), calm.squares(masses)
+    stds, curves = zip(*(_band(part, arm, covariance, colour) for part in inner), strict=True)
+    t, m_p, std = np.concatenate(curves, axis=1)
+    signal, left = calm.Q.sum() - calm.rows.sum(), max(squares.sum() - calm.rows.sum(), 0.0)
+    changes = [
+        (cells.start[at], cells.start[low - GUARD], cells.end[high + GUARD - 1])
+        for at, (low, high) in zip(found.places[1:-1], found.spans, strict=True)
+    ]
     wide = np.flatnonzero(cells.start[1:] - cells.end[:-1] > HOLE)
-    return np.stack([cells.end[wide], cells.start[wide + 1]], axis=1)
-
-
-def _parts(cells: Cells, places: Sequence[int]) -> list[Cells]:
-    return [cells.part(first, last) for first, last in pairwise(places)]
+    return Track(
+        stretches=[
+            Stretch(float(cells.start[first]), float(cells.end[last - 1]), part.mass, one)
+            for (first, last), part, one in zip(pairwise(found.places), inner, stds, strict=True)
+        ],
+        t=t,
+        m_p=m_p,
+        std=std,
+        stretch=np.repeat(np.arange(len(inner)), counts).astype(np.float64),
+        left=np.sqrt(np.maximum(squares, 0.0) / calm.rows),
+        changes=np.array(changes, dtype=np.float64).reshape(-1, 3),
+        colour=colour,
+        explained=float(1 - left / signal) if signal > 0 else 0.0,
+        holes=np.stack([cells.end[wide], cells.start[wide + 1]], axis=1),
+        bare=arm.bare,
+    )
 
 
 def _settled(source: Pass, arm: IdentifiedArm, rough: Sequence[Cells]) -> list[Cells]:
@@ -176,29 +172,14 @@ def _inner_parts(cells: Cells, found: Edges) -> list[Cells]:
     return parts
 
 
-def _changes(cells: Cells, found: Edges) -> FloatArray:
-    start = cells.start
-    rows = [
-        (start[at], start[low - GUARD], cells.end[high + GUARD - 1])
-        for at, (low, high) in zip(found.places[1:-1], found.spans, strict=True)
-    ]
-    return np.array(rows, dtype=np.float64).reshape(-1, 3)
+def _band(cells: Cells, arm: IdentifiedArm, covariance: FloatArray, colour: float) -> tuple[float, FloatArray]:
+    """The standard deviation of a stretch's mass; times, masses and their standard deviations (3, C) along it.
 
-
-def _stretch(whole: Cells, cells: Cells, arm: IdentifiedArm, covariance: FloatArray, colour: float) -> Stretch:
-    mass, T = cells.mass, cells.sensitivity(arm, cells.mass).sum(axis=0)
-    std = float(_std(np.array([cells.A.sum()]), T[None], _noise(cells, colour), covariance)[0])
-    return Stretch(float(whole.start[0]), float(whole.end[-1]), mass, std)
-
-
-def _noise(cells: Cells, colour: float) -> float:
-    """Variance of a stretch's rows: its own, or the log's where that is larger."""
-    return max(colour, float(cells.squares(cells.mass).sum() / (cells.rows.sum() - 1)))
-
-
-def _curve(cells: Cells, arm: IdentifiedArm, covariance: FloatArray, colour: float) -> FloatArray:
-    """Times, masses and their standard deviations (3, C), each cell from its neighbourhood within the stretch."""
-    half = round(HALF_BAND / CELL)
+    Along the stretch each cell's mass comes from its neighbourhood within the stretch.
+    """
+    # the stretch's own variance of rows, or the log's where that is larger
+    noise = max(colour, float(cells.squares(cells.mass).sum() / (cells.rows.sum() - 1)))
+    half, T = round(HALF_BAND / CELL), cells.sensitivity(arm, cells.mass)
     low = np.clip(np.arange(len(cells)) - half, 0, None)
     high = np.clip(np.arange(len(cells)) + half + 1, None, len(cells))
 
@@ -206,12 +187,10 @@ def _curve(cells: Cells, arm: IdentifiedArm, covariance: FloatArray, colour: flo
         total = np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x, axis=0)])
         return np.asarray(total[high] - total[low])
 
+    def std(A: FloatArray, T: FloatArray) -> FloatArray:
+        J = T / A[:, None]
+        return np.sqrt(noise / A + np.einsum("cx,xy,cy->c", J, covariance, J))
+
     A, B = np.maximum(moving(cells.A), 1e-300), moving(cells.B)
-    std = _std(A, moving(cells.sensitivity(arm, cells.mass)), _noise(cells, colour), covariance)
-    return np.stack([(cells.start + cells.end) / 2, B / A, std])
-
-
-def _std(A: FloatArray, T: FloatArray, noise: float, covariance: FloatArray) -> FloatArray:
-    A = np.maximum(A, 1e-300)
-    J = T / A[:, None]
-    return np.sqrt(noise / A + np.einsum("cx,xy,cy->c", J, covariance, J))
+    whole = std(np.maximum([cells.A.sum()], 1e-300), T.sum(axis=0)[None])
+    return float(whole[0]), np.stack([(cells.start + cells.end) / 2, B / A, std(A, moving(T))])

@@ -35,7 +35,8 @@ def read_track(folder: Path) -> TrackResult:
     path = folder / FILE
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
-        return _result(found, _joined(list(blocks(folder / "track.parquet", COLUMNS))))
+        curve = list(blocks(folder / "track.parquet", COLUMNS))
+        return _result(found, {name: np.concatenate([part[name] for part in curve]) for name in COLUMNS if curve})
     except OSError as error:
         raise ResultError(f"{path}: cannot read it ({error.strerror})") from error
     except KeyError as error:
@@ -43,10 +44,6 @@ def read_track(folder: Path) -> TrackResult:
     except (ValueError, TypeError, ValidationError, AttributeError) as error:
         reason = str(error).partition("\n")[0]
         raise ResultError(f"{path}: expected a track of algid track, found another thing ({reason})") from error
-
-
-def _joined(parts: list[Block]) -> Block:
-    return {name: np.concatenate([part[name] for part in parts]) for name in COLUMNS} if parts else {}
 
 
 def _result(found: dict[str, Any], curve: Block) -> TrackResult:

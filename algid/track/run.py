@@ -70,11 +70,12 @@ def track_log(
     otherwise = read_otherwise([survey.summary(source)], result, str(parameters))
     truth, notices = source.origin.truth, survey.seen(source).notices
     judged = verdict(result)
+    file = parameters / "result.json" if parameters.is_dir() else parameters
     return TrackResult(
         track=found,
         log=survey.summary(source),
         arm=str(parameters),
-        arm_sha256=_sha256(parameters),
+        arm_sha256=hashlib.sha256(read_whole(file)).hexdigest(),
         arm_sentence=None if judged.level == "good" else judged.sentence,
         settings={"l1": arm.l1, "l2": arm.l2, "gravity": arm.model.gravity, **(settings or {})},
         version=__version__,
@@ -82,8 +83,3 @@ def track_log(
         warnings=(*otherwise, *(notice.text for notice in notices)),
         data_lost=any(notice.lossy for notice in notices),
     )
-
-
-def _sha256(parameters: Path) -> str:
-    file = parameters / "result.json" if parameters.is_dir() else parameters
-    return hashlib.sha256(read_whole(file)).hexdigest()
