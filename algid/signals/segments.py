@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 
@@ -76,40 +76,22 @@ def segments(blocks: Iterable[Log]) -> Iterator[Segment]:
     The period is the mean over the log's first samples, gaps left out. A gap of more than `LONGEST_GAP` periods
     starts a new stretch; shorter ones are filled by interpolation.
     """
-    source = iter(blocks)
-    head = _first_samples(source)
-    if head is None:
+    source = (block for block in blocks if len(block))
+    first: list[Log] = []
+    while sum(map(len, first)) < PERIOD_SAMPLES and (block := next(source, None)) is not None:
+        first.append(block)
+    if not first:
         return
-    dt = _mean_period(join(spaced([head], usual_period(head.stamp_ns[:PERIOD_SAMPLES]))).stamp_ns)
+    head = join(first)  # so that the period does not depend on how the blocks were cut
+    stamps = join(spaced([head], usual_period(head.stamp_ns[:PERIOD_SAMPLES]))).stamp_ns[:PERIOD_SAMPLES]
+    steps, dt = np.diff(stamps).astype(np.float64), usual_period(stamps)
+    near = steps[np.abs(steps - 1e9 * dt) <= 0.5e9 * dt]
+    if 2 * near.size > steps.size:
+        dt = float(near.mean()) * 1e-9
     sampler = _Sampler(int(head.stamp_ns[0]), dt)
-    for block in spaced(_chain(head, source), dt):
+    for block in spaced(chain([head], source), dt):
         yield from sampler.push(block)
     yield from sampler.finish()
-
-
-def _first_samples(source: Iterator[Log]) -> Log | None:
-    """The first blocks joined, so that the period does not depend on how they were cut."""
-    head: list[Log] = []
-    while sum(map(len, head)) < PERIOD_SAMPLES:
-        block = next(source, None)
-        if block is None:
-            break
-        if len(block):
-            head.append(block)
-    return join(head) if head else None
-
-
-def _chain(head: Log, rest: Iterator[Log]) -> Iterator[Log]:
-    yield head
-    yield from rest
-
-
-def _mean_period(stamp_ns: IntArray) -> float:
-    """Mean time between neighbouring samples in s, over the first samples and without gaps."""
-    steps = np.diff(stamp_ns[:PERIOD_SAMPLES]).astype(np.float64)
-    period = usual_period(stamp_ns[:PERIOD_SAMPLES])
-    near = steps[np.abs(steps - 1e9 * period) <= 0.5e9 * period]
-    return float(near.mean()) * 1e-9 if 2 * near.size > steps.size else period
 
 
 class _Sampler:
@@ -157,36 +139,39 @@ class _Sampler:
             return
         grid = self._anchor + self._dt * np.arange(self._emitted, self._emitted + count)
         first = int(np.searchsorted(t, grid[0] - 0.5 * self._dt))
-        take = _take_even if _is_even(t[first : first + count], grid, self._dt) else _interpolate
+        own = slice(first, first + count)
+        even = t[own].size == count and bool(np.all(np.abs(t[own] - grid) <= EVEN * self._dt))
+        weights = None if even else _cubic(t, grid)
+
+        def take(signal: FloatArray) -> FloatArray:
+            if weights is None:
+                return signal[:, own]
+            values = np.zeros((2, count))
+            for place, weight in weights:
+                values += weight * signal[:, place]
+            return values
+
         yield Segment(
             start=float(grid[0]),
             dt=self._dt,
-            theta=take(t, log.theta, grid, first),
-            tau=take(t, log.tau, grid, first),
-            omega=None if log.omega is None else take(t, log.omega, grid, first),
+            theta=take(log.theta),
+            tau=take(log.tau),
+            omega=None if log.omega is None else take(log.omega),
             continues=self._emitted > 0,
         )
         self._emitted += count
 
 
-def _is_even(t: FloatArray, grid: FloatArray, dt: float) -> bool:
-    return t.size == grid.size and bool(np.all(np.abs(t - grid) <= EVEN * dt))
-
-
-def _take_even(_t: FloatArray, signal: FloatArray, grid: FloatArray, first: int) -> FloatArray:
-    return signal[:, first : first + grid.size]
-
-
-def _interpolate(t: FloatArray, signal: FloatArray, grid: FloatArray, _first: int) -> FloatArray:
-    """Values (2, M) at `grid` of the cubic through the four samples around each instant (Lagrange)."""
+def _cubic(t: FloatArray, grid: FloatArray) -> list[tuple[IntArray, FloatArray]]:
+    """Four samples around each instant of `grid` and their weights in the cubic through them (Lagrange)."""
     corner = np.clip(np.searchsorted(t, grid, side="right") - 2, 0, t.size - 4)
     nodes = t[corner[:, None] + np.arange(4)]
-    values = np.zeros((signal.shape[0], grid.size))
+    found = []
     for node in range(4):
         others = [other for other in range(4) if other != node]
         weight = np.prod([(grid - nodes[:, other]) / (nodes[:, node] - nodes[:, other]) for other in others], axis=0)
-        values += weight * signal[:, corner + node]
-    return values
+        found.append((corner + node, weight))
+    return found
 
 
 def pieces(source: Iterable[Segment], rows: int) -> Iterator[Segment]:
@@ -238,24 +223,16 @@ class Cutter:
         """Take in a segment; give out the pieces that are settled."""
         if self._held is not None and not segment.continues:
             yield from self.finish()
-        rest = segment
-        while len(rest) + (0 if self._held is None else len(self._held)) >= 2 * self._rows:
-            piece, rest = self._first(rest)
-            yield piece
-        if len(rest):
-            self._held = rest if self._held is None else append(self._held, rest)
-
-    def _first(self, rest: Segment) -> tuple[Segment, Segment]:
-        """The next piece out of what is held and of `rest`, and what remains of `rest`."""
-        held, self._held = self._held, None
-        if held is None:
-            return rest.part(0, self._rows), rest.part(self._rows, len(rest))
-        missing = self._rows - len(held)
-        if missing > 0:
-            return append(held, rest.part(0, missing)), rest.part(missing, len(rest))
-        if missing < 0:
-            self._held = held.part(self._rows, len(held))
-        return held.part(0, self._rows), rest
+        held, rest = (segment, None) if self._held is None else (self._held, segment)
+        while len(held) + (0 if rest is None else len(rest)) >= 2 * self._rows:
+            if rest is not None and len(held) < self._rows:
+                missing = self._rows - len(held)
+                yield append(held, rest.part(0, missing))
+                held, rest = rest.part(missing, len(rest)), None
+            else:
+                yield held.part(0, self._rows)
+                held = held.part(self._rows, len(held))
+        self._held = held if rest is None else append(held, rest)
 
     def finish(self) -> Iterator[Segment]:
         """Give out what is left of a stretch at its end."""

@@ -21,7 +21,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.log import IntArray, Log, join
@@ -94,41 +93,27 @@ def _settled(log: Log, before: Log | None, period: float) -> Log:
         return _settled(log.part(int(size[0]) - 1, len(log)), None, period)
     known = log if before is None else join([before, log])
     shift = len(known) - len(log)
-    late = _late(known, first + shift, size, period)
-    stamps = log.stamp_ns.copy()
-    for cluster in np.flatnonzero(late):
-        start, own = int(first[cluster]), int(size[cluster])
-        last_ns = known.stamp_ns[start + shift - 1]
-        regular = last_ns + np.rint(np.arange(1, own + 1) * period * 1e9).astype(np.int64)
-        stamps[start : start + own] = np.minimum(regular, stamps[start : start + own])
-    return _merged(replace(log, stamp_ns=stamps), _starts(first, size, late))
+    stamps, kept = log.stamp_ns.copy(), np.isin(np.arange(len(log)), first)
+    for start, own in zip(first[size > 1].tolist(), size[size > 1].tolist(), strict=True):
+        if start + shift > 0 and _late(around := known.part(start + shift - 1, start + shift + own), period):
+            regular = around.stamp_ns[0] + np.rint(np.arange(1, own + 1) * period * 1e9).astype(np.int64)
+            stamps[start : start + own] = np.minimum(regular, stamps[start : start + own])
+            kept[start : start + own] = True
+    return _merged(replace(log, stamp_ns=stamps), np.flatnonzero(kept))
 
 
-def _late(log: Log, first: IntArray, size: IntArray, period: float) -> NDArray[np.bool_]:
-    """Which clusters (C,) are of samples that belong to the periods before them."""
-    late = np.zeros(first.size, np.bool_)
-    for cluster in np.flatnonzero(size > 1):
-        start, own = int(first[cluster]), int(size[cluster])
-        if start == 0:
-            continue
-        times = (log.stamp_ns[start - 1 : start + own] - log.stamp_ns[start - 1]) * 1e-9
-        if round(times[-1] / period) == own:
-            late[cluster] = _moves_on(log.theta[:, start - 1 : start + own], times)
-    return late
+def _late(cluster: Log, period: float) -> bool:
+    """Whether a cluster, here after the sample before it, belongs to the periods between the two.
 
-
-def _moves_on(theta: FloatArray, times: FloatArray) -> bool:
-    """Whether angles (2, m + 1) lie nearer to a line at equal steps than to a line at their `times` (m + 1,)."""
-    travel = theta[:, -1:] - theta[:, :1]
+    As many periods have to lack samples as it has, and its angles (2, m + 1) to lie nearer to a line at equal steps
+    than to a line at their times (m + 1,).
+    """
+    times, theta = (cluster.stamp_ns - cluster.stamp_ns[0]) * 1e-9, cluster.theta - cluster.theta[:, :1]
+    if round(times[-1] / period) != len(cluster) - 1:
+        return False
     even = np.arange(times.size) / (times.size - 1)
-    off = [float(np.sum((theta - theta[:, :1] - travel * place) ** 2)) for place in (even, times / times[-1])]
+    off = [float(np.sum((theta - theta[:, -1:] * place) ** 2)) for place in (even, times / times[-1])]
     return off[0] <= off[1]
-
-
-def _starts(first: IntArray, size: IntArray, late: NDArray[np.bool_]) -> IntArray:
-    """Where the samples begin that stay: each cluster's first one, and every one of a late cluster."""
-    within = np.arange(int(size.sum())) - np.repeat(first, size)
-    return np.flatnonzero((within == 0) | np.repeat(late, size))
 
 
 def _merged(log: Log, starts: IntArray) -> Log:
