@@ -27,6 +27,11 @@ def synthesise(
     sensors : Sensors
         Noise, encoder, jitter and losses; none by default.
 
+    Returns
+    -------
+    unloaded, loaded : Log
+        Without and with the case's payload, each of them with its truth.
+
     Raises
     ------
     SettingError

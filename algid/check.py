@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from algid.errors import ResultError, SettingError
 from algid.files import read_toml
-from algid.results import Result, Table4Row
+from algid.results import Result
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def judge(
     """
     if not any(row.truth is not None for row in result.table4):
         raise ResultError(f"{result.log.path}: the log holds no true parameters; only synthetic logs can be checked")
-    limits = _limits(result, against, max_error, tolerance_file)
+    limits = _limits(result, against == "paper", max_error, tolerance_file)
     return [
         Judged(row.parameter, row.error_percent, limits[row.parameter])
         for row in result.table4
@@ -67,30 +67,24 @@ def failed(rows: Sequence[Judged]) -> bool:
     return not all(row.passed for row in rows)
 
 
-def _limits(result: Result, against: str, max_error: float | None, tolerance_file: Path | None) -> dict[str, float]:
+def _limits(
+    result: Result, of_paper: bool, max_error: float | None, tolerance_file: Path | None
+) -> Mapping[str, float]:
     known = [row for row in result.table4 if row.truth is not None]
     if tolerance_file is not None:
         if max_error is not None:
             raise SettingError("--max-error and --tolerance-file: give one of them")
-        return _of_file(tolerance_file, known)
-    if against == "paper":
-        return _of_paper(result, known)
+        limits = read_toml(tolerance_file, _Tolerances).max_error_percent
+        names = [row.parameter for row in known]
+        for name in limits:
+            if name not in names:
+                raise SettingError(f"{tolerance_file}: max_error_percent.{name}: expected one of {', '.join(names)}")
+        return limits
+    if of_paper:
+        limits = {row.parameter: row.paper_error_percent for row in known if row.paper_error_percent is not None}
+        if not limits:
+            raise ResultError(f"{result.log.path}: not a case of the paper; check --against truth")
+        return limits
     if max_error is None:
         raise SettingError("--against truth: give the largest error with --max-error or --tolerance-file")
     return {row.parameter: max_error for row in known}
-
-
-def _of_file(path: Path, known: Sequence[Table4Row]) -> dict[str, float]:
-    limits = read_toml(path, _Tolerances).max_error_percent
-    names = [row.parameter for row in known]
-    stranger = next((name for name in limits if name not in names), None)
-    if stranger is not None:
-        raise SettingError(f"{path}: max_error_percent.{stranger}: expected one of {', '.join(names)}")
-    return limits
-
-
-def _of_paper(result: Result, known: Sequence[Table4Row]) -> dict[str, float]:
-    limits = {row.parameter: row.paper_error_percent for row in known if row.paper_error_percent is not None}
-    if not limits:
-        raise ResultError(f"{result.log.path}: not a case of the paper; check --against truth")
-    return limits

@@ -31,6 +31,15 @@ ModelT = TypeVar("ModelT", bound="BaseModel")
 
 
 @contextmanager
+def writing(place: Path | str, trouble: str = "cannot write") -> Iterator[None]:
+    """What the system says against writing to `place` within the block becomes an `OutputError`."""
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"{place}: {trouble} ({error.strerror}); choose another folder with -o") from error
+
+
+@contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
     """Give a temporary name beside `path` to write to; it becomes `path` when the block ends well.
 
@@ -41,26 +50,18 @@ def whole_file(path: Path) -> Iterator[Path]:
     """
     temporary = path.parent / f".{path.name}.{secrets.token_hex(4)}"  # named before it is made, as below
     try:
-        try:
+        with writing(path, "cannot write there"):
             path.parent.mkdir(parents=True, exist_ok=True)
             temporary.touch(mode=0o600, exist_ok=False)
-        except OSError as error:
-            text = f"{path}: cannot write there ({error.strerror}); choose another folder with -o"
-            raise OutputError(text) from error
-        yield temporary
-        temporary.chmod(0o666 & ~_umask())
-        temporary.replace(path)
-    except OSError as error:
-        raise OutputError(f"{path}: cannot write ({error.strerror}); choose another folder with -o") from error
+        with writing(path):
+            yield temporary
+            mask = os.umask(0)
+            os.umask(mask)
+            temporary.chmod(0o666 & ~mask)
+            temporary.replace(path)
     finally:
         with suppress(OSError):  # it may never have been made: what is told is why, not that
             temporary.unlink()
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 LARGEST_TEXT = 1 << 26
@@ -160,17 +161,13 @@ def whole_folder(folder: Path, force: bool) -> Iterator[Path]:
     # Named before it is made: a signal may come as soon as it stands, and it must be taken away then too.
     temporary = folder.parent / f".{folder.name}.{secrets.token_hex(4)}"
     try:
-        try:
+        with writing(folder, "cannot write there"):
             folder.parent.mkdir(parents=True, exist_ok=True)
             temporary.mkdir(mode=0o755)
-        except OSError as error:
-            text = f"{folder}: cannot write there ({error.strerror}); choose another folder with -o"
-            raise OutputError(text) from error
-        with _held(temporary, strictly=False):
-            yield temporary
-        _swap(temporary, folder)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot write ({error.strerror}); choose another folder with -o") from error
+        with writing(folder):
+            with _held(temporary, strictly=False):
+                yield temporary
+            _swap(temporary, folder)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
 

@@ -169,7 +169,27 @@ class Origin:
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """Samples of one log, or of a stretch of it: see the table above. Stamps strictly increase."""
+    """Samples of one log, or of a stretch of it.
+
+    Parameters
+    ----------
+    stamp_ns : (N,) int64, ns, strictly increasing
+    theta : (2, N) float64, rad
+        Joint angles: θ1 from the horizontal, θ2 from link 1.
+    tau : (2, N) float64, N m
+        Joint torques.
+    origin : Origin
+        Where the samples came from, and how they were read.
+    omega : (2, N) float64, rad/s
+        Joint velocities; None where they were not recorded.
+    notices : tuple of Notice
+        What a reader saw that its user should know.
+
+    Raises
+    ------
+    ValueError
+        If a channel has another shape.
+    """
 
     stamp_ns: IntArray
     theta: FloatArray

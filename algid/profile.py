@@ -145,13 +145,16 @@ def with_settings(profile: Profile, settings: Mapping[str, Any]) -> Profile:
         If a setting or its value is not known.
     """
     merged = profile.model_dump(exclude_unset=True)
+    flags = set(profile._flags)
     for name, value in settings.items():
-        merged[name] = {**merged.get(name, {}), **value} if isinstance(value, Mapping) else value
+        one_channel = isinstance(value, Mapping)
+        merged[name] = {**merged.get(name, {}), **value} if one_channel else value
+        flags |= {f"{name}.{inner}" for inner in value} if one_channel else {name}
     try:
         found = Profile.model_validate(merged)
     except ValidationError as error:
         raise SettingError(f"setting {first_misfit(error)}") from error
-    found._flags = profile._flags | {place for name, value in settings.items() for place in _places(name, value)}
+    found._flags = frozenset(flags)
     return found
 
 
@@ -172,10 +175,6 @@ def over(profile: Profile | None, earlier: Mapping[str, Any]) -> Profile | None:
     found = with_settings(known, profile.model_dump(exclude_unset=True))
     found._flags = profile._flags
     return found
-
-
-def _places(name: str, value: object) -> list[str]:
-    return [f"{name}.{inner}" for inner in value] if isinstance(value, Mapping) else [name]
 
 
 def load_profile(path: Path) -> Profile:

@@ -204,9 +204,31 @@ class Cause(_Model):
 class Result(_Model):
     """The outcome of one identification.
 
-    `truth` holds what a synthetic log was made with, by parameter; `causes` what probably lies behind a poor
-    result, the most likely one first; `profile` what the user said about the logs, in a profile's words. How each
-    log was read in the end stands in its `reading`; `notes` tell of what could have been read otherwise.
+    Attributes
+    ----------
+    schema_version, version : int, str
+        Of the file's form, and of the algid that wrote it.
+    estimator : str
+        Whose numbers these are: the settings name the one that was asked for.
+    parameters, loaded, payload : dict of Estimate
+        By name k1 … k7 of the arm, those of the loaded arm, and what the payload is made of.
+    paper_payload : dict of Estimate
+        The payload by the paper's own formulas.
+    table4, truth : list of Table4Row, dict of float
+        Rows in the paper's order; by parameter what a synthetic log was made with.
+    fit : FitSummary
+        What a statistical estimator knows beside the estimates.
+    settings, profile : dict
+        How it was identified, and what the user said about the logs in a profile's words. How each log was read in
+        the end stands in its `reading`.
+    log, more_logs : LogSummary, list of LogSummary
+        The first log that was used, and the others.
+    data_lost : bool
+        Whether a log lacks samples.
+    warnings, notes : list of str
+        What makes the result doubtful, and what could have been read otherwise.
+    causes : list of Cause
+        What probably lies behind a poor result, the most likely one first.
     """
 
     schema_version: Literal[2] = SCHEMA_VERSION

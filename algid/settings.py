@@ -65,8 +65,10 @@ class Settings:
     gravity : float, m/s^2, 0 for an arm that moves in a horizontal plane
     model : 'auto', 'plain', or terms of the torque between commas
         Names in `algid.model.TERMS`, and delay; 'auto' lets the logs choose.
-    friction : 'viscous' or 'coulomb', torque_offset, rotor_inertia : bool
-        Short forms of terms in `model`, as is a delay of 'estimate': with one of them nothing else is chosen.
+    friction : 'viscous' or 'coulomb'
+    torque_offset, rotor_inertia : bool
+        These three are short forms of terms in `model`, as is a delay of 'estimate': with one of them nothing else
+        is chosen.
     torque_hold : 'foh' or 'zoh'
     delay : float, s, between torque and angle, or 'estimate'
     l1, l2 : float, m, link lengths where known

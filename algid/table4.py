@@ -74,25 +74,23 @@ def table4(
     found: Mapping[str, float], std: Mapping[str, float], true: Mapping[str, float], paper: Mapping[str, float]
 ) -> list[Table4Row]:
     """The twelve rows; what was not estimated, or is not known, is null."""
-    return [
-        _row(name, unit, found.get(name), std.get(name), true.get(name), paper.get(name))
-        for name, unit in UNITS.items()
-    ]
-
-
-def _row(
-    name: str, unit: str, found: float | None, std: float | None, true: float | None, paper: float | None
-) -> Table4Row:
-    estimate = finite(found)
-    return Table4Row(
-        parameter=name,
-        unit=unit,
-        estimate=estimate,
-        std=finite(std),
-        truth=true,
-        error_percent=None if estimate is None or not true else 100 * abs(estimate / true - 1),
-        paper_error_percent=paper,
-    )
+    rows = []
+    for name, unit in UNITS.items():
+        estimate, truth = finite(found.get(name)), true.get(name)
+        error = None if estimate is None or not truth else 100 * abs(estimate / truth - 1)
+        spread, of_paper = finite(std.get(name)), paper.get(name)
+        rows.append(
+            Table4Row(
+                parameter=name,
+                unit=unit,
+                estimate=estimate,
+                std=spread,
+                truth=truth,
+                error_percent=error,
+                paper_error_percent=of_paper,
+            )
+        )
+    return rows
 
 
 def finite(value: float | None) -> float | None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import json
+import re
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +23,38 @@ def test_dir_shows_the_public_names_and_each_is_there() -> None:
     assert dir(algid) == sorted(algid.__all__)
     assert all(getattr(algid, name) is not None for name in algid.__all__)
     assert algid.identify is identify
+
+
+CALLED = [name for name in algid.__all__ if name not in ("AlgidError", "Result", "__version__")]
+
+
+@pytest.mark.parametrize("name", CALLED)
+def test_what_notebooks_call_says_all_that_it_takes_and_gives(name: str) -> None:
+    thing = getattr(algid, name)
+    said = _sections(thing)
+    assert said["Parameters"] == set(inspect.signature(thing).parameters)
+    if inspect.isfunction(thing):
+        assert ("Returns" in said) == (inspect.signature(thing).return_annotation != "None")
+        assert said["Raises"]
+
+
+def test_a_result_says_what_each_of_its_fields_is() -> None:
+    assert _sections(Result)["Attributes"] == set(Result.model_fields)
+
+
+def _sections(thing: object) -> dict[str, set[str]]:
+    """By numpydoc's heading the names that its lines explain: before a colon, with commas between them."""
+    parts = re.split(r"^(\w+)\n-+\n", inspect.getdoc(thing) or "", flags=re.MULTILINE)[1:]
+    return {
+        heading: {name for line in text.splitlines() if line[:1].strip() for name in line.split(" :")[0].split(", ")}
+        for heading, text in zip(parts[::2], parts[1::2], strict=True)
+    }
+
+
+def test_a_log_is_written_to_a_path_that_is_text(tmp_path: Path) -> None:
+    log, _ = algid.synthesise("case1", duration=0.1)
+    algid.write_log(str(tmp_path / "a.mcap"), log)
+    assert (algid.read_log(str(tmp_path / "a.mcap")).theta == log.theta).all()
 
 
 def test_a_result_is_read_by_a_string_and_shows_itself_as_a_short_table(tmp_path: Path) -> None:

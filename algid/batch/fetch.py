@@ -88,8 +88,19 @@ class Partial(File):
         if wanted and not 0 <= wanted[0][0] <= wanted[-1][1] <= self.size:
             raise DamagedError(f"bytes {wanted[0][0]} to {wanted[-1][1]} of an object of {self.size}")
         wanted = merged(without(wanted, self._held), GAP)
+
+        def copy(start: int, end: int) -> None:
+            content = self.source.read_at(end - start, start)
+            if len(content) != end - start:
+                raise OSError(f"bytes {start} to {end} are gone: it was changed meanwhile")
+            view = memoryview(content)
+            while view:
+                written = os.pwrite(self._handle, view, start)
+                view, start = view[written:], start + written
+
         with ThreadPoolExecutor(_REQUESTS, thread_name_prefix="algid-fetch") as pool:
-            for _ in pool.map(self._copy, list(_pieces(wanted))):
+            pieces = [(p, min(p + _PIECE, end)) for start, end in wanted for p in range(start, end, _PIECE)]
+            for _ in pool.map(lambda piece: copy(*piece), pieces):
                 pass
         self._held = merged([*self._held, *wanted])
 
@@ -101,16 +112,6 @@ class Partial(File):
                 raise UnforeseenError(f"bytes {start} to {place[1]}")
             self.fetch([place])
         return super().read(start, length)
-
-    def _copy(self, place: Range) -> None:
-        start, end = place
-        content = self.source.read_at(end - start, start)
-        if len(content) != end - start:
-            raise OSError(f"bytes {start} to {end} are gone: it was changed meanwhile")
-        view = memoryview(content)
-        while view:
-            written = os.pwrite(self._handle, view, start)
-            view, start = view[written:], start + written
 
 
 def merged(ranges: Iterable[Range], gap: int = 0) -> list[Range]:
@@ -136,13 +137,6 @@ def without(ranges: Iterable[Range], held: Sequence[Range]) -> Iterator[Range]:
             place = max(place, last)
         if place < end:
             yield place, end
-
-
-def _pieces(ranges: Iterable[Range]) -> Iterator[Range]:
-    """The same bytes in pieces that fit into memory side by side."""
-    for start, end in ranges:
-        for place in range(start, end, _PIECE):
-            yield place, min(place + _PIECE, end)
 
 
 def staged(url: str, folder: Path, profile: Profile | None = None) -> Staged:
@@ -201,20 +195,13 @@ def _fetched_in_part(part: Partial, profile: Profile | None) -> bool:
 
 
 def _wanted_of_mcap(part: Partial, profile: Profile | None) -> list[Range]:
-    """The chunks that hold the joints, with the indexes behind them."""
-    from algid.readers.mcap.plan import plan
+    """The chunks that hold the joints, with the indexes behind them.
 
-    part.fetch(_read_by_catalogue(part))
-    found = catalogue(part)  # a scan of the whole is unforeseen
-    part.on_demand = True
-    topics = plan(part, found, profile).topics
-    channels = frozenset[int]().union(*(channels_of(found, topic.name, topic.type) for topic in topics))
-    return [(span.start, span.start + span.length + span.index_length) for span in spans_of(found, channels)]
-
-
-def _read_by_catalogue(part: Partial) -> list[Range]:
-    """Where the catalogue looks beyond the summary: heads of message indexes, metadata, what lies between."""
+    The catalogue looks at the summary, and beyond it at heads of message indexes, metadata, and what lies between.
+    """
     from mcap import records
+
+    from algid.readers.mcap.plan import plan
 
     (start,) = struct.unpack("<Q", part.read(part.size - _MCAP_END + 9, 8))
     end = part.size - _MCAP_END
@@ -232,7 +219,12 @@ def _read_by_catalogue(part: Partial) -> list[Range]:
             if place.length <= framing.SMALL_RECORD:
                 wanted.append((place.offset, place.offset + place.length))
     chunks.sort(key=lambda chunk: chunk.chunk_start_offset)
-    return [*wanted, *((first, last) for first, last in between(chunks, start) if last - first <= SMALL)]
+    part.fetch([*wanted, *((first, last) for first, last in between(chunks, start) if last - first <= SMALL)])
+    found = catalogue(part)  # a scan of the whole is unforeseen
+    part.on_demand = True
+    topics = plan(part, found, profile).topics
+    channels = frozenset[int]().union(*(channels_of(found, topic.name, topic.type) for topic in topics))
+    return [(span.start, span.start + span.length + span.index_length) for span in spans_of(found, channels)]
 
 
 def _wanted_of_parquet(part: Partial, profile: Profile | None) -> list[Range]:
@@ -254,14 +246,12 @@ def _wanted_of_parquet(part: Partial, profile: Profile | None) -> list[Range]:
     except (pa.ArrowException, OSError, LogError) as error:
         raise UnforeseenError(str(error)) from error
     groups = [metadata.row_group(place) for place in range(metadata.num_row_groups)]
-    pages = [group.column(place) for group in groups for place in range(group.num_columns)]
-    places = [(one.path_in_schema, _place(one)) for one in pages]
-    last = max((end for _, (_, end) in places), default=start)
-    return [(last, part.size), *(place for name, place in places if name in names)]
-
-
-def _place(pages: Any) -> Range:
-    """Where the pages of a column of a row group lie."""
-    offsets = (pages.dictionary_page_offset, pages.data_page_offset)
-    first = min(offset for offset in offsets if offset is not None)
-    return first, first + pages.total_compressed_size
+    last, wanted = 0, []
+    for pages in (group.column(place) for group in groups for place in range(group.num_columns)):
+        offsets = (pages.dictionary_page_offset, pages.data_page_offset)
+        first = min(offset for offset in offsets if offset is not None)
+        end = first + pages.total_compressed_size
+        last = max(last, end)
+        if pages.path_in_schema in names:
+            wanted.append((first, end))
+    return [(last or start, part.size), *wanted]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+import hashlib
+import json
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
@@ -13,13 +15,13 @@ from typing import TYPE_CHECKING, Any
 from algid import __version__
 from algid.batch.fetch import naming, staged
 from algid.batch.jobs import Job
-from algid.batch.records import End, Input, JobRecord, estimates_of, stat_of
+from algid.batch.records import End, Input, JobRecord, estimates_of, hash_of, stat_of
 from algid.errors import chain_of, text_of
 from algid.files import temporary_folder
 from algid.identification.identify import identify
-from algid.identification.source import Staged, sha256_of
+from algid.identification.source import Staged
 from algid.report.verdict import verdict
-from algid.results import Result
+from algid.results import Result, Status
 from algid.runtime import keep_freed, keep_to_one_core
 from algid.settings import Settings
 from algid.stores import is_url, open_store, put_folder
@@ -27,7 +29,9 @@ from algid.stores import is_url, open_store, put_folder
 if TYPE_CHECKING:
     from algid.profile import Profile
 
-NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
+NO_SPACE = {errno.ENOSPC, errno.EDQUOT}
+NO_SPACE_LEFT = "No space left on device"  # what libraries say that raise exceptions of their own
+TOO_LARGE = "it needs more memory than a worker has; raise --memory-limit"
 
 
 @dataclass(frozen=True)
@@ -62,18 +66,23 @@ def run_task(task: Task) -> JobRecord | DiskFull:
     try:
         result = _identified(task)
     except BaseException as error:
-        if any(map(_no_space, chain_of(error))):
+        chain = list(chain_of(error))
+        numbers = {one.errno for one in chain if isinstance(one, OSError)}
+        if not numbers.isdisjoint(NO_SPACE) or any(NO_SPACE_LEFT in text_of(one) for one in chain):
             return DiskFull(text_of(error))
-        inputs = tuple(map(_hashed, inputs))
-        return failed_record(task, _reason(error), inputs=inputs, seconds=time.perf_counter() - start)
+        reason = TOO_LARGE if isinstance(error, MemoryError) else text_of(error)
+        inputs = tuple(replace(one, sha256=hash_of(one.path)) for one in inputs)
+        return failed_record(task, reason, inputs=inputs, seconds=time.perf_counter() - start)
     judged = verdict(result)
-    good = result.complete and not result.data_lost and judged.level != "failed"
+    lacking = ["samples were lost"] if result.data_lost else []
+    lacking += [f"{name} {one.status.value}" for name, one in result.estimates.items() if one.status is not Status.OK]
+    failed = judged.level == "failed"
     hashes = {log.path: log.sha256 for log in result.logs}
     return _record(
         task,
         inputs=tuple(replace(one, sha256=hashes.get(one.path)) for one in inputs),
-        status=End.OK if good else End.INCOMPLETE,
-        reason="" if good else judged.sentence if judged.level == "failed" else _what_lacks(result),
+        status=End.INCOMPLETE if failed or lacking else End.OK,
+        reason=judged.sentence if failed else "; ".join(lacking),
         seconds=time.perf_counter() - start,
         start_ns=result.log.start_ns,
         log_seconds=sum(log.duration for log in result.logs),
@@ -126,34 +135,8 @@ def _here(paths: Sequence[str], folder: Path, profile: Profile | None) -> list[s
     return [staged(path, folder / str(n), profile) if is_url(path) else path for n, path in enumerate(paths)]
 
 
-def _what_lacks(result: Result) -> str:
-    lacking = [f"{name} {e.status.value}" for name, e in result.estimates.items() if e.status.value != "OK"]
-    return "; ".join([*(["samples were lost"] if result.data_lost else []), *lacking])
-
-
-def _hashed(one: Input) -> Input:
-    """With its sha256, where it can be had."""
-    try:
-        return one if is_url(one.path) else replace(one, sha256=sha256_of(Path(one.path)))
-    except OSError:
-        return one
-
-
-def _reason(error: BaseException) -> str:
-    if isinstance(error, MemoryError):
-        return "it needs more memory than a worker has; raise --memory-limit"
-    return text_of(error)
-
-
-def _no_space(error: BaseException) -> bool:
-    return (isinstance(error, OSError) and error.errno in NO_SPACE) or "No space left on device" in text_of(error)
-
-
 def basis_of(settings: Mapping[str, Any], profile: Profile | None, parameters: Result | None, report: bool) -> str:
     """A hash of everything but the logs that decides a job's outcome."""
-    import hashlib
-    import json
-
     content = {
         "settings": settings,
         "profile": None if profile is None else profile.model_dump(mode="json"),

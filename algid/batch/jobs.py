@@ -92,9 +92,8 @@ def is_manifest(path: Path) -> bool:
         return True
     if path.suffix.lower() != ".csv" or not path.is_file():
         return False
-    with path.open("rb") as stream:
-        head = stream.readline(1 << 16).decode("utf-8-sig", "replace")
-    columns = next(csv.reader([head.strip()]), [])
+    with path.open(encoding="utf-8-sig", errors="replace") as stream:  # logs too come by here, whatever is in them
+        columns = next(csv.reader([stream.readline(1 << 16).strip()]), [])
     return "name" in columns and ("logs" in columns or "loaded" in columns)
 
 
@@ -107,39 +106,37 @@ def read_manifest(path: Path) -> list[Job]:
         If it cannot be read or a row is wrong.
     """
     try:
-        rows = _toml_rows(path) if path.suffix.lower() == ".toml" else _csv_rows(path)
-    except (OSError, UnicodeDecodeError, csv.Error, tomllib.TOMLDecodeError) as error:
+        if path.suffix.lower() == ".toml":
+            kind, content = "job", tomllib.loads(read_text(path))
+            rows = content.get("job")
+            if set(content) != {"job"} or not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+                raise SettingError(f"{path}: expected tables [[job]] alone, found {', '.join(content) or 'nothing'}")
+        else:
+            kind, cells = "row", list(csv.DictReader(io.StringIO(read_text(path, "utf-8-sig"))))
+            if any(None in row for row in cells):
+                raise SettingError(f"{path}: a row has more cells than the header; quote commas within a cell")
+            rows = [{name: cell for name, cell in row.items() if cell} for row in cells]
+    except (OSError, UnicodeDecodeError, csv.Error, tomllib.TOMLDecodeError, RecursionError) as error:
         raise SettingError(f"{path}: the manifest cannot be read ({error}); mend it") from error
-    return [_job(row, f"{path}: {place}", path.parent) for place, row in rows]
-
-
-def _toml_rows(path: Path) -> list[tuple[str, Mapping[str, object]]]:
-    content = tomllib.loads(read_text(path))
-    tables = content.get("job")
-    if not isinstance(tables, list) or set(content) != {"job"}:
-        raise SettingError(f"{path}: expected tables [[job]] alone, found {', '.join(content) or 'nothing'}")
-    return [(f"job {number}", table) for number, table in enumerate(tables, 1)]
-
-
-def _csv_rows(path: Path) -> Iterable[tuple[str, Mapping[str, object]]]:
-    rows = list(csv.DictReader(io.StringIO(read_text(path, "utf-8-sig"))))
-    if any(None in row for row in rows):
-        raise SettingError(f"{path}: a row has more cells than the header; quote commas within a cell")
-    return [(f"row {number}", {k: v for k, v in row.items() if v}) for number, row in enumerate(rows, 1)]
+    return [_job(row, f"{path}: {kind} {number}", path.parent) for number, row in enumerate(rows, 1)]
 
 
 def _job(row: Mapping[str, object], place: str, folder: Path) -> Job:
     logs, loaded = _paths(row, "logs", place, folder), _paths(row, "loaded", place, folder)
     if "name" not in row or not (logs or loaded):
         raise SettingError(f"{place}: expected a name and logs, found {', '.join(row) or 'nothing'}")
-    profile = _paths(row, "profile", place, folder)
+    profile, time = _paths(row, "profile", place, folder), row.get("time")
+    try:
+        time = None if time is None else datetime.fromisoformat(str(time)).isoformat()
+    except ValueError as error:
+        raise SettingError(f"{place}: time: expected ISO 8601 like 2026-01-31T12:00:00Z, found {time!r}") from error
     return Job(
         name=checked_name(str(row["name"]), place),
         logs=logs,
         loaded=loaded,
         profile=profile[0] if profile else None,
         robot=None if row.get("robot") is None else str(row["robot"]),
-        time=_time(row.get("time"), place),
+        time=time,
         labels={name: label_of(value) for name, value in row.items() if name not in _OWN},
     )
 
@@ -149,30 +146,15 @@ def _paths(row: Mapping[str, object], name: str, place: str, folder: Path) -> tu
     if found is None:
         return ()
     parts = found.split(";") if isinstance(found, str) else found
-    if not isinstance(parts, list) or not all(isinstance(part, str) and part.strip() for part in parts):
+    if not isinstance(parts, list) or not all(
+        isinstance(part, str) and part.strip() and "\0" not in part for part in parts
+    ):
         raise SettingError(f"{place}: {name}: expected paths, found {found!r:.60}")
     return tuple(part.strip() if "://" in part else str(folder / part.strip()) for part in parts)
 
 
-def _time(value: object, place: str) -> str | None:
-    if value is None:
-        return None
-    try:
-        return datetime.fromisoformat(str(value)).isoformat()
-    except ValueError as error:
-        raise SettingError(f"{place}: time: expected ISO 8601 like 2026-01-31T12:00:00Z, found {value!r}") from error
-
-
 SUFFIXES = (".mcap", ".parquet", ".csv", ".csv.gz", ".csv.zst")
 _ROLE = re.compile(r"(?P<base>.+)[-_](?P<role>unloaded|loaded)")
-
-
-@dataclass(frozen=True)
-class _Found:
-    """A log: its path or URL, and its name below the source without suffix."""
-
-    path: str
-    name: str
 
 
 def jobs_of(sources: Sequence[str], out: str, alone: str = "logs") -> list[Job]:
@@ -192,29 +174,29 @@ def jobs_of(sources: Sequence[str], out: str, alone: str = "logs") -> list[Job]:
     """
     jobs: dict[str, Job] = {}
     for source in sources:
-        for job in _of_source(source, out, alone):
+        try:
+            manifest = not is_url(source) and is_manifest(Path(source))
+            found = read_manifest(Path(source)) if manifest else _paired(_logs(source, out), alone)
+        except OSError as error:
+            raise SettingError(f"{source}: cannot look there ({error}); check its name and rights") from error
+        for job in found:
             if job.name in jobs and jobs[job.name] != job:
                 raise _twice(job.name, jobs[job.name], job)
             jobs[job.name] = job
     return [jobs[name] for name in sorted(jobs)]
 
 
-def _of_source(source: str, out: str, alone: str) -> list[Job]:
-    if not is_url(source) and is_manifest(Path(source)):
-        return read_manifest(Path(source))
-    return _paired(_logs(source, out), alone)
-
-
-def _logs(source: str, out: str) -> list[_Found]:
+def _logs(source: str, out: str) -> list[tuple[str, str]]:
+    """Paths or URLs of a source's logs, each with its name below the source without suffix."""
     if is_url(source):
-        return [_Found(url, _stem(name)) for url, name in list_urls(source) if _is_log(name)]
+        return [(url, _stem(name)) for url, name in list_urls(source) if _is_log(name)]
     path = Path(source)
     if path.is_dir() and not _is_bag(path):
-        return [_Found(str(log), _stem(log.relative_to(path).as_posix())) for log in _walk(path, Path(out).resolve())]
+        return [(str(log), _stem(log.relative_to(path).as_posix())) for log in _walk(path, Path(out).resolve())]
     paths = [source] if path.exists() else sorted(glob.glob(source, recursive=True))  # noqa: PTH207  # a pattern may be absolute
     if not paths:
         raise SettingError(f"{source}: there is no such file, folder or match; check the name")
-    return [_Found(match, _stem(Path(match).name)) for match in paths if Path(match).is_file() or _is_bag(Path(match))]
+    return [(match, _stem(Path(match).name)) for match in paths if Path(match).is_file() or _is_bag(Path(match))]
 
 
 def _walk(folder: Path, out: Path) -> Iterator[Path]:
@@ -244,14 +226,15 @@ def _stem(name: str) -> str:
     return name[: len(name) - len(suffix)]
 
 
-def _paired(found: Sequence[_Found], alone: str) -> list[Job]:
+def _paired(logs: Iterable[tuple[str, str]], alone: str) -> list[Job]:
+    """A job for each name of logs that differ in their role alone."""
     jobs: dict[str, Job] = {}
-    for log in found:
-        match = _ROLE.fullmatch(log.name)
-        name = checked_name(match["base"] if match else log.name, log.path)
+    for path, stem in logs:
+        match = _ROLE.fullmatch(stem)
+        name = checked_name(match["base"] if match else stem, path)
         loaded = (match["role"] if match else alone) == "loaded"
         before = jobs.get(name, Job(name, robot=os.path.dirname(name) or None))  # noqa: PTH120  # a name, not a path
-        now = replace(before, loaded=(log.path,)) if loaded else replace(before, logs=(log.path,))
+        now = replace(before, loaded=(path,)) if loaded else replace(before, logs=(path,))
         if before.loaded if loaded else before.logs:
             raise _twice(name, before, now)
         jobs[name] = now

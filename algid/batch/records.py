@@ -7,15 +7,16 @@ from __future__ import annotations
 
 import io
 import json
-import os
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from algid.batch.jobs import Job, Label
+from algid.batch.jobs import Job
+from algid.identification.source import sha256_of
 from algid.results import Result
 from algid.stores import Store, is_url, object_stat
 
@@ -75,18 +76,28 @@ def stat_of(path: str) -> Input:
     if is_url(path):
         return Input(path, *object_stat(path))
     try:
-        found = [file.stat() for file in _files(Path(path))]
+        files = filter(Path.is_file, Path(path).iterdir()) if Path(path).is_dir() else [Path(path)]
+        found = [file.stat() for file in files]
     except OSError:
         return Input(path, 0, 0)
     mtime, ctime = (max((getattr(s, name) for s in found), default=0) for name in ("st_mtime_ns", "st_ctime_ns"))
     return Input(path, sum(s.st_size for s in found), mtime, ctime)
 
 
-def _files(path: Path) -> Iterator[Path]:
-    if path.is_dir():
-        yield from (Path(entry) for entry in os.scandir(path) if entry.is_file())
-    else:
-        yield path
+def hash_of(path: str) -> str | None:
+    """The SHA-256 of a log on this machine; None where it cannot be had."""
+    try:
+        return None if is_url(path) else sha256_of(Path(path))
+    except OSError:
+        return None
+
+
+def unchanged(before: Input) -> bool:
+    """Whether a log holds what it held: by its size and times of change, and by its hash where one of these moved."""
+    now = stat_of(before.path)
+    if replace(now, sha256=before.sha256) == before:
+        return True
+    return now.size == before.size and before.sha256 is not None and hash_of(before.path) == before.sha256
 
 
 def estimates_of(result: Result) -> dict[str, tuple[float | None, float | None, str]]:
@@ -104,25 +115,18 @@ def read_records(store: Store) -> dict[str, JobRecord]:
     """All records by job; one that cannot be read counts as none, so that its job runs again."""
     found = {}
     for name in store.names(FOLDER):
-        record = _parsed(store.read(name) or b"")
-        if record is not None:
+        with suppress(ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            fields = json.loads(store.read(name) or b"")
+            job = fields.pop("job")
+            record = JobRecord(
+                job=Job(**{**job, "logs": tuple(job["logs"]), "loaded": tuple(job["loaded"])}),
+                status=End(fields.pop("status")),
+                inputs=tuple(Input(**one) for one in fields.pop("inputs")),
+                estimates={name: tuple(three) for name, three in fields.pop("estimates").items()},
+                **fields,
+            )
             found[record.job.name] = record
     return found
-
-
-def _parsed(content: bytes) -> JobRecord | None:
-    try:
-        fields = json.loads(content)
-        job = fields.pop("job")
-        return JobRecord(
-            job=Job(**{**job, "logs": tuple(job["logs"]), "loaded": tuple(job["loaded"])}),
-            status=End(fields.pop("status")),
-            inputs=tuple(Input(**one) for one in fields.pop("inputs")),
-            estimates={name: tuple(three) for name, three in fields.pop("estimates").items()},
-            **fields,
-        )
-    except (ValueError, KeyError, TypeError, AttributeError):
-        return None
 
 
 if TYPE_CHECKING:
@@ -144,7 +148,8 @@ def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
 
     Columns: job, robot, time, status, reason, seconds, log_seconds, estimator (whose numbers these are; the one
     asked for stands in the settings), version, settings (JSON); logs, sha256, size in bytes and time of change
-    (lists; a log that was fetched in part has no sha256); ``label_X`` for each label; ``k``, ``k_std`` and
+    (lists; a log that was fetched in part has no sha256); ``label_X`` for each label, numbers where every one is,
+    text otherwise; ``k``, ``k_std`` and
     ``k_status`` for each estimate, null where there is none.
     """
     import polars as pl
@@ -168,7 +173,10 @@ def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
         ),
     }
     for name in _names([r.job.labels for r in records]):
-        columns[f"label_{name}"] = _label_column([r.job.labels.get(name) for r in records])
+        labels = [r.job.labels.get(name) for r in records]
+        numbers = all(label is None or type(label) in (int, float) for label in labels)
+        kind, dtype = (float, pl.Float64) if numbers else (str, pl.String)
+        columns[f"label_{name}"] = pl.Series([None if x is None else kind(x) for x in labels], dtype=dtype)
     for name in _names([r.estimates for r in records]):
         found = [r.estimates.get(name, (None, None, None)) for r in records]
         columns[name] = pl.Series([one[0] for one in found], dtype=pl.Float64)
@@ -189,12 +197,3 @@ def time_of(record: JobRecord) -> datetime | None:
 
 def _names(several: Sequence[Mapping[str, Any]]) -> list[str]:
     return sorted({name for one in several for name in one})
-
-
-def _label_column(values: Sequence[Label | None]) -> pl.Series:
-    """Numbers where every label is one, text otherwise."""
-    import polars as pl
-
-    if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
-        return pl.Series([None if value is None else float(value) for value in values], dtype=pl.Float64)
-    return pl.Series([None if value is None else str(value) for value in values], dtype=pl.String)

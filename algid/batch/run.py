@@ -10,20 +10,28 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from pathlib import Path
 from types import FrameType
 from typing import Any
 
 from algid.batch.job import DiskFull, Task, basis_of, failed_record, run_task
 from algid.batch.jobs import Job
-from algid.batch.records import FAILURES, End, Input, JobRecord, read_records, stat_of, write_jobs, write_record
+from algid.batch.records import (
+    FAILURES,
+    End,
+    Input,
+    JobRecord,
+    read_records,
+    stat_of,
+    unchanged,
+    write_jobs,
+    write_record,
+)
 from algid.batch.workers import CallFailedError, WorkerDiedError
 from algid.errors import OutputError, SettingError, text_of
-from algid.identification.source import sha256_of
 from algid.profile import Profile
 from algid.results import Result
 from algid.settings import Settings
-from algid.stores import Store, is_url
+from algid.stores import Store
 
 MOST_KILLS = 3
 LOOK_EVERY = 2.0  # s, for logs that have arrived
@@ -91,20 +99,7 @@ def _stands(record: JobRecord, task: Task, store: Store) -> bool:
         return False
     if record.status not in FAILURES and not store.exists(f"{task.job.name}.algid/result.json"):
         return False
-    return bool(record.inputs) and all(map(_unchanged, record.inputs))
-
-
-def _unchanged(before: Input) -> bool:
-    """Whether a log holds what it held: by its size and times of change, and by its hash where one of these moved."""
-    now = stat_of(before.path)
-    if replace(now, sha256=before.sha256) == before:
-        return True
-    if now.size != before.size or before.sha256 is None or is_url(before.path):
-        return False
-    try:
-        return sha256_of(Path(before.path)) == before.sha256
-    except OSError:
-        return False
+    return bool(record.inputs) and all(map(unchanged, record.inputs))
 
 
 @dataclass(frozen=True)

@@ -112,7 +112,11 @@ class Workers(Executor):
             if self._ended.is_set() or not future.set_running_or_notify_cancel():
                 continue
             try:
-                worker = worker or self._started()
+                if worker is None:
+                    worker = _Worker(self._memory_limit, self._temporary)
+                    self._running.add(worker)
+                    if self._ended.is_set():  # it was not yet there to be killed
+                        worker.process.kill()
                 future.set_result(worker.answer(packed, self._timeout))
             except (CallFailedError, WorkerDiedError, OSError) as error:  # OSError: no process could be started
                 future.set_exception(error)
@@ -122,13 +126,6 @@ class Workers(Executor):
         if worker is not None:
             worker.end()
             self._running.discard(worker)
-
-    def _started(self) -> _Worker:
-        worker = _Worker(self._memory_limit, self._temporary)
-        self._running.add(worker)
-        if self._ended.is_set():  # it was not yet there to be killed
-            worker.process.kill()
-        return worker
 
 
 class _Worker:
@@ -164,19 +161,15 @@ class _Worker:
             return _unpacked(coming.result())
         except BrokenProcessPool as error:
             self.end()
-            raise WorkerDiedError(_how(self.process.exitcode)) from error
+            code = self.process.exitcode or 0
+            how = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+            raise WorkerDiedError(f"the worker {how}") from error
 
     def end(self) -> None:
         """Let the process end, and wait for it."""
         self.gone = True
         self._pool.shutdown()
         self.process.join()
-
-
-def _how(code: int | None) -> str:
-    if code is None or code >= 0:
-        return f"the worker ended with exit code {code}"
-    return f"the worker was ended by {signal.Signals(-code).name}"
 
 
 def _prepare(memory_limit: int | None, temporary: Path) -> None:
@@ -186,8 +179,18 @@ def _prepare(memory_limit: int | None, temporary: Path) -> None:
     os.environ.update(dict.fromkeys(THREADS, "1"))  # before anything loads numpy
     tempfile.tempdir = str(temporary)  # the parent removes it, however this process ends
     threading.Thread(target=_die_with_parent, daemon=True).start()
-    if memory_limit is not None:
-        _bound_memory(memory_limit)
+    if memory_limit is None:
+        return
+    import resource
+
+    import polars as pl
+    import pyarrow.parquet  # noqa: F401
+
+    pl.select(pl.lit(1)).lazy().collect()  # a library whose threads cannot start waits for them for ever
+    # Data, not address space: allocators and threads reserve far more addresses than they use.
+    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    limit = memory_limit if hard == resource.RLIM_INFINITY else min(memory_limit, hard)
+    resource.setrlimit(resource.RLIMIT_DATA, (limit, hard))
 
 
 def _answered(packed: bytes) -> bytes:
@@ -218,18 +221,6 @@ def _die_with_parent() -> None:
         os._exit(1)
 
 
-def _bound_memory(limit: int) -> None:
-    import resource
-
-    import polars as pl
-    import pyarrow.parquet  # noqa: F401
-
-    pl.select(pl.lit(1)).lazy().collect()  # a library whose threads cannot start waits for them for ever
-    # Data, not address space: allocators and threads reserve far more addresses than they use.
-    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-    resource.setrlimit(resource.RLIMIT_DATA, (limit if hard == resource.RLIM_INFINITY else min(limit, hard), hard))
-
-
 @contextmanager
 def cluster(address: str, out: str, timeout: float | None = None) -> Iterator[tuple[Executor, int]]:
     """The workers of a Dask cluster behind the interface of the local ones, and how many jobs to hand out at once.
@@ -254,14 +245,14 @@ def cluster(address: str, out: str, timeout: float | None = None) -> Iterator[tu
         if not threads:
             raise SettingError(f"--scheduler {address}: it has no workers; start dask worker {address}")
         prefix = f"algid-{hashlib.sha256(out.encode()).hexdigest()[:16]}-"
-        while any(client.run(_at_work, prefix).values()):
+
+        def at_work(dask_worker: Any) -> bool:
+            """Whether a worker, this runs on it, has a call of that batch in hand."""
+            return any(str(task.key).startswith(prefix) for task in dask_worker.state.all_running_tasks)
+
+        while any(client.run(at_work).values()):
             time.sleep(LOOK_EVERY)
         yield _Cluster(client, prefix, timeout), 2 * threads
-
-
-def _at_work(prefix: str, dask_worker: Any) -> bool:
-    """Whether a worker, this function runs on it, has a call in hand whose key starts so."""
-    return any(str(task.key).startswith(prefix) for task in dask_worker.state.all_running_tasks)
 
 
 class _Cluster(Executor):
@@ -272,24 +263,24 @@ class _Cluster(Executor):
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Run ``fn(*args, **kwargs)`` on a worker; one that dies has the call run elsewhere."""
+        from distributed.client import FutureCancelledError
+        from distributed.scheduler import KilledWorker
+
         answer: Future[Any] = Future()
         answer.set_running_or_notify_cancel()
         packed = pickle.dumps((fn, args, kwargs))
         remote = self._client.submit(answered_within, packed, self._timeout, key=self._prefix + uuid.uuid4().hex)
-        remote.add_done_callback(lambda done: _settle(answer, done))
+
+        def settle(done: Any) -> None:
+            try:
+                answer.set_result(_unpacked(done.result()))
+            except KilledWorker as error:
+                answer.set_exception(WorkerDiedError(str(error).split("\n", maxsplit=1)[0], kills=MOST_DEATHS + 1))
+            except (FutureCancelledError, Exception) as error:
+                answer.set_exception(error)
+
+        remote.add_done_callback(settle)
         return answer
-
-
-def _settle(answer: Future[Any], remote: Any) -> None:
-    from distributed.client import FutureCancelledError
-    from distributed.scheduler import KilledWorker
-
-    try:
-        answer.set_result(_unpacked(remote.result()))
-    except KilledWorker as error:
-        answer.set_exception(WorkerDiedError(str(error).split("\n", maxsplit=1)[0], kills=MOST_DEATHS + 1))
-    except (FutureCancelledError, Exception) as error:
-        answer.set_exception(error)
 
 
 def answered_within(packed: bytes, timeout: float | None) -> bytes:

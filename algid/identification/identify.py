@@ -89,6 +89,11 @@ def identify(
     told : callable
         Called with the stage and how many samples of how many it has gone over, as the work goes on.
 
+    Returns
+    -------
+    Result
+        Each estimate with standard deviation, 95 % interval, unit and status; what is not identifiable says so.
+
     Raises
     ------
     AlgidError

@@ -71,6 +71,18 @@ def _open_bag(path: Path, profile: Profile | None) -> TableReader:
 def read_log(path: str | Path, profile: Profile | None = None) -> Log:
     """Read a whole log: see `open_log`.
 
+    Parameters
+    ----------
+    path : str or Path
+        A file of any format that algid reads, or a rosbag2 folder.
+    profile : Profile, optional
+        What the log's names, units and signs mean, where the log does not tell.
+
+    Returns
+    -------
+    Log
+        Its samples in SI units, and in `notices` what its user should know.
+
     Raises
     ------
     LogError

@@ -47,19 +47,21 @@ def simulate(
     omega0: FloatArray | None = None,
     reached: Callable[[float], None] | None = None,
 ) -> SimulatedMotion:
-    """Move the arm `k` by `torque` from rest, or from `theta0` (2,) rad and `omega0` (2,) rad/s at `t[0]`.
+    """Move an arm by torques.
 
     Parameters
     ----------
     k : (7,) float64, constants k1 … k7, with the payload's share where there is one
     torque : callable (M,) s -> (2, M) N m
     t : (N,) float64, s, increasing, at least two
+    theta0 : (2,) float64, rad, at `t[0]`; hanging by default
+    omega0 : (2,) float64, rad/s, at `t[0]`; at rest by default
     reached : callable
         Called with each time in s that the integration has come to.
 
     Returns
     -------
-    Motion
+    SimulatedMotion
         Angles within 1e-9 rad of the exact solution over tens of seconds.
 
     Raises

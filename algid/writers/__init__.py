@@ -10,8 +10,19 @@ from algid.log import Log, Truth
 FORMATS = ("mcap", "parquet", "csv")
 
 
-def write_log(path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None, kind: str | None = None) -> None:
-    """Write a log, or the blocks of one, in the format of `path`'s suffix or as `kind`.
+def write_log(
+    path: str | Path, log: Log | Iterable[Log], *, truth: Truth | None = None, kind: str | None = None
+) -> None:
+    """Write a log, or the blocks of one, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+    log : Log, or the blocks of one in their order
+    truth : Truth
+        The arm and the payload behind a synthetic log, which is written beside its samples.
+    kind : 'mcap', 'parquet' or 'csv'
+        Format; that of `path`'s suffix by default.
 
     Raises
     ------
@@ -20,6 +31,7 @@ def write_log(path: Path, log: Log | Iterable[Log], *, truth: Truth | None = Non
     ValueError
         If the format is unknown.
     """
+    path = Path(path)
     name = kind or path.suffix.lstrip(".").lower()
     if name == "mcap":
         from algid.writers import mcap

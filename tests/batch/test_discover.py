@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import errno
+import math
+import os
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from algid.batch.jobs import Job, is_manifest, jobs_of, read_manifest
+from algid.batch.jobs import Job, checked_name, is_manifest, jobs_of, label_of, read_manifest
 from algid.errors import SettingError
 
 
@@ -78,9 +83,156 @@ def test_manifests_in_csv_and_toml_say_the_same(tmp_path: Path) -> None:
         ("name,logs\nx,\n", "row 1: expected a name and logs"),
         ("name,logs,time\nx,a.csv,yesterday\n", "row 1: time: expected ISO 8601"),
         ("name,logs\nx,a,b,c\n", "a row has more cells"),
+        ("name,logs\nx,a.csv;;b.csv\n", "row 1: logs: expected paths, found 'a.csv;;b.csv'"),
+        ("name,logs\ny,a.csv\nx,a\0.csv\n", "row 2: logs: expected paths, found"),
+        ("name,logs\n" + "x" * 140_000 + ",a.csv\n", "the manifest cannot be read \\(field larger than"),
     ],
 )
 def test_a_bad_manifest_is_refused_by_its_place(tmp_path: Path, text: str, told: str) -> None:
     (tmp_path / "m.csv").write_text(text)
-    with pytest.raises(SettingError, match=told):
+    with pytest.raises(SettingError, match=rf"^{tmp_path}/m\.csv: {told}"):
         read_manifest(tmp_path / "m.csv")
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", r"expected tables \[\[job\]\] alone, found nothing"),
+        ("job = 1", r"expected tables \[\[job\]\] alone, found job"),
+        ("job = [1]", r"expected tables \[\[job\]\] alone, found job"),
+        ("more = 1\n[[job]]\nname = 'x'\nlogs = 'a.csv'", r"expected tables \[\[job\]\] alone, found more, job"),
+        ("[[job]]\nlogs = 'a.csv'", "job 1: expected a name and logs, found logs"),
+        ("[[job]]\nname = 'x'\nlogs = 5", "job 1: logs: expected paths, found 5"),
+        ("[[job]]\nname = 'x'\nlogs = ['a.csv', 5]", r"job 1: logs: expected paths, found \['a.csv', 5\]"),
+        ("[[job]]\nname = 'x'\nlogs = ['a.csv', ' ']", r"job 1: logs: expected paths, found \['a.csv', ' '\]"),
+        ("[[job]]\nname = 'x'\nloaded = \"a\\u0000.csv\"", "job 1: loaded: expected paths"),
+        ("[[job]]\nname = 'x'\nlogs = 'a.csv'\ntime = 07:32:00", "job 1: time: expected ISO 8601"),
+        ("a = " + "[" * 5000 + "]" * 5000, r"the manifest cannot be read \(maximum recursion depth"),
+        ("[[job", "the manifest cannot be read"),
+    ],
+)
+def test_a_bad_manifest_in_toml_is_refused_by_its_place(tmp_path: Path, text: str, told: str) -> None:
+    (tmp_path / "m.toml").write_text(text)
+    with pytest.raises(SettingError, match=rf"^{tmp_path}/m\.toml: {told}"):
+        jobs_of([str(tmp_path / "m.toml")], "out")
+
+
+def test_a_manifest_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SettingError, match=r"m\.toml: the manifest cannot be read .*No such file.*mend it$"):
+        jobs_of([str(tmp_path / "m.toml")], "out")
+    (tmp_path / "m.csv").write_bytes(b"name,logs\nx,\xff.csv\n")
+    with pytest.raises(SettingError, match=r"m\.csv: the manifest cannot be read .*utf-8.*mend it$"):
+        jobs_of([str(tmp_path / "m.csv")], "out")
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_a_csv_file_is_a_manifest_by_its_columns_whatever_ends_its_lines(tmp_path: Path, end: str) -> None:
+    path = tmp_path / "m.csv"
+    for header, expected in (
+        *(("name,logs", True), ("loaded,payload,name", True), ("\ufeffname,loaded", True)),
+        *(("name,log", False), ("logs,loaded", False), ("t,theta1", False), ("", False)),
+    ):
+        path.write_bytes(f"{header}{end}x,a.csv{end}".encode())
+        assert is_manifest(path) == expected, header
+    assert [job.name for job in jobs_of([str(path)], "out")] == ["m"]
+    path.write_bytes(f"name,logs{end}x,a.csv{end}y,b.csv{end}".encode())
+    assert [job.name for job in jobs_of([str(path)], "out")] == ["x", "y"]
+
+
+def test_bytes_of_any_kind_in_a_csv_file_make_it_a_log(tmp_path: Path) -> None:
+    path = tmp_path / "random.csv"
+    for seed in range(64):
+        content = bytes((seed * 37 + 11 * n * n) % 256 for n in range(512))
+        path.write_bytes(content)
+        assert jobs_of([str(path)], "out") == [Job("random", logs=(str(path),))]
+
+
+def test_what_else_a_row_holds_is_a_label(tmp_path: Path) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text(
+        "[[job]]\nname = 'x'\nlogs = 's3://lab/a.csv'\nrobot = 7\npayload = 0.5\nruns = 3\ngood = true\nat = 2026-01-31"
+    )
+    (job,) = read_manifest(path)
+    assert job.logs == ("s3://lab/a.csv",)
+    assert job.robot == "7"
+    assert job.labels == {"payload": 0.5, "runs": 3, "good": True, "at": "2026-01-31"}
+    assert (job.profile, job.time, job.loaded) == (None, None, ())
+
+
+@given(st.floats())
+def test_a_label_that_reads_like_a_finite_number_is_one(value: float) -> None:
+    found = label_of(repr(value))
+    assert found == (value if math.isfinite(value) else repr(value))
+    assert type(found) is (float if math.isfinite(value) else str)
+
+
+@pytest.mark.parametrize("name", ["", "/a", "a/", "a//b", "../a", "a/..", ".a", "a\\b", "a\nb", "a\x7f", "ä" * 101])
+def test_a_name_that_could_leave_the_folder_of_results_is_refused(name: str) -> None:
+    with pytest.raises(SettingError, match=r"^here: a job's name becomes a folder's"):
+        checked_name(name, "here")
+
+
+def test_a_name_may_hold_slashes_and_any_printable_character() -> None:
+    for name in ("a", "r1/day 2/a.b", "ä" * 100, "…", "a" * 200 + "/" + "b" * 200):
+        assert checked_name(name, "here") == name
+
+
+def test_where_the_system_lets_nobody_look_is_told_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _touch(tmp_path, "a.csv", "locked/b.csv")
+    listed = Path.iterdir
+
+    def refused(path: Path) -> object:
+        if path.name == "locked":
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+        return listed(path)
+
+    monkeypatch.setattr(Path, "iterdir", refused)
+    with pytest.raises(SettingError, match=rf"^{tmp_path}: cannot look there \(.*denied: '{tmp_path}/locked'\); check"):
+        jobs_of([str(tmp_path)], "out")
+    with pytest.raises(SettingError, match=r": cannot look there \(.*name too long.*\); check its name"):
+        jobs_of(["x" * 5000], "out")
+
+
+def test_a_bag_is_one_log_and_its_folder_no_place_to_look_in(tmp_path: Path) -> None:
+    _touch(tmp_path, "run-loaded/metadata.yaml", "run-loaded/0.mcap", "plain/0.mcap", "x.MCAP", "y.csv.gz")
+    found = jobs_of([str(tmp_path)], "out")
+    assert [(job.name, job.logs, job.loaded) for job in found] == [
+        ("plain/0", (str(tmp_path / "plain/0.mcap"),), ()),
+        ("run", (), (str(tmp_path / "run-loaded"),)),
+        ("x", (str(tmp_path / "x.MCAP"),), ()),
+        ("y", (str(tmp_path / "y.csv.gz"),), ()),
+    ]
+    (job,) = jobs_of([str(tmp_path / "run-loaded")], "out")
+    assert job == Job("run", loaded=(str(tmp_path / "run-loaded"),))
+
+
+def test_the_table_of_results_is_no_log_where_results_go_and_one_elsewhere(tmp_path: Path) -> None:
+    _touch(tmp_path, "jobs.parquet", "a.csv", "sub/jobs.parquet")
+    assert [job.name for job in jobs_of([str(tmp_path)], str(tmp_path))] == ["a", "sub/jobs"]
+    assert [job.name for job in jobs_of([str(tmp_path)], "out")] == ["a", "jobs", "sub/jobs"]
+
+
+def test_a_source_that_is_given_twice_counts_once(tmp_path: Path) -> None:
+    _touch(tmp_path, "a.csv", "b.csv")
+    assert [job.name for job in jobs_of([str(tmp_path), str(tmp_path / "a.csv")], "out")] == ["a", "b"]
+    _touch(tmp_path, "other/a.csv")
+    with pytest.raises(SettingError, match=rf"^a: two jobs of one name \({tmp_path}/a.csv, {tmp_path}/other/a.csv\)"):
+        jobs_of([str(tmp_path), str(tmp_path / "other/a.csv")], "out")
+
+
+@pytest.mark.parametrize(
+    ("stem", "name", "loaded"),
+    [
+        ("a-loaded", "a", True),
+        ("a_unloaded", "a", False),
+        ("a-b_loaded", "a-b", True),
+        ("a-loaded-2", "a-loaded-2", False),
+        ("loaded", "loaded", False),
+        ("a.loaded", "a.loaded", False),
+        ("a-Loaded", "a-Loaded", False),
+    ],
+)
+def test_a_role_is_the_last_word_of_a_name(tmp_path: Path, stem: str, name: str, *, loaded: bool) -> None:
+    _touch(tmp_path, f"{stem}.csv")
+    (job,) = jobs_of([str(tmp_path)], "out")
+    assert (job.name, bool(job.loaded)) == (name, loaded)
