@@ -232,6 +232,7 @@ def _wanted_of_parquet(part: Partial, profile: Profile | None) -> list[Range]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    from algid.profile import Profile
     from algid.readers.parquet import open_parquet
 
     start = part.size - 8 - int.from_bytes(part.read(part.size - 8, 4), "little")
@@ -242,7 +243,7 @@ def _wanted_of_parquet(part: Partial, profile: Profile | None) -> list[Range]:
         metadata = pq.read_metadata(part.path)
         if any(metadata.schema.column(place).max_repetition_level for place in range(metadata.num_columns)):
             raise UnforeseenError("lists have widths that the footer does not tell")
-        names = set(open_parquet(part.path, profile).origin.mapping.values())
+        names = set(open_parquet(part.path, profile or Profile()).origin.mapping.values())
     except (pa.ArrowException, OSError, LogError) as error:
         raise UnforeseenError(str(error)) from error
     groups = [metadata.row_group(place) for place in range(metadata.num_row_groups)]

@@ -75,7 +75,7 @@ def contents(path: Path) -> tuple[str, tuple[Entry, ...]]:
     if kind == "mcap":
         return kind, tuple(_topics(path))
     if kind == "rosbag2":
-        from algid.readers.rosbag2 import bag_files
+        from algid.readers.bag import bag_files
 
         bag = bag_files(path)
         return kind, tuple(_topics(bag.paths[0])) if bag.kind == "mcap" else ()
@@ -114,10 +114,11 @@ def _parquet(path: Path) -> Iterator[Entry]:
 
 
 def _csv(path: Path, kind: str) -> Iterator[Entry]:
-    from algid.readers.csv import counted_rows, head_bytes
+    from algid.readers.csv import counted_rows
     from algid.readers.dialect import detect, kinds
+    from algid.readers.sniff import head_of
 
-    head = head_bytes(path, kind)
+    head = head_of(path, kind)
     dialect = detect(path, head)
     rows = _known(lambda: counted_rows(path, kind, dialect))
     for name, told in kinds(path, head, dialect).items():

@@ -28,16 +28,23 @@ def open_log(path: str | Path, profile: Profile | None = None) -> TableReader:
     LogError
         If there is no such log, its format is unknown, it is damaged, or it lacks a channel.
     """
+    from algid.profile import Profile
     from algid.readers.sniff import sniff
 
-    path = Path(path)
+    path, profile = Path(path), profile or Profile()
     kind = sniff(path)
     if kind == "mcap":
         from algid.readers.mcap import open_mcap
 
         return open_mcap([path], profile)
     if kind == "rosbag2":
-        return _open_bag(path, profile)
+        from algid.readers.bag import bag_files
+        from algid.readers.mcap import open_mcap
+
+        bag = bag_files(path)
+        if bag.kind == "mcap":
+            reader = open_mcap(bag.paths, profile)
+            return replace(reader, notices=(*bag.notices, *reader.notices))
     if kind == "parquet":
         from algid.readers.parquet import open_parquet
 
@@ -53,19 +60,6 @@ def open_log(path: str | Path, profile: Profile | None = None) -> TableReader:
     from algid.readers.bag import open_bag
 
     return open_bag(path, profile)
-
-
-def _open_bag(path: Path, profile: Profile | None) -> TableReader:
-    from algid.readers.mcap import open_mcap
-    from algid.readers.rosbag2 import bag_files
-
-    bag = bag_files(path)
-    if bag.kind != "mcap":
-        from algid.readers.bag import open_bag
-
-        return open_bag(path, profile, bag.notices)
-    reader = open_mcap(bag.paths, profile)
-    return replace(reader, notices=(*bag.notices, *reader.notices))
 
 
 def read_log(path: str | Path, profile: Profile | None = None) -> Log:

@@ -14,8 +14,8 @@ from algid.arm import FloatArray
 from algid.errors import LogError
 from algid.log import Log, Notice, Origin
 from algid.readers.convert import ROWS, Conversion, Gatherer, Room, channel_readings
-from algid.readers.order import Sorter
 from algid.readers.table import BLOCK_ROWS, SampleTable, cut
+from algid.readers.timebase import in_order
 from algid.words import counted
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ class TableReader:
         """Checked and sorted tables that are not empty, with what is to be told of each."""
         notices, total = self.notices, 0
         held: tuple[SampleTable, tuple[Notice, ...]] | None = None
-        for table in cut(self._finite(self._within(Sorter(self.origin.path).run(self.tables(rows)))), rows):
+        for table in cut(self._finite(self._within(in_order(self.origin.path, self.tables(rows)))), rows):
             notices += table.notices
             if len(table):
                 if held is not None:

@@ -1,6 +1,7 @@
-"""ROS 1 bags and rosbag2 logs in SQLite, through the rosbags package (the extra ``algid[bags]``).
+"""ROS 1 bags and rosbag2 folders: which files belong to a bag, and the messages of those in SQLite or of ROS 1.
 
-Message by message, so slower than MCAP by far; sensor_msgs/JointState, or the fields that a profile names.
+Messages come through the rosbags package (the extra ``algid[bags]``), one by one, so slower than MCAP by far:
+sensor_msgs/JointState, or the fields that a profile names.
 """
 
 from __future__ import annotations
@@ -17,26 +18,86 @@ import numpy as np
 
 from algid.errors import LogError
 from algid.log import Notice, Origin, Reading
-from algid.readers.align import Series, aligned
 from algid.readers.assemble import TableReader, reader_of
-from algid.readers.joints import along_the_arm, order_notice
-from algid.readers.order import Sorter
-from algid.readers.others import moving_joints
-from algid.readers.rosbag2 import bag_files
-from algid.readers.sniff import SQLITE
-from algid.readers.table import BLOCK_ROWS, CHANNELS, JOINT_CHANNELS, VELOCITIES, SampleTable, stack
+from algid.readers.joints import moving_joints, reading_of
+from algid.readers.sniff import sniff
+from algid.readers.table import BLOCK_ROWS, CHANNELS, JOINT_CHANNELS, VELOCITIES, SampleTable
+from algid.readers.timebase import aligned, whole_topic
 from algid.words import counted
 
 if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
+
     from algid.profile import Profile
 
+_LARGEST_METADATA = 1 << 24
 _TYPE = "sensor_msgs/msg/JointState"
 _LOOKED = 1 << 12
 """Messages whose other joints are looked at."""
 _FIELDS = {"theta": "position", "tau": "effort", "omega": "velocity"}
 
 
-def open_bag(path: Path, profile: Profile | None = None, notices: tuple[Notice, ...] = ()) -> TableReader:
+@dataclass(frozen=True)
+class Bag:
+    """The files of a bag in their order, their kind ("mcap" or "db3"), and what is missing."""
+
+    paths: tuple[Path, ...]
+    kind: str
+    notices: tuple[Notice, ...]
+
+
+def bag_files(folder: Path) -> Bag:
+    """The files of a rosbag2 folder.
+
+    Raises
+    ------
+    LogError
+        If there is none, a path leads out of the folder, or the bag is compressed by rosbag2 itself.
+    """
+    metadata = folder / "metadata.yaml"
+    if metadata.is_file():
+        names = _listed(metadata)
+    else:  # the files themselves, by the numbers that end their names
+        found = [*folder.glob("*.mcap"), *folder.glob("*.db3")]
+        numbers = [(re.search(r"_(\d+)$", path.stem), path.name) for path in found]
+        names = [name for _, name in sorted((int(number[1]) if number else 0, name) for number, name in numbers)]
+    paths = [folder / name for name in names]
+    there = [path for path in paths if path.is_file()]
+    if not there:
+        raise LogError(f"{folder}: none of the bag's files is there; expected {names[:3]}")
+    kinds = {path.suffix for path in there}
+    if len(kinds) > 1:
+        raise LogError(f"{folder}: the bag mixes files of {', '.join(sorted(kinds))}; read one file of it")
+    missing = [path.name for path in paths if path not in there]
+    text = f"{len(missing)} of {counted(len(paths), 'file')} of the bag missing: {', '.join(missing[:3])}"
+    notices = (Notice("MISSING_SPLIT", text, lossy=True),) if missing else ()
+    return Bag(tuple(there), kinds.pop().lstrip("."), notices)
+
+
+def _listed(metadata: Path) -> list[str]:
+    """The names of files that a bag's metadata.yaml lists."""
+    with metadata.open("rb") as stream:
+        text = stream.read(_LARGEST_METADATA).decode("utf-8", errors="replace")
+    mode = re.search(r"^\s*compression_mode:[ \t]*[\"']?(\w+)", text, re.MULTILINE)
+    if mode and mode[1].upper() != "NONE":
+        raise LogError(
+            f"{metadata.parent}: the bag was compressed by rosbag2 (compression_mode {mode[1]}), unreadable; "
+            "write it anew with ros2 bag convert and storage compression (mcap, zstd chunks)"
+        )
+    # the one list that matters, without a YAML package: a block, one name a line, or [one, two]
+    block = re.search(r"^\s*relative_file_paths:\s*\n((?:\s*-\s*\S.*\n?)+)", text, re.MULTILINE)
+    flow = re.search(r"^\s*relative_file_paths:\s*\[([^\]]*)\]", text, re.MULTILINE)
+    if block is None and flow is None:
+        raise LogError(f"{metadata}: no relative_file_paths; expected the metadata of a rosbag2 folder")
+    lines = block[1].splitlines() if block else [one for one in flow[1].split(",") if one.strip()] if flow else []
+    names = [line.strip().removeprefix("-").strip().strip("\"'") for line in lines]
+    for name in names:
+        if Path(name).name != name or name in ("", ".", ".."):
+            raise LogError(f"{metadata}: {name[:80]!r} leads outside the bag's folder; expected a file in it")
+    return names
+
+
+def open_bag(path: Path, profile: Profile) -> TableReader:
     """Open a ROS 1 bag, a rosbag2 folder with SQLite files, or one of these by itself.
 
     Raises
@@ -50,70 +111,58 @@ def open_bag(path: Path, profile: Profile | None = None, notices: tuple[Notice, 
         raise LogError(
             f"{path}: bags need the rosbags package: pip install 'algid[bags]', or convert it to MCAP"
         ) from error
-    named = {name: profile.place(name) for name in CHANNELS if profile and profile.channel(name).source}
-    sources: dict[str, tuple[str, str]] = {}
-    reading, said = Reading(joints_told="profile"), notices
-    topic = profile.topic if profile else None
-    if not set(JOINT_CHANNELS) <= named.keys():
-        usual = _usual(path, profile)
-        topic, sources, reading = usual.topic, usual.sources, usual.reading
-        said += usual.notices
+    said = bag_files(path).notices if path.is_dir() else ()
+    named = {name: profile.place(name) for name in CHANNELS if profile.channel(name).source}
+    topic, sources, reading = profile.topic, dict[str, tuple[str, str]](), Reading(joints_told="profile")
+    if not named.keys() >= set(JOINT_CHANNELS):
+        topic, sources, reading, told = _usual(path, profile)
+        said += told
     for name, (own, field) in named.items():
         home = own or topic
         if home is None:
-            told = f'--set {name}.topic=NAME (profile: topic = "NAME" of [{name}])'
-            raise LogError(f"{path}: {name} is to be taken from {field!r} without a topic: {told}")
+            flag = f'--set {name}.topic=NAME (profile: topic = "NAME" of [{name}])'
+            raise LogError(f"{path}: {name} is to be taken from {field!r} without a topic: {flag}")
         sources[name] = (home, str(field))
-    if (profile and not profile.velocity) or not all(name in sources for name in VELOCITIES):
+    if not (profile.velocity and sources.keys() >= set(VELOCITIES)):
         sources = {name: source for name, source in sources.items() if name not in VELOCITIES}
-    clock = (profile.clock if profile else None) or "header"
+    clock = profile.clock or "header"
     homes = list(dict.fromkeys(home for home, _ in sources.values()))
-    parts = [_Part(path, home, {name: field for name, (own, field) in sources.items() if own == home}, clock)
-             for home in homes]  # fmt: skip
+    main, *others = (
+        _Part(path, home, {name: field for name, (own, field) in sources.items() if own == home}, clock)
+        for home in homes
+    )
     mapping = {name: f"{home}: {field}" for name, (home, field) in sources.items()}
     mapping["t"] = f"{homes[0]}: header.stamp" if clock == "header" else "log time"
     origin = Origin(str(path), "bag", mapping, None, replace(reading, topics=tuple(homes), clock=clock))
 
     def tables(rows: int) -> Iterator[SampleTable]:
-        main, *others = parts
-        return aligned(main.tables(rows), [other.series() for other in others]) if others else main.tables(rows)
+        if not others:
+            return main.tables(rows)
+        series = [whole_topic(str(path), one.topic, one.fields, one.tables(BLOCK_ROWS)) for one in others]
+        return aligned(main.tables(rows), series)
 
     return reader_of(origin, tables, profile, {}, said)
 
 
-@dataclass(frozen=True)
-class _Usual:
-    """A topic of joint states: the sources of its channels, and how its joints were chosen."""
-
-    topic: str
-    sources: dict[str, tuple[str, str]]
-    reading: Reading
-    notices: tuple[Notice, ...]
-
-
-def _usual(path: Path, profile: Profile | None) -> _Usual:
-    """Topic and joints of the first message that fits."""
-    joints = profile.joints if profile else None
+def _usual(path: Path, profile: Profile) -> tuple[str, dict[str, tuple[str, str]], Reading, tuple[Notice, ...]]:
+    """The topic of the first message of joint states that fits, its channels' sources, its joints, what to tell."""
+    joints = profile.joints
     seen: set[str] = set()
-    for topic, _, message in _messages(path, profile.topic if profile else None, _TYPE):
+    for topic, _, message in _messages(path, profile.topic, _TYPE):
         names = list(message.name)
         fits = set(joints) <= set(names) if joints else len(names) == 2
         if fits and len(set(names)) == len(names) and len(message.position) == len(message.effort) == len(names):
-            said: tuple[Notice, ...] = ()
-            if joints and profile:
-                reading = Reading(joints=joints, joints_told=profile.told_by("joints"))
-            else:
-                chosen, told = along_the_arm(names)
-                reading, said = Reading(joints=chosen, joints_told=told), order_notice(names, chosen, told)
+            reading, said = reading_of(names, profile)
+            chosen = reading.joints or ()
             quantities = ["theta", "tau", *(["omega"] if len(message.velocity) == len(names) else [])]
             sources = {
                 f"{quantity}{number}": (topic, f"{_FIELDS[quantity]}[{joint}]")
                 for quantity in quantities
-                for number, joint in enumerate(reading.joints or (), start=1)
+                for number, joint in enumerate(chosen, start=1)
             }
-            others = {name: f"position[{name}]" for name in names if name not in (reading.joints or ())}
+            others = {name: f"position[{name}]" for name in names if name not in chosen}
             beside = moving_joints(others, lambda paths: _Part(path, topic, paths, "log").tables(_LOOKED))  # noqa: B023
-            return _Usual(topic, sources, reading, said + beside)
+            return topic, sources, reading, (*said, *beside)
         twice = ", two of one name" if len(set(names)) < len(names) else ""
         lacking = "" if len(message.effort) else ", whose effort is empty"
         seen.add(f"{topic!r} with the joints {', '.join(names[:8])}{twice}{lacking}")
@@ -156,14 +205,6 @@ class _Part:
         text = f"{counted(skipped, 'message')} on {self.topic!r} left out for want of both joints"
         yield last.noting(Notice("OTHER_MESSAGES", text)) if skipped else last
 
-    def series(self) -> Series:
-        """The topic as a whole, in time order."""
-        parts = [table for table in Sorter(str(self.path)).run(self.tables(BLOCK_ROWS)) if len(table)]
-        if not parts:
-            mend = "--set NAME.topic=…, --set NAME.source=… (profile: topic and source of [NAME])"
-            raise LogError(f"{self.path}: topic {self.topic!r} holds no {', '.join(self.fields.values())}; {mend}")
-        return Series(self.topic, stack(parts))
-
     def _table(self, stamps: list[int], values: list[list[float]]) -> SampleTable:
         columns = np.array(values, np.float64).reshape(-1, len(self.fields)).T.copy()
         return SampleTable(np.array(stamps, np.int64), dict(zip(self.fields, columns, strict=True)))
@@ -175,7 +216,7 @@ def _value(message: Any, path: str) -> float | None:
     for part in re.findall(r"\[[^\]]*\]|[^.\[\]]+", path):
         if part.startswith("["):
             names, place = list(getattr(message, "name", ())), part[1:-1]
-            index = names.index(place) if place in names else int(place) if place.isdigit() else None
+            index = names.index(place) if place in names else int(place) if place.isdecimal() else None
             found = found[index] if index is not None and index < len(found) else None
         else:
             found = getattr(found, part, None)
@@ -186,11 +227,23 @@ def _value(message: Any, path: str) -> float | None:
 
 def _messages(path: Path, topic: str | None, kind: str | None = None) -> Iterator[tuple[str, int, Any]]:
     """Topic, recorder's time in ns and content of each message on `topic` and of the type `kind`, where given."""
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.LATEST)
     try:
-        for file in _loose_files(path):
-            yield from _loose(file, topic, kind)
-        if not _loose_files(path):
-            yield from _bagged(path, topic, kind)
+        if path.is_dir() and not (path / "metadata.yaml").is_file():
+            loose = bag_files(path).paths
+        else:
+            loose = (path,) if sniff(path) == "db3" else ()
+        for file in loose:
+            yield from _loose(file, topic, kind, store)
+        if loose:
+            return
+        with AnyReader([path], default_typestore=store) as reader:
+            wanted = [one for one in reader.connections if kind in (None, one.msgtype) and topic in (None, one.topic)]
+            for connection, log_ns, raw in reader.messages(connections=wanted) if wanted else ():
+                yield connection.topic, log_ns, reader.deserialize(raw, connection.msgtype)
     except (LogError, GeneratorExit):
         raise
     except Exception as error:  # whatever a damaged bag makes of a third package
@@ -198,29 +251,8 @@ def _messages(path: Path, topic: str | None, kind: str | None = None) -> Iterato
         raise LogError(f"{path}: the bag cannot be read ({type(error).__name__}: {told})") from error
 
 
-def _loose_files(path: Path) -> list[Path]:
-    """SQLite files without a folder's metadata: the file itself, or those of a folder in their order."""
-    if path.is_dir():
-        return [] if (path / "metadata.yaml").is_file() else list(bag_files(path).paths)
-    with path.open("rb") as stream:
-        return [path] if stream.read(len(SQLITE)) == SQLITE else []
-
-
-def _bagged(path: Path, topic: str | None, kind: str | None) -> Iterator[tuple[str, int, Any]]:
-    from rosbags.highlevel import AnyReader
-    from rosbags.typesys import Stores, get_typestore
-
-    with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
-        wanted = [one for one in reader.connections if kind in (None, one.msgtype) and topic in (None, one.topic)]
-        for connection, log_ns, raw in reader.messages(connections=wanted) if wanted else ():
-            yield connection.topic, log_ns, reader.deserialize(raw, connection.msgtype)
-
-
-def _loose(path: Path, topic: str | None, kind: str | None) -> Iterator[tuple[str, int, Any]]:
+def _loose(path: Path, topic: str | None, kind: str | None, store: Typestore) -> Iterator[tuple[str, int, Any]]:
     """Messages of a rosbag2 file without its folder's metadata: types that every ROS 2 knows."""
-    from rosbags.typesys import Stores, get_typestore
-
-    store = get_typestore(Stores.LATEST)
     with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as base:
         topics = {
             number: (name, type_name)

@@ -4,25 +4,24 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from algid.errors import LogError
-from algid.log import Companion, loads
+from algid.log import loads
 from algid.readers.assemble import TableReader
-from algid.readers.columns import Columns, assign, check_written, tables
+from algid.readers.columns import Columns, assign
 from algid.readers.dialect import Dialect, detect
+from algid.readers.frames import NO_COMPANION, flat_reader
 from algid.readers.sniff import head_of, whole_lines
-from algid.readers.table import SampleTable
 
 if TYPE_CHECKING:
     import polars as pl
 
     from algid.profile import Profile
 
-_HEAD = 1 << 16
 _EXCESS = "excess"
 
 
@@ -31,7 +30,7 @@ def sidecar(path: Path) -> Path:
     return path.with_name(path.name + ".truth.json")
 
 
-def open_csv(path: Path, profile: Profile | None = None, kind: str = "csv") -> TableReader:
+def open_csv(path: Path, profile: Profile, kind: str = "csv") -> TableReader:
     """Open a CSV log; `kind` is "csv", "csv.zst" or "csv.gz".
 
     Raises
@@ -39,32 +38,19 @@ def open_csv(path: Path, profile: Profile | None = None, kind: str = "csv") -> T
     LogError
         If the text is no table, or columns are missing.
     """
-    head = head_bytes(path, kind)
+    head = head_of(path, kind)
     dialect = detect(path, head)
-    companion = _companion(path)
-    check_written(str(path), dialect.columns, companion.sums if companion else {})
-    columns = assign(str(path), dialect.columns, profile, dialect.units)
+    beside = sidecar(path)
+    try:
+        companion = loads(beside.read_bytes()) if beside.is_file() else NO_COMPANION
+    except (OSError, ValueError) as error:
+        raise LogError(f"{beside}: the truth beside the log cannot be read ({error}); remove it") from error
+    columns = assign(str(path), dialect.columns, profile, dialect.units, companion.sums)
     if columns.sources["t"] in dialect.dates:
-        columns = replace(columns, time_unit="ns", time_told=True)
-    sums = companion.sums if companion else {}
-    truth = companion.truth if companion else None
-    rows = _rows(path, kind, head)
-    return columns.reader(
-        str(path), "csv", truth, lambda chosen: _Text(path, kind, dialect, chosen, sums).tables, profile, rows
-    )
-
-
-def head_bytes(path: Path, kind: str) -> bytes:
-    """The first bytes of the text, unpacked, 64 KiB at most."""
-    if kind != "csv":
-        return head_of(path, kind)
-    with path.open("rb") as stream:
-        return stream.read(_HEAD)
-
-
-def _rows(path: Path, kind: str, head: bytes) -> int:
-    """Rows to expect of plain text, from the length of its first lines and a tenth more."""
-    return 0 if kind != "csv" else int(1.1 * path.stat().st_size * head.count(b"\n") / len(head)) + 16
+        columns = columns.dated()
+    # rows to expect of plain text: from the length of its first lines, and a tenth more
+    rows = int(1.1 * path.stat().st_size * head.count(b"\n") / len(head)) + 16 if kind == "csv" else 0
+    return flat_reader(str(path), "csv", columns, partial(_frames, path, kind, dialect), profile, rows, companion)
 
 
 def counted_rows(path: Path, kind: str, dialect: Dialect) -> int:
@@ -84,125 +70,92 @@ def counted_rows(path: Path, kind: str, dialect: Dialect) -> int:
     return rows
 
 
-def _companion(path: Path) -> Companion | None:
-    beside = sidecar(path)
-    try:
-        return loads(beside.read_bytes()) if beside.is_file() else None
-    except (OSError, ValueError) as error:
-        raise LogError(f"{beside}: the truth beside the log cannot be read ({error}); remove it") from error
-
-
-@dataclass(frozen=True)
-class _Text:
-    """A text table and the columns to take from it."""
-
-    path: Path
-    kind: str
-    dialect: Dialect
-    columns: Columns
-    sums: Mapping[str, int]
-
-    def tables(self, rows: int) -> Iterator[SampleTable]:
-        """Tables of about `rows` rows."""
-        return tables(str(self.path), self._frames(rows), self.columns, self.sums)
-
-    def _frames(self, rows: int) -> Iterator[pl.DataFrame]:
-        import polars as pl
-
-        done = 0
-        try:
-            for frame in self._parsed(rows):
-                yield self._whole(frame, done)
-                done += frame.height
-        except pl.exceptions.PolarsError as error:
-            raise LogError(self._reason(done, error)) from error
-
-    def _parsed(self, rows: int) -> Iterator[pl.DataFrame]:
-        if self.kind == "csv" and self.dialect.separator:
-            yield from self._scan(self.path, self.dialect.skip).collect_batches(chunk_size=rows)
-            return
-        skip = self.dialect.skip
-        for text in whole_lines(self.path, self.kind):
-            yield self._scan(io.BytesIO(self._plain(text)), skip).collect()
-            skip = 0
-
-    def _plain(self, text: bytes) -> bytes:
-        """Runs of blanks become one tab where they separate."""
-        if self.dialect.separator:
-            return text
-        return re.sub(rb"[ \t]+", b"\t", re.sub(rb"(?m)^[ \t]+|[ \t]+$|[ \t]+(?=\r$)", b"", text))
-
-    def _scan(self, source: Path | io.BytesIO, skip: int) -> pl.LazyFrame:
-        import polars as pl
-
-        dialect = self.dialect
-        schema = {str(place): self._type(place) for place in range(len(dialect.columns))}
-        # polars drops cells past the last column without a word: one more column catches them
-        schema[_EXCESS] = pl.String
-        wanted = {name: str(dialect.columns.index(column)) for name, column in self.columns.sources.items()}
-        frame = pl.scan_csv(
-            source,
-            has_header=False,
-            separator=dialect.separator or "\t",
-            decimal_comma=dialect.decimal_comma,
-            comment_prefix=dialect.comment,
-            skip_lines=skip,
-            schema=schema,
-            missing_columns="insert",
-            glob=False,
-        )
-        numbers = [self._number(name, pl.col(place)).alias(name) for name, place in wanted.items()]
-        return frame.select(*numbers, pl.col(_EXCESS).is_not_null())
-
-    def _type(self, place: int) -> type[pl.DataType]:
-        import polars as pl
-
-        column = self.dialect.columns[place]
-        if column not in self.columns.sources.values() or self.dialect.padded or column in self.dialect.dates:
-            return pl.String
-        whole = column == self.columns.sources["t"] and column in self.dialect.whole
-        return pl.Int64 if whole else pl.Float64
-
-    def _number(self, name: str, cell: pl.Expr) -> pl.Expr:
-        import polars as pl
-
-        if self.columns.sources[name] in self.dialect.dates:
-            return _nanoseconds(cell.str.strip_chars()) if name == "t" else pl.lit(None, pl.Float64)
-        if not self.dialect.padded:
-            return cell
-        text = cell.str.strip_chars()
-        text = pl.when(text != "").then(text)
-        return (text.str.replace(",", ".", literal=True) if self.dialect.decimal_comma else text).cast(pl.Float64)
-
-    def _whole(self, frame: pl.DataFrame, done: int) -> pl.DataFrame:
-        import polars as pl
-
-        if frame[_EXCESS].any():
-            row = done + (frame[_EXCESS].arg_max() or 0) + 1
-            raise LogError(
-                f"{self.path}: row {row} has more cells than the header's {len(self.dialect.columns)}; mend that row"
-            )
-        frame.drop_in_place(_EXCESS)  # in place: `drop` would queue behind the parsing of the next rows
-        if any(frame.null_count().row(0)):  # an empty line is no row
-            frame = frame.filter(~pl.all_horizontal(pl.all().is_null()))
-        return frame
-
-    def _reason(self, done: int, error: Exception) -> str:
-        told = str(error).split("\n", maxsplit=1)[0]
-        found = re.search(r"could not parse `(.*?)` as dtype `\w+` at column '(\d+)'", told, re.DOTALL)
-        if found:
-            column = self.dialect.columns[int(found[2])]
-            return (
-                f"{self.path}: column {column!r}, past row {done}: expected a number, found "
-                f"{found[1][:40]!r}; mend the file or name another column"
-            )
-        return f"{self.path}: the table cannot be read past row {done}: {told[:200]}"
-
-
-def _nanoseconds(text: pl.Expr) -> pl.Expr:
-    """Dates with times of day as ns since 1970; UTC where they name no zone."""
+def _frames(
+    path: Path, kind: str, dialect: Dialect, columns: Columns, rows: int, most: int | None
+) -> Iterator[pl.DataFrame]:
+    """Frames of about `rows` rows, over the first `most` rows where that is told."""
     import polars as pl
 
-    zoned = text.str.replace(" ", "T", literal=True).str.replace(r"Z$", "+00:00")
-    zoned = pl.when(zoned.str.contains(r"[+-]\d{2}:?\d{2}$")).then(zoned).otherwise(zoned + "+00:00")
-    return zoned.str.to_datetime("%Y-%m-%dT%H:%M:%S%.f%z", time_unit="ns", strict=True).dt.timestamp("ns")
+    done = 0
+    try:
+        for frame in _parsed(path, kind, dialect, columns, rows, most):
+            if frame[_EXCESS].any():
+                row = done + (frame[_EXCESS].arg_max() or 0) + 1
+                raise LogError(
+                    f"{path}: row {row} has more cells than the header's {len(dialect.columns)}; mend that row"
+                )
+            done += frame.height
+            frame.drop_in_place(_EXCESS)  # in place: `drop` would queue behind the parsing of the next rows
+            empty_lines = any(frame.null_count().row(0))  # which are no rows
+            yield frame.filter(~pl.all_horizontal(pl.all().is_null())) if empty_lines else frame
+            if most is not None and done >= most:
+                return
+    except pl.exceptions.PolarsError as error:
+        told = str(error).split("\n", maxsplit=1)[0]
+        found = re.search(r"could not parse `(.*?)` as dtype `\w+` at column '(\d+)'", told, re.DOTALL)
+        if found is None:
+            raise LogError(f"{path}: the table cannot be read past row {done}: {told[:200]}") from error
+        raise LogError(
+            f"{path}: column {dialect.columns[int(found[2])]!r}, past row {done}: expected a number, found "
+            f"{found[1][:40]!r}; mend the file or name another column"
+        ) from error
+
+
+def _parsed(
+    path: Path, kind: str, dialect: Dialect, columns: Columns, rows: int, most: int | None
+) -> Iterator[pl.DataFrame]:
+    scan = partial(_scan, dialect, columns, most)
+    if kind == "csv" and dialect.separator:
+        yield from scan(path, dialect.skip).collect_batches(chunk_size=rows)
+        return
+    skip = dialect.skip
+    for text in whole_lines(path, kind):
+        if not dialect.separator:  # runs of blanks become one tab
+            text = re.sub(rb"[ \t]+", b"\t", re.sub(rb"(?m)^[ \t]+|[ \t]+$|[ \t]+(?=\r$)", b"", text))
+        yield scan(io.BytesIO(text), skip).collect()
+        skip = 0
+
+
+def _scan(dialect: Dialect, columns: Columns, most: int | None, source: Path | io.BytesIO, skip: int) -> pl.LazyFrame:
+    """The columns' numbers, and whether a row has cells beyond the header's."""
+    import polars as pl
+
+    whole = dialect.whole & {columns.sources["t"]}
+    plain = set() if dialect.padded else set(columns.sources.values()) - dialect.dates
+    types = [
+        pl.String if column not in plain else pl.Int64 if column in whole else pl.Float64 for column in dialect.columns
+    ]
+    frame = pl.scan_csv(
+        source,
+        has_header=False,
+        separator=dialect.separator or "\t",
+        decimal_comma=dialect.decimal_comma,
+        comment_prefix=dialect.comment,
+        skip_lines=skip,
+        n_rows=most,
+        # polars drops cells past the last column without a word: one more column catches them
+        schema={**{str(place): type_ for place, type_ in enumerate(types)}, _EXCESS: pl.String},
+        missing_columns="insert",
+        glob=False,
+    )
+    numbers = [_number(dialect, columns, name).alias(name) for name in columns.sources]
+    return frame.select(*numbers, pl.col(_EXCESS).is_not_null())
+
+
+def _number(dialect: Dialect, columns: Columns, name: str) -> pl.Expr:
+    """The cell of a channel as a number; a date as ns since 1970, in UTC where it names no zone."""
+    import polars as pl
+
+    column = columns.sources[name]
+    cell = pl.col(str(dialect.columns.index(column)))
+    if column in dialect.dates and name != "t":
+        return pl.lit(None, pl.Float64)
+    if column in dialect.dates:
+        text = cell.str.strip_chars().str.replace(" ", "T", literal=True).str.replace(r"Z$", "+00:00")
+        zoned = pl.when(text.str.contains(r"[+-]\d{2}:?\d{2}$")).then(text).otherwise(text + "+00:00")
+        return zoned.str.to_datetime("%Y-%m-%dT%H:%M:%S%.f%z", time_unit="ns", strict=True).dt.timestamp("ns")
+    if not dialect.padded:
+        return cell
+    text = cell.str.strip_chars()
+    text = pl.when(text != "").then(text)
+    return (text.str.replace(",", ".", literal=True) if dialect.decimal_comma else text).cast(pl.Float64)

@@ -1,13 +1,21 @@
-"""Which of two joints is the first along the arm, told by their names."""
+"""Which of two joints is the first along the arm, told by their names; and whether those not read are held still."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from algid.log import Notice
+import numpy as np
+
+from algid.errors import LogError
+from algid.log import Notice, Reading
+from algid.readers.table import SampleTable
+from algid.words import counted
+
+if TYPE_CHECKING:
+    from algid.profile import Profile
 
 _FROM_BASE_TO_TIP = (
     ("base", "root", "waist"),
@@ -46,17 +54,29 @@ def order_notice(names: Sequence[str], chosen: tuple[str, str], told: Literal["n
     return (Notice("JOINT_ORDER", f"{text}; {other}", note=told == "names"),)
 
 
+def reading_of(names: Sequence[str], profile: Profile) -> tuple[Reading, tuple[Notice, ...]]:
+    """Joint 1 and joint 2, as the user says or else as the two `names` tell, who said so, and what to say of it."""
+    if profile.joints:
+        return Reading(joints=profile.joints, joints_told=profile.told_by("joints")), ()
+    joints, told = along_the_arm(names)
+    return Reading(joints=joints, joints_told=told), order_notice(names, joints, told)
+
+
 def _ranks(first: str, second: str) -> tuple[int, int] | None:
     """Comparable places of the two names along the arm; None where the names do not tell."""
     words = [_words(first), _words(second)]
     if len(words[0]) == len(words[1]):
         differing = [pair for pair in zip(*words, strict=True) if pair[0] != pair[1]]
         if len(differing) == 1:
-            for ranked in (_number, _LETTERS.get):
-                found = [ranked(word) for word in differing[0]]
-                if found[0] is not None and found[1] is not None:
-                    return found[0], found[1]
-    places = [_place(one) for one in words]
+            pair = differing[0]
+            if all(word.isdecimal() for word in pair):
+                return int(pair[0]), int(pair[1])
+            if all(word in _LETTERS for word in pair):
+                return _LETTERS[pair[0]], _LETTERS[pair[1]]
+    places = []
+    for one in words:  # the first word, or pair of words, that stands for a place
+        pairs = [f"{before}_{after}" for before, after in pairwise(one)]
+        places.append(next((_RANKS[word] for word in [*pairs, *one] if word in _RANKS), None))
     if places[0] is not None and places[1] is not None and places[0] != places[1]:
         return places[0], places[1]
     at_base = [place == 0 for place in places]
@@ -69,11 +89,40 @@ def _words(name: str) -> list[str]:
     return re.findall(r"[^\W\d_]+|\d+", spaced.lower())
 
 
-def _number(word: str) -> int | None:
-    return int(word) if word.isdigit() else None
+_STILL = 0.02
+"""In rad, or m: how far a joint that is held may creep."""
+_NAMED = 4
+Tables = Callable[[Mapping[str, str]], Iterator[SampleTable]]
+"""Tables of a topic's fields, whose paths are given by the columns' names."""
 
 
-def _place(words: list[str]) -> int | None:
-    """The place of the first word, or pair of words, that stands for one."""
-    pairs = [f"{one}_{two}" for one, two in pairwise(words)]
-    return next((_RANKS[word] for word in [*pairs, *words] if word in _RANKS), None)
+def moving_joints(positions: Mapping[str, str], tables: Tables, unit: float = 1.0) -> tuple[Notice, ...]:
+    """Say which of the other joints of a topic or table move, and how far, in its first table.
+
+    Where they move, the two-link model lacks their torque. `positions` has by joint the path of its position, in
+    `unit` rad.
+    """
+    joints = {f"joint {number}": joint for number, joint in enumerate(positions)}  # no name of which is a stamp's
+    if not joints:
+        return ()
+    try:
+        table = next((one for one in tables({name: positions[joints[name]] for name in joints}) if len(one)), None)
+    except LogError:  # the joints that are read tell of what is wrong
+        return ()
+    if table is None:
+        return ()
+    moved: dict[str, float] = {}
+    for name, values in table.columns.items():
+        finite = values[np.isfinite(values)]
+        if finite.size and unit * np.ptp(finite) > _STILL:
+            moved[joints[name]] = unit * float(np.ptp(finite))
+    if not moved:
+        return ()
+    furthest = sorted(moved, key=lambda joint: -moved[joint])
+    told = ", ".join(f"{joint} by {moved[joint]:.2g} rad" for joint in furthest[:_NAMED])
+    more = f" and {len(moved) - _NAMED} more" if len(moved) > _NAMED else ""
+    text = (
+        f"{counted(len(moved), 'other joint moves', 'other joints move')} meanwhile: {told}{more} (in the first "
+        f"{counted(len(table), 'sample')}); what that does to the torques is in no two-link model: hold them still"
+    )
+    return (Notice("OTHER_JOINTS", text),)

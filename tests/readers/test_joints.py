@@ -145,3 +145,9 @@ def test_flat_json_messages_are_read_by_their_names(content: dict[str, object], 
     assert log.tau[:, 3].tolist() == [1, 2]
     assert log.stamp_ns.tolist() == stamps
     assert log.origin.reading.clock == "log"
+
+
+def test_a_raised_digit_is_no_number() -> None:
+    """`str.isdigit` says that ² is one, and `int` does not."""
+    assert along_the_arm(["axis ³", "axis ²"]) == (("axis ³", "axis ²"), "order")
+    assert along_the_arm(["axis 3", "axis 2"]) == (("axis 2", "axis 3"), "names")

@@ -11,10 +11,10 @@ import pytest
 from algid.errors import LogError
 from algid.log import Notice
 from algid.readers import read_log
-from algid.readers.columns import time_unit, to_nanoseconds
+from algid.readers.frames import time_unit, to_nanoseconds
 from algid.readers.names import choose, take_apart
-from algid.readers.order import Sorter
 from algid.readers.table import SampleTable
+from algid.readers.timebase import in_order
 
 FIELD = {
     "t,q1,q2,tau1,tau2": "t q1 q2 tau1 tau2",
@@ -126,7 +126,7 @@ def test_list_columns_of_parquet(tmp_path: Path) -> None:
 
 def sorted_stamps(*tables: list[int]) -> tuple[list[int], list[str]]:
     made = [SampleTable(np.array(stamps), {"theta1": np.array(stamps, float)}) for stamps in tables]
-    found = list(Sorter("log").run(iter(made)))
+    found = list(in_order("log", iter(made)))
     for table in found:
         assert table.columns["theta1"].tolist() == table.stamp_ns.tolist()
     stamps = [stamp for table in found for stamp in table.stamp_ns.tolist()]

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING
 
 from algid.errors import LogError
 from algid.log import Origin
-from algid.readers.align import Series, aligned
 from algid.readers.assemble import TableReader, reader_of
+from algid.readers.joints import moving_joints
 from algid.readers.mcap.catalogue import Catalogue, catalogue
 from algid.readers.mcap.framing import DamagedError, File
 from algid.readers.mcap.topic import Fields, Topic
-from algid.readers.order import Sorter
-from algid.readers.others import moving_joints
-from algid.readers.table import BLOCK_ROWS, SampleTable, stack
+from algid.readers.table import BLOCK_ROWS, SampleTable
+from algid.readers.timebase import aligned, whole_topic
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -62,7 +61,10 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
 
     def tables(rows: int) -> Iterator[SampleTable]:
         samples, others = _read(paths, main, rows, known), wanted.topics[1:]
-        return aligned(samples, [_series(name, paths, other, known) for other in others]) if others else samples
+        if not others:
+            return samples
+        series = [whole_topic(name, one.name, one.fields.paths, _read(paths, one, BLOCK_ROWS, known)) for one in others]
+        return aligned(samples, series)
 
     return reader_of(origin, tables, profile, wanted.units, (*wanted.notices, *beside), rows)
 
@@ -71,18 +73,6 @@ def _read(paths: Sequence[Path], topic: Topic, rows: int, known: Known) -> Itera
     for path in paths:
         with opened(path, known) as (file, found):
             yield from topic.tables(str(path), file, found, rows)
-
-
-def _series(name: str, paths: Sequence[Path], topic: Topic, known: Known) -> Series:
-    """A topic as a whole, in time order."""
-    tables = [table for table in Sorter(name).run(_read(paths, topic, BLOCK_ROWS, known)) if len(table)]
-    if not tables:
-        channel = next(iter(topic.fields.paths))
-        raise LogError(
-            f"{name}: topic {topic.name!r} holds no sample of {channel}; name another: --set {channel}.topic=NAME "
-            f"--set {channel}.source=FIELD (profile: topic and source of [{channel}])"
-        )
-    return Series(topic.name, stack(tables))
 
 
 Known = dict[tuple[Path, int, int], Catalogue]

@@ -1,0 +1,262 @@
+"""Frames of a flat log's columns made into tables: their clock is told, rows that lack a value go, sums are verified.
+
+float64 seconds since 1970 resolve 0.24 µs, so whole and fractional seconds are converted apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from algid.errors import LogError
+from algid.log import Companion, IntArray, Notice, Origin, add, word_sum
+from algid.readers.assemble import TableReader, reader_of
+from algid.readers.columns import Columns
+from algid.readers.joints import moving_joints
+from algid.readers.table import SampleTable
+from algid.units import ANGLE, NANOSECONDS
+from algid.words import counted
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from algid.profile import Profile
+
+    Frames = Callable[[Columns, int, int | None], Iterator[pl.DataFrame]]
+    """A fresh pass over columns in frames of so many rows, one column a channel; over the first rows only if told."""
+
+NO_COMPANION = Companion(None, {})
+MOST_COLUMNS = 4096
+WIDEST = 64
+_LOOKED = 1 << 14
+"""Samples in which the joints that are not read are looked at."""
+
+
+def flat_reader(
+    path: str,
+    kind: str,
+    columns: Columns,
+    frames: Frames,
+    profile: Profile,
+    rows: int,
+    companion: Companion = NO_COMPANION,
+) -> TableReader:
+    """A reader of columns out of the frames that hold them; `rows` samples are to be expected.
+
+    Raises
+    ------
+    LogError
+        As `reader_of`.
+    """
+    reading = replace(columns.reading, clock="column", time_unit=columns.time_unit)
+    origin = Origin(path, kind, dict(columns.sources), companion.truth, reading)
+
+    def look(others: Mapping[str, str]) -> Iterator[SampleTable]:
+        looked = replace(columns, sources={"t": columns.sources["t"], **others})
+        return tables(path, frames(looked, _LOOKED, _LOOKED), looked, {})
+
+    unit = profile.theta1.unit or columns.units.get("theta1", "rad")
+    # of counts nobody knows how far they are
+    beside = moving_joints(columns.others, look, ANGLE[unit]) if unit in ANGLE else ()
+    return reader_of(
+        origin,
+        lambda rows: tables(path, frames(columns, rows, None), columns, companion.sums),
+        profile,
+        columns.units,
+        (*columns.notices, *beside),
+        rows,
+    )
+
+
+def cells(schema: Mapping[str, pl.DataType], width: Callable[[str], int]) -> dict[str, tuple[pl.Expr, pl.DataType]]:
+    """By name every cell of a row and its type: a column, or a place in a list column, ``q[0]``, ``q[1]``.
+
+    Parameters
+    ----------
+    schema : mapping
+        The type of each column.
+    width : callable
+        How many cells the lists of a column have, of which 64 at most are taken.
+    """
+    import polars as pl
+
+    found: dict[str, tuple[pl.Expr, pl.DataType]] = {}
+    for column, kind in schema.items():
+        cell = pl.col(column)
+        if not isinstance(kind, (pl.List, pl.Array)):
+            found[column] = cell, kind
+            continue
+        size = width(column) if isinstance(kind, pl.List) else kind.size
+        lists = cell.list if isinstance(kind, pl.List) else cell.arr
+        for place in range(min(size, WIDEST)):
+            found[f"{column}[{place}]"] = lists.get(place, null_on_oob=True), cast("pl.DataType", kind.inner)
+    return found
+
+
+def of_numbers(path: str, columns: Columns, kinds: Mapping[str, pl.DataType]) -> Columns:
+    """The columns once their types, given by column, hold numbers; the time may hold dates, or durations.
+
+    Raises
+    ------
+    LogError
+        If a column holds something else.
+    """
+    import polars as pl
+
+    for name, source in columns.sources.items():
+        kind = kinds[source]
+        if not (kind.is_numeric() or (name == "t" and isinstance(kind, (pl.Datetime, pl.Duration, pl.Time)))):
+            raise LogError(f"{path}: column {source!r} for {name} holds {kind}; expected numbers")
+    others = {joint: name for joint, name in columns.others.items() if kinds[name].is_numeric()}
+    columns = replace(columns, others=others)
+    return columns.dated() if kinds[columns.sources["t"]].is_temporal() else columns
+
+
+def number(name: str, cell: pl.Expr, kind: pl.DataType) -> pl.Expr:
+    """A cell as the float64 of a channel; as "t" a whole number as int64, a date in ns since 1970, a duration in ns."""
+    import polars as pl
+
+    if name != "t":
+        return cell.cast(pl.Float64).alias(name)
+    if isinstance(kind, pl.Datetime):
+        return cell.dt.timestamp("ns").alias(name)
+    if isinstance(kind, pl.Duration):
+        return cell.dt.total_nanoseconds().alias(name)
+    return cell.cast(pl.Int64 if kind.is_integer() or kind.is_temporal() else pl.Float64).alias(name)
+
+
+_EPOCH = (("s", 1e8, 1e11), ("ms", 1e11, 1e14), ("us", 1e14, 1e17), ("ns", 1e17, 1e20))
+_LARGEST = 9.2e18
+_STEPS = (("s", 0.2), ("ms", 50.0), ("us", 50_000.0))
+_SLOWEST_NS = 200_000_000
+"""A longer median step is no recording of an arm in motion: it has 5 Hz at least."""
+
+
+def time_unit(times: NDArray[Any]) -> str:
+    """The unit of a time column (N,) nobody named one for: "s", "ms", "us" or "ns".
+
+    Times since 1970 tell by their size, where that makes a median step of 20 µs to 10 s. Times since the start of a
+    log tell by their median step, for logs between 20 Hz and 20 kHz: below 0.2 it is seconds, below 50 ms, below
+    50,000 µs, else ns.
+    """
+    first, step = abs(float(times[0])), _median_step(times)
+    for unit, low, high in _EPOCH:
+        if low <= first < high and (step == 0 or 2e4 <= step * NANOSECONDS[unit] <= 1e10):
+            return unit
+    return _unit_of_step(step)
+
+
+def _unit_of_step(step: float) -> str:
+    return next((unit for unit, longest in _STEPS if step < longest), "ns")
+
+
+def _median_step(times: NDArray[Any]) -> float:
+    """Median size of the steps between times (N,) that differ; 0 where none do."""
+    steps = np.abs(np.diff(times.astype(np.float64)))
+    steps = steps[steps > 0]
+    return float(np.median(steps)) if steps.size else 0.0
+
+
+def to_nanoseconds(times: NDArray[Any], unit: str) -> IntArray:
+    """Times (N,) in `unit` as int64 ns, to the nearest; integers stay exact.
+
+    Raises
+    ------
+    ValueError
+        If a time is not finite, or out of the 292 years that int64 nanoseconds span.
+    """
+    factor = NANOSECONDS[unit]
+    whole = np.issubdtype(times.dtype, np.integer)
+    if not (whole or np.all(np.isfinite(times))):
+        raise ValueError("a time that is not finite")
+    if times.size and max(abs(times.min().item()), abs(times.max().item())) * factor > _LARGEST:
+        raise ValueError("a time beyond 292 years")
+    if whole:
+        whole_ns = times.astype(np.int64, copy=False)
+        return whole_ns * factor if factor != 1 else whole_ns
+    seconds = np.floor(times)
+    return seconds.astype(np.int64) * factor + np.rint((times - seconds) * factor).astype(np.int64)
+
+
+def tables(
+    path: str, frames: Iterator[pl.DataFrame], columns: Columns, sums: Mapping[str, int]
+) -> Iterator[SampleTable]:
+    """Tables out of frames that hold one column a channel, and "t"; `sums` are of words by column.
+
+    Raises
+    ------
+    LogError
+        If a value is missing, a time is no time, or the sums of the values are not the file's own.
+    """
+    expected = {name: sums[source] for name, source in columns.sources.items() if source in sums}
+    unit, seen, done = columns.time_unit, dict.fromkeys(expected, 0), 0
+    for frame, cut_off in _complete(path, frames):
+        if frame.height == 0 and done:
+            continue
+        for name in seen:
+            seen[name] = add(seen[name], word_sum(frame[name].to_numpy()))
+        times = frame["t"].to_numpy()
+        notices = list(cut_off)
+        if unit is None:
+            if not np.all(np.isfinite(times)):
+                raise LogError(f"{path}: a time is not finite; expected a number in every row")
+            unit = time_unit(times) if times.size else "s"
+            if unit != "s":
+                notices.append(Notice("TIME_UNIT", f"times are taken for {unit}, from their size and their steps"))
+        try:
+            stamps = to_nanoseconds(times, unit)
+        except ValueError as error:
+            raise LogError(f"{path}: {error} in column {columns.sources['t']!r}, past row {done}") from error
+        if not (done or columns.time_told):
+            notices += _slow(columns.sources["t"], stamps, unit)
+        channels = {name: frame[name].to_numpy() for name in frame.columns if name != "t"}
+        done += frame.height
+        yield SampleTable(stamps, channels, tuple(notices))
+    wrong = [name for name, total in seen.items() if total != expected[name]]
+    if wrong:
+        raise LogError(
+            f"{path}: the values of {', '.join(wrong)} are not those that were written: the file was changed "
+            "or damaged; write it again, or remove its truth if it was changed on purpose"
+        )
+
+
+def _slow(column: str, stamps: IntArray, unit: str) -> list[Notice]:
+    """What to say where nobody told the unit of time and samples are too far apart for an arm."""
+    step = _median_step(stamps - stamps[:1])
+    if step <= _SLOWEST_NS:
+        return []
+    likely = _unit_of_step(step / NANOSECONDS[unit])
+    text = (
+        f"times in {column!r} are taken for {unit}, which makes {1e9 / step:.3g} Hz, too slow for an arm in motion; "
+        f'if they are in {likely}: --set time_unit={likely} (profile: time_unit = "{likely}")'
+    )
+    return [Notice("SLOW_CLOCK", text)]
+
+
+def _complete(path: str, frames: Iterator[pl.DataFrame]) -> Iterator[tuple[pl.DataFrame, tuple[Notice, ...]]]:
+    """Frames without nulls: rows that lack a value are dropped and told of; the last row may break off."""
+    rows, lost, held = 0, 0, None
+    for frame in frames:
+        if held is not None:
+            yield held, ()
+        rows += frame.height
+        cut_off = bool(frame.height) and any(value is None for value in frame.row(-1))
+        held = frame.drop_nulls() if any(frame.null_count().row(0)) else frame
+        lost += frame.height - held.height
+    if held is None:
+        return
+    if lost == 1 and cut_off:
+        yield held, (Notice("CUT_OFF", "the last row breaks off and was dropped", lossy=True),)
+    elif lost:
+        if lost == rows:
+            raise LogError(
+                f"{path}: no row has a value in every column that is needed; put the signals on common stamps"
+            )
+        text = f"{lost} of {counted(rows, 'row')} dropped for want of a value"
+        yield held, (Notice("EMPTY_CELLS", text, lossy=True),)
+    else:
+        yield held, ()

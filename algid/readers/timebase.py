@@ -1,0 +1,175 @@
+"""Samples on one time base: in time order, and other topics' signals interpolated to the stamps of the main one.
+
+Late samples are put in their place, repeated stamps dropped, a broken clock refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from algid.arm import FloatArray
+from algid.errors import LogError
+from algid.log import IntArray, Notice
+from algid.readers.table import SampleTable, stack
+from algid.words import counted
+
+HORIZON = 1024
+"""Rows a sample may come late: a network reorders neighbours, it does not mix two recordings."""
+BACKWARD_SHARE = 0.25
+REPEATED_SHARE = 0.5
+_GAP = 3.0
+"""Samples of the other topic this many of its periods apart are not interpolated between."""
+
+
+def in_order(path: str, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
+    """Tables with strictly increasing stamps, within and across; the last one tells what was mended.
+
+    Raises
+    ------
+    LogError
+        If time goes backwards by more than `HORIZON` rows or in a quarter of the rows, or stands still in half of
+        them.
+    """
+    pending: SampleTable | None = None
+    late = repeated = 0
+    for table in tables:
+        if len(table) == 0 and pending is not None:
+            pending = pending.noting(*table.notices)
+            continue
+        ordered, came_late, came_twice = _sorted(path, table)
+        late, repeated = late + came_late, repeated + came_twice
+        if pending is None or len(pending) == 0:
+            pending = ordered if pending is None else ordered.noting(*pending.notices)
+        elif ordered.stamp_ns[0] > pending.stamp_ns[-1]:
+            yield pending
+            pending = ordered
+        else:
+            merged, came_late, came_twice = _sorted(path, stack([pending, ordered]))
+            late, repeated = late + came_late, repeated + came_twice
+            keep = max(0, len(merged) - max(HORIZON, len(ordered) // 2))
+            if keep:
+                yield merged.part(0, keep)
+            pending = merged.part(keep, len(merged)) if keep else merged
+    said = []
+    if late:
+        said.append(Notice("UNSORTED_STAMPS", f"{counted(late, 'sample')} came late, now in order"))
+    if repeated:
+        text = f"{counted(repeated, 'sample repeats', 'samples repeat')} a stamp; the first of each was kept"
+        said.append(Notice("DUPLICATE_STAMPS", text))
+    if pending is not None:
+        yield pending.noting(*said)
+
+
+def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, int, int]:
+    """The table in time order, how many of its samples came late, and how many repeated a stamp and went."""
+    stamps = table.stamp_ns
+    if np.all(stamps[1:] > stamps[:-1]):
+        return table, 0, 0
+    rows = len(table)
+    back = np.flatnonzero(np.diff(stamps) < 0)
+    order = np.argsort(stamps, kind="stable")
+    moved = order - np.arange(rows)
+    if back.size > BACKWARD_SHARE * rows or np.abs(moved).max() > HORIZON:
+        last = stamps[back[0]]
+        raise LogError(
+            f"{path}: time goes backwards by {(last - stamps[back[0] + 1]) * 1e-9:.6g} s behind stamp {last} ns, "
+            "and not for a few late samples only; split the file where its clock starts again"
+        )
+    fresh = np.diff(stamps[order], prepend=stamps[order[0]] - 1) > 0
+    repeated = rows - int(np.count_nonzero(fresh))
+    if repeated > REPEATED_SHARE * rows:
+        raise LogError(
+            f"{path}: time stands still: {repeated} of {counted(rows, 'stamp')} as the one before; "
+            'expected increasing stamps; name another time: --set time=NAME (profile: time = "NAME"), of messages '
+            '--clock log (profile: clock = "log")'
+        )
+    return table.take(order[fresh]), int(np.count_nonzero(moved > 0)), repeated
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """A topic read as a whole: sorted stamps (M,) and its channels (M,)."""
+
+    topic: str
+    table: SampleTable
+
+    @property
+    def period(self) -> float:
+        """Median time between samples in ns."""
+        return float(np.median(np.diff(self.table.stamp_ns))) if len(self.table) > 1 else 0.0
+
+    def covers(self, stamps: IntArray) -> NDArray[np.bool_]:
+        """Which of the stamps (N,) lie between two samples that are not far apart."""
+        own = self.table.stamp_ns
+        if own.size < 2:
+            return np.zeros(stamps.size, np.bool_)
+        after = np.clip(np.searchsorted(own, stamps, side="left"), 1, own.size - 1)
+        near = own[after] - own[after - 1] <= _GAP * self.period
+        return near & (stamps >= own[0]) & (stamps <= own[-1])
+
+    def at(self, stamps: IntArray) -> dict[str, FloatArray]:
+        """The channels at the stamps (N,), linear between samples."""
+        start = self.table.stamp_ns[0]
+        own, wanted = (self.table.stamp_ns - start).astype(np.float64), (stamps - start).astype(np.float64)
+        return {name: np.interp(wanted, own, values) for name, values in self.table.columns.items()}
+
+    def error(self) -> str:
+        """What linear interpolation costs: an eighth of the second differences, root mean square."""
+        told = []
+        for name, values in self.table.columns.items():
+            bend = np.diff(values, 2) / 8
+            told.append(f"{name} {float(np.sqrt(np.mean(bend**2))) if bend.size else 0.0:.2g}")
+        return ", ".join(told)
+
+
+def whole_topic(path: str, topic: str, channels: Collection[str], tables: Iterator[SampleTable]) -> Series:
+    """A topic of a file as a whole, in time order; its tables hold the `channels`.
+
+    Raises
+    ------
+    LogError
+        As `in_order`, and if there is no sample.
+    """
+    found = [table for table in in_order(path, tables) if len(table)]
+    if not found:
+        channel = next(iter(channels))
+        raise LogError(
+            f"{path}: topic {topic!r} holds no sample of {channel}; name another: --set {channel}.topic=NAME "
+            f"--set {channel}.source=FIELD (profile: topic and source of [{channel}])"
+        )
+    return Series(topic, stack(found))
+
+
+def aligned(main: Iterator[SampleTable], others: Sequence[Series]) -> Iterator[SampleTable]:
+    """The main topic's tables with the other topics' channels, where all cover it.
+
+    The last table tells how many were dropped and what the interpolation costs, in the log's own units.
+    """
+    lost, held = 0, None
+    for table in main:
+        if held is not None:
+            yield held
+        covered = np.all([np.ones(len(table), np.bool_), *(other.covers(table.stamp_ns) for other in others)], axis=0)
+        lost += len(table) - int(np.count_nonzero(covered))
+        kept = table if covered.all() else table.take(covered)
+        columns = dict(kept.columns)
+        for other in others:
+            columns |= other.at(kept.stamp_ns)
+        held = SampleTable(kept.stamp_ns, columns, kept.notices)
+    said = [
+        Notice(
+            "ALIGNED",
+            f"{other.topic!r} ({1e9 / other.period if other.period else 0:.6g} Hz) was interpolated; "
+            f"error, root mean square, in the log's units: {other.error()}",
+        )
+        for other in others
+    ]
+    if lost:
+        text = f"{counted(lost, 'sample was', 'samples were')} dropped, where another topic has none"
+        said.append(Notice("NOT_COVERED", text, lossy=True))
+    if held is not None:
+        yield held.noting(*said, *(notice for other in others for notice in other.table.notices))

@@ -1,0 +1,143 @@
+"""What flat tables of every format share: their clock, dates, types, rows with gaps, and the look at other joints."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from datetime import UTC, date, datetime, time, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from algid.errors import LogError
+from algid.profile import Profile
+from algid.readers import open_log, read_log
+
+ROWS = 20_000
+LOOKED = 1 << 14
+"""Samples that the message of other joints speaks of."""
+WRITERS: dict[str, Callable[[pl.DataFrame, Path], object]] = {
+    "parquet": pl.DataFrame.write_parquet,
+    "feather": pl.DataFrame.write_ipc,
+}
+
+
+def arm(rows: int = ROWS, joints: int = 3) -> pl.DataFrame:
+    """Joints that all swing by 0.8 rad, at 1 kHz."""
+    t = np.arange(rows) * 1e-3
+    angles = {f"q{joint}": 0.4 * np.sin(9 * t + joint) for joint in range(1, joints + 1)}
+    return pl.DataFrame({"t": t, **angles, **{f"tau{joint}": np.cos(t + joint) for joint in range(1, joints + 1)}})
+
+
+def other_joints(path: Path) -> list[str]:
+    reader = open_log(path, Profile(joints=("1", "2")))
+    return [notice.text for notice in reader.notices if notice.code == "OTHER_JOINTS"]
+
+
+@pytest.mark.parametrize("options", [{"row_group_size": 17_000}, {"data_page_size": 32_000, "write_batch_size": 4096}])
+def test_other_joints_are_looked_at_in_the_first_samples_only(options: dict[str, int], tmp_path: Path) -> None:
+    """A page of theirs that is damaged further on is not read for it; one among the first is."""
+    path, frame = tmp_path / "log.parquet", arm()
+    pq.write_table(
+        frame.to_arrow(), path, compression="none", use_dictionary=False, write_page_checksum=True, **options
+    )
+    whole = path.read_bytes()
+    for row, told in ((ROWS - 1, 1), (5000, 0)):
+        content = bytearray(whole)
+        content[content.index(struct.pack("<d", frame["q3"][row]))] ^= 1
+        path.write_bytes(content)
+        found = other_joints(path)
+        assert len(found) == told
+        assert all(f"3 by 0.8 rad (in the first {LOOKED:,} samples)" in text for text in found)
+        assert len(read_log(path, Profile(joints=("1", "2")))) == ROWS
+
+
+@pytest.mark.parametrize("separator", [",", " "])
+def test_other_joints_of_text_are_looked_at_in_the_first_rows_only(separator: str, tmp_path: Path) -> None:
+    path, lines = tmp_path / "log.csv", arm().write_csv(separator=separator).splitlines()
+    for row, told in ((ROWS, 1), (5000, 0)):
+        cells = lines[row].split(separator)
+        path.write_text("\n".join([*lines[:row], separator.join([*cells[:3], "torn", *cells[4:]]), *lines[row + 1 :]]))
+        assert len(other_joints(path)) == told
+
+
+def test_of_other_joints_those_are_looked_at_that_hold_numbers(tmp_path: Path) -> None:
+    frame = arm(300, 4).with_columns(q3=pl.lit("n/a"))
+    for form, write in WRITERS.items():
+        write(frame, tmp_path / f"log.{form}")
+        (text,) = other_joints(tmp_path / f"log.{form}")
+        assert text.startswith("1 other joint moves meanwhile: 4 by")
+
+
+START = datetime(2024, 3, 1, 23, 59, 59, 500_000, tzinfo=UTC)
+STAMPS: dict[str, tuple[list[Any], Any, int]] = {
+    "a date in ns": (
+        [START + timedelta(milliseconds=k) for k in range(9)],
+        pl.Datetime("ns", "UTC"),
+        1709337599500000000,
+    ),
+    "a date in ms": (
+        [START + timedelta(milliseconds=k) for k in range(9)],
+        pl.Datetime("ms", "UTC"),
+        1709337599500000000,
+    ),
+    "a duration": ([timedelta(seconds=2, milliseconds=k) for k in range(9)], pl.Duration("us"), 2_000_000_000),
+    "a time of day": ([time(0, 1, 0, 1000 * k) for k in range(9)], pl.Time(), 60_000_000_000),
+}
+
+
+@pytest.mark.parametrize("form", WRITERS)
+@pytest.mark.parametrize("name", STAMPS)
+def test_dates_and_durations_are_times_in_ns(name: str, form: str, tmp_path: Path) -> None:
+    """Also where a column is named after a unit, or the user says one: a date has its own."""
+    values, kind, first = STAMPS[name]
+    frame = arm(9, 2).drop("t").with_columns(pl.Series("t_ms", values, kind))
+    WRITERS[form](frame, tmp_path / f"log.{form}")
+    for profile in (None, Profile(time_unit="s")):
+        log = read_log(tmp_path / f"log.{form}", profile)
+        assert log.stamp_ns.tolist() == [first + k * 1_000_000 for k in range(9)]
+        assert log.origin.reading.time_unit == "ns"
+
+
+@pytest.mark.parametrize("form", WRITERS)
+def test_days_are_no_clock(form: str, tmp_path: Path) -> None:
+    frame = arm(9, 2).with_columns(pl.Series("t", [date(2024, 3, day) for day in range(1, 10)]))
+    WRITERS[form](frame, tmp_path / f"log.{form}")
+    with pytest.raises(LogError, match="column 't' for t holds Date; expected numbers"):
+        read_log(tmp_path / f"log.{form}")
+
+
+@pytest.mark.parametrize("form", WRITERS)
+def test_a_date_is_no_angle(form: str, tmp_path: Path) -> None:
+    frame = arm(9, 2).with_columns(pl.Series("q2", [START] * 9))
+    WRITERS[form](frame, tmp_path / f"log.{form}")
+    with pytest.raises(LogError, match=r"column 'q2' for theta2 holds Datetime.*; expected numbers"):
+        read_log(tmp_path / f"log.{form}")
+
+
+def test_whole_stamps_in_lists_stay_exact(tmp_path: Path) -> None:
+    """Past 2^53 a float64 would lose the last digits."""
+    stamps = [1_700_000_000_123_456_789 + 1_000_001 * row for row in range(5)]
+    frame = {"stamp_ns": pa.array([[stamp, 0] for stamp in stamps]), "q": pa.array([[0.1, 0.2]] * 5)}
+    table = pa.table({**frame, "tau": pa.array([[1.0, 2.0]] * 5)})
+    pq.write_table(table, tmp_path / "log.parquet")
+    log = read_log(tmp_path / "log.parquet", Profile(time="stamp_ns[0]", time_unit="ns"))
+    assert log.stamp_ns.tolist() == stamps
+    assert log.tau.tolist() == [[1] * 5, [2] * 5]
+
+
+def test_more_columns_than_any_log_has_are_refused_in_every_format(tmp_path: Path) -> None:
+    frame = arm(3, 2).with_columns(pl.lit(0.0).alias(f"c{place}") for place in range(4093))
+    for form, write in WRITERS.items():
+        write(frame, tmp_path / f"log.{form}")
+        with pytest.raises(LogError, match="4,098 columns; expected 4096 at most"):
+            read_log(tmp_path / f"log.{form}")
+    matrices: dict[str, Any] = {f"q{place}": np.zeros((5, 64)) for place in range(64)}
+    np.savez(tmp_path / "log.npz", t=np.arange(5), **matrices)
+    with pytest.raises(LogError, match="4,097 columns; expected 4096 at most"):
+        read_log(tmp_path / "log.npz")
