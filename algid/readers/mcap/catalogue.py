@@ -8,7 +8,6 @@ start, record by record and past what is broken.
 from __future__ import annotations
 
 import struct
-import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -22,8 +21,6 @@ from algid.readers.mcap.messages import Records, records_in
 from algid.readers.mcap.salvage import Gap, salvaged
 from algid.words import counted
 
-_FOOTER_SIZE = 9 + 20 + 8
-_LARGEST_SUMMARY = 1 << 28
 _MOST_INDEXES = 2_000_000
 _MOST_SPANS = 100_000
 _SPAN = 1 << 23
@@ -157,7 +154,7 @@ def _from_summary(file: File) -> Catalogue | None:
     """What a summary says that can be trusted, None where there is none that tells enough."""
     from mcap import records
 
-    start, content = _summary(file)
+    start, content = framing.summary(file)
     found, statistics, metadata = Catalogue(), None, []
     chunks: list[ChunkIndex] = []
     for record in framing.walk_bytes(content, 0, len(content)):
@@ -183,25 +180,6 @@ def _from_summary(file: File) -> Catalogue | None:
         if one.name == KEY and KEY not in found.metadata:
             _keep_metadata(file, framing.Record(framing.METADATA, one.offset + 9, one.length - 9), found)
     return found
-
-
-def _summary(file: File) -> tuple[int, bytes]:
-    """Where the summary starts, and its bytes, none where the footer names no summary; its checksum is verified."""
-    tail = file.read(max(0, file.size - _FOOTER_SIZE), min(_FOOTER_SIZE, file.size))
-    if len(tail) < _FOOTER_SIZE or tail[-8:] != framing.MAGIC:
-        raise DamagedError("the file has no end: it was cut off")
-    code, length, start, _, crc = struct.unpack("<BQQQI", tail[:-8])
-    end = file.size - _FOOTER_SIZE
-    if code != framing.FOOTER or length != 20:
-        raise DamagedError("its footer is damaged")
-    if start == 0:
-        return 0, b""
-    if not 8 <= start <= end or end - start > _LARGEST_SUMMARY:
-        raise DamagedError(f"its footer claims a summary at byte {start}")
-    content = file.read(start, end - start)
-    if crc and zlib.crc32(tail[:25], zlib.crc32(content)) != crc:
-        raise DamagedError("its checksum is wrong")
-    return start, content
 
 
 def _check_listed(file: File, chunks: list[ChunkIndex], statistics: Any, end: int) -> None:
@@ -251,7 +229,8 @@ def _walked(file: File) -> Catalogue:
         for record in salvaged(file, len(framing.MAGIC)):
             if isinstance(record, Gap):
                 gaps.append(record)
-                spans.add_torn(record)
+                if record.torn is not None:  # what there is of a chunk that breaks off
+                    spans.append(record.torn.start, record.end - record.torn.start, _TORN)
             elif record.code == framing.DATA_END:
                 ended = record.start
             elif record.code in (framing.SCHEMA, framing.CHANNEL) and record.length <= framing.SMALL_RECORD:
@@ -289,22 +268,18 @@ class _Spans:
         """Take in a record; whether it holds data."""
         last = self._places[-1] if self._places else [0, 0, 0]
         if record.code == framing.CHUNK:
-            self._append(record.start, record.length, 0)
+            self.append(record.start, record.length, 0)
         elif record.code == framing.MESSAGE:
             if last[2] == _LOOSE and last[0] + last[1] == record.start - 9 and last[1] < _SPAN:
                 last[1] += record.length + 9
             else:
-                self._append(record.start - 9, record.length + 9, _LOOSE)
+                self.append(record.start - 9, record.length + 9, _LOOSE)
         elif record.code == framing.MESSAGE_INDEX and last[2] >= 0 and sum(last) == record.start - 9:
             last[2] += record.length + 9
         return record.code in (framing.CHUNK, framing.MESSAGE)
 
-    def add_torn(self, gap: Gap) -> None:
-        """Take in what there is of a chunk that breaks off."""
-        if gap.torn is not None:
-            self._append(gap.torn.start, gap.end - gap.torn.start, _TORN)
-
-    def _append(self, start: int, length: int, kind: int) -> None:
+    def append(self, start: int, length: int, kind: int) -> None:
+        """Take in a span of its own."""
         if len(self._places) == _MOST_SPANS:
             raise DamagedError(f"more than {_MOST_SPANS} chunks, or messages apart from each other")
         self._places.append([start, length, kind])

@@ -9,7 +9,7 @@ import struct
 from dataclasses import dataclass
 
 from algid.readers.mcap.columnar import MisfitError, Numbers, Shape
-from algid.readers.mcap.definitions import PRIMITIVES, Field, Types
+from algid.readers.mcap.definitions import PRIMITIVES, TEXTS, Field, Types
 from algid.words import counted
 
 _ENDINGS = {0: ">", 1: "<"}
@@ -38,7 +38,7 @@ class _Walk:
         count = self.length() if field.count < 0 else field.count
         if field.type in PRIMITIVES:
             self.numbers(field.type, path, count)
-        elif field.type in ("string", "wstring"):
+        elif field.type in TEXTS:
             self.shape.count(self.possible(count, 4))
             self.shape.texts[path] = tuple(self.text(field.type) for _ in range(count))
         else:
@@ -48,7 +48,7 @@ class _Walk:
     def one(self, kind: str, path: str) -> None:
         if kind in PRIMITIVES:
             self.numbers(kind, path, 1)
-        elif kind in ("string", "wstring"):
+        elif kind in TEXTS:
             self.skipped_text(kind)
         else:
             self.structure(kind, f"{path}.")

@@ -16,7 +16,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.log import IntArray
 from algid.readers.mcap.messages import Messages
 from algid.words import counted
 
@@ -88,14 +87,15 @@ class Shape:
         """
         place = ""
         for part in re.split(r"(\[[^\]]*\])", path):
-            names = self._beside(place, part[1:-1]) if part.startswith("[") else ()
-            if names:  # a name first: joints may be called "1" and "2"
-                if names.count(part[1:-1]) > 1:
-                    return None
-                part = f"[{names.index(part[1:-1])}]"
-            elif part.startswith("[") and not part[1:-1].isdigit():
+            name, parent = part[1:-1], place.rpartition(".")[0]
+            if not part.startswith("["):
+                place += part
+                continue
+            lists = (texts for one, texts in self.texts.items() if one.rpartition(".")[0] == parent and name in texts)
+            names = next(lists, ())  # a name first: joints may be called "1" and "2"
+            if names.count(name) > 1 or not (names or name.isdigit()):
                 return None
-            place += part
+            place += f"[{names.index(name)}]" if names else part
         if place in self.numbers:
             found = self.numbers[place]
             return found if found.count == 1 else None
@@ -106,12 +106,6 @@ class Shape:
         if index >= found.count or found.kind[0] not in "<>|":
             return None
         return Numbers(found.offset + index * int(found.kind[-1]), found.kind)
-
-    def _beside(self, array: str, name: str) -> tuple[str, ...]:
-        """The first list of strings beside a list that has a name, empty where none has."""
-        parent = array.rpartition(".")[0]
-        lists = (texts for path, texts in self.texts.items() if path.rpartition(".")[0] == parent and name in texts)
-        return next(lists, ())
 
 
 MOST_LAYOUTS = 256
@@ -149,23 +143,16 @@ class Layout:
         octets, columns = table.view(np.uint8), Fields()
         for name, at in (self.fields or {}).items():
             start, rows = self.lead + at.offset, octets.shape[0]
-            if at.kind == "varint":
-                columns[name] = _varint(octets[:, start : start + at.width], at.zigzag)
+            if at.kind == "varint":  # in base 128, the lowest seven bits first
+                digits = (octets[:, start : start + at.width] & 0x7F).astype(np.uint64)
+                total = np.bitwise_or.reduce(digits << (7 * np.arange(at.width, dtype=np.uint64)), axis=1)
+                signed = (total >> np.uint64(1)) ^ (np.uint64(0) - (total & np.uint64(1)))
+                columns[name] = (signed if at.zigzag else total).view(np.int64)
             elif at.kind == "zero":  # a number that protobuf leaves out because it is zero
                 columns[name] = np.zeros(rows)
             else:
                 columns[name] = np.ndarray(rows, np.dtype(at.kind), octets.data, start, (octets.strides[0],))
         return columns
-
-
-def _varint(octets: NDArray[np.uint8], zigzag: bool) -> NDArray[np.int64]:
-    """Numbers in base 128, the lowest seven bits first (N, bytes)."""
-    total = np.zeros(octets.shape[0], np.uint64)
-    for place in range(octets.shape[1]):
-        total |= (octets[:, place] & 0x7F).astype(np.uint64) << np.uint64(7 * place)
-    if zigzag:
-        return (total >> np.uint64(1)).view(np.int64) ^ -(total & np.uint64(1)).view(np.int64)
-    return total.view(np.int64)
 
 
 def layout(payload: bytes, shape: Shape, wanted: Mapping[str, str]) -> Layout:
@@ -256,7 +243,9 @@ class ColumnDecoder(Decoder):
     def read(self, messages: Messages, held: NDArray[np.bool_]) -> Fields:
         """The numbers of the messages that hold what is wanted, by name; notes in `held` (N,) which do."""
         parts: list[tuple[NDArray[np.intp], Fields]] = []
-        for size, rows in _by_size(messages.sizes):
+        order = np.argsort(messages.sizes, kind="stable")
+        for rows in filter(len, np.split(order, np.flatnonzero(np.diff(messages.sizes[order])) + 1)):
+            size = int(messages.sizes[rows[0]])
             self.spend(_WORK_A_SIZE, _TOO_MANY)
             if size > LARGEST_MESSAGE:
                 self.misfitting(f"messages of {counted(size, 'byte')}", rows.size)
@@ -266,8 +255,8 @@ class ColumnDecoder(Decoder):
                 parts.append((chosen, fields))
         if len(parts) < 2:
             return parts[0][1] if parts else {name: np.empty(0) for name in self.wanted}
-        order = np.argsort(np.concatenate([chosen for chosen, _ in parts]))
-        return {name: np.concatenate([fields[name] for _, fields in parts])[order] for name in parts[0][1]}
+        places = np.argsort(np.concatenate([chosen for chosen, _ in parts]))
+        return {name: np.concatenate([fields[name] for _, fields in parts])[places] for name in parts[0][1]}
 
     def _of_one_size(
         self, messages: Messages, size: int, rows: NDArray[np.intp]
@@ -315,14 +304,3 @@ class ColumnDecoder(Decoder):
             return None
         self.spend(_WORK_A_WALK + shape.parts, _TOO_MANY)
         return layout(payload, shape, self.wanted)
-
-
-def _by_size(sizes: IntArray) -> Iterator[tuple[int, NDArray[np.intp]]]:
-    """Each size that there is, mostly one, and the messages that have it."""
-    if sizes.size and np.all(sizes == sizes[0]):
-        yield int(sizes[0]), np.arange(sizes.size)
-        return
-    order = np.argsort(sizes, kind="stable")
-    for rows in np.split(order, np.flatnonzero(np.diff(sizes[order])) + 1):
-        if rows.size:
-            yield int(sizes[rows[0]]), rows

@@ -11,7 +11,6 @@ this one takes 0.05 ms; and modules nested a hundred times end it in a Recursion
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from algid.words import counted
@@ -20,11 +19,16 @@ PRIMITIVES = {
     "bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
     "int32": "i4", "uint32": "u4", "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8",
 }  # fmt: skip
+TEXTS = ("string", "wstring")
+_SHORT = {
+    "time": "builtin_interfaces/Time", "duration": "builtin_interfaces/Duration", "Header": "std_msgs/Header"
+}  # fmt: skip
 _FIELD = re.compile(
     r"^(?P<type>[A-Za-z][\w/]*)(?P<bound><=\d+)?(?P<array>\[(?P<size>(<=)?\d*)\])?\s+(?P<name>[A-Za-z]\w*)\s*(?P<rest>.*)$"
 )
 _MOST_FIELDS = 4096
 _DEEPEST = 32
+"""Types, typedefs and modules within one another."""
 _LONGEST = 1 << 20
 _LONGEST_NUMBER = 10
 """Digits of a length: 32 bits have so many."""
@@ -64,7 +68,7 @@ def parse_msg(root: str, text: str) -> Types:
             raise DefinitionError(f"{root}: expected 'MSG: package/Type', found {head[:60]!r}")
         types[found[1]] = _fields(found[1], body)
     resolved = {name: tuple(_resolved(field, name, types) for field in fields) for name, fields in types.items()}
-    check_depth(root, resolved)
+    _check_depth(root, resolved, {})
     return resolved
 
 
@@ -74,64 +78,42 @@ def _check_length(root: str, text: str) -> None:
 
 
 def _fields(name: str, text: str) -> tuple[Field, ...]:
-    fields = [found for line in text.splitlines() if (found := _field(name, line)) is not None]
+    """The fields of a structure, a line each; comments and constants are passed over."""
+    fields = []
+    for line in text.splitlines():
+        found = _FIELD.match(line.split("#", 1)[0].strip())
+        if found is None and line.split("#", 1)[0].strip():
+            raise DefinitionError(f"{name}: cannot read the line {line.strip()[:60]!r}")
+        if found is None or found["rest"].startswith("="):
+            continue
+        size = found["size"]
+        if size and len(size.removeprefix("<=")) > _LONGEST_NUMBER:
+            told = f"a length of {counted(len(size), 'digit')} in the line {line.strip()[:60]!r}"
+            raise DefinitionError(f"{name}: {told}")
+        count = None if found["array"] is None else int(size) if size.isdigit() else -1
+        fields.append(Field(found["name"], found["type"], count))
     if len(fields) > _MOST_FIELDS:
         raise DefinitionError(f"{name}: {counted(len(fields), 'field')}")
     # an empty structure takes one byte, since IDL has none
     return tuple(fields) or (Field("structure_needs_at_least_one_member", "uint8", None),)
 
 
-def _field(name: str, line: str) -> Field | None:
-    text = line.split("#", 1)[0].strip()
-    if not text:
-        return None
-    found = _FIELD.match(text)
-    if found is None:
-        raise DefinitionError(f"{name}: cannot read the line {line.strip()[:60]!r}")
-    if found["rest"].startswith("="):
-        return None  # a constant
-    size = found["size"]
-    if size and len(size.removeprefix("<=")) > _LONGEST_NUMBER:
-        raise DefinitionError(f"{name}: a length of {counted(len(size), 'digit')} in the line {line.strip()[:60]!r}")
-    count = None if found["array"] is None else int(size) if size.isdigit() else -1
-    return Field(found["name"], found["type"], count)
-
-
 def _resolved(field: Field, owner: str, types: Types) -> Field:
-    if field.type in PRIMITIVES or field.type in ("string", "wstring"):
+    """A field with its type's name as `types` has it: short, within the owner's package, or with ``msg`` between."""
+    if field.type in PRIMITIVES or field.type in TEXTS:
         return field
-    package = owner.split("/")[0]
-    short = {
-        "time": "builtin_interfaces/Time",
-        "duration": "builtin_interfaces/Duration",
-        "Header": "std_msgs/Header",
-    }
-    wanted = field.type if "/" in field.type else f"{package}/{field.type}"
-    for name in (wanted, wanted.replace("/msg/", "/"), _with_msg(wanted), short.get(field.type, wanted)):
+    wanted = field.type if "/" in field.type else f"{owner.split('/')[0]}/{field.type}"
+    package, _, rest = wanted.partition("/")
+    for name in (wanted, wanted.replace("/msg/", "/"), f"{package}/msg/{rest}", _SHORT.get(field.type, wanted)):
         if name in types:
             return Field(field.name, name, field.count)
     raise DefinitionError(f"{owner}: the type {field.type!r} of {field.name!r} is not defined")
 
 
-def _with_msg(name: str) -> str:
-    package, _, rest = name.partition("/")
-    return f"{package}/msg/{rest}"
-
-
-def check_depth(root: str, types: Types) -> None:
-    """Refuse types that contain each other, or go too deep.
-
-    Raises
-    ------
-    DefinitionError
-    """
-    _height(root, types, {}, 0)
-
-
-def _height(name: str, types: Types, known: dict[str, int], above: int) -> int:
-    """Types below one another under `name`; each is looked at once, however often it is used."""
+def _check_depth(name: str, types: Types, known: dict[str, int], above: int = 0) -> int:
+    """Types below one another under `name`, each looked at once, however often it is used; too many are refused."""
     if name not in known and above <= _DEEPEST:
-        below = (_height(field.type, types, known, above + 1) for field in types[name] if field.type in types)
+        below = (_check_depth(field.type, types, known, above + 1) for field in types[name] if field.type in types)
         known[name] = 1 + max(below, default=0)
     if above + known.get(name, 1) > _DEEPEST:
         raise DefinitionError(f"{name}: types nested more than {_DEEPEST} deep")
@@ -152,8 +134,6 @@ _LONGER = frozenset(
     " ".join(words[: size + 1]) for words in (name.split() for name in _NUMBERS) for size in range(1, len(words))
 )
 """Names of numbers that go on behind a blank: ``unsigned long`` and ``unsigned long long``."""
-_TEXTS = ("string", "wstring")
-_DEEPEST_IDL = 32
 
 
 def parse_idl(root: str, text: str) -> Types:
@@ -167,19 +147,16 @@ def parse_idl(root: str, text: str) -> Types:
     _check_length(root, text)
     found = _Definitions()
     for section in _SECTION.split(text):
-        _Parser(root, [*_tokens(section)], found).definitions(())
+        tokens = [one["token"] for one in _TOKEN.finditer(section) if one["token"]]
+        _Parser(root, tokens, found).definitions(())
     if root not in found.structures:
         raise DefinitionError(f"{root}: not defined; found {', '.join([*found.structures][:8]) or 'no structure'}")
     types = {
         owner: tuple(found.resolved(owner, name, spec) for name, spec in members)
         for owner, members in found.structures.items()
     }
-    check_depth(root, types)
+    _check_depth(root, types, {})
     return types
-
-
-def _tokens(text: str) -> Iterator[str]:
-    return (found["token"] for found in _TOKEN.finditer(text) if found["token"])
 
 
 @dataclass(frozen=True)
@@ -206,8 +183,8 @@ class _Definitions:
 
     def resolved(self, owner: str, name: str, spec: _Spec) -> Field:
         """The member `name` of `owner` with its type's full name."""
-        for _ in range(_DEEPEST_IDL):
-            if spec.name in PRIMITIVES or spec.name in _TEXTS:
+        for _ in range(_DEEPEST):
+            if spec.name in PRIMITIVES or spec.name in TEXTS:
                 return Field(name, spec.name, spec.count)
             meant = next((one for one in spec.candidates() if one in self.structures or one in self.typedefs), None)
             if meant is None:
@@ -218,7 +195,7 @@ class _Definitions:
             if alias.count is not None and spec.count is not None:
                 raise DefinitionError(f"{owner}: {name!r} is a list of lists")
             spec = _Spec(alias.name, alias.scope, alias.count if spec.count is None else spec.count)
-        raise DefinitionError(f"{owner}: typedefs of {name!r} nested more than {_DEEPEST_IDL} deep")
+        raise DefinitionError(f"{owner}: typedefs of {name!r} nested more than {_DEEPEST} deep")
 
 
 @dataclass
@@ -232,27 +209,26 @@ class _Parser:
 
     def definitions(self, scope: tuple[str, ...]) -> None:
         """Definitions up to the end, or to the brace that closes a module."""
-        if len(scope) > _DEEPEST_IDL:
-            raise DefinitionError(f"{self.root}: modules nested more than {_DEEPEST_IDL} deep")
+        if len(scope) > _DEEPEST:
+            raise DefinitionError(f"{self.root}: modules nested more than {_DEEPEST} deep")
         while self.place < len(self.tokens) and not (scope and self.tokens[self.place] == "}"):
             self._annotations()
-            self._definition(self._next(), scope)
-
-    def _definition(self, kind: str, scope: tuple[str, ...]) -> None:
-        if kind == "module":
-            name = self._next()
-            self._expect("{")
-            self.definitions((*scope, name))
-            self._expect("}", ";")
-        elif kind == "struct":
-            self._structure(scope)
-        elif kind == "typedef":
-            self.found.typedefs |= {"/".join((*scope, name)): spec for name, spec in self._declared(scope)}
-        elif kind == "const":
-            while self._next() != ";":
-                pass
-        else:
-            raise DefinitionError(f"{self.root}: {kind[:40]!r} where module, struct, typedef or const was expected")
+            kind = self._next()
+            if kind == "module":
+                name = self._next()
+                self._expect("{")
+                self.definitions((*scope, name))
+                self._expect("}", ";")
+            elif kind == "struct":
+                self._structure(scope)
+            elif kind == "typedef":
+                self.found.typedefs |= {"/".join((*scope, name)): spec for name, spec in self._declared(scope)}
+            elif kind == "const":
+                while self._next() != ";":
+                    pass
+            else:
+                told = f"{kind[:40]!r} where module, struct, typedef or const was expected"
+                raise DefinitionError(f"{self.root}: {told}")
 
     def _structure(self, scope: tuple[str, ...]) -> None:
         name, members = self._next(), []
@@ -295,7 +271,7 @@ class _Parser:
             else:
                 self._expect(">")
             return inner, -1
-        if name in _TEXTS and self._taken("<"):
+        if name in TEXTS and self._taken("<"):
             self._number(">")
         while f"{name} {self.tokens[self.place] if self.place < len(self.tokens) else ''}" in _LONGER:
             name = f"{name} {self._next()}"

@@ -26,6 +26,8 @@ HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = ra
 STATISTICS, METADATA, METADATA_INDEX, DATA_END = 0x0B, 0x0C, 0x0D, 0x0F
 FRAME = struct.Struct("<BQ")
 SMALL_RECORD = 1 << 24
+_FOOTER_SIZE = 9 + 20 + 8
+_LARGEST_SUMMARY = 1 << 28
 LARGEST_CHUNK = 1 << 28
 """A recorder closes a chunk at some MiB; beyond 256 MiB it is a mistake or an attack."""
 _WINDOW = 1 << 20
@@ -189,6 +191,31 @@ def walk_bytes(content: bytes | memoryview, start: int, end: int) -> Iterator[Re
             raise DamagedError(f"more than {MOST_OTHERS} records that are no messages")
         yield Record(code, start + FRAME.size, length)
         start += FRAME.size + length
+
+
+def summary(file: File) -> tuple[int, bytes]:
+    """Where the summary starts, and its bytes, none where the footer names no summary; its checksum is verified.
+
+    Raises
+    ------
+    DamagedError
+        If the file has no end, or its footer or summary is damaged.
+    """
+    tail = file.read(max(0, file.size - _FOOTER_SIZE), min(_FOOTER_SIZE, file.size))
+    if len(tail) < _FOOTER_SIZE or tail[-8:] != MAGIC:
+        raise DamagedError("the file has no end: it was cut off")
+    code, length, start, _, crc = struct.unpack("<BQQQI", tail[:-8])
+    end = file.size - _FOOTER_SIZE
+    if code != FOOTER or length != 20:
+        raise DamagedError("its footer is damaged")
+    if start == 0:
+        return 0, b""
+    if not 8 <= start <= end or end - start > _LARGEST_SUMMARY:
+        raise DamagedError(f"its footer claims a summary at byte {start}")
+    content = file.read(start, end - start)
+    if crc and zlib.crc32(tail[:25], zlib.crc32(content)) != crc:
+        raise DamagedError("its checksum is wrong")
+    return start, content
 
 
 def parse(kind: Any, content: bytes) -> Any:

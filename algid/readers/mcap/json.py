@@ -117,15 +117,14 @@ class _Paths:
             if not part.startswith("["):
                 parent, found = found, found.get(part) if isinstance(found, dict) else None
                 continue
-            index = self._place(parent, part[1:-1]) if isinstance(parent, dict) else None
-            if index is None and part[1:-1].isdigit():
-                index = int(part[1:-1])
+            name, index = part[1:-1], None
+            if isinstance(parent, dict):
+                if id(parent) not in self._lists:
+                    self._lists[id(parent)] = [one for one in parent.values() if isinstance(one, list)]
+                names = next((one for one in self._lists[id(parent)] if name in one), None)
+                if names is not None:  # one that stands there twice has no place
+                    index = names.index(name) if names.count(name) == 1 else len(names)
+            if index is None and name.isdigit():
+                index = int(name)
             found = found[index] if isinstance(found, list) and index is not None and index < len(found) else None
         return found if isinstance(found, (int, float)) and not isinstance(found, bool) else None
-
-    def _place(self, parent: dict[str, Any], name: str) -> int | None:
-        """Where a name stands in a list beside; behind its end, where nothing is, for one that stands there twice."""
-        if id(parent) not in self._lists:
-            self._lists[id(parent)] = [one for one in parent.values() if isinstance(one, list)]
-        named = next((one for one in self._lists[id(parent)] if name in one), None)
-        return None if named is None else named.index(name) if named.count(name) == 1 else len(named)

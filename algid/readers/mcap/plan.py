@@ -201,11 +201,9 @@ def _fitting(topic: str, shape: Shape, joints: list[str], profile: Profile | Non
         there = (joints[0], joints[1]) if len(joints) == 2 else chosen
         named = bool(names_in(shape))
         return _Usual(topic, there, named, joint_fields(shape, chosen), others=other_positions(shape, chosen))
-    return None if joints or repeated_name(shape) else _flat(topic, shape, profile)
-
-
-def _flat(topic: str, shape: Shape, profile: Profile | None) -> _Usual | None:
-    """A message of plain numbers, ``{"q1": …, "tau1": …}`` or ``{"q": […], "tau": […]}``, by their names."""
+    if joints or repeated_name(shape):
+        return None
+    # plain numbers by their names: {"q1": …, "tau1": …} or {"q": […], "tau": […]}
     paths = [path for name, one in shape.numbers.items() for path in _paths_of(name, one.count, ())]
     try:
         choice = choose(paths, profile.joints if profile else None)
@@ -217,8 +215,7 @@ def _flat(topic: str, shape: Shape, profile: Profile | None) -> _Usual | None:
     if not set(JOINT_CHANNELS) <= found.keys() or not all(shape.find(path) for path in found.values()):
         return None
     currents = {name: "A" for name, path in found.items() if take_apart(path).stem in CURRENTS}
-    joints = choice.joints or ("1", "2")
-    return _Usual(topic, joints, choice.joints is not None, found, {**choice.units, **currents})
+    return _Usual(topic, choice.joints or ("1", "2"), choice.joints is not None, found, {**choice.units, **currents})
 
 
 def _candidates(file: File, found: Catalogue, profile: Profile | None) -> list[tuple[str, str]]:

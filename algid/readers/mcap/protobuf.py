@@ -66,7 +66,10 @@ def parse(root: str, data: bytes) -> Types:
                 continue
             if name not in found:
                 raise DefinitionError(f"{root}: the type {name[:80]!r} is not defined")
-            types[name] = {one.number: _field(one) for one in found[name].field}
+            types[name] = {
+                one.number: ProtobufField(one.name, one.type, one.type_name.lstrip("."), one.label == _REPEATED)
+                for one in found[name].field
+            }
             waiting += [one.message for one in types[name].values() if one.type == _MESSAGE]
     except (DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise DefinitionError(f"{root}: no set of descriptors ({error})") from error
@@ -78,10 +81,6 @@ def _messages(scope: str, messages: Any) -> Iterator[tuple[str, Any]]:
         name = f"{scope}.{message.name}" if scope else message.name
         yield name, message
         yield from _messages(name, message.nested_type)
-
-
-def _field(one: Any) -> ProtobufField:
-    return ProtobufField(one.name, one.type, one.type_name.lstrip("."), one.label == _REPEATED)
 
 
 def _entries(data: bytes, start: int, end: int) -> Iterator[tuple[int, int, int, int, int]]:
@@ -140,7 +139,8 @@ class _Absent:
         kind, done = self.root, ""
         *inner, last = path.split(".")
         for part in inner:
-            name, index = _indexed(part)
+            place = re.fullmatch(r"(.*)\[(\d{1,9})\]", part)
+            name, index = (place[1], int(place[2])) if place else (part, None)
             found = self._named(kind, name)
             done += name
             if found is None or found.type != _MESSAGE or found.repeated != (index is not None):
@@ -154,11 +154,6 @@ class _Absent:
 
     def _named(self, kind: str, name: str) -> ProtobufField | None:
         return next((one for one in self.types[kind].values() if one.name == name), None)
-
-
-def _indexed(part: str) -> tuple[str, int | None]:
-    found = re.fullmatch(r"(.*)\[(\d{1,9})\]", part)
-    return (found[1], int(found[2])) if found else (part, None)
 
 
 def _walk(data: bytes, start: int, end: int, kind: str, prefix: str, shape: Shape, absent: _Absent, depth: int) -> None:
