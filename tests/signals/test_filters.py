@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
-from scipy.signal import butter, lfilter, sosfiltfilt
+from scipy.signal import butter, freqz, lfilter, sosfiltfilt
 
-from algid.signals.filters import butterworth, correlate, differentiator, half_length, recursion, smoothed
+from algid.arm import FloatArray
+from algid.signals.filters import butterworth, correlate, differentiator, half_length, recursion, smoothed, smoother
 
 
 def test_a_ramp_has_its_slope() -> None:
@@ -68,3 +69,104 @@ def test_a_recursion_is_scipys_and_leaves_its_state(n: int) -> None:
     expected, expected_left = lfilter(numerator, denominator, x, zi=state)
     np.testing.assert_allclose(y, expected, atol=1e-12)
     np.testing.assert_allclose(left, expected_left, atol=1e-12)
+
+
+def test_kernels_are_kept_and_nobody_writes_into_them() -> None:
+    for make in (differentiator, smoother):
+        assert make(1e-3, 37.0) is make(1e-3, 37.0)
+        with pytest.raises(ValueError, match="read-only"):
+            make(1e-3, 37.0)[0] = 1.0
+
+
+@pytest.mark.parametrize(
+    ("dt", "bandwidth", "reach"), [(1e-3, 50.0, 50), (2e-3, 50.0, 25), (0.1, 60.0, 3), (1.0, 0.1, 25)]
+)
+def test_a_kernel_reaches_two_and_a_half_periods_of_its_bandwidth(dt: float, bandwidth: float, reach: int) -> None:
+    assert half_length(dt, bandwidth) == reach
+    assert smoother(dt, bandwidth).size == differentiator(dt, bandwidth).size == 2 * reach + 1
+
+
+def test_the_differentiators_response_is_that_of_a_derivative_and_falls_off() -> None:
+    """Against SciPy's frequency response: i ω up to half the bandwidth, next to nothing from twice of it."""
+    dt, bandwidth = 1e-3, 40.0
+    kernel = differentiator(dt, bandwidth)
+    np.testing.assert_allclose(kernel, -kernel[::-1], atol=1e-9 * np.abs(kernel).max())  # no phase
+    hertz = np.array([0.1, 2.0, 8.0, 20.0, 80.0, 200.0, 450.0])
+    _, response = freqz(kernel[::-1], worN=hertz, fs=1 / dt)
+    response = response * np.exp(2j * np.pi * hertz * dt * (kernel.size // 2)) / (2j * np.pi * hertz)
+    assert np.abs(response.imag).max() < 1e-9
+    np.testing.assert_allclose(response.real[:3], 1, atol=1e-3)
+    assert response.real[3] == pytest.approx(1, abs=0.03)
+    assert np.abs(response[4:]).max() < 2e-3
+
+
+def test_the_smoother_passes_what_is_slow_halves_its_bandwidth_and_stops_at_70_dB() -> None:
+    dt, bandwidth = 1e-3, 40.0
+    kernel = smoother(dt, bandwidth)
+    hertz = np.array([0.0, 10.0, bandwidth, 80.0, 150.0, 400.0])
+    _, response = freqz(kernel, worN=hertz, fs=1 / dt)
+    gain = np.abs(response)
+    assert gain[0] == pytest.approx(1, abs=1e-12)
+    assert gain[1] == pytest.approx(1, abs=2e-3)
+    assert gain[2] == pytest.approx(0.5, abs=0.01)  # the window's middle lies on the ideal filter's edge
+    assert 20 * np.log10(gain[3:].max()) < -65
+
+
+def test_smoothing_is_a_convolution_over_ends_turned_about_their_last_sample() -> None:
+    x = np.cumsum(np.random.default_rng(2).standard_normal((2, 300)), axis=1)
+    kernel = smoother(1e-3, 40.0)
+    reach = kernel.size // 2
+    extended = np.pad(x, ((0, 0), (reach, reach)), mode="reflect", reflect_type="odd")
+    expected = np.stack([np.convolve(row, kernel, "valid") for row in extended])
+    np.testing.assert_allclose(smoothed(x, 1e-3, 40.0), expected, atol=1e-11)
+
+
+@pytest.mark.parametrize("length", [2, 5, 40, 126])
+def test_a_log_shorter_than_the_kernel_keeps_its_line(length: int) -> None:
+    line = np.stack([3.0 * np.arange(length) + 1, -np.arange(length, dtype=np.float64)])
+    found = smoothed(line, 1e-3, 40.0)
+    assert found.shape == line.shape
+    np.testing.assert_allclose(found, line, atol=1e-10)
+
+
+@pytest.mark.parametrize("step", [1, 2, 5, 40])
+@pytest.mark.parametrize("length", [31, 32, 70, 517])
+def test_every_so_many_values_of_a_correlation_are_numpys(step: int, length: int) -> None:
+    rng = np.random.default_rng(3)
+    x, kernel = rng.standard_normal((3, length)), rng.standard_normal(31)
+    expected = np.stack([np.correlate(row, kernel, "valid")[::step] for row in x])
+    np.testing.assert_allclose(correlate(x, kernel, step), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_butterworth_is_the_minimum_that_it_is_said_to_be_ends_included(order: int) -> None:
+    """|S (y − x)|² + γ |D y|² by least squares on dense matrices of n-fold sums and differences."""
+    dt, cutoff, n = 0.01, 6.0, 60
+    x = np.random.default_rng(5).standard_normal((2, n))
+    sums, differences = np.eye(n), np.eye(n)
+    for _ in range(order):
+        sums, differences = sums[1:] + sums[:-1], differences[1:] - differences[:-1]
+    weight = np.tan(np.pi * cutoff * dt) ** -order
+    stacked = np.concatenate([sums, weight * differences])
+    expected = [np.linalg.lstsq(stacked, np.concatenate([sums @ row, np.zeros(n - order)]), rcond=None)[0] for row in x]
+    np.testing.assert_allclose(butterworth(x, dt, cutoff, order), expected, atol=1e-8)  # conditions to 1e4, squared
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_butterworth_keeps_polynomials_below_its_order_and_halves_its_cutoff(order: int) -> None:
+    t = np.arange(3000) * 2e-3
+    kept = np.stack([t ** (order - 1), np.ones_like(t)])
+    np.testing.assert_allclose(butterworth(kept, 2e-3, 5.0, order), kept, atol=1e-5 * kept.max())
+    wave = np.cos(2 * np.pi * 5.0 * t)[None]  # forwards and backwards: 2^-1/2 twice
+    np.testing.assert_allclose(butterworth(wave, 2e-3, 5.0, order)[0, 800:-800], 0.5 * wave[0, 800:-800], atol=1e-3)
+
+
+def test_a_recursion_goes_on_from_the_state_it_left() -> None:
+    x = np.random.default_rng(6).standard_normal(400)
+    numerator, denominator = butter(3, 0.2)
+    state: FloatArray = np.zeros(3)
+    parts = []
+    for part in np.split(x, [1, 3, 50, 333]):
+        y, state = recursion(numerator, denominator, part, state)
+        parts.append(y)
+    np.testing.assert_allclose(np.concatenate(parts), lfilter(numerator, denominator, x), atol=1e-11)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.signal import cont2discrete, lfilter
 
 from algid.signals.observers import C_OBS, PAPER_POLES, A, C, LuenbergerObserver, observer_gain
 
@@ -18,7 +19,7 @@ def test_gain_places_the_poles_of_the_paper() -> None:
 
 @pytest.mark.parametrize("poles", [PAPER_POLES, (-50 + 20j, -50 - 20j, -60, -80, -90, -100)])
 def test_velocities_are_those_of_the_differential_equation(poles: tuple[complex, ...]) -> None:
-    t = DT * np.arange(301)
+    t = DT * np.arange(61)
     theta = np.stack([np.sin(8 * t), np.cos(5 * t)])
     gain = observer_gain(poles)
 
@@ -62,4 +63,46 @@ def test_an_arm_at_rest_has_no_velocity() -> None:
 @pytest.mark.parametrize("poles", [(-1.0,) * 5, (1.0, -1, -2, -3, -4, -5), (-1 + 1j, -2, -3, -1 - 1j, -4, -5)])
 def test_poles_that_cannot_be_are_refused(poles: tuple[complex, ...]) -> None:
     with pytest.raises(ValueError, match="poles"):
+        observer_gain(poles)
+
+
+@pytest.mark.parametrize("poles", [PAPER_POLES, (-30 + 40j, -30 - 40j, -50, -20, -25, -90)])
+def test_the_recursion_is_scipys_first_order_hold_of_each_joints_transfer_function(poles: tuple[complex, ...]) -> None:
+    theta = np.cumsum(np.random.default_rng(2).normal(0, 0.01, (2, 400)), axis=1)
+    theta -= theta[:, :1]
+    found = LuenbergerObserver(DT, poles).velocities(theta)
+    for joint, own in enumerate((poles[:3], poles[3:])):
+        _, l1, l2, l3 = np.poly(np.array(own)).real
+        numerator, denominator, _ = cont2discrete(([l2, l3, 0.0], [1.0, l1, l2, l3]), DT, method="foh")
+        expected = lfilter(np.ravel(numerator), denominator, theta[joint])
+        np.testing.assert_allclose(found[joint], expected, atol=1e-6 * np.abs(expected).max())
+
+
+def test_after_a_reset_the_observer_starts_at_rest_where_it_is() -> None:
+    rng = np.random.default_rng(3)
+    first, second = np.cumsum(rng.normal(size=(2, 2, 200)), axis=2)
+    observer = LuenbergerObserver(DT)
+    observer.velocities(first)
+    observer.reset()
+    found = observer.velocities(second + 5.0)
+    np.testing.assert_allclose(found, LuenbergerObserver(DT).velocities(second), rtol=1e-9, atol=1e-6)
+    assert np.all(np.abs(found[:, 0]) < 1e-6)
+
+
+def test_no_joint_disturbs_the_other() -> None:
+    theta = np.random.default_rng(4).normal(size=(2, 100)).cumsum(axis=1)
+    alone = LuenbergerObserver(DT).velocities(theta * np.array([[1.0], [0.0]]))
+    np.testing.assert_array_equal(alone[0], LuenbergerObserver(DT).velocities(theta)[0])
+    assert not alone[1].any()
+
+
+def test_a_ramp_ends_at_its_slope() -> None:
+    t = DT * np.arange(1000)
+    found = LuenbergerObserver(DT).velocities(np.stack([2.0 * t, -0.5 * t + 1.0]))
+    np.testing.assert_allclose(found[:, -1], [2.0, -0.5], rtol=1e-6)  # type 1: the filter has no error of position
+
+
+@pytest.mark.parametrize("poles", [(-1.0, -2, -3, -4, -5, 0.0), (-1.0,) * 7, (-1 + 1j, -1 - 2j, -3, -4, -5, -6)])
+def test_poles_on_the_axis_too_many_or_not_conjugate_are_refused(poles: tuple[complex, ...]) -> None:
+    with pytest.raises(ValueError, match=r"poles.*got \("):
         observer_gain(poles)

@@ -1,0 +1,213 @@
+"""Logs opened, and passes over them: what is refused, counted, hashed, kept, and told on the way."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from algid.errors import LogError
+from algid.identification.source import LogSource, Staged, open_source, open_sources, sha256_of, tell_twins
+from algid.identification.survey import Survey
+from algid.log import Log, Notice, Origin, Truth
+from algid.synth.cases import load_case
+from algid.writers import write_log
+
+ARM = load_case("case1").arm
+
+
+def moving(name: str = "log.csv", samples: int = 600, payload: float | None = None, **origin: object) -> Log:
+    """An arm that swings at 1 kHz, whose first stamp is not zero."""
+    t = np.arange(samples) * 1e-3
+    theta = np.stack([np.sin(9 * t) - 1.5, np.cos(7 * t)])
+    truth = None if payload is None else Truth(ARM, payload)
+    stamps = 5_000_000_000 + np.arange(samples) * 1_000_000
+    return Log(stamps, theta, 3 * np.cos(theta), Origin(name, "csv", {}, truth, **origin))  # type: ignore[arg-type]
+
+
+def in_blocks(log: Log, cuts: list[int], promised: int = 0) -> LogSource:
+    ends = [0, *cuts, len(log)]
+    blocks = [log.part(first, last) for first, last in pairwise(ends)]
+    return replace(open_source(log, "unloaded"), blocks=lambda: iter(blocks), promised=promised)
+
+
+@pytest.mark.parametrize(
+    ("payload", "role", "said"),
+    [
+        (0.2, "unloaded", "expected a log of the unloaded arm, its metadata say a payload of 0.2 kg; swap the logs"),
+        (0.0, "loaded", "expected a log of the loaded arm, its metadata say no payload; swap the logs"),
+    ],
+)
+def test_a_log_of_the_other_role_is_refused_and_one_of_its_own_is_not(payload: float, role: str, said: str) -> None:
+    log = moving(payload=payload)
+    with pytest.raises(LogError, match=f"^log.csv: {said}$"):
+        open_source(log, role)  # type: ignore[arg-type]
+    open_source(log, "loaded" if role == "unloaded" else "unloaded")
+    open_source(log, role, changing=True)  # type: ignore[arg-type]
+    open_source(moving(), role)  # type: ignore[arg-type]
+
+
+def test_a_log_whose_payload_changes_is_only_for_tracking() -> None:
+    truth = Truth(ARM, 0.0, None, ((1.0, 0.2),))
+    log = replace(moving(), origin=replace(moving().origin, truth=truth))
+    for role in ("unloaded", "loaded"):
+        with pytest.raises(
+            LogError, match=r"^log\.csv: its metadata say that the payload changes; weigh it with algid"
+        ):
+            open_source(log, role)
+    assert open_source(log, "loaded", changing=True).role == "loaded"
+
+
+def test_a_summary_holds_what_the_whole_log_showed() -> None:
+    source = in_blocks(moving(samples=601), [100, 100, 350])
+    survey = Survey([source])
+    summary = survey.summary(source)
+    assert (summary.path, summary.role, summary.format, summary.rows) == ("log.csv", "unloaded", "csv", 601)
+    assert summary.start_ns == 5_000_000_000
+    assert summary.duration == pytest.approx(0.6, rel=1e-12)
+    assert summary.rate == pytest.approx(1000, rel=1e-12)
+    seen = survey.seen(source)
+    assert (seen.rows, seen.first_ns, seen.last_ns) == (601, 5_000_000_000, 5_600_000_000)
+
+
+def test_a_log_of_one_sample_has_no_rate() -> None:
+    source = open_source(moving(samples=1), "unloaded")
+    summary = Survey([source]).summary(source)
+    assert (summary.rows, summary.duration, summary.rate) == (1, 0.0, 0.0)
+
+
+def test_hashes_are_those_of_the_bytes(tmp_path: Path) -> None:
+    log = moving()
+    write_log(tmp_path / "log.csv", log)
+    expected = hashlib.sha256((tmp_path / "log.csv").read_bytes()).hexdigest()
+    source = open_source(tmp_path / "log.csv", "unloaded")
+    assert Survey([source]).summary(source).sha256 == expected
+    part = open_source(Staged(tmp_path / "log.csv", "s3://bucket/log.csv", whole=False), "unloaded")
+    summary = Survey([part]).summary(part)
+    assert (summary.path, summary.sha256) == ("s3://bucket/log.csv", None)
+    whole = open_source(Staged(tmp_path / "log.csv", "s3://bucket/log.csv"), "unloaded")
+    assert Survey([whole]).summary(whole).sha256 == expected
+    arrays = b"".join(array.tobytes() for array in (log.stamp_ns, *log.theta, *log.tau))
+    memory = open_source(log, "unloaded")
+    assert Survey([memory]).summary(memory).sha256 == hashlib.sha256(arrays).hexdigest()
+
+
+def test_a_folders_hash_is_that_of_its_files_by_name(tmp_path: Path) -> None:
+    (tmp_path / "inner").mkdir()
+    (tmp_path / "inner" / "not.txt").write_text("no")
+    (tmp_path / "b.txt").write_bytes(b"second" * 300_000)  # more than is read at once
+    (tmp_path / "a.txt").write_bytes(b"first")
+    assert sha256_of(tmp_path) == hashlib.sha256(b"first" + b"second" * 300_000).hexdigest()
+
+
+def test_twins_count_once_and_others_of_their_length_stay() -> None:
+    one, other = moving("one.csv"), moving("other.csv", payload=0.0)
+    bent = replace(moving("bent.csv"), tau=one.tau + 1e-12)
+    third = moving("third.csv")
+    kept = open_sources([one, bent, other, third], "unloaded", None, 9.81)
+    assert [source.name for source in kept] == ["one.csv", "bent.csv"]
+    assert [notice.text for notice in kept[0].notices] == [
+        f"SAME_LOG: {name} is the same log, byte for byte, and counts once" for name in ("other.csv", "third.csv")
+    ]
+    assert kept[1].notices == ()
+    assert open_sources(None, "loaded", None, 9.81) == []
+    assert [source.name for source in open_sources(iter([one]), "unloaded", None, 1.6)] == ["one.csv"]
+    assert open_sources(one, "unloaded", None, 1.6)[0].gravity == 1.6
+
+
+def test_logs_of_lengths_of_their_own_are_not_hashed_before_the_first_pass() -> None:
+    def never() -> str:
+        raise AssertionError("hashed")
+
+    one, two = (replace(open_source(moving(samples=n), "unloaded"), digest=never) for n in (300, 301))
+    assert tell_twins([one], [two]) == [one, two]
+    with pytest.raises(AssertionError, match="hashed"):
+        tell_twins([one], [replace(two, promised=300)])
+
+
+def test_a_loaded_twin_of_an_unloaded_log_tells_so_and_stays() -> None:
+    bare = open_source(moving("bare.csv"), "unloaded")
+    loaded = [open_source(moving("twin.csv"), "loaded"), open_source(moving("own.csv", samples=601), "loaded")]
+    found = tell_twins([bare], loaded)
+    assert [source.name for source in found] == ["bare.csv", "twin.csv", "own.csv"]
+    assert [len(source.notices) for source in found] == [0, 1, 0]
+    assert found[1].notices[0].text.startswith("SAME_LOG: twin.csv is bare.csv, byte for byte")
+
+
+@pytest.mark.parametrize(("cuts", "alone"), [([], True), ([599], False), ([300], False)])
+def test_the_named_checks_refuse_a_log_only_where_they_see_all_of_it(cuts: list[int], alone: bool) -> None:
+    dead = replace(moving(), tau=np.zeros((2, 600)))
+    survey = Survey([in_blocks(dead, cuts)])
+    if alone:
+        with pytest.raises(LogError, match="EFFORT_ZERO"):
+            list(survey.segments(survey.logs[0]))
+    else:
+        assert sum(map(len, survey.segments(survey.logs[0]))) == 600
+        assert any("EFFORT_ZERO" in notice.text for notice in survey.seen(survey.logs[0]).notices)
+
+
+@pytest.mark.parametrize("promised", [0, 600, 601])
+def test_a_first_block_need_not_wait_where_the_file_promises_more_than_twice_of_it(promised: int) -> None:
+    """Of 600 promised samples one block of 300 may be all; of 601 it is not."""
+    log, begun = moving(), list[int]()
+
+    def blocks() -> Iterator[Log]:
+        for first in (0, 300):
+            begun.append(first)
+            yield log.part(first, first + 300)
+
+    source = replace(open_source(log, "unloaded"), blocks=blocks, promised=promised)
+    survey = Survey([source])
+    first = next(survey._counted(source))
+    assert len(first) == 300
+    assert begun == ([0] if promised == 601 else [0, 300])
+
+
+def test_notices_of_the_log_its_blocks_and_the_checks_come_once_however_often_it_is_gone_over() -> None:
+    log, told = moving(), Notice("CUT", "CUT: some", lossy=True)
+    source = in_blocks(replace(log, notices=(told,)), [300])
+    source = replace(source, notices=(Notice("SAME_LOG", "SAME_LOG: twin"),))
+    survey = Survey([source])
+    for _ in range(3):
+        assert sum(map(len, survey.segments(source))) == 600
+    codes = [notice.code for notice in survey.seen(source).notices]
+    assert codes[0] == "SAME_LOG"
+    assert codes.count("CUT") == 2  # `part` keeps a log's notices in both blocks
+    assert len(codes) == len([notice.code for notice in Survey([source]).seen(source).notices])
+
+
+def test_progress_goes_from_nothing_to_all_samples_and_names_the_stage() -> None:
+    told: list[tuple[str, int, int]] = []
+    one, other = in_blocks(moving(samples=600), [200], 600), in_blocks(moving("b.csv", samples=300), [], 300)
+    survey = Survey([one, other], lambda *what: told.append(what))
+    survey.begin("choosing terms")
+    for log in survey.logs:
+        list(survey.segments(log))
+    assert told == [
+        *(("reading", rows, 900) for rows in (0, 200, 600, 600, 900)),
+    ]
+    told.clear()
+    list(survey.segments(one))
+    assert {(stage, total) for stage, _, total in told} == {("choosing terms", 900)}
+    assert told[0][1] == 0
+    assert max(rows for _, rows, _ in told) == 600
+    told.clear()
+    survey.begin("series", [other])
+    list(survey.segments(other))
+    assert [told[0], told[-1]] == [("series", 0, 300), ("series", 300, 300)]
+
+
+def test_a_log_of_unknown_length_has_no_total_before_its_end() -> None:
+    told: list[tuple[str, int, int]] = []
+    source = in_blocks(moving(), [200], 0)
+    survey = Survey([source], lambda *what: told.append(what))
+    list(survey.segments(source))
+    assert told == [("reading", 0, 0), ("reading", 200, 0), ("reading", 600, 0)]
+    told.clear()
+    list(survey.segments(source))
+    assert told[-1] == ("fitting", 600, 600)

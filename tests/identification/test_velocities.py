@@ -1,0 +1,109 @@
+"""Where velocities come from: the log, the paper's observer, or the zero-phase differentiator, stretch by stretch."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from algid.arm import FloatArray
+from algid.errors import LogError
+from algid.identification.source import open_source
+from algid.identification.survey import Survey
+from algid.identification.velocities import with_velocities
+from algid.log import Log, Origin
+from algid.settings import Settings
+from algid.signals.filters import differentiator, half_length
+from algid.signals.observers import LuenbergerObserver
+from algid.signals.segments import Segment, append
+
+DT = 1e-3
+BANDWIDTH = 60.0
+REACH = half_length(DT, BANDWIDTH)
+
+
+def log_at(stamps: FloatArray, omega: FloatArray | None = None) -> Log:
+    """Angles that wander at random at `stamps` in whole periods."""
+    theta = np.cumsum(np.random.default_rng(0).normal(0, 1e-2, (2, stamps.size)), axis=1)
+    stamp_ns = (stamps * 1_000_000).astype(np.int64)
+    return Log(stamp_ns, theta, 5 * np.cos(theta), Origin("walk.csv", "csv", {}), omega)
+
+
+def observed(log: Log, rows: int, *, luenberger: bool = False, **settings: object) -> list[Segment]:
+    """The log, read in blocks of `rows` samples, with velocities: each stretch in one segment."""
+    blocks = [log.part(first, min(first + rows, len(log))) for first in range(0, len(log), rows)]
+    source = replace(open_source(log, "unloaded"), blocks=lambda: iter(blocks), promised=0)
+    whole: list[Segment] = []
+    wanted = replace(Settings(bandwidth=BANDWIDTH), **settings)  # type: ignore[arg-type]
+    for part in with_velocities(Survey([source]), source, wanted, luenberger=luenberger):
+        if part.continues:
+            whole[-1] = append(whole[-1], part)
+        else:
+            whole.append(part)
+    return whole
+
+
+def differentiated(theta: FloatArray) -> FloatArray:
+    """By NumPy's convolution, both ends turned about their last sample."""
+    extended = np.pad(theta, ((0, 0), (REACH, REACH)), mode="reflect", reflect_type="odd")
+    return np.stack([np.correlate(row, differentiator(DT, BANDWIDTH), "valid") for row in extended])
+
+
+TWO = np.concatenate([np.arange(6000.0), np.arange(6100.0, 6900.0)])
+
+
+@pytest.mark.parametrize("rows", [6800, 700, 97])
+def test_the_differentiator_does_not_see_blocks_and_starts_anew_behind_a_gap(rows: int) -> None:
+    log = log_at(TWO)
+    first, second = observed(log, rows)
+    for found, own in ((first, slice(0, 6000)), (second, slice(6000, None))):
+        assert found.omega is not None
+        np.testing.assert_array_equal(found.theta, log.theta[:, own])
+        np.testing.assert_allclose(found.omega, differentiated(log.theta[:, own]), atol=1e-9)
+    assert second.start == pytest.approx(6.1, abs=1e-9)
+
+
+@pytest.mark.parametrize("length", [4, 30, REACH, REACH + 1, REACH + 2, 2 * REACH + 1])
+def test_a_stretch_shorter_than_the_kernel_has_numpys_gradient_and_a_longer_one_the_kernels(length: int) -> None:
+    log = log_at(np.concatenate([np.arange(500.0), 600 + np.arange(float(length))]))
+    _, second = observed(log, 10_000)
+    theta = log.theta[:, 500:]
+    short = length <= REACH
+    assert second.omega is not None
+    np.testing.assert_allclose(
+        second.omega, np.gradient(theta, DT, axis=1) if short else differentiated(theta), atol=1e-9
+    )
+
+
+def test_the_papers_observer_starts_at_rest_behind_a_gap() -> None:
+    log = log_at(TWO)
+    first, second = observed(log, 700, luenberger=True)
+    for found, own in ((first, slice(0, 6000)), (second, slice(6000, None))):
+        assert found.omega is not None
+        expected = LuenbergerObserver(DT).velocities(log.theta[:, own])
+        np.testing.assert_allclose(found.omega, expected, rtol=1e-9, atol=1e-6)
+
+
+def test_poles_that_are_set_are_the_observers() -> None:
+    poles = (-20.0, -30.0, -40.0, -25.0, -35.0, -45.0)
+    (found,) = observed(log_at(np.arange(300.0)), 300, luenberger=True, poles=poles)
+    assert found.omega is not None
+    np.testing.assert_allclose(found.omega, LuenbergerObserver(DT, poles).velocities(found.theta), atol=1e-9)
+
+
+def test_measured_velocities_are_the_logs_whatever_the_observer() -> None:
+    omega = np.random.default_rng(1).normal(size=(2, 300))
+    for luenberger in (False, True):
+        (found,) = observed(log_at(np.arange(300.0), omega), 300, luenberger=luenberger, velocity="measured")
+        assert found.omega is not None
+        np.testing.assert_array_equal(found.omega, omega)
+
+
+def test_a_log_without_velocities_is_refused_in_one_line_that_says_what_to_do() -> None:
+    with pytest.raises(
+        LogError,
+        match=r"^walk\.csv: expected velocities omega1, omega2 for --velocity measured, found none; "
+        r"leave the flag out to observe them$",
+    ):
+        observed(log_at(np.arange(300.0)), 300, velocity="measured")

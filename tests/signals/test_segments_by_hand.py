@@ -1,0 +1,215 @@
+"""Segments of stamps small enough to check by eye: where a log is cut, what is dropped, what is put in between."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.interpolate import BarycentricInterpolator
+
+from algid.log import Log, Origin
+from algid.signals.segments import PERIOD_SAMPLES, Segment, append, pieces, segments
+
+MS = 1_000_000  # ns
+
+
+def log_at(ms: list[float], *, omega: bool = False) -> Log:
+    """Samples at `ms`; each signal is its own straight line through time."""
+    stamp_ns = np.array([round(one * MS) for one in ms], dtype=np.int64)
+    t = stamp_ns * 1e-9
+    signals = [np.stack([a * t + b, b * t - a]) for a, b in ((2.0, 1.0), (-3.0, 0.5), (0.25, 4.0))]
+    return Log(stamp_ns, signals[0], signals[1], Origin("log", "test", {}), signals[2] if omega else None)
+
+
+def found(log: Log | list[float], *, omega: bool = False) -> list[Segment]:
+    """The stretches, each joined to one segment."""
+    whole: list[Segment] = []
+    for part in segments([log if isinstance(log, Log) else log_at(log, omega=omega)]):
+        if part.continues:
+            whole[-1] = append(whole[-1], part)
+        else:
+            whole.append(part)
+    return whole
+
+
+def test_a_log_without_samples_has_no_segments() -> None:
+    empty = log_at([0, 1, 2, 3]).part(0, 0)
+    assert list(segments([])) == []
+    assert list(segments([empty, empty])) == []
+
+
+def test_empty_blocks_between_others_do_not_show() -> None:
+    log = log_at([*range(40)])
+    blocks = [log.part(0, 0), log.part(0, 11), log.part(11, 11), log.part(11, 40), log.part(40, 40)]
+    np.testing.assert_array_equal(np.concatenate([one.theta for one in segments(blocks)], axis=1), log.theta)
+
+
+@pytest.mark.parametrize(("gap", "starts"), [(5.0, [0.0]), (5.1, [0.0, 0.0141])])
+def test_a_log_is_cut_where_more_than_five_periods_lack_samples(gap: float, starts: list[float]) -> None:
+    stretches = found([*range(10), *(9 + gap + n for n in range(12))])
+    assert [one.start for one in stretches] == pytest.approx(starts, abs=1e-12)
+    assert [one.dt for one in stretches] == pytest.approx([1e-3] * len(starts), rel=1e-12)
+
+
+def test_both_sides_of_a_gap_hold_their_own_samples_and_nothing_between() -> None:
+    first, second = found([*range(10), *range(30, 45)], omega=True)
+    log = log_at([*range(10), *range(30, 45)], omega=True)
+    for name in ("theta", "tau", "omega"):
+        np.testing.assert_array_equal(getattr(first, name), getattr(log, name)[:, :10])
+        np.testing.assert_array_equal(getattr(second, name), getattr(log, name)[:, 10:])
+    assert [first.start, second.start] == pytest.approx([0.0, 0.030], abs=1e-12)
+    assert not first.continues
+    assert not second.continues
+
+
+def test_fewer_than_four_samples_between_gaps_are_left_out() -> None:
+    stretches = found([*range(200), 240, 241, 242, *range(300, 400), 450, 451, 452, 453])
+    assert [one.start for one in stretches] == pytest.approx([0.0, 0.300, 0.450], abs=1e-12)
+    assert [len(one) for one in stretches] == [200, 100, 4]
+
+
+def test_times_are_counted_from_the_logs_first_sample() -> None:
+    (whole,) = found([1_000_000 + n for n in range(20)])
+    assert whole.start == 0.0
+    np.testing.assert_allclose(whole.t, np.arange(20) * 1e-3, atol=1e-15)
+
+
+@pytest.mark.parametrize(("off", "taken"), [(0.0009, True), (0.0011, False)])
+def test_a_stamp_within_a_thousandth_of_a_period_lies_on_the_grid(off: float, taken: bool) -> None:
+    ms = [float(n) for n in range(30)]
+    ms[17] += off
+    log = log_at(ms)
+    bent = replace(log, theta=log.theta**3 + np.arange(30) ** 2)  # no line: what is put in between differs
+    (whole,) = found(bent)
+    assert np.array_equal(whole.theta[:, 17], bent.theta[:, 17]) is taken
+
+
+def test_missing_samples_are_those_of_the_cubic_through_four_neighbours() -> None:
+    """Samples 12 and 13 are lost; SciPy's polynomial through 10, 11, 14 and 15."""
+    rng = np.random.default_rng(0)
+    kept = [n for n in range(30) if n not in (12, 13)]
+    log = replace(log_at([*map(float, kept)]), theta=rng.standard_normal((2, 28)), tau=rng.standard_normal((2, 28)))
+    values = np.concatenate([one.theta for one in segments([log])], axis=1)
+    assert values.shape == (2, 30)
+    nodes = [kept.index(n) for n in (10, 11, 14, 15)]
+    cubic = BarycentricInterpolator(np.array([10.0, 11.0, 14.0, 15.0]), log.theta[:, nodes].T)
+    np.testing.assert_allclose(values[:, 12:14], cubic(np.array([12.0, 13.0])).T, atol=1e-9)  # rounding of stamps
+    np.testing.assert_allclose(values[:, :12], log.theta[:, :12], atol=1e-9)
+
+
+def test_the_ends_of_a_stretch_use_the_four_samples_there() -> None:
+    rng = np.random.default_rng(1)
+    ms = [0.0, *(n + 0.2 for n in range(1, 11)), 11.0]
+    log = replace(log_at(ms), theta=rng.standard_normal((2, 12)))
+    (whole,) = found(log)
+    t = np.array(ms)
+    assert whole.dt == pytest.approx(1e-3, rel=1e-9)
+    for at, nodes in ((1, slice(0, 4)), (10, slice(8, 12))):
+        cubic = BarycentricInterpolator(t[nodes], log.theta[:, nodes].T)
+        np.testing.assert_allclose(whole.theta[:, at], cubic(float(at)), atol=1e-9)
+
+
+def test_the_period_is_the_mean_of_the_steps_near_the_usual_one() -> None:
+    """Stamps in whole tenths of a millisecond, 1.0 and 1.1 by turns; a gap of 4 ms counts for nothing."""
+    steps = [1.0, 1.1] * 50 + [4.0] + [1.0, 1.1] * 50
+    (whole,) = found(np.concatenate([[0.0], np.cumsum(steps)]).tolist())
+    assert whole.dt == pytest.approx(1.05e-3, rel=1e-9)
+
+
+def test_the_period_is_told_by_the_first_samples() -> None:
+    steps = np.concatenate([np.full(PERIOD_SAMPLES - 1, 1.0), np.full(3000, 1.002)])
+    parts = list(segments([log_at(np.concatenate([[0.0], np.cumsum(steps)]).tolist())]))
+    assert [part.dt for part in parts] == pytest.approx([1e-3] * len(parts), rel=1e-12)
+
+
+def test_velocities_come_along_or_stay_away() -> None:
+    ms = [n + 0.2 * (n % 3 == 1) for n in range(20)]
+    log = log_at(ms, omega=True)
+    for part in segments([log]):
+        assert part.omega is not None
+        line = np.stack([0.25 * part.t + 4.0, 4.0 * part.t - 0.25])  # the cubic through a line is the line
+        np.testing.assert_allclose(part.omega, line, atol=1e-9)
+    assert all(part.omega is None for part in segments([replace(log, omega=None)]))
+
+
+def numbered(length: int, *, start: float = 2.0, continues: bool = False, omega: bool = True) -> Segment:
+    values = np.stack([np.arange(length), -np.arange(length)]).astype(np.float64)
+    return Segment(start, 0.5, values, 10 * values, 100 * values if omega else None, continues)
+
+
+def test_a_part_is_a_view_that_knows_its_time_and_what_it_continues() -> None:
+    whole = numbered(8)
+    begin, rest = whole.part(0, 3), whole.part(3, 8)
+    assert (begin.start, begin.continues, len(begin)) == (2.0, False, 3)
+    assert (rest.start, rest.continues, len(rest)) == (3.5, True, 5)
+    assert rest.t.tolist() == [3.5, 4.0, 4.5, 5.0, 5.5]
+    assert rest.omega is not None
+    assert rest.omega[1].tolist() == [-300.0, -400.0, -500.0, -600.0, -700.0]
+    assert np.shares_memory(rest.tau, whole.tau)
+    assert numbered(8, continues=True).part(0, 2).continues
+
+
+def test_two_segments_are_one_after_the_other_and_lose_velocities_that_one_lacks() -> None:
+    one, other = numbered(3), numbered(2, start=3.5, continues=True)
+    both = append(one, other)
+    assert (both.start, both.dt, both.continues) == (2.0, 0.5, False)
+    assert both.theta[0].tolist() == [0, 1, 2, 0, 1]
+    assert both.tau[1].tolist() == [0, -10, -20, 0, -10]
+    assert both.omega is not None
+    assert both.omega[0].tolist() == [0, 100, 200, 0, 100]
+    assert append(one, numbered(2, omega=False)).omega is None
+    assert append(numbered(2, omega=False), one).omega is None
+
+
+def stretches(lengths: list[list[int]]) -> Iterator[Segment]:
+    """Stretches given as the lengths of the segments they come in; a sample's value is its number in all."""
+    number = 0
+    for place, parts in enumerate(lengths):
+        for order, length in enumerate(parts):
+            values = np.tile(np.arange(number, number + length, dtype=np.float64), (2, 1))
+            yield Segment(100.0 * place + 0.1 * number, 0.1, values, values, None, order > 0)
+            number += length
+
+
+@pytest.mark.parametrize(
+    ("lengths", "expected"),
+    [
+        ([[4]], [[4]]),
+        ([[10]], [[10]]),
+        ([[14]], [[14]]),  # a rest below half a piece joins the last one
+        ([[15]], [[10, 5]]),
+        ([[25]], [[10, 10, 5]]),
+        ([[24]], [[10, 14]]),
+        ([[7, 7, 7, 7]], [[10, 10, 8]]),
+        ([[30, 3]], [[10, 10, 13]]),
+        ([[12], [3], [9, 9]], [[12], [3], [10, 8]]),
+    ],
+)
+def test_pieces_have_the_lengths_that_they_promise(lengths: list[list[int]], expected: list[list[int]]) -> None:
+    cut: list[list[int]] = []
+    for piece in pieces(stretches(lengths), 10):
+        if piece.continues:
+            cut[-1].append(len(piece))
+        else:
+            cut.append([len(piece)])
+    assert cut == expected
+
+
+@given(parts=st.lists(st.lists(st.integers(1, 35), min_size=1, max_size=5), min_size=1, max_size=4))
+def test_pieces_do_not_depend_on_how_a_stretch_came_in(parts: list[list[int]]) -> None:
+    one, other = (list(pieces(stretches(kind), 10)) for kind in (parts, [[sum(lengths)] for lengths in parts]))
+    assert [len(piece) for piece in one] == [len(piece) for piece in other]
+    for mine, whole in zip(one, other, strict=True):
+        np.testing.assert_array_equal(mine.theta, whole.theta)
+        assert mine.continues == whole.continues
+        assert mine.start == pytest.approx(whole.start, abs=1e-9)
+
+
+def test_pieces_of_one_segment_are_views_of_it() -> None:
+    whole = numbered(95)
+    for piece in pieces([whole], 10):
+        assert np.shares_memory(piece.theta, whole.theta)
