@@ -21,7 +21,7 @@ def test_every_setting_is_an_option_with_its_default_and_help() -> None:
             assert options[field.name].opts == [flag(field.name)]
             assert options[field.name].help == field.metadata["help"]
         defaults = {field.name: options[field.name].default for field in fields(Settings)}
-        assert Choice(defaults, None, {}).settings() == Settings()
+        assert Choice(defaults, {}).settings() == Settings()
 
 
 @pytest.mark.parametrize(
@@ -44,7 +44,7 @@ def test_text_of_an_option_that_means_nothing_names_the_option() -> None:
     defaults = {field.name: field.default for field in fields(Settings)}
     for name, text in (("delay", "soon"), ("poles", "1,2,3"), ("poles", "a,b")):
         with pytest.raises(SettingError, match=f"^{flag(name)}"):
-            Choice(defaults | {"delay": "0", name: text}, None, {}).settings()
+            Choice(defaults | {"delay": "0", name: text}, {}).settings()
 
 
 def test_short_forms_and_lists_name_the_same_terms() -> None:

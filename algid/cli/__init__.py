@@ -19,8 +19,12 @@ def main() -> None:
     from algid.cli.streams import harden_streams
     from algid.runtime import bound_by_environment
 
+    def stop(number: int, _frame: FrameType | None) -> None:
+        """Leave by an exception, so that what is half-written is taken away."""
+        raise _StoppedError(128 + number)
+
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _stop)
+        signal.signal(number, stop)
     harden_streams()
     bound_by_environment()  # before anything loads numpy
     from algid.cli.app import called
@@ -29,7 +33,9 @@ def main() -> None:
     try:
         called(sys.argv[1:])()
     except AlgidError as error:
-        print(f"algid: {_one_line(error)}", file=sys.stderr)
+        # control characters from foreign names are made visible: they would break the line
+        line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in str(error))
+        print(f"algid: {line}", file=sys.stderr)
         sys.exit(EXIT_USAGE)
     except _StoppedError:
         print("algid: stopped; nothing half-written is left", file=sys.stderr)
@@ -38,13 +44,3 @@ def main() -> None:
 
 class _StoppedError(SystemExit):
     """A signal ends algid. typer hands it on, where it would make a `KeyboardInterrupt` an exit without a word."""
-
-
-def _stop(number: int, _frame: FrameType | None) -> None:
-    """Leave by an exception, so that what is half-written is taken away."""
-    raise _StoppedError(128 + number)
-
-
-def _one_line(error: Exception) -> str:
-    """The message on one line, with control characters from foreign names made visible."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in str(error))

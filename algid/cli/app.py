@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from algid import __version__
+from algid.errors import SettingError
 
 COMMANDS: dict[str, Callable[[], Callable[..., Any]]] = {
     "inspect": lambda: import_module("algid.cli.inspect").inspect,
@@ -28,6 +31,24 @@ COMMANDS: dict[str, Callable[[], Callable[..., Any]]] = {
     "guide": lambda: import_module("algid.cli.guide").guide,
 }
 """What loads each command, in the order of `algid --help`."""
+
+
+class FiniteCommand(TyperCommand):
+    """A command whose numbers are finite: no flag of any has a meaning for nan or inf."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run it.
+
+        Raises
+        ------
+        SettingError
+            If a number is not finite.
+        """
+        for option in self.params:
+            value = ctx.params.get(option.name or "")
+            if isinstance(value, float) and not math.isfinite(value):
+                raise SettingError(f"{option.opts[0]}: expected a finite number, found {value:g}")
+        return super().invoke(ctx)
 
 
 def _print_version(wanted: bool) -> None:
@@ -59,20 +80,12 @@ def gathered(names: Iterable[str], *, listed: bool = False) -> typer.Typer:
     wanted = list(names)
     for name in wanted:
         command = COMMANDS[name]()
-        made.command(name)(_without_options(command) if listed else command)
+        made.command(name, cls=FiniteCommand, help=command.__doc__)((lambda: None) if listed else command)
     if len(wanted) != 1:
         profiles = typer.Typer(help="Profiles tell what a log's names, units and signs mean.", no_args_is_help=True)
         profiles.command("new")(import_module("algid.cli.profile").new)
         made.add_typer(profiles, name="profile")
     return made
-
-
-def _without_options(command: Callable[..., Any]) -> Callable[[], None]:
-    def named() -> None:
-        pass
-
-    named.__doc__ = command.__doc__
-    return named
 
 
 def called(arguments: Sequence[str]) -> typer.Typer:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,9 +17,7 @@ from algid.cli.settings import Choice, takes_settings
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from algid.batch.jobs import Job
     from algid.batch.run import Batch, Ended, Progress
-    from algid.profile import Profile
 
 EXIT_STOPPED = 130
 
@@ -54,6 +53,7 @@ def batch(
 
     Example: algid batch logs/ -o results --workers 2
     """
+    from algid.batch.jobs import jobs_of
     from algid.batch.lock import locked
     from algid.batch.run import Batch, Recipe, stopped_by_signals, sweep
     from algid.errors import SettingError
@@ -64,10 +64,13 @@ def batch(
     if scheduler is not None and (workers is not None or memory_limit is not None):
         raise SettingError("--scheduler: workers and their memory are the cluster's; set them where it is started")
     known = None if parameters is None else read_result(parameters)
-    recipe = Recipe(out, choice.settings(), _profiles(choice), known, report)
+    profile = cache(lambda file: choice.profile(None if file is None else Path(file)))  # each file is read once
+    recipe = Recipe(out, choice.settings(), profile, known, report)
     recipe.profile(None)
     alone = "logs" if known is None else "loaded"
-    jobs = [] if watch else _jobs(sources, out, alone)
+    jobs = [] if watch else jobs_of(sources, out, alone)
+    if not (jobs or watch):
+        raise SettingError(f"{' '.join(sources)}: expected logs in MCAP, Parquet or CSV, found none")
     store = open_store(out)
     with locked(out):
         sweep(store)
@@ -80,23 +83,6 @@ def batch(
                 ended = _watch(running, sources, out, alone, retry_failed) if watch else running.run(jobs, retry_failed)
         sweep(store)
     _conclude(ended, running.stop.is_set() and not watch, out, quiet)
-
-
-def _jobs(sources: list[str], out: str, alone: str) -> list[Job]:
-    from algid.batch.jobs import jobs_of
-    from algid.errors import SettingError
-
-    jobs = jobs_of(sources, out, alone)
-    if not jobs:
-        raise SettingError(f"{' '.join(sources)}: expected logs in MCAP, Parquet or CSV, found none")
-    return jobs
-
-
-def _profiles(choice: Choice) -> Callable[[str | None], Profile | None]:
-    """Profiles by their file, each read once."""
-    from functools import lru_cache
-
-    return lru_cache(maxsize=None)(lambda file: choice.profile(None if file is None else Path(file)))
 
 
 @contextmanager

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from algid.cli.report import ResultFormat
 from algid.errors import SettingError
-
-if TYPE_CHECKING:
-    from algid.report.document import Table
 
 
 def compare(
@@ -23,9 +20,12 @@ def compare(
 
     Example: algid compare monday.algid friday.algid -o friday
     """
+    from rich.console import Console
+
     from algid.report.comparison import compare as compared
     from algid.report.comparison import comparison_json
     from algid.report.markdown import markdown_table
+    from algid.report.terminal import print_table
     from algid.results import read_result
 
     if len(results) < 2:
@@ -33,7 +33,10 @@ def compare(
     read = [read_result(path) for path in results]
     found = compared(read, labels(results))
     if form is ResultFormat.TABLE:
-        _print((found.estimates, found.settings))
+        console = Console()
+        for table in (found.estimates, found.settings):
+            print_table(table, console)
+            console.print()
     elif form is ResultFormat.MARKDOWN:
         typer.echo("\n".join(markdown_table(table) for table in (found.estimates, found.settings)), nl=False)
     else:
@@ -53,14 +56,3 @@ def labels(paths: list[Path]) -> list[str]:
         if len(set(names)) == len(names):
             return names
     return [str(folder) for folder in folders]  # one of them is named twice
-
-
-def _print(tables: tuple[Table, ...]) -> None:
-    from rich.console import Console
-
-    from algid.report.terminal import print_table
-
-    console = Console()
-    for table in tables:
-        print_table(table, console)
-        console.print()

@@ -25,6 +25,20 @@ def listed(known: Callable[[], list[str]]) -> Completion:
     return complete
 
 
+def refusing_checks() -> list[str]:
+    """Codes of the checks that refuse a log."""
+    from algid.inspection.findings import REFUSED
+
+    return list(REFUSED)
+
+
+def terms() -> list[str]:
+    """What ``--model`` may hold."""
+    from algid.model import TERMS
+
+    return ["auto", "plain", *TERMS, "delay"]
+
+
 def of_profile(setting: str, channel: str | None = None) -> Completion:
     """Completes what a setting of a profile, or of one of its channels, may be."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -37,22 +37,21 @@ def convert(
         raise OutputError(f"{target}: expected a name that ends in .mcap, .parquet or .csv")
     if target.exists() and not force:
         raise OutputError(f"{target}: exists already; overwrite it with --force")
-    chosen = choice.profile()
-    reader = open_log(source, chosen)
+    reader = open_log(source, choice.profile())
     notices: list[Notice] = []
+
+    def noted(told: Told | None) -> Iterator[Log]:
+        """The blocks; keeps their notices, and tells how far the writing has come."""
+        done = 0
+        for block in reader.blocks():
+            notices.extend(block.notices)
+            yield block
+            done += len(block)
+            if told is not None:
+                told("writing", done, reader.rows)
+
     with progress("samples") as told:
-        write_log(target, _noted(reader.blocks(), notices, reader.rows, told), truth=reader.origin.truth)
+        write_log(target, noted(told), truth=reader.origin.truth)
     for notice in notices:
         typer.echo(f"{notice.code}: {notice.text}", err=True)
     raise typer.Exit(3 if any(notice.lossy for notice in notices) else 0)
-
-
-def _noted(blocks: Iterable[Log], notices: list[Notice], rows: int, told: Told | None) -> Iterator[Log]:
-    """The blocks; keeps their notices, and tells how far the writing of `rows` samples has come."""
-    done = 0
-    for block in blocks:
-        notices += block.notices
-        yield block
-        done += len(block)
-        if told is not None:
-            told("writing", done, rows)

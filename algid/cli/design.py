@@ -11,9 +11,10 @@ import typer
 
 from algid.cli import EXIT_INCOMPLETE
 from algid.cli.completion import cases
+from algid.cli.settings import two_names
 
 if TYPE_CHECKING:
-    from algid.design.campaign import Campaign, Design
+    from algid.design.campaign import Campaign
     from algid.design.prior import BelievedArm
     from algid.design.request import Request
     from algid.estimators.whitening import NoiseLevels
@@ -92,12 +93,16 @@ def design(
     """
     import shlex
 
+    from rich.console import Console
+
     from algid.design.campaign import plan
     from algid.design.prior import KnownBefore, prior_of
     from algid.design.request import request
-    from algid.design.write import Provenance, write_design
+    from algid.design.tables import bound_table, limit_table, sentence
+    from algid.design.write import Provenance, design_json, write_design
     from algid.files import refuse_existing, whole_folder
     from algid.report.progress import progress
+    from algid.report.terminal import print_table
     from algid.runtime import one_blas_thread
 
     asked = request(
@@ -113,20 +118,35 @@ def design(
             "runs": runs,
         },
     )
-    names = _joints(joints)
+    names = two_names("joints", joints)
     folder = out / f"{Path(prior).stem or 'arm'}.design"
     refuse_existing(folder, force)
-    known = prior_of(prior, _loaded(asked), KnownBefore(l1, l2, payload, prior_error))
+    wished = asked.get("runs", None)
+    known = prior_of(prior, None if wished is None else wished[1] > 0, KnownBefore(l1, l2, payload, prior_error))
     noise = _noise(known, position_noise, torque_noise, noise_from)
-    campaign = _campaign(known, asked, noise, wanted, drive.value, margin, seed)
+    campaign = _campaign(known, asked, noise, wanted, drive, margin, seed)
     with one_blas_thread(), progress("steps", quiet) as told:
         planned = plan(campaign, told)
-    warnings = [*known.warnings, *_warnings(planned)]
+    warnings = [*known.warnings]
+    if planned.interrupted:
+        warnings.append("the search was broken off: this is the best motion until then")
+    if planned.open_parameters:
+        open_ones = ", ".join(planned.open_parameters)
+        warnings.append(
+            f"no motion within the limits tells {open_ones}: widen --range, --speed or --torque, or add runs"
+        )
     origin = Provenance(prior, shlex.join(["algid", *sys.argv[1:]]), names, warnings)
     with whole_folder(folder, force) as temporary:
         write_design(planned, temporary, origin)
     if not quiet:
-        _print(planned, origin, form)
+        if form is Shown.JSON:
+            print(design_json(planned, origin), end="")
+        else:
+            print(sentence(planned))
+            console = Console()
+            for table in (bound_table(planned), limit_table(planned)):
+                console.print()
+                print_table(table, console)
         for warning in warnings:
             typer.echo(f"warning: {warning}", err=True)
         typer.echo(f"wrote {folder}", err=True)
@@ -134,26 +154,12 @@ def design(
         raise typer.Exit(EXIT_INCOMPLETE)
 
 
-def _joints(text: str) -> tuple[str, str]:
-    from algid.errors import SettingError
-
-    names = [name.strip() for name in text.split(",")]
-    if len(names) != 2 or not all(names):
-        raise SettingError(f"--joints: expected two names like shoulder,elbow, found {text!r}")
-    return names[0], names[1]
-
-
-def _loaded(asked: Request) -> bool | None:
-    runs = asked.get("runs", None)
-    return None if runs is None else runs[1] > 0
-
-
 def _campaign(
     prior: BelievedArm,
     asked: Request,
     noise: NoiseLevels,
     wanted: str | None,
-    drive: str,
+    drive: Drive,
     margin: float,
     seed: int,
 ) -> Campaign:
@@ -171,7 +177,7 @@ def _campaign(
         limits=limits_of(asked, prior.lengths),
         asked=asked_for(prior.belief, names, prior.source),
         duration=asked.get("duration", DURATION),
-        drive="torque" if drive == "torque" else "position",
+        drive="torque" if drive is Drive.TORQUE else "position",
         margin=margin,
         seed=seed,
     )
@@ -191,42 +197,14 @@ def _noise(prior: BelievedArm, position: float | None, torque: float | None, log
 
         found = read_log(log)
         measured = first_guess(found.theta, found.tau)
-    given = NoiseLevels(np.full(2, position or np.nan), np.full(2, torque or np.nan))
-    if measured is None:
-        measured = NoiseLevels(np.full(2, np.nan), np.full(2, np.nan))
-    theta = given.theta if position is not None else measured.theta
-    tau = given.tau if torque is not None else measured.tau
-    for flag, values in (("--position-noise", theta), ("--torque-noise", tau)):
-        if not np.all(values > 0):
+    told = {}
+    for flag, given, name in (("--position-noise", position, "theta"), ("--torque-noise", torque, "tau")):
+        if given is not None:
+            told[name] = np.full(2, given)
+        elif measured is not None and np.all(getattr(measured, name) > 0):
+            told[name] = getattr(measured, name)
+        else:
             raise SettingError(
                 f"{flag}: {prior.source} does not tell how noisy the sensors are; give it, or --noise-from LOG"
             )
-    return NoiseLevels(theta, tau)
-
-
-def _warnings(planned: Design) -> list[str]:
-    found = []
-    if planned.interrupted:
-        found.append("the search was broken off: this is the best motion until then")
-    if planned.open_parameters:
-        names = ", ".join(planned.open_parameters)
-        found.append(f"no motion within the limits tells {names}: widen --range, --speed or --torque, or add runs")
-    return found
-
-
-def _print(planned: Design, origin: object, form: Shown) -> None:
-    from rich.console import Console
-
-    from algid.design.tables import bound_table, limit_table, sentence
-    from algid.design.write import Provenance, design_json
-    from algid.report.terminal import print_table
-
-    assert isinstance(origin, Provenance)
-    if form is Shown.JSON:
-        print(design_json(planned, origin), end="")
-        return
-    console = Console()
-    print(sentence(planned))
-    for table in (bound_table(planned), limit_table(planned)):
-        console.print()
-        print_table(table, console)
+    return NoiseLevels(**told)

@@ -52,7 +52,11 @@ def guide(
 
     Example: algid guide start
     """
-    text = _contents() if topic is None else text_of(topic)
+    if topic is None:
+        rows = "".join(f"| `algid guide {name}` | {words} |\n" for name, words in SUMMARIES.items())
+        text = f"# The guide\n\n| | |\n|---|---|\n{rows}"
+    else:
+        text = text_of(topic)
     if not sys.stdout.isatty():
         print(text, end="")
         return
@@ -65,8 +69,3 @@ def guide(
 def text_of(topic: str) -> str:
     """A topic's Markdown."""
     return (resources.files("algid") / "guide" / f"{topic}.md").read_text(encoding="utf-8")
-
-
-def _contents() -> str:
-    rows = "".join(f"| `algid guide {name}` | {words} |\n" for name, words in SUMMARIES.items())
-    return f"# The guide\n\n| | |\n|---|---|\n{rows}"

@@ -72,6 +72,8 @@ def identify(
 
     if export is not None and not report:
         raise SettingError("--export: the log is made from the time series; leave --no-report out")
+    if name == "":
+        raise SettingError("--name: expected a name for the result folder, found ''; leave it out for the log's own")
     keep_freed()
     settings = choice.settings()
     bare, burdened = (logs, loaded or []) if parameters is None else ([], [*logs, *(loaded or [])])

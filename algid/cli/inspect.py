@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
     from algid.inspection.report import Inspection
 
+MOST_SHOWN = 100
+"""Entries of a log that are listed."""
+
 
 @takes_profile
 def inspect(
@@ -35,34 +38,49 @@ def inspect(
 
     from algid.inspection.report import inspect_log
 
-    chosen = choice.profile()
-    found = inspect_log(log, chosen)
+    found = inspect_log(log, choice.profile())
     if output == "json":
         typer.echo(json.dumps(found.as_dict(), indent=2))
     else:
-        _print(found, Console(highlight=False))
+        console = Console(highlight=False)
+        _print_content(found, console)
+        _print_worth(found, console)
     raise typer.Exit(2 if found.refused else 3 if found.lossy else 0)
 
 
-def _print(found: Inspection, console: Console) -> None:
+def _print_content(found: Inspection, console: Console) -> None:
+    """What the log holds, and which of it would be used."""
     from rich.markup import escape
 
     console.print(f"{escape(plain(found.path))}: {found.format}{', synthetic' if found.synthetic else ''}")
-    _table(console, "channels", ("name", "type", "samples"), _entries(found))
-    for entry in found.entries[:100]:
+    shown = found.entries[:MOST_SHOWN]
+    rows = [(one.name[:80], one.type[:60], "" if one.count is None else str(one.count)) for one in shown]
+    if len(found.entries) > len(shown):
+        rows.append((f"and {len(found.entries) - len(shown)} more", "", ""))
+    _table(console, "channels", ("name", "type", "samples"), rows)
+    for entry in shown:
         if entry.joints or entry.fields:
             joints = f"joints {', '.join(entry.joints)}; " if entry.joints else ""
             fields = ", ".join(entry.fields[:12]) + (" …" if len(entry.fields) > 12 else "")
             console.print(escape(plain(f"{entry.name}: {joints}fields {fields or 'without a number'}")))
-    mapping = [(name, plain(source)) for name, source in sorted((found.mapping or {}).items())]
-    _table(console, "taken as", ("algid", "log"), mapping)
+    _table(console, "taken as", ("algid", "log"), sorted((found.mapping or {}).items()))
+
+
+def _print_worth(found: Inspection, console: Console) -> None:
+    """What the log is worth: figures of clock, signals and dynamics, then what was found wrong."""
+    from rich.markup import escape
+
     if found.clock is not None:
         clock = found.clock
         console.print(
             f"{counted(clock.rows, 'sample')}, {clock.duration:.6g} s at {clock.rate:.6g} Hz, "
             f"jitter {clock.jitter * 1e3:.3g} ms, {counted(clock.gaps, 'gap')}, the longest {clock.longest_gap:.3g} s"
         )
-    _table(console, "signals", ("channel", "low", "high", "noise", "step", "saturated %"), _signals(found))
+    signals = [
+        (name, *(f"{value:.4g}" for value in (one.low, one.high, one.noise, one.step, 100 * one.saturated)))
+        for name, one in (found.signals or {}).items()
+    ]
+    _table(console, "signals", ("channel", "low", "high", "noise", "step", "saturated %"), signals)
     if found.dynamics is not None:
         rough = found.dynamics
         console.print(
@@ -84,29 +102,12 @@ def plain(text: str) -> str:
     return "".join(letter if letter.isprintable() else "\ufffd" for letter in text)
 
 
-def _entries(found: Inspection) -> list[tuple[str, ...]]:
-    shown = [
-        (plain(one.name[:80]), plain(one.type[:60]), "" if one.count is None else str(one.count))
-        for one in found.entries[:100]
-    ]
-    more = len(found.entries) - len(shown)
-    return [*shown, (f"and {more} more", "", "")] if more else list(shown)
-
-
-def _signals(found: Inspection) -> list[tuple[str, ...]]:
-    return [
-        (name, *(f"{value:.4g}" for value in (one.low, one.high, one.noise, one.step, 100 * one.saturated)))
-        for name, one in (found.signals or {}).items()
-    ]
-
-
 def _table(console: Console, title: str, header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    if not rows:
-        return
-    table = Table(*header, title=title, title_justify="left")
-    for row in rows:
-        table.add_row(*map(escape, row))
-    console.print(table)
+    if rows:
+        table = Table(*header, title=title, title_justify="left")
+        for row in rows:
+            table.add_row(*(escape(plain(cell)) for cell in row))
+        console.print(table)

@@ -1,18 +1,30 @@
-"""The options of every command that reads a log (a profile, and flags that beat it), and those of `Settings`."""
+"""The command line's options of `Settings`, one a field, and those of a profile: what a log means.
+
+A command declares its own options; `takes_settings` and `takes_profile` add these, and hand it a `Choice` of both.
+"""
 
 from __future__ import annotations
 
 import inspect
-import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import Field, dataclass, fields
-from functools import cache, wraps
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from algid.cli.completion import Completion, listed, of_profile, settings_of_profile, words
+from algid.cli.completion import (
+    Completion,
+    listed,
+    of_profile,
+    refusing_checks,
+    settings_of_profile,
+    terms,
+    words,
+)
+from algid.errors import SettingError
 from algid.settings import Settings, flag
 
 if TYPE_CHECKING:
@@ -23,104 +35,93 @@ MODEL, METHOD, LOG = "The arm's model", "Method", "What the log means"
 MODELLED = ("gravity", "model", "friction", "torque_offset", "rotor_inertia", "torque_hold", "delay", "l1", "l2")
 
 
-def _checks() -> list[str]:
-    from algid.inspection.checks import REFUSED
-
-    return list(REFUSED)
-
-
-def _terms() -> list[str]:
-    from algid.model import TERMS
-
-    return ["auto", "plain", *TERMS, "delay"]
-
-
-_COMPLETED = {"model": listed(_terms), "delay": words("estimate")}
+COMPLETED = {"model": listed(terms), "delay": words("estimate")}
 """Settings that are text and take some words."""
 
-
-def _of_log(text: str, *names: str, completed: Completion | None = None) -> Any:
-    """An option that tells what the log means, with the help `text`."""
-    return typer.Option(*names, help=text, autocompletion=completed, rich_help_panel=LOG)
-
-
-ProfileFile = Annotated[Path | None, _of_log("algid.toml that says what the log's names and units mean.", "--profile")]
-Topic = Annotated[str | None, _of_log("Topic with the joint states.")]
-Joints = Annotated[str | None, _of_log("The two joints, as NAME,NAME.")]
-AngleUnit = Annotated[str | None, _of_log("rad, deg, rev or counts.", completed=of_profile("unit", "theta1"))]
-TorqueUnit = Annotated[str | None, _of_log('"N m", "mN m", A or mA.', completed=of_profile("unit", "tau1"))]
-Zero = Annotated[str | None, _of_log("Where θ1 is zero: horizontal or hanging.", completed=of_profile("zero"))]
-SecondAngle = Annotated[
-    str | None, _of_log("θ2 is relative (to link 1) or absolute.", completed=of_profile("second_angle"))
-]
-Drive = Annotated[
-    str | None,
-    _of_log("Where the second motor stands: in its joint, or at the base.", completed=of_profile("drive")),
-]
-Passive = Annotated[
-    str | None,
-    _of_log("The joint without a motor, 1 or 2: its torque is zero.", completed=of_profile("passive")),
-]
-Sets = Annotated[
-    list[str] | None,
-    _of_log("Any setting of a profile, as tau1.sign=-1; may be repeated.", "--set", completed=settings_of_profile),
-]
-Clock = Annotated[str | None, _of_log("Stamps of the messages' header, or of the log.", completed=of_profile("clock"))]
-Start = Annotated[str | None, _of_log("Leave out what comes before, s since the log's first sample.")]
-End = Annotated[str | None, _of_log("Leave out what comes after, s since the log's first sample.")]
-Accept = Annotated[str | None, _of_log("Checks that may warn but not refuse, as CODE,CODE.", completed=listed(_checks))]
+OF_PROFILE: Mapping[str, tuple[Any, str, Completion | None]] = {
+    "profile": (Path, "algid.toml that says what the log's names and units mean.", None),
+    "topic": (str, "Topic with the joint states.", None),
+    "joints": (str, "The two joints, as NAME,NAME.", None),
+    "angle_unit": (str, "rad, deg, rev or counts.", of_profile("unit", "theta1")),
+    "torque_unit": (str, '"N m", "mN m", A or mA.', of_profile("unit", "tau1")),
+    "zero": (str, "Where θ1 is zero: horizontal or hanging.", of_profile("zero")),
+    "second_angle": (str, "θ2 is relative (to link 1) or absolute.", of_profile("second_angle")),
+    "drive": (str, "Where the second motor stands: in its joint, or at the base.", of_profile("drive")),
+    "passive": (str, "The joint without a motor, 1 or 2: its torque is zero.", of_profile("passive")),
+    "clock": (str, "Stamps of the messages' header, or of the log.", of_profile("clock")),
+    "start": (str, "Leave out what comes before, s since the log's first sample.", None),
+    "end": (str, "Leave out what comes after, s since the log's first sample.", None),
+    "accept": (str, "Checks that may warn but not refuse, as CODE,CODE.", listed(refusing_checks)),
+    "set": (list[str], "Any setting of a profile, as tau1.sign=-1; may be repeated.", settings_of_profile),
+}
+"""Type, help and completion of a profile's file, of each of its settings with a flag of its own, and of any other."""
+CHANNELS_OF = {
+    "angle_unit": ("theta1", "theta2", "omega1", "omega2"),
+    "torque_unit": ("tau1", "tau2"),
+}
+"""Flags that set the unit of several channels."""
 
 
-def profile_from(file: Path | None, sets: Sequence[str] = (), **flags: str | None) -> Profile | None:
-    """The profile of a file with flags over it, and `sets` over these; None where none is given.
+def options_of_settings() -> Iterator[inspect.Parameter]:
+    """An option for each field of `Settings`: a bool has no --no-, and what has its own parser is text."""
+    hints = get_type_hints(Settings)
+    for field in fields(Settings):
+        kind, default = hints[field.name], field.default
+        if field.metadata.get("profile"):  # the profile may say it: what is not given is not known here
+            kind, default = kind | None, None
+        if "parse" in field.metadata:
+            kind, default = str | None, None if default is None else f"{default:g}"
+        panel = MODEL if field.name in MODELLED else METHOD
+        yield _option(field.name, kind, default, field.metadata["help"], panel, COMPLETED.get(field.name))
 
-    Raises
-    ------
-    SettingError
-        If the file or a flag is wrong.
-    """
-    given = {name: value for name, value in flags.items() if value is not None}
-    if file is None and not given and not sets:
-        return None
-    from algid.profile import Profile, load_profile, with_settings
 
-    settings: dict[str, Any] = {}
-    for name, value in given.items():
-        if name == "joints":
-            settings["joints"] = [part.strip() for part in value.split(",")]
-        elif name == "angle_unit":
-            settings |= {channel: {"unit": value} for channel in ("theta1", "theta2", "omega1", "omega2")}
-        elif name == "torque_unit":
-            settings |= {channel: {"unit": value} for channel in ("tau1", "tau2")}
-        else:
-            settings[name] = value
-    for text in sets:
-        _merge(settings, _setting(text))
-    return with_settings(load_profile(file) if file else Profile(), settings)
+def options_of_profile() -> Iterator[inspect.Parameter]:
+    """An option for each row of `OF_PROFILE`."""
+    for name, (kind, text, completed) in OF_PROFILE.items():
+        yield _option(name, kind | None, None, text, LOG, completed)
+
+
+def _option(
+    name: str, kind: Any, default: Any, text: str, panel: str, completed: Completion | None
+) -> inspect.Parameter:
+    option = typer.Option(flag(name), help=text, rich_help_panel=panel, autocompletion=completed)
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, option])
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What the shared options were set to."""
+    """What the shared options were set to; None stands for an option that was not given.
+
+    Parameters
+    ----------
+    settings_flags : by the names of `Settings`' fields
+    profile_flags : by the names of `OF_PROFILE`
+    """
 
     settings_flags: Mapping[str, Any]
-    profile_file: Path | None
-    profile_flags: Mapping[str, str | None]
-    profile_sets: Sequence[str] = ()
+    profile_flags: Mapping[str, Any]
 
     def settings(self) -> Settings:
-        """As the pipeline takes them. Raises `SettingError` where an option is wrong."""
-        return Settings(
-            **{
-                field.name: _value(field, self.settings_flags[field.name])
-                for field in fields(Settings)
-                if self.settings_flags[field.name] is not None
-            }
-        )
+        """As the pipeline takes them.
+
+        Raises
+        ------
+        SettingError
+            If an option is wrong.
+        """
+        parsers = {field.name: field.metadata.get("parse", lambda given: given) for field in fields(Settings)}
+        given = {name: value for name, value in self.settings_flags.items() if value is not None}
+        return Settings(**{name: parsers[name](value) for name, value in given.items()})
 
     def profile(self, file: Path | None = None) -> Profile | None:
-        """The profile of `file`, or of ``--profile``, with the flags over it. Raises `SettingError`."""
-        found = profile_from(file or self.profile_file, self.profile_sets, **self.profile_flags)
+        """The profile of `file`, or of ``--profile``, with the flags over it; None where none is given.
+
+        Raises
+        ------
+        SettingError
+            If the file or a flag is wrong.
+        """
+        found = profile_from({**self.profile_flags, "profile": file or self.profile_flags.get("profile")})
         gravity = self.settings_flags.get("gravity")
         if found is None or gravity is None:
             return found
@@ -129,108 +130,81 @@ class Choice:
         return with_settings(found, {"gravity": gravity})
 
 
-def _profile(
-    profile: ProfileFile = None,
-    topic: Topic = None,
-    joints: Joints = None,
-    angle_unit: AngleUnit = None,
-    torque_unit: TorqueUnit = None,
-    zero: Zero = None,
-    second_angle: SecondAngle = None,
-    drive: Drive = None,
-    passive: Passive = None,
-    clock: Clock = None,
-    start: Start = None,
-    end: End = None,
-    accept: Accept = None,
-    sets: Sets = None,
-) -> None:
-    """The options of a profile."""
+def profile_from(flags: Mapping[str, Any]) -> Profile | None:
+    """The profile of the file of ``--profile`` with the other flags of `OF_PROFILE` over it, in their order.
+
+    Raises
+    ------
+    SettingError
+        If the file or a flag is wrong: the flag is named, and the profile's line beside it.
+    """
+    given = {name: value for name, value in flags.items() if value not in (None, [])}
+    if not given:
+        return None
+    from algid.profile import Profile, load_profile, with_settings
+
+    file = given.pop("profile", None)
+    found = load_profile(file) if file else Profile()
+    texts = {name: value if name == "set" else [value] for name, value in given.items()}
+    for name, text in ((name, text) for name, every in texts.items() for text in every):
+        meaning = _meaning(name, text)
+        try:
+            found = with_settings(found, meaning)
+        except SettingError as error:
+            place, _, said = str(error).removeprefix("setting ").partition(": ")
+            raise SettingError(f"{flag(name)} (profile: {place}): {said}") from error
+    return found
+
+
+def two_names(name: str, text: str) -> tuple[str, str]:
+    """The names in NAME,NAME, the text of the flag of `name`; raises `SettingError` where there are not two."""
+    first, *others = (part.strip() for part in text.split(","))
+    if len(others) != 1 or not (first and others[0]):
+        raise SettingError(f"{flag(name)}: expected two names like shoulder,elbow, found {text!r}")
+    return first, others[0]
+
+
+def _meaning(name: str, text: str) -> dict[str, Any]:
+    """A profile's settings out of a flag's text."""
+    if name == "joints":
+        return {name: two_names(name, text)}
+    if name in CHANNELS_OF:
+        return {channel: {"unit": text} for channel in CHANNELS_OF[name]}
+    if name != "set":
+        return {name: text}
+    key, _, value = text.partition("=")
+    if "=" not in text or not key.strip():
+        raise SettingError(f"--set {text}: expected KEY=VALUE like tau1.sign=-1")
+    try:
+        return tomllib.loads(f"{key} = {value}")
+    except tomllib.TOMLDecodeError:  # a bare word
+        setting: Any = value.strip()
+        for part in reversed(key.split(".")):
+            setting = {part.strip(): setting}
+        return dict(setting)
 
 
 def takes_settings(command: Callable[..., None]) -> Callable[..., None]:
     """Give `command`, whose first parameter is the `Choice`, the options of logs and of settings after its own."""
-    return _taking(command, _parameters(_profile), _settings())
+    return _taking(command, [*options_of_profile()], [*options_of_settings()])
 
 
 def takes_profile(command: Callable[..., None]) -> Callable[..., None]:
     """Give `command`, whose first parameter is the `Choice`, the options of logs after its own."""
-    return _taking(command, _parameters(_profile), ())
+    return _taking(command, [*options_of_profile()], [])
 
 
 def _taking(
     command: Callable[..., None], profile: Sequence[inspect.Parameter], settings: Sequence[inspect.Parameter]
 ) -> Callable[..., None]:
-    own = _parameters(command)[1:]
+    _, *own = inspect.signature(command, eval_str=True).parameters.values()
 
     @wraps(command)
     def with_options(**values: Any) -> None:
-        chosen = {parameter.name: values.pop(parameter.name) for parameter in settings}
-        meaning = {parameter.name: values.pop(parameter.name) for parameter in profile}
-        command(Choice(chosen, meaning.pop("profile"), meaning, meaning.pop("sets") or ()), **values)
+        chosen, meaning = ({one.name: values.pop(one.name) for one in part} for part in (settings, profile))
+        command(Choice(chosen, meaning), **values)
 
-    every = [*own, *profile, *settings]
+    every = [*(one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in own), *profile, *settings]
     with_options.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]  # typer reads it
     with_options.__annotations__ = {parameter.name: parameter.annotation for parameter in every}
     return with_options
-
-
-@cache
-def _parameters(function: Callable[..., None]) -> tuple[inspect.Parameter, ...]:
-    found = inspect.signature(function, eval_str=True).parameters.values()
-    return tuple(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in found)
-
-
-@cache
-def _settings() -> tuple[inspect.Parameter, ...]:
-    """An option for each field of `Settings`."""
-    hints = get_type_hints(Settings)
-    return tuple(_option(field, hints[field.name]) for field in fields(Settings))
-
-
-def _setting(text: str) -> dict[str, Any]:
-    """A profile's setting out of KEY=VALUE: the value as TOML has it, or a bare word."""
-    import tomllib
-
-    from algid.errors import SettingError
-
-    key, equals, value = text.partition("=")
-    if not equals or not key.strip():
-        raise SettingError(f"--set {text}: expected KEY=VALUE like tau1.sign=-1")
-    try:
-        return tomllib.loads(f"{key} = {value}")
-    except tomllib.TOMLDecodeError:
-        pass
-    try:
-        return tomllib.loads(f"{key} = {json.dumps(value.strip())}")
-    except tomllib.TOMLDecodeError as error:
-        raise SettingError(f"--set {text}: expected KEY=VALUE like tau1.sign=-1 ({error})") from error
-
-
-def _merge(settings: dict[str, Any], more: Mapping[str, Any]) -> None:
-    """Set what `more` holds, channel by channel."""
-    for name, value in more.items():
-        if isinstance(value, Mapping):
-            settings[name] = {**settings.get(name, {}), **value}
-        else:
-            settings[name] = value
-
-
-def _option(field: Field[Any], kind: Any) -> inspect.Parameter:
-    """A field's option; a bool has no --no-, and what its type does not tell is text for its own parser."""
-    default = field.default
-    if field.metadata.get("profile"):  # the profile may say it: what is not given is not known here
-        kind, default = kind | None, None
-    if "parse" in field.metadata:
-        kind, default = str | None, None if default is None else f"{default:g}"
-    panel = MODEL if field.name in MODELLED else METHOD
-    completed = _COMPLETED.get(field.name)
-    option = typer.Option(
-        flag(field.name), help=field.metadata["help"], rich_help_panel=panel, autocompletion=completed
-    )
-    annotation = Annotated[kind, option]
-    return inspect.Parameter(field.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
-
-
-def _value(field: Field[Any], given: Any) -> Any:
-    return field.metadata["parse"](given) if "parse" in field.metadata else given

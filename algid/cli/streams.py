@@ -48,10 +48,8 @@ def _spelled(error: UnicodeError) -> tuple[str, int]:
     """Letters that the terminal lacks in such that every terminal has."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
-    lacking = error.object[error.start : error.end]
-    return "".join(map(_spelling, lacking)), error.end
-
-
-def _spelling(letter: str) -> str:
-    plain = SPELLINGS.get(letter) or unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode()
-    return plain or letter.encode("ascii", "backslashreplace").decode()
+    spelled = ""
+    for letter in error.object[error.start : error.end]:
+        near = SPELLINGS.get(letter) or unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode()
+        spelled += near or letter.encode("ascii", "backslashreplace").decode()
+    return spelled, error.end

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from enum import StrEnum
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,11 +15,8 @@ import typer
 from algid.cli.completion import cases, or_files
 
 if TYPE_CHECKING:
-    from algid.log import Log
-    from algid.progress import Told
     from algid.synth.cases import Case
     from algid.synth.excitation import Torque
-    from algid.synth.run import Recording
 
 
 class LogFormat(StrEnum):
@@ -89,97 +87,82 @@ def synth(
 
     Example: algid synth case1 -o logs --position-noise 1e-3 --torque-noise 1e-2 --duration 10 --torque wide
     """
+    from algid.errors import SettingError
     from algid.files import refuse_existing
     from algid.report.progress import progress
     from algid.synth.cases import load_case
-    from algid.synth.run import EXCITATIONS, Recording, held, synthesise
+    from algid.synth.follow import read_plan
+    from algid.synth.run import EXCITATIONS, Recording, held, rehearse, synthesise, with_schedule
     from algid.synth.sensors import Sensors
-
-    described = load_case(case)
-    sensors = Sensors(position_noise, torque_noise, encoder_bits, jitter, drop, seed, _stamp(start_time))
-    if motion is not None:
-        _refuse_beside_motion({"--initial": initial, "--payload-schedule": payload_schedule, "--torque": torque})
-        _rehearse(described, motion, Recording(rate, duration or 0.0, sensors=sensors), out, kind)
-        return
-    duration = 1.0 if duration is None else duration
-    recording = _recording(Recording(rate=rate, duration=duration, sensors=sensors), initial)
-    torque = torque or "case"
-    drive = _torque(described, torque, torque_hold)
-    if torque_hold is not Hold.EXACT and torque in EXCITATIONS:
-        drive = held(drive, rate, duration, "zoh" if torque_hold is Hold.ZOH else "foh")
-    for role in ("unloaded", "loaded") if payload_schedule is None else ("schedule",):
-        refuse_existing(out / f"{described.name}-{role}.{kind.value}", force)
-    with progress("samples") as told:
-        if payload_schedule is None:
-            logs: tuple[Log, ...] = synthesise(described, drive, recording, told)
-        else:
-            logs = (_scheduled(described, drive, recording, payload_schedule, told),)
-    _write(logs, out, kind)
-
-
-def _write(logs: Sequence[Log], out: Path, kind: LogFormat) -> None:
     from algid.writers import write_log
 
+    described = load_case(case)
+    start_ns = 0 if start_time is None else int(start_time.replace(tzinfo=UTC).timestamp()) * 10**9
+    sensors = Sensors(position_noise, torque_noise, encoder_bits, jitter, drop, seed, start_ns)
+    if motion is not None:
+        for flag, value in (("--initial", initial), ("--payload-schedule", payload_schedule), ("--torque", torque)):
+            if value is not None:
+                raise SettingError(
+                    f"{flag} {value}: a motion starts where it was planned and carries one payload; leave it out"
+                )
+        plan = read_plan(motion)
+        with progress("samples") as told:
+            logs = rehearse(described, plan, Recording(rate, duration or plan.duration, sensors=sensors), told)
+    else:
+        recording = Recording(rate=rate, duration=1.0 if duration is None else duration, sensors=sensors)
+        if initial is not None:
+            recording = replace(recording, initial=_state(initial))
+        if round(rate * recording.duration) < 1:
+            raise SettingError(
+                f"--duration: expected at least {1 / rate:g} s, two samples at --rate {rate:g}, "
+                f"found {recording.duration:g}"
+            )
+        named = "case" if torque is None else torque
+        drive = _torque(described, named, torque_hold)
+        if torque_hold is not Hold.EXACT and named in EXCITATIONS:
+            drive = held(drive, rate, recording.duration, "zoh" if torque_hold is Hold.ZOH else "foh")
+        schedule = None if payload_schedule is None else _schedule(payload_schedule)
+        for role in ("unloaded", "loaded") if schedule is None else ("schedule",):
+            refuse_existing(out / f"{described.name}-{role}.{kind.value}", force)
+        with progress("samples") as told:
+            if schedule is None:
+                logs = [*synthesise(described, drive, recording, told)]
+            else:
+                logs = [with_schedule(described, drive, recording, schedule, told)]
     for log in logs:
         path = out / f"{log.origin.path}.{kind.value}"
         write_log(path, log, truth=log.origin.truth, kind=kind.value)
         print(path)
 
 
-def _refuse_beside_motion(flags: dict[str, str | None]) -> None:
+def _schedule(text: str) -> list[tuple[float, float]]:
+    """Times in s, increasing, and payloads in kg out of S=KG,…."""
     from algid.errors import SettingError
-
-    for flag, value in flags.items():
-        if value is not None:
-            raise SettingError(
-                f"{flag} {value}: a motion starts where it was planned and carries one payload; leave it out"
-            )
-
-
-def _rehearse(case: Case, motion: Path, recording: Recording, out: Path, kind: LogFormat) -> None:
-    from dataclasses import replace
-
-    from algid.report.progress import progress
-    from algid.synth.follow import read_plan
-    from algid.synth.run import rehearse
-
-    plan = read_plan(motion)
-    recording = replace(recording, duration=recording.duration or plan.duration)
-    with progress("samples") as told:
-        logs = rehearse(case, plan, recording, told)
-    _write(logs, out, kind)
-
-
-def _stamp(start: datetime | None) -> int:
-    """Ns since 1970."""
-    return 0 if start is None else int(start.replace(tzinfo=UTC).timestamp()) * 10**9
-
-
-def _scheduled(case: Case, torque: Torque, recording: Recording, text: str, told: Told | None) -> Log:
-    from algid.errors import SettingError
-    from algid.synth.run import with_schedule
 
     try:
-        pairs = [tuple(map(float, part.split("="))) for part in text.split(",")]
-        return with_schedule(case, torque, recording, [(time, mass) for time, mass in pairs], told)
-    except ValueError as error:
-        raise SettingError(f"--payload-schedule {text}: {error}; give times and payloads like 2=0.05,4=0") from error
-
-
-def _recording(recording: Recording, initial: str | None) -> Recording:
-    from dataclasses import replace
-
-    from algid.errors import SettingError
-
-    if initial is None:
-        return recording
-    try:
-        state = tuple(float(part) for part in initial.split(","))
+        schedule = [(float(time), float(mass)) for time, mass in (part.split("=") for part in text.split(","))]
     except ValueError:
-        state = ()
-    if len(state) != 4 or not all(map(math.isfinite, state)):
-        raise SettingError(f"--initial: expected four numbers like -1.57,0,0,0, found {initial!r}")
-    return replace(recording, initial=state)
+        schedule = []
+    times = [time for time, _ in schedule]
+    increasing = all(earlier < later for earlier, later in pairwise(times))
+    if not (schedule and increasing and all(0 <= number < math.inf for pair in schedule for number in pair)):
+        raise SettingError(
+            f"--payload-schedule: expected increasing times and payloads of 0 or more like 2=0.05,4=0, found {text!r}"
+        )
+    return schedule
+
+
+def _state(text: str) -> tuple[float, float, float, float]:
+    """Two angles in rad and two velocities in rad/s out of θ1,θ2,ω1,ω2."""
+    from algid.errors import SettingError
+
+    try:
+        first, second, third, fourth = (float(part) for part in text.split(","))
+    except ValueError:
+        first = second = third = fourth = math.nan
+    if not math.isfinite(first + second + third + fourth):
+        raise SettingError(f"--initial: expected four numbers like -1.57,0,0,0, found {text!r}")
+    return first, second, third, fourth
 
 
 def _torque(case: Case, name: str, hold: Hold) -> Torque:

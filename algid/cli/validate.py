@@ -16,9 +16,11 @@ from algid.words import counted
 
 if TYPE_CHECKING:
     from algid.estimators.rollout import RolloutScore
-    from algid.identification.validate import Simulation
     from algid.report.document import Table
     from algid.results import TorquePrediction
+
+    Simulated = Mapping[str, list[dict[str, Any]]]
+    """The rows of `_rows` by log."""
 
 
 @takes_profile
@@ -64,107 +66,32 @@ def validate(
         survey = Survey(sources, told)
         survey.begin("prediction")
         found = judge(model, survey)
-        simulation = roll(model, survey) if simulate else None
+        rolled = roll(model, survey) if simulate else None
     summaries = [survey.summary(log) for log in survey.logs]
     for warning in (*warnings, *(() if known is None else read_otherwise(summaries, known, str(result)))):
         typer.echo(f"algid: {visible(warning)}", err=True)
     total = found.total
     over = max_nrmse is not None and (total is None or max(total.nrmse) > max_nrmse)
     every = {**found.logs, "all logs": total}
+    simulation = {} if rolled is None else {**rolled.logs, "all logs": rolled.total}
+    simulated = {name: _rows(one) for name, one in simulation.items()}
     if form is ResultFormat.TABLE:
-        typer.echo("\n".join(_line(name, one) for name, one in every.items()))
-        if total is not None:
-            typer.echo(f"filter: {total.filter}")
-        if simulation is not None:
-            typer.echo("\n".join(_simulated_lines(simulation)))
+        typer.echo("\n".join(_lines(every, simulated)))
         if over:
             typer.echo(f"OVER: normalised RMSE past {max_nrmse:g}")
     elif form is ResultFormat.MARKDOWN:
-        typer.echo(markdown_table(_table(every)), nl=False)
-        if simulation is not None:
-            typer.echo("\n" + markdown_table(_simulated_table(simulation)), nl=False)
+        typer.echo("\n".join(map(markdown_table, _tables(every, simulated))), nl=False)
     else:
-        predictions = {name: None if one is None else one.model_dump(mode="json") for name, one in found.logs.items()}
-        content = {"logs": predictions, "total": None if total is None else total.model_dump(mode="json"), "over": over}
-        if simulation is not None:
-            content["simulation"] = {name: _simulated_json(one) for name, one in _every(simulation).items()}
+        predictions = {name: None if one is None else one.model_dump(mode="json") for name, one in every.items()}
+        content: dict[str, Any] = {"logs": predictions, "total": predictions.pop("all logs"), "over": over}
+        if simulated:
+            content["simulation"] = simulated
         typer.echo(json.dumps(content, indent=2, allow_nan=False))
     if over:
         raise typer.Exit(EXIT_FAILED)
 
 
-def _table(found: Mapping[str, TorquePrediction | None]) -> Table:
-    from algid.report.document import Column, Table
-    from algid.report.text import ABSENT, significant, visible
-
-    headings = ("Log", "Joint", "RMSE, N m", "RMSE / RMS", "R²")
-    rows = []
-    for name, one in found.items():
-        if one is None:
-            rows.append((visible(name), *[ABSENT] * 4))
-            continue
-        for joint in range(2):
-            figures = (one.rmse[joint], one.nrmse[joint], one.r2[joint])
-            rows.append((visible(name), str(joint + 1), *(significant(figure, 4) for figure in figures)))
-    columns = (Column(headings[0], "name"), *(Column(heading, "number") for heading in headings[1:]))
-    return Table("Torque prediction", columns, tuple(rows))
-
-
-def _line(name: str, found: TorquePrediction | None) -> str:
-    if found is None:
-        return f"{name}: too short to judge"
-    joints = (
-        f"joint {joint}: RMSE {rmse:.4g} N m, normalised {nrmse:.4g}, R² {r2:.4f}"
-        for joint, rmse, nrmse, r2 in zip((1, 2), found.rmse, found.nrmse, found.r2, strict=True)
-    )
-    return f"{name}: {'; '.join(joints)}"
-
-
-def _every(simulation: Simulation) -> dict[str, RolloutScore]:
-    return {**simulation.logs, "all logs": simulation.total}
-
-
-def _simulated_lines(simulation: Simulation) -> Iterator[str]:
-    from algid.report.text import visible
-
-    for name, one in _every(simulation).items():
-        for row in _simulated_json(one):
-            if not row["starts"]:
-                yield f"{visible(name)}: simulated {row['horizon']:g} s: too short to judge"
-                continue
-            joints = (
-                f"joint {joint}: RMSE {_number(rmse)} rad where it moved {_number(moved)} rad"
-                for joint, rmse, moved in zip((1, 2), row["rmse"], row["moved"], strict=True)
-            )
-            yield (
-                f"{visible(name)}: simulated {row['horizon']:g} s from "
-                f"{counted(row['starts'], 'state')}: {'; '.join(joints)}"
-            )
-
-
-def _number(value: float | None) -> str:
-    return "without bounds" if value is None else f"{value:.4g}"
-
-
-def _simulated_table(simulation: Simulation) -> Table:
-    from algid.report.document import Column, Table
-    from algid.report.text import visible
-
-    headings = ("Log", "Horizon, s", "States", "Joint", "RMSE, rad", "Moved, rad")
-    rows = [
-        (
-            *(visible(name), f"{row['horizon']:g}", str(row["starts"]), str(joint + 1)),
-            *(_number(row[kind][joint]) if row["starts"] else "-" for kind in ("rmse", "moved")),
-        )
-        for name, one in _every(simulation).items()
-        for row in _simulated_json(one)
-        for joint in range(2)
-    ]
-    columns = (Column(headings[0], "name"), *(Column(heading, "number") for heading in headings[1:]))
-    return Table("Angles of the arm simulated forward", columns, tuple(rows))
-
-
-def _simulated_json(one: RolloutScore) -> list[dict[str, Any]]:
+def _rows(one: RolloutScore) -> list[dict[str, Any]]:
     """A horizon a row; null where there is no start, or where the simulation runs away."""
     import numpy as np
 
@@ -178,3 +105,64 @@ def _simulated_json(one: RolloutScore) -> list[dict[str, Any]]:
         {"horizon": horizon, "starts": int(count), "rmse": numbers(rmse), "moved": numbers(moved)}
         for horizon, count, rmse, moved in rows
     ]
+
+
+def _lines(every: Mapping[str, TorquePrediction | None], simulated: Simulated) -> Iterator[str]:
+    """The predictions in words, then the simulations."""
+    from algid.report.text import visible
+
+    for name, one in every.items():
+        if one is None:
+            yield f"{name}: too short to judge"
+            continue
+        joints = (
+            f"joint {joint}: RMSE {rmse:.4g} N m, normalised {nrmse:.4g}, R² {r2:.4f}"
+            for joint, rmse, nrmse, r2 in zip((1, 2), one.rmse, one.nrmse, one.r2, strict=True)
+        )
+        yield f"{name}: {'; '.join(joints)}"
+    if (total := every["all logs"]) is not None:
+        yield f"filter: {total.filter}"
+    for name, rows in simulated.items():
+        for row in rows:
+            head = f"{visible(name)}: simulated {row['horizon']:g} s"
+            joints = (
+                f"joint {joint}: RMSE {_number(rmse)} rad where it moved {_number(moved)} rad"
+                for joint, rmse, moved in zip((1, 2), row["rmse"], row["moved"], strict=True)
+            )
+            states = f"from {counted(row['starts'], 'state')}: {'; '.join(joints)}"
+            yield f"{head} {states}" if row["starts"] else f"{head}: too short to judge"
+
+
+def _tables(every: Mapping[str, TorquePrediction | None], simulated: Simulated) -> Iterator[Table]:
+    """The predictions, and the simulations if there are any."""
+    from algid.report.document import Column, Table
+    from algid.report.text import ABSENT, significant, visible
+
+    def table(title: str, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> Table:
+        columns = (Column(headings[0], "name"), *(Column(heading, "number") for heading in headings[1:]))
+        return Table(title, columns, tuple(rows))
+
+    predicted: list[tuple[str, ...]] = []
+    for name, one in every.items():
+        if one is None:
+            predicted.append((visible(name), *[ABSENT] * 4))
+            continue
+        for joint, figures in enumerate(zip(one.rmse, one.nrmse, one.r2, strict=True), start=1):
+            predicted.append((visible(name), str(joint), *(significant(figure, 4) for figure in figures)))
+    yield table("Torque prediction", ("Log", "Joint", "RMSE, N m", "RMSE / RMS", "R²"), predicted)
+    if simulated:
+        rolled = [
+            (
+                *(visible(name), f"{row['horizon']:g}", str(row["starts"]), str(joint + 1)),
+                *(_number(row[kind][joint]) if row["starts"] else "-" for kind in ("rmse", "moved")),
+            )
+            for name, rows in simulated.items()
+            for row in rows
+            for joint in range(2)
+        ]
+        headings = ("Log", "Horizon, s", "States", "Joint", "RMSE, rad", "Moved, rad")
+        yield table("Angles of the arm simulated forward", headings, rolled)
+
+
+def _number(value: float | None) -> str:
+    return "without bounds" if value is None else f"{value:.4g}"

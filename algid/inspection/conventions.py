@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from algid.estimators.conventions import AS_READ, Candidate, Convention, Judgement, judge
+from algid.estimators.conventions import AS_READ, Convention, Judgement, judge
 from algid.log import Log, Reading
 from algid.signals.segments import Segment, append, segments
 from algid.words import counted
@@ -51,7 +51,7 @@ class Mend:
                 flags += ["--joints", ",".join(value)]
             elif isinstance(value, Mapping):
                 for key, inner in value.items():
-                    flags += ["--set", f"{name}.{key}={json.dumps(inner, ensure_ascii=False)}"]
+                    flags += ["--set", f"{name}.{key}={_toml(inner)}"]
             else:
                 flags += ["--set", f"{name}={json.dumps(value)}"]
         return tuple(flags)
@@ -59,11 +59,13 @@ class Mend:
     @property
     def lines(self) -> str:
         """The profile's lines."""
-        own = [f"{name} = {_toml(value)}" for name, value in self.settings.items() if not isinstance(value, Mapping)]
+        own, channels = [], []
         for name, value in self.settings.items():
             if isinstance(value, Mapping):
-                own += [f"{key} = {_toml(inner)} of [{name}]" for key, inner in value.items()]
-        return ", ".join(own)
+                channels += [f"{key} = {_toml(inner)} of [{name}]" for key, inner in value.items()]
+            else:
+                own.append(f"{name} = {_toml(value)}")
+        return ", ".join(own + channels)
 
 
 def judged(log: Log, *, gravity: bool = True) -> Judgement | None:
@@ -74,7 +76,13 @@ def judged(log: Log, *, gravity: bool = True) -> Judgement | None:
     log : Log, as it was read
     gravity : False for an arm in a horizontal plane
     """
-    longest = _longest_stretch(log)
+    stretches: list[Segment] = []
+    for segment in segments([log]):
+        if segment.continues and stretches:
+            stretches[-1] = append(stretches[-1], segment)
+        else:
+            stretches.append(segment)
+    longest = max(stretches, key=len, default=None)
     if longest is None or not np.all(np.mean(longest.tau**2, axis=1) > 0):  # a torque that is none tells nothing
         return None
     return judge(longest.theta, longest.tau, longest.dt, gravity=gravity)
@@ -101,38 +109,29 @@ def mend(log: Log, found: Judgement | None) -> Mend | None:
     words = " and ".join(_clauses(convention))
     if convention.mirrored().zero == (0.0, 0.0) and replace(convention, zero=(0.0, 0.0)) == AS_READ:
         words = "all signs are turned round, or θ1 counts from the other horizontal (the same arm seen from behind)"
+    broken = min(found.as_read.broken.items(), key=lambda one: one[1], default=None)
+    if broken is None:
+        left, then = (100 * float(one.left.max()) for one in (found.as_read, found.best))
+        contradiction = f"{left:.3g} % of a torque stays unexplained, {then:.2g} % then"
+    else:
+        name, distance = broken
+        missed = counted(round(-distance), "standard deviation")
+        contradiction = f"it demands {name}, which the log misses by {missed}"
     small = all(abs(angle) < _SMALL for angle in convention.zero)
     return Mend(
         words,
-        _contradiction(found.as_read, found.best),
+        contradiction,
         _settings(convention, log),
         another=not small or replace(convention, zero=(0.0, 0.0)) != AS_READ,
     )
 
 
-def _longest_stretch(log: Log) -> Segment | None:
-    """The longest stretch of a log without a gap, evenly sampled."""
-    stretches: list[Segment] = []
-    for segment in segments([log]):
-        if segment.continues and stretches:
-            stretches[-1] = append(stretches[-1], segment)
-        else:
-            stretches.append(segment)
-    return max(stretches, key=len, default=None)
-
-
-def _contradiction(as_read: Candidate, best: Candidate) -> str:
-    broken = sorted(as_read.broken.items(), key=lambda found: found[1])
-    left = f"{100 * float(as_read.left.max()):.3g} % of a torque stays unexplained"
-    if not broken:
-        return f"{left}, {100 * float(best.left.max()):.2g} % then"
-    (name, distance), *_ = broken
-    return f"it demands {name}, which the log misses by {counted(round(-distance), 'standard deviation')}"
-
-
 def _clauses(convention: Convention) -> Iterator[str]:
     """What is wrong with a log that has to be read by `convention`."""
-    yield from _order(convention)
+    if convention.swapped and convention.torques_swapped:
+        yield "the joints are swapped"
+    elif convention.swapped or convention.torques_swapped:
+        yield f"the {'angles' if convention.swapped else 'torques'} of the joints are swapped"
     for joint in (0, 1):
         angle, torque = convention.signs[joint] < 0, convention.torque_signs[joint] < 0
         if angle and torque:
@@ -143,37 +142,20 @@ def _clauses(convention: Convention) -> Iterator[str]:
         yield "θ2 counts from the horizontal or the vertical, not from link 1"
     if convention.base:
         yield "the second motor stands at the base"
-    yield from _scale(convention.scale)
-    for joint, off in enumerate(convention.zero):
-        if abs(off) > _TOLD:
-            yield _zero(joint, off)
-
-
-def _order(convention: Convention) -> Iterator[str]:
-    if convention.swapped and convention.torques_swapped:
-        yield "the joints are swapped"
-    elif convention.swapped or convention.torques_swapped:
-        yield f"the {'angles' if convention.swapped else 'torques'} of the joints are swapped"
-
-
-def _scale(scale: tuple[float, float]) -> Iterator[str]:
-    for what, one in zip(("θ1", "θ2"), scale, strict=True):
-        if _is_unit(one):
-            yield f"{what} is in {'degrees' if one > 1 else 'turns'}"
-        elif one != 1:
-            yield f"{what} is the motor's angle, {one:.4g} times the joint's"
+    for what, scale in zip(("θ1", "θ2"), convention.scale, strict=True):
+        if _is_unit(scale):
+            yield f"{what} is in {'degrees' if scale > 1 else 'turns'}"
+        elif scale != 1:
+            yield f"{what} is the motor's angle, {scale:.4g} times the joint's"
+    for what, off in zip(("θ1", "θ2"), convention.zero, strict=True):
+        if what == "θ1" and abs(abs(off) - pi / 2) < _SAME:
+            yield f"θ1 is zero {'hanging straight down' if off < 0 else 'upright'}"
+        elif abs(off) > _TOLD:
+            yield f"the zero of {what} is off by {degrees(off):.4g}°"
 
 
 def _is_unit(scale: float) -> bool:
     return isclose(scale, 180 / pi) or isclose(scale, 1 / (2 * pi))
-
-
-def _zero(joint: int, angle: float) -> str:
-    if joint == 0 and abs(angle + pi / 2) < _SAME:
-        return "θ1 is zero hanging straight down"
-    if joint == 0 and abs(angle - pi / 2) < _SAME:
-        return "θ1 is zero upright"
-    return f"the zero of θ{joint + 1} is off by {degrees(angle):.4g}°"
 
 
 def _settings(convention: Convention, log: Log) -> dict[str, Any]:
@@ -236,16 +218,10 @@ def _zeros(convention: Convention, reading: Reading, place: tuple[int, int]) -> 
     zero = min(zeros, key=lambda name: (abs(remainder(zeros[name], 2 * pi)) > _SAME, name != reading.zero))
     offset = remainder(zeros[zero], 2 * pi)
     both = (offset, second + (offset if convention.absolute else 0.0))
-    offsets = [
-        _plain(remainder(angle, 2 * pi) - (own[joint] - reading.offsets[joint])) for joint, angle in enumerate(both)
-    ]
+    added = [remainder(both[joint], 2 * pi) - (own[joint] - reading.offsets[joint]) for joint in (0, 1)]
+    offsets = [0.0 if abs(angle) < _SAME else float(f"{angle:.6g}") for angle in added]
     found: dict[str, Any] = {"zero": zero} if zero != reading.zero else {}
     return found | ({"offsets": offsets} if offsets != list(reading.offsets) else {})
-
-
-def _plain(angle: float) -> float:
-    """An angle with six digits, as one writes it down; zero where it is one."""
-    return 0.0 if abs(angle) < _SAME else float(f"{angle:.6g}")
 
 
 def _toml(value: Any) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from algid.inspection.report import Entry, look
+from algid.inspection.report import look
 from algid.log import Origin, Reading
 from algid.readers import open_log
 from algid.readers.table import CHANNELS
@@ -46,15 +46,19 @@ def draft_profile(path: Path) -> str:
         If there is no such log, or its format is unknown.
     """
     log = look(path, lambda: open_log(path).origin)
-    origin = log.found
-    head = "" if origin else f"# {_safe(log.refused or '')}\n"
-    reading = origin.reading if origin else Reading()
-    return _HEAD + head + _source(origin, reading, log.format) + _listed(log.entries) + _channels(origin, log.format)
+    head = "" if log.found else f"# {_safe(log.refused or '')}\n"
+    entries = "".join(f"# in the log: {_safe(one.name)[:80]} ({_safe(one.type)[:60]})\n" for one in log.entries[:64])
+    return _HEAD + head + _source(log.found, log.format) + entries + _channels(log.found, log.format)
 
 
-def _source(origin: Origin | None, reading: Reading, kind: str) -> str:
+def _source(origin: Origin | None, kind: str) -> str:
     """The lines of topic, joints, clock and time: those of the log, behind # where they are not known."""
-    joints = f"joints = {json.dumps(list(reading.joints))}" if reading.joints else '# joints = ["shoulder", "elbow"]'
+    reading = origin.reading if origin else Reading()
+    joints = (
+        f"joints = [{', '.join(map(_quoted, reading.joints))}]"
+        if reading.joints
+        else '# joints = ["shoulder", "elbow"]'
+    )
     if kind in _ON_TOPICS:
         topic = f"topic = {_quoted(reading.topics[0])}" if reading.topics else '# topic = "/joint_states"'
         time = ('# time = "t"  # of tables', '# time_unit = "s"  # of tables: s, ms, us, ns')
@@ -65,10 +69,6 @@ def _source(origin: Origin | None, reading: Reading, kind: str) -> str:
         name = f"time = {_quoted(origin.mapping['t'])}" if origin else '# time = "t"'
         time = (name, f"{unit}  # s, ms, us, ns")
     return "\n".join([topic, f"{joints}  # first joint first", clock, *time, ""])
-
-
-def _listed(entries: tuple[Entry, ...]) -> str:
-    return "".join(f"# in the log: {_safe(one.name)[:80]} ({_safe(one.type)[:60]})\n" for one in entries[:64])
 
 
 def _channels(origin: Origin | None, kind: str) -> str:
@@ -87,8 +87,9 @@ def _channels(origin: Origin | None, kind: str) -> str:
 
 
 def _quoted(text: str) -> str:
-    """As a TOML basic string, whose escapes are JSON's."""
-    return json.dumps(text).replace("\x7f", "\\u007f")
+    """As a TOML basic string: its escapes are JSON's, save those of characters that JSON writes as two halves."""
+    letters = (f"\\U{ord(one):08x}" if ord(one) > 0xFFFF else json.dumps(one)[1:-1] for one in text)
+    return f'"{"".join(letters)}"'.replace("\x7f", "\\u007f")
 
 
 def _safe(text: str) -> str:

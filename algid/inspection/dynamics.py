@@ -6,17 +6,22 @@ gravity turned by a right angle. That is no identification; it tells a wrong sig
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from algid.arm import FloatArray, regressor
+from algid.inspection.findings import Finding
 from algid.log import Log
 
 _RATE = 100.0
 _MOST_ROWS = 20_000
 _EDGE = 10
 _K2, _K3, _K4, _K5 = 1, 2, 3, 4
+_LEAST_PULL = 1.3
+"""Weight in N m to inertia in kg m^2: a fifth of g/l for links of 1.5 m."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +68,10 @@ def dynamic_figures(log: Log) -> DynamicFigures | None:
     theta, omega, alpha, tau = theta[:, inner], omega[:, inner], alpha[:, inner], tau[:, inner]
     rows = _rows(regressor(theta, omega, alpha))
     turned = _rows(regressor(theta - np.array([[np.pi / 2], [0.0]]), omega, alpha))[:, [_K2, _K4]]
-    friction = _rows(_signs(omega))
+    zeros, one = np.zeros_like(omega[0]), np.ones_like(omega[0])
+    coulomb = np.tanh(omega / 0.05)
+    # Coulomb friction and torque offset of either joint
+    friction = _rows(np.stack([[coulomb[0], zeros, one, zeros], [zeros, coulomb[1], zeros, one]]))
     target = tau.ravel()
     wide = np.hstack([rows, turned, friction])
     found = _fit(wide, target)
@@ -72,8 +80,9 @@ def dynamic_figures(log: Log) -> DynamicFigures | None:
     left = _left(wide, found, target)
     lost = _left(without, _fit(without, target), target) - left
     turn = np.degrees(np.arctan2(found[7] + found[8], found[_K2] + found[_K4]))
+    scale = np.linalg.norm(rows, axis=0)
     return DynamicFigures(
-        condition=_condition(rows),
+        condition=float(np.linalg.cond(rows / scale)) if np.all(scale > 0) else math.inf,
         explained=1 - left / total,
         weight1=float(found[_K4]),
         weight2=float(found[_K2]),
@@ -82,6 +91,34 @@ def dynamic_figures(log: Log) -> DynamicFigures | None:
         seen=_standing_out(np.hstack([rows[:, [_K2, _K4]], turned]), without),
         inertia=float(found[_K3] + found[_K5]),
     )
+
+
+def gravity_findings(figures: DynamicFigures) -> Iterator[Finding]:
+    """What a rough fit that explains the torques says of gravity: none, upwards, or sideways."""
+    if figures.condition > 1e6 or figures.explained < 0.3:
+        return
+    weightless = math.hypot(figures.weight1, figures.weight2) < _LEAST_PULL * abs(figures.inertia)
+    if figures.seen > 0.15 and figures.gravity_share < 0.01 and weightless:
+        text = (
+            f"torques carry no weight (gravity explains {100 * figures.gravity_share:.2g} % of them): "
+            "they are gravity-compensated, or the arm moves in a horizontal plane (--gravity 0; profile: gravity = 0)"
+        )
+        yield Finding("GRAVITY_COMPENSATED", text)
+    elif figures.seen < 0.015 or figures.gravity_share < 0.02:
+        return  # the motion does not tell where gravity pulls
+    elif abs(figures.turn) > 135:
+        text = (
+            f"gravity pulls upwards (k4 = {figures.weight1:.3g} N m): the sign of torques or angles is wrong; turn the "
+            "torques round: --set tau1.sign=-1 --set tau2.sign=-1 (profile: sign = -1 of [tau1] and [tau2]), or angles "
+            "and velocities likewise"
+        )
+        yield Finding("FLIPPED_SIGN", text)
+    elif abs(figures.turn) > 45:
+        text = (
+            f"gravity is turned by {figures.turn:.0f}°: θ1 is not from the horizontal: --zero hanging "
+            '(profile: zero = "hanging"), or --set theta1.offset=RAD'
+        )
+        yield Finding("WRONG_ZERO", text)
 
 
 def _smoothed(log: Log) -> tuple[FloatArray, FloatArray, float] | None:
@@ -96,13 +133,6 @@ def _smoothed(log: Log) -> tuple[FloatArray, FloatArray, float] | None:
     kernel = np.hanning(9)[1:-1] / np.hanning(9).sum()
     smooth = np.stack([np.convolve(row, kernel, "same") for row in (*theta, *tau)])
     return smooth[:2], smooth[2:], log.period * width
-
-
-def _signs(omega: FloatArray) -> FloatArray:
-    """Columns of Coulomb friction and torque offset (2, 4, N)."""
-    zeros, one = np.zeros_like(omega[0]), np.ones_like(omega[0])
-    first = np.stack([np.tanh(omega[0] / 0.05), zeros, one, zeros])
-    return np.stack([first, np.stack([zeros, np.tanh(omega[1] / 0.05), zeros, one])])
 
 
 def _rows(columns: FloatArray) -> FloatArray:
@@ -128,8 +158,3 @@ def _standing_out(columns: FloatArray, others: FloatArray) -> float:
         return 0.0
     left = columns / scale - others @ np.linalg.lstsq(others, columns / scale, rcond=1e-8)[0]
     return float(np.linalg.svd(left, compute_uv=False)[-1])
-
-
-def _condition(matrix: FloatArray) -> float:
-    scale = np.linalg.norm(matrix, axis=0)
-    return float(np.linalg.cond(matrix / scale)) if np.all(scale > 0) else float("inf")

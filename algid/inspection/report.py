@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from algid.errors import LogError
-from algid.inspection.checks import Finding, examine
+from algid.inspection.checks import examine
 from algid.inspection.dynamics import DynamicFigures, dynamic_figures
 from algid.inspection.figures import ClockFigures, SignalFigures, clock_figures, signal_figures
+from algid.inspection.findings import Finding
 from algid.log import Log, Notice
 from algid.readers import read_log
 from algid.readers.sniff import sniff

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from algid.inspection.checks import REFUSED
+from algid.inspection.findings import REFUSED
 from algid.writers import write_log
 from tests.inspection.test_checks import spoiled
 from tests.processes import Outcome

@@ -11,7 +11,7 @@ from typing import Any, Literal, get_origin
 import pytest
 import typer
 
-from algid.inspection import checks
+from algid.inspection import findings
 from tests.cli.commands import app
 
 FREE = {
@@ -62,9 +62,9 @@ def test_every_choice_completes(command: Any, option: Any, monkeypatch: pytest.M
         ("torque_unit", "m", ["mN m", "mA"]),
         ("zero", "h", ["horizontal", "hanging"]),
         ("second_angle", "", ["relative", "absolute"]),
-        ("sets", "tau1.s", ["tau1.source=", "tau1.sign="]),
-        ("sets", "tau1.sign=", ["tau1.sign=1", "tau1.sign=-1"]),
-        ("sets", "velocity=t", ["velocity=true"]),
+        ("set", "tau1.s", ["tau1.source=", "tau1.sign="]),
+        ("set", "tau1.sign=", ["tau1.sign=1", "tau1.sign=-1"]),
+        ("set", "velocity=t", ["velocity=true"]),
         ("accept", "DEGREES,EFFORT_Z", ["DEGREES,EFFORT_ZERO"]),
         ("model", "coulomb,ro", ["coulomb,rotor"]),
         ("estimator", "re", ["refined"]),
@@ -85,4 +85,4 @@ def test_cases_and_files_complete(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
 
 
 def test_the_checks_that_refuse_are_those_of_the_table() -> None:
-    assert tuple(re.findall(r"^([A-Z_]+) +yes ", checks.__doc__ or "", re.MULTILINE)) == checks.REFUSED
+    assert tuple(re.findall(r"^([A-Z_]+) +yes ", findings.__doc__ or "", re.MULTILINE)) == findings.REFUSED

@@ -11,9 +11,10 @@ import pytest
 
 from algid.arm import Arm, FloatArray, inverse_dynamics
 from algid.errors import LogError
-from algid.inspection.checks import Finding, _yielding, examine, noticed
+from algid.inspection.checks import examine, noticed
 from algid.inspection.dynamics import dynamic_figures
 from algid.inspection.figures import signal_figures
+from algid.inspection.findings import Finding
 from algid.log import Log, Origin
 from algid.profile import Profile
 from algid.readers import read_log
@@ -288,12 +289,12 @@ def test_a_short_rest_and_the_end_of_a_part_are_no_rest() -> None:
 
 def test_a_refusal_alone_names_what_overrides_it_and_yields_to_that() -> None:
     refusal, warning = Finding("STILL", "joint 2 is still", refuse=True), Finding("RESTS", "the arm rests")
-    assert _yielding(warning, ()) == warning
-    assert _yielding(warning, ("RESTS",)) == warning
-    named = _yielding(refusal, ("RESTS",))
+    assert warning.yielding(()) == warning
+    assert warning.yielding(("RESTS",)) == warning
+    named = refusal.yielding(("RESTS",))
     assert named.refuse
     assert named.text == 'joint 2 is still; to use it nevertheless: --accept STILL (profile: accept = ["STILL"])'
-    accepted = _yielding(refusal, ("RESTS", "STILL"))
+    accepted = refusal.yielding(("RESTS", "STILL"))
     assert not accepted.refuse
     assert accepted.text == "joint 2 is still; used nevertheless, as accept says"
 

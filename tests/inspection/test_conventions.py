@@ -99,7 +99,7 @@ def test_a_finding_names_flags_that_the_command_line_takes(tmp_path: Path) -> No
     assert "--drive base" in finding.text
     assert 'drive = "base"' in finding.text
     assert finding.flags == ("--set", "tau2.sign=-1", "--drive", "base")
-    profile = profile_from(None, sets=["tau2.sign=-1"], drive="base")
+    profile = profile_from({"set": ["tau2.sign=-1"], "drive": "base"})
     assert profile is not None
     log = read_log(path, profile)
     assert log.tau == pytest.approx(RIGHT.tau)

@@ -1,0 +1,148 @@
+"""Checks of single channels: torques that are none, angles that jump, freeze or are in degrees, spikes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from algid.inspection.figures import robust_deviation, saturated_share
+from algid.inspection.findings import Finding
+from algid.log import Log
+from algid.words import counted
+
+_DENORMAL = 1e-6
+_SPIKE = 30.0
+_DEAD, _DEAD_RUNS = 0.1, 20  # s, and in usual runs: a torque that keeps one value so long is not measured
+_TURN = 2 * math.pi
+
+
+def efforts(log: Log) -> Iterator[Finding]:
+    """Torques that are zero, constant or clipped; that of a joint without a motor may be anything."""
+    for joint, tau in enumerate(log.tau, start=1):
+        if joint == log.origin.reading.passive:
+            continue
+        name = f"tau{joint}"
+        other = f'--set {name}.source=NAME (profile: source = "NAME" of [{name}])'
+        largest, what = float(np.abs(tau).max()), _source(log, name)
+        if largest == 0:
+            text = (
+                f"{what} is zero in every sample; name the measured torque: {other}; for a joint without a "
+                f"motor: --passive {joint} (profile: passive = {joint})"
+            )
+            yield Finding("EFFORT_ZERO", text, True)
+        elif largest < _DENORMAL:
+            text = f"{what} never exceeds {largest:.3g} N m: no torque; name the measured one: {other}"
+            yield Finding("EFFORT_DENORMAL", text, True)
+        elif tau.min() == tau.max():
+            text = f"{what} is {tau[0]:.6g} N m in every sample; name the measured torque: {other}"
+            yield Finding("EFFORT_CONSTANT", text, True)
+        elif (share := saturated_share(tau)) > 0.01:
+            text = f"{what} stands at its limit in {100 * share:.3g} % of the samples"
+            yield Finding("SATURATED_EFFORT", text)
+
+
+def dead_efforts(log: Log) -> Iterator[Finding]:
+    """Torques whose longest run of one value is far longer than their runs elsewhere.
+
+    A run at the largest or the smallest value is a limit's, and slow publishers repeat every value as often.
+    """
+    for name, tau in zip(("tau1", "tau2"), log.tau, strict=True):
+        changes = np.flatnonzero(np.diff(tau))
+        if changes.size < _DEAD_RUNS:
+            continue
+        runs = np.diff(changes)
+        longest = int(np.argmax(runs))
+        first, length = int(changes[longest]) + 1, int(runs[longest])
+        usual = float(np.quantile(runs, 0.95))
+        at_limit = tau[first] in (tau.max(), tau.min())
+        if not at_limit and length * log.period >= _DEAD and length >= _DEAD_RUNS * usual:
+            span = f"for {length * log.period:.3g} s from t = {first * log.period:.6g} s"
+            yield Finding("DEAD_EFFORT", f"{_source(log, name)} stands still {span}; leave that out")
+
+
+def angles(log: Log) -> Iterator[Finding]:
+    """Angles that never change, jump by a turn, or freeze until they jump."""
+    for name, theta in zip(("theta1", "theta2"), log.theta, strict=True):
+        steps, what = np.diff(theta), _source(log, name)
+        moving = np.flatnonzero(steps)
+        if not moving.size:
+            yield Finding("ANGLE_CONSTANT", f"{what} is {theta[0]:.6g} rad in every sample")
+            continue
+        sizes = np.abs(steps)
+        wraps = int(np.count_nonzero(np.abs(sizes - _TURN) < 0.1 * _TURN))
+        if wraps and np.median(sizes) < 0.5:  # at this rate the arm moves by far less than a turn between two samples
+            text = (
+                f"{what} jumps by a turn {counted(wraps, 'time')}: --set {name}.unwrap=true "
+                f"(profile: unwrap = true of [{name}])"
+            )
+            yield Finding("WRAPPED_ANGLE", text, True)
+        runs, usual = np.diff(moving), float(np.quantile(sizes[moving], 0.99))
+        long_enough = max(10, round(0.02 / log.period))
+        frozen = np.flatnonzero((runs > long_enough) & (sizes[moving[1:]] > 5 * usual))
+        if frozen.size:
+            start, length = (int(moving[frozen[0]]) + 1) * log.period, int(runs[frozen[0]]) * log.period
+            yield Finding("STUCK_SENSOR", f"{what} freezes for {length:.3g} s from t = {start:.6g} s, then jumps")
+
+
+def degrees(log: Log, is_right: Callable[[], bool]) -> Iterator[Finding]:
+    """Angles or velocities in degrees, by each other or by how far the angles turn.
+
+    A joint may turn as often as it will: `is_right` tells whether physics holds for the log as it was read.
+    """
+    ratios = (0.0, 0.0) if log.omega is None else tuple(_travelled_over_summed(log, row) for row in (0, 1))
+    pairs = (("angles", "theta", 180 / math.pi), ("velocities", "omega", math.pi / 180))
+    for joint, ratio in enumerate(ratios, start=1):
+        for what, quantity, factor in pairs:
+            if len(log) > 20 and 0.8 < ratio / factor < 1.25:
+                text = f"{what} of joint {joint} are in degrees by the other signal"
+                yield _in_degrees(log, f"{quantity}{joint}", text)
+    widest = np.abs(log.theta).max(axis=1)
+    row = int(np.argmax(widest))
+    if widest[row] > 12 * math.pi and not any(ratios) and not is_right():
+        yield _in_degrees(log, f"theta{row + 1}", f"angles reach {widest[row]:.4g}: few arms turn that far in rad")
+
+
+def _travelled_over_summed(log: Log, row: int) -> float:
+    """Angle travelled over velocity summed, robustly; 0 where there is no velocity or no motion."""
+    assert log.omega is not None
+    width = max(1, len(log) // 200)
+    travelled = np.abs(np.diff(log.theta[row, ::width]))
+    summed = np.add.reduceat(np.abs(log.omega[row]), np.arange(0, len(log), width))[: travelled.size]
+    summed = summed / width * np.diff(log.t[::width])
+    moving = travelled > 0.2 * travelled.max()
+    total = float(np.sum(summed[moving]))
+    return float(np.sum(travelled[moving])) / total if total > 0 else 0.0
+
+
+def _in_degrees(log: Log, name: str, text: str) -> Finding:
+    """Refused, unless the user has said the unit of the channel `name`."""
+    if log.origin.reading.told(name):
+        unit = log.origin.reading.channels[name].unit
+        return Finding("DEGREES", f"{text}; they are taken for {unit} as told")
+    of_angle = name.startswith("theta")
+    flag = "--angle-unit " if of_angle else f"--set {name}.unit="
+    motor = f", --set {name}.gear_ratio=N for the angle of a motor behind its gear" if of_angle else ""
+    told = f"{flag}deg{motor}, or {flag}rad where it is right (profile: unit or gear_ratio of [{name}])"
+    return Finding("DEGREES", f"{text}: {told}", True)
+
+
+def spikes(log: Log) -> Iterator[Finding]:
+    """Single samples thirty times further off the middle of their neighbours than noise and bends of the signal are."""
+    if len(log) < 20:
+        return
+    for name, values in zip(("theta1", "theta2", "tau1", "tau2"), (*log.theta, *log.tau), strict=True):
+        off = values[1:-1] - (values[:-2] + values[2:]) / 2
+        size, aside = np.abs(off), np.abs(values[2:] - values[:-2])
+        limit = _SPIKE * max(robust_deviation(off), float(np.quantile(size, 0.9)))
+        found = np.flatnonzero((size > limit) & (aside < 0.2 * size) & (limit > 0))
+        if found.size:
+            first = float(log.t[1:-1][found][0])
+            text = f"{_source(log, name)} has {counted(len(found), 'spike')}, the first at t = {first:.6g} s"
+            yield Finding("SPIKES", text)
+
+
+def _source(log: Log, name: str) -> str:
+    source = log.origin.mapping.get(name, name)
+    return name if source == name else f"{name} ({source})"

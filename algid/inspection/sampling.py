@@ -1,0 +1,131 @@
+"""Checks of how a log samples its motion: length, rate, stamps, lost samples, and rest at both ends."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.inspection.figures import clock_figures, signal_figures
+from algid.inspection.findings import Finding
+from algid.log import Log
+from algid.signals.spacing import NEAR, near_stamps
+from algid.words import counted
+
+_LOST, _LOST_SHARE, _AGAINST = 0.3, 0.003, 5.0
+"""Of a step: how near it lies to the double; of the samples: how many do; and over those as near to none at all."""
+_SHORTEST = 1.0
+_FEWEST = 10.0
+_REST, _STILL = 0.5, 1e-3
+"""Seconds at rest that are worth a word; and of an angle's range, how far it may creep meanwhile."""
+
+
+def sampling(log: Log) -> Iterator[Finding]:
+    """Logs too short or too slow for their motion; stamps that cluster, miss samples or jitter."""
+    clock = clock_figures(log)
+    period = f"a period of {1e3 / clock.rate:.4g} ms"
+    if clock.duration < _SHORTEST:
+        text = f"the log lasts {clock.duration:.3g} s; an estimate needs a second of motion at least, ten are better"
+        yield Finding("SHORT_LOG", text)
+    samples = samples_a_period(log)
+    if samples < _FEWEST:
+        text = (
+            f"{samples:.2g} samples in a period of the motion at {clock.rate:.4g} Hz: too slow to tell its "
+            "acceleration; record faster, or move more slowly"
+        )
+        yield Finding("SLOW_SAMPLING", text)
+    near = near_stamps(log.stamp_ns, log.period)
+    if near:
+        text = (
+            f"{counted(near, 'sample follows', 'samples follow')} the one before by less than {NEAR:g} of {period}, as "
+            "receipt times do: late ones go back to the period they are missing from, the mean stands for the others"
+        )
+        yield Finding("NEAR_STAMPS", text)
+    lost = lost_steps(log)
+    if lost:
+        text = (
+            f"{counted(lost, 'step of the angles is', 'steps of the angles are')} twice as long as usual, though "
+            "the stamps are even: samples were lost and the others renumbered, so that no estimate can be right; take "
+            "the stamps of the messages, or record without losses; to use it nevertheless: --accept LOST_SAMPLES "
+            '(profile: accept = ["LOST_SAMPLES"])'
+        )
+        yield Finding("LOST_SAMPLES", text)
+    if clock.gaps:
+        text = f"{counted(clock.gaps, 'gap')}, the longest {clock.longest_gap:.4g} s; no window spans one"
+        yield Finding("GAPS", text)
+    if clock.jitter * clock.rate > 0.01:
+        bend = max(float(np.sqrt(np.mean(np.diff(row, 2) ** 2))) for row in log.theta) / 8
+        text = f"stamps jitter by {clock.jitter * 1e3:.3g} ms about {period}"
+        yield Finding("JITTER", f"{text}; resampling moves angles by {bend:.2g} rad at most, linearly")
+
+
+def samples_a_period(log: Log) -> float:
+    """Samples in a period of the faster joint's motion; infinite where a step between samples is below 0.02 rad.
+
+    Notes
+    -----
+    Of a sine with p samples a period, second differences are 2 sin(π/p) times first ones in size. Medians, so that
+    spikes and rest do not count; steps that small may be noise.
+    """
+    fewest = math.inf
+    for theta in log.theta:
+        step, bend = (float(np.median(np.abs(np.diff(theta, order)))) for order in (1, 2))
+        if step > 0.02 and bend > 0:
+            fewest = min(fewest, math.pi / math.asin(min(1.0, bend / (2 * step))))
+    return fewest
+
+
+def lost_steps(log: Log) -> int:
+    """How many steps both joints make in the time of one; 0 where noise or a slow motion does not tell.
+
+    A velocity that is twice the mean of its neighbours' is a lost sample's. Noise makes one that is nought as often.
+    """
+    velocity = np.diff(log.theta) / (np.diff(log.stamp_ns) * 1e-9)
+    around = 0.5 * (velocity[:, 2:] + velocity[:, :-2])
+    own = velocity[:, 1:-1]
+    power = np.sum(around**2, axis=0)
+    share = np.sum(own * around, axis=0) / np.maximum(power, 1e-300)
+    off = np.sqrt(np.sum((own - share * around) ** 2, axis=0))
+    told = (power > np.quantile(power, 0.25)) & (off < _LOST * np.sqrt(power))
+    lost = int(np.count_nonzero(told & (np.abs(share - 2) < _LOST)))
+    chance = int(np.count_nonzero(told & (np.abs(share) < _LOST)))
+    return lost if lost > max(_LOST_SHARE * len(log), _FEWEST, _AGAINST * chance) else 0
+
+
+def rests(log: Log, whole: bool) -> Iterator[Finding]:
+    """Rest before the motion and, where the log is `whole`, after it.
+
+    A joint that stiction holds bears a torque of which the motion tells nothing: gravity's constants take it. A posture
+    that a motor holds freely tells more of gravity than any motion. The log cannot tell which it is: the rest is named,
+    with the flags that leave it out, and stays.
+    """
+    figures = [signal_figures(theta) for theta in log.theta]
+    room = np.array([max(8 * one.noise, 2 * one.step, _STILL * (one.high - one.low)) for one in figures])
+    few = max(4, round(0.02 / log.period))
+    before = _still(log.t, log.theta, room, few)
+    after = _still(log.duration - log.t[::-1], log.theta[:, ::-1], room, few) if whole else 0.0
+    if before == log.duration:
+        return
+    end = log.duration - after
+    parts = [(before, f"for its first {before:.3g} s", f"--start {before:.4g}", f"start = {before:.4g}")]
+    parts += [(after, f"for its last {after:.3g} s", f"--end {end:.4g}", f"end = {end:.4g}")]
+    if told := [part for part in parts if part[0] >= _REST]:
+        _, words, flags, lines = zip(*told, strict=True)
+        text = (
+            f"the arm rests {' and '.join(words)}; where friction holds it there, the torque is not that of the "
+            f"weight: leave the rest out with {' '.join(flags)} (profile: {', '.join(lines)})"
+        )
+        yield Finding("RESTS", text, flags=flags, note=True)
+
+
+def _still(t: FloatArray, theta: FloatArray, room: FloatArray, few: int) -> float:
+    """Seconds until one of the angles (2, N) at times t (N,) has left its place, the median of the first `few`.
+
+    `room` (2,) is how far noise and encoder let it be from there.
+    """
+    places = np.median(theta[:, :few], axis=1, keepdims=True)
+    away = np.flatnonzero(np.any(np.abs(theta - places) > room[:, None], axis=0))
+    moved = int(away[0]) if away.size else t.size
+    return float(t[moved - 1]) if moved else 0.0
