@@ -1,0 +1,161 @@
+"""The paper's integrals in closed form, its rows, and what windows and logs make of its estimates."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from algid.arm import FloatArray, inverse_dynamics, with_payload
+from algid.estimators import paper
+from algid.estimators.paper import (
+    PaperSeries,
+    Summary,
+    columns,
+    payload,
+    stack_rows,
+    stage1_series,
+    stage2_series,
+    wanders,
+)
+from algid.signals.segments import Segment
+from algid.synth.cases import load_case
+
+
+def _by_sympy(t: FloatArray, q1: sp.Expr, q2: sp.Expr, torques: tuple[sp.Expr, sp.Expr]) -> dict[str, FloatArray]:
+    """∫∫ t² of what stands beside each unknown of eq. (1), twice from nought, with no integration by parts."""
+    s = sp.Symbol("s")
+    v1, v2 = sp.diff(q1, s), sp.diff(q2, s)
+    signals = {
+        "inertia1": sp.diff(v1, s),
+        "inertia2": sp.diff(v2, s),
+        "viscous1": v1,
+        "viscous2": v2,
+        "torque1": torques[0],
+        "torque2": torques[1],
+    }
+    twice = {}
+    for name, signal in signals.items():
+        once = sp.integrate(sp.expand(s**2 * signal), s)
+        twice[name] = sp.integrate(sp.expand(once - once.subs(s, 0)), s)
+    return {name: sp.lambdify(s, found - found.subs(s, 0), "numpy")(t) for name, found in twice.items()}
+
+
+@pytest.mark.parametrize("start", [0.0, 0.8])
+def test_columns_are_the_integrals_of_polynomial_motions(start: float) -> None:
+    """Whatever the angles and velocities at the window's start: t² takes them out."""
+    s, dt = sp.Symbol("s"), 2e-3
+    t = dt * np.arange(501)
+    q1, q2 = start + sp.Rational(3, 10) * s - s**2 / 2 + s**3 / 5, -2 * start + s**2 - s**3 / 3
+    torques = (1 + s - s**2, 2 * s**3)
+    exact = _by_sympy(t, q1, q2, torques)
+
+    def at(expression: sp.Expr) -> FloatArray:
+        return np.asarray(np.broadcast_to(sp.lambdify(s, expression, "numpy")(t), t.shape), dtype=np.float64)
+
+    theta, omega = np.stack([at(q1), at(q2)]), np.stack([at(sp.diff(q1, s)), at(sp.diff(q2, s))])
+    found = columns(theta, omega, np.stack([at(one) for one in torques]), dt)
+    for name, expected in exact.items():
+        np.testing.assert_allclose(getattr(found, name), expected, atol=1e-8)  # Simpson's dt⁴ and rounding
+
+
+def test_coupling_and_gravity_are_integrated_to_fourth_order() -> None:
+    """Halved steps leave a sixteenth of the error; the truth by steps eight times as fine again."""
+
+    def at(rate: int) -> FloatArray:
+        t = np.arange(rate + 1) / rate
+        theta = np.stack([np.sin(3 * t), 0.4 + np.cos(5 * t)])
+        omega = np.stack([3 * np.cos(3 * t), -5 * np.sin(5 * t)])
+        found = columns(theta, omega, np.stack([np.sin(7 * t), np.cos(2 * t)]), 1 / rate)
+        names = ("coupling1", "coupling2", "gravity1", "gravity12", "torque1", "torque2")
+        return np.stack([getattr(found, name)[:: rate // 50] for name in names])
+
+    truth = at(6400)
+    errors = [np.linalg.norm(at(rate) - truth, axis=1) for rate in (200, 400)]
+    assert np.all(np.abs(np.log2(errors[0] / errors[1]) - 4) < 0.3)
+
+
+def test_rows_are_integrals_of_the_row_before() -> None:
+    dt = 0.01
+    t = dt * np.arange(101)
+    rows = stack_rows(np.stack([np.ones_like(t), t**2]), dt, 4)
+    for n in range(4):
+        np.testing.assert_allclose(rows[n, 0], t**n / float(sp.factorial(n)), atol=1e-9)
+        np.testing.assert_allclose(rows[n, 1], 2 * t ** (n + 2) / float(sp.factorial(n + 2)), atol=1e-9)
+
+
+def test_the_payload_is_that_of_table_2() -> None:
+    case = load_case("case2")
+    k, z = case.arm.constants(), case.arm.payload_constants(0.3)
+    k1, k2, k3, k4, k5, _, _ = with_payload(k, z)
+    l1, m_p = payload(np.array([k5 + k3, k1, k3, k4, k2]), k, case.arm.g)
+    assert (float(l1), float(m_p)) == pytest.approx((case.arm.l1, 0.3), rel=1e-12)
+    bare = np.array([k[4] + k[2], k[0], k[2], k[3], k[1]])
+    assert np.isnan(payload(bare, k, case.arm.g)).all()  # no payload has no length: 0 / 0
+
+
+def test_joint_2_at_rest_leaves_k7_open_and_its_condition_infinite() -> None:
+    t = 1e-3 * np.arange(1001)
+    still = np.zeros_like(t)
+    theta, omega = np.stack([np.sin(5 * t), still]), np.stack([5 * np.cos(5 * t), still])
+    alpha = np.stack([-25 * np.sin(5 * t), still])
+    found = paper.stage1(theta, omega, inverse_dynamics(load_case("case1").arm.constants(), theta, omega, alpha), 1e-3)
+    assert np.isinf(found.k7_condition).all()
+    assert np.isnan(found.k[6]).all()
+
+
+def _log(duration: float) -> Segment:
+    t = 1e-3 * np.arange(round(duration / 1e-3) + 1)
+    theta = np.stack([np.sin(5 * t) - 1, 0.8 * np.sin(9 * t)])
+    omega = np.stack([5 * np.cos(5 * t), 7.2 * np.cos(9 * t)])
+    alpha = np.stack([-25 * np.sin(5 * t), -64.8 * np.sin(9 * t)])
+    return Segment(0.0, 1e-3, theta, inverse_dynamics(load_case("case1").arm.constants(), theta, omega, alpha), omega)
+
+
+def test_windows_are_what_they_are_alone_and_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By twos in a block or one by one; a segment's last window is what is left of it; crumbs are left out."""
+    log = _log(2.4)
+    k = load_case("case1").arm.constants()
+    found = {}
+    for block in (600, 1200, 16384):
+        monkeypatch.setattr(paper, "BLOCK_SAMPLES", block)
+        found[block] = [*stage1_series([log], 0.6), *stage2_series([log], 0.6, k, 9.81)]
+    assert [one.values.shape[1] for one in found[600]] == 2 * [600, 600, 600, 601]
+    for several in (1200, 16384):
+        for alone, together in zip(found[600], found[several], strict=True):
+            np.testing.assert_array_equal(alone.t, together.t)
+            # rounding times condition numbers of up to 1e10, beyond which there is no estimate
+            np.testing.assert_allclose(np.minimum(alone.values, 1e10), np.minimum(together.values, 1e10), rtol=1e-5)
+    ends = [one.t[-1] for one in found[600][:4]]
+    assert np.allclose(np.diff(ends), 0.6, atol=2e-3)
+    for before, after in pairwise(found[600][:4]):
+        assert after.t[0] - before.t[-1] == pytest.approx(1e-3)
+    assert [*stage1_series([], 0.6)] == []
+    assert [*stage1_series([log.part(0, 7)], 0.6)] == []
+    lone = [*stage1_series([log.part(0, 7), log.part(0, 500)], 0.6)]
+    assert [one.values.shape[1] for one in lone] == [500]
+
+
+def _series(*rows: list[float]) -> PaperSeries:
+    values = np.array(rows)
+    return PaperSeries(np.arange(values.shape[1]) * 0.1, values, settled=4)
+
+
+def test_an_estimate_is_the_median_of_medians_and_wanders_by_half_its_quartiles() -> None:
+    summary = Summary(3)
+    nothing = summary.estimates()
+    assert np.isnan(nothing).all()
+    nan = np.nan
+    summary.add(_series([99, 1, 2, 3, 4], [9, nan, 5, 5, 5], [nan] * 5))  # what is not settled counts nothing
+    estimate, wander = summary.estimates()
+    np.testing.assert_allclose(estimate, [2.5, 5, nan])
+    np.testing.assert_allclose(wander, [0.5 * (3.25 - 1.75), 0, nan])
+    summary.add(_series([0, 7, 7, 7, 7], [0, nan, nan, nan, nan], [nan] * 5))
+    summary.add(_series([0, 3, 3, 3, 3], [0, 1, 1, 1, 1], [nan] * 5))
+    estimate, wander = summary.estimates()
+    np.testing.assert_allclose(estimate, [3, 3, nan])  # medians 2.5, 7, 3 and 5, 1
+    np.testing.assert_allclose(wander, [0.5 * (5 - 2.75), 0.5 * (4 - 2), nan])  # between windows more than within
+    assert wanders(estimate, wander).tolist() == [False, False, True]
+    assert wanders(np.array([-1.0, 1.0]), np.array([1.0, 1.1])).tolist() == [False, True]
