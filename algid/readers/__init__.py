@@ -1,4 +1,4 @@
-"""Readers of logs: one file a format, behind the `Reader` of `algid.readers.table`."""
+"""Readers of logs: one file a format, behind the `TableReader` of `algid.readers.assemble`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def open_log(path: str | Path, profile: Profile | None = None) -> TableReader:
-    """Open a log of any format, told from its content; its samples are read by `Reader.blocks`.
+    """Open a log of any format, told from its content; its samples are read by `TableReader.blocks`.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.errors import LogError
 from algid.log import Log, Notice, Origin
-from algid.readers.convert import ROWS, Conversion, Gatherer, Room, channel_readings
+from algid.readers.convert import ROWS, Conversion, Gatherer, channel_readings
 from algid.readers.table import BLOCK_ROWS, SampleTable, cut
 from algid.readers.timebase import in_order
 from algid.words import counted
@@ -27,7 +27,12 @@ _LARGEST = 1e100
 
 @dataclass(frozen=True, eq=False)
 class TableReader:
-    """A `Reader` over any format that yields tables of at most so many rows."""
+    """An opened log of any format. What it is stands in `origin` at once; its samples come in blocks, in time order.
+
+    `tables` gives a fresh pass in tables of at most so many rows. Stamps strictly increase within and across blocks;
+    a block's notices are those found while reading it. Memory is bounded by the block's size wherever the format
+    allows it.
+    """
 
     origin: Origin
     tables: Callable[[int], Iterator[SampleTable]]
@@ -37,7 +42,7 @@ class TableReader:
     """Samples to expect, 0 where the file does not tell."""
 
     def blocks(self, rows: int = BLOCK_ROWS) -> Iterator[Log]:
-        """Blocks of at most `rows` samples: see `algid.readers.table.Reader`.
+        """Blocks of at most `rows` samples.
 
         Raises
         ------
@@ -68,7 +73,10 @@ class TableReader:
                 gatherer, notices = None, ()
             if gatherer is None:
                 gatherer = Gatherer(min(most, self.rows or len(table)), velocity=table.has_velocities)
-            self._convert(table, gatherer.more(len(table)), unwrapper)
+            room = gatherer.more(len(table))
+            room.stamp_ns[:] = table.stamp_ns
+            self.conversion.apply(table, room)
+            unwrapper.run(room.theta)
             notices += said
         if gatherer is not None:
             yield self._log(gatherer, notices)
@@ -117,11 +125,6 @@ class TableReader:
             text = f"{counted(left_out, 'sample')} before {start or 0:g} s or behind {last}"
             yield held.noting(Notice("CUT", f"{text} left out, as told", note=True))
 
-    def _convert(self, table: SampleTable, room: Room, unwrapper: Unwrapper) -> None:
-        room.stamp_ns[:] = table.stamp_ns
-        self.conversion.apply(table, room)
-        unwrapper.run(room.theta)
-
     def _finite(self, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
         """Tables of finite numbers; where a user accepts others, their rows are left out and counted."""
         first, dropped = 0, 0
@@ -151,10 +154,8 @@ class TableReader:
 
     def _check(self, name: str, values: FloatArray, first: int) -> None:
         # one pass without an array of its own: a small sum of squares has no large term, and no NaN
-        if not np.einsum("i,i->", values, values) < _LARGEST:
-            self._refuse_large(name, values, first)
-
-    def _refuse_large(self, name: str, values: FloatArray, first: int) -> None:
+        if np.einsum("i,i->", values, values) < _LARGEST:
+            return
         wrong = np.flatnonzero(~(np.abs(values) < _LARGEST))
         if wrong.size:
             row = int(wrong[0])

@@ -73,16 +73,13 @@ class Gatherer:
         """Room for the next `rows` samples."""
         first, self._used = self._used, self._used + rows
         if self._used > len(self._room):
-            self._grow(first)
+            old = self._room.part(0, first)
+            self._room = Room.empty(max(self._used, 2 * len(self._room)), velocity=old.omega is not None)
+            new = self._room.part(0, first)
+            new.stamp_ns[:], new.theta[:], new.tau[:] = old.stamp_ns, old.theta, old.tau
+            if old.omega is not None and new.omega is not None:
+                new.omega[:] = old.omega
         return self._room.part(first, self._used)
-
-    def _grow(self, filled: int) -> None:
-        old = self._room.part(0, filled)
-        self._room = Room.empty(max(self._used, 2 * len(self._room)), velocity=old.omega is not None)
-        new = self._room.part(0, filled)
-        new.stamp_ns[:], new.theta[:], new.tau[:] = old.stamp_ns, old.theta, old.tau
-        if old.omega is not None and new.omega is not None:
-            new.omega[:] = old.omega
 
     def filled(self) -> Room:
         """All samples so far."""
@@ -142,35 +139,28 @@ def channel_readings(
     LogError
         If a torque is in amperes without a torque constant, or counts without counts a turn.
     """
-    return {
-        name: _channel_reading(path, name, mapping[name], profile, stated.get(name))
-        for name in CHANNELS
-        if name in mapping
-    }
+    found = {}
+    for name in [name for name in CHANNELS if name in mapping]:
+        channel, joint, own = profile.channel(name), int(name[-1]) - 1, stated.get(name)
+        unit = channel.unit or own or ("N m" if name.startswith("tau") else "rad")
+        told = profile.told_by(f"{name}.unit") if channel.unit else "names" if own else "assumed"
+        if name == f"tau{profile.passive}":
+            found[name] = ChannelReading("none: no motor", "N m", "profile", 0.0)
+            continue
+        factor = channel.sign * profile.signs[joint] * _factor(path, name, mapping[name], channel, unit)
+        offset = channel.offset + (profile.offsets[joint] if name.startswith("theta") else 0.0)
+        found[name] = ChannelReading(mapping[name], unit, told, factor, offset)
+    return found
 
 
-def _channel_reading(path: str, name: str, source: str, profile: Profile, stated: str | None) -> ChannelReading:
-    channel, joint = profile.channel(name), int(name[-1]) - 1
-    unit = channel.unit or stated or ("N m" if name.startswith("tau") else "rad")
-    told = profile.told_by(f"{name}.unit") if channel.unit else "names" if stated else "assumed"
-    if name == f"tau{profile.passive}":
-        return ChannelReading("none: no motor", "N m", "profile", 0.0)
-    _refuse_unit(path, name, source, unit)
-    sign = channel.sign * profile.signs[joint]
-    offset = channel.offset + (profile.offsets[joint] if name.startswith("theta") else 0.0)
-    return ChannelReading(source, unit, told, sign * _factor(path, name, channel, unit), offset)
-
-
-def _refuse_unit(path: str, name: str, source: str, unit: str) -> None:
+def _factor(path: str, name: str, source: str, channel: Angle | Velocity | Torque, unit: str) -> float:
+    """What a value in `unit` at the channel's own side of the gear is in SI units at the joint."""
     known = (*TORQUE, *CURRENT) if name.startswith("tau") else (*VELOCITY, "counts")
     if unit not in known:
         raise LogError(
             f"{path}: {name} ({source}) is in {unit!r} by its name; expected one of {', '.join(known)}; say its unit: "
             f'--set {name}.unit="{known[0]}" (profile: unit = "{known[0]}" of [{name}])'
         )
-
-
-def _factor(path: str, name: str, channel: Angle | Velocity | Torque, unit: str) -> float:
     if unit in CURRENT:
         constant = getattr(channel, "torque_constant", None)
         if constant is None:

@@ -31,16 +31,7 @@ STEMS: dict[str, tuple[str, ...]] = {
     "tau": (
         *("tau", "tau_meas", "tau_j", "torque_measured", "measured_torque", "actual_tau", "actual_torque"),
         *("torque", "trq", "effort", "joint_torque", "joint_effort", "torques", "efforts", "tau_filt"),
-        *(
-            "torque_filtered",
-            "tau_con",
-            "tau_cmd",
-            "tau_des",
-            "tau_d",
-            "tau_j_d",
-            "torque_cmd",
-            "target_torque",
-        ),
+        *("torque_filtered", "tau_con", "tau_cmd", "tau_des", "tau_d", "tau_j_d", "torque_cmd", "target_torque"),
         *("motor_torque", "observation_effort", "observation_torque"),
         *("actual_current", "current", "currents", "motor_current", "joint_current", "i_q", "iq"),
     ),
@@ -48,30 +39,8 @@ STEMS: dict[str, tuple[str, ...]] = {
 COMMANDED = frozenset({"tau_con", "tau_cmd", "tau_des", "tau_d", "tau_j_d", "torque_cmd", "target_torque"})
 CURRENTS = frozenset({"actual_current", "current", "currents", "motor_current", "joint_current", "i_q", "iq"})
 TIMES = (
-    *(
-        "stamp_ns",
-        "t",
-        "time",
-        "timestamp",
-        "stamp",
-        "__time",
-        "_time",
-        "time_s",
-        "time_ms",
-        "time_us",
-        "time_ns",
-    ),
-    *(
-        "timestamp_s",
-        "timestamp_ms",
-        "timestamp_us",
-        "timestamp_ns",
-        "t_s",
-        "t_ms",
-        "t_us",
-        "t_ns",
-        "time_sec",
-    ),
+    *("stamp_ns", "t", "time", "timestamp", "stamp", "__time", "_time", "time_s", "time_ms", "time_us", "time_ns"),
+    *("timestamp_s", "timestamp_ms", "timestamp_us", "timestamp_ns", "t_s", "t_ms", "t_us", "t_ns", "time_sec"),
     *("seconds", "secs", "sec", "elapsed", "elapsed_time", "log_time", "header.stamp", "header/stamp"),
     *("milliseconds", "millis", "microseconds", "micros", "nanoseconds", "nanos"),
 )
@@ -80,12 +49,16 @@ _NO_JOINTS = frozenset(
     | {"err", "raw", "max", "min", "limit", "old", "new", "filt", "filtered", "meas", "measured", "actual", "est"}
 )
 """Words before or behind a stem that name no joint."""
+_STEMS = sorted({stem for known in STEMS.values() for stem in known}, key=lambda stem: (-len(stem), stem))
+"""The stems of every quantity, the longest first."""
 _MOTOR_SIDE = frozenset({"motor", "rotor", "drive"})
 _BRACKET_UNIT = re.compile(r"^(.*\S)\s*[\[(]\s*([^\[\]()]*[^\[\]()\d\s][^\[\]()]*)\s*[\])]$")
 _SUFFIX_UNIT = re.compile(
     r"^(.*[^_\W])_(deg(?:rees?)?|m?rad|rev|turns|counts|ticks|[mk]?nm|ncm|kgf?cm|kgf?m|lbf?ft|lbf?in|ozf?in|ma|rpm|inch(?:es)?|"
     r"grad|volts?|s|secs?|seconds|[mun]s(?:ec)?|millis|micros|nanos|(?:milli|micro|nano)seconds)$"
 )
+_JOINT_NAMED = re.compile(r"^(.*/[^/]+)/(position|velocity|effort)$")
+_JOINT_PLACED = re.compile(r"^.*/(position|velocity|effort)[.\[/](\d+)\]?$")
 _JOINT_FIRST = re.compile(r"^(?:joint|axis|motor|link|j)[_ ]?(\d{1,3})[_./ ]+(.+)$")
 _JOINT_LAST = re.compile(r"^(.*?[^\W\d])[_./ ]*\[?(\d{1,3})\]?$")
 
@@ -101,6 +74,16 @@ class Name:
     joint: str | None
     unit: str | None
     foreign: str | None = None
+
+    @property
+    def own(self) -> str:
+        """The joint's own name, ``elbow`` of ``/joint_states/elbow``."""
+        return (self.joint or "").rpartition("/")[2]
+
+    @property
+    def topic(self) -> str:
+        """What stands before the joint's own name."""
+        return (self.joint or "").rpartition("/")[0]
 
 
 @dataclass(frozen=True)
@@ -127,18 +110,15 @@ def take_apart(column: str) -> Name:
             break
     if text in TIMES and (known := unit_of(text)):  # "millis" says its unit itself
         unit = known
-    return replace(_stem_and_joint(text), unit=unit, foreign=foreign)
-
-
-def _stem_and_joint(text: str) -> Name:
-    if found := re.match(r"^(.*)/([^/]+)/(position|velocity|effort)$", text):
-        return Name(found[3], f"{found[1]}/{found[2]}", None)
-    if found := re.match(r"^.*/(position|velocity|effort)[.\[/](\d+)\]?$", text):
-        return Name(found[1], found[2], None)
+    if found := _JOINT_NAMED.match(text):
+        return Name(found[2], found[1], unit, foreign)
+    if found := _JOINT_PLACED.match(text):
+        return Name(found[1], found[2], unit, foreign)
     for pattern, stem, joint in ((_JOINT_FIRST, 2, 1), (_JOINT_LAST, 1, 2)):
         if found := pattern.match(text):
-            return Name(found[stem].replace(" ", "_").replace(".", "_"), found[joint].lstrip("0") or "0", None)
-    return Name(text, None, None)
+            plain = found[stem].replace(" ", "_").replace(".", "_")
+            return Name(plain, found[joint].lstrip("0") or "0", unit, foreign)
+    return Name(text, None, unit, foreign)
 
 
 def on_motor_side(column: str) -> bool:
@@ -177,33 +157,59 @@ def choose(
     if "theta1" not in chosen or "tau1" not in chosen:
         worded = _worded(parts)
         found = _pairs({**parts, **worded}, joints)
-        names = _named_joints(found, {**parts, **worded})
-        if joints or (names and along_the_arm(names)[1] == "names"):
+        own = _named_joints(found, {**parts, **worded})
+        if joints or (own and along_the_arm(own)[1] == "names"):
             chosen, parts = found, {**parts, **worded}
         if joints and "theta1" not in {*chosen, *named}:
-            there = _joints_there({**parts, **worded})
+            names = [name.own for name in {**parts, **worded}.values() if name.joint and name.stem in _STEMS]
+            there = ", ".join(list(dict.fromkeys(names))[:16]) or "none that can be told by their names"
             raise LookupError(f"no columns of the joints {', '.join(joints)}; joints there are: {there}")
     if passive and "tau1" not in chosen and (torque := _only_torque(parts, chosen.get(f"theta{3 - passive}"))):
         chosen[f"tau{3 - passive}"] = torque
-    time = _time(parts)
-    if time:
+    if time := _time(parts):
         chosen["t"] = time
     chosen = _of_one_pair(chosen, parts)
     for channel, column in chosen.items():
-        if channel not in named:
-            _refuse_twin(column, parts)
+        stem, joint = parts[column].stem, parts[column].joint
+        if channel in named or joint is None:
+            continue
+        twin = next(
+            (one for one, other in parts.items() if one != column and (other.stem, other.joint) == (stem, joint)), None
+        )
+        if twin is not None:  # another column of the same name but for its writing or its unit
+            raise LookupError(f"{column!r} and {twin!r} are both {stem} of joint {joint}")
     units = {channel: unit for channel, column in chosen.items() if (unit := parts[column].unit)}
     foreign = {channel: unit for channel, column in chosen.items() if (unit := parts[column].foreign)}
     return ChannelChoice(chosen, units, _named_joints(chosen, parts), foreign)
 
 
 def _pairs(parts: dict[str, Name], joints: tuple[str, str] | None) -> dict[str, str]:
+    """By canonical channel its column, of the quantities that stand there for two joints, or for the two told."""
     chosen: dict[str, str] = {}
     for quantity in ("theta", "tau", "omega"):
-        pair = _pair(parts, STEMS[quantity], joints)
-        if pair:
-            chosen |= {f"{quantity}1": pair[0], f"{quantity}2": pair[1]}
+        for stem in STEMS[quantity]:
+            of_stem = {name.joint: column for column, name in parts.items() if name.stem == stem and name.joint}
+            pair = _two(of_stem, joints)
+            if len(of_stem) > 2 and not joints:
+                there = ", ".join(list(of_stem)[:8])
+                raise LookupError(f"{stem!r} stands there for {counted(len(of_stem), 'joint')}: {there}")
+            if pair:
+                chosen |= {f"{quantity}1": pair[0], f"{quantity}2": pair[1]}
+                break
     return chosen
+
+
+def _two(by_joint: dict[str, str], joints: tuple[str, str] | None) -> tuple[str, str] | None:
+    """The columns of the two joints told, else of the two there are, from the base outwards where their names tell."""
+    if joints:
+        found = [[key for key in by_joint if joint.lower() in (key, key.rpartition("/")[2])] for joint in joints]
+        return (by_joint[found[0][0]], by_joint[found[1][0]]) if all(len(keys) == 1 for keys in found) else None
+    if len(by_joint) != 2:
+        return None
+    short = {key.rpartition("/")[2]: column for key, column in by_joint.items()}
+    named = short if len(short) == 2 else by_joint
+    (first, second), _ = along_the_arm(list(named))
+    return named[first], named[second]
 
 
 def other_joints(columns: Iterable[str], angles: Collection[str]) -> dict[str, str]:
@@ -211,29 +217,23 @@ def other_joints(columns: Iterable[str], angles: Collection[str]) -> dict[str, s
     parts = {column: take_apart(column) for column in columns}
     parts |= _worded(parts)
     read = [parts[column] for column in angles]
-    kinds = {(name.stem, _topic(name)) for name in read}
+    kinds = {(name.stem, name.topic) for name in read}
     joints = {name.joint for name in read}
     return {
-        name.joint.rsplit("/", 1)[-1]: column
+        name.own: column
         for column, name in parts.items()
-        if name.joint and name.joint not in joints and (name.stem, _topic(name)) in kinds
+        if name.joint and name.joint not in joints and (name.stem, name.topic) in kinds
     }
-
-
-def _topic(name: Name) -> str:
-    """What stands before a joint's own name, as in ``/joint_states/elbow``."""
-    return (name.joint or "").rpartition("/")[0]
 
 
 def _worded(parts: dict[str, Name]) -> dict[str, Name]:
     """Columns named by a joint's own name and a stem, ``shoulder_pos`` or ``torque elbow``, taken apart so."""
-    stems = sorted({stem for known in STEMS.values() for stem in known}, key=len, reverse=True)
     found = {}
     for column, name in parts.items():
-        if name.joint is not None or name.stem in stems:
+        if name.joint is not None or name.stem in _STEMS:
             continue
         text = re.sub(r"\W+", "_", name.stem).strip("_")
-        for stem in stems:
+        for stem in _STEMS:
             joint = text.removesuffix(f"_{stem}") if text.endswith(f"_{stem}") else text.removeprefix(f"{stem}_")
             if joint != text:
                 words = [word for word in joint.split("_") if word not in ("joint", "axis")]
@@ -243,44 +243,12 @@ def _worded(parts: dict[str, Name]) -> dict[str, Name]:
     return found
 
 
-def _joints_there(parts: dict[str, Name]) -> str:
-    stems = {stem for known in STEMS.values() for stem in known}
-    names = [name.joint.rsplit("/", 1)[-1] for name in parts.values() if name.joint and name.stem in stems]
-    return ", ".join(list(dict.fromkeys(names))[:16]) or "none that can be told by their names"
-
-
-def _refuse_twin(column: str, parts: dict[str, Name]) -> None:
-    """Raises `LookupError` where another column has the same name but for its writing or its unit."""
-    name = parts[column]
-    twin = next((one for one, other in parts.items() if one != column and _same(name, other)), None)
-    if name.joint is not None and twin is not None:
-        raise LookupError(f"{column!r} and {twin!r} are both {name.stem} of joint {name.joint}")
-
-
-def _same(one: Name, other: Name) -> bool:
-    return (one.stem, one.joint) == (other.stem, other.joint)
-
-
 def _named_joints(chosen: dict[str, str], parts: dict[str, Name]) -> tuple[str, str] | None:
     """The joints' own names as they stand in the log; None where they are numbers, or none was found."""
     places = list(parts)
     pair = sorted((chosen[name] for name in ("theta1", "theta2") if name in chosen), key=places.index)
-    names = [(parts[column].joint or "").rsplit("/", 1)[-1] for column in pair]
-    return (names[0], names[1]) if len(names) == 2 and not all(name.isdigit() for name in names) else None
-
-
-def _pair(parts: dict[str, Name], stems: tuple[str, ...], joints: tuple[str, str] | None) -> tuple[str, str] | None:
-    for stem in stems:
-        by_joint = {name.joint: column for column, name in parts.items() if name.stem == stem and name.joint}
-        if joints and (wanted := _wanted(by_joint, joints)):
-            return wanted
-        if len(by_joint) == 2 and not joints:
-            return _in_order(by_joint)
-        if len(by_joint) > 2 and not joints:
-            raise LookupError(
-                f"{stem!r} stands there for {counted(len(by_joint), 'joint')}: {', '.join(list(by_joint)[:8])}"
-            )
-    return None
+    names = [parts[column].own for column in pair]
+    return (names[0], names[1]) if len(names) == 2 and not all(name.isdecimal() for name in names) else None
 
 
 def _only_torque(parts: dict[str, Name], angle: str | None) -> str | None:
@@ -298,34 +266,12 @@ def _of_one_pair(chosen: dict[str, str], parts: dict[str, Name]) -> dict[str, st
     pair = [parts[chosen[f"theta{joint}"]].joint for joint in (1, 2)] if "theta1" in chosen else None
     kept = {}
     for channel, column in chosen.items():
-        own = (
-            channel == "t"
-            or pair is None
-            or parts[column].joint is None
-            or parts[column].joint == pair[int(channel[-1]) - 1]
-        )
+        joint = parts[column].joint
+        theirs = pair[int(channel[-1]) - 1] if pair and channel != "t" else joint
         # drivers mix counting from zero and from one between quantities: the order is what counts then
-        if own or {parts[column].joint, pair[int(channel[-1]) - 1] if pair else None} <= {"0", "1", "2"}:
+        if joint in (None, theirs) or {joint, theirs} <= {"0", "1", "2"}:
             kept[channel] = column
     return kept
-
-
-def _wanted(by_joint: dict[str, str], joints: tuple[str, str]) -> tuple[str, str] | None:
-    found = []
-    for joint in joints:
-        text = joint.lower()
-        matches = [key for key in by_joint if key == text or key.rsplit("/", 1)[-1] == text]
-        if len(matches) != 1:
-            return None
-        found.append(by_joint[matches[0]])
-    return found[0], found[1]
-
-
-def _in_order(by_joint: dict[str, str]) -> tuple[str, str]:
-    """The columns of two joints, from the base outwards where their names tell."""
-    short = {joint.rsplit("/", 1)[-1]: column for joint, column in by_joint.items()}
-    (first, second), _ = along_the_arm(list(short if len(short) == 2 else by_joint))
-    return (short[first], short[second]) if len(short) == 2 else (by_joint[first], by_joint[second])
 
 
 def _time(parts: dict[str, Name]) -> str | None:

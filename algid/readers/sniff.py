@@ -40,11 +40,13 @@ def sniff(path: Path) -> str:
     LogError
         If there is no such file, it cannot be read, or its content is none of these.
     """
-    if not _is_unicode(path):
+    if any(0xD800 <= ord(letter) <= 0xDFFF for letter in str(path)):  # bytes that polars and results cannot name
         raise LogError(f"{str(path)!r}: the name is not valid UTF-8; rename the log")
     try:
         if path.is_dir():
-            return _folder(path)
+            if (path / "metadata.yaml").is_file() or any(path.glob("*.mcap")) or any(path.glob("*.db3")):
+                return "rosbag2"
+            raise LogError(f"{path}: a folder without metadata.yaml or *.mcap; expected a log file or a rosbag2 folder")
         if not path.is_file():
             found = "it is no regular file" if path.exists() else "there is no such file"
             raise LogError(f"{path}: {found}; expected a log in MCAP, Parquet or CSV; check the name")
@@ -55,17 +57,6 @@ def sniff(path: Path) -> str:
     return _by_content(path, head)
 
 
-def _is_unicode(path: Path) -> bool:
-    """Whether the name can be told to polars and written into a result; surrogates stand for bytes that cannot."""
-    return not any(0xD800 <= ord(letter) <= 0xDFFF for letter in str(path))
-
-
-def _folder(path: Path) -> str:
-    if (path / "metadata.yaml").is_file() or any(path.glob("*.mcap")) or any(path.glob("*.db3")):
-        return "rosbag2"
-    raise LogError(f"{path}: a folder without metadata.yaml or *.mcap; expected a log file or a rosbag2 folder")
-
-
 def _by_content(path: Path, head: bytes) -> str:
     kind = next((name for magic, name in _KINDS if head.startswith(magic)), None)
     if kind is not None:
@@ -73,24 +64,21 @@ def _by_content(path: Path, head: bytes) -> str:
     if head.startswith(b"PK\x03\x04") and path.suffix.lower() == ".npz":  # any zip begins so
         return "npz"
     if head.startswith((ZSTD, GZIP)):
-        return _compressed(path, "csv.zst" if head.startswith(ZSTD) else "csv.gz")
+        name = "csv.zst" if head.startswith(ZSTD) else "csv.gz"
+        inside = head_of(path, name)
+        if inside.startswith(MCAP):
+            raise LogError(
+                f"{path}: an MCAP file compressed as a whole, which cannot be read by parts; "
+                f"unpack it first: {'zstd -d' if name == 'csv.zst' else 'gunzip'} {path.name}"
+            )
+        if inside and looks_like_text(inside):
+            return name
+        raise LogError(f"{path}: compressed, but not a table of text; unpack it and name what is inside")
     if not head:
         raise LogError(f"{path}: the file is empty; expected a log in MCAP, Parquet or CSV")
     if looks_like_text(head):
         return "csv"
     raise LogError(f"{path}: unknown format, it begins with {head[:8]!r}; expected a log in MCAP, Parquet or CSV")
-
-
-def _compressed(path: Path, name: str) -> str:
-    head = head_of(path, name)
-    if head.startswith(MCAP):
-        raise LogError(
-            f"{path}: an MCAP file compressed as a whole, which cannot be read by parts; "
-            f"unpack it first: {'zstd -d' if name == 'csv.zst' else 'gunzip'} {path.name}"
-        )
-    if head and looks_like_text(head):
-        return name
-    raise LogError(f"{path}: compressed, but not a table of text; unpack it and name what is inside")
 
 
 def looks_like_text(head: bytes) -> bool:
@@ -125,13 +113,19 @@ def pieces(path: Path, name: str, size: int = _PIECE) -> Iterator[bytes]:
     try:
         with path.open("rb") as raw:
             most = _FREE_BYTES + _BYTES_A_BYTE * os.fstat(raw.fileno()).st_size
-            if name == "csv.zst":
-                yield from _bounded(path, _gathered(_zstd(raw), size), most)
-            elif name == "csv.gz":
-                stream = gzip.GzipFile(fileobj=raw)
-                yield from _bounded(path, iter(lambda: stream.read(size), b""), most)
-            else:
+            if name == "csv":
                 yield from iter(lambda: raw.read(size), b"")
+                return
+            stream = gzip.GzipFile(fileobj=raw)
+            total = 0
+            for part in _gathered(_zstd(raw), size) if name == "csv.zst" else iter(lambda: stream.read(size), b""):
+                total += len(part)
+                if total > most:
+                    raise LogError(
+                        f"{path}: the compressed data unpack to more than {counted(most, 'byte')}, "
+                        "as no table of their size does; if it is one, unpack it first"
+                    )
+                yield part
     except (OSError, EOFError, zlib.error) as error:
         raise LogError(f"{path}: the compressed data are damaged or cut off ({error}); copy it again") from error
 
@@ -168,19 +162,6 @@ def _gathered(parts: Iterator[bytes], size: int) -> Iterator[bytes]:
             held, length = [], 0
     if length:
         yield b"".join(held)
-
-
-def _bounded(path: Path, parts: Iterator[bytes], most: int) -> Iterator[bytes]:
-    total = 0
-    for part in parts:
-        total += len(part)
-        if total > most:
-            raise LogError(
-                f"{path}: the compressed data unpack to more than {counted(most, 'byte')}, "
-                "as no table of their size does; "
-                "if it is one, unpack it first"
-            )
-        yield part
 
 
 def whole_lines(path: Path, name: str) -> Iterator[bytes]:

@@ -10,6 +10,7 @@ import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
+from typing import TypeGuard
 
 from algid.readers.names import CURRENTS, STEMS, TIMES, take_apart
 from algid.units import ANGLE, CURRENT, NANOSECONDS, TORQUE, is_foreign, unit_of
@@ -49,23 +50,20 @@ def in_metadata(metadata: Mapping[str, str], columns: Sequence[str]) -> dict[str
     found: dict[str, str] = {}
     for key, value in metadata.items():
         if key.lower() in ("unit", "units"):
-            found |= _mapped(value, columns) or in_text([f"units: {value}", value], columns)
+            try:
+                content = json.loads(value)  # an object of units by name, or text
+            except (ValueError, RecursionError):
+                content = None
+            units = (
+                {name: unit for name, unit in content.items() if _is_unit(unit)} if isinstance(content, dict) else {}
+            )
+            mapped = {column: unit for name, unit in units.items() for column in _columns_of(name, columns)}
+            found |= mapped or in_text([f"units: {value}", value], columns)
             continue
         named = re.fullmatch(r"(?:units?[.:_ /](.+)|(.+)[.:_ /]units?)", key, re.IGNORECASE)
         if named and _is_unit(value):
             found |= dict.fromkeys(_columns_of(named[1] or named[2], columns), value.strip())
     return found
-
-
-def _mapped(text: str, columns: Sequence[str]) -> dict[str, str]:
-    """A JSON object of units by name."""
-    try:
-        content = json.loads(text)
-    except (ValueError, RecursionError):
-        return {}
-    stated = content.items() if isinstance(content, dict) else ()
-    units = [(name, unit) for name, unit in stated if isinstance(unit, str) and _is_unit(unit)]
-    return {column: unit for name, unit in units for column in _columns_of(name, columns)}
 
 
 def _statements(line: str, columns: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -76,13 +74,9 @@ def _statements(line: str, columns: Sequence[str]) -> Iterator[tuple[str, str]]:
             *others, last = re.split(r" ?(?:,|&|\band\b) ?", found["names"])
             yield from ((column, unit) for column in _columns_of(last, columns))
             for name in others:
-                yield from ((column, unit) for column in _columns_of(name, columns) if _has(column, unit))
-
-
-def _has(column: str, unit: str) -> bool:
-    """Whether the quantity of a column has a unit."""
-    known = _UNITS.get(_quantity(column) or "", {})
-    return unit_of(unit) in known
+                for column in _columns_of(name, columns):
+                    if unit_of(unit) in _UNITS.get(_quantity(column) or "", {}):
+                        yield column, unit
 
 
 def _listed(text: str, columns: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -100,8 +94,8 @@ def _listed(text: str, columns: Sequence[str]) -> Iterator[tuple[str, str]]:
                 yield from ((column, unit) for column in columns if _quantity(column) == quantity)
 
 
-def _is_unit(text: str) -> bool:
-    return unit_of(text) is not None or is_foreign(text)
+def _is_unit(text: object) -> TypeGuard[str]:
+    return isinstance(text, str) and (unit_of(text) is not None or is_foreign(text))
 
 
 def _columns_of(name: str, columns: Sequence[str]) -> list[str]:

@@ -1,18 +1,14 @@
-"""Samples as a file holds them: named channels in the file's own units, before anything is converted.
-
-What every reader of a log format offers.
-"""
+"""Samples as a file holds them: named channels in the file's own units, before anything is converted."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.log import IntArray, Log, Notice, Origin
+from algid.log import IntArray, Notice
 
 JOINT_CHANNELS = ("theta1", "theta2", "tau1", "tau2")
 VELOCITIES = ("omega1", "omega2")
@@ -70,20 +66,3 @@ def cut(tables: Iterator[SampleTable], rows: int) -> Iterator[SampleTable]:
 
 
 BLOCK_ROWS = 1 << 18
-
-
-class Reader(Protocol):
-    """An opened log. What it is stands in `origin` at once; its samples come in blocks, in time order.
-
-    A block's notices are those found while reading it; stamps strictly increase within and across blocks.
-    Memory is bounded by the block's size wherever the format allows it.
-    """
-
-    @property
-    def origin(self) -> Origin:
-        """Where the log came from, and how it is read."""
-        ...
-
-    def blocks(self, rows: int = BLOCK_ROWS) -> Iterator[Log]:
-        """Yield the log in blocks of at most `rows` samples. Raises `LogError` for what cannot be read."""
-        ...
