@@ -29,7 +29,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.files import whole_file
 from algid.progress import Told
-from algid.report.reduce import Block, blocks, by_log, columns_of, row_count
+from algid.report.reduce import blocks, by_log, columns_of, row_count
 from algid.results import read_result
 from algid.ros2 import HEADER, JOINT_STATE, JOINT_STATE_DEFINITION
 
@@ -92,7 +92,8 @@ def _write_torques(writer: Writer, path: Path, logs: int, told: Told | None) -> 
     for log, block in by_log(blocks(path, SIGNALS, ROWS)):
         stamps = _stamps(block["t"], starts[log] if log < len(starts) else 0)
         place = "/algid" if log == 0 else f"/algid/log{log + 1}"
-        theta, omega, tau, predicted = (_pairs(block, name) for name in ("theta", "omega", "tau", "tau#_predicted"))
+        names = ("theta{}", "omega{}", "tau{}", "tau{}_predicted")
+        theta, omega, tau, predicted = ((block[name.format(1)], block[name.format(2)]) for name in names)
         residual = (tau[0] - predicted[0], tau[1] - predicted[1])
         for name, message, signals in (
             ("measured", whole, (theta, omega, tau)),
@@ -108,12 +109,6 @@ def _write_torques(writer: Writer, path: Path, logs: int, told: Told | None) -> 
         done += len(stamps)
         if told is not None:
             told("export", done, total)
-
-
-def _pairs(block: Block, name: str) -> tuple[FloatArray, FloatArray]:
-    """A signal of both joints; `#` stands for the joint, which otherwise comes last."""
-    first, second = (name.replace("#", str(joint)) if "#" in name else f"{name}{joint}" for joint in (1, 2))
-    return block[first], block[second]
 
 
 def write_series(writer: Writer, path: Path, topic: str) -> None:

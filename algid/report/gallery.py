@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from algid.errors import ResultError
 from algid.progress import Told
 from algid.report.figures.base import Figure, Missing
-from algid.report.figures.closeup import TITLE as CLOSEUP
-from algid.report.figures.closeup import closeup
-from algid.report.figures.convergence import convergence
+from algid.report.figures.convergence import LOADED, convergence
+from algid.report.figures.convergence import TITLE as CONVERGENCE
 from algid.report.figures.correlation import correlation
 from algid.report.figures.coverage import coverage
 from algid.report.figures.inertia import inertia
@@ -21,12 +21,13 @@ from algid.report.figures.innovations import TITLE as INNOVATIONS
 from algid.report.figures.innovations import innovations
 from algid.report.figures.running import TITLE as RUNNING
 from algid.report.figures.running import running
-from algid.report.figures.signals import signals
+from algid.report.figures.torque import CLOSEUP, closeup, signals, torque
 from algid.report.figures.torque import TITLE as TORQUE
-from algid.report.figures.torque import torque
 from algid.report.reduce import LARGEST
 from algid.report.series import TorqueLog, read_torque
 from algid.results import Estimate, Result
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -46,24 +47,19 @@ class Gallery:
 def gallery(folder: Path, result: Result, told: Told | None = None) -> Gallery:
     """Every figure that the folder gives, in the page's order."""
     result = drawable(result)
-    series, loaded, seconds, left, so_far = (
-        folder / f"{name}.parquet" for name in ("estimates", "loaded", "information", "innovations", "running")
+    estimates, loaded, torques, left, so_far, seconds = (
+        folder / f"{name}.parquet"
+        for name in ("estimates", "loaded", "torque", "innovations", "running", "information")
     )
-    paper = [_try("convergence", "Convergence of the estimates", series, lambda: convergence(series, result))]
+    found = _try("torque", f"{TORQUE}, residual, coverage", torques, lambda: read_torque(torques, told))
+    read = None if isinstance(found, Missing) else found
     figures: list[Figure | Missing] = []
-    if loaded.is_file():
-        paper.append(
-            _try("loaded", "Convergence, loaded log", loaded, lambda: convergence(loaded, result, loaded=True))
-        )
-    measured = folder / "torque.parquet"
-    found = _torque_log(measured, told)
     if isinstance(found, Missing):
         figures.append(found)
     else:
         figures.append(torque(found, result.logs))
         if found.reduced:
-            figures.append(_try("closeup", CLOSEUP, measured, lambda: closeup(measured, found)))
-    read = None if isinstance(found, Missing) else found
+            figures.append(_try("closeup", CLOSEUP, torques, lambda: closeup(torques, found)))
     figures.append(_try("innovations", INNOVATIONS, left, lambda: innovations(left, result)))
     figures.append(_try("running", RUNNING, so_far, lambda: running(so_far, result)))
     if read is not None:
@@ -71,6 +67,9 @@ def gallery(folder: Path, result: Result, told: Told | None = None) -> Gallery:
     figures.append(correlation(result))
     figures.append(_try("information", INFORMATION, seconds, lambda: information(seconds, result)))
     figures.append(inertia(result, read))
+    paper = [_try("convergence", CONVERGENCE, estimates, lambda: convergence(estimates, result))]
+    if loaded.is_file():
+        paper.append(_try("loaded", LOADED, loaded, lambda: convergence(loaded, result, loaded=True)))
     return Gallery(read, figures, paper)
 
 
@@ -91,24 +90,11 @@ def drawable(result: Result) -> Result:
     return result.model_copy(update={**changed, "fit": result.fit.model_copy(update={"covariance": covariance})})
 
 
-def _torque_log(path: Path, told: Told | None) -> TorqueLog | Missing:
-    title = f"{TORQUE}, residual, coverage"
-    if not path.is_file():
-        return Missing("torque", title, _absent(path))
-    try:
-        return read_torque(path, told)
-    except ResultError as error:
-        return Missing("torque", title, str(error))
-
-
-def _try(key: str, title: str, file: Path, make: Callable[[], Figure | Missing]) -> Figure | Missing:
+def _try(key: str, title: str, file: Path, make: Callable[[], T]) -> T | Missing:
+    """What `make` gives, or why the file does not give it."""
     if not file.is_file():
-        return Missing(key, title, _absent(file))
+        return Missing(key, title, f"{file.name} is not in this folder")
     try:
         return make()
     except ResultError as error:
         return Missing(key, title, str(error))
-
-
-def _absent(path: Path) -> str:
-    return f"{path.name} is not in this folder"

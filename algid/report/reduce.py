@@ -67,7 +67,12 @@ def blocks(path: Path, names: Sequence[str], rows: int = ROWS) -> Iterator[Block
     # without pre_buffer=False the file is kept in memory as it is read
     with _reading(path), pyarrow.parquet.ParquetFile(path, pre_buffer=False) as file:
         for batch in file.iter_batches(batch_size=rows, columns=list(names)):
-            yield {name: _array(batch.column(name)) for name in names}
+            block = {}
+            for name in names:
+                values = np.asarray(batch.column(name).to_numpy(zero_copy_only=False), dtype=np.float64)
+                beyond = np.isfinite(values) & (np.abs(values) > LARGEST)
+                block[name] = np.where(beyond, np.nan, values) if beyond.any() else values
+            yield block
 
 
 def table_of(path: Path, names: Sequence[str]) -> dict[str, list[Any]]:
@@ -109,12 +114,6 @@ def by_log(found: Iterator[Block]) -> Iterator[tuple[int, Block]]:
         for first, last in pairwise(edges):
             if last > first:
                 yield int(log[first]), {name: column[first:last] for name, column in block.items()}
-
-
-def _array(column: object) -> FloatArray:
-    values = np.asarray(column.to_numpy(zero_copy_only=False), dtype=np.float64)  # type: ignore[attr-defined]
-    beyond = np.isfinite(values) & (np.abs(values) > LARGEST)
-    return np.where(beyond, np.nan, values) if beyond.any() else values
 
 
 GOLDEN = 0.6180339887498949

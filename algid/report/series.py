@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.progress import Told
@@ -83,7 +82,9 @@ class _SeriesGathering:
     def __init__(self, names: list[str], total: int, settings: Mapping[str, Any]) -> None:
         self.names = names
         self._total = total
-        self._window = _positive(settings.get("window"), WINDOW) if settings.get("estimator") == "paper" else WINDOW
+        window = settings.get("window") if settings.get("estimator") == "paper" else None
+        usable = isinstance(window, int | float) and not isinstance(window, bool) and window > 0
+        self._window = float(window) if usable else WINDOW  # type: ignore[arg-type]
         self._start: float | None = None
         self._end = 0.0
         self._size = bucket_size(total, SERIES_POINTS)
@@ -102,7 +103,11 @@ class _SeriesGathering:
         late = np.mod(since + 1e-9, self._window) >= EPSILON
         for name in self.names:
             self._lines[name].feed(t, block[name])
-            self._singular[name].feed(t, late & np.isnan(block[name]) & _ill(block, name))
+            conditions = ["condition", *(["k7_condition"] if name == "k7" else [])]
+            known = [~(block[condition] <= LARGEST_CONDITION) for condition in conditions if condition in block]
+            # everywhere where the file does not tell
+            ill = np.logical_or.reduce(known) if known else np.ones(t.size, dtype=bool)
+            self._singular[name].feed(t, late & np.isnan(block[name]) & ill)
         if "condition" in block:
             self._condition.feed(t, np.where(np.isfinite(block["condition"]), block["condition"], np.nan))
         self._samples.feed(np.stack([t, *(block[name] for name in self.names)]))
@@ -126,13 +131,6 @@ class _SeriesGathering:
         )
 
 
-def _ill(block: Block, name: str) -> NDArray[np.bool_]:
-    """Where the system of that series is singular; everywhere where the file does not tell."""
-    conditions = ["condition", *(["k7_condition"] if name == "k7" else [])]
-    known = [~(block[condition] <= LARGEST_CONDITION) for condition in conditions if condition in block]
-    return np.logical_or.reduce(known) if known else np.ones(block["t"].size, dtype=bool)
-
-
 def _medians(x: FloatArray, y: FloatArray) -> Series:
     """Medians of the finite samples in `MIDDLES` stretches, NaN where there are none."""
     size = max(x.size // MIDDLES, 1)
@@ -143,24 +141,8 @@ def _medians(x: FloatArray, y: FloatArray) -> Series:
     return x[:whole:size], middle
 
 
-def _positive(value: object, otherwise: float) -> float:
-    usable = isinstance(value, int | float) and not isinstance(value, bool) and value > 0
-    return float(value) if usable else otherwise  # type: ignore[arg-type]
-
-
 COLUMNS = ("log", "t", "theta1", "theta2", "omega1", "omega2", "tau1", "tau2", "tau1_predicted", "tau2_predicted")
-SERIES = (
-    "theta1",
-    "theta2",
-    "omega1",
-    "omega2",
-    "tau1",
-    "tau2",
-    "tau1_predicted",
-    "tau2_predicted",
-    "residual1",
-    "residual2",
-)
+SERIES = (*COLUMNS[2:], "residual1", "residual2")
 POINTS = 2_400  # a series; twice what the page is wide
 DOTS = 2_000
 LONGEST_GAP = 5  # sampling periods; longer breaks the line
@@ -194,7 +176,7 @@ class TorqueLog:
     """
 
     ranges: dict[int, LogRange]
-    series: dict[int, dict[str, tuple[FloatArray, FloatArray]]]
+    series: dict[int, dict[str, Series]]
     motion: FloatArray
     extremes: dict[str, tuple[float, float]]
     rms: tuple[float, float]
@@ -237,9 +219,19 @@ class _Gathering:
         for name, reducer in reducers.items():
             reducer.feed(block["t"], block[name])
         self.motion.feed(np.stack([block[name] for name in ("theta1", "theta2", "omega1", "omega2")]))
-        self._widen(block)
-        self._find_worst(log, block)
-        self._sum(block)
+        for name in SERIES:
+            low, high = float(np.fmin.reduce(block[name])), float(np.fmax.reduce(block[name]))
+            old = self.extremes.get(name, (low, high))
+            self.extremes[name] = float(np.fmin(low, old[0])), float(np.fmax(high, old[1]))
+        for joint in (1, 2):
+            size = np.nan_to_num(np.abs(block[f"residual{joint}"]), nan=-1.0)
+            place = int(size.argmax())
+            if size[place] >= 0 and size[place] > self.worst.get(joint, (-1.0, 0, 0.0))[0]:
+                self.worst[joint] = (float(size[place]), log, float(block["t"][place]))
+        for place, name in enumerate(("tau1", "tau2", "residual1", "residual2")):
+            finite = block[name][np.isfinite(block[name])]
+            self.squares[place] += finite @ finite
+            self.counts[place] += finite.size
 
     def _range(self, log: int, t: FloatArray) -> None:
         """Extend the log's range."""
@@ -253,31 +245,16 @@ class _Gathering:
         span.largest_gap = max(span.largest_gap, float(steps.max()))
         span.gaps += int(np.count_nonzero(steps > LONGEST_GAP * span.period))
 
-    def _widen(self, block: Block) -> None:
-        for name in (*COLUMNS[2:], "residual1", "residual2"):
-            low, high = float(np.fmin.reduce(block[name])), float(np.fmax.reduce(block[name]))
-            old = self.extremes.get(name, (low, high))
-            self.extremes[name] = float(np.fmin(low, old[0])), float(np.fmax(high, old[1]))
-
-    def _find_worst(self, log: int, block: Block) -> None:
-        for joint in (1, 2):
-            size = np.nan_to_num(np.abs(block[f"residual{joint}"]), nan=-1.0)
-            place = int(size.argmax())
-            if size[place] >= 0 and size[place] > self.worst.get(joint, (-1.0, 0, 0.0))[0]:
-                self.worst[joint] = (float(size[place]), log, float(block["t"][place]))
-
-    def _sum(self, block: Block) -> None:
-        for place, name in enumerate(("tau1", "tau2", "residual1", "residual2")):
-            finite = block[name][np.isfinite(block[name])]
-            self.squares[place] += finite @ finite
-            self.counts[place] += finite.size
-
     def result(self) -> TorqueLog:
         """What was gathered."""
         rms = np.sqrt(self.squares / np.maximum(self.counts, 1))
+        longest = {log: LONGEST_GAP * self.size * span.period for log, span in self.ranges.items()}
         return TorqueLog(
             ranges=self.ranges,
-            series={log: {name: self._series(log, name) for name in SERIES} for log in self.reducers},
+            series={
+                log: {name: broken_at_gaps(*reducer.result(), longest[log]) for name, reducer in reducers.items()}
+                for log, reducers in self.reducers.items()
+            },
             motion=self.motion.result(4),
             extremes=self.extremes,
             rms=(float(rms[0]), float(rms[1])),
@@ -286,7 +263,3 @@ class _Gathering:
             worst={joint: (log, moment) for joint, (_, log, moment) in self.worst.items()},
             reduced=self.size > 2,
         )
-
-    def _series(self, log: int, name: str) -> tuple[FloatArray, FloatArray]:
-        x, y = self.reducers[log][name].result()
-        return broken_at_gaps(x, y, LONGEST_GAP * self.size * self.ranges[log].period)

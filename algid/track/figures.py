@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.report.figures.base import Figure, Layout, Legend, Panel, Trace, axis, line, packed, times
+from algid.report.figures.base import Figure, Layout, Legend, Panel, Trace, axis, level, line, packed, stretch, times
 from algid.report.reduce import MinMax, broken_at_gaps, bucket_size
 from algid.report.text import joined
 from algid.track.bins import CELL
@@ -30,7 +30,9 @@ def _payload(result: TrackResult) -> Figure:
     found = result.track
     hover = "m_p %{y:.5g} kg at %{x:.3f} s<extra></extra>"
     traces = [*_band(found), line(*_curve(found, found.m_p), "@blue", "m_p(t)", "curve", width=1.2, hover=hover)]
-    traces.append(_steps(*_stretch_steps(found), "@green", "stretch", "solid", 2.6))
+    ends = np.array([end for one in found.stretches for end in (one.start, one.end)])
+    masses = np.repeat([one.m_p for one in found.stretches], 2)
+    traces.append(_steps(ends, masses, "@green", "stretch", "solid", 2.6))
     legend = [
         Legend("curve", f"m_p(t) from ± {HALF_BAND:g} s around, within its stretch", "@blue"),
         Legend("band", "its 95 % band", "@blue/0.25", "area"),
@@ -51,8 +53,8 @@ def _payload(result: TrackResult) -> Figure:
         "Read: blue should run level, green within its band; orange is where it may step. "
         "A band that opens wide tells that the arm moved too little; double-click shows all of it."
     )
-    masses = joined([mass_text(stretch) for stretch in found.stretches[:6]])
-    panel = Panel(traces, layout, f"Payload over time; stretches of {masses} kg", height=380, sync=SYNC)
+    told = joined([mass_text(one) for one in found.stretches[:6]])
+    panel = Panel(traces, layout, f"Payload over time; stretches of {told} kg", height=380, sync=SYNC)
     return Figure("payload", "Payload in time", (panel,), reading, tuple(legend))
 
 
@@ -63,7 +65,7 @@ def _left(result: TrackResult) -> Figure:
     layout = {
         "xaxis": axis("time, s", range=_span(found)),
         "yaxis": axis("residual / noise", rangemode="tozero"),
-        "shapes": [*_marks(found), _noise_level()],
+        "shapes": [*_marks(found), level(1.0, "@ink", "dash", 1.2)],
         "hovermode": "closest",
     }
     reading = (
@@ -79,11 +81,6 @@ def _left(result: TrackResult) -> Figure:
     return Figure("left", "What arm and payload leave of the torque", (panel,), reading, legend)
 
 
-def _noise_level() -> Layout:
-    dashed = {"color": "@ink", "width": 1.2, "dash": "dash"}
-    return {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": 1, "y1": 1, "line": dashed}
-
-
 def _span(found: Track) -> list[float]:
     return [found.stretches[0].start, found.stretches[-1].end]
 
@@ -92,7 +89,7 @@ def _view(result: TrackResult) -> list[float]:
     """Masses, their intervals and the truth; m_p(t) where it is as certain as usual."""
     found = result.track
     certain = found.std <= 3 * np.median(found.std)
-    ends = [end for stretch in found.stretches for end in stretch.ci95]
+    ends = [end for one in found.stretches for end in one.ci95]
     band = QUANTILE * found.std[certain]
     # percentiles: a jolt's spike may leave the frame
     ends += np.percentile(found.m_p[certain] - band, [1]).tolist()
@@ -107,12 +104,7 @@ def _marks(found: Track) -> list[Layout]:
     """Each change, over the whole panel, as wide as it is uncertain."""
     if len(found.changes) > MOST_MARKS:
         return []
-    return [_mark(low, high) for _, low, high in found.changes.tolist()]
-
-
-def _mark(low: float, high: float) -> Layout:
-    place = {"x0": low, "x1": high, "yref": "paper", "y0": 0, "y1": 1}
-    return {"type": "rect", **place, "fillcolor": "@orange/0.2", "line": {"width": 0}, "layer": "below"}
+    return [stretch(low, high, "@orange/0.2") for _, low, high in found.changes.tolist()]
 
 
 def _curve(found: Track, values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -144,11 +136,6 @@ def _band(found: Track) -> list[Trace]:
     area = {"mode": "lines", "fill": "toself", "fillcolor": "@blue/0.25", "line": {"width": 0, "color": "@blue/0.25"}}
     drawn = {"x": times(np.concatenate(xs)), "y": packed(np.concatenate(ys))}
     return [{"type": "scatter", **area, **drawn, "name": "band", "legendgroup": "band", "hoverinfo": "skip"}]
-
-
-def _stretch_steps(found: Track) -> tuple[FloatArray, FloatArray]:
-    x = [end for stretch in found.stretches for end in (stretch.start, stretch.end)]
-    return np.array(x), np.repeat([stretch.m_p for stretch in found.stretches], 2)
 
 
 def _true_steps(result: TrackResult) -> tuple[FloatArray, FloatArray]:

@@ -32,28 +32,26 @@ COLUMNS = (
 
 def stretch_table(result: TrackResult) -> Table:
     """The stretches, their masses and intervals."""
-    rows = tuple(
-        _row(place, stretch, status.value, result.truth(stretch))
-        for place, (stretch, status) in enumerate(zip(result.track.stretches, result.statuses, strict=True), start=1)
-    )
-    table = Table("Payload by stretch", COLUMNS, rows).without_empty()
+    rows = []
+    for place, (stretch, status) in enumerate(zip(result.track.stretches, result.statuses, strict=True), start=1):
+        low, high = (fixed(end, stretch.std) for end in stretch.ci95)
+        truth = result.truth(stretch)
+        rows.append(
+            (
+                str(place),
+                f"{stretch.start:.3f}",
+                f"{stretch.end:.3f}",
+                mass_text(stretch),
+                half_text(stretch),
+                "kg",
+                status.value,
+                f"[{low}, {high}]",
+                ABSENT if truth is None else fixed(truth, stretch.std),
+                ABSENT if truth is None else fixed(stretch.m_p - truth, stretch.std),
+            )
+        )
+    table = Table("Payload by stretch", COLUMNS, tuple(rows)).without_empty()
     return table.doubted() if verdict(result).level == "failed" else table
-
-
-def _row(place: int, stretch: Stretch, status: str, truth: float | None) -> tuple[str, ...]:
-    low, high = (fixed(end, stretch.std) for end in stretch.ci95)
-    return (
-        str(place),
-        f"{stretch.start:.3f}",
-        f"{stretch.end:.3f}",
-        mass_text(stretch),
-        half_text(stretch),
-        "kg",
-        status,
-        f"[{low}, {high}]",
-        ABSENT if truth is None else fixed(truth, stretch.std),
-        ABSENT if truth is None else fixed(stretch.m_p - truth, stretch.std),
-    )
 
 
 def change_table(result: TrackResult) -> Table:
@@ -66,25 +64,24 @@ def change_table(result: TrackResult) -> Table:
         Column("Unit", "text"),
         Column("Truth at, s", "number", rank=2),
     )
-    stretches = result.track.stretches
-    rows = tuple(
-        (
-            str(place + 1),
-            f"{moment:.3f}",
-            f"[{low:.3f}, {high:.3f}]",
-            _signed(stretches[place + 1].m_p - stretches[place].m_p, max(s.std for s in stretches[place : place + 2])),
-            "kg",
-            ABSENT if (true := _true_change(result, moment)) is None else f"{true:.3f}",
-        )
-        for place, (moment, low, high) in enumerate(result.track.changes.tolist())
-    )
-    note = "Times between tell neither mass: a grasp jolts the arm."
-    return Table("Changes", columns, rows, note).without_empty()
-
-
-def _true_change(result: TrackResult, moment: float) -> float | None:
     times = [time for time, _ in result.schedule or () if time > 0]
-    return min(times, key=lambda time: abs(time - moment), default=None)
+    rows = []
+    for place, (moment, low, high) in enumerate(result.track.changes.tolist()):
+        before, after = result.track.stretches[place : place + 2]
+        step = fixed(after.m_p - before.m_p, max(before.std, after.std))
+        true = min(times, key=lambda time: abs(time - moment), default=None)
+        rows.append(
+            (
+                str(place + 1),
+                f"{moment:.3f}",
+                f"[{low:.3f}, {high:.3f}]",
+                step if step.startswith("-") else f"+{step}",
+                "kg",
+                ABSENT if true is None else f"{true:.3f}",
+            )
+        )
+    note = "Times between tell neither mass: a grasp jolts the arm."
+    return Table("Changes", columns, tuple(rows), note).without_empty()
 
 
 def quality_tables(result: TrackResult) -> tuple[Table, ...]:
@@ -134,11 +131,6 @@ def fixed(value: float, std: float) -> str:
     return text.removeprefix("-") if float(text) == 0 else text
 
 
-def _signed(value: float, std: float) -> str:
-    text = fixed(value, std)
-    return text if text.startswith("-") else f"+{text}"
-
-
 COLOURED = 4.0  # of the rows' variance: intervals twice as wide as the sensors' noise asks for
 STRANGE = 1e4  # of the rows' variance: a real arm with friction reaches 6e3, another arm 5e4 and more
 ALL_BUT = 0.99  # explained of the torque, beyond which such errors are those of very quiet sensors
@@ -184,14 +176,12 @@ def _failure(result: TrackResult) -> str | None:
     statuses = result.statuses
     negative = sum(status is StretchStatus.NEGATIVE_MASS for status in statuses)
     if 2 * negative >= len(statuses):
-        return f"{_share(negative, len(statuses))} less than nothing: the arm's constants do not fit this log"
+        share = f"{negative} of {counted(len(statuses), 'stretch', 'stretches')} weigh"
+        share = "the payload weighs" if len(statuses) == 1 else share
+        return f"{share} less than nothing: the arm's constants do not fit this log"
     if all(status is StretchStatus.WEAK_EXCITATION for status in statuses):
         return "the arm moves too little to weigh anything"
     return None
-
-
-def _share(some: int, count: int) -> str:
-    return "the payload weighs" if count == 1 else f"{some} of {counted(count, 'stretch', 'stretches')} weigh"
 
 
 def _reasons(result: TrackResult) -> Iterator[str]:

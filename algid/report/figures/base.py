@@ -150,3 +150,16 @@ def band(low: float, high: float, colour: str) -> Layout:
         "line": {"width": 0},
         "layer": "below",
     }
+
+
+def stretch(first: float, last: float, colour: str) -> Layout:
+    """A vertical band over the whole panel, below the traces."""
+    place = {"yref": "paper", "x0": first, "x1": last, "y0": 0, "y1": 1}
+    return {"type": "rect", **place, "fillcolor": colour, "line": {"width": 0}, "layer": "below"}
+
+
+def between(x: FloatArray, low: FloatArray, high: FloatArray, colour: str, group: str = "") -> list[Trace]:
+    """The area between two series, as their unseen edges."""
+    edge = {"type": "scatter", "mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "x": times(x)}
+    edge |= {"legendgroup": group} if group else {}
+    return [{**edge, "y": packed(low)}, {**edge, "y": packed(high), "fill": "tonexty", "fillcolor": colour}]

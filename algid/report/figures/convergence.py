@@ -30,6 +30,7 @@ from algid.report.text import resolved, significant, unit_text
 from algid.results import Estimate, Result
 
 HEIGHT = 230
+TITLE, LOADED = "Convergence of the estimates", "Convergence, loaded log"
 MOST_WINDOWS = 6  # beyond, a line at every window's ε hides the series
 
 
@@ -44,7 +45,7 @@ class Target:
 
 def convergence(path: Path, result: Result, loaded: bool = False) -> Figure | Missing:
     """The series of `path` (estimates.parquet, or loaded.parquet where `loaded`), a panel each."""
-    key, title = ("loaded", "Convergence, loaded log") if loaded else ("convergence", "Convergence of the estimates")
+    key, title = ("loaded", LOADED) if loaded else ("convergence", TITLE)
     read = read_series(path, result.settings)
     if not read.lines:
         return Missing(key, title, f"{path.name} holds no series")
@@ -52,7 +53,12 @@ def convergence(path: Path, result: Result, loaded: bool = False) -> Figure | Mi
     panels = [_panel(read, name, target, key) for name, target in targets.items()]
     if read.condition is not None:
         panels.append(_condition(read, read.condition, key))
-    return Figure(key, title, tuple(panels), _reading_aid(read), _legend(read, targets), columns=2)
+    windows = f" in each window of {read.window:g} s" if len(read.windows) > 1 else ""
+    reading = (
+        f"Read: from ε = {EPSILON:g} s on{windows}, blue should settle on green; "
+        "double-click shows the spikes that the frame cuts off."
+    )
+    return Figure(key, title, tuple(panels), reading, _legend(read, targets), columns=2)
 
 
 def _target(name: str, result: Result, loaded: bool) -> Target:
@@ -65,41 +71,35 @@ def _target(name: str, result: Result, loaded: bool) -> Target:
 
 
 def _panel(read: SeriesLog, name: str, target: Target, sync: str) -> Panel:
+    found, unit = target.found, target.unit
     layout = {
         "xaxis": axis("time, s", range=[read.start, read.end]),
-        "yaxis": axis(label(target.unit), range=_view(read.samples[name], target)),
+        "yaxis": axis(label(unit), range=_view(read.samples[name], target)),
         "yaxis2": {"overlaying": "y", "range": [0, 1], "visible": False, "fixedrange": True},
         "shapes": [*_marks(target), *_epsilons(read)],
         "hovermode": "closest",
     }
-    return Panel(_traces(read, name, target), layout, _says(name, target), name, HEIGHT, sync)
+    final = "" if found is None else f"; final estimate {resolved(found.estimate, found.std)} {unit}"
+    truth = "" if target.truth is None else f"; truth {significant(target.truth)} {unit}"
+    return Panel(_traces(read, name, unit), layout, f"{name} over time{final}{truth}", name, HEIGHT, sync)
 
 
-def _traces(read: SeriesLog, name: str, target: Target) -> list[Trace]:
+def _traces(read: SeriesLog, name: str, unit: str) -> list[Trace]:
+    """The series, and behind it where the system was singular, as a share of the panel's height."""
     where, share = read.singular[name]
-    traces = [_shading(where, share)] if share.any() else []
-    hover = f"{label(name)} %{{y:.5g}} {label(target.unit)}<br>at %{{x:.4g}} s<extra></extra>"
+    traces: list[Trace] = []
+    if share.any():
+        area = {"fill": "tozeroy", "fillcolor": "@amber/0.35", "line": {"width": 0, "shape": "hv"}, "hoverinfo": "skip"}
+        traces.append(
+            {"type": "scatter", "mode": "lines", "x": times(where), "y": packed(share), "yaxis": "y2", **area}
+        )
+        traces[-1] |= {"legendgroup": "singular", "name": "singular"}
+    hover = f"{label(name)} %{{y:.5g}} {label(unit)}<br>at %{{x:.4g}} s<extra></extra>"
     colour = "@blue/0.3" if read.coarse else "@blue"
     traces.append(line(*read.lines[name], colour, label(name), "series", width=1.2, hover=hover))
     if read.coarse:
         traces.append(line(*read.middles[name], "@blue", label(name), "middle", width=1.6, hover=hover))
     return traces
-
-
-def _shading(where: FloatArray, share: FloatArray) -> Trace:
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "x": times(where),
-        "y": packed(share),
-        "yaxis": "y2",
-        "line": {"width": 0, "shape": "hv"},
-        "fill": "tozeroy",
-        "fillcolor": "@amber/0.35",
-        "hoverinfo": "skip",
-        "legendgroup": "singular",
-        "name": "singular",
-    }
 
 
 def _condition(read: SeriesLog, condition: Series, sync: str) -> Panel:
@@ -120,25 +120,21 @@ def _view(samples: FloatArray, target: Target) -> list[float] | None:
     settled = finite[finite.size // 4 :]
     if not settled.size:
         return None
-    ends = [*np.percentile(settled, [4, 96]).tolist(), *_known(target)]
+    found = target.found
+    known = [target.truth] if found is None else [target.truth, found.estimate, *(found.ci95 or ())]
+    ends = [*np.percentile(settled, [4, 96]).tolist(), *(value for value in known if value is not None)]
     low, high = min(ends), max(ends)
     space = 0.25 * (high - low) or 0.05 * abs(high) or 1.0
     return [low - space, high + space]
 
 
-def _known(target: Target) -> list[float]:
-    found = target.found
-    values = [target.truth] if found is None else [target.truth, found.estimate, *(found.ci95 or ())]
-    return [value for value in values if value is not None]
-
-
 def _marks(target: Target) -> list[Layout]:
+    """The interval, the estimate and the truth, as far as they are known."""
     marks: list[Layout] = []
     found = target.found
-    if found is not None and found.ci95 is not None:
-        low, high = found.ci95
-        if low is not None and high is not None:
-            marks.append(band(low, high, "@green/0.28"))
+    low, high = (found.ci95 if found is not None else None) or (None, None)
+    if low is not None and high is not None:
+        marks.append(band(low, high, "@green/0.28"))
     if found is not None and found.estimate is not None:
         marks.append(level(found.estimate, "@green", "solid"))
     if target.truth is not None:
@@ -174,11 +170,3 @@ def _legend(read: SeriesLog, targets: Mapping[str, Target]) -> tuple[Legend, ...
     if read.any_singular:
         entries.append(Legend("singular", "singular: condition number past 1e10", "@amber/0.35", "area"))
     return tuple(entries)
-
-
-def _reading_aid(read: SeriesLog) -> str:
-    windows = f" in each window of {read.window:g} s" if len(read.windows) > 1 else ""
-    return (
-        f"Read: from ε = {EPSILON:g} s on{windows}, blue should settle on green; "
-        "double-click shows the spikes that the frame cuts off."
-    )

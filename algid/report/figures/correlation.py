@@ -22,7 +22,8 @@ def correlation(result: Result) -> Figure | Missing:
     names = result.fit.covariance_names
     matrix = correlation_matrix(result.fit.covariance)
     reading = "Read: a strong colour off the diagonal means two estimates err together: trust their combination first."
-    pairs = _strong_pairs(names, matrix)
+    strong = np.argwhere(np.triu(np.abs(matrix) > STRONG, 1))
+    pairs = [f"{names[i]} and {names[j]} ({matrix[i, j]:+.3f})" for i, j in strong]
     note = f"Correlated beyond {STRONG:g}: {joined(pairs)}." if pairs else f"No pair is correlated beyond {STRONG:g}."
     if np.isnan(matrix).any():
         note += " What is not identifiable has no correlation."
@@ -62,8 +63,3 @@ def _panel(names: list[str], matrix: FloatArray, says: str) -> Panel:
     return Panel(
         [trace], layout, f"Correlation matrix of the estimates. {says}", height=min(140 + 34 * len(names), 620)
     )
-
-
-def _strong_pairs(names: list[str], matrix: FloatArray) -> list[str]:
-    strong = np.argwhere(np.triu(np.abs(matrix) > STRONG, 1))
-    return [f"{names[i]} and {names[j]} ({matrix[i, j]:+.3f})" for i, j in strong]

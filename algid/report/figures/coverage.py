@@ -14,7 +14,9 @@ TURN = 540.0  # degrees: an angle that spans more has turned round, and is shown
 
 def coverage(found: TorqueLog) -> Figure:
     """Samples of the motion, evenly spaced in time."""
-    degrees, turned = _wrapped(np.degrees(found.motion[:2]))
+    degrees = np.degrees(found.motion[:2])
+    turned = np.nanmax(degrees, axis=1) - np.nanmin(degrees, axis=1) > TURN
+    degrees = np.where(turned[:, None], (degrees + 180) % 360 - 180, degrees)
     theta = [_range(found, f"theta{joint}", np.degrees(1.0), "°") for joint in (1, 2)]
     omega = [_range(found, f"omega{joint}", 1.0, " rad/s") for joint in (1, 2)]
     panels = (
@@ -29,15 +31,8 @@ def coverage(found: TorqueLog) -> Figure:
     )
     reading = "Read: dots spread over both planes teach; a line or a spot leaves parameters tied to each other."
     note = f"θ1 {theta[0]}, θ2 {theta[1]}; speeds {omega[0]} and {omega[1]}."
-    note += " Angles that turned round are shown within ±180°." if turned else ""
+    note += " Angles that turned round are shown within ±180°." if turned.any() else ""
     return Figure("coverage", "Coverage of the motion", panels, reading, note=note, columns=2)
-
-
-def _wrapped(degrees: FloatArray) -> tuple[FloatArray, bool]:
-    span = np.nanmax(degrees, axis=1) - np.nanmin(degrees, axis=1)
-    turned = span > TURN
-    wrapped = (degrees + 180) % 360 - 180
-    return np.where(turned[:, None], wrapped, degrees), bool(turned.any())
 
 
 def _range(found: TorqueLog, name: str, scale: float, unit: str) -> str:

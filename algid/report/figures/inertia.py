@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from algid.arm import FloatArray, mass_matrix
-from algid.report.figures.base import Figure, Layout, Legend, Missing, Panel, Trace, axis, line, packed
+from algid.report.figures.base import Figure, Legend, Missing, Panel, Trace, axis, line, packed, stretch
 from algid.report.series import TorqueLog
 from algid.results import Result
 
@@ -27,12 +27,23 @@ def inertia(result: Result, found: TorqueLog | None) -> Figure | Missing:
         return Missing("inertia", TITLE, "k1, k3 or k5 has no estimate that can be drawn")
     theta2 = np.linspace(-np.pi, np.pi, 181)
     parts, stds = _parts(known, theta2), _stds(result, theta2)
-    smallest = _smallest_eigenvalue(parts)
+    m11, m12, m22 = parts
+    smallest = float((0.5 * (m11 + m22) - np.hypot(0.5 * (m11 - m22), m12)).min())  # eigenvalue
     reading = "Read: M11 and M22 must stay above zero; outside the grey stretch the curves extrapolate."
     definite = "M is positive definite for every θ2"
     if smallest <= 0:
         definite = "M is not positive definite for every θ2, which no arm is"
-    panel = Panel(_traces(theta2, parts, stds), _layout(found), f"{TITLE} over θ2. {definite}", height=300)
+    shapes = []
+    if found is not None:
+        first, last = np.clip(np.degrees(found.extremes["theta2"]), -180, 180).tolist()
+        shapes.append(stretch(first, last, "@muted/0.16"))
+    layout = {
+        "xaxis": axis("θ2, °", range=[-180, 180], dtick=45),
+        "yaxis": axis("kg m²", rangemode="tozero"),
+        "shapes": shapes,
+        "hovermode": "closest",
+    }
+    panel = Panel(_traces(theta2, parts, stds), layout, f"{TITLE} over θ2. {definite}", height=300)
     return Figure(
         "inertia", TITLE, (panel,), reading, LEGEND, f"{definite}; its smallest eigenvalue is {smallest:.3g} kg m²."
     )
@@ -63,59 +74,20 @@ def _stds(result: Result, theta2: FloatArray) -> FloatArray | None:
     return np.sqrt(np.maximum(variance, 0))
 
 
-def _smallest_eigenvalue(parts: FloatArray) -> float:
-    m11, m12, m22 = parts
-    middle, half = 0.5 * (m11 + m22), 0.5 * (m11 - m22)
-    return float((middle - np.hypot(half, m12)).min())
-
-
 def _traces(theta2: FloatArray, parts: FloatArray, stds: FloatArray | None) -> list[Trace]:
+    """M11, M12, M22, each with its 95 % band as one closed area."""
     degrees = np.degrees(theta2)
+    both = packed(np.concatenate([degrees, degrees[::-1]]))
     traces: list[Trace] = []
     for place, (name, colour) in enumerate(PARTS):
+        middle = parts[place]
         if stds is not None:
-            traces.append(_band(degrees, parts[place], 1.96 * stds[place], name, f"{colour}/0.22"))
+            half = 1.96 * stds[place]
+            area = {"fill": "toself", "fillcolor": f"{colour}/0.22", "line": {"width": 0}, "hoverinfo": "skip"}
+            edge = packed(np.concatenate([middle + half, (middle - half)[::-1]]))
+            traces.append({"type": "scatter", "mode": "lines", "x": both, "y": edge, **area})
+            traces[-1] |= {"legendgroup": name, "name": name}
         hover = f"{name} %{{y:.4g}} kg m² at %{{x:.0f}}°<extra></extra>"
-        traces.append(line(degrees, parts[place], colour, name, name, width=2, hover=hover))
+        traces.append(line(degrees, middle, colour, name, name, width=2, hover=hover))
         traces[-1]["line"]["simplify"] = False
     return traces
-
-
-def _band(x: FloatArray, middle: FloatArray, half: FloatArray, name: str, colour: str) -> Trace:
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "x": packed(np.concatenate([x, x[::-1]])),
-        "y": packed(np.concatenate([middle + half, (middle - half)[::-1]])),
-        "fill": "toself",
-        "fillcolor": colour,
-        "line": {"width": 0},
-        "hoverinfo": "skip",
-        "legendgroup": name,
-        "name": name,
-    }
-
-
-def _layout(found: TorqueLog | None) -> Layout:
-    shapes = []
-    if found is not None:
-        low, high = np.clip(np.degrees(found.extremes["theta2"]), -180, 180)
-        shapes.append(
-            {
-                "type": "rect",
-                "yref": "paper",
-                "x0": float(low),
-                "x1": float(high),
-                "y0": 0,
-                "y1": 1,
-                "fillcolor": "@muted/0.16",
-                "line": {"width": 0},
-                "layer": "below",
-            }
-        )
-    return {
-        "xaxis": axis("θ2, °", range=[-180, 180], dtick=45),
-        "yaxis": axis("kg m²", rangemode="tozero"),
-        "shapes": shapes,
-        "hovermode": "closest",
-    }

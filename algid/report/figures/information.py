@@ -29,9 +29,10 @@ def information(path: Path, result: Result) -> Figure | Missing:
     if not names or not found:
         return Missing("information", TITLE, f"{path.name} holds no second")
     x, gained, ranges = _summed(names, found)
-    shares = _shares(gained)
+    total = gained.sum(axis=1, keepdims=True)
+    shares = 100 * np.divide(gained, total, out=np.zeros_like(gained), where=total > 0)
     reading = "Read: strongly coloured seconds tell most; a row with colour in one place only rests on that moment."
-    panel = _panel(names, x, shares, result, ranges)
+    panel = information_panel(names, x, shares, SCALE, separators(ranges, offsets(ranges), result.logs))
     return Figure("information", TITLE, (panel,), reading, note=_note(names, x, shares))
 
 
@@ -51,16 +52,6 @@ def _summed(names: list[str], found: list[tuple[int, Block]]) -> tuple[FloatArra
     starts = np.arange(0, x.size, step)
     counts = np.diff(starts, append=x.size)
     return np.add.reduceat(x, starts) / counts, np.add.reduceat(np.nan_to_num(gained), starts, axis=1), ranges
-
-
-def _shares(gained: FloatArray) -> FloatArray:
-    """Percent of each parameter's information."""
-    total = gained.sum(axis=1, keepdims=True)
-    return 100 * np.divide(gained, total, out=np.zeros_like(gained), where=total > 0)
-
-
-def _panel(names: list[str], x: FloatArray, shares: FloatArray, result: Result, ranges: dict[int, LogRange]) -> Panel:
-    return information_panel(names, x, shares, SCALE, separators(ranges, offsets(ranges), result.logs))
 
 
 def information_panel(
@@ -88,15 +79,13 @@ def information_panel(
 
 
 def _note(names: list[str], x: FloatArray, shares: FloatArray) -> str:
-    """How much of the log is needed for half of each parameter's information, at the extremes."""
-    half = {name: _least_share(row) for name, row in zip(names, shares, strict=True) if row.any()}
+    """The least share of the time that holds half of a parameter's information, of the parameter that has least."""
+    half = {}
+    for name, row in zip(names, shares, strict=True):
+        most = np.cumsum(np.sort(row)[::-1])
+        if row.any():
+            half[name] = float(np.searchsorted(most, 0.5 * most[-1]) + 1) / row.size
     if len(half) < 2 or x.size < 4:
         return ""
     poorest = min(half, key=lambda name: half[name])
     return f"Half of what is known of {poorest} comes from {significant(100 * half[poorest], 2)} % of the time."
-
-
-def _least_share(row: FloatArray) -> float:
-    """The least share of the stretches that holds half of the information."""
-    most = np.cumsum(np.sort(row)[::-1])
-    return float(np.searchsorted(most, 0.5 * most[-1]) + 1) / row.size

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.report.figures.base import Figure, Legend, Missing, Panel, Trace, axis, band, level, line, packed
+from algid.report.figures.base import Figure, Legend, Missing, Panel, axis, band, between, level, line
 from algid.report.reduce import table_of
 from algid.results import Result
 
@@ -18,6 +18,14 @@ COLUMNS = ("quantity", "joint", "x", "value", "low", "high")
 FAINT = 0.02  # a correlation below which the estimator's test takes colour not to matter
 HEIGHT = 260
 MILLI = 0.5  # s: lags that end before are told in milliseconds
+WHITE_READING = (
+    "Read: white noise leaves 19 of 20 points and bars inside the blue band; a hump in the spectrum is motion that the "
+    "model misses, bars that start high and fall are an error slower than the sampling."
+)
+RAW_READING = (
+    "Read: a flat orange line far below grey is noise and a hump is motion that the model misses; bars inside the blue "
+    "band, one window apart, are white."
+)
 RESIDUAL = Legend("residual", "the estimator's residual", "@orange")
 BAND = Legend("", "95 % band of white noise", "@blue/0.25", "area")
 
@@ -48,15 +56,14 @@ def innovations(path: Path, result: Result) -> Figure | Missing:
         return Missing("innovations", TITLE, "the logs are too short to tell noise from colour")
     whitened = any(quantity == WHITENED for quantity, _ in curves)
     panels = tuple(panel for joint in joints for panel in (_spectrum(curves, joint), _correlation(curves, joint)))
-    faint = _has_faint(curves, joints)
-    legend = [RESIDUAL, BAND]
+    faint = any(_is_faint(curves[CORRELATION, joint]) for joint in joints)
+    legend, reading = [RESIDUAL, BAND], WHITE_READING
     if not whitened:
+        reading = RAW_READING
         legend.insert(1, Legend("torque", "measured torque, through the same windows", "@measured"))
     if faint:
         legend.append(Legend("", f"±{FAINT:g}: fainter colour moves no error bar", "@muted", "dash"))
-    return Figure(
-        "innovations", TITLE, panels, _reading(whitened), tuple(legend), _note(curves, joints, result), columns=2
-    )
+    return Figure("innovations", TITLE, panels, reading, tuple(legend), _note(curves, joints, result), columns=2)
 
 
 def read_curves(path: Path) -> Curves:
@@ -73,24 +80,15 @@ def read_curves(path: Path) -> Curves:
     return found
 
 
-def _reading(whitened: bool) -> str:
-    if whitened:
-        return (
-            "Read: white noise leaves 19 of 20 points and bars inside the blue band; a hump in the spectrum is motion "
-            "that the model misses, bars that start high and fall are an error slower than the sampling."
-        )
-    return (
-        "Read: a flat orange line far below grey is noise and a hump is motion that the model misses; bars inside the "
-        "blue band, one window apart, are white."
-    )
-
-
 def _spectrum(curves: Curves, joint: int) -> Panel:
     title, says = f"Joint {joint}: spectrum", f"Spectrum of joint {joint}'s residual"
     white = curves.get((WHITENED, joint))
     if white is not None:
         hover = "%{y:.3g} of white noise at %{x:.3g} Hz<extra></extra>"
-        traces = [*_band(white), line(white.x, white.value, "@orange", "residual", "residual", hover=hover)]
+        traces = [
+            *between(white.x, white.low, white.high, "@blue/0.25"),
+            line(white.x, white.value, "@orange", "residual", "residual", hover=hover),
+        ]
         y = axis("share of white noise", type="log", **_round_ticks(white))
         return Panel(traces, _layout(white.x, y), f"{says}; {_count(white)} inside the band", title, HEIGHT)
     hover = "%{y:.3g} (N m)²/Hz at %{x:.3g} Hz<extra></extra>"
@@ -100,9 +98,12 @@ def _spectrum(curves: Curves, joint: int) -> Panel:
         traces.append(line(torque.x, torque.value, "@measured", "torque", "torque", width=2, hover=hover))
     if own is not None:
         traces.append(line(own.x, own.value, "@orange", "residual", "residual", hover=hover))
-    both = [curve.value for curve in (torque, own) if curve is not None]
+    density = np.concatenate([np.empty(0), *(curve.value for curve in (torque, own) if curve is not None)])
+    positive = density[density > 0]
     x = own.x if own is not None else np.ones(1)
-    y = axis("(N m)²/Hz", type="log", tickfont={"size": 10}, **_powers(np.concatenate(both or [np.ones(1)])))
+    # ticks at every other power of ten where there are many; plotly's own where there are few
+    ticks = {"dtick": 2} if positive.size and positive.max() > 1e4 * positive.min() else {"nticks": 5}
+    y = axis("(N m)²/Hz", type="log", tickfont={"size": 10}, **ticks)
     return Panel(traces, _layout(x, y), says, title, HEIGHT)
 
 
@@ -125,21 +126,6 @@ def _round_ticks(white: Curve) -> dict[str, object]:
         "ticktext": [f"{tick:,g}" for tick in ticks],
         "range": [float(np.log10(low)) - 0.05, float(np.log10(high)) + 0.05],
     }
-
-
-def _powers(density: FloatArray) -> dict[str, object]:
-    """Ticks at every other power of ten where there are many; plotly's own where there are few."""
-    positive = density[density > 0]
-    many = positive.size and positive.max() > 1e4 * positive.min()
-    return {"dtick": 2} if many else {"nticks": 5}
-
-
-def _band(curve: Curve) -> list[Trace]:
-    edge = {"type": "scatter", "mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "x": packed(curve.x)}
-    return [
-        {**edge, "y": packed(curve.low)},
-        {**edge, "y": packed(curve.high), "fill": "tonexty", "fillcolor": "@blue/0.25"},
-    ]
 
 
 def _correlation(curves: Curves, joint: int) -> Panel:
@@ -177,10 +163,6 @@ def _is_faint(curve: Curve) -> bool:
     return bool(curve.x.size > 1 and float(np.abs(curve.high).max()) < FAINT)
 
 
-def _has_faint(curves: Curves, joints: list[int]) -> bool:
-    return any(_is_faint(curves[CORRELATION, joint]) for joint in joints)
-
-
 def _count(curve: Curve) -> str:
     return f"{curve.inside} of {curve.x.size}"
 
@@ -190,18 +172,13 @@ def _note(curves: Curves, joints: list[int], result: Result) -> str:
     told = " and ".join(_count(curves[CORRELATION, joint]) for joint in joints)
     note = f"Inside the band: {told} correlations of joints 1 and 2"
     white = [curves[WHITENED, joint] for joint in joints if (WHITENED, joint) in curves]
-    if white:
-        note += f", {' and '.join(map(_count, white))} frequencies"
-    return f"{note}.{_judged(result)}"
-
-
-def _judged(result: Result) -> str:
+    note += f", {' and '.join(map(_count, white))} frequencies." if white else "."
     fit = result.fit
     if fit is None:
-        return ""
+        return note
     allow = "the intervals allow for colour" if fit.intervals != "likelihood" else "the intervals do not allow for that"
     if not fit.whiteness:
-        return f" The {result.estimator} estimator takes no noise to be white: {allow}."
+        return f"{note} The {result.estimator} estimator takes no noise to be white: {allow}."
     if all(test.white for test in fit.whiteness.values()):
-        return " The estimator's test finds no colour that would move an error bar."
-    return f" The estimator's test finds the residual coloured; {allow}."
+        return f"{note} The estimator's test finds no colour that would move an error bar."
+    return f"{note} The estimator's test finds the residual coloured; {allow}."

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
-from algid.report.figures.base import Figure, Layout, Legend, Missing, Panel, axis, label, level, line, packed, times
+from algid.report.figures.base import Figure, Layout, Legend, Missing, Panel, axis, between, label, level, line
 from algid.report.figures.timeline import offsets, separators, views
-from algid.report.reduce import Block, blocks, by_log, columns_of
+from algid.report.reduce import blocks, by_log, columns_of
 from algid.report.series import LogRange
 from algid.report.text import resolved, significant, unit_text
 from algid.results import Estimate, Result
@@ -51,7 +51,9 @@ def running(path: Path, result: Result) -> Figure | Missing:
     found = list(by_log(blocks(path, ["log", "t", *names, *(name + HALF for name in names)])))
     if not names or not found:
         return Missing("running", TITLE, f"{path.name} holds no series")
-    ranges = _ranges(found)
+    ranges: dict[int, LogRange] = {}
+    for log, block in found:
+        ranges.setdefault(log, LogRange(0.0, 0.0)).last = float(block["t"][-1])
     moved = offsets(ranges)
     t = np.concatenate([block["t"] + moved[log] for log, block in found])
 
@@ -68,37 +70,26 @@ def running(path: Path, result: Result) -> Figure | Missing:
         return Missing("running", TITLE, "no parameter is determined")
     starts = separators(ranges, moved, result.logs).get("shapes", [])
     panels = tuple(_panel(course, t, result.estimates[course.name], starts) for course in courses)
-    note = _note(courses, t) + _truths(courses, result)
+    note = _note(courses, t, result)
     return Figure("running", TITLE, panels, READING, LEGEND, note, 2, views(ranges, result.logs))
-
-
-def _ranges(found: list[tuple[int, Block]]) -> dict[int, LogRange]:
-    ranges: dict[int, LogRange] = {}
-    for log, block in found:
-        ranges.setdefault(log, LogRange(0.0, 0.0)).last = float(block["t"][-1])
-    return ranges
 
 
 def _panel(course: RunningCourse, t: FloatArray, final: Estimate, starts: list[Layout]) -> Panel:
     name, value, half = course.name, course.value, course.half
     unit = unit_text(final.unit)
     hover = f"{label(name)} %{{y:.5g}} {unit}<br>by %{{x:.4g}} s<extra></extra>"
-    edge = {
-        "type": "scatter",
-        "mode": "lines",
-        "line": {"width": 0},
-        "hoverinfo": "skip",
-        "x": times(t),
-        "legendgroup": "band",
-    }
     traces = [
-        {**edge, "y": packed(value - half)},
-        {**edge, "y": packed(value + half), "fill": "tonexty", "fillcolor": "@blue/0.25"},
+        *between(t, value - half, value + half, "@blue/0.25", "band"),
         line(t, value, "@blue", label(name), "estimate", hover=hover),
     ]
+    # the final interval several times over, and the last two thirds of the series with its band
+    later = np.flatnonzero(np.isfinite(value) & np.isfinite(half))
+    later = later[later.size // 3 :]
+    low = [float(value[-1] - SETTLED * half[-1]), *(value[later] - half[later]).tolist()]
+    high = [float(value[-1] + SETTLED * half[-1]), *(value[later] + half[later]).tolist()]
     layout = {
         "xaxis": axis("time, s", range=[0.0, float(t[-1])]),
-        "yaxis": axis(unit, range=_view(value, half)),
+        "yaxis": axis(unit, range=[min(low), max(high)]),
         "shapes": [*starts, level(float(value[-1]), "@muted", "dash", 1.0)],
         "hovermode": "closest",
     }
@@ -106,30 +97,16 @@ def _panel(course: RunningCourse, t: FloatArray, final: Estimate, starts: list[L
     return Panel(traces, layout, says, name, HEIGHT, "running")
 
 
-def _view(value: FloatArray, half: FloatArray) -> list[float]:
-    """The final interval several times over, and the middle half of the series with its band."""
-    known = np.isfinite(value) & np.isfinite(half)
-    later = np.flatnonzero(known)
-    later = later[later.size // 3 :]
-    low = [float(value[-1] - SETTLED * half[-1]), *(value[later] - half[later]).tolist()]
-    high = [float(value[-1] + SETTLED * half[-1]), *(value[later] + half[later]).tolist()]
-    return [min(low), max(high)]
-
-
-def _note(courses: list[RunningCourse], t: FloatArray) -> str:
-    """When the last band missed its final estimate."""
+def _note(courses: list[RunningCourse], t: FloatArray, result: Result) -> str:
+    """When the last band missed its final estimate, and how often the bands hold a truth that is known."""
+    note = "Every band held the final estimate from the start."
     late = {course.name: float(t[course.strays[-1]]) for course in courses if course.strays.size}
-    if not late:
-        return "Every band held the final estimate from the start."
-    latest = max(late, key=lambda name: late[name])
-    when = f"{significant(late[latest], 3)} s of {significant(float(t[-1]), 3)} s"
-    return f"The last band to miss its final estimate was that of {latest}, at {when}."
-
-
-def _truths(courses: list[RunningCourse], result: Result) -> str:
-    """How often the bands hold a truth that is known."""
+    if late:
+        latest = max(late, key=lambda name: late[name])
+        when = f"{significant(late[latest], 3)} s of {significant(float(t[-1]), 3)} s"
+        note = f"The last band to miss its final estimate was that of {latest}, at {when}."
     truth = {row.parameter: row.truth for row in result.table4 if row.truth is not None} | result.truth
     known = [course for course in courses if course.name in truth]
     held = sum(int(np.sum(np.abs(course.value - truth[course.name]) <= course.half)) for course in known)
     count = sum(int(np.isfinite(course.half).sum()) for course in known)
-    return f" The bands hold the truth {significant(100 * held / count, 3)} % of the time." if count else ""
+    return note + (f" The bands hold the truth {significant(100 * held / count, 3)} % of the time." if count else "")

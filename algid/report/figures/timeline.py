@@ -55,23 +55,12 @@ def separators(ranges: Mapping[int, LogRange], moved: Mapping[int, float], logs:
     starts = {log: moved[log] + span.first for log, span in sorted(ranges.items())}
     shapes = [upright(start, "@muted/0.6") for start in list(starts.values())[1:]]
     named = starts if len(starts) <= MOST_NAMES else {}
-    names = [_name(start, _words(log, logs)) for log, start in named.items()]
+    name: Layout = {"y": 1, "yref": "paper", "xanchor": "left", "yanchor": "bottom", "showarrow": False}
+    name["font"] = {"size": 11, "color": "@muted"}
+    names = [{**name, "x": start, "text": _words(log, logs)} for log, start in named.items()]
     room = {"margin": {"t": ROOM}} if names else {}
     return {"shapes": shapes, "annotations": names, **room}
 
 
 def _words(log: int, logs: list[LogSummary]) -> str:
     return label(file_name(logs[log].path), 22) if 0 <= log < len(logs) else f"log {log + 1}"
-
-
-def _name(x: float, words: str) -> Layout:
-    return {
-        "x": x,
-        "y": 1,
-        "yref": "paper",
-        "xanchor": "left",
-        "yanchor": "bottom",
-        "text": words,
-        "showarrow": False,
-        "font": {"size": 11, "color": "@muted"},
-    }

@@ -1,67 +1,129 @@
-"""Measured against predicted torque, and the residual below it, a panel a joint."""
+"""What the logs hold over time: torques measured and predicted, their worst moment at full rate, the signals."""
 
 from __future__ import annotations
 
-from algid.report.figures.base import Figure, Layout, Legend, Panel, Trace, axis, line
+from pathlib import Path
+
+import numpy as np
+
+from algid.errors import ResultError
+from algid.report.figures.base import Figure, Legend, Missing, Panel, Trace, axis, line
 from algid.report.figures.timeline import chained, offsets, separators, views
 from algid.report.series import TorqueLog
 from algid.report.text import significant
 from algid.results import LogSummary
 
 TITLE = "Measured and predicted torque"
-LEGEND = (
+CLOSEUP = "The worst moment, at full rate"
+HALF = 0.5  # s before and after the worst moment
+COLOURS = ("@blue", "@orange")
+MEASURED, PREDICTED = (
     Legend("measured", "measured", "@measured"),
     Legend("predicted", "predicted by the model", "@blue"),
-    Legend("residual", "residual: measured − predicted", "@orange"),
 )
 
 
 def torque(found: TorqueLog, logs: list[LogSummary]) -> Figure:
-    """The torques of all logs one after another."""
-    panels = tuple(_joint(found, logs, joint) for joint in (1, 2))
-    reading = "Read: blue should cover grey, and orange should look like noise without a trace of the motion."
-    return Figure("torque", TITLE, panels, reading, LEGEND, _note(found), views=views(found.ranges, logs))
-
-
-def _joint(found: TorqueLog, logs: list[LogSummary], joint: int) -> Panel:
+    """Measured against predicted torque of all logs one after another, and the residual below it, a panel a joint."""
     moved = offsets(found.ranges)
-    traces: list[Trace] = []
-    for name, colour, group, width in (
-        (f"tau{joint}", "@measured", "measured", 3.6),
-        (f"tau{joint}_predicted", "@blue", "predicted", 1.3),
-        (f"residual{joint}", "@orange", "residual", 1.0),
-    ):
-        x, y = chained({log: series[name] for log, series in found.series.items()}, moved)
-        traces.append(
+    panels = []
+    for joint in (1, 2):
+        traces = [
             line(
-                x, y, colour, group, group, width=width, hover=f"{group} %{{y:.4g}} N m at %{{x:.4f}} s<extra></extra>"
+                *chained({log: series[name] for log, series in found.series.items()}, moved),
+                colour,
+                group,
+                group,
+                width=width,
+                hover=f"{group} %{{y:.4g}} N m at %{{x:.4f}} s<extra></extra>",
             )
-        )
-    traces[2]["yaxis"] = "y2"
-    return Panel(traces, _layout(found, logs), _says(found, joint), f"Joint {joint}", 340, "torque")
+            for name, colour, group, width in (
+                (f"tau{joint}", "@measured", "measured", 3.6),
+                (f"tau{joint}_predicted", "@blue", "predicted", 1.3),
+                (f"residual{joint}", "@orange", "residual", 1.0),
+            )
+        ]
+        traces[2]["yaxis"] = "y2"
+        layout = {
+            "xaxis": axis("time, s", anchor="y2"),
+            "yaxis": axis("torque, N m", domain=[0.42, 1]),
+            "yaxis2": axis("residual, N m", domain=[0, 0.32], anchor="x"),
+            "hovermode": "closest",
+            **separators(found.ranges, moved, logs),
+        }
+        rms, left = (significant(both[joint - 1], 3) for both in (found.rms, found.residual_rms))
+        says = f"Torque of joint {joint}: RMS {rms} N m; residual RMS {left} N m"
+        panels.append(Panel(traces, layout, says, f"Joint {joint}", 340, "torque"))
+    pairs = list(zip(found.residual_rms, found.rms, strict=True))
+    shares = [f"{significant(left, 3)} of {significant(rms, 3)} N m RMS" for left, rms in pairs]
+    note = f"Residual of joint 1: {shares[0]}; of joint 2: {shares[1]}."
+    if any(2 * left > rms for left, rms in pairs):
+        note += " The prediction differentiates angles twice, and with them their noise: see Torque prediction above."
+    reading = "Read: blue should cover grey, and orange should look like noise without a trace of the motion."
+    legend = (MEASURED, PREDICTED, Legend("residual", "residual: measured − predicted", "@orange"))
+    return Figure("torque", TITLE, tuple(panels), reading, legend, note, views=views(found.ranges, logs))
 
 
-def _layout(found: TorqueLog, logs: list[LogSummary]) -> Layout:
-    moved = offsets(found.ranges)
-    return {
-        "xaxis": axis("time, s", anchor="y2"),
-        "yaxis": axis("torque, N m", domain=[0.42, 1]),
-        "yaxis2": axis("residual, N m", domain=[0, 0.32], anchor="x"),
-        "hovermode": "closest",
-        **separators(found.ranges, moved, logs),
-    }
+def closeup(path: Path, found: TorqueLog) -> Figure | Missing:
+    """One second around the largest residual of each joint, every sample. Raises `ResultError`."""
+    panels = tuple(_closeup_panel(path, found, joint) for joint in (1, 2) if joint in found.worst)
+    if not panels:
+        return Missing("closeup", CLOSEUP, "no torque is predicted")
+    reading = (
+        "Read: a residual that stands out once is an event, such as a knock; one like the rest is the model's limit."
+    )
+    legend = (MEASURED, PREDICTED, Legend("residual", "residual", "@orange"))
+    return Figure("closeup", CLOSEUP, panels, reading, legend, columns=2)
 
 
-def _says(found: TorqueLog, joint: int) -> str:
-    rms, residual = found.rms[joint - 1], found.residual_rms[joint - 1]
-    return f"Torque of joint {joint}: RMS {significant(rms, 3)} N m; residual RMS {significant(residual, 3)} N m"
+def _closeup_panel(path: Path, found: TorqueLog, joint: int) -> Panel:
+    """The stretch around the worst moment of a joint; only the file's row groups around it are read."""
+    import polars as pl
 
-
-def _note(found: TorqueLog) -> str:
-    shares = [
-        f"{significant(residual, 3)} of {significant(rms, 3)} N m RMS"
-        for residual, rms in zip(found.residual_rms, found.rms, strict=True)
+    log, moment = found.worst[joint]
+    near = pl.col("t").is_between(moment - HALF, moment + HALF) & (pl.col("log") == log)
+    names = ["t", f"tau{joint}", f"tau{joint}_predicted"]
+    try:
+        rows = pl.scan_parquet(path).filter(near).select(names).collect()
+    except (OSError, pl.exceptions.PolarsError) as error:
+        raise ResultError(f"{path}: cannot read it ({error}); identify again with this version") from error
+    t, measured, predicted = (rows[name].cast(pl.Float64).fill_null(float("nan")).to_numpy() for name in names)
+    residual = measured - predicted
+    traces = [
+        line(t, measured, "@measured", "measured", "measured", width=3.6),
+        line(t, predicted, "@blue", "predicted", "predicted"),
+        line(t, residual, "@orange", "residual", "residual", width=1.0),
     ]
-    noisy = any(2 * residual > rms for residual, rms in zip(found.residual_rms, found.rms, strict=True))
-    why = " The prediction differentiates angles twice, and with them their noise: see Torque prediction above."
-    return f"Residual of joint 1: {shares[0]}; of joint 2: {shares[1]}.{why if noisy else ''}"
+    where = f" of log {log + 1}" if len(found.ranges) > 1 else ""
+    largest = significant(float(np.nanmax(np.abs(residual))), 3)
+    says = f"Joint {joint}, largest residual {largest} N m at {moment:.3f} s{where}"
+    layout = {"xaxis": axis(f"time{where}, s"), "yaxis": axis("N m"), "hovermode": "closest"}
+    return Panel(traces, layout, says, says)
+
+
+def signals(found: TorqueLog, logs: list[LogSummary]) -> Figure:
+    """Angles, the velocities that the estimator used, and measured torques of all logs, both joints in one panel."""
+    moved = offsets(found.ranges)
+    panels = []
+    for name, words, unit in (
+        ("theta", "Angle", "rad"),
+        ("omega", "Velocity", "rad/s"),
+        ("tau", "Measured torque", "N m"),
+    ):
+        traces: list[Trace] = []
+        for joint, colour in enumerate(COLOURS, start=1):
+            x, y = chained({log: series[f"{name}{joint}"] for log, series in found.series.items()}, moved)
+            hover = f"joint {joint} %{{y:.4g}} {unit} at %{{x:.4f}} s<extra></extra>"
+            traces.append(line(x, y, colour, f"joint {joint}", f"joint{joint}", width=1.2, hover=hover))
+        layout = {
+            "xaxis": axis("time, s"),
+            "yaxis": axis(f"{words.lower()}, {unit}"),
+            "hovermode": "closest",
+            **separators(found.ranges, moved, logs),
+        }
+        lows, highs = zip(*(found.extremes[f"{name}{joint}"] for joint in (1, 2)), strict=True)
+        says = f"{words} of both joints, {min(lows):.4g} to {max(highs):.4g} {unit}"
+        panels.append(Panel(traces, layout, says, words, 200, "torque"))
+    reading = "Read: look for jumps, flat stretches and clipped tops; what is odd here is odd in every number above."
+    legend = tuple(Legend(f"joint{joint}", f"joint {joint}", colour) for joint, colour in enumerate(COLOURS, start=1))
+    return Figure("signals", "Signals", tuple(panels), reading, legend, views=views(found.ranges, logs))
