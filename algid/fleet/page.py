@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 import numpy as np
@@ -173,24 +173,24 @@ def drift_table(history: History) -> Table:
         Column("95 % interval", "number"),
         Column("p", "number", rank=4),
     )
-    rows = tuple(_drift_row(row) for row in history.drifts.head(MOST_ROWS).iter_rows(named=True))
+    rows = []
+    for row in history.drifts.head(MOST_ROWS).iter_rows(named=True):
+        percent = 100 / abs(row["mean"]) if row["mean"] else np.nan
+        slope, half = percent * row["slope"], 1.96 * percent * row["slope_std"]
+        rows.append(
+            (
+                visible(row["robot"]),
+                row["parameter"],
+                row["end"].date().isoformat(),
+                str(row["logs"]),
+                significant(row["mean"]),
+                f"{slope:+.3g}",
+                f"[{slope - half:.3g}, {slope + half:.3g}]",
+                f"{row['p']:.1e}",
+            )
+        )
     note = f"{history.drifts.height} found. A slope over {SPAN} months is told from none at p < {ALPHA:g}."
-    return Table("Drift", columns, rows, note)
-
-
-def _drift_row(row: dict[str, Any]) -> tuple[str, ...]:
-    percent = 100 / abs(row["mean"]) if row["mean"] else np.nan
-    slope, half = percent * row["slope"], 1.96 * percent * row["slope_std"]
-    return (
-        visible(row["robot"]),
-        row["parameter"],
-        row["end"].date().isoformat(),
-        str(row["logs"]),
-        significant(row["mean"]),
-        f"{slope:+.3g}",
-        f"[{slope - half:.3g}, {slope + half:.3g}]",
-        f"{row['p']:.1e}",
-    )
+    return Table("Drift", columns, tuple(rows), note)
 
 
 def finding_table(history: History) -> Table:
@@ -226,10 +226,8 @@ def finding_table(history: History) -> Table:
 def _figures(history: History) -> list[Figure]:
     pairs = history.drifts.head(MOST_PANELS).select("robot", "parameter").rows()
     panels = tuple(_panel(history, robot, parameter) for robot, parameter in pairs)
-    if not panels:
-        return []
     reading = f"Read: each dot is the mean of {SPAN} months that end there, with its 95 % interval."
-    return [Figure("drift", "Parameters that drift", panels, reading, columns=2)]
+    return [Figure("drift", "Parameters that drift", panels, reading, columns=2)] if panels else []
 
 
 def _panel(history: History, robot: str, parameter: str) -> Panel:
@@ -245,11 +243,6 @@ def _panel(history: History, robot: str, parameter: str) -> Panel:
         "line": {"color": "@blue", "width": 1.4},
         "hovertemplate": "%{y:.6g}<extra></extra>",
     }
-    title = f"{label(robot)}: {parameter}"
+    layout = {"xaxis": axis(type="date"), "yaxis": axis(f"{parameter}, {unit_text(UNITS[parameter])}")}
     says = f"{visible(robot)}, {parameter}, {counted(own.height, 'month')}"
-    return Panel(
-        [trace],
-        {"xaxis": axis(type="date"), "yaxis": axis(f"{parameter}, {unit_text(UNITS[parameter])}")},
-        says,
-        title=title,
-    )
+    return Panel([trace], layout, says, f"{label(robot)}: {parameter}")

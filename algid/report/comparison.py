@@ -51,8 +51,12 @@ def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> C
         raise ValueError(f"a comparison needs at least two results, got {len(results)}")
     if labels is not None and len(labels) != len(results):
         raise ValueError(f"labels must name {counted(len(results), 'result')}, got {len(labels)}")
-    shown = _distinct([visible(label) for label in labels] if labels else [file_name(r.log.path) for r in results])
-    sigma = {name: _distances(name, results) for name in _names(results)}
+    shown = [visible(label) for label in labels] if labels else [file_name(r.log.path) for r in results]
+    if len(set(shown)) < len(shown):
+        shown = [f"{number} {label}" for number, label in enumerate(shown, start=1)]
+    first, others = results[0].estimates, [result.estimates for result in results[1:]]
+    names = dict.fromkeys(name for result in results for name in result.estimates)  # in the order met
+    sigma = {name: tuple(distance_sigma(first.get(name), other.get(name)) for other in others) for name in names}
     return Comparison(tuple(shown), sigma, _estimates(results, shown, sigma), _settings(results, shown))
 
 
@@ -87,39 +91,23 @@ def distance_sigma(first: Estimate | None, other: Estimate | None) -> float | No
     return (other.estimate - first.estimate) / combined if combined > 0 else None
 
 
-def _names(results: Sequence[Result]) -> list[str]:
-    """Every parameter that any result has, in the order met."""
-    return list(dict.fromkeys(name for result in results for name in result.estimates))
-
-
-def _distances(name: str, results: Sequence[Result]) -> tuple[float | None, ...]:
-    first = results[0].estimates.get(name)
-    return tuple(distance_sigma(first, result.estimates.get(name)) for result in results[1:])
-
-
-def _distinct(labels: list[str]) -> list[str]:
-    """The labels, numbered where two are equal."""
-    if len(set(labels)) == len(labels):
-        return labels
-    return [f"{number} {label}" for number, label in enumerate(labels, start=1)]
-
-
 def _estimates(results: Sequence[Result], labels: list[str], sigma: dict[str, tuple[float | None, ...]]) -> Table:
     columns = [Column("Parameter", "name"), Column("Unit", "text"), Column(labels[0], "number")]
     for label in labels[1:]:
         columns += [Column(label, "number"), Column("Δ %", "number", rank=1), Column("Δ/σ", "number")]
-    rows = tuple(_row(name, results, sigma[name]) for name in sigma)
+    rows = []
+    for name, distances in sigma.items():
+        first, *others = (result.estimates.get(name) for result in results)
+        unit = next(unit_text(one.unit) for one in (first, *others) if one is not None)
+        cells = [visible(name), unit, with_std(first)]
+        for other, distance in zip(others, distances, strict=True):
+            change = ABSENT
+            if first is not None and other is not None and first.estimate and other.estimate is not None:
+                change = f"{100 * (other.estimate - first.estimate) / abs(first.estimate):+.3g}"
+            cells += [with_std(other), change, ABSENT if distance is None else f"{distance:+.1f}"]
+        rows.append(tuple(cells))
     note = f"Differences are against {labels[0]}; σ combines both standard deviations."
-    return Table("Estimates side by side", tuple(columns), rows, note).without_empty()
-
-
-def _row(name: str, results: Sequence[Result], distances: tuple[float | None, ...]) -> tuple[str, ...]:
-    found = [result.estimates.get(name) for result in results]
-    unit = next(unit_text(estimate.unit) for estimate in found if estimate is not None)
-    cells = [visible(name), unit, with_std(found[0])]
-    for other, distance in zip(found[1:], distances, strict=True):
-        cells += [with_std(other), _change(found[0], other), ABSENT if distance is None else f"{distance:+.1f}"]
-    return tuple(cells)
+    return Table("Estimates side by side", tuple(columns), tuple(rows), note).without_empty()
 
 
 def with_std(found: Estimate | None) -> str:
@@ -131,27 +119,15 @@ def with_std(found: Estimate | None) -> str:
     return f"{resolved(found.estimate, found.std)}{spread}{status}"
 
 
-def _change(first: Estimate | None, other: Estimate | None) -> str:
-    if first is None or other is None or not first.estimate or other.estimate is None:
-        return ABSENT
-    return f"{100 * (other.estimate - first.estimate) / abs(first.estimate):+.3g}"
-
-
-def _readings(result: Result) -> dict[str, str]:
-    """How the first log of each kind was read, by dotted names."""
-    firsts = {log.role: log for log in reversed(result.logs)}
-    return {
-        f"{role} log: {name}": value
-        for role, log in firsts.items()
-        if log.reading is not None
-        for name, value in flat_settings(asdict(log.reading)).items()
-    }
-
-
 def _settings(results: Sequence[Result], labels: list[str]) -> Table:
-    every = [
-        {**flat_settings(r.settings), "estimator": r.estimator, "algid": r.version, **_readings(r)} for r in results
-    ]
+    """What was set otherwise, and how the first log of each kind was read otherwise."""
+    every: list[dict[str, str]] = []
+    for result in results:
+        settings = {**flat_settings(result.settings), "estimator": result.estimator, "algid": result.version}
+        for role, log in {log.role: log for log in reversed(result.logs)}.items():
+            reading = {} if log.reading is None else flat_settings(asdict(log.reading))
+            settings |= {f"{role} log: {name}": value for name, value in reading.items()}
+        every.append(settings)
     names = dict.fromkeys(name for settings in every for name in settings)
     differing = [name for name in names if len({settings.get(name) for settings in every}) > 1]
     rows = tuple((visible(n), *(visible(settings.get(n, ABSENT)) for settings in every)) for n in differing)

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from algid import __version__
+from algid.arm import FloatArray
 from algid.files import whole_file
 from algid.report.comparison import Comparison
 from algid.report.document import Document, Section
-from algid.report.figures.base import Figure, Layout, Legend, Panel, Trace, axis, label, packed
+from algid.report.figures.base import Figure, Layout, Legend, Panel, Trace, axis, label, packed, stretch
 from algid.report.frame import page
 from algid.report.text import joined, significant, visible
 from algid.report.verdict import Verdict
@@ -69,14 +70,26 @@ def verdict(found: Comparison) -> Verdict:
     return Verdict("good", f"{within}; the largest is {largest}")
 
 
-def _colour(place: int) -> str:
-    return COLOURS[place % len(COLOURS)]
-
-
 def _legend(found: Comparison, first: int = 0) -> tuple[Legend, ...]:
     return tuple(
-        Legend(f"result{place}", words, _colour(place)) for place, words in enumerate(found.labels[first:], start=first)
+        Legend(f"result{place}", words, COLOURS[place % len(COLOURS)])
+        for place, words in enumerate(found.labels[first:], start=first)
     )
+
+
+def _dots(found: Comparison, place: int, x: FloatArray, y: FloatArray, size: int, number: str) -> Trace:
+    """The dots of one result; `number` is how a value is written."""
+    name = label(found.labels[place])
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "x": packed(x),
+        "y": packed(y),
+        "marker": {"color": COLOURS[place % len(COLOURS)], "size": size},
+        "name": name,
+        "legendgroup": f"result{place}",
+        "hovertemplate": f"{name} %{{x:{number}<extra></extra>",
+    }
 
 
 def _share(found: Estimate | None, middle: float) -> tuple[float, float] | None:
@@ -101,25 +114,9 @@ def _intervals(found: Comparison, results: Sequence[Result]) -> Figure:
         x, half = (np.array([row[column] for row in shown]) for column in (1, 2))
         y = np.array([row[0] for row in shown]) + (place - (len(results) - 1) / 2) * apart
         widest += [float(value) for value in np.abs(x) + half]
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "markers",
-                "x": packed(x),
-                "y": packed(y),
-                "error_x": {
-                    "type": "data",
-                    "array": half.tolist(),
-                    "color": _colour(place),
-                    "thickness": 2,
-                    "width": 0,
-                },
-                "marker": {"color": _colour(place), "size": 7},
-                "name": label(found.labels[place]),
-                "legendgroup": f"result{place}",
-                "hovertemplate": f"{label(found.labels[place])} %{{x:+.3g}} %<extra></extra>",
-            }
-        )
+        dots = _dots(found, place, x, y, 7, "+.3g} %")
+        bar = {"type": "data", "array": half.tolist(), "color": dots["marker"]["color"], "thickness": 2, "width": 0}
+        traces.append({**dots, "error_x": bar})
     reach = 1.1 * float(np.quantile(widest, 0.9))
     layout = {
         "xaxis": axis(f"from {label(found.labels[0])}, %", range=[-reach, reach]),
@@ -136,28 +133,17 @@ def _distances(found: Comparison) -> Figure:
     """How far each result is from the first, in combined standard deviations."""
     names = [name for name, row in found.sigma.items() if any(distance is not None for distance in row)]
     traces: list[Trace] = []
-    for place, words in enumerate(found.labels[1:], start=1):
+    for place in range(1, len(found.labels)):
         pairs = [(found.sigma[name][place - 1], at) for at, name in enumerate(names)]
-        shown = [(distance, at) for distance, at in pairs if distance is not None]
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "markers",
-                "x": packed(np.array([distance for distance, _ in shown])),
-                "y": packed(np.array([float(at) for _, at in shown])),
-                "marker": {"color": _colour(place), "size": 8},
-                "name": label(words),
-                "legendgroup": f"result{place}",
-                "hovertemplate": f"{label(words)} %{{x:+.2f}} σ<extra></extra>",
-            }
-        )
+        shown = np.array([(distance, at) for distance, at in pairs if distance is not None]).reshape(-1, 2)
+        traces.append(_dots(found, place, shown[:, 0], shown[:, 1], 8, "+.2f} σ"))
     sizes = [abs(distance) for row in found.sigma.values() for distance in row if distance is not None]
     reach = max(1.1 * max(sizes, default=0.0), 4.0)
     inside = sum(size <= CHANCE for size in sizes)
     layout = {
         "xaxis": axis("distance, σ", range=[-reach, reach]),
         "yaxis": _names(names),
-        "shapes": [_chance()],
+        "shapes": [stretch(-CHANCE, CHANCE, "@blue/0.25")],
         "hovermode": "closest",
     }
     largest = significant(max(sizes, default=0.0), 2)
@@ -171,8 +157,3 @@ def _names(names: Sequence[str]) -> Layout:
     """An axis of names from the top down."""
     ticks: Layout = {"tickvals": list(range(len(names))), "ticktext": [label(name) for name in names]}
     return axis(range=[len(names) - 0.4, -0.6], zeroline=False, fixedrange=True, **ticks)
-
-
-def _chance() -> Layout:
-    upright = {"type": "rect", "yref": "paper", "y0": 0, "y1": 1, "x0": -CHANCE, "x1": CHANCE}
-    return {**upright, "fillcolor": "@blue/0.25", "line": {"width": 0}, "layer": "below"}
