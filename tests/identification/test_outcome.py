@@ -1,0 +1,283 @@
+"""What a result holds of a fit: intervals, Table 4, statistics and sentences, against numbers worked out by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from algid.estimators.combine import LogInformation
+from algid.estimators.fit import Fit
+from algid.estimators.identifiability import Whiteness
+from algid.estimators.prediction import PredictionScore
+from algid.estimators.selection import Selection
+from algid.estimators.whitening import NoiseLevels
+from algid.identification.outcome import distrusted, estimate, outcome_of, prediction, table_rows, unknown
+from algid.identification.sentences import ONE_RUN, fit_notes, fit_warnings
+from algid.identification.source import open_source
+from algid.identification.survey import Survey
+from algid.log import Log, Origin
+from algid.model import Model
+from algid.results import Estimate, FitSummary, Repeatability, Status
+from algid.settings import Settings
+from algid.table4 import LOADED_ROWS, UNLOADED_ROWS
+from tests.identification.fits import CASE, QUANTILE, K, fit_of, information, with_stds, with_values
+
+ARM, PAYLOAD = CASE.arm, CASE.payload
+K1, K2, K3, K4, K5, K6, K7 = K.tolist()
+
+
+def survey(*, loaded: bool = True) -> Survey:
+    """A short log of each kind, or of the unloaded arm alone, too short to judge a prediction by."""
+    t = np.arange(50) * 1e-3
+    theta = np.stack([np.sin(9 * t), np.cos(7 * t)])
+    logs = [Log((t * 1e9).astype(np.int64), theta, 3 * np.cos(theta), Origin(name, "csv", {})) for name in "ab"]
+    return Survey([open_source(logs[0], "unloaded"), *([open_source(logs[1], "loaded")] if loaded else [])])
+
+
+def summed(fit: Fit, chosen: Selection | None = None, **settings: Any) -> FitSummary:
+    chosen = chosen or Selection(fit.shared.model, False)
+    found = outcome_of(fit, {}, survey(loaded=fit.shared.payload), Settings(**settings), chosen).fit
+    assert found is not None
+    return found
+
+
+def test_an_estimate_has_its_interval_and_one_that_is_open_has_nothing_but_its_unit() -> None:
+    found = estimate(2.0, 0.5, 1.25, "kg", "OK")
+    assert found == Estimate(estimate=2.0, std=0.5, ci95=(0.75, 3.25), unit="kg", status=Status.OK)
+    assert estimate(2.0, 0.5, 1.25, "kg", "NOT_CONVERGED").status is Status.NOT_CONVERGED
+    lost = estimate(2.0, 0.5, 1.25, "kg", "NOT_IDENTIFIABLE")
+    assert lost == unknown("kg")
+    assert (lost.estimate, lost.std, lost.ci95, lost.unit) == (None, None, (None, None), "kg")
+    assert estimate(np.nan, 1.0, 1.0, "kg", "OK").estimate is None
+
+
+def test_distrust_takes_ok_and_leaves_what_was_no_better() -> None:
+    group = {"a": estimate(1, 1, 1, "kg", "OK"), "b": unknown("kg"), "c": estimate(1, 1, 1, "kg", "NOT_CONVERGED")}
+    found = distrusted(group)
+    assert [one.status for one in found.values()] == ["IMPLAUSIBLE", "NOT_IDENTIFIABLE", "NOT_CONVERGED"]
+    assert found["a"].ci95 == group["a"].ci95
+    assert group["a"].status is Status.OK
+
+
+def test_parameters_are_within_the_fits_quantile_of_their_deviations() -> None:
+    found = outcome_of(fit_of(), {}, survey(), Settings(), Selection(Model(), False))
+    assert list(found.parameters) == [f"k{n}" for n in range(1, 8)]
+    assert list(found.payload) == ["m_p", "l1", "l2"]
+    k4 = found.parameters["k4"]
+    assert k4.estimate == pytest.approx(K4)
+    assert k4.unit == "N m"
+    assert k4.ci95 == pytest.approx((K4 * (1 - 0.01 * QUANTILE), K4 * (1 + 0.01 * QUANTILE)), rel=1e-12)
+    assert found.payload["m_p"].std == pytest.approx(0.01 * PAYLOAD, rel=1e-12)
+    assert {one.status for one in (found.parameters | found.payload | found.loaded).values()} == {Status.OK}
+
+
+def test_rows_of_table_4_are_sums_of_constants_and_their_deviations_are_propagated() -> None:
+    """By hand: Tables 1 and 2, and first-order propagation through z = m_p (l1², l2², l1 l2, g l1, g l2)."""
+    fit = fit_of()
+    rows, stds = table_rows(fit)
+    assert list(rows) == [*UNLOADED_ROWS, *LOADED_ROWS, "m_p"]
+    l1, l2, g = ARM.l1, ARM.l2, ARM.g
+    unloaded = (K5 + K3, K1, K3, K6, K4, K2)
+    m = PAYLOAD
+    loaded = (K5 + K3 + m * (l1**2 + l2**2), K1 + m * l1 * l2, K3 + m * l2**2, K4 + m * g * l1, K2 + m * g * l2)
+    assert list(rows.values()) == pytest.approx([*unloaded, *loaded, m], rel=1e-12)
+    assert stds["k5+k3"] == pytest.approx(0.01 * math.hypot(K5, K3), rel=1e-9)
+    assert stds["k6"] == pytest.approx(0.01 * K6, rel=1e-9)
+    z3 = m * l1 * l2  # moves by a hundredth of itself with each of m_p, l1 and l2
+    assert stds["k1+z3"] == pytest.approx(0.01 * math.sqrt(K1**2 + 3 * z3**2), rel=1e-9)
+    z2 = m * l2**2  # twice as far with l2
+    assert stds["k3+z2"] == pytest.approx(0.01 * math.sqrt(K3**2 + z2**2 + (2 * z2) ** 2), rel=1e-9)
+    assert stds["m_p"] == pytest.approx(0.01 * m, rel=1e-12)
+
+
+def test_rows_of_what_the_logs_leave_open_are_left_out() -> None:
+    rows, _ = table_rows(with_stds(fit_of(), k6=np.inf, m_p=np.inf))
+    assert "k6" not in rows
+    assert "m_p" not in rows
+    assert rows["k4"] == pytest.approx(K4)
+    rows, _ = table_rows(fit_of(payload=False))
+    assert list(rows) == [*UNLOADED_ROWS]
+
+
+def test_loaded_rows_of_a_fit_that_did_not_settle_say_so() -> None:
+    found = outcome_of(replace(fit_of(), converged=False), {}, survey(), Settings(), Selection(Model(), False))
+    assert {one.status for one in found.loaded.values()} == {Status.NOT_CONVERGED}
+    assert list(found.loaded) == list(LOADED_ROWS)
+    assert found.loaded["k4+z4"].ci95 is not None
+
+
+def test_a_bound_broken_by_far_spoils_every_estimate_and_one_broken_by_chance_none() -> None:
+    for k6, status in ((-2.9, Status.OK), (-3.1, Status.IMPLAUSIBLE)):
+        fit = with_stds(with_values(fit_of(), k6=k6), k6=1.0)
+        found = outcome_of(fit, {}, survey(), Settings(), Selection(Model(), False))
+        assert {one.status for one in (found.parameters | found.payload).values()} == {status}
+        assert any(text.startswith("the estimates break k6 >= 0: ") for text in found.warnings)
+
+
+def test_noise_is_the_root_mean_square_over_logs() -> None:
+    levels = (NoiseLevels(np.array([3.0, 1.0]), np.array([0.0, 2.0])), NoiseLevels(np.array([4.0, 7.0]), np.zeros(2)))
+    assert summed(replace(fit_of(), noise=levels)).noise == pytest.approx(
+        {"theta1": math.sqrt(12.5), "theta2": 5.0, "tau1": 0.0, "tau2": math.sqrt(2)}
+    )
+    assert summed(fit_of()).noise == {}
+
+
+def test_the_covariance_is_null_where_a_parameter_is_open() -> None:
+    fit = with_stds(fit_of(), k3=np.inf)
+    found = summed(fit).covariance
+    place = fit.names.index("k3")
+    for row, values in enumerate(found):
+        for column, value in enumerate(values):
+            expected = None if place in (row, column) else fit.covariance[row, column]
+            assert value == (None if expected is None else pytest.approx(expected))
+
+
+def test_whiteness_goes_by_joint() -> None:
+    tests = Whiteness(np.array([0.2, 0.001]), np.array([0.01, 0.4]), np.zeros(2), (True, False))
+    found = summed(replace(fit_of(), whiteness=tests)).whiteness
+    assert list(found) == ["tau1", "tau2"]
+    assert [(one.white, one.p_value, one.lag1_correlation) for one in found.values()] == [
+        (True, 0.2, 0.01),
+        (False, 0.001, 0.4),
+    ]
+    assert summed(fit_of()).whiteness == {}
+
+
+@pytest.mark.parametrize(("statistic", "endogenous"), [(0.5, False), (3.2, None), (7.0, True)])
+def test_endogeneity_is_judged_for_as_many_coefficients_as_a_log_has(statistic: float, endogenous: bool | None) -> None:
+    found = summed(replace(fit_of(), endogeneity=statistic)).endogeneity["largest"]
+    assert found.statistic == statistic
+    assert found.p_value == pytest.approx(min(1.0, 7 * 2 * norm.sf(statistic)), rel=1e-9)
+    if endogenous is not None:
+        assert found.endogenous is endogenous
+    assert summed(fit_of()).endogeneity == {}
+
+
+def test_each_log_tells_its_own_estimates() -> None:
+    """A log whose information is 4e8 on every coefficient but the last, on which it is none."""
+    size, c0 = 7, K
+    S = np.tile(np.diag([4e8] * 6 + [0.0]), (1, 1, 1))
+    g = np.array([[2e4, *[0.0] * 6]])  # the most likely k1 lies 2e4 / 4e8 further
+    fit = replace(fit_of(), logs=(LogInformation(False, c0, S, g), information(size, loaded=True, c0=c0)))
+    own, _ = summed(fit).by_log
+    assert own["k1"].estimate == pytest.approx(K1 + 5e-5, rel=1e-9)
+    assert own["k1"].std == pytest.approx(5e-5, rel=1e-6)
+    assert own["k1"].ci95 == pytest.approx((K1 + 5e-5 * (1 - QUANTILE), K1 + 5e-5 * (1 + QUANTILE)), rel=1e-6)
+    assert own["k7"].status is Status.NOT_IDENTIFIABLE
+    assert own["k7"].estimate is None
+
+
+@pytest.mark.parametrize("known", [0.4, PAYLOAD, 2.0])
+def test_the_torques_gain_is_the_known_mass_over_the_found_one(known: float) -> None:
+    found = summed(fit_of(), payload_mass=known).torque_gain
+    assert found is not None
+    assert found.estimate == pytest.approx(known / PAYLOAD, rel=1e-12)
+    assert found.std == pytest.approx(0.01 * known / PAYLOAD, rel=1e-12)
+    ends = (known / (PAYLOAD * (1 + 0.01 * QUANTILE)), known / (PAYLOAD * (1 - 0.01 * QUANTILE)))
+    assert found.ci95 == pytest.approx(ends, rel=1e-12)
+
+
+def test_a_mass_not_told_from_zero_tells_no_gain() -> None:
+    for fit in (with_stds(fit_of(), m_p=PAYLOAD / QUANTILE), with_stds(fit_of(), m_p=np.inf)):
+        assert summed(fit, payload_mass=1.0).torque_gain == unknown("1")
+    assert summed(with_stds(fit_of(), m_p=0.99 * PAYLOAD / QUANTILE), payload_mass=1.0).torque_gain != unknown("1")
+    assert summed(fit_of(payload=False), payload_mass=1.0).torque_gain is None
+    assert summed(fit_of()).torque_gain is None
+
+
+def test_a_prediction_without_samples_is_none_and_others_hold_their_sums() -> None:
+    assert prediction(PredictionScore()) is None
+    sums = PredictionScore(100.0, np.array([4.0, 9.0]), np.array([0.0, 50.0]), np.array([400.0, 125.0]))
+    found = prediction(sums)
+    assert found is not None
+    assert found.rmse == pytest.approx((0.2, 0.3))
+    assert found.nrmse == pytest.approx((0.1, math.sqrt(9 / 125)))
+    assert found.r2 == pytest.approx((0.99, 0.91))  # 125 − 50²/100 = 100 is the variance left to explain
+
+
+def sentences(fit: Fit, word: str) -> list[str]:
+    return [text for text in fit_warnings(fit) if word in text]
+
+
+def test_a_good_fit_is_passed_over_in_silence() -> None:
+    assert list(fit_warnings(fit_of())) == []
+
+
+def test_a_payload_near_zero_has_its_one_sided_bound() -> None:
+    fit = with_stds(with_values(fit_of(), m_p=0.1), m_p=0.1)
+    assert sentences(fit, "not told from zero") == ["the payload is not told from zero: at most 0.265 kg at 95 %"]
+    negative = with_stds(with_values(fit_of(), m_p=-0.2), m_p=0.1)
+    assert sentences(negative, "not told from zero") == ["the payload is not told from zero: at most 0 kg at 95 %"]
+    assert not sentences(with_stds(with_values(fit_of(), m_p=0.26), m_p=0.1), "not told")
+    lost = with_stds(fit_of(), m_p=np.inf)
+    assert sentences(lost, "give --l1 and --l2")
+    assert not sentences(with_stds(fit_of(lengths={"l1": ARM.l1}), m_p=np.inf), "give --l1 and --l2")
+
+
+def test_a_length_that_the_constants_contradict_is_named() -> None:
+    """g k1 / k2 is l1 by Table 1, here uncertain by √2 %."""
+    std = 0.01 * math.sqrt(2) * ARM.l1
+    for times, told in ((4.9, False), (5.1, True)):
+        fit = fit_of(lengths={"l1": ARM.l1 + times * std})
+        assert bool(sentences(fit, "LENGTH_MISMATCH")) is told
+    (text,) = sentences(fit, "LENGTH_MISMATCH")
+    assert f"makes l1 {ARM.l1:.4g} ± {QUANTILE * std:.2g} m, given are {ARM.l1 + 5.1 * std:g} m" in text
+
+
+def test_a_negative_mass_by_five_deviations_says_exchanged_and_is_the_cause() -> None:
+    for mass, told in ((-0.49, False), (-0.51, True)):
+        fit = with_stds(with_values(fit_of(), m_p=mass), m_p=0.1)
+        assert bool(sentences(fit, "EXCHANGED_LOGS")) is told
+        causes = outcome_of(fit, {}, survey(), Settings(), Selection(Model(), False)).causes
+        assert ["exchanged" in cause.cause for cause in causes] == [True] * told
+
+
+def test_notes_of_a_fit_are_repeated_with_what_the_intervals_lack() -> None:
+    assert list(fit_warnings(replace(fit_of(), note="a reason"))) == ["a reason"]
+    assert next(fit_warnings(replace(fit_of(), note="a reason", intervals="sandwich"))) == f"a reason; {ONE_RUN}"
+    failed = replace(fit_of(), converged=False)
+    assert sentences(failed, "did not converge")
+    assert not sentences(replace(failed, note="--constrain found no point"), "did not converge")
+
+
+def test_endogeneity_is_told_unless_instruments_already_stand_in() -> None:
+    fit = replace(fit_of(), endogeneity=8.25)
+    (text,) = sentences(fit, "instruments and least squares")
+    assert "8.2 standard deviations apart" in text
+    assert not sentences(replace(fit, estimator="instruments"), "least squares")
+    assert not sentences(replace(fit, endogeneity=0.3), "least squares")
+
+
+def notes(warnings: list[str] | None = None, **changes: Any) -> list[str]:
+    summary = FitSummary(
+        noise={}, covariance_names=[], covariance=[], iterations=0, converged=True,
+        **({"intervals": "likelihood"} | changes),
+    )  # fmt: skip
+    return list(fit_notes(summary, warnings or []))
+
+
+def test_what_one_run_leaves_out_is_noted_once() -> None:
+    assert notes(intervals="sandwich") == [ONE_RUN]
+    assert notes([f"a reason; {ONE_RUN}"], intervals="sandwich") == []
+    assert notes() == notes(intervals="jackknife") == []
+
+
+def test_repeatability_and_gain_are_told_in_numbers() -> None:
+    repeated = Repeatability(masses=[0.5, 0.51234], std=0.0087, ci95=(0.0039, 0.28))
+    (text,) = notes(repeatability=repeated)
+    assert text == "the loaded runs by themselves weigh 0.5, 0.5123 kg: repeatability 0.0087 kg (95 %: 0.0039 to 0.28)"
+    gain = Estimate(estimate=1.25, std=0.01, ci95=(1.23, 1.27), unit="1")
+    (text,) = notes(torque_gain=gain)
+    assert "the torques have to be multiplied by 1.25 (95 %: 1.23 to 1.27), and" in text
+    (text,) = notes(torque_gain=unknown("1"))
+    assert text.endswith("its mass is not told from zero")
+
+
+def test_cross_validation_that_could_not_be_done_is_told() -> None:
+    found = outcome_of(fit_of(), {}, survey(), Settings(cross_validate=True), Selection(Model(), False))
+    assert found.warnings == ["no cross-validation: a log is too short to be fitted, or to be judged"]

@@ -1,0 +1,174 @@
+"""Predictions of logs that a result has not seen, against SciPy's filters on the simulator's own motion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfiltfilt
+
+from algid.arm import FloatArray, forward_dynamics, regressor, with_payload
+from algid.errors import ResultError
+from algid.identification.identify import identify
+from algid.identification.source import Role, open_source
+from algid.identification.survey import Survey
+from algid.identification.validate import Predictor, predictor_of, simulate, validate
+from algid.log import Log, Origin
+from algid.model import Model
+from algid.results import Result
+from algid.settings import Settings
+from algid.synth.cases import load_case
+from algid.synth.excitation import wide_multi_sine
+from algid.synth.simulator import SimulatedMotion
+from algid.synth.simulator import simulate as move
+
+CASE = load_case("case1")
+K = CASE.arm.constants()
+LOADED_K = with_payload(K, CASE.arm.payload_constants(CASE.payload))
+DT = 4e-3
+SIGMA = 0.02  # N m
+EDGE = round(0.3 / DT)  # that the score leaves out
+
+
+def moved(seed: int, k: FloatArray = K) -> SimulatedMotion:
+    return move(k, wide_multi_sine(CASE.arm, seed), DT * np.arange(1501))
+
+
+def logged(motion: SimulatedMotion, seed: int, *, lead: int = 0) -> Log:
+    """Exact angles, torques with noise and logged `lead` samples early."""
+    noise = SIGMA * np.random.default_rng(seed).standard_normal(motion.tau.shape)
+    rows = motion.t.size - lead
+    stamps = np.rint(motion.t[:rows] * 1e9).astype(np.int64)
+    return Log(stamps, motion.theta[:, :rows], (motion.tau + noise)[:, lead:], Origin(f"log{seed}", "csv", {}))
+
+
+def low(x: FloatArray) -> FloatArray:
+    return np.asarray(sosfiltfilt(butter(3, 5.0, fs=1 / DT, output="sos"), x, axis=-1)[..., EDGE:-EDGE])
+
+
+def columns(motion: SimulatedMotion, k: FloatArray = K) -> FloatArray:
+    """The paper's regressor (7, 2, N) on the true motion, below 5 Hz."""
+    alpha = forward_dynamics(k, motion.theta, motion.omega, motion.tau)
+    return low(np.moveaxis(np.asarray(regressor(motion.theta, motion.omega, alpha)), 1, 0))
+
+
+def known(k: FloatArray, shift: float = 0.0) -> Predictor:
+    return Predictor(Model(), lambda _: k, shift)
+
+
+def survey(*logs: tuple[Log, Role]) -> Survey:
+    return Survey([open_source(log, role) for log, role in logs])
+
+
+@pytest.fixture(scope="module")
+def motions() -> list[SimulatedMotion]:
+    return [moved(seed) for seed in (3, 5, 7)]
+
+
+@pytest.mark.parametrize("wrong", [False, True])
+def test_a_hold_out_score_is_that_of_scipys_filters_on_the_true_motion(
+    motions: list[SimulatedMotion], wrong: bool
+) -> None:
+    k = K * (1 + 0.1 * np.array([1, -1, 1, 1, -1, 1, -1])) if wrong else K
+    log = logged(motions[0], 1)
+    found = validate(known(k), survey((log, "unloaded"))).logs["log1"]
+    assert found is not None
+    Y, tau = columns(motions[0]), low(log.tau)
+    residual = tau - np.einsum("p,pjn->jn", k, Y)
+    rms = np.sqrt(np.mean(residual**2, axis=1))
+    # the score's own filter differs at the ends, and it differentiates angles that pass 20 Hz
+    np.testing.assert_allclose(found.rmse, rms, rtol=0.05, atol=0.1 * SIGMA)
+    np.testing.assert_allclose(found.nrmse, rms / np.sqrt(np.mean(tau**2, axis=1)), rtol=0.1, atol=2e-3)
+    np.testing.assert_allclose(found.r2, 1 - rms**2 / np.var(tau, axis=1), atol=2e-3 if not wrong else 0.02)
+
+
+def test_all_logs_together_weigh_by_their_samples(motions: list[SimulatedMotion]) -> None:
+    one, other = logged(motions[0], 1), logged(motions[1], 2).part(0, 700)
+    both = validate(known(K), survey((one, "unloaded"), (other, "unloaded")))
+    assert both.total is not None
+    first, second = both.logs["log1"], both.logs["log2"]
+    assert first is not None
+    assert second is not None
+    counts = np.array([1501 - 2 * EDGE, 700 - 2 * EDGE])
+    squares = np.array([first.rmse, second.rmse]) ** 2
+    np.testing.assert_allclose(both.total.rmse, np.sqrt(counts @ squares / counts.sum()), rtol=1e-2)
+
+
+def test_a_log_too_short_to_judge_is_none_and_does_not_count(motions: list[SimulatedMotion]) -> None:
+    one, other = logged(motions[0], 1), logged(motions[1], 2).part(0, 100)
+    both = validate(known(K), survey((one, "unloaded"), (other, "unloaded")))
+    assert both.logs["log2"] is None
+    assert both.total == both.logs["log1"]
+    assert validate(known(K), survey((other, "unloaded"))).total is None
+
+
+def test_a_torque_that_acts_late_is_predicted_where_it_acts(motions: list[SimulatedMotion]) -> None:
+    early = logged(motions[0], 1, lead=6)
+    right, wrong = (validate(known(K, shift), survey((early, "unloaded"))).total for shift in (6 * DT, 0.0))
+    assert right is not None
+    assert wrong is not None
+    exact = validate(known(K), survey((logged(motions[0], 1), "unloaded"))).total
+    assert exact is not None
+    np.testing.assert_allclose(right.rmse, exact.rmse, rtol=0.05)
+    assert wrong.rmse[0] > 5 * right.rmse[0]
+
+
+def test_cross_validation_is_the_prediction_of_each_log_by_a_fit_of_the_others(motions: list[SimulatedMotion]) -> None:
+    """By hand: least squares on the true motion of two logs, scored on the third, for each in turn."""
+    logs = [logged(motion, seed) for seed, motion in enumerate(motions)]
+    settings = Settings(estimator="weak", model="plain", cross_validate=True)
+    result = identify(logs, None, settings, report=False)
+    assert result.fit is not None
+    assert result.fit.cross_validation is not None
+    Y, tau = [columns(motion) for motion in motions], [low(log.tau) for log in logs]
+    squares, count = np.zeros(2), 0
+    for out in range(3):
+        kept = [place for place in range(3) if place != out]
+        A = np.concatenate([Y[place].reshape(7, -1).T for place in kept])
+        b = np.concatenate([tau[place].ravel() for place in kept])
+        k = np.linalg.lstsq(A, b, rcond=None)[0]
+        left = tau[out] - np.einsum("p,pjn->jn", k, Y[out])
+        squares, count = squares + np.sum(left**2, axis=1), count + left.shape[1]
+    np.testing.assert_allclose(result.fit.cross_validation.rmse, np.sqrt(squares / count), rtol=0.1)
+    assert result.fit.residual is not None
+    assert np.all(np.array(result.fit.cross_validation.rmse) > np.array(result.fit.residual.rmse))
+
+
+@pytest.fixture(scope="module")
+def weighed(motions: list[SimulatedMotion]) -> Result:
+    settings = Settings(estimator="weak", model="plain")
+    return identify(logged(motions[0], 1), logged(moved(4, LOADED_K), 2), settings, report=False)
+
+
+def test_a_result_predicts_logs_of_both_roles(weighed: Result, motions: list[SimulatedMotion]) -> None:
+    fresh = survey((logged(motions[1], 11), "unloaded"), (logged(moved(8, LOADED_K), 12), "loaded"))
+    found = validate(predictor_of(weighed, "r"), fresh)
+    for name in ("log11", "log12"):
+        one = found.logs[name]
+        assert one is not None
+        # little beyond the torque's own noise below 5 Hz, σ √(2 · 5 Hz · dt) and the filter's slope
+        assert np.all(np.array(one.rmse) < 1.5 * SIGMA * np.sqrt(2 * 5.0 * DT))
+    swapped = survey((logged(motions[1], 11), "loaded"))
+    bad = validate(predictor_of(weighed, "r"), swapped).total
+    assert bad is not None
+    assert bad.rmse[0] > 3 * SIGMA
+
+
+def test_a_prediction_without_a_constant_is_refused_by_the_results_own_file(weighed: Result) -> None:
+    bare = weighed.model_copy(update={"payload": {}})
+    judge = predictor_of(bare, "arm.algid/result.json")
+    log = logged(moved(8), 12)
+    validate(judge, survey((log, "unloaded")))
+    for work in (validate, simulate):
+        with pytest.raises(ResultError, match=r"^arm\.algid/result\.json: the result has no m_p; identify"):
+            work(judge, survey((log, "loaded")))
+
+
+def test_simulations_by_the_true_constants_stay_on_the_log(motions: list[SimulatedMotion]) -> None:
+    exact = replace(logged(motions[0], 1), tau=motions[0].tau)
+    right = simulate(known(K), survey((exact, "unloaded")))
+    wrong = simulate(known(1.2 * K), survey((exact, "unloaded")))
+    assert list(right.logs) == ["log1"]
+    assert np.all(right.total.rmse < 0.02)
+    assert np.all(wrong.total.rmse > 3 * right.total.rmse)
