@@ -1,18 +1,4 @@
-"""A fleet's history from ``jobs.parquet``: slopes of parameters over time, and single logs that stand out.
-
-======  ============================================  =========
-symbol  name                                          unit
-======  ============================================  =========
-t       time since the robot's first log              month
-y       estimate, less the robot's mean               its own
-w       1 / std², what the estimate's interval says   its own
-======  ============================================  =========
-
-A window is `SPAN` months long and ends with each month, so that a year holds twelve tests a parameter. The
-slope's error is the one that the intervals give, or the larger one that the scatter about the line shows; its t
-test alarms below `ALPHA`. With seven parameters that is 12 × 7 × 0.001 = 0.084 false alarms a robot-year where
-estimates scatter independently. Sums of a month's moments add up to a window's: the cost is O(N).
-"""
+"""A fleet's history from ``jobs.parquet``: who drifts, which logs stand out, and what could not be tested."""
 
 from __future__ import annotations
 
@@ -21,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from algid.errors import ResultError
 from algid.files import whole_file
+from algid.fleet.drift import FEWEST, SPAN, windows
+from algid.fleet.findings import mislabelled, outliers
 from algid.progress import Told
 from algid.words import counted
 
@@ -32,15 +18,8 @@ if TYPE_CHECKING:
     import polars as pl
 
 MONTH_DAYS = 30.4375
-SPAN = 3
-ALPHA = 1e-3
-FEWEST = 8  # logs in a window that is tested
 PARAMETERS = ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "f1", "f2", "o1", "o2", "j2")
 FEWEST_PEERS = 3  # logs of a robot, among which one can be told from the others
-OUTLYING = 6.0  # robust standard deviations
-MISLABELLED = 5.0  # standard deviations: one false alarm in 1.7 million logs
-_MAD = 1.4826  # from the median of absolute deviations to a standard deviation
-_SUMS = ("w", "wt", "wtt", "wy", "wty", "wyy", "n")
 
 
 def read_jobs(path: Path) -> pl.DataFrame:
@@ -70,137 +49,6 @@ def read_jobs(path: Path) -> pl.DataFrame:
     months = (pl.col("time") - pl.col("time").min().over("robot")).dt.total_seconds() / (86400 * MONTH_DAYS)
     finished = jobs.filter(pl.col("status").is_in(["ok", "incomplete"]))
     return finished.with_columns(months.alias("t")).with_columns(pl.col("t").floor().cast(pl.Int32).alias("month"))
-
-
-def parameters_in(jobs: pl.DataFrame) -> list[str]:
-    """Parameters that the table has columns for."""
-    return [name for name in PARAMETERS if name in jobs.columns]
-
-
-def windows(jobs: pl.DataFrame, parameter: str) -> pl.DataFrame:
-    """A row a robot and month: mean and slope of `parameter` on the window that ends with that month.
-
-    Columns: robot, parameter, month, end (time of its last log), logs, mean, mean_std, slope, slope_std (of the
-    parameter a month), p, drift.
-    """
-    import polars as pl
-
-    known = jobs.filter(pl.col("time").is_not_null() & (pl.col(f"{parameter}_std") > 0) & pl.col(parameter).is_finite())
-    known = known.with_columns(pl.col(parameter).mean().over("robot").alias("centre"))
-    w, t, y = 1 / pl.col(f"{parameter}_std") ** 2, pl.col("t"), pl.col(parameter) - pl.col("centre")
-    months = known.group_by("robot", "month", maintain_order=False).agg(
-        pl.col("centre").first(),
-        pl.col("time").max().alias("end"),
-        w.sum().alias("w"),
-        (w * t).sum().alias("wt"),
-        (w * t * t).sum().alias("wtt"),
-        (w * y).sum().alias("wy"),
-        (w * t * y).sum().alias("wty"),
-        (w * y * y).sum().alias("wyy"),
-        pl.len().cast(pl.Float64).alias("n"),
-    )
-    months = months.sort("robot", "month")
-    summed = months.rolling(index_column="month", period=f"{SPAN}i", group_by="robot").agg(
-        pl.col("centre").last(), pl.col("end").last(), *(pl.col(name).sum() for name in _SUMS)
-    )
-    return _regressed(summed, parameter)
-
-
-def _regressed(summed: pl.DataFrame, parameter: str) -> pl.DataFrame:
-    import polars as pl
-    from scipy.special import stdtr
-
-    w, wt, wtt, wy, wty, wyy, n = (summed[name].to_numpy() for name in _SUMS)
-    middle = wt / w
-    sloped = wtt - wt * middle > 1e-9 * w  # logs of one instant, or a single one, have a mean and no slope
-    spread = np.where(sloped, wtt - wt * middle, np.inf)
-    rise = np.where(sloped, wty - wy * middle, 0.0)
-    slope = rise / spread
-    squares = wyy - wy * wy / w - slope * rise
-    freedom = np.maximum(n - 1 - sloped, 1)
-    scale = np.sqrt(np.maximum(1.0, squares / freedom))
-    slope_std = scale / np.sqrt(spread)
-    tested = (n >= FEWEST) & sloped
-    p = np.full(n.size, np.nan)
-    p[tested] = 2 * stdtr(freedom[tested], -np.abs(slope[tested]) / slope_std[tested])
-    return summed.select("robot", pl.lit(parameter).alias("parameter"), "month", "end").with_columns(
-        logs=pl.Series(n.astype(np.int64)),
-        mean=pl.Series(summed["centre"].to_numpy() + wy / w),
-        mean_std=pl.Series(scale / np.sqrt(w)),
-        slope=pl.Series(np.where(tested, slope, np.nan)),
-        slope_std=pl.Series(np.where(tested, slope_std, np.nan)),
-        p=pl.Series(p),
-        drift=pl.Series(np.nan_to_num(p, nan=1.0) < ALPHA),
-    )
-
-
-def outliers(jobs: pl.DataFrame) -> pl.DataFrame:
-    """Estimates far from their robot's median, in the larger of their own and the history's scatter.
-
-    Columns: kind, robot, job, time, parameter, value, expected, sigmas.
-    """
-    import polars as pl
-
-    found = [_far(jobs, name) for name in parameters_in(jobs)]
-    return pl.concat(found) if found else _nothing(jobs)
-
-
-def _far(jobs: pl.DataFrame, name: str) -> pl.DataFrame:
-    import polars as pl
-
-    scaled = jobs.filter((pl.col(f"{name}_std") > 0) & pl.col(name).is_finite()).with_columns(
-        pl.col(name).median().over("robot").alias("expected")
-    )
-    scaled = scaled.with_columns(((pl.col(name) - pl.col("expected")) / pl.col(f"{name}_std")).alias("sigmas"))
-    scatter = (_MAD * pl.col("sigmas").abs().median().over("robot")).clip(lower_bound=1.0)
-    far = scaled.with_columns(pl.col("sigmas") / scatter).filter(pl.col("sigmas").abs() > OUTLYING)
-    return _as_findings(far, "outlier", name)
-
-
-def mislabelled(jobs: pl.DataFrame) -> pl.DataFrame:
-    """Payloads that differ from ``label_payload`` (kg) by more than their intervals explain; columns as `outliers`.
-
-    Where a robot's payloads scatter about each other by more than their intervals say, that scatter counts. Medians
-    are the lower ones, so that of two logs the one that agrees with its label shows how well they can.
-    """
-    import polars as pl
-
-    if not {"label_payload", "m_p", "m_p_std"} <= set(jobs.columns) or jobs["label_payload"].dtype != pl.Float64:
-        return _nothing(jobs)
-    labelled = jobs.filter((pl.col("m_p_std") > 0) & pl.col("label_payload").is_not_null()).with_columns(
-        pl.col("label_payload").alias("expected"),
-        ((pl.col("m_p") - pl.col("label_payload")) / pl.col("m_p_std")).alias("sigmas"),
-    )
-    centred = (pl.col("sigmas") - _lower_median(pl.col("sigmas")).over("robot")).abs()
-    scatter = (_MAD * _lower_median(centred).over("robot")).clip(lower_bound=1.0)
-    wrong = labelled.with_columns(pl.col("sigmas") / scatter).filter(pl.col("sigmas").abs() > MISLABELLED)
-    return _as_findings(wrong, "payload", "m_p")
-
-
-def _lower_median(values: pl.Expr) -> pl.Expr:
-    return values.quantile(0.5, interpolation="lower")
-
-
-def _as_findings(rows: pl.DataFrame, kind: str, name: str) -> pl.DataFrame:
-    import polars as pl
-
-    return rows.select(
-        pl.lit(kind).alias("kind"),
-        "robot",
-        "job",
-        "time",
-        pl.lit(name).alias("parameter"),
-        pl.col(name).alias("value"),
-        "expected",
-        "sigmas",
-    )
-
-
-def _nothing(jobs: pl.DataFrame) -> pl.DataFrame:
-    import polars as pl
-
-    empty = jobs.head(0).with_columns(expected=pl.lit(np.nan), sigmas=pl.lit(np.nan), nothing=pl.lit(np.nan))
-    return _as_findings(empty, "payload", "nothing").with_columns(parameter=pl.lit("m_p"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,7 +125,7 @@ def history_of(path: Path, progress: Told | None = None) -> History:
     import polars as pl
 
     finished = read_jobs(path)
-    names = parameters_in(finished)
+    names = [name for name in PARAMETERS if name in finished.columns]
     jobs = finished.filter(pl.col("robot").is_not_null())
     if not finished.height or not names:
         raise ResultError(f"{path}: no job has given parameters; see its column reason, and run algid batch again")
@@ -286,13 +134,14 @@ def history_of(path: Path, progress: Told | None = None) -> History:
             f"{path}: none of {counted(finished.height, 'finished job')} has a robot; give each robot's logs a folder "
             "of their own, or name robots in a manifest, and run algid batch again"
         )
-    followed = []
+    followed, standing_out = [], [mislabelled(jobs)]
     for place, name in enumerate(names):
         if progress is not None:
             progress("following", place, len(names))
         followed.append(windows(jobs, name))
+        standing_out.append(outliers(jobs, name))
     history = pl.concat(followed)
-    findings = pl.concat([mislabelled(jobs), outliers(jobs)]).sort("kind", "robot", "time", "parameter")
+    findings = pl.concat(standing_out).sort("kind", "robot", "time", "parameter")
     listed = jobs.sort("robot", "time", descending=[False, True], nulls_last=True).select("robot", "job")
     return History(history, findings, _roster(jobs, history), finished.height - jobs.height, listed)
 

@@ -12,7 +12,8 @@ from urllib.parse import quote
 import numpy as np
 
 from algid import __version__
-from algid.fleet.history import ALPHA, SPAN, History
+from algid.fleet.drift import ALPHA, SPAN
+from algid.fleet.history import History
 from algid.model import UNITS
 from algid.report.document import Column, Depth, Document, Drawn, ReadingAid, References, Section, Table, filled
 from algid.report.drawings import Course, sparklines

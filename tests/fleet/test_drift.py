@@ -1,0 +1,291 @@
+"""Windows, drift, outliers and labels by hand: weighted least squares, scipy's distributions, each limit."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+import pytest
+from scipy import stats
+
+from algid.errors import ResultError
+from algid.fleet.drift import windows
+from algid.fleet.findings import mislabelled, outliers
+from algid.fleet.history import history_of, read_jobs, write_history
+
+START = datetime(2026, 1, 1, tzinfo=UTC)
+MONTH = 30.4375  # days
+STAMP = pl.Datetime("us", "UTC")
+
+
+def table(values: Sequence[float], std: Sequence[float] | float = 0.01, **others: Any) -> pl.DataFrame:
+    """A robot's k1, a day apart, as `algid batch` writes it; `others` replace columns or add them."""
+    count = len(values)
+    columns = {
+        "job": [f"j{row}" for row in range(count)],
+        "robot": ["r"] * count,
+        "time": pl.Series([START + timedelta(days=row) for row in range(count)], dtype=STAMP),
+        "status": ["ok"] * count,
+        "k1": pl.Series(values, dtype=pl.Float64),
+        "k1_std": pl.Series([std] * count if isinstance(std, float) else std, dtype=pl.Float64),
+    }
+    return pl.DataFrame(columns | others)
+
+
+def read(jobs: pl.DataFrame, folder: Path) -> pl.DataFrame:
+    jobs.write_parquet(folder / "jobs.parquet")
+    return read_jobs(folder / "jobs.parquet")
+
+
+def weighted_line(t: np.ndarray, y: np.ndarray, std: np.ndarray) -> dict[str, float]:
+    """Weighted least squares by its normal equations, its errors widened by χ² per degree of freedom above one."""
+    design = np.stack([np.ones(t.size), t], axis=1)
+    normal = design.T @ (design / std[:, None] ** 2)
+    found = np.linalg.solve(normal, design.T @ (y / std**2))
+    freedom = t.size - 2
+    widened = max(1.0, math.sqrt(np.sum(((y - design @ found) / std) ** 2) / freedom))
+    slope_std = widened * math.sqrt(np.linalg.inv(normal)[1, 1])
+    p = 2 * stats.t.sf(abs(found[1]) / slope_std, freedom)
+    mean, mean_std = np.sum(y / std**2) / np.sum(1 / std**2), widened / math.sqrt(np.sum(1 / std**2))
+    return {"slope": found[1], "slope_std": slope_std, "p": p, "mean": mean, "mean_std": mean_std, "logs": t.size}
+
+
+@pytest.mark.parametrize(("scatter", "growth"), [(0.3, 0.0), (1.0, 0.01), (5.0, 0.1)])
+def test_every_window_is_weighted_least_squares_with_students_test(
+    scatter: float, growth: float, tmp_path: Path
+) -> None:
+    draw = np.random.default_rng(7)
+    days = np.sort(draw.choice(200, 90, replace=False))
+    days -= days[0]
+    std = draw.uniform(0.005, 0.02, days.size)
+    values = 3 + growth * days / MONTH + scatter * std * draw.standard_normal(days.size)
+    when = pl.Series([START + timedelta(days=int(day)) for day in days], dtype=STAMP)
+    found = windows(read(table(values.tolist(), std.tolist(), time=when), tmp_path), "k1")
+    month = np.floor(days / MONTH).astype(int)
+    assert found["month"].to_list() == sorted(set(month.tolist()))
+    for row in found.rows(named=True):
+        inside = (month <= row["month"]) & (month > row["month"] - 3)
+        expected = weighted_line(days[inside] / MONTH, values[inside], std[inside])
+        # sums of moments about the robot's first log: rounding is that of t² Σw, some 1e-16 × 40 × 60
+        assert {name: row[name] for name in expected} == pytest.approx(expected, rel=1e-8, abs=1e-15)
+        assert row["end"] == START + timedelta(days=int(days[inside][-1]))
+        assert row["drift"] == (expected["p"] < 1e-3)
+    assert found["drift"].any() == (growth / scatter > 0.001 and growth > 0)
+
+
+@pytest.mark.parametrize(("logs", "tested"), [(7, False), (8, True)])
+def test_eight_logs_are_tested(logs: int, tested: bool, tmp_path: Path) -> None:
+    (row,) = windows(read(table([1.0 + 0.5 * day for day in range(logs)]), tmp_path), "k1").rows(named=True)
+    assert row["drift"] == tested
+    assert math.isnan(row["p"]) != tested
+    assert math.isnan(row["slope"]) != tested
+    assert math.isnan(row["slope_std"]) != tested
+    assert row["logs"] == logs
+
+
+@pytest.mark.parametrize(("factor", "alarm"), [(0.999, False), (1.001, True)])
+def test_the_alarm_is_at_one_in_a_thousand(factor: float, alarm: bool, tmp_path: Path) -> None:
+    """On a line without scatter the intervals alone count: t is slope × √Σ(t - t̄)² / std."""
+    t = np.arange(20) / MONTH
+    critical = stats.t.isf(0.0005, 18) * 0.01 / math.sqrt(np.sum((t - t.mean()) ** 2))
+    (row,) = windows(read(table((2 - factor * critical * t).tolist()), tmp_path), "k1").rows(named=True)
+    assert row["p"] == pytest.approx(2 * stats.t.sf(factor * stats.t.isf(0.0005, 18), 18), rel=1e-6)
+    assert row["drift"] == alarm
+    assert row["slope"] == pytest.approx(-factor * critical, rel=1e-8)
+
+
+def test_a_window_forgets_what_is_three_months_old(tmp_path: Path) -> None:
+    """Months count from a robot's own first log, and one without logs has no row of its own."""
+    days = [0, 1, 45, 100, 101, 200]
+    when = pl.Series([START + timedelta(days=day) for day in days], dtype=STAMP)
+    found = windows(read(table([1, 2, 3, 4, 5, 6], time=when), tmp_path), "k1")
+    assert found.select("month", "logs").rows() == [(0, 2), (1, 3), (3, 3), (6, 1)]
+    assert found["mean"].to_numpy() == pytest.approx([1.5, 2.0, 4.0, 6.0], rel=1e-12)
+    # alone in its window it has the error that its interval says
+    assert found["mean_std"].to_numpy()[-1] == pytest.approx(0.01, rel=1e-9)
+
+
+def test_robots_do_not_see_each_other(tmp_path: Path) -> None:
+    one = table([1.0 + 0.01 * day for day in range(20)])
+    other = table([5.0 - 0.01 * day for day in range(20)], robot=["s"] * 20)
+    both = windows(read(pl.concat([one, other]), tmp_path), "k1")
+    alone = [windows(read(jobs, tmp_path), "k1") for jobs in (one, other)]
+    for robot, expected in zip(("r", "s"), alone, strict=True):
+        mine = both.filter(robot=robot)
+        for name in ("mean", "mean_std", "slope", "slope_std", "p"):
+            assert mine[name].to_numpy() == pytest.approx(expected[name].to_numpy(), rel=1e-10)
+    assert both.filter(robot="r")["slope"][0] > 0 > both.filter(robot="s")["slope"][0]
+
+
+def test_estimates_without_an_error_bar_count_for_nothing(tmp_path: Path) -> None:
+    good = [1.0, 1.1, 0.9, 1.05, 0.95, 1.02, 0.98, 1.01]
+    jobs = table([*good, 50.0, math.nan, 50.0], [*[0.01] * 8, 0.0, 0.01, math.nan])
+    nothing = jobs.with_columns(k1_std=pl.when(pl.col("job") == "j10").then(None).otherwise(pl.col("k1_std")))
+    for one in (jobs.head(10), nothing):
+        found = windows(read(one, tmp_path), "k1").rows(named=True)[-1]
+        assert found["logs"] == 8
+        assert found["mean"] == pytest.approx(np.mean(good), rel=1e-12)
+
+
+@pytest.mark.parametrize("status", ["failed", "timeout", "killed"])
+def test_what_is_not_finished_is_not_read(status: str, tmp_path: Path) -> None:
+    jobs = table([1.0, 2.0, 3.0], status=["ok", status, "incomplete"])
+    found = read(jobs, tmp_path)
+    assert found["job"].to_list() == ["j0", "j2"]
+    assert found["month"].to_list() == [0, 0]
+    assert found["t"].to_numpy() == pytest.approx([0, 2 / MONTH], rel=1e-12)
+
+
+def test_a_job_without_a_date_has_no_month(tmp_path: Path) -> None:
+    when = pl.Series([START, None, START + timedelta(days=31)], dtype=STAMP)
+    found = read(table([1.0, 2.0, 3.0], time=when), tmp_path)
+    assert found["month"].to_list() == [0, None, 1]
+    assert windows(found, "k1")["logs"].sum() == 1 + 2
+
+
+@pytest.mark.parametrize(("away", "told"), [(5.99, False), (6.01, True), (-6.01, True)])
+def test_an_outlier_is_six_deviations_away(away: float, told: bool, tmp_path: Path) -> None:
+    """Where half the logs are the median itself the scatter is the intervals' own, never less."""
+    found = outliers(read(table([1.0] * 7 + [1.0 + 0.01 * away]), tmp_path), "k1")
+    assert found.height == told
+    if told:
+        expected = ("outlier", "r", "j7", "k1", 1.0 + 0.01 * away, 1.0)
+        assert found.select("kind", "robot", "job", "parameter", "value", "expected").row(0) == expected
+        assert found["sigmas"][0] == pytest.approx(away, rel=1e-9)
+
+
+@pytest.mark.parametrize(("away", "told"), [(5.99, False), (6.01, True)])
+def test_logs_that_scatter_are_judged_by_their_scatter(away: float, told: bool, tmp_path: Path) -> None:
+    """Deviations of 3 standard deviations to both sides: 1.4826 times them is one robust deviation."""
+    robust = stats.median_abs_deviation([-3, 3, -3, 3, 0], scale="normal")  # scipy has more digits of 1.4826
+    values = [1 + 0.01 * one for one in (-3, 3, -3, 3, 0, -3, 3, -3, 3, away * robust)]
+    jobs = read(table([*values, 1.0]), tmp_path)
+    assert jobs["k1"].median() == pytest.approx(1.0, abs=1e-12)
+    found = outliers(jobs, "k1")
+    assert found["job"].to_list() == (["j9"] if told else [])
+
+
+@pytest.mark.parametrize(("payload", "told"), [(0.5049, False), (0.5051, True), (0.4949, True)])
+def test_a_label_is_wrong_at_five_deviations(payload: float, told: bool, tmp_path: Path) -> None:
+    jobs = table([1.0] * 5, m_p=[0.5, 0.5, payload, 0.5, 0.5], m_p_std=[0.001] * 5, label_payload=[0.5] * 5)
+    found = mislabelled(read(jobs, tmp_path))
+    assert found["job"].to_list() == (["j2"] if told else [])
+    if told:
+        assert found.select("kind", "parameter", "value", "expected").row(0) == ("payload", "m_p", payload, 0.5)
+        assert found["sigmas"][0] == pytest.approx((payload - 0.5) / 0.001, rel=1e-9)
+
+
+def test_labels_are_judged_robot_by_robot_and_only_where_there_are_any(tmp_path: Path) -> None:
+    payloads = {"m_p": [0.5, 0.51, 0.49, 0.52, 0.48, 0.56], "m_p_std": [0.001] * 6}
+    wild = table([1.0] * 6, **payloads, label_payload=[0.5] * 6)
+    calm = table([1.0] * 6, robot=["s"] * 6, m_p=[0.5] * 5 + [0.51], m_p_std=[0.001] * 6, label_payload=[0.5] * 6)
+    found = mislabelled(read(pl.concat([wild, calm]), tmp_path))
+    assert found.select("robot", "job").rows() == [("s", "j5")]  # 10 of its own are; 60 where one is 14.8 are not
+    some = wild.with_columns(label_payload=pl.when(pl.col("job") == "j5").then(0.5).otherwise(None))
+    assert mislabelled(read(some, tmp_path))["job"].to_list() == ["j5"]
+    without = (
+        wild.drop("label_payload"),
+        wild.drop("m_p", "m_p_std"),
+        wild.with_columns(label_payload=pl.lit("heavy")),
+    )
+    for jobs in without:
+        nothing = mislabelled(read(jobs, tmp_path))
+        assert nothing.height == 0
+        assert nothing.columns == found.columns
+        assert nothing.schema == found.schema
+
+
+def test_the_history_has_a_row_a_robot_and_its_findings_in_order(tmp_path: Path) -> None:
+    when = pl.Series([START + timedelta(days=day) for day in range(9)] + [None], dtype=STAMP)
+    later = table([1.0] * 10, robot=["s"] * 10, time=when, job=[f"s{row}" for row in range(10)])
+    early = table([1.0] * 4 + [9.0, 9.5] + [1.0] * 6, job=[f"r{row}" for row in range(12)])
+    pl.concat([later, early]).write_parquet(tmp_path / "jobs.parquet")
+    history = history_of(tmp_path / "jobs.parquet")
+    assert history.roster.columns == ["robot", "logs", "undated", "first", "last", "latest", "tested"]
+    last = {"r": START + timedelta(days=11), "s": START + timedelta(days=8)}
+    assert history.roster.rows() == [
+        ("r", 12, 0, START, last["r"], "r11", True),
+        ("s", 10, 1, START, last["s"], "s8", True),
+    ]
+    assert (history.robots, history.logs, history.nameless) == (2, 22, 0)
+    assert history.findings.select("robot", "job", "value").rows() == [("r", "r4", 9.0), ("r", "r5", 9.5)]
+    assert history.jobs is not None
+    assert history.jobs.rows()[:2] == [("r", "r11"), ("r", "r10")]
+    assert history.jobs.rows()[-1] == ("s", "s9")  # without a date it stands last
+    assert history.untested == [
+        "No drift was looked for in 1 log without a date: stamps count from 1970, or a manifest tells the time."
+    ]
+
+
+def test_drifts_are_the_latest_of_each_robot_and_the_clearest_comes_first(tmp_path: Path) -> None:
+    days = 100
+    faint = [1 + 0.04 * (day % 2) + 0.0009 * day for day in range(days)]
+    clear = [1 + 0.0009 * day for day in range(days)]
+    jobs = pl.concat([table(faint), table(clear, robot=["s"] * days)])
+    jobs = jobs.with_columns(k2=pl.lit(1.0), k2_std=pl.lit(0.01))
+    jobs.write_parquet(tmp_path / "jobs.parquet")
+    history = history_of(tmp_path / "jobs.parquet")
+    found = history.drifts
+    assert found.select("robot", "parameter", "month").rows() == [("s", "k1", 3), ("r", "k1", 3)]
+    assert found["p"][0] < found["p"][1] < 1e-3
+    plain = history.as_dict()
+    assert [row["robot"] for row in plain["drifts"]] == ["s", "r"]
+    assert plain["robots"][0]["first"].startswith("2026-01-01")
+    assert json.loads(json.dumps(plain, allow_nan=False)) == plain
+
+
+def test_files_hold_what_the_history_holds(tmp_path: Path) -> None:
+    table([1.0] * 9 + [2.0]).write_parquet(tmp_path / "jobs.parquet")
+    history = history_of(tmp_path / "jobs.parquet")
+    written = write_history(history, tmp_path / "new" / "page", tmp_path)
+    assert [path.name for path in written] == ["fleet.parquet", "findings.parquet", "fleet.html"]
+    assert pl.read_parquet(written[0]).equals(history.windows)
+    assert pl.read_parquet(written[1]).equals(history.findings)
+    assert {path.name for path in written[0].parent.iterdir()} == {path.name for path in written}
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda jobs: jobs.drop("time"), "no column time; expected jobs.parquet of algid batch"),
+        (lambda jobs: jobs.drop("robot", "job"), "no column job, robot; expected jobs.parquet of algid batch"),
+        (lambda jobs: jobs.drop("k1"), "no job has given parameters; see its column reason, and run algid batch again"),
+        (
+            lambda jobs: jobs.drop("k1_std"),
+            "no job has given parameters; see its column reason, and run algid batch again",
+        ),
+        (
+            lambda jobs: jobs.with_columns(status=pl.lit("failed")),
+            "no job has given parameters; see its column reason, and run algid batch again",
+        ),
+        (
+            lambda jobs: jobs.with_columns(robot=pl.lit(None, dtype=pl.String)),
+            (
+                "none of 3 finished jobs has a robot; give each robot's logs a folder of their own, or name robots in "
+                "a manifest, and run algid batch again"
+            ),
+        ),
+    ],
+)
+def test_tables_that_tell_nothing_are_refused_in_one_line(change: Any, told: str, tmp_path: Path) -> None:
+    path = tmp_path / "jobs.parquet"
+    change(table([1.0, 2.0, 3.0])).write_parquet(path)
+    with pytest.raises(ResultError) as raised:
+        history_of(path)
+    assert str(raised.value) == f"{path}: {told}"
+
+
+def test_a_file_that_is_no_table_is_refused_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "jobs.parquet"
+    path.write_text("job,robot\n")
+    with pytest.raises(
+        ResultError, match=r"jobs\.parquet: cannot read it \(.+\); expected jobs\.parquet of algid batch$"
+    ) as raised:
+        history_of(path)
+    assert "\n" not in str(raised.value)
