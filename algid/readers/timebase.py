@@ -103,13 +103,14 @@ class Series:
         return float(np.median(np.diff(self.table.stamp_ns))) if len(self.table) > 1 else 0.0
 
     def covers(self, stamps: IntArray) -> NDArray[np.bool_]:
-        """Which of the stamps (N,) lie between two samples that are not far apart."""
+        """Which of the stamps (N,) are those of samples, or lie between two that are not far apart."""
         own = self.table.stamp_ns
         if own.size < 2:
             return np.zeros(stamps.size, np.bool_)
         after = np.clip(np.searchsorted(own, stamps, side="left"), 1, own.size - 1)
-        near = own[after] - own[after - 1] <= _GAP * self.period
-        return near & (stamps >= own[0]) & (stamps <= own[-1])
+        bridged = own[after] - own[after - 1] <= _GAP * self.period
+        at_sample = (own[after] == stamps) | (own[after - 1] == stamps)
+        return (bridged | at_sample) & (stamps >= own[0]) & (stamps <= own[-1])
 
     def at(self, stamps: IntArray) -> dict[str, FloatArray]:
         """The channels at the stamps (N,), linear between samples."""

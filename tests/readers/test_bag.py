@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from algid.errors import LogError
 from algid.log import Log
 from algid.profile import Profile
 from algid.readers import read_log
+from algid.readers.bag import bag_files
 from tests.readers.logs import EPOCH_NS, noise_log, same
 
 TYPE = "sensor_msgs/msg/JointState"
@@ -126,3 +128,146 @@ def test_other_joints_of_a_bag_that_move_are_told(tmp_path: Path) -> None:
     assert same(found, log)
     (text,) = (notice.text for notice in found.notices if notice.code == "OTHER_JOINTS")
     assert "1 other joint moves meanwhile: j3 by 0.1 rad" in text
+
+
+def described(folder: Path, names: list[str], more: str = "") -> Path:
+    """A folder of empty files, and metadata that list them."""
+    folder.mkdir()
+    listed = "".join(f"    - {name}\n" for name in names)
+    (folder / "metadata.yaml").write_text(f"info:\n  version: 5\n{more}  relative_file_paths:\n{listed}  files: []\n")
+    return folder
+
+
+def test_the_files_of_a_bag_come_as_its_metadata_list_them(tmp_path: Path) -> None:
+    names = ["bag_1.mcap", '"bag_0.mcap"', "'bag_10.mcap'", "bag_2.mcap"]
+    folder = described(tmp_path / "bag", names, "  compression_mode: none\n")
+    for number in (0, 1, 2):
+        (folder / f"bag_{number}.mcap").touch()
+    bag = bag_files(folder)
+    assert [path.name for path in bag.paths] == ["bag_1.mcap", "bag_0.mcap", "bag_2.mcap"]
+    assert bag.kind == "mcap"
+    (lost,) = bag.notices
+    assert (lost.code, lost.lossy, lost.text) == ("MISSING_SPLIT", True, "1 of 4 files of the bag missing: bag_10.mcap")
+
+
+def test_files_without_metadata_come_by_their_numbers(tmp_path: Path) -> None:
+    for name in ("run_10.db3", "run_9.db3", "run.db3", "a_9.db3", "run_0.txt"):
+        (tmp_path / name).touch()
+    found = bag_files(tmp_path)
+    assert [path.name for path in found.paths] == ["run.db3", "a_9.db3", "run_9.db3", "run_10.db3"]
+    assert (found.kind, found.notices) == ("db3", ())
+    (tmp_path / "run_11.mcap").touch()
+    with pytest.raises(LogError, match=r"the bag mixes files of \.db3, \.mcap; read one file of it"):
+        bag_files(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("names", "more", "words"),
+    [
+        (
+            ["a.db3", "b.db3", "c.db3", "d.db3"],
+            "",
+            r"none of the bag's files is there; expected \['a.db3', 'b",
+        ),
+        (["../a.db3"], "", r"'../a.db3' leads outside the bag's folder"),
+        (["/etc/passwd"], "", "leads outside the bag's folder"),
+        ([".."], "", "leads outside the bag's folder"),
+        (["a.db3"], "  compression_mode: FILE\n", r"compressed by rosbag2 \(compression_mode FILE\), unreadable"),
+        (["a.db3"], '  compression_mode: "message"\n', "compression_mode message"),
+        ([], "", "no relative_file_paths; expected the metadata"),
+    ],
+)
+def test_folders_that_are_no_bag_are_refused(names: list[str], more: str, words: str, tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=words):
+        bag_files(described(tmp_path / "bag", names, more))
+
+
+def states(folder: Path, *messages: dict[str, Any], topic: str = "/joint_states") -> Path:
+    """A rosbag2 folder in SQLite whose joint states have these fields, one a millisecond."""
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    time, header = store.types["builtin_interfaces/msg/Time"], store.types["std_msgs/msg/Header"]
+    with Writer2(folder, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        channel = writer.add_connection(topic, TYPE, typestore=store)
+        for row, fields in enumerate(messages):
+            values = {name: np.array(fields.get(name, ()), float) for name in ("position", "velocity", "effort")}
+            stamp = time(sec=5, nanosec=row * 1_000_000)
+            state = store.types[TYPE](header=header(stamp=stamp, frame_id=""), name=fields["name"], **values)
+            writer.write(channel, 10**9 + row, store.serialize_cdr(state, TYPE))
+    return folder
+
+
+PAIR = {"name": ["b", "a"], "position": [1, 2], "effort": [10, 20]}
+
+
+def test_joints_come_along_the_arm_and_messages_without_them_are_counted(tmp_path: Path) -> None:
+    path = states(tmp_path / "bag", PAIR, {"name": ["c"], "position": [9], "effort": [9]}, PAIR, {"name": []}, PAIR)
+    log = read_log(path)
+    assert log.theta.tolist() == [[2] * 3, [1] * 3]
+    assert log.tau.tolist() == [[20] * 3, [10] * 3]
+    assert log.omega is None
+    assert log.stamp_ns.tolist() == [5 * 10**9 + row * 1_000_000 for row in (0, 2, 4)]
+    assert (log.origin.reading.joints, log.origin.reading.joints_told) == (("a", "b"), "names")
+    assert [notice.text for notice in log.notices if notice.code == "OTHER_MESSAGES"] == [
+        "2 messages on '/joint_states' left out for want of both joints"
+    ]
+    # the recorder's own times, where a user asks for them
+    assert read_log(path, Profile(clock="log")).stamp_ns.tolist() == [10**9 + row for row in (0, 2, 4)]
+
+
+def test_velocities_are_read_only_where_they_are_wanted(tmp_path: Path) -> None:
+    path = states(tmp_path / "bag", *[{**PAIR, "velocity": [3, 4]}] * 3)
+    log = read_log(path)
+    assert log.omega is not None
+    assert log.omega.tolist() == [[4] * 3, [3] * 3]
+    assert read_log(path, Profile(velocity=False)).omega is None
+
+
+@pytest.mark.parametrize(
+    ("message", "words"),
+    [
+        ({**PAIR, "effort": []}, "found '/joint_states' with the joints b, a, whose effort is empty; choose: --topic"),
+        ({**PAIR, "name": ["a", "a"]}, "with the joints a, a, two of one name; choose"),
+        ({**PAIR, "position": [1]}, "no topic holds positions and efforts of two joints; found '/joint_states' with"),
+        ({"name": ["x", "y", "z"], "position": [1, 2, 3], "effort": [1, 2, 3]}, "of two joints; .* the joints x, y, z"),
+    ],
+)
+def test_joint_states_that_do_not_fit_are_told(message: dict[str, Any], words: str, tmp_path: Path) -> None:
+    path = states(tmp_path / "bag", *[message] * 3)
+    with pytest.raises(LogError, match=words):
+        read_log(path)
+
+
+def test_a_search_for_joints_ends(tmp_path: Path) -> None:
+    """Among messages that all have other joints the first two dozen tell enough."""
+    odd = [{"name": [f"j{row}"], "position": [1], "effort": [1]} for row in range(40)]
+    path = states(tmp_path / "bag", *odd, PAIR, PAIR)
+    with pytest.raises(LogError, match="no topic holds positions and efforts of two joints") as refused:
+        read_log(path)
+    assert str(refused.value).count("with the joints") == 21
+    named = {f"{quantity}{joint}": {"source": f"{field}[{joint - 1}]", "topic": "/joint_states"}
+             for quantity, field in (("theta", "position"), ("tau", "effort")) for joint in (1, 2)}  # fmt: skip
+    assert len(read_log(path, Profile.model_validate(named))) == 2
+
+
+def test_a_field_needs_a_topic_and_a_topic_its_field(tmp_path: Path) -> None:
+    path = states(tmp_path / "bag", *[PAIR] * 3)
+    fields = {"theta1": "position[0]", "theta2": "position[1]", "tau1": "effort[0]", "tau2": "effort[1]"}
+    named: dict[str, Any] = {name: {"source": field} for name, field in fields.items()}
+    with pytest.raises(
+        LogError, match=r"theta1 is to be taken from 'position\[0\]' without a topic: --set theta1.topic"
+    ):
+        read_log(path, Profile.model_validate(named))
+    log = read_log(path, Profile.model_validate({**named, "topic": "/joint_states"}))
+    assert log.tau.tolist() == [[10] * 3, [20] * 3]
+    with pytest.raises(LogError, match=r"holds no sample of tau2; name another: --set tau2.topic=NAME"):
+        read_log(path, Profile.model_validate({"tau2": {"source": "effort[0]", "topic": "/other"}}))
+    for wrong in ("effort[²]", "effort[2]", "header.frame_id"):
+        with pytest.raises(LogError, match="0 samples; a log needs two at least"):
+            read_log(path, Profile.model_validate({"tau2": {"source": wrong}}))
+
+
+def test_a_missing_package_is_told_with_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "log.bag").write_bytes(b"#ROSBAG V2.0\n")
+    monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
+    with pytest.raises(LogError, match=r"bags need the rosbags package: pip install 'algid\[bags\]'"):
+        read_log(tmp_path / "log.bag")

@@ -1,0 +1,234 @@
+"""Which column is which: choices, refusals to the letter, and what is said of commands, currents, motors and units."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import pytest
+
+from algid.errors import LogError
+from algid.log import Notice
+from algid.profile import Profile, with_settings
+from algid.readers.columns import Columns, assign
+from algid.readers.names import Name, choose, on_motor_side, other_joints, take_apart
+
+PLAIN = "t q1 q2 tau1 tau2"
+
+
+def assigned(header: str, settings: dict[str, Any] | None = None, **stated: str) -> Columns:
+    return assign("log.csv", header.split(), with_settings(Profile(), settings or {}), stated)
+
+
+def refusal(header: str, settings: dict[str, Any] | None = None, **stated: str) -> str:
+    with pytest.raises(LogError) as refused:
+        assigned(header, settings, **stated)
+    return str(refused.value).removeprefix("log.csv: ")
+
+
+def test_columns_that_are_missing_are_named_with_the_flags_that_name_them() -> None:
+    assert refusal("q1 q2 tau1") == (
+        "no column for t, tau1, tau2; found 'q1', 'q2', 'tau1'; name them: --set time=NAME --set tau1.source=NAME "
+        '--set tau2.source=NAME (profile: time = "NAME"; source = "NAME" of [tau1]; source = "NAME" of [tau2])'
+    )
+    many = " ".join(f"c{place:02d}" + "x" * 60 for place in range(18))
+    told = refusal(many)
+    assert told.count("'c") == 16
+    assert f"'c15{'x' * 37}' and 2 more; name them" in told
+    assert refusal(PLAIN, {"theta2": {"source": "angle"}}) == (
+        f"theta2 is to be taken from 'angle', which is not there; found {', '.join(map(repr, PLAIN.split()))}; "
+        'name another: --set theta2.source=NAME (profile: source = "NAME" of [theta2])'
+    )
+
+
+def test_columns_that_were_written_must_be_there() -> None:
+    with pytest.raises(LogError, match="the columns tau2, omega1 that were written are not there: the file was"):
+        assign("log.csv", PLAIN.split()[:-1], Profile(), {}, ["tau2", "tau1", "omega1"])
+
+
+@pytest.mark.parametrize("passive", [1, 2])
+def test_a_joint_without_motor_needs_no_torque(passive: int) -> None:
+    driven = 3 - passive
+    for torque in (f"tau{driven}", "torque"):
+        found = assigned(f"t q1 q2 {torque}", {"passive": passive})
+        assert found.sources[f"tau{driven}"] == torque
+        assert found.sources[f"tau{passive}"] == torque
+    assert "no column for tau1, tau2" in refusal(f"t q1 q2 tau{driven}")
+    assert "no column for tau" in refusal("t q1 q2 tau7 tau8 tau9".replace("tau8 tau9", ""), {"passive": passive})
+
+
+def test_velocities_are_taken_in_pairs_and_if_wanted() -> None:
+    both = f"{PLAIN} dq1 dq2"
+    assert assigned(both).sources["omega2"] == "dq2"
+    assert not {"omega1", "omega2"} & assigned(both, {"velocity": False}).sources.keys()
+    assert not {"omega1", "omega2"} & assigned(f"{PLAIN} dq1").sources.keys()
+    named = assigned(f"{PLAIN} speed_a dq2", {"omega1": {"source": "speed_a"}})
+    assert "omega1" not in named.sources
+
+
+def test_who_said_which_joint_is_the_first() -> None:
+    sources: dict[str, Any] = {
+        name: {"source": own} for name, own in zip(("theta1", "theta2", "tau1", "tau2"), PLAIN.split()[1:], strict=True)
+    }
+    named = "t wrist_pos elbow_pos wrist_torque elbow_torque"
+    found = assigned(named)
+    assert (found.reading.joints, found.reading.joints_told) == (("elbow", "wrist"), "names")
+    assert [notice.code for notice in found.notices] == ["JOINT_ORDER"]
+    assert assigned(PLAIN).reading.joints_told == "names"
+    assert assigned(PLAIN, sources).reading.joints_told == "profile"
+    told = assigned(named, {"joints": ["wrist", "elbow"]})
+    assert (told.reading.joints, told.reading.joints_told, told.notices) == (("wrist", "elbow"), "flag", ())
+    assert told.sources["tau1"] == "wrist_torque"
+
+
+@pytest.mark.parametrize(
+    ("header", "settings", "unit", "told"),
+    [
+        (PLAIN, {}, None, False),
+        ("time_ms q1 q2 tau1 tau2", {}, "ms", True),
+        (PLAIN, {"time_unit": "us"}, "us", True),
+        ("time_ms q1 q2 tau1 tau2", {"time_unit": "us"}, "us", True),
+        ("t theta1 theta2 tau1 tau2", {}, "s", False),
+    ],
+)
+def test_the_unit_of_time(header: str, settings: dict[str, Any], unit: str | None, told: bool) -> None:
+    """algid's own names mean seconds, and still are only taken to."""
+    found = assigned(header, settings)
+    assert (found.time_unit, found.time_told) == (unit, told)
+    assert (found.dated().time_unit, found.dated().time_told) == ("ns", True)
+
+
+def said(found: Columns) -> list[tuple[str, str]]:
+    return [(notice.code, notice.text) for notice in found.notices]
+
+
+def test_commanded_torques_are_told_and_taken_last() -> None:
+    commanded = assigned("t q1 q2 tau_cmd1 tau_cmd2")
+    text = "torques are commanded ones (tau_cmd1, tau_cmd2): no measured torque in the log"
+    assert commanded.notices == (Notice("COMMANDED_TORQUE", text),)
+    assert assigned("t q1 q2 tau_cmd1 tau_cmd2 tau_meas1 tau_meas2").sources["tau1"] == "tau_meas1"
+    assert assigned("t q1 q2 tau_cmd1 tau_cmd2 i_q1 i_q2").sources["tau1"] == "tau_cmd1"
+
+
+def test_currents_are_in_amperes_unless_their_unit_is_told() -> None:
+    header = "t q1 q2 current_1 current_2"
+    assert assigned(header).units == {"tau1": "A", "tau2": "A"}
+    assert assigned(header, None, current_2="mA").units == {"tau1": "A", "tau2": "mA"}
+    assert assigned(header, None, current_2="Nm").units == {"tau1": "A", "tau2": "A"}
+    told = assigned(header, {"tau1": {"unit": "N m"}})
+    text = "'current_1' for tau1 is a current by its name, and is taken for a torque in N m as told"
+    assert said(told) == [("CURRENT_AS_TORQUE", text)]
+
+
+def test_the_file_and_the_user_differ_about_a_unit() -> None:
+    assert said(assigned("t q1_deg q2_deg tau1 tau2", {"theta1": {"unit": "rad"}, "theta2": {"unit": "deg"}})) == [
+        ("OTHER_UNIT", "the file states the unit deg for theta1 ('q1_deg'), which is taken for rad as told")
+    ]
+    assert said(assigned("t q1_deg q2 tau1 tau2", None, q1_deg="rad", q2="deg")) == [
+        ("OTHER_UNIT", "the file states the unit rad beside theta1; its name, 'q1_deg', says deg, which holds")
+    ]
+    assert said(assigned("time_ms q1 q2 tau1 tau2", {"time_unit": "s"})) == [
+        ("OTHER_UNIT", "the file states the unit ms for t ('time_ms'), which is taken for s as told")
+    ]
+
+
+def test_a_unit_of_no_joint_is_refused_where_it_counts() -> None:
+    assert refusal("t q1_inch q2 tau1 tau2") == (
+        "the column 'q1_inch' for theta1 is in 'inch', which is no unit of a joint; say its unit if that is wrong: "
+        '--set theta1.unit="rad" (profile: unit = "rad" of [theta1])'
+    )
+    assert '--set tau2.unit="N m"' in refusal(PLAIN, None, tau2="%")
+    (foreign,) = said(assigned("t q1_inch q2 tau1 tau2", {"theta1": {"unit": "rev"}}))
+    assert foreign[1] == "the column 'q1_inch' for theta1 states the unit 'inch', and is taken for rev as told"
+    assert said(assigned("t q1_inch q2 q_b tau1 tau2", {"theta1": {"source": "q_b"}})) == []
+    assert said(assigned(PLAIN, None, t="%")) == []
+
+
+def test_motors_beside_joints_need_a_gear() -> None:
+    told = refusal("t q1 q2 motor1_torque motor2_torque", {"tau2": {"gear_ratio": 1}})
+    assert told == (
+        "tau1 (motor1_torque): signals of motors beside those of joints; tell the gear, turns of the motor in one of "
+        "the joint, 1 for a direct drive: --set tau1.gear_ratio=N (profile: gear_ratio of tau1)"
+    )
+    motors = assigned("t motor1_pos motor2_pos motor1_torque motor2_torque")
+    assert [code for code, _ in said(motors)] == ["MOTOR_SIDE"]
+    # a current's constant tells of its gear
+    assert said(assigned("t q1 q2 motor1_current motor2_current")) == []
+
+
+@pytest.mark.parametrize(
+    ("column", "stem", "joint", "unit", "foreign"),
+    [
+        (' "Q_02 [DEG]" ', "q", "2", "deg", None),
+        ("J3 Torque (N.m)", "torque", "3", "N m", None),
+        ("/arm/elbow/velocity", "velocity", "/arm/elbow", None, None),
+        ("/arm/position[05]", "position", "05", None, None),
+        ("/arm/effort.1", "effort", "1", None, None),
+        ("joint007_pos", "pos", "7", None, None),
+        ("joint000_pos", "pos", "0", None, None),
+        ("load [V]", "load", None, None, "v"),
+        ("motor2_speed_rpm", "speed", "2", "rpm", None),
+        ("millis", "millis", None, "ms", None),
+        ("[Nm]", "[nm]", None, None, None),
+    ],
+)
+def test_a_name_taken_apart(column: str, stem: str, joint: str | None, unit: str | None, foreign: str | None) -> None:
+    assert take_apart(column) == Name(stem, joint, unit, foreign)
+
+
+def test_a_name_that_holds_a_topic() -> None:
+    name = take_apart("/left/joint_states/elbow/position")
+    assert (name.own, name.topic) == ("elbow", "/left/joint_states")
+    assert (take_apart("q2").own, take_apart("q2").topic, take_apart("q").own) == ("2", "", "")
+    assert on_motor_side("left Motor_1 torque")
+    assert not on_motor_side("motorised_joint_1")
+
+
+@pytest.mark.parametrize(
+    ("columns", "joints", "chosen"),
+    [
+        ("/a/x/position /a/y/position /a/x/effort /a/y/effort", None, "/a/x/position"),
+        ("/a/x/position /b/x/position /a/x/effort /b/x/effort", None, "/a/x/position"),
+        ("/a/x/position /a/y/position /a/x/effort /a/y/effort", ("Y", "/a/x"), "/a/y/position"),
+        ("q0 q1 tau1 tau2", None, "q0"),
+        ("elbow_pos base_pos elbow_torque base_torque", None, "base_pos"),
+        ("q10 q9 tau9 tau10", None, "q9"),
+    ],
+)
+def test_the_pair_chosen(columns: str, joints: tuple[str, str] | None, chosen: str) -> None:
+    found = choose(["t", *columns.split()], joints)
+    assert found.columns["theta1"] == chosen
+    assert {"theta2", "tau1", "tau2"} < found.columns.keys()
+
+
+def test_joints_told_that_stand_there_twice_or_not_at_all() -> None:
+    columns = ["t", "/a/x/position", "/b/x/position", "/a/y/position", "/a/x/effort", "/a/y/effort"]
+    with pytest.raises(LookupError, match=r"no columns of the joints x, y; joints there are: x, y$"):
+        choose(columns, ("x", "y"))
+    assert choose(columns, ("/a/x", "y")).columns["theta1"] == "/a/x/position"
+    with pytest.raises(LookupError, match="joints there are: none that can be told by their names"):
+        choose(["t", "alpha", "beta"], ("1", "2"))
+    with pytest.raises(LookupError, match=re.escape("'pos' stands there for 9 joints: 1, 2, 3, 4, 5, 6, 7, 8")):
+        choose([f"pos{joint}" for joint in range(1, 10)])
+
+
+def test_a_name_written_twice_is_refused_but_where_its_column_is_told() -> None:
+    columns = ["t", "q1", "q_01 [deg]", "q2", "tau1", "tau2"]
+    with pytest.raises(LookupError, match=r"'q_01 \[deg\]' and 'q1' are both q of joint 1"):
+        choose(columns)
+    assert choose(columns, named=["theta1"]).columns["theta2"] == "q2"
+
+
+def test_a_time_is_known_by_its_whole_name_first() -> None:
+    assert choose(["time [ms]", "T", *PLAIN.split()[1:]]).columns["t"] == "T"
+    assert choose(["clock", "time [ms]", *PLAIN.split()[1:]]).columns["t"] == "time [ms]"
+    assert choose(["stamp", "time", "stamp_ns", *PLAIN.split()[1:]]).columns["t"] == "stamp_ns"
+    assert "t" not in choose(PLAIN.split()[1:]).columns
+
+
+def test_other_joints_are_those_of_the_same_quantity_and_topic() -> None:
+    flat = ["t", "q1", "q2", "q3", "tau3", "q_filt4", "dq3"]
+    assert other_joints(flat, ["q1", "q2"]) == {"3": "q3"}
+    topics = ["/a/x/position", "/a/y/position", "/a/z/position", "/b/w/position", "/a/z/effort"]
+    assert other_joints(topics, topics[:2]) == {"z": "/a/z/position"}
+    assert other_joints(["hip_pos", "knee_pos", "toe_pos", "max_pos"], ["hip_pos", "knee_pos"]) == {"toe": "toe_pos"}

@@ -1,0 +1,164 @@
+"""Units, gears, zeros and references: by the definitions of the units, by power, and against numpy's unwrap."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import constants
+
+from algid.errors import LogError
+from algid.log import ChannelReading
+from algid.profile import Profile
+from algid.readers.assemble import Unwrapper
+from algid.readers.convert import Conversion, Gatherer, Room, channel_readings
+from algid.readers.table import CHANNELS, SampleTable
+from algid.units import CURRENT, TORQUE, VELOCITY
+
+TURN = 2 * np.pi
+TORQUES = {
+    "N m": 1, "mN m": constants.milli, "N cm": constants.centi, "kN m": constants.kilo,
+    "kgf m": constants.kgf, "kgf cm": constants.kgf * constants.centi,
+    "lbf ft": constants.lbf * constants.foot, "lbf in": constants.lbf * constants.inch,
+    "ozf in": constants.ounce * constants.g * constants.inch,
+}  # fmt: skip
+ANGLES = {"rad": 1, "mrad": constants.milli, "deg": constants.degree, "rev": TURN}
+VELOCITIES = {**ANGLES, "rpm": TURN / constants.minute}
+MAPPING = {name: f"column of {name}" for name in CHANNELS}
+
+
+def readings(settings: dict[str, Any], stated: dict[str, str] | None = None) -> dict[str, ChannelReading]:
+    return channel_readings("log", MAPPING, Profile.model_validate(settings), stated or {})
+
+
+def test_the_units_are_those_known_here() -> None:
+    assert (set(TORQUES), set(VELOCITIES), set(CURRENT)) == (set(TORQUE), set(VELOCITY), {"A", "mA"})
+
+
+@pytest.mark.parametrize("gear", [1.0, 100.0])
+def test_every_unit_on_either_side_of_a_gear(gear: float) -> None:
+    """A motor turns `gear` times as far as its joint, and its torque is that much smaller."""
+    for unit, size in TORQUES.items():
+        found = readings({"tau1": {"unit": unit, "gear_ratio": gear}})["tau1"]
+        assert found.factor == pytest.approx(size * gear, rel=1e-12)
+    for unit, size in VELOCITIES.items():
+        channel = {"unit": unit, "gear_ratio": gear}
+        found = readings({"omega2": channel})["omega2"]
+        assert found.factor == pytest.approx(size / gear, rel=1e-12)
+        if unit in ANGLES:
+            assert readings({"theta2": channel})["theta2"].factor == pytest.approx(size / gear, rel=1e-12)
+    drive = {"torque_constant": 0.05, "gear_ratio": gear}
+    for unit, size in (("A", 1), ("mA", 1e-3)):
+        found = readings({"tau2": drive}, {"tau2": unit})["tau2"]
+        assert (found.unit, found.told) == (unit, "names")
+        assert found.factor == pytest.approx(0.05 * gear * size, rel=1e-12)
+    counts = readings({"theta1": {"unit": "counts", "counts": 4096, "gear_ratio": gear}})["theta1"]
+    assert counts.factor == pytest.approx(TURN / 4096 / gear, rel=1e-12)
+
+
+def test_signs_and_offsets_of_channels_and_joints_add_up() -> None:
+    found = readings(
+        {
+            "signs": [1, -1],
+            "offsets": [0.25, 0.5],
+            "theta2": {"sign": -1, "offset": 1.0},
+            "tau2": {"offset": 2.0},
+            "tau1": {"sign": -1},
+        }
+    )
+    assert {name: (one.factor, one.offset, one.sign) for name, one in found.items()} == {
+        "theta1": (1, 0.25, 1),
+        "theta2": (1, 1.5, 1),
+        "tau1": (-1, 0, -1),
+        "tau2": (-1, 2, -1),
+        "omega1": (1, 0, 1),
+        "omega2": (-1, 0, -1),
+    }
+
+
+@pytest.mark.parametrize(
+    ("settings", "stated", "words"),
+    [
+        ({}, {"tau1": "deg"}, r"tau1 \(column of tau1\) is in 'deg' by its name; expected one of N m, .*, A, mA; say"),
+        ({}, {"theta2": "N m"}, r"theta2 .* expected one of rad, .*, rpm, counts; .*--set theta2.unit=\"rad\""),
+        ({}, {"tau2": "A"}, r"tau2 is a current; .*--set tau2.torque_constant=… .*tau2.unit=\"N m\".*up to a gain"),
+        ({}, {"theta1": "counts"}, r"theta1 in encoder counts needs counts a turn: --set theta1.counts=…"),
+    ],
+)
+def test_units_that_do_not_fit_are_refused(settings: dict[str, Any], stated: dict[str, str], words: str) -> None:
+    with pytest.raises(LogError, match=words):
+        readings(settings, stated)
+
+
+def test_the_torque_of_a_joint_without_motor_needs_no_unit() -> None:
+    found = readings({"passive": 2}, {"tau2": "deg"})
+    assert (found["tau2"].source, found["tau2"].factor) == ("none: no motor", 0)
+
+
+SIGNALS = np.random.default_rng(7).normal(size=(6, 50))
+
+
+def converted(**settings: Any) -> Room:
+    samples = SampleTable(np.arange(50), dict(zip(CHANNELS, SIGNALS, strict=True)))
+    room = Room.empty(50, velocity=True)
+    Conversion({name: ChannelReading(name, "") for name in CHANNELS}, **settings).apply(samples, room)
+    return room
+
+
+def test_a_second_motor_at_the_base_does_the_same_work() -> None:
+    """τ_m1 θ̇1 + τ_m2 (θ̇1 + θ̇2), the power of both motors, is that of the joints' torques."""
+    room = converted(base=True)
+    assert room.omega is not None
+    (first, second), (one, two) = SIGNALS[2:4], SIGNALS[4:6]
+    assert np.allclose((room.tau * room.omega).sum(axis=0), first * one + second * (one + two), rtol=1e-13, atol=1e-13)
+
+
+def test_zero_and_reference_of_the_angles() -> None:
+    """The tip of an arm of two links of 1 m is where it was, whatever the angles are counted from."""
+    hanging, absolute = converted(hanging=True).theta, converted(absolute=True)
+    first, second = SIGNALS[:2]
+    assert np.allclose(np.exp(1j * hanging[0]) * 1j, np.exp(1j * first), atol=1e-14)
+    assert np.allclose(np.exp(1j * absolute.theta.sum(axis=0)), np.exp(1j * second), atol=1e-14)
+    assert absolute.omega is not None
+    assert np.allclose(absolute.omega.sum(axis=0), SIGNALS[5], atol=1e-14)
+    assert np.all(converted(passive=1).tau[0] == 0)
+    assert np.all(converted(passive=1, base=True).tau == SIGNALS[3])
+
+
+@settings(max_examples=40, deadline=None)
+@given(sizes=st.lists(st.integers(0, 40), min_size=1, max_size=8), expected=st.integers(0, 60), velocity=st.booleans())
+def test_a_gatherer_keeps_what_was_put_in(sizes: list[int], expected: int, velocity: bool) -> None:
+    """Whatever number of samples was expected, also none."""
+    gatherer, total = Gatherer(expected, velocity=velocity), sum(sizes)
+    signals = np.random.default_rng(total).normal(size=(3, 2, total))
+    done = 0
+    for size in sizes:
+        room, rows = gatherer.more(size), slice(done, done + size)
+        room.stamp_ns[:], room.theta[:], room.tau[:] = np.arange(done, done + size), *signals[:2, :, rows]
+        if room.omega is not None:
+            room.omega[:] = signals[2, :, rows]
+        done += size
+        assert len(gatherer) == done
+    found = gatherer.filled()
+    assert found.stamp_ns.tolist() == list(range(total))
+    assert np.array_equal(found.theta, signals[0])
+    assert np.array_equal(found.tau, signals[1])
+    assert (found.omega is not None) == velocity
+    assert found.omega is None or np.array_equal(found.omega, signals[2])
+
+
+@settings(max_examples=40, deadline=None)
+@given(steps=st.lists(st.floats(-3, 3), min_size=2, max_size=60), cuts=st.sets(st.integers(0, 59), max_size=4))
+def test_unwrapping_is_that_of_numpy_in_any_blocks(steps: list[float], cuts: set[int]) -> None:
+    turning = np.cumsum(steps)
+    wrapped = np.angle(np.exp(1j * turning))
+    theta = np.stack([wrapped, wrapped])
+    unwrapper = Unwrapper((True, False))
+    for part in np.split(theta, sorted(cuts), axis=1):
+        unwrapper.run(part)
+    # twenty turns at most, each good to a unit in the last place
+    assert np.allclose(theta[0], np.unwrap(wrapped), rtol=0, atol=1e-12)
+    assert np.array_equal(theta[1], wrapped)

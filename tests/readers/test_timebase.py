@@ -1,0 +1,180 @@
+"""Time order and alignment: against numpy's sort, closed forms of linear interpolation, and at their very limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from algid.arm import FloatArray
+from algid.errors import LogError
+from algid.log import IntArray, Notice
+from algid.readers.table import SampleTable, stack
+from algid.readers.timebase import HORIZON, Series, aligned, in_order, whole_topic
+from tests.readers.logs import EPOCH_NS
+
+MS = 1_000_000
+
+
+def table(stamps: Sequence[int] | IntArray, *notices: Notice, **columns: FloatArray) -> SampleTable:
+    own = np.asarray(stamps, np.int64)
+    return SampleTable(own, columns or {"theta1": np.arange(own.size, dtype=float)}, notices)
+
+
+def ordered(*tables: SampleTable) -> SampleTable:
+    """What comes out, as one table: stamps must rise within and across the tables."""
+    found = stack([one for one in in_order("log", iter(tables)) if len(one) or one.notices])
+    assert np.all(np.diff(found.stamp_ns) > 0)
+    return found
+
+
+@settings(max_examples=60, deadline=None)
+@given(data=st.data())
+def test_late_and_repeated_samples_in_any_tables(data: st.DataObject) -> None:
+    """Neighbours swapped and stamps repeated at random: numpy's unique tells what must come out, and how many go."""
+    steps = data.draw(st.lists(st.integers(0, 3), min_size=40, max_size=80))
+    stamps = np.cumsum([step or (place % 3 != 0) for place, step in enumerate(steps)])
+    for place in data.draw(st.sets(st.integers(0, stamps.size // 8 - 1))):
+        stamps[8 * place : 8 * place + 2] = stamps[8 * place : 8 * place + 2][::-1]
+    values = np.arange(stamps.size, dtype=float)
+    cuts = sorted(data.draw(st.sets(st.integers(1, stamps.size - 1), max_size=4)))
+    parts = [table(own, q=kept) for own, kept in zip(np.split(stamps, cuts), np.split(values, cuts), strict=True)]
+    unique, first = np.unique(stamps, return_index=True)
+    try:
+        found = ordered(*parts)
+    except LogError:  # a table so short that one swap is a quarter of it
+        assert min(map(len, parts)) < 10
+        return
+    assert found.stamp_ns.tolist() == unique.tolist()
+    assert found.columns["q"].tolist() == values[first].tolist()
+    said = {notice.code: int(notice.text.split()[0]) for notice in found.notices}
+    assert said.get("DUPLICATE_STAMPS", 0) == stamps.size - unique.size
+    assert ("UNSORTED_STAMPS" in said) == bool(np.any(np.diff(stamps) < 0))
+
+
+@pytest.mark.parametrize(("late", "fits"), [(HORIZON, True), (HORIZON + 1, False)])
+def test_a_sample_may_come_late_by_the_horizon_and_no_more(late: int, fits: bool) -> None:
+    stamps = np.arange(4 * HORIZON) * MS
+    moved = np.concatenate([stamps[:10], stamps[11 : 11 + late], stamps[10:11], stamps[11 + late :]])
+    if fits:
+        assert ordered(table(moved)).stamp_ns.tolist() == stamps.tolist()
+    else:
+        with pytest.raises(LogError, match=f"backwards by {late * 1e-3:.6g} s behind stamp {stamps[10 + late]} ns"):
+            ordered(table(moved))
+
+
+@pytest.mark.parametrize(("swaps", "fits"), [(10, True), (11, False)])
+def test_a_quarter_of_the_steps_may_go_backwards(swaps: int, fits: bool) -> None:
+    stamps = np.arange(40)
+    for place in range(0, 2 * swaps, 2):
+        stamps[place : place + 2] = stamps[place : place + 2][::-1]
+    if fits:
+        (said,) = ordered(table(stamps)).notices
+        assert said.text == "10 samples came late, now in order"
+    else:
+        with pytest.raises(LogError, match="time goes backwards"):
+            ordered(table(stamps))
+
+
+@pytest.mark.parametrize(("repeats", "fits"), [(20, True), (21, False)])
+def test_half_of_the_stamps_may_repeat(repeats: int, fits: bool) -> None:
+    stamps = np.concatenate([np.arange(40 - repeats), np.full(repeats, 39 - repeats)])
+    if fits:
+        (said,) = ordered(table(stamps)).notices
+        assert said.text == "20 samples repeat a stamp; the first of each was kept"
+    else:
+        with pytest.raises(LogError, match="time stands still: 21 of 40 stamps as the one before"):
+            ordered(table(stamps))
+
+
+def test_what_empty_tables_tell_is_kept() -> None:
+    first, last = Notice("ONE", "first"), Notice("TWO", "last")
+    found = ordered(table([], first), table([1, 2]), table([], last))
+    assert (found.stamp_ns.tolist(), found.notices) == ([1, 2], (first, last))
+    assert list(in_order("log", iter([]))) == []
+    (empty,) = in_order("log", iter([table([], first), table([], last)]))
+    assert (len(empty), empty.notices) == (0, (first, last))
+
+
+def test_memory_is_bounded_where_tables_overlap() -> None:
+    """Each table reaches a little into the one before, so that all are merged, and still none is held back for long."""
+    stamps = np.arange(40_000)
+    parts = np.split(stamps, range(4000, 40_000, 4000))
+    for one, other in pairwise(parts):
+        one[-1], other[0] = other[0], one[-1]
+    sizes = [len(found) for found in in_order("log", (table(part) for part in parts))]
+    assert sum(sizes) == stamps.size
+    assert max(sizes) <= 8000
+
+
+def series(stamps: IntArray, **columns: FloatArray) -> Series:
+    return Series("/other", table(stamps, **columns))
+
+
+@pytest.mark.parametrize("start", [0, EPOCH_NS])
+@pytest.mark.parametrize("step", [MS, 3 * MS])
+def test_the_error_told_is_that_of_a_parabola(step: int, start: int) -> None:
+    """Between samples h apart a line misses a t² by a h²/4 at most, in the middle: what the notice says of it."""
+    stamps = start + np.arange(200) * step
+    seconds = (stamps - start) * 1e-9
+    other = series(stamps, tau1=3 * seconds**2, tau2=-2 * seconds)
+    middle = stamps[:-1] + step // 2
+    missed = other.at(middle)["tau1"] - 3 * ((middle - start) * 1e-9) ** 2
+    # differences of squares of up to 0.36 s² lose 1e-16 of these
+    assert np.abs(missed - 0.75 * (step * 1e-9) ** 2).max() < 1e-14
+    assert other.error() == f"tau1 {0.75 * (step * 1e-9) ** 2:.2g}, tau2 {float(other.error().split()[-1]):.2g}"
+    assert float(other.error().split()[-1]) < 1e-15
+
+
+def test_samples_three_periods_apart_are_bridged_and_no_further() -> None:
+    stamps = np.array([0, 1, 2, 3, 6, 7, 8, 12, 13, 14]) * MS  # a gap of three periods, and one of four
+    other = series(stamps, tau1=stamps * 1.0)
+    assert other.period == MS
+    asked = np.array([-1, 0, 3 * MS + 1, 6 * MS - 1, 8 * MS, 8 * MS + 1, 12 * MS - 1, 12 * MS, 14 * MS, 14 * MS + 1])
+    assert other.covers(asked).tolist() == [False, True, True, True, True, False, False, True, True, False]
+    torn = series(np.array([0, 9, 10, 11, 12]) * MS, tau1=np.zeros(5))
+    assert torn.covers(np.array([0, 1, 9 * MS])).tolist() == [True, False, True]
+    assert not series(stamps[:1], tau1=np.ones(1)).covers(asked).any()
+    assert series(stamps[:2], tau1=np.ones(2)).error() == "tau1 0"
+
+
+@settings(max_examples=20, deadline=None)
+@given(shift=st.integers(-(10**15), 10**18), cut=st.integers(0, 60))
+def test_alignment_does_not_depend_on_the_clock_or_the_tables(shift: int, cut: int) -> None:
+    own, theirs = np.arange(60) * MS, 10 * MS + np.arange(12) * (3 * MS)
+    line = 2.0 + 1e-9 * (theirs - theirs[0])
+    other = Series("/other", table(theirs + shift, tau1=line))
+    parts = [table(part + shift, theta1=part * 1.0) for part in (own[:cut], own[cut:])]
+    found = stack(list(aligned(iter(parts), [other])))
+    inside = (own >= theirs[0]) & (own <= theirs[-1])
+    assert (found.stamp_ns - shift).tolist() == own[inside].tolist()
+    assert found.columns["theta1"].tolist() == own[inside].tolist()
+    assert np.allclose(found.columns["tau1"], 2.0 + 1e-9 * (own[inside] - theirs[0]), rtol=1e-14)
+    texts = {notice.code: notice for notice in found.notices}
+    assert texts["NOT_COVERED"].text == f"{60 - inside.sum()} samples were dropped, where another topic has none"
+    assert texts["NOT_COVERED"].lossy
+    assert texts["ALIGNED"].text.startswith("'/other' (333.333 Hz) was interpolated; error, root mean square")
+
+
+def test_all_topics_must_cover_a_sample() -> None:
+    own = np.arange(30) * MS
+    early, late = (
+        series(own[part], **{name: own[part] * 1.0}) for part, name in ((slice(0, 20), "tau1"), (slice(10, 30), "tau2"))
+    )
+    (found,) = aligned(iter([table(own, theta1=own * 1.0)]), [early, late])
+    assert found.stamp_ns.tolist() == own[10:20].tolist()
+    assert found.columns.keys() == {"theta1", "tau1", "tau2"}
+    assert [notice.code for notice in found.notices] == ["ALIGNED", "ALIGNED", "NOT_COVERED"]
+
+
+def test_a_topic_is_read_whole_in_order_or_refused() -> None:
+    found = whole_topic("log", "/other", ["tau1"], iter([table(range(0, 20, 2)), table([]), table([17, 21, 22, 23])]))
+    assert found.table.stamp_ns.tolist() == [*range(0, 17, 2), 17, 18, 21, 22, 23]
+    with pytest.raises(
+        LogError, match=r"topic '/other' holds no sample of tau1; .*--set tau1.topic=NAME .*\(profile: "
+    ):
+        whole_topic("log", "/other", ["tau1", "tau2"], iter([table([])]))
