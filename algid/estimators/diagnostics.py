@@ -19,12 +19,12 @@ import numpy as np
 from scipy.special import chdtrc, chdtri, ndtri
 
 from algid.arm import FloatArray
-from algid.estimators.combine import LogInformation, Prior, combine, likelihood, long_run_variance, scaled_pinv
+from algid.estimators.combine import LogInformation, Prior, combine, likelihood, sandwich, scaled_pinv
 from algid.estimators.fit import Fit, Status
 from algid.estimators.identifiability import sizes
 from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Normal
-from algid.model import TERMS
+from algid.model import TERMS, Model
 
 _NOT_NEGATIVE = ("k6", "k7", "f1", "f2", "j2", "m_p", "l1", "l2")
 _NUDGE = 1e-6  # of a parameter's size: step of the differences
@@ -185,13 +185,14 @@ class JointsApart:
     second: float
 
 
-def joints_apart(normals: Sequence[Normal], names: Sequence[str]) -> JointsApart | None:
+def joints_apart(normals: Sequence[Normal], model: Model) -> JointsApart | None:
     """Whether the equations of the two joints contradict each other about k1, k2 or k3, which stand in both.
 
     Parameters
     ----------
-    normals : normal equations of logs of one kind
-    names : names of their columns, the torque's aside
+    normals : normal equations of logs of one kind, without a delay's column
+    model : Model
+        Of their columns.
 
     Returns
     -------
@@ -205,25 +206,23 @@ def joints_apart(normals: Sequence[Normal], names: Sequence[str]) -> JointsApart
     solved by constants near nothing. Its residual is small then, so that it outweighs the joint that is driven. The
     standard deviations are those of the sandwich, as for a fit.
     """
-    both = [place for place, name in enumerate(names) if name in ("k1", "k2", "k3")]
+    shared = Shared(model)
+    both = [place for place, name in enumerate(model.names) if name in ("k1", "k2", "k3")]
     found = []
     for joint in range(2):
         grams = [normal.gram[:, joint] for normal in normals]
-        total = np.sum([gram.sum(axis=0) for gram in grams], axis=0)
-        inverse = scaled_pinv(total[:-1, :-1])
-        v = np.append(-inverse @ total[:-1, -1], 1.0)
-        meats = [long_run_variance((gram @ v)[:, :-1]) for gram in grams]
-        stretches = sum(len(gram) // (lags + 1) for gram, (_, lags) in zip(grams, meats, strict=True))
-        freedom = max(2, stretches - int(np.count_nonzero(np.diag(total)[:-1])))
-        variance = np.diag(inverse @ np.sum([meat for meat, _ in meats], axis=0) @ inverse)
-        found.append((-v[both], variance[both] * max(1.0, stretches / freedom)))
+        nothing = np.zeros(len(model.names))
+        c, covariance, _ = _by_themselves(
+            shared, [LogInformation(False, nothing, gram[:, :-1, :-1], gram[:, :-1, -1]) for gram in grams]
+        )
+        found.append((c[both], np.diag(covariance)[both]))
     (first, of_first), (second, of_second) = found
     distance = np.abs(first - second) / np.sqrt(of_first + of_second + 1e-300)
     unlike = np.abs(first - second) > _UNLIKE * np.maximum(np.abs(first), np.abs(second))
     worst = int(np.argmax(np.where(unlike, distance, 0.0)))
     if not unlike[worst] or distance[worst] < FAR_BEYOND:
         return None
-    return JointsApart(names[both[worst]], float(first[worst]), float(second[worst]))
+    return JointsApart(model.names[both[worst]], float(first[worst]), float(second[worst]))
 
 
 _OPTIONAL = {**{term: content.names for term, content in TERMS.items()}, "delay": ("delay",)}
@@ -266,13 +265,15 @@ def payload_distance(fit: Fit) -> float | None:
 
     Notes
     -----
-    The statistic compares the arm's constants with the loaded arm's, less the payload that fits best; it is χ² where
-    they agree, with as many degrees of freedom as constants less those of the payload.
+    The statistic compares the arm's constants with the loaded arm's, less the payload that fits best. Where they agree
+    it is χ² with as many degrees of freedom as constants less those of the payload.
     """
-    sides = [_alone([log for log in fit.logs if log.loaded is loaded]) for loaded in (False, True)]
-    if not fit.shared.payload or any(side is None for side in sides):
+    kinds = [[log for log in fit.logs if log.loaded is loaded] for loaded in (False, True)]
+    if not fit.shared.payload or not all(kinds):
         return None
-    bare, burdened = [side for side in sides if side is not None]
+    bare, burdened = (_by_themselves(fit.shared, kind) for kind in kinds)
+    if not (bare[2] and burdened[2]):
+        return None
     freedom = len(fit.shared.log_names) - (len(fit.shared.names) - len(fit.shared.log_names))
     arm = Prior.of(fit.shared.log_names, bare[0], bare[1])
     loaded = LogInformation(True, burdened[0], scaled_pinv(burdened[1])[None], np.zeros_like(burdened[0])[None])
@@ -314,15 +315,10 @@ def repeatability(fit: Fit) -> MassScatter | None:
     return MassScatter(np.array(masses), std, (low, high))
 
 
-def _alone(logs: list[LogInformation]) -> tuple[FloatArray, FloatArray] | None:
-    """Coefficients (q,) that logs of one kind give by themselves, and their robust covariance (q, q)."""
-    if not logs:
-        return None
+def _by_themselves(shared: Shared, logs: Sequence[LogInformation]) -> tuple[FloatArray, FloatArray, bool]:
+    """Coefficients (q,) that logs of one kind give, their sandwich (q, q), and whether all of them are told."""
     S = np.sum([log.total[0] for log in logs], axis=0)
-    g = np.sum([log.total[1] + log.total[0] @ log.c0 for log in logs], axis=0)
     inverse = scaled_pinv(S)
-    if np.linalg.matrix_rank(inverse @ S) < S.shape[0]:
-        return None
-    c = inverse @ g
-    meat = np.sum([long_run_variance(log.g - log.S @ (c - log.c0))[0] for log in logs], axis=0)
-    return c, inverse @ meat @ inverse
+    c = inverse @ np.sum([log.total[1] + log.total[0] @ log.c0 for log in logs], axis=0)
+    meat, _ = sandwich(Shared(shared.model, shared.delay), [replace(log, loaded=False) for log in logs], c)
+    return c, inverse @ meat @ inverse, bool(np.linalg.matrix_rank(inverse @ S) == len(c))

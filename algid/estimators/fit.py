@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -17,7 +17,6 @@ from algid.estimators.combine import (
     combine,
     jackknife,
     left_out,
-    long_run_variance,
     sandwich,
     scaled_pinv,
 )
@@ -136,11 +135,12 @@ class OwnEstimate:
 def own_estimates(fit: Fit) -> tuple[OwnEstimate, ...]:
     """Each log's own estimate of `Shared.log_names`, unloaded logs first, with the blocks of that log alone."""
     found = []
+    shared = Shared(fit.shared.model, fit.shared.delay)
     for log in fit.logs:
         S, g = log.total
         values = log.c0 + scaled_pinv(S) @ g
         known = examine(fit.shared.log_names, values, S, fit.moved)
-        meat, _ = long_run_variance(log.g - log.S @ (values - log.c0))
+        meat, _ = sandwich(shared, [replace(log, loaded=False)], values)
         covariance = known.covariance @ meat @ known.covariance if fit.intervals != "likelihood" else known.covariance
         std = np.where(known.determined, np.sqrt(np.maximum(np.diag(covariance), 0.0)), np.inf)
         found.append(OwnEstimate(log.loaded, values, std))

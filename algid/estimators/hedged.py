@@ -86,8 +86,9 @@ def _doubt(fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], setti
         at = None if settings.model.linear else fit.shared.coefficients(fit.values, kind)[: len(names)]
         every = [weak.normal_equations(source, settings, at) for source in sources]
         normals = [normal for normal in every if normal is not None]
-        apart = joints_apart(normals, names) if normals else None
+        apart = joints_apart(normals, settings.model) if normals else None
         if apart is not None:
-            told = f"joint 1 by itself tells {apart.name} as {apart.first:.2g} {UNITS[apart.name]} and joint 2 as"
-            return f"{told} {apart.second:.2g}: one of them is hardly driven, give a log in which both are"
+            first, second = f"{apart.first:.2g} {UNITS[apart.name]}", f"{apart.second:.2g}"
+            told = f"joint 1 by itself tells {apart.name} as {first} and joint 2 as {second}: one of them"
+            return f"{told} is hardly driven, or a term is missing; give a log that drives both"
     return None

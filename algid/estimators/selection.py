@@ -163,8 +163,7 @@ def select(
     searches: list[_Search] = []
     for _ in range(_ROUNDS):
         grams = look.grams(everything)
-        told = [term for term in candidates if set(term_names(term)) & set(grams.names) and term not in fixed]
-        searches.append(_Search(grams, tuple(told), fixed))
+        searches.append(_Search(grams, tuple(term for term in candidates if term not in fixed), fixed))
         terms = searches[-1].run()
         if terms == before or not (_RELINEARISED | _SHAPED["coulomb_speed"]) & set(terms):
             break
@@ -192,7 +191,7 @@ def _lowest(x: FloatArray, y: Sequence[float]) -> float:
     if least in (0, len(x) - 1):
         return float(x[least])
     a, b, _ = np.polyfit(x[least - 1 : least + 2] - x[least], y[least - 1 : least + 2], 2)
-    return float(x[least] - b / (2 * a)) if a > 0 else float(x[least])
+    return float(x[least] - b / (2 * a))
 
 
 def _as_lag(start: _Look, look: _Look, terms: Sequence[str], chosen: Selection) -> Selection:
@@ -272,8 +271,6 @@ class _Search:
         beside = [other for other in kept if other != term and _need(other) != term]
         if term in asked:
             return TermTrial(term, True, self.gain([term], beside), self.evidence([term], beside), "asked for")
-        if term not in self.candidates:
-            return TermTrial(term, False, 0.0, 0.0, "left out: without gravity it has no effect")
         if _need(term) not in (None, *beside):
             return TermTrial(term, False, 0.0, 0.0, f"left out: no meaning without {_need(term)}")
         gain, evidence = self.gain([term], beside), self.evidence([term], beside)

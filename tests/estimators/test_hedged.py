@@ -102,13 +102,13 @@ def test_a_joint_that_is_hardly_driven_is_told_by_the_other(bench: Bench, idle: 
     normal = weak.normal_equations(lambda: [replace(log, tau=log.tau * share)], WeakSettings())
     assert normal is not None
     names = WeakSettings().model.names
-    apart = joints_apart([normal], names)
+    apart = joints_apart([normal], Model())
     assert apart is not None
     truth = dict(zip(names, bench.truth[:7], strict=True))
     np.testing.assert_allclose([apart.first, apart.second], truth[apart.name] * share[:, 0], rtol=0.02)
     sound = weak.normal_equations(lambda: [log], WeakSettings())
     assert sound is not None
-    assert joints_apart([sound], names) is None
+    assert joints_apart([sound], Model()) is None
 
 
 def test_constants_that_the_joints_contradict_are_not_ok(bench: Bench) -> None:

@@ -1,0 +1,111 @@
+"""The torque solved for the accelerations, and friction's slopes: inverses and differences of what SymPy holds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from algid.arm import FloatArray, forward_dynamics
+from algid.model import (
+    COLUMN_NAMES,
+    TERMS,
+    Model,
+    Motion,
+    acceleration,
+    friction_columns,
+    friction_slope,
+    torque,
+)
+from tests.estimators.test_model import VALUES
+
+WITHOUT_LAG = tuple(term for term in TERMS if term != "lag")
+MODELS = [(), *((term,) for term in WITHOUT_LAG), ("coulomb", "stribeck", "asymmetry"), WITHOUT_LAG]
+
+
+def _states(seed: int = 0, count: int = 400) -> tuple[FloatArray, FloatArray, FloatArray]:
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-3, 3, (2, count)), rng.normal(0, 2, (2, count)), rng.normal(0, 40, (2, count))
+
+
+def _constants(model: Model) -> FloatArray:
+    return np.array([VALUES[name] for name in model.names])
+
+
+@pytest.mark.parametrize("gravity", [9.81, 0.0])
+@pytest.mark.parametrize("terms", MODELS, ids=lambda terms: "+".join(terms) or "plain")
+def test_accelerations_are_those_whose_torque_it_is(terms: tuple[str, ...], gravity: float) -> None:
+    model = Model(terms, gravity, coulomb_speed=0.5)
+    theta, omega, alpha = _states()
+    c = _constants(model)
+    found = acceleration(model, c, theta, omega, torque(model, c, Motion(theta, omega, alpha)))
+    # the mass matrix has a condition number of about 10
+    np.testing.assert_allclose(found, alpha, rtol=1e-9, atol=1e-9)
+
+
+def test_without_terms_it_is_the_arms_forward_dynamics() -> None:
+    theta, omega, tau = _states(1)
+    c = _constants(Model())
+    np.testing.assert_allclose(
+        acceleration(Model(), c, theta, omega, tau), forward_dynamics(c, theta, omega, tau), rtol=1e-9
+    )
+
+
+def test_a_load_whose_sign_turns_is_found_from_either_side() -> None:
+    """Friction by load of a third: loads near nothing have the sign of the torque left for them, or the other."""
+    model = Model(("load",), coulomb_speed=0.1)
+    c = np.array([*_constants(Model()), 0.3, 0.3])
+    theta, omega, _ = _states(2, 2000)
+    alpha = np.random.default_rng(3).normal(0, 2, theta.shape)
+    tau = torque(model, c, Motion(theta, omega, alpha))
+    kept = tau.copy()
+    found = acceleration(model, c, theta, omega, tau)
+    np.testing.assert_array_equal(tau, kept)
+    again = torque(model, c, Motion(theta, omega, found))
+    np.testing.assert_allclose(again, tau, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("terms", [(), ("coulomb",), ("coulomb", "asymmetry"), ("coulomb", "stribeck"), WITHOUT_LAG])
+def test_frictions_slope_is_its_difference(terms: tuple[str, ...]) -> None:
+    model = Model(terms, coulomb_speed=0.3, stribeck_speed=0.4)
+    value = model.values(_constants(model))
+    omega = np.random.default_rng(4).normal(0, 0.5, (2, 300))
+
+    def friction(omega: FloatArray) -> FloatArray:
+        drag = np.array([[value["k6"]], [value["k7"]]]) * omega
+        columns = friction_columns(model, omega).items()
+        return drag + sum(np.array([[value[f"{name}1"]], [value[f"{name}2"]]]) * found for name, found in columns)
+
+    step = 1e-6
+    expected = (friction(omega + step) - friction(omega - step)) / (2 * step)
+    np.testing.assert_allclose(friction_slope(model, value, omega), expected, atol=1e-8)
+
+
+def test_what_a_model_lacks_is_nothing_in_the_order_of_all_columns() -> None:
+    model = Model(("rotor",), gravity=0.0)
+    full = model.expand(np.arange(1.0, 7.0))
+    assert dict(zip(COLUMN_NAMES, full.tolist(), strict=True)) == model.values(np.arange(1.0, 7.0))
+    assert {name: value for name, value in model.values(np.arange(1.0, 7.0)).items() if value} == {
+        "k1": 1.0,
+        "k3": 2.0,
+        "k5": 3.0,
+        "k6": 4.0,
+        "k7": 5.0,
+        "j2": 6.0,
+    }
+
+
+def test_a_motion_that_is_not_turned_is_itself() -> None:
+    motion = Motion(*_states(5, 20))
+    assert motion.turned(np.zeros(2)) is motion
+    turned = motion.turned(np.array([0.1, -0.2]))
+    np.testing.assert_allclose(turned.theta, motion.theta + np.array([[0.1], [-0.2]]))
+    s1, c1, s2, c2, s12, c12 = turned.trigonometry
+    for found, expected in (
+        (s1, np.sin(turned.theta[0])),
+        (c1, np.cos(turned.theta[0])),
+        (s2, np.sin(turned.theta[1])),
+    ):
+        np.testing.assert_allclose(found, expected, atol=1e-15)
+    np.testing.assert_allclose(c2, np.cos(turned.theta[1]), atol=1e-15)
+    np.testing.assert_allclose(s12, np.sin(turned.theta.sum(axis=0)), atol=1e-15)
+    np.testing.assert_allclose(c12, np.cos(turned.theta.sum(axis=0)), atol=1e-15)

@@ -1,0 +1,181 @@
+"""Bounds of physics by closed forms, the worth of terms by Schwarz's own sum, and what cannot be told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import scipy.optimize
+
+from algid.arm import FloatArray
+from algid.estimators import weak
+from algid.estimators.combine import LogInformation
+from algid.estimators.diagnostics import (
+    broken_bounds,
+    constrained,
+    joints_apart,
+    length_by_constants,
+    payload_distance,
+    repeatability,
+    term_worths,
+)
+from algid.estimators.fit import Fit, conclude
+from algid.estimators.parametrisation import Shared
+from algid.estimators.weak import Source, WeakSettings
+from algid.model import Model
+
+from .conftest import Bench
+
+PLAIN = Model()
+K = np.array([0.03, 1.4, 0.05, 1.9, 0.06, 0.1, 0.2])
+
+
+def fit_of(values: FloatArray, model: Model = PLAIN, delay: bool = False) -> Fit:
+    """A fit of one log whose information is dense, and that is most likely at `values`."""
+    shared = Shared(model, delay)
+    X = np.random.default_rng(0).standard_normal((50, values.size)) / (0.01 * np.maximum(np.abs(values), 1e-3))
+    log = LogInformation(False, values, X[:, :, None] * X[:, None, :], np.zeros((50, values.size)))
+    return conclude("refined", shared, [log], values, np.ones(2), coloured=False)
+
+
+@pytest.mark.parametrize("broken", [5, 6])
+def test_a_friction_held_at_nothing_moves_the_others_as_conditional_normals(broken: int) -> None:
+    """E[b | k6 = 0] = b − C[:, 6] k6 / C66, the optimum of a quadratic likelihood under one bound that holds."""
+    values = K.copy()
+    values[broken] = -0.05
+    fit = fit_of(values)
+    expected = fit.values - fit.covariance[:, broken] * fit.values[broken] / fit.covariance[broken, broken]
+    found = constrained(fit)
+    np.testing.assert_allclose(found.values, expected, atol=1e-4 * np.abs(K).max())
+    np.testing.assert_array_equal(found.std, fit.std)
+    assert found.converged
+    name = fit.names[broken]
+    distance = 0.05 / fit.std[broken]
+    assert found.note == (
+        f"--constrain enforces {name} >= 0 ({distance:.2g} standard deviations beyond), which the logs contradict"
+    )
+    assert constrained(replace(fit, note="before")).note == f"before; {found.note}"
+
+
+def test_bounds_that_no_point_keeps_leave_the_free_estimates(monkeypatch: pytest.MonkeyPatch) -> None:
+    values = K.copy()
+    values[5] = -0.05
+    fit = replace(fit_of(values), status=("OK", "NOT_IDENTIFIABLE", *("OK",) * 5))
+    stuck = {"nothing": np.full(7, np.nan), "where it was": np.zeros(7)}
+    for x in stuck.values():
+        monkeypatch.setattr(scipy.optimize, "minimize", lambda *_, x=x, **__: SimpleNamespace(x=x))
+        found = constrained(fit)
+        assert not found.converged
+        assert found.status == ("NOT_CONVERGED", "NOT_IDENTIFIABLE", *("NOT_CONVERGED",) * 5)
+        np.testing.assert_array_equal(found.values, fit.values)
+        assert found.note is not None
+        assert found.note.startswith("--constrain cannot obey k6 >= 0 (")
+        assert found.note.endswith("standard deviations beyond): no estimates within the bounds were found")
+
+
+def test_a_bound_is_broken_by_what_is_known_alone() -> None:
+    values = K.copy()
+    values[6] = -0.02
+    fit = fit_of(values)
+    (bound,) = broken_bounds(fit)
+    assert bound.bound == "k7 >= 0"
+    assert bound.value == pytest.approx(-0.02)
+    assert bound.distance == pytest.approx(0.02 / fit.std[6], rel=1e-6)
+    assert broken_bounds(replace(fit, status=(*("OK",) * 6, "NOT_IDENTIFIABLE"))) == []
+    (exact,) = broken_bounds(replace(fit, covariance=np.zeros((7, 7))))
+    assert exact.distance is None
+
+
+def test_the_length_by_constants_has_the_error_of_a_ratio() -> None:
+    """Against draws of k1 and k2 by their covariance; a few thousand tell a deviation to 5 %."""
+    fit = fit_of(K)
+    found = length_by_constants(fit)
+    assert found is not None
+    assert found[0] == pytest.approx(9.81 * 0.03 / 1.4)
+    drawn = np.random.default_rng(0).multivariate_normal(fit.values[:2], fit.covariance[:2, :2], 5000)
+    assert found[1] == pytest.approx(np.std(9.81 * drawn[:, 0] / drawn[:, 1]), rel=0.05)
+    assert length_by_constants(fit_of(K[[0, 2, 4, 5, 6]], Model(gravity=0.0))) is None
+    assert length_by_constants(replace(fit, values=K * [1, 0, 1, 1, 1, 1, 1])) is None
+    assert length_by_constants(replace(fit, status=("OK", "NOT_IDENTIFIABLE", *("OK",) * 5))) is None
+    assert length_by_constants(replace(fit, status=("NOT_IDENTIFIABLE", *("OK",) * 6))) is None
+
+
+def test_a_terms_worth_is_schwarzs_price_less_walds_statistic() -> None:
+    model = Model(("coulomb", "rotor"))
+    fit = fit_of(np.array([*K, 0.3, 0.2, 0.004, 0.002]), model, delay=True)
+    std = np.array([0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.05, 0.1, 0.002, 0.004])
+    fit = replace(fit, covariance=np.diag(std**2), freedom=400)
+    assert fit.names[7:] == ("f1", "f2", "j2", "delay")
+    worths = {one.term: one for one in term_worths(fit)}
+    assert set(worths) == {"coulomb", "rotor", "delay"}
+    assert worths["coulomb"].delta_bic == pytest.approx(2 * np.log(400) - (6**2 + 2**2), rel=1e-9)
+    assert worths["rotor"].delta_bic == pytest.approx(np.log(400) - 2**2, rel=1e-9)
+    assert worths["delay"].delta_bic == pytest.approx(np.log(400) - 0.5**2, rel=1e-9)
+    assert [worths[term].earned for term in ("coulomb", "rotor", "delay")] == [True, False, False]
+    both = np.zeros((11, 11))
+    both[7, 8] = both[8, 7] = 0.003
+    correlated = replace(fit, covariance=fit.covariance + both)
+    V = correlated.covariance[7:9, 7:9]
+    wald = fit.values[7:9] @ np.linalg.solve(V, fit.values[7:9])
+    assert term_worths(correlated)[0].delta_bic == pytest.approx(2 * np.log(400) - wald, rel=1e-6)
+
+
+def test_logs_of_one_arm_are_not_taken_for_those_of_two(bench: Bench) -> None:
+    """A log of each kind, four seconds: few stretches tell a variance, and none of 12 pairs is 5 deviations apart.
+
+    Without the freedom of so few stretches 1 pair in 6 was. Friction that is another's is still told.
+    """
+    found = []
+    for seed in range(12):
+        logs = [bench.log(loaded, 1e-3, 20 + seed) for loaded in (False, True)]
+        found.append(payload_distance(weak.fit([partial(list, logs[:1])], [partial(list, logs[1:])])))
+    apart = [distance for distance in found if distance is not None]
+    assert len(apart) == 12
+    assert max(apart) < 5
+    other = replace(logs[1], tau=logs[1].tau + 0.5 * bench.arm.b2 * bench.burdened.omega)
+    told = payload_distance(weak.fit([partial(list, logs[:1])], [partial(list, [other])]))
+    assert told is not None
+    assert told > 5
+
+
+def test_a_payload_that_one_kind_of_log_cannot_tell_has_no_distance(bench: Bench) -> None:
+    bare: Source = partial(list, [bench.log(sigma=1e-3)])
+    fit = weak.fit([bare], [partial(list, [bench.log(True, 1e-3)])])
+    assert payload_distance(fit) is not None
+    assert payload_distance(weak.fit([bare])) is None
+    first, second = fit.logs
+    S = second.S.copy()
+    S[:, 6] = S[:, :, 6] = 0.0  # nothing of k7
+    assert payload_distance(replace(fit, logs=(first, replace(second, S=S)))) is None
+    assert payload_distance(replace(fit, logs=(second,))) is None
+
+
+def test_a_loaded_log_that_tells_no_mass_has_no_repeatability(bench: Bench) -> None:
+    lengths = {"l1": bench.arm.l1, "l2": bench.arm.l2}
+    burdened = [lambda: [bench.log(True, 1e-3, 1)], lambda: [bench.log(True, 1e-3, 2)]]
+    fit = weak.fit([lambda: [bench.log(sigma=1e-3)]], burdened, lengths=lengths)
+    assert repeatability(fit) is not None
+    empty = replace(fit.logs[2], S=np.zeros_like(fit.logs[2].S))
+    assert repeatability(replace(fit, logs=(*fit.logs[:2], empty))) is None
+
+
+def test_joints_of_an_arm_in_a_plane_are_held_against_each_other_too(bench: Bench) -> None:
+    """Without gravity k1 and k3 are left to compare; torques that differ by less than half contradict nothing."""
+    flat = WeakSettings(model=Model(gravity=0.0))
+    k = bench.arm.constants()
+    theta1, both = bench.bare.theta[0], bench.bare.theta.sum(axis=0)
+    weight = np.stack([k[3] * np.cos(theta1) + k[1] * np.cos(both), k[1] * np.cos(both)])
+    log = bench.log(sigma=1e-4)
+    log = replace(log, tau=log.tau - weight)
+    for share, told in ((1.0, False), (0.7, False), (0.3, True)):
+        scaled = replace(log, tau=log.tau * np.array([[1.0], [share]]))
+        normal = weak.normal_equations(partial(list, [scaled]), flat)
+        assert normal is not None
+        found = joints_apart([normal], flat.model)
+        assert (found is not None) is told
+        if found is not None:
+            truth = dict(zip(("k1", "k3"), k[[0, 2]], strict=True))[found.name]
+            np.testing.assert_allclose([found.first, found.second], [truth, share * truth], rtol=0.05)

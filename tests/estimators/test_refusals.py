@@ -1,0 +1,79 @@
+"""What the refined estimator does where it cannot: no convergence, no factor, pieces too short, a callback's tale."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from algid.estimators import refined, weak
+from algid.estimators.weak import Source
+from algid.estimators.whitening import Linearised, covariance_factor, low_passed
+from algid.signals.differences import POINTS
+from algid.signals.segments import Segment
+
+from .conftest import DT, Bench
+
+
+def test_steps_that_do_not_settle_leave_the_weak_estimate(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    source: Source = partial(list, [bench.log(sigma=1e-3)])
+    monkeypatch.setattr(refined, "_STEPS", 1)
+    fit = refined.fit([source])
+    before = weak.fit([source])
+    assert (fit.estimator, fit.converged, fit.iterations) == ("weak", False, 1)
+    assert fit.status == ("NOT_CONVERGED",) * 7
+    np.testing.assert_array_equal(fit.values, before.values)
+    np.testing.assert_array_equal(fit.covariance, before.covariance)
+
+
+def test_a_factor_that_does_not_exist_leaves_the_weak_estimate(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object) -> None:
+        raise np.linalg.LinAlgError("not positive definite")
+
+    log = bench.log(sigma=1e-3)
+    still = Segment(0.0, DT, np.stack([log.theta[0], np.full(len(log), 0.2)]), log.tau)
+    monkeypatch.setattr(refined, "_train", fails)
+    fit = refined.fit([lambda: [still]])
+    assert (fit.estimator, fit.converged, fit.iterations) == ("weak", False, 0)
+    assert set(fit.status) == {"NOT_CONVERGED", "NOT_IDENTIFIABLE"}
+
+
+def test_a_covariance_that_is_none_has_no_factor() -> None:
+    H = np.zeros((2, 2, POINTS, 12))
+    H[0, :, 2, 7] = 1e9  # both joints' rows the same in floating point: their own noise is lost beside it
+    H[1, :, 2, 7] = 1e9
+    with pytest.raises(np.linalg.LinAlgError, match=r"not positive definite \(row 16\)"):
+        covariance_factor(H)
+
+
+def test_a_factor_without_a_pivot_solves_nothing() -> None:
+    factor = covariance_factor(np.zeros((2, 2, POINTS, 12)))
+    factor[0, 5] = 0.0
+    linear = Linearised(np.zeros((1, 24)), factor, np.zeros((2, 2, POINTS, 12)), 0, np.zeros((2, 12)))
+    for solve in (linear.solve, linear.solve_transposed):
+        with pytest.raises(np.linalg.LinAlgError, match="substitution failed with info 6"):
+            solve(np.ones((1, 24)))
+
+
+def test_a_lag_of_nothing_copies_and_a_straight_line_passes_as_it_is() -> None:
+    t = np.arange(300) * DT
+    line = np.stack([2 * t - 1, 5 - 3 * t])
+    same = low_passed(line, DT, 0.0)
+    np.testing.assert_array_equal(same, line)
+    assert not np.shares_memory(same, line)
+    for lag in (4.3 * DT, -4.3 * DT, 0.2 * DT):
+        np.testing.assert_allclose(low_passed(line, DT, lag), line, atol=1e-12)  # unchanged and in time
+
+
+def test_stretches_too_short_to_tell_are_left_out_and_each_step_is_told(bench: Bench) -> None:
+    log = bench.log(sigma=1e-3).part(0, 2000)
+    crumb = Segment(3.0, DT, log.theta[:, :30], log.tau[:, :30])
+    told: list[tuple[str, int, int]] = []
+    fit = refined.fit([lambda: [log, crumb]], told=lambda *what: told.append(what))
+    np.testing.assert_array_equal(fit.values, refined.fit([lambda: [log]]).values)
+    assert [stage for stage, _, _ in told] == [f"fitting, step {step}" for step in range(1, fit.iterations + 1)]
+    assert {(done, total) for _, done, total in told} == {(2000, 2000)}
+    crumbs = refined.fit([lambda: [log], lambda: [crumb]])
+    np.testing.assert_array_equal(crumbs.values, fit.values)
+    assert len(crumbs.logs) == 1
