@@ -99,6 +99,12 @@ def synth(
     described = load_case(case)
     start_ns = 0 if start_time is None else int(start_time.replace(tzinfo=UTC).timestamp()) * 10**9
     sensors = Sensors(position_noise, torque_noise, encoder_bits, jitter, drop, seed, start_ns)
+    roles = ("unloaded", "loaded") if described.payload else ("unloaded",)
+
+    def refuse_existing_logs(roles: tuple[str, ...]) -> None:
+        for role in roles:
+            refuse_existing(out / f"{described.name}-{role}.{kind.value}", force)
+
     if motion is not None:
         for flag, value in (("--initial", initial), ("--payload-schedule", payload_schedule), ("--torque", torque)):
             if value is not None:
@@ -106,6 +112,7 @@ def synth(
                     f"{flag} {value}: a motion starts where it was planned and carries one payload; leave it out"
                 )
         plan = read_plan(motion)
+        refuse_existing_logs(roles)
         with progress("samples") as told:
             logs = rehearse(described, plan, Recording(rate, duration or plan.duration, sensors=sensors), told)
     else:
@@ -122,11 +129,10 @@ def synth(
         if torque_hold is not Hold.EXACT and named in EXCITATIONS:
             drive = held(drive, rate, recording.duration, "zoh" if torque_hold is Hold.ZOH else "foh")
         schedule = None if payload_schedule is None else _schedule(payload_schedule)
-        for role in ("unloaded", "loaded") if schedule is None else ("schedule",):
-            refuse_existing(out / f"{described.name}-{role}.{kind.value}", force)
+        refuse_existing_logs(roles if schedule is None else ("schedule",))
         with progress("samples") as told:
             if schedule is None:
-                logs = [*synthesise(described, drive, recording, told)]
+                logs = [*synthesise(described, drive, recording, told)][: len(roles)]
             else:
                 logs = [with_schedule(described, drive, recording, schedule, told)]
     for log in logs:

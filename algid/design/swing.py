@@ -7,21 +7,24 @@ symbol  name                                             shape
 ======  ===============================================  =========
 C       coefficients of the torque, a column an arm      (q, B)
 s       angles and velocities                            (4, B)
-M       inertia matrix                                   (2, 2, B)
+M       inertia matrix with joint 2's rotor              (2, 2)
 ======  ===============================================  =========
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from algid.arm import FloatArray
-from algid.model import Model, Motion, friction_slope, regressor
+from algid.arm import CONSTANT_NAMES, FloatArray, mass_matrix, passive_torque
+from algid.model import COLUMN_NAMES, Model, Motion, friction_columns, friction_slope, partials
 
 _STABLE = 2.0  # largest product of step and fastest rate; the method's own limit is 2.8
 _COARSEST = 0.01  # s
+_LOOK = 32  # steps, from one look to the next whether motions are lost
+FAST = 1e3  # rad/s: what no arm reaches, lest one that breaks all bounds overflows
 FINEST = 2e-4  # s: an arm that asks for less is taken to be slower than it is
 
 
@@ -41,17 +44,23 @@ class Swings:
 
 def step_for(model: Model, coefficients: FloatArray, duration: float) -> float:
     """A step in s, of which `duration` holds a whole number, that is stable for arms (q, B)."""
-    fastest = 1.0
+    fastest, still = 1.0, np.zeros((2, 1))
     for c in coefficients.T:
-        still = np.zeros((2, 1))
         slope = friction_slope(model, model.values(c), still)[:, 0]
-        inverse = np.linalg.inv(_inertia(model, c[:, None], still)[:, :, 0])
-        fastest = max(fastest, float(np.abs(np.linalg.eigvals(inverse * slope)).max()))
+        M = partials(model, c, Motion(still, still, still))[2, :, :, 0]
+        fastest = max(fastest, float(np.abs(np.linalg.eigvals(np.linalg.inv(M) * slope)).max()))
     step = max(min(_COARSEST, _STABLE / fastest), FINEST)
     return duration / int(np.ceil(duration / step))
 
 
-def swing(model: Model, C: FloatArray, torque: FloatArray, step: float, start: FloatArray) -> Swings:
+def swing(
+    model: Model,
+    C: FloatArray,
+    torque: FloatArray,
+    step: float,
+    start: FloatArray,
+    lost: Callable[[FloatArray], bool] | None = None,
+) -> Swings:
     """Swing arms from rest at `start` (2,) rad.
 
     Parameters
@@ -61,45 +70,42 @@ def swing(model: Model, C: FloatArray, torque: FloatArray, step: float, start: F
     C : (q, B)
     torque : (2 N + 1, 2, B), N m
         At every half step of `step` s.
+    lost : callable
+        Asked now and then whether states (4, B) are such that the rest does not matter: the motions end there.
     """
+    value = dict(zip(COLUMN_NAMES, np.zeros((len(COLUMN_NAMES), C.shape[1])), strict=True))
+    value |= dict(zip(model.names, C, strict=True))
+    k = np.array([value[name] for name in CONSTANT_NAMES])
+    offset = np.array([value["o1"], value["o2"]])
+
+    def rate(state: FloatArray, torque: FloatArray) -> FloatArray:
+        theta, omega = state[:2], np.clip(state[2:], -FAST, FAST)
+        free = torque - passive_torque(k, theta, omega) - offset
+        for letter, column in friction_columns(model, omega).items():
+            free -= np.array([value[f"{letter}1"], value[f"{letter}2"]]) * column
+        m11, m12, m22 = mass_matrix(k, theta)
+        m22 = m22 + value["j2"]
+        alpha = np.array([m22 * free[0] - m12 * free[1], m11 * free[1] - m12 * free[0]]) / (m11 * m22 - m12 * m12)
+        return np.concatenate([omega, alpha])
+
     steps = torque.shape[0] // 2
     state = np.zeros((4, C.shape[1]))
     state[:2] = start[:, None]
     states, slopes = np.empty((steps + 1, 4, C.shape[1])), np.empty((steps + 1, 2, C.shape[1]))
     for place in range(steps):
+        if lost is not None and place % _LOOK == 0 and lost(state):
+            steps = place
+            break
         before, middle, after = torque[2 * place : 2 * place + 3]
-        first = _rate(model, C, state, before)
-        second = _rate(model, C, state + 0.5 * step * first, middle)
-        third = _rate(model, C, state + 0.5 * step * second, middle)
-        fourth = _rate(model, C, state + step * third, after)
+        first = rate(state, before)
+        second = rate(state + 0.5 * step * first, middle)
+        third = rate(state + 0.5 * step * second, middle)
+        fourth = rate(state + step * third, after)
         states[place], slopes[place] = state, first[2:]
         state = state + step / 6 * (first + 2 * second + 2 * third + fourth)
-    states[-1], slopes[-1] = state, _rate(model, C, state, torque[-1])[2:]
+    states[steps], slopes[steps] = state, rate(state, torque[2 * steps])[2:]
+    states, slopes = states[: steps + 1], slopes[: steps + 1]
     return Swings(step * np.arange(steps + 1), states[:, :2], states[:, 2:], slopes)
-
-
-def _rate(model: Model, C: FloatArray, state: FloatArray, torque: FloatArray) -> FloatArray:
-    theta, omega = state[:2], np.clip(state[2:], -1e3, 1e3)
-    passive = np.einsum("aqb,qb->ab", regressor(model, Motion(theta, omega, np.zeros_like(theta))), C)
-    free = torque - passive
-    M = _inertia(model, C, theta)
-    determinant = M[0, 0] * M[1, 1] - M[0, 1] * M[1, 0]
-    return np.stack(
-        [
-            *omega,
-            (M[1, 1] * free[0] - M[0, 1] * free[1]) / determinant,
-            (M[0, 0] * free[1] - M[1, 0] * free[0]) / determinant,
-        ]
-    )
-
-
-def _inertia(model: Model, C: FloatArray, theta: FloatArray) -> FloatArray:
-    """M (2, 2, B) of eq. (2) with joint 2's rotor."""
-    value = dict(zip(model.names, C, strict=True))
-    coupling = value["k1"] * np.cos(theta[1])
-    m12 = value["k3"] + coupling
-    m22 = value["k3"] + value.get("j2", 0.0)
-    return np.array([[value["k5"] + value["k3"] + 2 * coupling, m12], [m12, m22 + 0 * coupling]])
 
 
 def sampled(t: FloatArray, motion: Motion, wanted: FloatArray) -> Motion:

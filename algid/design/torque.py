@@ -1,14 +1,16 @@
 """Open loop: a multi-sine of torques swings the arm from rest, and limits hold for arms drawn from the belief.
 
 τ_i(t) = w(t) τ̂_i Σ_l (a_il sin ω_l t + b_il cos ω_l t), with the window w of `algid.design.position` and amplitudes in
-shares of the torque's limit τ̂. Where the arm goes depends on the arm: each candidate is simulated for the believed arm
-and for arms drawn from the belief, without and with the payload, all in one batch. An evolution strategy (recombination
-of the better half, step sizes by the spread of it) needs no derivatives of that. A joint whose limit is zero has no
-drive and is swung along.
+shares of τ̂: the torque's limit or, where a drive is far stronger than its arm, what the believed arms need
+outstretched at the highest speed and acceleration that the limits leave to the fastest harmonic.
+Where the arm goes depends on the arm: each candidate is simulated for the believed arm and for arms drawn from the
+belief, without and with the payload, all in one batch. An evolution strategy (recombination of the better half, step
+sizes by the spread of it) needs no derivatives of that. A joint whose limit is zero has no drive and is swung along.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,9 +20,9 @@ from algid.design.belief import Asked, Belief
 from algid.design.information import Experiment, Slopes, informations
 from algid.design.limits import Limits, Row, Usage, usage
 from algid.design.position import Fourier
-from algid.design.swing import Swings, step_for, swing
+from algid.design.swing import FAST, Swings, step_for, swing
 from algid.errors import SettingError
-from algid.model import Motion
+from algid.model import Motion, regressor
 from algid.progress import Told
 
 POPULATION = 24
@@ -28,6 +30,7 @@ GENERATIONS = 30
 SEARCHED_ARMS = 2  # drawn beside the believed one while searching
 CHECKED_ARMS = 24  # drawn for the last check of the limits
 END = 0.1  # of the largest velocity, that may be left of it at the end
+_BROKEN = 1.001  # of a limit: beyond it by more than rounding
 _PENALTY = 20.0  # on each share of a limit beyond it
 _LOST = 0.5  # beyond the limits by so much, what a motion tells does not matter
 _INFORMATION_RATE = 100.0  # Hz, about
@@ -84,6 +87,15 @@ class TorqueProblem:
         self._checked = np.vstack([belief.mean, belief.draws(CHECKED_ARMS, seed + 1)])
         model = experiment.shared.model
         self._step = step_for(model, self._coefficients(self._checked, list(experiment.kinds)), duration)
+        self._strength = np.minimum(limits.torque, self._need())
+
+    def _need(self) -> FloatArray:
+        """What arms of the belief ask for at most (2,), about, in motions within the limits."""
+        limits, highest = self._limits, self._family.harmonics[-1]
+        speed = np.minimum(np.minimum(limits.speed, 0.5 * (limits.high - limits.low) * highest), FAST)
+        fastest = Motion(*(np.array([[0.0, 0.0], speed, np.minimum(limits.acceleration, speed * highest)])[..., None]))
+        Y = regressor(self._experiment.shared.model, fastest)[..., 0]
+        return np.max(np.abs(Y) @ np.abs(self._coefficients(self._arms, list(self._experiment.kinds))), axis=1)
 
     def _coefficients(self, arms: FloatArray, kinds: list[bool]) -> FloatArray:
         """C (q, arms × kinds), the kinds of an arm side by side."""
@@ -96,31 +108,34 @@ class TorqueProblem:
         waves = np.concatenate([np.sin(phase), np.cos(phase)]) * self._family.window(t)[0]
         torque = np.zeros((2, t.size))
         torque[self._driven] = x.reshape(self._driven.size, -1) @ waves
-        return torque * self._limits.torque[:, None]
+        return torque * self._strength[:, None]
 
     def random(self, rng: np.random.Generator) -> FloatArray:
-        """A random pattern: slow harmonics as strong as fast ones, peaks near the limit."""
+        """A random pattern: slow harmonics as strong as fast ones, peaks near τ̂ at most."""
         x = rng.standard_normal(self.size)
         return x / np.sqrt(self._family.harmonics.size) * rng.uniform(0.05, 0.4)
 
-    def _swings(self, patterns: FloatArray, arms: FloatArray, kinds: list[bool]) -> Swings:
+    def _swings(
+        self, patterns: FloatArray, arms: FloatArray, lost: Callable[[FloatArray], bool] | None = None
+    ) -> Swings:
         """Every pattern (P, n) on every arm and kind, in that order of columns."""
         count = 2 * round(self._family.duration / self._step) + 1
         t = 0.5 * self._step * np.arange(count)
         each = np.array([self.torques(x, t).T for x in patterns]).transpose(1, 2, 0)
-        C = self._coefficients(arms, kinds)
+        C = self._coefficients(arms, list(self._experiment.kinds))
         return swing(
             self._experiment.shared.model,
             np.tile(C, (1, len(patterns))),
             np.repeat(each, C.shape[1], axis=2),
             self._step,
             self._start,
+            lost,
         )
 
     def figures(self, patterns: FloatArray) -> FloatArray:
         """What the search makes small (P,): the logarithm of the largest relative bound, and a penalty on limits."""
         kinds = list(self._experiment.kinds)
-        swings = self._swings(patterns, self._arms, kinds)
+        swings = self._swings(patterns, self._arms)
         width = len(self._arms) * len(kinds)
         found = []
         for place, x in enumerate(patterns):
@@ -155,10 +170,16 @@ class TorqueProblem:
 
     def checked(self, x: FloatArray) -> Swung:
         """The motion of a pattern, its amplitude drawn back until no limit breaks for any arm that is checked."""
-        kinds = list(self._experiment.kinds)
+        kinds, limits = list(self._experiment.kinds), self._limits
+        reach = np.concatenate([0.5 * (limits.high - limits.low), limits.speed])[:, None]
+        middle = np.concatenate([limits.middle, np.zeros(2)])[:, None]
+
+        def broken(states: FloatArray) -> bool:
+            return bool(np.any(np.abs(states - middle) > _BROKEN * reach))
+
         for shrunk in x * np.linspace(1.0, 0.0, 41)[:, None]:
-            swings = self._swings(shrunk[None], self._checked, kinds)
-            motions = [swings.motion(column) for column in range(len(self._checked) * len(kinds))]
+            swings = self._swings(shrunk[None], self._checked, broken)
+            motions = [swings.motion(column) for column in range(swings.theta.shape[2])]
             used = self._used(shrunk, swings.t, motions)
             if max(float(one.u.max()) for one in used) <= 1.0 or not shrunk.any():
                 break

@@ -1,0 +1,148 @@
+"""Torques that drive a simulated arm: closed forms, holds, and what is refused; cases and their files."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from algid.arm import Arm
+from algid.errors import SettingError
+from algid.synth.cases import Case, case_names, load_case
+from algid.synth.excitation import Hold, MultiSine, SampledTorque, no_torque, wide_multi_sine
+from algid.synth.run import excitation, held
+
+ARM = Arm(2.0, 1.0, 0.2, 0.15, 0.4, 0.3, 0.03, 0.01, 0.5, 0.25)
+TIMES = np.array([0.0, 0.013, 0.7, 3.0])
+
+
+def test_a_multi_sine_is_the_sum_of_its_waves() -> None:
+    torque = MultiSine(((2.0, 0.5), (1.0,)), ((0.3, 4.0), (2.5,)), ((0.1, -1.0), (0.7,)))
+    expected = [
+        [2 * math.sin(2 * math.pi * 0.3 * t + 0.1) + 0.5 * math.sin(8 * math.pi * t - 1) for t in TIMES],
+        [math.sin(5 * math.pi * t + 0.7) for t in TIMES],
+    ]
+    np.testing.assert_allclose(torque(TIMES), expected, atol=1e-13)
+
+
+def test_the_wide_torque_scales_with_what_the_arm_asks_for() -> None:
+    torque = wide_multi_sine(ARM)
+    # weight outstretched, friction at 4 rad/s, inertia outstretched at 40 rad/s², each by Table 1
+    weight2, inertia2 = 1.0 * 9.81 * 0.15, 0.01 + 1.0 * 0.15**2
+    weight1 = 2.0 * 9.81 * 0.2 + 1.0 * 9.81 * 0.4
+    inertia1 = 0.03 + 2.0 * 0.2**2 + 1.0 * 0.4**2 + inertia2 + 2 * (1.0 * 0.4 * 0.15)
+    need = (weight1 + weight2 + 4 * 0.5 + 40 * inertia1, weight2 + 4 * 0.25 + 40 * inertia2)
+    for amplitude, all_of_it in zip(torque.amplitude, need, strict=True):
+        np.testing.assert_allclose(amplitude, 0.6 * all_of_it, rtol=1e-12)
+    for frequency in torque.frequency:
+        np.testing.assert_allclose([frequency[0], frequency[-1]], [0.3, 8.0])
+        np.testing.assert_allclose(np.diff(np.log(frequency)), np.log(8 / 0.3) / 5)
+    phases = np.array(torque.phase)
+    assert phases.shape == (2, 6)
+    assert np.unique(phases).size == 12
+    assert np.all((phases >= 0) & (phases < 2 * np.pi))
+    assert wide_multi_sine(ARM) == torque
+    assert wide_multi_sine(ARM, 1).phase != torque.phase
+
+
+@pytest.mark.parametrize(
+    ("hold", "between", "just_before"), [("zoh", [1.0, -2.0], [1.0, -2.0]), ("foh", [2.0, 0.0], [3.0, 2.0])]
+)
+def test_a_sampled_torque_is_held_or_joined(hold: Hold, between: list[float], just_before: list[float]) -> None:
+    torque = SampledTorque(np.array([0.0, 1.0, 3.0]), np.array([[1.0, 3.0, 5.0], [-2.0, 2.0, 4.0]]), hold)
+    found = torque(np.array([-1.0, 0.0, 0.5, 1.0 - 1e-12, 1.0, 3.0, 9.0]))
+    expected = np.array([[1, -2], [1, -2], between, just_before, [3, 2], [5, 4], [5, 4]]).T
+    np.testing.assert_allclose(found, expected, atol=1e-11)
+
+
+@pytest.mark.parametrize("hold", ["zoh", "foh"])
+def test_a_drive_is_commanded_at_its_rate(hold: Hold) -> None:
+    wave = MultiSine(((1.0,), (2.0,)), ((0.5,), (0.25,)), ((0.0,), (0.0,)))
+    driven = held(wave, 10.0, 1.05, hold)
+    np.testing.assert_allclose(driven.t, np.arange(11) / 10)  # 10.5 rounds to even
+    np.testing.assert_array_equal(driven.tau, wave(driven.t))
+    middle = driven(np.array([0.25]))
+    ends = wave(np.array([0.2, 0.3]))
+    np.testing.assert_allclose(middle[:, 0], ends[:, 0] if hold == "zoh" else ends.mean(axis=1))
+
+
+def test_excitations_go_by_their_names() -> None:
+    case = load_case("case1")
+    assert excitation(case, "case") is case.torque
+    assert excitation(case, "wide") == wide_multi_sine(case.arm)
+    assert excitation(Case("it", ARM, 0.0, None, {}), "case") == wide_multi_sine(ARM)
+    np.testing.assert_array_equal(excitation(case, "none")(TIMES), np.zeros((2, 4)))
+    assert excitation(case, "none") is no_torque
+    with pytest.raises(ValueError, match=r"^excitation must be one of case, wide, none, got fast$"):
+        excitation(case, "fast")
+
+
+def test_the_cases_are_those_of_table_3() -> None:
+    assert case_names() == ["case1", "case2"]
+    expected = {
+        "case1": (0.3674, 0.0814, 0.0813, 0.0616, 0.1626, 0.1232, 0.0009, 0.0018, 0.1360, 0.3072, 9.81),
+        "case2": (0.4274, 0.1077, 0.1213, 0.0857, 0.1925, 0.1433, 0.0011, 0.0022, 0.1570, 0.3392, 9.81),
+    }
+    for name, values in expected.items():
+        case = load_case(name)
+        assert case.arm == Arm(*values)
+        assert case.payload == {"case1": 0.3515, "case2": 0.6315}[name]
+        assert case.torque is not None
+        assert set(map(len, (*case.torque.amplitude, *case.torque.frequency, *case.torque.phase))) == {4}
+        assert case.paper_error_percent["m_p"] > 0
+
+
+def test_a_file_of_lengths_and_masses_is_an_arm_of_uniform_links(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    text = "[arm]\nm1 = 3.0\nm2 = 1.2\nl1 = 0.5\nl2 = 0.4\n"
+    file.write_text(text, encoding="utf-8")
+    case = load_case(str(file))
+    assert case.name == "mine"
+    assert case.arm == Arm(3.0, 1.2, 0.25, 0.2, 0.5, 0.4, 3.0 * 0.5**2 / 12, 1.2 * 0.4**2 / 12, 0.0, 0.0, 9.81)
+    assert (case.payload, case.torque, case.paper_error_percent) == (0.0, None, {})
+    file.write_text(text + "lc2 = -0.1\nI1 = 0.0\nb2 = 0.3\ng = 0.0\n[payload]\nm_p = 0.7\n", encoding="utf-8")
+    case = load_case(str(file))
+    assert (case.arm.lc2, case.arm.I1, case.arm.b2, case.arm.g, case.payload) == (-0.1, 0.0, 0.3, 0.0, 0.7)
+    np.testing.assert_allclose([case.arm.lc1, case.arm.I2], [0.25, 1.2 * 0.4**2 / 12])
+
+
+JOINT = "[torque.joint{}]\namplitude = {}\nfrequency = [1.0]\nphase = [0.0]\n"
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ("m3 = 1.0\n", "arm.m3: "),
+        ("g = -1.0\n", "arm.g: "),
+        ("b1 = inf\n", "arm.b1: "),
+        ("lc1 = nan\n", "arm.lc1: "),
+        ("[payload]\nm_p = -0.1\n", "payload.m_p: "),
+        ("[payload]\nmass = 0.1\n", "payload.m"),
+        ("[torque.joint1]\namplitude = []\nfrequency = []\nphase = []\n", "torque.joint1.amplitude: "),
+        (JOINT.format(1, "[1.0, 2.0]") + JOINT.format(2, "[1.0]"), "need the same number of harmonics"),
+        (JOINT.format(1, "[1.0]"), "torque.joint2: "),
+        ("[paper_error_percent]\nk1 = 0.0\n", "paper_error_percent.k1: "),
+        ("m1 = 1.0\n", "not TOML ("),
+    ],
+)
+def test_a_file_that_describes_no_arm_is_refused_with_its_line(more: str, message: str, tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text("[arm]\nm1 = 3.0\nm2 = 1.2\nl1 = 0.5\nl2 = 0.4\n" + more, encoding="utf-8")
+    with pytest.raises(SettingError) as refused:
+        load_case(str(file))
+    assert str(refused.value).startswith(f"{file}: ")
+    assert message in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_name_that_is_nothing_is_refused(tmp_path: Path) -> None:
+    for name in ("case3", "arm.yaml", ""):
+        with pytest.raises(SettingError) as refused:
+            load_case(name)
+        told = "no such case; expected case1, case2 or a .toml file that describes an arm"
+        assert str(refused.value) == f"{name}: {told}"
+    missing = tmp_path / "none.toml"
+    with pytest.raises(SettingError, match="cannot read it"):
+        load_case(str(missing))

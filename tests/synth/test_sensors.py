@@ -1,0 +1,148 @@
+"""What sensors make of a motion: quantisation and noise against their statistics, with exact bounds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import binom, chi2, kstest
+
+from algid.arm import FloatArray
+from algid.log import Truth
+from algid.synth.cases import load_case
+from algid.synth.sensors import Sensors, record, sample_times
+from algid.synth.simulator import SimulatedMotion
+
+CASE = load_case("case1")
+COUNT = 20_000
+RARE = 1e-6  # how often a bound may be broken by chance: seeds are fixed, so it holds always or never
+
+
+def motion(count: int = COUNT) -> SimulatedMotion:
+    t = 1e-3 * np.arange(count)
+    return SimulatedMotion(
+        t,
+        np.stack([np.sin(0.7 * t), 2 * np.cos(1.3 * t)]),
+        np.stack([0.7 * np.cos(0.7 * t), -2.6 * np.sin(1.3 * t)]),
+        np.stack([3 * np.sin(t), np.cos(2 * t)]),
+    )
+
+
+def recorded(**sensors: float | int | None) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+    log = record(motion(), Sensors(**sensors), Truth(CASE.arm, 0.0, "case1"), "it")  # type: ignore[arg-type]
+    return log.theta, log.tau, log.omega
+
+
+def test_exact_sensors_change_nothing() -> None:
+    theta, tau, omega = recorded()
+    np.testing.assert_array_equal(theta, motion().theta)
+    np.testing.assert_array_equal(tau, motion().tau)
+    assert omega is not None
+    np.testing.assert_array_equal(omega, motion().omega)
+
+
+@pytest.mark.parametrize(("position", "torque"), [(2e-3, 0.0), (0.0, 5e-2), (2e-3, 5e-2)])
+def test_noise_has_the_standard_deviation_asked_for_and_no_memory(position: float, torque: float) -> None:
+    theta, tau, omega = recorded(position_noise=position, torque_noise=torque, seed=4)
+    assert (omega is None) == (position > 0)
+    for error, std in ((theta - motion().theta, position), (tau - motion().tau, torque)):
+        if std == 0:
+            np.testing.assert_array_equal(error, 0.0)
+            continue
+        low, high = chi2.ppf([RARE / 2, 1 - RARE / 2], COUNT)
+        for row in error / std:
+            assert low < row @ row < high
+            assert kstest(row, "norm").pvalue > RARE
+        # products of neighbours, and of both joints, have mean 0 and variance 1
+        products = (error[:, 1:] * error[:, :-1]).ravel(), error[0] * error[1]
+        for product in products:
+            assert abs(product.sum()) < 5 * std**2 * np.sqrt(product.size)
+
+
+def test_noise_of_angles_and_torques_is_not_the_same() -> None:
+    theta, tau, _ = recorded(position_noise=1.0, torque_noise=1.0, seed=4)
+    error = np.concatenate([theta - motion().theta, tau - motion().tau])
+    correlation = np.corrcoef(error) - np.eye(4)
+    assert np.abs(correlation).max() < 5 / np.sqrt(COUNT)
+
+
+def test_a_seed_gives_its_own_noise_and_the_same_each_time() -> None:
+    first, again, other = (recorded(torque_noise=1.0, seed=seed)[1] for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    assert np.abs(np.corrcoef((first - motion().tau).ravel(), (other - motion().tau).ravel())[0, 1]) < 0.03
+
+
+@pytest.mark.parametrize("bits", [4, 12, 20])
+def test_an_encoder_rounds_to_the_nearest_of_its_lines(bits: int) -> None:
+    theta, tau, omega = recorded(encoder_bits=bits)
+    step = 2 * np.pi / 2**bits
+    lines = theta / step
+    np.testing.assert_allclose(lines, np.round(lines), atol=1e-9)
+    error = (theta - motion().theta) / step
+    assert np.abs(error).max() <= 0.5 + 1e-9
+    assert omega is None
+    np.testing.assert_array_equal(tau, motion().tau)
+    if bits == 20:  # fine lines: the error is uniform, of variance a twelfth, whose square has variance 1 / 180
+        squares = error**2
+        assert abs(squares.mean() - 1 / 12) < 5 * np.sqrt(1 / 180 / squares.size)
+        assert abs(error.mean()) < 5 * np.sqrt(1 / 12 / error.size)
+
+
+def test_an_encoder_reads_the_noisy_angle() -> None:
+    theta, _, _ = recorded(encoder_bits=12, position_noise=0.01, seed=3)
+    step, plain = 2 * np.pi / 2**12, recorded(position_noise=0.01, seed=3)[0]
+    np.testing.assert_allclose(theta, step * np.round(plain / step), atol=1e-12)
+
+
+def test_stamps_are_whole_nanoseconds_from_the_start() -> None:
+    log = record(motion(5), Sensors(start_ns=10**18), Truth(CASE.arm, 0.2, "case1"), "it")
+    assert log.stamp_ns.dtype == np.int64
+    np.testing.assert_array_equal(log.stamp_ns - 10**18, 10**6 * np.arange(5))
+    assert log.origin.truth == Truth(CASE.arm, 0.2, "case1")
+    assert (log.origin.path, log.origin.format) == ("it", "synthetic")
+
+
+def test_instants_are_uniform_and_end_with_the_duration() -> None:
+    t = sample_times(30.0, 2.0, Sensors())
+    assert t.size == 61
+    np.testing.assert_allclose(t, np.arange(61) / 30, atol=0.5e-9)
+    np.testing.assert_allclose(t * 1e9, np.round(t * 1e9), atol=1e-6)
+
+
+def test_jitter_is_as_large_as_asked_and_keeps_the_order() -> None:
+    rate, std = 1000.0, 1e-4
+    t = sample_times(rate, 20.0, Sensors(jitter=std, seed=2))
+    error = t - np.arange(t.size) / rate
+    assert error[0] == 0
+    low, high = chi2.ppf([RARE / 2, 1 - RARE / 2], t.size - 1)
+    assert low < np.sum(error**2) / std**2 < high  # clipped at 4.5 standard deviations, which takes 1e-4 of them away
+    wild = sample_times(rate, 20.0, Sensors(jitter=1.0, seed=2))
+    assert np.diff(wild).min() >= 0.1 / rate - 1e-9  # 0.45 to either side leave a tenth
+    assert np.abs(wild - np.arange(wild.size) / rate).max() <= 0.45 / rate + 1e-9
+
+
+@pytest.mark.parametrize("share", [0.05, 0.9])
+def test_as_many_samples_are_lost_as_asked_but_not_the_ends(share: float) -> None:
+    t = sample_times(1000.0, 20.0, Sensors(drop=share, seed=6))
+    low, high = binom.ppf([RARE / 2, 1 - RARE / 2], 20_001, 1 - share)
+    assert low <= t.size <= high + 2
+    assert (t[0], t[-1]) == (0.0, 20.0)
+    places = np.round(1000 * t).astype(int)
+    np.testing.assert_allclose(t, places / 1000, atol=1e-9)
+    lost = np.diff(places) > 1  # at random: what is lost does not tell whether the next is
+    assert abs(lost.mean() - share) < 5 * np.sqrt(share * (1 - share) / lost.size)
+
+
+def test_jitter_and_losses_leave_the_noise_alone() -> None:
+    short = Sensors(torque_noise=1.0, seed=5)
+    plain, uneven = (sample_times(100.0, 1.0, one) for one in (short, Sensors(torque_noise=1.0, seed=5, jitter=1e-3)))
+    assert plain.size == uneven.size == 101
+    zero = np.zeros((2, 101))
+    still = [SimulatedMotion(t, zero, zero, zero) for t in (plain, uneven)]
+    logs = [record(one, short, Truth(CASE.arm, 0.0), "it").tau for one in still]
+    np.testing.assert_array_equal(logs[0], logs[1])
+
+
+def test_one_sample_is_no_log() -> None:
+    with pytest.raises(ValueError, match=r"^rate and duration must give at least two samples, got 10.0 Hz for 0.04 s$"):
+        sample_times(10.0, 0.04, Sensors())
+    assert sample_times(10.0, 0.06, Sensors()).size == 2
