@@ -38,7 +38,7 @@ class Limits:
 
     Parameters
     ----------
-    low, high : rad
+    low, high : rad; a joint has both or neither
     speed : rad/s
     acceleration : rad/s^2
     torque : N m
@@ -59,14 +59,20 @@ class Limits:
     @property
     def middle(self) -> FloatArray:
         """Middle (2,) of the range; hanging where there is none."""
-        return np.where(np.isfinite(self.low + self.high), 0.5 * (self.low + self.high), HANGING)
+        bounded = np.isfinite(self.half)
+        return np.where(bounded, 0.5 * (np.where(bounded, self.low, 0.0) + np.where(bounded, self.high, 0.0)), HANGING)
+
+    @property
+    def half(self) -> FloatArray:
+        """Half the width (2,) of the range; infinite where there is none."""
+        return 0.5 * (self.high - self.low)
 
     def within(self, margin: float) -> Limits:
         """These limits less a share `margin` of each."""
-        half = 0.5 * (self.high - self.low)
+        taken = np.where(np.isfinite(self.half), margin * self.half, 0.0)
         kept = {name: (1 - margin) * getattr(self, name) for name in ("speed", "acceleration", "torque")}
         height = self.height + margin * (self.lengths.sum() - self.height) if np.isfinite(self.height) else self.height
-        return replace(self, low=self.low + margin * half, high=self.high - margin * half, height=height, **kept)
+        return replace(self, low=self.low + taken, high=self.high - taken, height=height, **kept)
 
     def height_of(self, theta: FloatArray) -> FloatArray:
         """Height of the tip (...) in m at angles (2, ...)."""
@@ -123,7 +129,7 @@ def usage(limits: Limits, slopes: Slopes, loads: Sequence[Load], derivatives: bo
 
 def _kinematic(limits: Limits, motion: Motion) -> Iterator[_Found]:
     kinds = (
-        ("range", motion.theta - limits.middle[:, None], 0.5 * (limits.high - limits.low)),
+        ("range", motion.theta - limits.middle[:, None], limits.half),
         ("speed", motion.omega, limits.speed),
         ("acceleration", motion.alpha, limits.acceleration),
     )

@@ -88,15 +88,10 @@ def limits_of(asked: Request, lengths: FloatArray) -> Limits:
     reach = float(np.sum(lengths))
     if height >= reach:
         raise SettingError(f"--tip-height: expected less than the arm's reach, {reach:.4g} m, found {height:g} m")
-    return Limits(
-        low=low,
-        high=high,
-        speed=_both(asked.content["speed"]),
-        acceleration=_both(asked.get("acceleration", np.inf)),
-        torque=_both(asked.content["torque"]),
-        height=height,
-        lengths=lengths,
-    )
+    others = {name: _both(asked.get(name, np.inf)) for name in ("speed", "acceleration", "torque")}
+    if not np.any(np.isfinite([high - low, *others.values()])):
+        raise SettingError("--range: without any limit no motion is the best, found inf for all; give one")
+    return Limits(low=low, high=high, height=height, lengths=lengths, **others)
 
 
 def _both(value: Any) -> FloatArray:
@@ -112,6 +107,11 @@ def _range(value: Any) -> tuple[FloatArray, FloatArray]:
             raise SettingError(
                 f"--range: expected LOW:HIGH with LOW below HIGH for joint {joint + 1}, found "
                 f"{low[joint]:g}:{high[joint]:g}"
+            )
+        if np.isfinite(low[joint]) != np.isfinite(high[joint]):
+            raise SettingError(
+                f"--range: expected both ends of joint {joint + 1} or neither, found {low[joint]:g}:{high[joint]:g}; "
+                "give a wide one in place of inf"
             )
     return low, high
 

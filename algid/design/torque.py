@@ -92,7 +92,7 @@ class TorqueProblem:
     def _need(self) -> FloatArray:
         """What arms of the belief ask for at most (2,), about, in motions within the limits."""
         limits, highest = self._limits, self._family.harmonics[-1]
-        speed = np.minimum(np.minimum(limits.speed, 0.5 * (limits.high - limits.low) * highest), FAST)
+        speed = np.minimum(np.minimum(limits.speed, limits.half * highest), FAST)
         fastest = Motion(*(np.array([[0.0, 0.0], speed, np.minimum(limits.acceleration, speed * highest)])[..., None]))
         Y = regressor(self._experiment.shared.model, fastest)[..., 0]
         return np.max(np.abs(Y) @ np.abs(self._coefficients(self._arms, list(self._experiment.kinds))), axis=1)
@@ -171,7 +171,7 @@ class TorqueProblem:
     def checked(self, x: FloatArray) -> Swung:
         """The motion of a pattern, its amplitude drawn back until no limit breaks for any arm that is checked."""
         kinds, limits = list(self._experiment.kinds), self._limits
-        reach = np.concatenate([0.5 * (limits.high - limits.low), limits.speed])[:, None]
+        reach = np.concatenate([limits.half, limits.speed])[:, None]
         middle = np.concatenate([limits.middle, np.zeros(2)])[:, None]
 
         def broken(states: FloatArray) -> bool:
