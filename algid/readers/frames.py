@@ -195,23 +195,21 @@ def tables(
     expected = {name: sums[source] for name, source in columns.sources.items() if source in sums}
     unit, seen, done = columns.time_unit, dict.fromkeys(expected, 0), 0
     for frame, cut_off in _complete(path, frames):
-        if frame.height == 0 and done:
-            continue
         for name in seen:
             seen[name] = add(seen[name], word_sum(frame[name].to_numpy()))
         times = frame["t"].to_numpy()
         notices = list(cut_off)
-        if unit is None:
+        if unit is None and times.size:
             if not np.all(np.isfinite(times)):
                 raise LogError(f"{path}: a time is not finite; expected a number in every row")
-            unit = time_unit(times) if times.size else "s"
+            unit = time_unit(times)
             if unit != "s":
                 notices.append(Notice("TIME_UNIT", f"times are taken for {unit}, from their size and their steps"))
         try:
-            stamps = to_nanoseconds(times, unit)
+            stamps = to_nanoseconds(times, unit or "s")
         except ValueError as error:
             raise LogError(f"{path}: {error} in column {columns.sources['t']!r}, past row {done}") from error
-        if not (done or columns.time_told):
+        if unit and not (done or columns.time_told):
             notices += _slow(columns.sources["t"], stamps, unit)
         channels = {name: frame[name].to_numpy() for name in frame.columns if name != "t"}
         done += frame.height

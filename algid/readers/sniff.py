@@ -177,9 +177,9 @@ def whole_lines(path: Path, name: str) -> Iterator[bytes]:
         text = rest + piece[:head] + _EMPTY_LINES.sub(b"\n", piece[head:])
         head = max(0, head - len(piece))
         end = text.rfind(b"\n") + 1
-        if not end and len(text) > _LONGEST_LINE:
-            raise LogError(f"{path}: a line of more than 65,000 characters; expected rows of numbers")
         rest = text[end:]
+        if len(rest) > _LONGEST_LINE:
+            raise LogError(f"{path}: a line of more than 65,000 characters; expected rows of numbers")
         if end:
             yield text[:end]
     if rest:

@@ -141,3 +141,59 @@ def test_more_columns_than_any_log_has_are_refused_in_every_format(tmp_path: Pat
     np.savez(tmp_path / "log.npz", t=np.arange(5), **matrices)
     with pytest.raises(LogError, match="4,097 columns; expected 4096 at most"):
         read_log(tmp_path / "log.npz")
+
+
+OWN = {"q1": "theta1", "q2": "theta2"}
+
+
+@pytest.mark.parametrize(("slower", "told"), [(500, True), (200, False), (201, True)])
+def test_a_clock_too_slow_for_an_arm_is_told_once(slower: int, told: bool, tmp_path: Path) -> None:
+    """algid's own names mean seconds: below 5 Hz these are said to be doubtful, unless the user told them."""
+    path = tmp_path / "log.csv"
+    arm(30, 2).with_columns(t=pl.col("t") * slower).rename(OWN).write_csv(path)
+    said = [notice for table in open_log(path).tables(10) for notice in table.notices]
+    text = (
+        f"times in 't' are taken for s, which makes {1000 / slower:.3g} Hz, too slow for an arm in motion; "
+        'if they are in ms: --set time_unit=ms (profile: time_unit = "ms")'
+    )
+    assert [(notice.code, notice.text) for notice in said] == [("SLOW_CLOCK", text)] * told
+    assert read_log(path, Profile(time_unit="s")).notices == ()
+
+
+@pytest.mark.parametrize(
+    ("gaps", "code", "text"),
+    [
+        ([29], "CUT_OFF", "the last row breaks off and was dropped"),
+        ([15], "EMPTY_CELLS", "1 of 30 rows dropped for want of a value"),
+        ([15, 29], "EMPTY_CELLS", "2 of 30 rows dropped for want of a value"),
+        (list(range(20, 30)), "EMPTY_CELLS", "10 of 30 rows dropped for want of a value"),
+        (list(range(10)), "EMPTY_CELLS", "10 of 30 rows dropped for want of a value"),
+    ],
+)
+def test_rows_that_lack_a_value_are_dropped_and_told(gaps: list[int], code: str, text: str, tmp_path: Path) -> None:
+    """Also where a whole table of the pass is lost, the first or the last."""
+    frame = arm(30, 2).with_columns(
+        pl.when(pl.int_range(30).is_in(gaps)).then(None).otherwise(pl.col("q2")).alias("q2")
+    )
+    frame.with_columns(t=pl.int_range(30)).write_ipc(tmp_path / "log.feather")  # in ms, as nobody says
+    tables = list(open_log(tmp_path / "log.feather").tables(10))
+    kept = [row for row in range(30) if row not in gaps]
+    assert [row for table in tables for row in np.rint(table.stamp_ns * 1e-6).astype(int).tolist()] == kept
+    assert [(one.code, one.text, one.lossy) for table in tables for one in table.notices if one.lossy] == [
+        (code, text, True)
+    ]
+
+
+def test_of_wide_lists_the_first_places_are_taken(tmp_path: Path) -> None:
+    """A list of a hundred numbers is no arm's; a row that is shorter than others lacks a value."""
+    rows = [[0.1 * place for place in range(100)]] * 9
+    frame = pl.DataFrame({"t": np.arange(9) * 1e-3, "q": rows, "tau": [[1.0, 2.0]] * 8 + [[1.0]]})
+    for form, write in WRITERS.items():
+        write(frame, tmp_path / f"log.{form}")
+        with pytest.raises(LogError, match="'q' stands there for 64 joints: 0, 1, 2, 3, 4, 5, 6, 7"):
+            read_log(tmp_path / f"log.{form}")
+        log = read_log(
+            tmp_path / f"log.{form}", Profile.model_validate({"theta1": {"source": "q[62]"}, "joints": ["0", "1"]})
+        )
+        assert np.allclose(log.theta[0], 6.2, rtol=1e-12)
+        assert [notice.code for notice in log.notices if notice.lossy] == ["CUT_OFF"]
