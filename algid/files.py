@@ -127,8 +127,11 @@ def first_misfit(error: ValidationError) -> str:
     first, *others = error.errors(include_url=False, include_context=False)
     place = ".".join(str(part) for part in first["loc"]) or "top level"
     more = f" (and {len(others)} more)" if others else ""
-    # The same misfit has other words in a dataclass than in a model.
-    said = "extra inputs are not permitted" if first["type"] == "unexpected_keyword_argument" else first["msg"].lower()
+    if first["type"] == "unexpected_keyword_argument":  # the same misfit has other words in a dataclass than in a model
+        said = "extra inputs are not permitted"
+    else:  # a unit or a code keeps its capitals
+        words = first["msg"].partition(", unable to parse")[0]
+        said = f"{words[:1].lower()}{words[1:]}".replace("input should be", "expected", 1)
     return f"{place}: {said}, found {reprlib.repr(first['input']):.60}{more}"
 
 

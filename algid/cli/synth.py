@@ -180,7 +180,7 @@ def _torque(case: Case, name: str, hold: Hold) -> Torque:
 
     if name in EXCITATIONS:
         return excitation(case, name)
-    if not Path(name).exists():
+    if not name or not Path(name).exists():
         raise SettingError(f"--torque {name}: expected {', '.join(EXCITATIONS)} or a log, found neither")
     log = read_log(name)
     return SampledTorque(log.t, log.tau, "foh" if hold is Hold.FOH else "zoh")
