@@ -1,0 +1,238 @@
+"""How commands end: what a batch prints and returns, what `synth` writes, and what `design` is asked."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import polars as pl
+import pytest
+import typer
+
+from algid.batch.jobs import Job
+from algid.batch.records import End, JobRecord
+from algid.batch.run import Ended, Progress
+from algid.cli import batch as command
+from algid.cli.compare import labels
+from algid.cli.design import Drive, _campaign, _noise
+from algid.design.prior import KnownBefore, prior_of
+from algid.design.request import request
+from algid.errors import SettingError
+from algid.estimators.whitening import NoiseLevels
+from algid.synth.cases import load_case
+from tests.cli.commands import call
+
+
+def record(name: str, status: End, reason: str = "") -> JobRecord:
+    return JobRecord(Job(name, ("a.csv",)), status, reason, "", (), {}, "")
+
+
+GOOD, PART = record("a", End.OK), record("b", End.INCOMPLETE)
+BAD, DEAD = record("c", End.FAILED, "no\x1b[31m torque"), record("d", End.KILLED, "three times")
+
+
+@pytest.mark.parametrize(
+    ("ended", "stopped", "code", "lines"),
+    [
+        (Ended([GOOD, GOOD], 2, 0), False, 0, ["2 ok; 2 run now, 0 left; out/jobs.parquet"]),
+        (Ended([], 0, 0), False, 0, ["nothing done; 0 run now, 0 left; out/jobs.parquet"]),
+        (Ended([GOOD, PART], 1, 0), False, 3, ["1 ok, 1 incomplete; 1 run now, 0 left; out/jobs.parquet"]),
+        (
+            Ended([GOOD, PART, BAD, DEAD], 4, 0),
+            False,
+            1,
+            [
+                "c: failed: no\\x1b[31m torque",
+                "d: killed: three times",
+                "1 ok, 1 incomplete, 1 failed, 1 killed; 4 run now, 0 left; out/jobs.parquet",
+            ],
+        ),
+        (Ended([GOOD], 1, 3), False, 1, ["1 ok; 1 run now, 3 left; out/jobs.parquet"]),
+        (Ended([GOOD, PART], 2, 3), True, 130, ["1 ok, 1 incomplete; 2 run now, 3 left; out/jobs.parquet"]),
+        (Ended([GOOD], 1, 3, "out: the disk is full"), True, 1, ["1 ok; 1 run now, 3 left; out/jobs.parquet"]),
+        (Ended([GOOD], 1, 0, "out: the disk is full"), False, 1, ["1 ok; 1 run now, 0 left; out/jobs.parquet"]),
+    ],
+)
+def test_a_batch_says_what_became_of_its_jobs(
+    ended: Ended, stopped: bool, code: int, lines: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    for quiet in (False, True):
+        left = 0
+        try:
+            command._conclude(ended, stopped, "out", quiet)
+        except typer.Exit as end:
+            left = end.exit_code
+        assert left == code
+        shown = capsys.readouterr()
+        assert shown.out.splitlines() == ([] if quiet else lines)
+        full = f"algid: {ended.full}; make room and run again: what is finished is kept\n"
+        assert shown.err == ("" if ended.full is None else full)
+
+
+def test_progress_is_one_line_that_is_gone_at_the_end(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    last = Progress(3, 7, record("x" * 60, End.OK))
+    with command._progress(False) as silent:
+        silent(last)
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    with command._progress(True) as quiet:
+        quiet(last)
+    assert capsys.readouterr().err == ""
+    with command._progress(False) as show:
+        show(last)
+    assert capsys.readouterr().err == f"\r\x1b[2K3/7 {'x' * 50}: ok\r\x1b[2K"
+
+
+class Watched:
+    """A batch that stops after some looks, and hears what it is given to run."""
+
+    def __init__(self, looks: int) -> None:
+        self.heard: list[tuple[list[Any], bool]] = []
+        self.looks = looks
+        self.stop = SimpleNamespace(is_set=lambda: self.looks == 0, wait=self.look)
+
+    def look(self, _seconds: float) -> None:
+        self.looks -= 1
+
+    def run(self, jobs: list[Any], retry_failed: bool = False) -> Ended:
+        self.heard.append((jobs, retry_failed))
+        return Ended([GOOD] * len(self.heard), len(jobs), 0)
+
+
+def test_a_watch_complains_once_and_retries_what_failed_once(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    looks: list[Any] = [SettingError("logs: gone"), SettingError("logs: gone"), ["a"], SettingError("twice"), [], ["b"]]
+
+    def jobs_of(*_: object) -> Any:
+        found = looks.pop(0)
+        if isinstance(found, SettingError):
+            raise found
+        return found
+
+    monkeypatch.setattr("algid.batch.jobs.jobs_of", jobs_of)
+    monkeypatch.setattr("algid.batch.run.Settling", lambda: SimpleNamespace(settled=lambda jobs: jobs))
+    running: Any = Watched(6)
+    ended = command._watch(running, ["logs"], "out", "logs", True)
+    assert running.heard == [([], False), (["a"], True), (["b"], False)]
+    assert len(ended.records) == 3
+    assert capsys.readouterr().err == "algid: logs: gone\nalgid: twice\n"
+
+
+def test_results_are_named_by_what_tells_them_apart(tmp_path: Path) -> None:
+    def named(*paths: str) -> list[str]:
+        return labels([tmp_path / path for path in paths])
+
+    assert named("a.algid", "b.algid/result.json") == ["a", "b"]
+    assert named("mon/a.algid", "fri/a.algid") == ["mon/a", "fri/a"]
+    assert named("x/1/a.algid", "x/2/a.algid", "y/1/b.algid") == ["1/a", "2/a", "1/b"]
+    twice = str((tmp_path / "a.algid").resolve())
+    assert named("a.algid", "a.algid") == [twice, twice]
+    assert call("compare", tmp_path / "a.algid").err == (
+        "algid: compare: expected two results or more, found 1; name another one\n"
+    )
+
+
+def synthetic(folder: Path, *flags: str, role: str = "unloaded") -> pl.DataFrame:
+    done = call("synth", "case1", "-o", folder, "--format", "csv", "--rate", "200", "--duration", "0.5", *flags)
+    assert done.code == 0, done.err
+    return pl.read_csv(folder / f"case1-{role}.csv")
+
+
+def test_velocities_are_in_a_log_only_where_its_angles_are_exact(tmp_path: Path) -> None:
+    exact = synthetic(tmp_path / "exact")
+    assert exact.columns == ["t", "theta1", "theta2", "omega1", "omega2", "tau1", "tau2"] or {"omega1"} < {
+        *exact.columns
+    }
+    for name, flags in {"noise": ("--position-noise", "1e-4"), "encoder": ("--encoder-bits", "12")}.items():
+        assert "omega1" not in synthetic(tmp_path / name, *flags).columns
+    step = 2 * math.pi / 2**12
+    for name in ("theta1", "theta2"):
+        counts = pl.read_csv(tmp_path / "encoder" / "case1-unloaded.csv")[name].to_numpy() / step
+        assert counts == pytest.approx(np.rint(counts), abs=1e-9)
+        assert np.rint(exact[name].to_numpy() / step) == pytest.approx(counts, abs=1e-9)
+
+
+def test_a_drive_holds_or_ramps_the_torque(tmp_path: Path) -> None:
+    """The log holds what was commanded at its stamps, whatever the drive does between; the motion differs."""
+    logs = {hold: synthetic(tmp_path / hold, "--torque-hold", hold) for hold in ("exact", "zoh", "foh")}
+    moved = {hold: log["theta1"].to_numpy() for hold, log in logs.items()}
+    torque = {hold: log["tau1"].to_numpy() for hold, log in logs.items()}
+    assert torque["foh"] == pytest.approx(torque["exact"], abs=1e-12)
+    held = np.abs(moved["zoh"] - moved["exact"]).max()
+    ramped = np.abs(moved["foh"] - moved["exact"]).max()
+    assert 0 < ramped < held / 20  # of first order in the step, and of second
+
+
+def test_a_start_and_a_schedule_are_taken(tmp_path: Path) -> None:
+    began = synthetic(tmp_path / "began", "--initial", "-1,0.25,0.5,-0.75")
+    first = began.row(0, named=True)
+    assert [first[name] for name in ("theta1", "theta2", "omega1", "omega2")] == [-1, 0.25, 0.5, -0.75]
+    bare = synthetic(tmp_path / "bare")
+    picked = synthetic(tmp_path / "picked", "--payload-schedule", "0.2=0.3,0.4=0", role="schedule")
+    written = sorted(path.name for path in (tmp_path / "picked").iterdir())
+    assert written == ["case1-schedule.csv", "case1-schedule.csv.truth.json"]
+    apart = np.abs(picked["theta1"].to_numpy() - bare["theta1"].to_numpy())
+    assert apart[:41].max() < 1e-9  # until it is grasped at 0.2 s
+    assert apart[60] > 1e-6
+    mine = (tmp_path / "picked" / "case1-schedule.csv").read_bytes()
+    again = call("synth", "case1", "-o", tmp_path / "picked", "--format", "csv", "--payload-schedule", "0.2=0.3")
+    assert (again.code, again.out) == (2, "")
+    assert "case1-schedule.csv: exists already" in again.err
+    assert (tmp_path / "picked" / "case1-schedule.csv").read_bytes() == mine
+
+
+def test_no_torque_and_a_replayed_one(tmp_path: Path) -> None:
+    still = synthetic(tmp_path / "still", "--torque", "none")
+    assert still["tau1"].abs().max() == 0
+    assert still["theta1"].to_numpy() == pytest.approx(-math.pi / 2, abs=1e-9)  # hanging at rest
+    wide = synthetic(tmp_path / "wide", "--torque", "wide")
+    again = synthetic(tmp_path / "again", "--torque", str(tmp_path / "wide" / "case1-unloaded.csv"))
+    assert again["tau1"].to_numpy() == pytest.approx(wide["tau1"].to_numpy(), abs=1e-9)
+
+
+def prior() -> Any:
+    return prior_of("case1", None, KnownBefore(None, None, None, None))
+
+
+def test_noise_is_the_flags_then_a_logs_then_the_results(tmp_path: Path) -> None:
+    by_flags = _noise(prior(), 1e-3, 2e-2, None)
+    assert (by_flags.theta.tolist(), by_flags.tau.tolist()) == ([1e-3, 1e-3], [2e-2, 2e-2])
+    synthetic(tmp_path, "--position-noise", "1e-3", "--torque-noise", "2e-2", "--rate", "1000", "--duration", "2")
+    log = tmp_path / "case1-unloaded.csv"
+    measured = _noise(prior(), None, None, log)
+    # a first guess from differences: to a fifth or so
+    assert measured.theta == pytest.approx(1e-3, rel=0.3)
+    assert measured.tau == pytest.approx(2e-2, rel=0.3)
+    mixed = _noise(prior(), 5e-3, None, log)
+    assert mixed.theta.tolist() == [5e-3, 5e-3]
+    assert mixed.tau.tolist() == measured.tau.tolist()
+    known = SimpleNamespace(source="arm", noise=NoiseLevels(np.full(2, 3e-4), np.array([0.1, np.nan])))
+    assert _noise(known, None, 0.2, None).theta.tolist() == [3e-4, 3e-4]  # type: ignore[arg-type]
+    with pytest.raises(SettingError, match=r"^--torque-noise: arm does not tell how noisy the sensors are; give it"):
+        _noise(known, None, None, None)  # type: ignore[arg-type]
+
+
+def test_a_campaign_takes_what_is_asked_and_else_its_defaults() -> None:
+    limits = {"range": "1.2", "speed": "3", "torque": "1.5"}
+    noise = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
+    plain = _campaign(prior(), request(None, limits), noise, None, Drive.POSITION, 0.05, 4)
+    assert (plain.duration, plain.experiment.rate, plain.drive, plain.margin, plain.seed) == (
+        10,
+        1000,
+        "position",
+        0.05,
+        4,
+    )
+    assert plain.experiment.runs == ((1, 1) if load_case("case1").payload else (1, 0))
+    asked = request(None, limits | {"duration": 2.0, "rate": 100.0, "runs": "3,0"})
+    other = _campaign(prior(), asked, noise, "k1, k3", Drive.TORQUE, 0.1, 0)
+    assert (other.duration, other.experiment.rate, other.experiment.runs) == (2, 100, (3, 0))
+    assert (other.drive, other.margin) == ("torque", 0.1)
+    assert plain.asked.wanted.all()
+    assert np.flatnonzero(other.asked.wanted).tolist() == [0, 2]  # k1 and k3
