@@ -178,11 +178,12 @@ def test_real_arm_is_identified(shared_data: Path) -> None:
 
 
 def test_a_joint_that_stands_still_is_a_status(wide: tuple[Log, Log], tmp_path: Path) -> None:
-    still = replace(wide[0], theta=np.stack([wide[0].theta[0], np.zeros(len(wide[0]))]))
-    held = replace(wide[0], theta=np.full_like(wide[0].theta, -1.5), omega=None)
-    for number, log in enumerate((still, held)):
+    log = wide[0].part(0, 1500)
+    still = replace(log, theta=np.stack([log.theta[0], np.zeros(len(log))]))
+    held = replace(log, theta=np.full_like(log.theta, -1.5), omega=None)
+    for number, stuck in enumerate((still, held)):
         for settings in (Settings(), PAPER):
-            result = identify(log, None, settings, out=tmp_path / f"{number}{settings.estimator}")
+            result = identify(stuck, None, settings, out=tmp_path / f"{number}{settings.estimator}", report=number == 0)
             assert not result.complete
 
 
@@ -200,10 +201,10 @@ def test_a_result_names_the_estimator_whose_numbers_it_holds(shared_data: Path) 
 
     logs = sorted((shared_data / "dfki" / "C1_sysid").glob("*.csv"))
     profile = with_settings(Profile(), {"zero": "hanging"})
-    result = identify(logs[:3], None, Settings(friction="coulomb"), profile=profile)
+    result = identify(logs[:2], None, Settings(friction="coulomb"), profile=profile)
     assert result.estimator in ("weak", "instruments")  # whichever foretells the logs left out better
     assert result.settings["estimator"] == "refined"
-    own = identify(logs[:3], None, Settings(friction="coulomb", estimator=result.estimator), profile=profile)  # type: ignore[arg-type]
+    own = identify(logs[:2], None, Settings(friction="coulomb", estimator=result.estimator), profile=profile)  # type: ignore[arg-type]
     for name, found in own.parameters.items():
         shown = result.parameters[name]
         assert found.estimate is not None

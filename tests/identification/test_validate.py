@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -31,8 +32,9 @@ SIGMA = 0.02  # N m
 EDGE = round(0.3 / DT)  # that the score leaves out
 
 
-def moved(seed: int, k: FloatArray = K) -> SimulatedMotion:
-    return move(k, wide_multi_sine(CASE.arm, seed), DT * np.arange(1501))
+@cache
+def moved(seed: int, *, loaded: bool = False) -> SimulatedMotion:
+    return move(LOADED_K if loaded else K, wide_multi_sine(CASE.arm, seed), DT * np.arange(1001))
 
 
 def logged(motion: SimulatedMotion, seed: int, *, lead: int = 0) -> Log:
@@ -90,7 +92,7 @@ def test_all_logs_together_weigh_by_their_samples(motions: list[SimulatedMotion]
     first, second = both.logs["log1"], both.logs["log2"]
     assert first is not None
     assert second is not None
-    counts = np.array([1501 - 2 * EDGE, 700 - 2 * EDGE])
+    counts = np.array([1001 - 2 * EDGE, 700 - 2 * EDGE])
     squares = np.array([first.rmse, second.rmse]) ** 2
     np.testing.assert_allclose(both.total.rmse, np.sqrt(counts @ squares / counts.sum()), rtol=1e-2)
 
@@ -138,11 +140,11 @@ def test_cross_validation_is_the_prediction_of_each_log_by_a_fit_of_the_others(m
 @pytest.fixture(scope="module")
 def weighed(motions: list[SimulatedMotion]) -> Result:
     settings = Settings(estimator="weak", model="plain")
-    return identify(logged(motions[0], 1), logged(moved(4, LOADED_K), 2), settings, report=False)
+    return identify(logged(motions[0], 1), logged(moved(4, loaded=True), 2), settings, report=False)
 
 
 def test_a_result_predicts_logs_of_both_roles(weighed: Result, motions: list[SimulatedMotion]) -> None:
-    fresh = survey((logged(motions[1], 11), "unloaded"), (logged(moved(8, LOADED_K), 12), "loaded"))
+    fresh = survey((logged(motions[1], 11), "unloaded"), (logged(moved(8, loaded=True), 12), "loaded"))
     found = validate(predictor_of(weighed, "r"), fresh)
     for name in ("log11", "log12"):
         one = found.logs[name]
@@ -158,7 +160,7 @@ def test_a_result_predicts_logs_of_both_roles(weighed: Result, motions: list[Sim
 def test_a_prediction_without_a_constant_is_refused_by_the_results_own_file(weighed: Result) -> None:
     bare = weighed.model_copy(update={"payload": {}})
     judge = predictor_of(bare, "arm.algid/result.json")
-    log = logged(moved(8), 12)
+    log = logged(moved(3), 12).part(0, 400)
     validate(judge, survey((log, "unloaded")))
     for work in (validate, simulate):
         with pytest.raises(ResultError, match=r"^arm\.algid/result\.json: the result has no m_p; identify"):
@@ -166,9 +168,10 @@ def test_a_prediction_without_a_constant_is_refused_by_the_results_own_file(weig
 
 
 def test_simulations_by_the_true_constants_stay_on_the_log(motions: list[SimulatedMotion]) -> None:
-    exact = replace(logged(motions[0], 1), tau=motions[0].tau)
+    exact = replace(logged(motions[0], 1), tau=motions[0].tau).part(0, 400)
     right = simulate(known(K), survey((exact, "unloaded")))
     wrong = simulate(known(1.2 * K), survey((exact, "unloaded")))
     assert list(right.logs) == ["log1"]
-    assert np.all(right.total.rmse < 0.02)
-    assert np.all(wrong.total.rmse > 3 * right.total.rmse)
+    assert np.all(right.total.rmse[:2] < 2e-3)  # of joints that turn by radians; integration and differences
+    assert np.all(wrong.total.rmse[:2] > 30 * right.total.rmse[:2])
+    assert np.isnan(right.total.rmse[2]).all()  # no start is so long before the log's end

@@ -11,6 +11,7 @@ from algid.arm import FloatArray
 from algid.identification.identify import identify
 from algid.inspection.checks import examine
 from algid.log import Log, Origin, join, usual_period
+from algid.settings import Settings
 from algid.signals.segments import segments
 from algid.signals.spacing import spaced
 from algid.synth.cases import load_case
@@ -18,6 +19,7 @@ from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import HANGING, simulate
 
 PERIOD = 1e-3
+PLAIN = Settings(model="plain")
 ROWS = 4000
 RANDOM = np.random.default_rng(8)
 
@@ -150,7 +152,8 @@ def test_pairs_two_microseconds_apart_leave_the_estimates_alone() -> None:
     nothing = np.array([], np.int64)
     four = np.array([500, 1400, 2300, 3700])
     clean, *others = (
-        identify(simulated(*pairs), report=False) for pairs in ((nothing, nothing), (four, nothing), (nothing, four))
+        identify(simulated(*pairs), settings=PLAIN, report=False)
+        for pairs in ((nothing, nothing), (four, nothing), (nothing, four))
     )
     for found in others:
         assert found.estimator == clean.estimator
