@@ -31,8 +31,10 @@ test-slow: setup
 test-processor: setup
 	OPENBLAS_CORETYPE=$$(grep -q avx512f /proc/cpuinfo && echo SkylakeX || echo Nehalem) \
 	NPY_DISABLE_CPU_FEATURES="X86_V3 X86_V4 AVX512_ICL AVX512_SPR" \
-	$(BIN)/python -m pytest tests/test_arm.py tests/estimators tests/signals tests/synth tests/track/test_track.py \
-		$(addprefix tests/identification/test_, identify.py passive.py streaming.py torque_scale.py)
+	$(BIN)/python -m pytest tests/test_arm.py tests/estimators tests/signals tests/synth \
+		$(addprefix tests/track/test_, track.py cells.py change_points.py) \
+		$(addprefix tests/identification/test_, identify.py known.py outcome.py passive.py series.py streaming.py \
+			torque_scale.py validate.py velocities.py)
 
 check: setup
 	$(BIN)/ruff format --check .

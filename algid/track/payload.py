@@ -146,12 +146,16 @@ def _by_stretch(log: Iterable[Segment], arm: IdentifiedArm, rough: Sequence[Cell
         end = segment.start + len(segment) * segment.dt
         for place, cells in enumerate(rough):
             if cells.start[0] < end and cells.end[-1] > segment.start:
-                part = _cut(segment, float(cells.start[0]), float(cells.end[-1]), arm.shift)
+                part = cut_to(segment, float(cells.start[0]), float(cells.end[-1]), arm.shift)
                 if part is not None:
                     yield place, part
 
 
-def _cut(segment: Segment, start: float, end: float, shift: float) -> Segment | None:
+def cut_to(segment: Segment, start: float, end: float, shift: float) -> Segment | None:
+    """The samples that give the torques from `start` to `end` s, their stencils' included; None where it has none.
+
+    `shift` is the time in s after which a logged torque acts.
+    """
     told = Stencil(segment.dt, shift).torques(len(segment))  # the others serve the stencil
     first = round((start - segment.start) / segment.dt) - told.start
     last = round((end - segment.start) / segment.dt) + len(segment) - told.stop

@@ -20,8 +20,8 @@ QUANTILE = 2.5
 
 
 def information(size: int, *, loaded: bool = False, c0: FloatArray | None = None, stretches: int = 6) -> LogInformation:
-    """A log that tells each coefficient alike, at `c0` the most likely ones."""
-    S = np.tile(np.eye(size), (stretches, 1, 1))
+    """A log that tells each coefficient alike and well, at `c0` the most likely ones."""
+    S = np.tile(1e9 * np.eye(size), (stretches, 1, 1))
     return LogInformation(loaded, np.zeros(size) if c0 is None else c0, S, np.zeros((stretches, size)))
 
 

@@ -203,9 +203,8 @@ def test_a_fits_series_stand_in_its_folder(
 ) -> None:
     survey = Survey([open_source(both[0][0], "unloaded"), open_source(both[1][0], "loaded")])
     fit = fit_of()
-    informed = [replace(log, S=1e9 * log.S) for log in fit.logs]  # every parameter is told by the first moment
     residual = residual_sums(np.random.default_rng(0).standard_normal((4, 4000)), DT)  # torques beside it
-    write_fit_series(tmp_path, replace(fit, logs=tuple(informed)), survey, Settings(), residual)
+    write_fit_series(tmp_path, fit, survey, Settings(), residual)
     names = ["information.parquet", "innovations.parquet", "running.parquet", "torque.parquet"]
     assert sorted(path.name for path in tmp_path.iterdir()) == names
     for name in names:

@@ -7,7 +7,7 @@ import pytest
 
 from algid.signals.differences import Stencil
 from algid.signals.segments import Segment
-from algid.track.payload import _cut
+from algid.track.payload import cut_to
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.004, 0.0125, -0.007])
@@ -16,13 +16,13 @@ def test_the_torques_of_a_cut_are_those_of_its_stretch(dt: float, shift: float) 
     n = 2000
     segment = Segment(5.0, dt, np.zeros((2, n)), np.arange(2.0 * n).reshape(2, n))
     start, end = 5.0 + 300 * dt, 5.0 + 1100 * dt
-    part = _cut(segment, start, end, shift)
+    part = cut_to(segment, start, end, shift)
     assert part is not None
     told = Stencil(dt, shift).torques(len(part))
     assert part.start + told.start * dt == pytest.approx(start, abs=1e-9)
     assert part.start + told.stop * dt == pytest.approx(end, abs=1e-9)
     assert part.tau[0, told.start] == 300
-    whole = _cut(segment, 0.0, 100.0, shift)
+    whole = cut_to(segment, 0.0, 100.0, shift)
     assert whole is not None
     assert len(whole) == n
-    assert _cut(segment, 0.0, 4.0, shift) is None
+    assert cut_to(segment, 0.0, 4.0, shift) is None
