@@ -39,12 +39,14 @@ X, Y = np.array([0.0, 1.0, 2.0]), np.array([1.0, 3.0, 2.0])
 def test_figures_are_saved_in_the_form_that_is_asked_for(tmp_path: Path) -> None:
     panel = Panel([line(X, Y, "@blue", "n", "g")], {"xaxis": axis(), "yaxis": axis()}, "says")
     shown = [Figure(key, "title", (panel,), "Read: it.") for key in ("one", "two")]
-    for form, start in (("png", b"\x89PNG"), ("pdf", b"%PDF")):
-        written = save_plots(shown, tmp_path, "case1", form)  # type: ignore[arg-type]
-        assert [path.name for path in written] == [f"case1-one.{form}", f"case1-two.{form}"]
-        assert all(path.read_bytes().startswith(start) for path in written)
+    written = save_plots(shown, tmp_path, "case1", "png")
+    assert [path.name for path in written] == ["case1-one.png", "case1-two.png"]
+    assert all(path.read_bytes().startswith(b"\x89PNG") for path in written)
+    written = save_plots(shown[:1], tmp_path, "case1")
+    assert [path.name for path in written] == ["case1-one.pdf"]
     once = written[0].read_bytes()
-    assert save_plots(shown, tmp_path, "case1")[0].read_bytes() == once  # no date, no random name
+    assert once.startswith(b"%PDF")
+    assert save_plots(shown[:1], tmp_path, "case1")[0].read_bytes() == once  # no date, no random name
 
 
 @pytest.mark.slow  # matplotlib takes fonts apart for every file
