@@ -166,8 +166,21 @@ def sine_cosine(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> FloatArray:
-    """Y (2, q, N) with τ = Y c: eq. (1) and the model's terms.
+    """Y with τ = Y c: eq. (1) and the model's terms.
 
+    Parameters
+    ----------
+    model : Model
+    motion : Motion of N samples
+    c : (q,), in `UNITS`
+        Where a model that is not linear is taken.
+
+    Returns
+    -------
+    (2, q, N), N m over the column's unit
+
+    Notes
+    -----
     Friction by load, the gain and the zero offsets make the torque bilinear in c: Y is taken at `c` then, with
     the load and the angles that c gives, joint 2's rows times its gain, and nothing in the columns of gain2, zero1
     and zero2. The column of the lag, which is no function of the motion at one instant, is nothing too.
@@ -234,8 +247,20 @@ def torque(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
 
 
 def sensitivity(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
-    """J (2, q, N), the derivative of the torque by the coefficients; nothing in the column of the lag.
+    """J, the derivative of the torque by the coefficients.
 
+    Parameters
+    ----------
+    model : Model
+    c : (q,), in `UNITS`
+    motion : Motion of N samples
+
+    Returns
+    -------
+    (2, q, N), N m over the column's unit; nothing in the column of the lag
+
+    Notes
+    -----
     The regressor where the torque is linear in c. Else, with sgn L and t = tanh(ω / ω_s),
 
         ∂τ_i/∂k_j = Y_ij (1 + e_i t_i sgn L_i)        j = 1 … 5
@@ -265,7 +290,19 @@ def sensitivity(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
 
 
 def partials(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
-    """Derivatives (3, 2, 2, N) of the torque: order of θ's derivative, torque of joint, angle of joint."""
+    """P = ∂τ/∂θ, ∂τ/∂θ̇ and ∂τ/∂θ̈.
+
+    Parameters
+    ----------
+    model : Model
+    c : (q,), in `UNITS`
+    motion : Motion of N samples
+
+    Returns
+    -------
+    (3, 2, 2, N), N m/rad, N m s/rad and N m s²/rad
+        By order of θ's derivative, torque's joint and angle's joint. Where a load is nothing its sign is too.
+    """
     value = model.values(c)
     motion = motion.turned(_zeros(value))
     P = _rigid_partials(value, motion)
@@ -344,8 +381,20 @@ def _zeros(value: dict[str, float]) -> FloatArray:
 
 
 def acceleration(model: Model, c: FloatArray, theta: FloatArray, omega: FloatArray, tau: FloatArray) -> FloatArray:
-    """Accelerations (2, N) in rad/s^2 that the torques `tau` (2, N) give: `torque` solved for θ̈, without the lag.
+    """Accelerations that torques give: `torque` solved for θ̈, without the lag.
 
+    Parameters
+    ----------
+    model : Model
+    c : (q,), in `UNITS`
+    theta, omega, tau : (2, N), rad, rad/s and N m
+
+    Returns
+    -------
+    (2, N), rad/s²
+
+    Notes
+    -----
     With L = M θ̈ + n the load, D = 1 + e tanh(ω / ω_s) sgn L and R = diag(0, j2), friction and offsets in r,
 
         (D M + R) θ̈ = τ / (1, 1 + gain2) - r - D n

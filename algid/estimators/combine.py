@@ -235,7 +235,14 @@ class BlockSums:
         self._rest = blocks[whole * self._factor :]
         self._append(_added(blocks[: whole * self._factor], self._factor))
         while self._count > 2 * MOST_BLOCKS:
-            self._halve()
+            sums = np.concatenate(self._full)
+            odd = sums.shape[0] % 2
+            self._full, self._count = [], 0
+            self._append(_added(sums[: sums.shape[0] - odd], 2))
+            if odd:  # waits, as one entry of the old size, for its partner
+                filler = np.zeros((self._factor - 1, *sums.shape[1:]))
+                self._rest = np.concatenate([sums[-1:], filler, self._rest])
+            self._factor *= 2
 
     def values(self) -> FloatArray:
         """All sums (B, ...) in time order; the last stretch may be shorter.
@@ -254,18 +261,6 @@ class BlockSums:
         if sums.shape[0]:
             self._full.append(sums)
             self._count += sums.shape[0]
-
-    def _halve(self) -> None:
-        sums = np.concatenate(self._full)
-        odd = sums.shape[0] % 2
-        # An odd stretch waits, as one entry of the old size, for its partner.
-        self._full, self._count = [], 0
-        self._append(_added(sums[: sums.shape[0] - odd], 2))
-        if odd:
-            filler = np.zeros((self._factor - 1, *sums.shape[1:]))
-            rest = self._rest if self._rest is not None else filler[:0]
-            self._rest = np.concatenate([sums[-1:], filler, rest])
-        self._factor *= 2
 
 
 def _added(blocks: FloatArray, factor: int) -> FloatArray:

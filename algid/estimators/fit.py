@@ -200,7 +200,7 @@ def conclude(
         if repeated is not None:
             within, covariance, intervals = covariance, widened(covariance, repeated), "jackknife"
             squares = _satterthwaite(within, covariance, freedom, logs)
-        quantile = float(stdtrit(max(2, squares), 0.975))
+        quantile = float(stdtrit(squares, 0.975))  # squares are two at least
     return Fit(
         estimator=estimator,
         shared=shared,

@@ -71,7 +71,12 @@ class Windows:
         return 2 * self.margin + (OVERLAP - 1) * self.step
 
     def kernels(self, offset: float = 0.0) -> FloatArray:
-        """φ, φ' and φ'' (3, L) at the samples plus `offset` samples, times dt: weights of a quadrature."""
+        """φ, φ' and φ'' at the samples plus `offset` samples, times dt: weights of a quadrature.
+
+        Returns
+        -------
+        (3, L), in 1, 1/s and 1/s²
+        """
         length = OVERLAP * self.step
         s = np.clip((np.arange(length) + offset) / length, 0, 1)
         span = length * self.dt
@@ -92,7 +97,17 @@ class Windows:
         return self.kernels(self.shift / self.dt - self.whole)
 
     def moments(self, signals: FloatArray, kernel: FloatArray) -> FloatArray:
-        """Integrals (m, R) of kernel (L,) times each signal (m, R + OVERLAP - 1 blocks of h)."""
+        """Integrals of a kernel times each signal, window by window.
+
+        Parameters
+        ----------
+        signals : (m, n), unit u
+        kernel : (L,), of `kernels`
+
+        Returns
+        -------
+        (m, R), with R = n // h - `OVERLAP` + 1 whole windows, unit u times the kernel's
+        """
         rows = signals.shape[1] // self.step
         blocks = signals[:, : rows * self.step].reshape(signals.shape[0], rows, self.step)
         parts = blocks @ np.ascontiguousarray(kernel.reshape(OVERLAP, self.step).T)
@@ -103,8 +118,28 @@ class Windows:
         return result
 
     def equations(self, model: Model, piece: Segment, delay: bool, at: FloatArray | None = None) -> FloatArray:
-        """X (2, q + 1, R), or (2, q + 2, R) with a column for a change of `shift`; R = 0 for a short piece.
+        """X, the columns of both joints' equations and the torque's moment, window by window.
 
+        Parameters
+        ----------
+        model : Model
+        piece : Segment
+        delay : bool
+            Whether there is a column for a change of `shift`, last but the torque.
+        at : (q,), in `algid.model.UNITS`
+            Where terms that are not linear are linearised.
+
+        Returns
+        -------
+        (2, q + 1, R) or, with the delay, (2, q + 2, R); R = 0 for a piece shorter than a window
+
+        Raises
+        ------
+        ValueError
+            If the log's own velocities are asked for, and there are none.
+
+        Notes
+        -----
         Where the torque is bilinear in the coefficients, X is linearised at the coefficients `at` (q,) so that
         least squares on it gives better ones; without `at` the columns of gain2, zero1, zero2, e1, e2 are nothing.
         The load is that of `at` (a fixed point, not a derivative): least squares settles in a few rounds.

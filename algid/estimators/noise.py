@@ -92,9 +92,7 @@ def quantum(signal: FloatArray) -> FloatArray:
 def _step(values: FloatArray) -> float:
     steps = np.abs(np.diff(values))
     steps = steps[steps > 1e-9 * (np.abs(values).max() + 1e-300)]
-    if steps.size < 8:
-        return 0.0
-    smallest = float(steps.min())
+    smallest = float(steps.min(initial=np.inf))
     near = steps[steps < 50 * smallest]
     if near.size < 8:
         return 0.0

@@ -157,7 +157,11 @@ def select(
     logs = [Training.of(source, kind) for kind, sources in ((False, unloaded), (True, loaded)) for source in sources]
     if not all(log.driven for log in logs):
         candidates = [term for term in candidates if term not in _OF_BOTH_TORQUES]
-    start = _first_look(tuple(logs), settings)
+    # At the constants, and at the shapes of friction, that a model of the most common terms gives.
+    look = _Look(tuple(logs), settings, {False: {}, True: {}}).shaped("coulomb_speed", _WIDTHS, FIRST_TERMS)
+    at = look.grams(FIRST_TERMS).coefficients((*FIRST_TERMS, "delay"))
+    linear = {kind: {name: c for name, c in values.items() if name != "delay"} for kind, values in at.items()}
+    start = replace(look, at=linear).shaped("stribeck_speed", _FADES, (*FIRST_TERMS, "stribeck"))
     look, fixed, before = start, tuple(kept), None
     everything = tuple(dict.fromkeys((*candidates, *kept)))
     searches: list[_Search] = []
@@ -175,14 +179,6 @@ def select(
         return Selection(model, "delay" in terms)
     trials = tuple(searches[0 if term == "delay" else -1].trial(term, terms, kept) for term in everything)
     return _as_lag(start, look, terms, Selection(model, "delay" in terms, "logs", trials, grams.held_out))
-
-
-def _first_look(logs: tuple[Training, ...], settings: WeakSettings) -> _Look:
-    """At the constants, and at the shapes of friction, that a model of the most common terms gives."""
-    look = _Look(logs, settings, {False: {}, True: {}}).shaped("coulomb_speed", _WIDTHS, FIRST_TERMS)
-    at = look.grams(FIRST_TERMS).coefficients((*FIRST_TERMS, "delay"))
-    linear = {kind: {name: c for name, c in values.items() if name != "delay"} for kind, values in at.items()}
-    return replace(look, at=linear).shaped("stribeck_speed", _FADES, (*FIRST_TERMS, "stribeck"))
 
 
 def _lowest(x: FloatArray, y: Sequence[float]) -> float:

@@ -96,11 +96,21 @@ def linearise(
     noise: NoiseLevels,
     delay: bool = False,
 ) -> Linearised:
-    """Linearise a piece at the trajectory `theta0` (2, N) and the coefficients `c` (q,), and whiten it.
+    """Linearise a piece of log at a trajectory and at coefficients, and whiten it.
 
-    With `delay` the last column is the derivative of the torque by the stencil's shift. A lag of the torque is
-    taken from that shift by the caller; what the low-pass does beyond that is done here, to the torque and its
-    derivatives by c, while H counts the shift alone.
+    Parameters
+    ----------
+    model : Model
+    c : (q,), in `algid.model.UNITS`
+    theta0 : (2, N), rad
+        The trajectory, near the truth.
+    piece : Segment of N samples
+    stencil : Stencil
+        Its shift is when a logged torque acts. A lag of the torque is taken from that shift by the caller; what the
+        low-pass does beyond that is done here, to the torque and its derivatives by c, while H counts the shift alone.
+    noise : NoiseLevels
+    delay : bool
+        Whether the last column but the residual is the derivative of the torque by the stencil's shift.
 
     Raises
     ------
@@ -129,10 +139,23 @@ def linearise(
 
 
 def low_passed(signal: FloatArray, dt: float, lag: float) -> FloatArray:
-    """Signals (..., n), sampled `lag` s ago, after a first-order low-pass of time constant `lag` s.
+    """Signals sampled `lag` s later, after a first-order low-pass of that time constant.
 
-    The response is exp(s lag) / (1 + s lag), so that a slow signal passes unchanged and in time. A negative lag is
-    the mirror image, which runs from the end of the signal to its start. Both ends continue by point reflection.
+    Parameters
+    ----------
+    signal : (..., n), unit u
+    dt : float, s
+    lag : float, s
+        A negative one is the mirror image, which runs from the end of the signal to its start.
+
+    Returns
+    -------
+    (..., n), unit u
+
+    Notes
+    -----
+    The response is exp(s lag) / (1 + s lag), so that a slow signal passes unchanged and in time. Exact for a signal
+    that is straight between its samples. Both ends continue by point reflection.
     """
     if abs(lag) < 1e-6 * dt:
         return signal.copy()
@@ -143,7 +166,6 @@ def low_passed(signal: FloatArray, dt: float, lag: float) -> FloatArray:
     before = 2 * signal[..., :1] - signal[..., reach:0:-1]
     after = 2 * signal[..., -1:] - signal[..., -2 : -reach - 2 : -1]
     extended = np.concatenate([before, signal, after], axis=-1)
-    # Exact for a signal that is straight between its samples.
     decay = np.exp(-dt / lag)
     mean = (1 - decay) * lag / dt
     numerator, denominator = np.array([1 - mean, mean - decay]), np.array([1.0, -decay])
@@ -167,14 +189,24 @@ def low_passed(signal: FloatArray, dt: float, lag: float) -> FloatArray:
 
 
 def along_stencil(P: FloatArray, weights: FloatArray) -> FloatArray:
-    """G (2, 2, POINTS, n): derivative of each torque by each angle its stencil touches."""
+    """G, the derivative of each torque by each angle that its stencil touches.
+
+    Parameters
+    ----------
+    P : (3, 2, 2, n), `algid.model.partials`
+    weights : (3, POINTS), of the stencil's value and its two derivatives, in 1, 1/s and 1/s²
+
+    Returns
+    -------
+    (2, 2, POINTS, n), N m/rad, by torque's joint, angle's joint and point
+    """
     n = P.shape[-1]
     G = weights.T @ P.reshape(3, 4 * n)
     return np.ascontiguousarray(G.reshape(POINTS, 2, 2, n).transpose(1, 2, 0, 3))
 
 
 def forward(G: FloatArray, x: FloatArray, first: int) -> FloatArray:
-    """G x (2, n) of angle changes x (2, N)."""
+    """G x (2, n) in N m of angle changes x (2, N) in rad; `first` is the sample of the first stencil's first point."""
     n = G.shape[-1]
     result = np.zeros((2, n))
     for point in range(POINTS):
@@ -183,7 +215,7 @@ def forward(G: FloatArray, x: FloatArray, first: int) -> FloatArray:
 
 
 def adjoint(G: FloatArray, y: FloatArray, first: int, length: int) -> FloatArray:
-    """Gᵀ y (2, N) of torques y (2, n)."""
+    """Gᵀ y (2, N) of torques y (2, n), N = `length`: the transpose of `forward`."""
     n = G.shape[-1]
     result = np.zeros((2, length))
     for point in range(POINTS):
@@ -192,7 +224,23 @@ def adjoint(G: FloatArray, y: FloatArray, first: int, length: int) -> FloatArray
 
 
 def covariance_factor(H: FloatArray, *, held: bool = False) -> FloatArray:
-    """Cholesky factor of F Fᵀ + H Hᵀ as LAPACK's lower band (2 POINTS, 2 n)."""
+    """Cholesky factor of V = F Fᵀ + H Hᵀ.
+
+    Parameters
+    ----------
+    H : (2, 2, POINTS, n)
+    held : bool
+        Whether F is `held_torque`, and not I.
+
+    Returns
+    -------
+    (2 POINTS, 2 n), LAPACK's lower band
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If V is not positive definite in floating point.
+    """
     n = H.shape[-1]
     band = np.zeros((n, 2, 2 * POINTS))
     for lag in range(POINTS):
@@ -216,6 +264,18 @@ def covariance_factor(H: FloatArray, *, held: bool = False) -> FloatArray:
 
 
 def trajectory(piece: Segment, linear: Linearised, multiplier: FloatArray, noise: NoiseLevels) -> FloatArray:
-    """Most likely angles (2, N) given the multipliers V⁻¹e (2 n,)."""
+    """Most likely angles θ_m + Σ_θ Gᵀ V⁻¹e.
+
+    Parameters
+    ----------
+    piece : Segment of N samples
+    linear : Linearised
+    multiplier : (2 n,), V⁻¹e
+    noise : NoiseLevels
+
+    Returns
+    -------
+    (2, N), rad
+    """
     y = np.ascontiguousarray(multiplier.reshape(-1, 2).T)
     return piece.theta + noise.theta[:, None] * adjoint(linear.H, y, linear.first, piece.theta.shape[1])

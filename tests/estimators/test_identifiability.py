@@ -42,6 +42,7 @@ def axis(**share: float) -> FloatArray:
         ((axis(k3=1, k5=-1),), ("k3 and k5 only as a sum",)),
         ((axis(k3=1, k5=1),), ("k3 and k5 only as a difference",)),
         ((axis(k1=1, k5=2),), ("k1 and k5 only as -2 times the first plus the second",)),
+        ((axis(k1=1, k5=-2),), ("k1 and k5 only as 2 times the first plus the second",)),
         ((axis(k1=1, k6=-1),), ("k1 and k6 only as 6 times the first plus the second",)),
         ((axis(k1=1, k3=1, k5=1),), ("k1, k3 and k5 only in 2 combinations",)),
         ((axis(k1=1, k3=1), axis(k3=1, k5=1)), ("k1, k3 and k5 only in 1 combination",)),
@@ -85,6 +86,9 @@ def test_a_direction_is_open_from_half_the_size_on_and_a_share_of_it_counts() ->
     for share, told in ((0.14, True), (0.16, False)):
         direction = axis(k7=np.sqrt(1 - share**2), k4=share)
         assert examine(NAMES, VALUES, information(direction), MOVED).determined[3] is told
+    faint = axis(k1=np.sqrt(1 - 0.151**2), k5=0.151)  # what has a part is said in one sentence with the rest
+    (sentence,) = examine(NAMES, VALUES, information(faint), MOVED).sentences
+    assert sentence.startswith("k1 and k5 only as ")
 
 
 def test_a_sum_is_known_whose_terms_are_not(bench: Bench) -> None:

@@ -99,10 +99,10 @@ def test_the_score_is_that_of_dense_algebra(linear: Linearised) -> None:
         expected = Y.T @ inverse @ part @ inverse @ Y
         scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
         np.testing.assert_allclose(one / scale, expected / scale, atol=1e3 * rounding)
-    traces = np.array([variance_score(linear, ANGLES, seed).trace for seed in range(60)])
+    traces = np.array([variance_score(linear, ANGLES, seed).trace for seed in range(30)])
     expected = np.array([np.trace(inverse @ part) for part in parts])
-    assert np.all(np.abs(traces.mean(axis=0) - expected) < 4.5 * traces.std(axis=0, ddof=1) / np.sqrt(60) + 1e-9)
-    assert traces.mean(axis=0).sum() == pytest.approx(len(V), rel=0.02)  # Σ V_i = V
+    assert np.all(np.abs(traces.mean(axis=0) - expected) < 4.5 * traces.std(axis=0, ddof=1) / np.sqrt(30) + 1e-9)
+    assert traces.mean(axis=0).sum() == pytest.approx(len(V), rel=0.03)  # Σ V_i = V
 
 
 def test_a_newton_step_goes_along_the_slope_of_the_restricted_likelihood(linear: Linearised) -> None:

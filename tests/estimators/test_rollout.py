@@ -52,7 +52,7 @@ def test_a_wrong_arm_does_as_its_simulation_says(segment: Segment) -> None:
     score = rollouts(Model(), wrong, [segment], 8.0)
     t = np.arange(len(segment)) * DT
     true = simulate(K, push, t)
-    errors, starts = [], range(60, len(segment) - 60 - 100, 10)
+    errors, starts = [], range(60, len(segment) - 60 - 100, 30)
     for start in starts:
         ends = np.array([t[start], t[start + 100]])
         alone = simulate(wrong, push, ends, true.theta[:, start], true.omega[:, start])

@@ -134,6 +134,7 @@ def test_windows_are_what_they_are_alone_and_together(monkeypatch: pytest.Monkey
         assert after.t[0] - before.t[-1] == pytest.approx(1e-3)
     assert [*stage1_series([], 0.6)] == []
     assert [*stage1_series([log.part(0, 7)], 0.6)] == []
+    assert [one.values.shape[1] for one in stage1_series([log.part(0, 8)], 0.6)] == [8]
     lone = [*stage1_series([log.part(0, 7), log.part(0, 500)], 0.6)]
     assert [one.values.shape[1] for one in lone] == [500]
 

@@ -95,3 +95,13 @@ def test_singular_systems_are_told_apart() -> None:
     np.testing.assert_array_equal(found.x[:, 0], 1.0)
     assert np.isnan(found.x[:, 1]).all()
     assert np.isinf(found.condition[1])
+
+
+def test_a_condition_that_leaves_less_than_a_percent_is_singular() -> None:
+    """[[1, 1], [1, 1 + e]] has the condition (2 + e)² / e in the 1-norm; nested sums round by 1e-12."""
+    e = np.array([1e-3, 1e-8, 1e-9, 5e-10, 3e-10, 1e-11])
+    ones = np.ones_like(e)
+    found = solve_scaled(np.array([[ones, ones], [ones, 1 + e]]), np.array([2 * ones, 2 + e]))
+    np.testing.assert_allclose(found.condition, 4 / e, rtol=2e-3)
+    np.testing.assert_allclose(found.x[:, :4], 1, rtol=1e-5)
+    assert np.isnan(found.x[:, 4:]).all()
