@@ -92,6 +92,7 @@ def test_a_delay_is_recovered_with_its_error_bar(bench: Bench) -> None:
     late = replace(log, theta=log.theta[:, :-5], tau=log.tau[:, 5:], omega=None)
     fit = refined.fit([lambda: [late]], settings=RefinedSettings(estimate_delay=True))
     assert fit.names[-1] == "delay"
+    assert (fit.estimator, fit.converged) == ("refined", True)
     assert abs(fit.values[-1] - 5e-3) < 1e-4
     assert abs(fit.values[-1] - 5e-3) < 4 * fit.std[-1]
     assert np.allclose(fit.values[5:7], bench.truth[5:7], rtol=1e-3)
