@@ -97,7 +97,8 @@ class TableReader:
                 total += len(table)
                 held, notices = (table, notices), ()
         if total < 2:
-            worst = sorted(notices, key=lambda notice: not notice.lossy)[:1]
+            told = held[1] + notices if held else notices
+            worst = sorted(told, key=lambda notice: not notice.lossy)[:1]
             why = "".join(f" ({notice.text})" for notice in worst)
             raise LogError(f"{self.origin.path}: {counted(total, 'sample')}; a log needs two at least{why}")
         if held is not None:  # what the last tables tell, also where they are empty

@@ -123,7 +123,7 @@ class Conversion:
             channel = self.channels[name]
             if channel.factor == 1:
                 row[:] = table.columns[name]
-            else:
+            elif channel.factor:  # without a motor a torque may be anything
                 np.multiply(table.columns[name], channel.factor, out=row)
             if channel.offset:
                 row += channel.offset

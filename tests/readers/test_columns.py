@@ -232,3 +232,21 @@ def test_other_joints_are_those_of_the_same_quantity_and_topic() -> None:
     topics = ["/a/x/position", "/a/y/position", "/a/z/position", "/b/w/position", "/a/z/effort"]
     assert other_joints(topics, topics[:2]) == {"z": "/a/z/position"}
     assert other_joints(["hip_pos", "knee_pos", "toe_pos", "max_pos"], ["hip_pos", "knee_pos"]) == {"toe": "toe_pos"}
+
+
+def test_the_first_of_two_clocks_of_one_name_and_the_only_torque() -> None:
+    assert choose(["t", "T", "q1", "q2", "tau1", "tau2"]).columns["t"] == "t"
+    assert choose(["T", "t", "q1", "q2", "tau1", "tau2"]).columns["t"] == "T"
+    assert choose(["t [s]", "T [ms]", "q1", "q2", "tau1", "tau2"]).columns["t"] == "t [s]"
+    # of several torques that of the joint that has the motor
+    columns = ["t", "q1", "q2", "tau1", "tau7"]
+    assert choose(columns, passive=2).columns["tau1"] == "tau1"
+    assert "tau1" not in choose(["t", "q1", "q2", "tau6", "tau7"], passive=2).columns
+    assert choose(["t", "q1", "q2", "effort"], passive=1).columns["tau2"] == "effort"
+
+
+def test_joint_and_axis_are_no_joints_names() -> None:
+    columns = [f"{joint}_{signal}" for joint in ("base_axis", "elbow_axis") for signal in ("pos", "torque")]
+    assert choose(["t", *columns]).joints == ("base", "elbow")
+    assert choose(["t", *columns], ("elbow", "base")).columns["theta1"] == "elbow_axis_pos"
+    assert choose(["t", "axis_pos", "joint_pos", "axis_torque", "joint_torque"]).columns == {"t": "t"}

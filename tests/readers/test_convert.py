@@ -128,6 +128,24 @@ def test_zero_and_reference_of_the_angles() -> None:
     assert np.all(converted(passive=1, base=True).tau == SIGNALS[3])
 
 
+def test_factor_and_offset_of_a_channel() -> None:
+    samples = SampleTable(np.arange(50), dict(zip(CHANNELS, SIGNALS, strict=True)))
+    room = Room.empty(50, velocity=False)
+    channels = {
+        name: ChannelReading(name, "", factor=place - 1.5, offset=1.0 - place) for place, name in enumerate(CHANNELS)
+    }
+    Conversion(channels).apply(samples, room)
+    wanted = [(place - 1.5) * SIGNALS[place] + 1.0 - place for place in range(4)]
+    assert np.allclose([*room.theta, *room.tau], wanted, rtol=1e-15, atol=1e-15)
+
+
+def test_a_file_is_not_believed_how_many_samples_it_holds() -> None:
+    """Of 2^45, which take a petabyte, none is reserved beyond what may be at once."""
+    gatherer = Gatherer(1 << 45, velocity=False)
+    gatherer.more(3).tau[:] = 7
+    assert gatherer.filled().tau.tolist() == [[7] * 3] * 2
+
+
 @settings(max_examples=40, deadline=None)
 @given(sizes=st.lists(st.integers(0, 40), min_size=1, max_size=8), expected=st.integers(0, 60), velocity=st.booleans())
 def test_a_gatherer_keeps_what_was_put_in(sizes: list[int], expected: int, velocity: bool) -> None:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from algid.log import Log
+from algid.errors import LogError
+from algid.log import Log, Reading
 from algid.profile import Profile, with_settings
 from algid.readers import read_log
-from algid.readers.joints import along_the_arm
+from algid.readers.joints import along_the_arm, moving_joints, reading_of
+from algid.readers.table import SampleTable
 from tests.readers.logs import EPOCH_NS
 from tests.readers.mcaps import joint_state, write_mcap
 
@@ -151,3 +154,63 @@ def test_a_raised_digit_is_no_number() -> None:
     """`str.isdigit` says that ² is one, and `int` does not."""
     assert along_the_arm(["axis ³", "axis ²"]) == (("axis ³", "axis ²"), "order")
     assert along_the_arm(["axis 3", "axis 2"]) == (("axis 2", "axis 3"), "names")
+
+
+@pytest.mark.parametrize("names", [("pan", "tilt"), ("primary", "secondary"), ("tilt", "wrist"), ("axis_i", "axis_ii")])
+def test_more_words_of_the_field_tell_the_order(names: tuple[str, str]) -> None:
+    assert along_the_arm(names[::-1]) == (names, "names")
+
+
+def moving(unit: float = 1.0, rows: int = 3, **travel: float) -> str | None:
+    """What is said of joints that go as far as this and back, with a gap in what was recorded."""
+    asked: list[Mapping[str, str]] = []
+
+    def tables(paths: Mapping[str, str]) -> Iterator[SampleTable]:
+        asked.append(paths)
+        yield SampleTable(np.array([], np.int64), {name: np.array([]) for name in paths})
+        values = {name: np.array([0, np.nan, travel[path]]) for name, path in paths.items()}
+        yield SampleTable(np.arange(rows), values)
+        raise AssertionError("a second table is not asked for")
+
+    told = moving_joints({f"joint of {name}": name for name in travel}, tables, unit)
+    assert len(asked) == (1 if travel else 0)
+    assert all(notice.code == "OTHER_JOINTS" for notice in told)
+    return told[0].text.partition(" (in the first")[0] if told else None
+
+
+def test_joints_that_move_are_told_from_those_that_creep() -> None:
+    assert moving() is None
+    assert moving(a=0.0199, b=-0.0199) is None
+    assert moving(a=0.0201, b=0.0) == "1 other joint moves meanwhile: joint of a by 0.02 rad"
+    assert moving(unit=np.pi / 180, a=1.0, b=-90.0) == "1 other joint moves meanwhile: joint of b by 1.6 rad"
+    assert moving(a=float("nan"), b=float("inf")) is None
+
+
+def test_the_four_that_move_furthest_are_named() -> None:
+    assert moving(a=0.1, b=-0.5, c=0.3, d=0.2) == (
+        "4 other joints move meanwhile: joint of b by 0.5 rad, joint of c by 0.3 rad, joint of d by 0.2 rad, "
+        "joint of a by 0.1 rad"
+    )
+    assert (moving(a=1, b=2, c=3, d=4, e=5, f=6) or "").endswith("joint of d by 4 rad, joint of c by 3 rad and 2 more")
+
+
+def test_joints_that_cannot_be_read_or_were_not_recorded_tell_nothing() -> None:
+    def none(_paths: Mapping[str, str]) -> Iterator[SampleTable]:
+        return iter(())
+
+    def torn(_paths: Mapping[str, str]) -> Iterator[SampleTable]:
+        raise LogError("torn")
+
+    assert moving_joints({"a": "q3"}, none) == moving_joints({"a": "q3"}, torn) == ()
+
+
+def test_a_user_who_says_the_joints_is_not_told_of_their_order() -> None:
+    reading, said = reading_of(["elbow", "shoulder"], Profile())
+    assert (reading.joints, reading.joints_told, [notice.code for notice in said]) == (
+        ("shoulder", "elbow"), "names", ["JOINT_ORDER"]
+    )  # fmt: skip
+    assert said[0].note
+    told = with_settings(Profile(), {"joints": ["elbow", "shoulder"]})
+    assert reading_of(["shoulder", "elbow"], told) == (Reading(joints=("elbow", "shoulder"), joints_told="flag"), ())
+    (unknown,) = reading_of(["left", "right"], Profile())[1]
+    assert not unknown.note

@@ -1,0 +1,111 @@
+"""From tables to blocks of a log: what is cut, left out, refused and told, and that blocks add up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from algid.arm import FloatArray
+from algid.errors import LogError
+from algid.log import Log, Notice, Origin, join
+from algid.profile import Profile
+from algid.readers.assemble import TableReader, reader_of
+from algid.readers.table import CHANNELS, SampleTable, cut
+
+MS = 1_000_000
+MAPPING = {name: f"column {name}" for name in CHANNELS[:4]}
+
+
+def tables(*sizes: int, **channels: FloatArray) -> Iterator[SampleTable]:
+    """Tables of so many rows, 1 kHz; each channel counts the samples unless it is given."""
+    first = 0
+    for number, size in enumerate(sizes):
+        rows = np.arange(first, first + size)
+        columns = {name: channels.get(name, np.arange(sum(sizes)) * 1.0)[rows] for name in MAPPING}
+        yield SampleTable(rows * MS, columns, (Notice(f"TABLE{number}", f"table {number}", lossy=number == 1),))
+        first += size
+
+
+def reader(*sizes: int, settings: dict[str, Any] | None = None, **channels: FloatArray) -> TableReader:
+    profile = Profile.model_validate(settings or {})
+    origin = Origin("log.csv", "csv", MAPPING)
+    return reader_of(origin, lambda _rows: tables(*sizes, **channels), profile, {}, (Notice("FIRST", "first"),))
+
+
+def codes(log: Log) -> list[str]:
+    return [notice.code for notice in log.notices]
+
+
+def test_notices_come_with_the_samples_they_were_found_at() -> None:
+    blocks = list(reader(4, 0, 4, 0).blocks(4))
+    assert [len(block) for block in blocks] == [4, 4]
+    assert [codes(block) for block in blocks] == [["FIRST", "TABLE0", "TABLE1"], ["TABLE2", "TABLE3"]]
+    assert sorted(codes(reader(0, 4).whole())) == ["FIRST", "TABLE0", "TABLE1"]
+
+
+@pytest.mark.parametrize("rows", [1, 3, 7, 100])
+def test_blocks_are_as_large_as_asked_and_add_up(rows: int) -> None:
+    found = list(reader(5, 1, 9).blocks(rows))
+    assert max(map(len, found)) <= rows
+    whole = join(found)
+    assert whole.stamp_ns.tolist() == [place * MS for place in range(15)]
+    assert np.array_equal(whole.theta, np.stack([np.arange(15.0)] * 2))
+    assert codes(whole) == codes(reader(5, 1, 9).whole()) == ["FIRST", "TABLE0", "TABLE1", "TABLE2"]
+
+
+@pytest.mark.parametrize("sizes", [(), (0,), (1,), (1, 0)])
+def test_a_log_of_fewer_than_two_samples_is_refused_with_what_was_lost(sizes: tuple[int, ...]) -> None:
+    count = "1 sample" if 1 in sizes else "0 samples"
+    worst = "table 1" if len(sizes) == 2 else "first"
+    with pytest.raises(LogError, match=rf"log.csv: {count}; a log needs two at least \({worst}\)$"):
+        reader(*sizes).whole()
+
+
+@pytest.mark.parametrize("sizes", [(10,), (2, 3, 5), (6, 4)])
+def test_a_log_is_cut_where_the_user_says(sizes: tuple[int, ...]) -> None:
+    """Both ends stay; times count from the first sample, whatever its stamp."""
+    for settings, kept, text in (
+        ({"start": 0.003, "end": 0.006}, range(3, 7), "6 samples before 0.003 s or behind 0.006 s left out, as told"),
+        ({"start": 0.0035}, range(4, 10), "4 samples before 0.0035 s or behind the end left out, as told"),
+        ({"end": 0.0088}, range(9), "1 sample before 0 s or behind 0.0088 s left out, as told"),
+    ):
+        log = reader(*sizes, settings=settings).whole()
+        assert (log.stamp_ns // MS).tolist() == list(kept)
+        (said,) = [notice for notice in log.notices if notice.code == "CUT"]
+        assert (said.text, said.note, said.lossy) == (text, True, False)
+    with pytest.raises(LogError, match="0 samples; a log needs two at least"):
+        reader(*sizes, settings={"start": 5}).whole()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "found"), [(np.nan, "nan"), (-np.inf, "-inf"), (1e100, "1e\\+100"), (-3e200, "-3e\\+200")]
+)
+def test_numbers_that_are_none_are_refused_or_left_out(wrong: float, found: str) -> None:
+    values = np.zeros(10)
+    values[7] = wrong
+    with pytest.raises(
+        LogError, match=rf"tau2 \(column tau2\) in sample 8: expected a finite number .* found {found};"
+    ):
+        reader(4, 6, tau2=values).whole()
+    log = reader(4, 6, tau2=values, settings={"accept": ["NOT_FINITE"]}).whole()
+    assert (log.stamp_ns // MS).tolist() == [0, 1, 2, 3, 4, 5, 6, 8, 9]
+    (said,) = [notice for notice in log.notices if notice.code == "NOT_FINITE"]
+    assert (said.text, said.lossy) == ("1 sample holds a number that is not finite; left out", True)
+    # the torque of a joint without motor may be anything
+    assert len(reader(4, 6, tau2=values, settings={"passive": 2}).whole()) == 10
+
+
+def test_large_numbers_are_no_error() -> None:
+    """The sum of squares overflows before any of them is too large."""
+    values = np.full(10, 9e99)
+    assert np.all(reader(10, theta1=values).whole().theta[0] == 9e99)
+
+
+def test_tables_are_cut_with_their_notices_first() -> None:
+    parts = list(cut(tables(7, 2), 3))
+    assert [len(part) for part in parts] == [3, 3, 1, 2]
+    assert [len(part.notices) for part in parts] == [1, 0, 0, 1]
+    assert [stamp // MS for part in parts for stamp in part.stamp_ns.tolist()] == list(range(9))
