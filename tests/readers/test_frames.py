@@ -197,3 +197,23 @@ def test_of_wide_lists_the_first_places_are_taken(tmp_path: Path) -> None:
         )
         assert np.allclose(log.theta[0], 6.2, rtol=1e-12)
         assert [notice.code for notice in log.notices if notice.lossy] == ["CUT_OFF"]
+
+
+def test_a_look_at_other_joints_does_not_stand_for_the_check_of_all_pages(tmp_path: Path) -> None:
+    """A page of a joint that is read is checked to its last, though its first were looked at before."""
+    path, frame = tmp_path / "log.parquet", arm()
+    pq.write_table(frame.to_arrow(), path, compression="none", use_dictionary=False, write_page_checksum=True)
+    content = bytearray(path.read_bytes())
+    content[content.index(struct.pack("<d", frame["q1"][ROWS - 1]))] ^= 1
+    path.write_bytes(content)
+    reader = open_log(path, Profile(joints=("1", "2")))
+    assert [notice.code for notice in reader.notices] == ["OTHER_JOINTS"]
+    with pytest.raises(LogError, match="the checksum of a page at byte"):
+        reader.whole()
+
+
+def test_an_angle_that_is_a_date_holds_no_number(tmp_path: Path) -> None:
+    rows = [f"{row},2024-03-01 00:00:{row:02d},2,3,4" for row in range(10)]
+    (tmp_path / "log.csv").write_text("\n".join(["t,q1,q2,tau1,tau2", *rows]) + "\n")
+    with pytest.raises(LogError, match="no row has a value in every column that is needed"):
+        read_log(tmp_path / "log.csv")
