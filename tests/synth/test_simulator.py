@@ -46,7 +46,7 @@ def test_small_swing_is_that_of_the_linear_arm() -> None:
     np.testing.assert_allclose(motion.theta + np.array([[np.pi / 2], [0.0]]), linear[:2], atol=1e-12)
 
 
-def test_angles_agree_with_an_implicit_integrator() -> None:
+def test_angles_agree_with_another_integrator() -> None:
     torque = wide_multi_sine(CASE.arm)
     t = np.linspace(0, 0.3, 4)
     motion = simulate(K, torque, t)
@@ -54,7 +54,7 @@ def test_angles_agree_with_an_implicit_integrator() -> None:
     def rate(now: float, y: np.ndarray) -> np.ndarray:
         return np.concatenate([y[2:], forward_dynamics(K, y[:2], y[2:], torque(np.array([now]))[:, 0])])
 
-    other = solve_ivp(rate, (0, 0.3), [-np.pi / 2, 0, 0, 0], method="Radau", t_eval=t, rtol=1e-11, atol=1e-12).y
+    other = solve_ivp(rate, (0, 0.3), [-np.pi / 2, 0, 0, 0], method="LSODA", t_eval=t, rtol=1e-11, atol=1e-12).y
     np.testing.assert_allclose(motion.theta, other[:2], atol=1e-9)
 
 

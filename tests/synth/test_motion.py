@@ -1,0 +1,146 @@
+"""The simulator against what mechanics keeps, decoupled arms in closed form, MuJoCo and Pinocchio."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from algid.arm import FloatArray, energy, forward_dynamics, mass_matrix
+from algid.export.formats import exported
+from algid.export.links import Knowns
+from algid.model import Model
+from algid.synth.excitation import no_torque
+from algid.synth.simulator import HANGING, simulate
+from tests.export.arms import ODD, result_of, values_of
+
+FREE = np.array([0.05, 1.0, 0.03, 4.0, 0.2, 0.0, 0.0])  # without friction
+START = np.array([0.5, -1.0]), np.array([2.0, -3.0])
+
+
+def test_energy_is_kept_without_friction() -> None:
+    motion = simulate(FREE, no_torque, np.linspace(0, 3, 61), *START)
+    stored = energy(FREE, motion.theta, motion.omega)
+    assert np.ptp(motion.theta, axis=1).min() > 1
+    np.testing.assert_allclose(stored, stored[0], rtol=0, atol=1e-10 * np.abs(stored).max())
+
+
+def test_friction_takes_energy_away() -> None:
+    damped = FREE + np.array([0, 0, 0, 0, 0, 0.1, 0.02])
+    motion = simulate(damped, no_torque, np.linspace(0, 2, 201), *START)
+    assert np.all(np.diff(energy(damped, motion.theta, motion.omega)) < 0)
+
+
+def test_angular_momentum_is_kept_in_a_horizontal_plane() -> None:
+    k = np.array([0.05, 0.0, 0.03, 0.0, 0.2, 0.0, 0.3])  # friction in joint 2 is an inner torque
+    motion = simulate(k, lambda t: np.stack([0 * t, np.sin(3 * t)]), np.linspace(0, 2, 41), *START)
+    m11, m12, _ = mass_matrix(k, motion.theta)
+    momentum = m11 * motion.omega[0] + m12 * motion.omega[1]
+    assert np.ptp(motion.omega[1]) > 1
+    np.testing.assert_allclose(momentum, momentum[0], rtol=1e-9)
+
+
+def test_a_motion_without_friction_runs_back_as_it_came() -> None:
+    t = np.linspace(0, 0.8, 17)
+    out = simulate(FREE, no_torque, t, *START)
+    back = simulate(FREE, no_torque, t, out.theta[:, -1], -out.omega[:, -1])
+    np.testing.assert_allclose(back.theta, out.theta[:, ::-1], atol=1e-9)
+    np.testing.assert_allclose(back.omega, -out.omega[:, ::-1], atol=1e-8)
+
+
+def test_an_arm_without_coupling_is_two_bodies_in_closed_form() -> None:
+    """With k1 = 0 and no weight, k5 θ̈1 = τ1 − τ2 and k3 (θ̈1 + θ̈2) = τ2."""
+    k = np.array([0.0, 0.0, 0.5, 0.0, 2.0, 0.0, 0.0])
+    t = np.linspace(0, 2, 41)
+    motion = simulate(k, lambda now: np.stack([3 * np.cos(2 * now), 1.0 + 0 * now]), t, np.zeros(2), np.zeros(2))
+    first = (3 * (1 - np.cos(2 * t)) / 4 - t**2 / 2) / 2.0
+    whole = t**2 / 2 / 0.5
+    np.testing.assert_allclose(motion.theta, [first, whole - first], atol=1e-11)
+
+
+def test_friction_alone_slows_exponentially() -> None:
+    """With k1 = 0, no weight, no torque and k7 = 0: k5 θ̈1 = −k6 θ̇1, while link 2 keeps its own turning in space."""
+    k = np.array([0.0, 0.0, 0.5, 0.0, 2.0, 0.8, 0.0])
+    t = np.linspace(0, 4, 41)
+    motion = simulate(k, no_torque, t, np.zeros(2), np.array([3.0, -1.0]))
+    np.testing.assert_allclose(motion.omega[0], 3 * np.exp(-0.4 * t), atol=1e-11)
+    np.testing.assert_allclose(motion.omega.sum(axis=0), 2.0, atol=1e-11)
+
+
+def test_shifting_the_clock_or_turning_the_arm_by_whole_turns_changes_nothing() -> None:
+    t = np.linspace(0, 1, 21)
+
+    def torque(now: FloatArray) -> FloatArray:
+        return np.stack([3 * np.sin(5 * now), np.cos(4 * now)])
+
+    plain = simulate(FREE, torque, t, *START)
+    later = simulate(FREE, lambda now: torque(now - 7.0), t + 7.0, *START)
+    np.testing.assert_allclose(later.theta, plain.theta, atol=1e-9)
+    turned = simulate(FREE, torque, t, START[0] + 2 * np.pi * np.array([3, -2]), START[1])
+    np.testing.assert_allclose(turned.theta - plain.theta, 2 * np.pi * np.array([[3.0], [-2.0]]) + 0 * t, atol=1e-9)
+
+
+def test_scaling_masses_and_torques_alike_changes_nothing() -> None:
+    t = np.linspace(0, 1, 21)
+    plain = simulate(FREE, lambda now: np.stack([3 * np.sin(5 * now), now]), t, *START)
+    heavy = simulate(7 * FREE, lambda now: 7 * np.stack([3 * np.sin(5 * now), now]), t, *START)
+    np.testing.assert_allclose(heavy.theta, plain.theta, atol=1e-10)
+
+
+def test_an_arm_at_rest_stays_there() -> None:
+    motion = simulate(FREE, no_torque, np.linspace(0, 1, 5))
+    np.testing.assert_allclose(motion.theta, np.repeat(HANGING[:, None], 5, axis=1), atol=1e-12)
+    up = simulate(FREE, lambda t: np.stack([5.0 + 0 * t, 1.0 + 0 * t]), np.linspace(0, 1, 5), np.zeros(2))
+    np.testing.assert_allclose(up.theta, 0.0, atol=1e-12)  # held outstretched by k4 + k2 and k2
+
+
+def states(count: int = 40) -> tuple[FloatArray, FloatArray, FloatArray]:
+    draw = np.random.default_rng(5)
+    return draw.uniform(-3, 3, (2, count)), draw.normal(0, 4, (2, count)), draw.normal(0, 9, (2, count))
+
+
+def test_pinocchios_articulated_bodies_accelerate_alike() -> None:
+    pin = pytest.importorskip("pinocchio")
+    value = values_of(ODD) | {"k6": 0.0, "k7": 0.0}
+    robot = pin.buildModelFromXML(exported(result_of(value), "arm", "urdf", Knowns(l2=0.3))[0])
+    data, (theta, omega, tau) = robot.createData(), states()
+    k = np.array(list(value.values()))
+    ours = forward_dynamics(k, theta, omega, tau)
+    found, kinetic = [], []
+    for q, v, u in zip(theta.T, omega.T, tau.T, strict=True):
+        posture = np.stack([np.cos(q), np.sin(q)], axis=1).ravel()
+        found.append(pin.aba(robot, data, posture, v, u).copy())
+        stands = pin.computePotentialEnergy(robot, data, posture)
+        kinetic.append(pin.computeKineticEnergy(robot, data, posture, v) + stands)
+    np.testing.assert_allclose(np.array(found).T, ours, rtol=0, atol=1e-9 * np.abs(ours).max())
+    stored = energy(k, theta, omega)
+    np.testing.assert_allclose(np.array(kinetic) - kinetic[0], stored - stored[0], atol=1e-10 * np.abs(stored).max())
+
+
+def test_mujocos_inertia_and_acceleration_are_alike() -> None:
+    mujoco = pytest.importorskip("mujoco")
+    value = values_of(ODD, j2=0.004)
+    model = mujoco.MjModel.from_xml_string(exported(result_of(value, Model(("rotor",))), "arm", "mjcf", Knowns())[0])
+    data, (theta, omega, tau) = mujoco.MjData(model), states()
+    k = np.array(list(value.values()))[:7]
+    full = np.zeros((2, 2))
+    for q, v, u in zip(theta.T, omega.T, tau.T, strict=True):
+        data.qpos[:], data.qvel[:], data.qfrc_applied[:] = q, v, u
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, full)
+        m11, m12, m22 = (float(one[0]) for one in mass_matrix(k, q[:, None]))
+        expected = np.array([[m11, m12], [m12, m22 + 0.004]])
+        np.testing.assert_allclose(full, expected, rtol=0, atol=1e-9 * m11)
+        rest = u - _passive(k, q, v)
+        np.testing.assert_allclose(data.qacc, np.linalg.solve(expected, rest), rtol=1e-7, atol=1e-7)
+
+
+def _passive(k: FloatArray, q: FloatArray, v: FloatArray) -> FloatArray:
+    """Coriolis, weight and friction of eq. (1), written out."""
+    k1, k2, _, k4, _, k6, k7 = k
+    s2, c12 = np.sin(q[1]), np.cos(q[0] + q[1])
+    return np.array(
+        [
+            -k1 * s2 * (2 * v[0] * v[1] + v[1] ** 2) + k6 * v[0] + k4 * np.cos(q[0]) + k2 * c12,
+            k1 * s2 * v[0] ** 2 + k7 * v[1] + k2 * c12,
+        ]
+    )
