@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from algid.arm import FloatArray
 from algid.design.belief import SURE, UNKNOWN, Asked, Belief, asked_for
@@ -145,3 +146,7 @@ def test_what_is_asked_for_is_what_the_prior_knows_or_what_is_named() -> None:
         "--for l1: expected some of k1, k2, k3, k4, k5, k6, k7, m_p, found 'l1' (there are no loaded runs); "
         "leave it out"
     )
+
+
+def test_six_arms_in_a_hundred_thousand_lie_beyond_what_is_sure() -> None:
+    assert 2 * norm.sf(SURE) == pytest.approx(6.3e-5, rel=0.01)

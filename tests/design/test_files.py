@@ -168,6 +168,7 @@ def test_a_design_names_what_stays_open_and_what_binds_first() -> None:
     one = made_up()
     assert one.open_parameters == ["k4"]  # 80 % of itself
     assert replace(one, std=0.499 * one.campaign.asked.size).open_parameters == []
+    assert len(replace(one, std=0.501 * one.campaign.asked.size).open_parameters) == 6
     assert one.largest == pytest.approx(0.8)
     assert [(row.limit, used) for row, used in one.binding] == [("speed", 0.9), ("torque", 0.7), ("range", 0.5)]
     assert one.names == ("k1", "k2", "k3", "k4", "k5", "k6", "k7")
@@ -183,3 +184,11 @@ def test_a_height_stands_in_the_json_where_there_is_one() -> None:
     (used,) = content["used"]
     assert (used["limit"], used["joint"], used["allowed"]) == ("tip-height", None, -0.3)
     assert used["most"] == pytest.approx(0.7 - 0.25 * 1.0)  # a quarter of the metre below the stretched arm's tip
+
+
+def test_points_are_a_fiftieth_of_a_second_apart_whatever_the_rate() -> None:
+    one = made_up()
+    fast = replace(one.campaign, experiment=replace(one.campaign.experiment, rate=600.0))
+    text = joint_trajectory(replace(one, campaign=fast, t=np.arange(COUNT) / 600), ("a", "b"))
+    stamps = [int(nanosec) for nanosec in re.findall(r"time_from_start: .*nanosec: (\d+)", text)]
+    assert stamps == [20_000_000 * place for place in range(6)]

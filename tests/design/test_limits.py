@@ -146,3 +146,11 @@ def test_what_no_posture_keeps_is_named_with_what_it_misses() -> None:
         SettingError, match=r"^--torque: the arm asks for 0\.98 N m at joint 2 even at rest, .* 0\.5 N m"
     ):
         resting(replace(flat, torque=np.array([9.0, 0.5])), Model(), [load(np.zeros((7, 1)), box=True)])
+
+
+@pytest.mark.parametrize(("limit", "central"), [(5.0 / 0.69, True), (5.0 / 0.71, False)])
+def test_the_middle_will_do_up_to_seven_tenths_of_a_limit(limit: float, central: bool) -> None:
+    """Outstretched, the middle of this range, the arm asks for k4 + k2 = 5 N m."""
+    around = replace(FREE, low=np.full(2, -1.0), high=np.full(2, 1.0), torque=np.array([limit, np.inf]))
+    rest = resting(around, Model(), [load(np.zeros((7, 1)), box=True)])
+    assert (np.abs(rest).max() < 1e-12) == central

@@ -79,6 +79,9 @@ def test_a_drawn_link_is_as_long_as_it_is(to: str) -> None:
         return
     sizes = [str(box.attrib.get("size") or box.findtext("size")) for box in root.iter("box")]
     expected = [[0.4, 0.024, 0.024], [0.3, 0.018, 0.018]]
+    visuals = [(visual.find("origin"), visual.findtext("pose")) for visual in root.iter("visual")]
+    middles = [pose if origin is None else origin.attrib["xyz"] for origin, pose in visuals]
+    np.testing.assert_allclose([float(str(middle).split()[0]) for middle in middles], [0.2, 0.15])
     np.testing.assert_allclose([[float(part) for part in size.split()] for size in sizes], expected)
 
 
@@ -232,3 +235,9 @@ def test_links_follow_one_another_without_a_gap() -> None:
         root = ET.fromstring(text_of("urdf", l2=float(length)))
         masses.append([float(mass.attrib["value"]) for mass in root.iter("mass")][1])
     assert all(a > b for a, b in pairwise(masses))  # a longer link 2 of the same inertia is lighter
+
+
+def test_no_rotor_may_be_said_and_no_arm_has_two_negative_inertias() -> None:
+    assert re.search(r"rotor1 +0\.0 +kg m\^2 +given", text_of("urdf", rotor1=0.0))
+    with pytest.raises(AlgidError, match=r"not positive definite \(k1 0\.0308, k3 -1, k5 -1 kg m²\)"):
+        text_of("c", values_of(ODD) | {"k3": -1.0, "k5": -1.0})
