@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from algid.errors import LogError
+from algid.identification import source
 from algid.identification.source import LogSource, Staged, open_source, open_sources, sha256_of, tell_twins
 from algid.identification.survey import Survey
 from algid.log import Log, Notice, Origin, Truth
@@ -64,14 +65,14 @@ def test_a_log_whose_payload_changes_is_only_for_tracking() -> None:
 
 
 def test_a_summary_holds_what_the_whole_log_showed() -> None:
-    source = in_blocks(moving(samples=601), [100, 100, 350])
-    survey = Survey([source])
-    summary = survey.summary(source)
+    log = in_blocks(moving(samples=601), [100, 100, 350])
+    survey = Survey([log])
+    summary = survey.summary(log)
     assert (summary.path, summary.role, summary.format, summary.rows) == ("log.csv", "unloaded", "csv", 601)
     assert summary.start_ns == 5_000_000_000
     assert summary.duration == pytest.approx(0.6, rel=1e-12)
     assert summary.rate == pytest.approx(1000, rel=1e-12)
-    seen = survey.seen(source)
+    seen = survey.seen(log)
     assert (seen.rows, seen.first_ns, seen.last_ns) == (601, 5_000_000_000, 5_600_000_000)
 
 
@@ -128,6 +129,20 @@ def test_logs_of_lengths_of_their_own_are_not_hashed_before_the_first_pass() -> 
     assert tell_twins([one], [two]) == [one, two]
     with pytest.raises(AssertionError, match="hashed"):
         tell_twins([one], [replace(two, promised=300)])
+
+
+def test_files_of_lengths_of_their_own_are_opened_without_hashing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hashed: list[Path] = []
+    monkeypatch.setattr(source, "sha256_of", lambda path: hashed.append(path) or str(path))  # type: ignore[func-returns-value]
+    files = [tmp_path / f"{name}.parquet" for name in "abc"]
+    for file, samples in zip(files, (300, 301, 300), strict=True):
+        write_log(file, moving(samples=samples))
+    assert len(open_sources(files[:2], "unloaded", None, 9.81)) == 2
+    assert hashed == []
+    open_sources(files, "unloaded", None, 9.81)
+    assert hashed == [files[0], files[2]]
 
 
 def test_a_loaded_twin_of_an_unloaded_log_tells_so_and_stays() -> None:
