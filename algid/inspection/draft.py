@@ -89,7 +89,7 @@ def _channels(origin: Origin | None, kind: str) -> str:
 def _quoted(text: str) -> str:
     """As a TOML basic string: its escapes are JSON's, save those of characters that JSON writes as two halves."""
     letters = (f"\\U{ord(one):08x}" if ord(one) > 0xFFFF else json.dumps(one)[1:-1] for one in text)
-    return f'"{"".join(letters)}"'.replace("\x7f", "\\u007f")
+    return f'"{"".join(letters)}"'
 
 
 def _safe(text: str) -> str:

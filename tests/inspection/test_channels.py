@@ -340,6 +340,7 @@ def test_a_joint_that_creeps_does_not_rest_and_one_that_never_moves_has_no_end_o
     assert [*rests(held(0.6, 0.7, creep=1e-2), True)] == []
     still = logged(np.zeros((2, ROWS)))
     assert [*rests(still, True)] == []
+    assert [*rests(held(0.0, 0.7), False)] == []  # a part may end where the arm stands
 
 
 def test_fewer_than_four_samples_are_not_looked_at() -> None:
@@ -364,3 +365,14 @@ def test_a_log_that_is_refused_is_not_asked_for_its_physics(monkeypatch: pytest.
     for name in ("judged", "dynamic_figures"):
         monkeypatch.setattr(f"algid.inspection.checks.{name}", asked)
     assert [one.code for one in examine(logged(tau=np.zeros((2, ROWS))))] == ["EFFORT_ZERO", "EFFORT_ZERO"]
+
+
+def test_an_arm_in_a_horizontal_plane_is_not_asked_for_gravity(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Log] = []
+    monkeypatch.setattr("algid.inspection.checks.judged", lambda *_, **__: None)
+    monkeypatch.setattr("algid.inspection.checks.dynamic_figures", asked.append)
+    log = logged()
+    assert examine(log, gravity=0) == ()
+    assert asked == []
+    assert examine(log) == ()
+    assert asked == [log]

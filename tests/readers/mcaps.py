@@ -29,7 +29,7 @@ class Cdr:
 
     def text(self, value: str) -> Cdr:
         """Append a string."""
-        self.put("I", len(value) + 1)
+        self.put("I", len(value.encode()) + 1)
         self.data += value.encode() + b"\0"
         return self
 
