@@ -289,3 +289,15 @@ def test_a_file_that_is_no_table_is_refused_in_one_line(tmp_path: Path) -> None:
     ) as raised:
         history_of(path)
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(("logs", "told"), [(2, True), (3, False)])
+def test_of_three_logs_one_can_stand_out(logs: int, told: bool, tmp_path: Path) -> None:
+    table([1.0] * logs).write_parquet(tmp_path / "jobs.parquet")
+    untested = history_of(tmp_path / "jobs.parquet").untested
+    assert ("Outliers were not tested for 1 robot: fewer than 3 logs." in untested) == told
+
+
+def test_of_two_payloads_the_one_that_agrees_with_its_label_tells_how_well(tmp_path: Path) -> None:
+    pair = table([1.0, 1.0], m_p=[0.5, 0.9], m_p_std=[0.001, 0.001], label_payload=[0.5, 0.5])
+    assert mislabelled(read(pair, tmp_path))["job"].to_list() == ["j1"]
