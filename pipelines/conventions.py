@@ -19,7 +19,8 @@ import numpy as np
 
 from algid.arm import CONSTANT_NAMES, FloatArray, with_payload
 from algid.errors import LogError
-from algid.estimators.conventions import AS_READ, judge
+from algid.estimators.convention_search import judge
+from algid.estimators.conventions import AS_READ
 from algid.identification.identify import identify
 from algid.inspection.conventions import judged, mend
 from algid.log import Log, Origin, Reading

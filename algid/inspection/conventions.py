@@ -1,6 +1,6 @@
 """The convention under which a log obeys physics, where it is not the one it was read by, and what sets it.
 
-`algid.estimators.conventions` finds it; here it becomes words, and the profile's settings that change the reading.
+`algid.estimators.convention_search` finds it; here it becomes words, and settings of a profile that change the reading.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from algid.estimators.conventions import AS_READ, Convention, Judgement, judge
+from algid.estimators.convention_search import Judgement, judge
+from algid.estimators.conventions import AS_READ, Convention
 from algid.log import Log, Reading
 from algid.signals.segments import Segment, append, segments
 from algid.words import counted

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.estimators.conventions import AS_READ, ZEROED, Convention, Judgement, _demands, judge
+from algid.estimators.convention_search import Judgement, _demands, judge
+from algid.estimators.convention_sums import ZEROED
+from algid.estimators.conventions import AS_READ, Convention
 from algid.synth.simulator import SimulatedMotion
 from tests.estimators.conftest import DT, Bench
 

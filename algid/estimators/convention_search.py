@@ -1,0 +1,309 @@
+"""The convention of angles and torques under which a log obeys the equations of motion: each is tried.
+
+See `algid.estimators.conventions` for what each does to a log, and `algid.estimators.convention_sums` for the fits.
+
+**What physics demands** (Table 1): M22 = k3 + j2 > 0, k5 > 0 and k3 k5 > k1² (M positive definite, by the inequality of
+Cauchy and Schwarz on m2 l1² ≤ k5, m2 lc2² ≤ k3), friction that brakes, k1 k2 ≥ 0; and k2, k4 ≥ 0: gravity pulls down.
+Friction is judged by its torque at the joint's RMS speed, since a real one falls with speed at first (Stribeck).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import islice, product
+from math import copysign, pi, remainder
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.estimators.convention_sums import (
+    COLUMNS,
+    WINDOW,
+    ZEROED,
+    ConventionSums,
+    ThinnedLog,
+    solved,
+    summed,
+    thinned,
+)
+from algid.estimators.conventions import AS_READ, Convention
+
+_CLEAN = 1e-3  # of a torque's power: what the arm's true convention leaves on a log that is nearly all model
+_FINE, _COARSE = (250.0, 40.0), (125.0, 12.0)  # Hz and s: what is looked at, and what scales are sought in
+_QUARTERS = (0.0, 0.5 * pi, pi, -0.5 * pi)
+_SHIFTED = 3  # conventions, of the best, whose zeros are set free
+_SCALES = (0.1, 400.0)  # from turns (0.16) to the motors behind large gears
+_WIDEST = 40.0  # rad: no scale is tried under which a joint would move further
+_EXACT = (180 / pi, 1 / (2 * pi), *range(2, 401))
+"""Scales of their own right: degrees, turns, whole gears."""
+_NEAR = 0.01  # of a scale: how near one of those it is tried for them
+
+_INERTIAL = ("M22 > 0", "k5 > 0", "det M > 0", "k1 k2 > 0")
+
+BROKEN = -4.0
+"""A demand of physics missed by more standard deviations than this is broken."""
+MET = 4.0
+"""A convention is physical where the demands of inertia are met by as many."""
+APART = 1.0
+"""Two conventions are told apart where the logarithms of what they leave of the torques differ by this in sum."""
+EVIDENCE = 15.0
+"""And where that is worth so much in log-likelihood: a chance of 1 in 3000 among a thousand conventions tried."""
+LEAST = 1e-5
+"""To leave less than this share of a torque is no merit: one joint's exact equation does not outweigh the other's."""
+EXPLAINED = 0.2
+"""A convention that leaves more than this share of a torque explains nothing."""
+
+
+def _sizes(left: FloatArray) -> FloatArray:
+    """Sums of logarithms (…) of what is left of both torques (…, 2)."""
+    return np.asarray(np.log(left).sum(axis=-1))
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A convention and what the log says under it.
+
+    Parameters
+    ----------
+    family : Convention, without its zeros
+    zero : those, in rad
+    names : of `ZEROED`, those that the log may tell
+    k : (q,), what is found for them
+    covariance : (q, q), of `k`
+    left : (2,), share of each recorded torque's mean square that is not explained
+    score : sum of the logarithms of what is left: less is better
+    speed : (2,), RMS of the joints' in rad/s
+    """
+
+    family: Convention
+    zero: tuple[float, float]
+    names: tuple[str, ...]
+    k: FloatArray
+    covariance: FloatArray
+    left: FloatArray
+    score: float
+    speed: FloatArray
+
+    @property
+    def convention(self) -> Convention:
+        """The convention, zeros included."""
+        return replace(self.family, zero=self.zero)
+
+    @cached_property
+    def demands(self) -> dict[str, float]:
+        """What physics demands, and how many standard deviations the log is on the right side."""
+        return _demands(dict(zip(self.names, self.k.tolist(), strict=True)), self.covariance, self.speed)
+
+    @property
+    def broken(self) -> dict[str, float]:
+        """The demands that the log breaks under this convention."""
+        return {name: distance for name, distance in self.demands.items() if distance < BROKEN}
+
+    @property
+    def convincing(self) -> bool:
+        """Whether the log shows a real arm: every inertia is told, nothing is broken, the torque explained."""
+        inertial = (self.demands[name] for name in _INERTIAL if name in self.demands)
+        return not self.broken and min(inertial) > MET and float(self.left.max()) < EXPLAINED
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The log as it was read, the best convention, and whether it is `alone`.
+
+    It is where the log shows a real arm under it, and no other convention that physics allows comes near.
+    """
+
+    as_read: Candidate
+    best: Candidate
+    alone: bool
+
+
+def judge(theta: FloatArray, tau: FloatArray, dt: float, *, gravity: bool = True) -> Judgement | None:
+    """Try every convention on angles (2, N) in rad and torques (2, N) in N m, `dt` s apart.
+
+    None where the log is too short (six windows) or too slow (ten samples a window) to tell, or a torque is zero.
+    """
+    if theta.shape[1] * dt < 6 * WINDOW or 10 * dt > WINDOW or not np.all(np.any(tau != 0, axis=1)):
+        return None
+    log = _Trials(theta, tau, dt, gravity)
+    found = list(log.discrete())
+    judged = _judged(found, log.apart)
+    if judged.alone and judged.best.left.max() < _CLEAN:
+        return judged
+    found += log.shifted(found)
+    judged = _judged(found, log.apart)
+    if not judged.alone:
+        found += log.scaled()
+        judged = _judged(found, log.apart)
+    return judged
+
+
+def _judged(found: Sequence[Candidate], apart: float) -> Judgement:
+    as_read = next(one for one in found if one.family == AS_READ and one.zero == AS_READ.zero)
+    ranked = sorted(found, key=lambda one: one.score)
+    possible = list(islice((one for one in ranked if not one.broken), 2))
+    if not possible:
+        return Judgement(as_read, as_read, alone=False)
+    best = possible[0]
+    alone = best.convincing and all(other.score - best.score > apart for other in possible[1:])
+    return Judgement(as_read, best, alone)
+
+
+class _Trials:
+    """One log, mapped and fitted under any convention."""
+
+    def __init__(self, theta: FloatArray, tau: FloatArray, dt: float, gravity: bool) -> None:
+        self._fine = thinned(theta, tau, dt, *_FINE)
+        self._coarse = thinned(theta, tau, dt, *_COARSE)
+        kept = [not name.startswith(("k2", "k4")) or gravity for name in COLUMNS]
+        self._free = np.eye(len(COLUMNS))[:, kept]
+        self._zeros = [(turn, half) for half in (0.0, pi) for turn in (_QUARTERS if gravity else _QUARTERS[:1])]
+        self._names = tuple(name for name in ZEROED if name not in ("k2", "k4") or gravity)
+        self.apart = max(APART, 2 * EVIDENCE * WINDOW / (self._fine.theta.shape[1] * self._fine.dt))
+        """By how much the scores of two conventions differ that are told apart."""
+        self._passes: dict[Convention, tuple[ConventionSums, ConventionSums]] = {}
+
+    def discrete(self) -> Iterator[Candidate]:
+        """Every convention without a scale, its zeros by quarter and half turns."""
+        for families in _families():
+            yield from self._with_zeros(families, self._zeros)
+
+    def shifted(self, found: Sequence[Candidate]) -> Iterator[Candidate]:
+        """The conventions that leave least when both zeros are free, with the zeros that fit best."""
+        scored = [pair for each in _families() for pair in zip(self._scores(each, self._fine), each, strict=True)]
+        for _, family in sorted(scored, key=lambda pair: pair[0])[:_SHIFTED]:
+            yield from self._with_free_zero(family, found)
+
+    def scaled(self) -> Iterator[Candidate]:
+        """The scales of both angles, or of one, that leave least under the log's own signs and order."""
+        for joints in ((1, 1), (1, 0), (0, 1)):
+            family = self._scaled(joints)
+            if family is None:
+                continue
+            found = list(self._with_zeros([family], self._zeros))
+            yield from found
+            yield from self._with_free_zero(family, found)
+
+    def _with_zeros(self, families: Sequence[Convention], zeros: Sequence[tuple[float, float]]) -> Iterator[Candidate]:
+        """Each family of the same angles and drive with each of the zeros."""
+        sums = self._sums(families[0], self._fine)
+        fitted = solved(sums, families, np.stack([self._place(zero) for zero in zeros]))
+        scores = _sizes(np.maximum(fitted[1], LEAST)).tolist()
+        for (family, zero), c, left, covariance, score in zip(product(families, zeros), *fitted, scores, strict=True):
+            yield Candidate(family, zero, self._names, c, covariance, left, score, sums.speed)
+
+    def _with_free_zero(self, family: Convention, found: Sequence[Candidate]) -> Iterator[Candidate]:
+        """The zeros that fit best, where they leave far less than those that were found."""
+        (free,) = self._with_zeros([family], [self._best_zero(family)])
+        if free.score < min(one.score for one in found if one.family == family) - self.apart:
+            yield free
+
+    def _scores(self, families: Sequence[Convention], log: ThinnedLog) -> list[float]:
+        """What is left with free zeros, sums of logarithms, for families of the same angles and drive."""
+        return _sizes(solved(self._sums(families[0], log), families, self._free[None])[1]).tolist()
+
+    def _best_zero(self, family: Convention) -> tuple[float, float]:
+        """Zeros δ1 and δ2 in rad that leave least, with k1, k2 and k4 positive where the log tells."""
+        sums = self._sums(family, self._fine)
+        c = self._free @ solved(sums, [family], self._free[None])[0][0]
+        start = np.array([np.arctan2(c[6], c[5]), np.arctan2(c[1], c[0])])
+
+        def score(zero: FloatArray) -> float:
+            return float(_sizes(solved(sums, [family], self._place((zero[0], zero[1]))[None])[1][0]))
+
+        from scipy.optimize import minimize
+
+        best = minimize(score, start, method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-3, "maxiter": 200}).x
+        return remainder(float(best[0]), 2 * pi), remainder(float(best[1]), 2 * pi)
+
+    def _scaled(self, joints: tuple[int, int]) -> Convention | None:
+        """What the angles of `joints` have to be divided by; None where no scale leaves far less than none."""
+
+        def score(scale: float, log: ThinnedLog) -> float:
+            return self._scores([_scaled_by(scale, joints)], log)[0]
+
+        grid = _grid(np.ptp(self._coarse.theta, axis=1)[np.array(joints) == 1])
+        scale = min(grid, key=lambda scale: score(scale, self._coarse))
+        if score(scale, self._coarse) > score(1.0, self._coarse) - self.apart:
+            return None
+        step = 1.2
+        while step > 1 + 1e-5:
+            around = [scale / step, scale / step**0.5, scale, scale * step**0.5, scale * step]
+            scale = min(around, key=lambda scale: score(scale, self._fine))
+            step = step**0.5
+        near = [whole for whole in _EXACT if abs(scale / whole - 1) < _NEAR]
+        nearest = min(near, key=lambda whole: abs(scale / whole - 1), default=scale)
+        exact = score(nearest, self._fine) < score(scale, self._fine) + self.apart
+        return _scaled_by(nearest if exact else scale, joints)
+
+    def _place(self, zero: tuple[float, float]) -> FloatArray:
+        """T (15, q) of the zeros δ1 and δ2."""
+        T = np.zeros((len(COLUMNS), len(self._names)))
+        turned = {"k1": zero[1], "k2": zero[0] + zero[1], "k4": zero[0]}
+        for column, name in enumerate(self._names):
+            row = COLUMNS.index(name)
+            T[row, column] = 1.0
+            if name in turned:
+                T[row : row + 2, column] = np.cos(turned[name]), np.sin(turned[name])
+        return T
+
+    def _sums(self, family: Convention, log: ThinnedLog) -> ConventionSums:
+        """Sums for a family's angles and drive; those of the last pass over the log serve the next one too."""
+        angles = Convention(swapped=family.swapped, scale=family.scale, signs=family.signs, absolute=family.absolute)
+        if angles not in self._passes or log is not self._fine:
+            passed = summed(angles, log)
+            if log is not self._fine:
+                return passed[family.base]
+            self._passes[angles] = passed
+        return self._passes[angles][family.base]
+
+
+def _families() -> Iterator[list[Convention]]:
+    """Every convention without scale and zeros, those of the same angles and drive together."""
+    for swapped, sign, absolute, base in product((False, True), (1, -1), (False, True), (False, True)):
+        angles = Convention(swapped=swapped, signs=(1, sign), absolute=absolute, base=base)
+        torques = product((False, True), (1, -1), (1, -1))
+        yield [replace(angles, torques_swapped=swap, torque_signs=(one, two)) for swap, one, two in torques]
+
+
+def _scaled_by(scale: float, joints: tuple[int, int]) -> Convention:
+    return Convention(scale=(scale if joints[0] else 1.0, scale if joints[1] else 1.0))
+
+
+def _grid(travel: FloatArray) -> list[float]:
+    """Scales to try for angles that `travel` so far, rad as read: two neighbours differ by half a radian at most."""
+    scale = max(_SCALES[0], float(travel.max()) / _WIDEST)
+    grid = []
+    while scale < _SCALES[1]:
+        grid.append(scale)
+        scale *= 1 + min(0.15, 0.5 * scale / max(float(travel.max()), 1e-9))
+    return grid
+
+
+def _demands(k: dict[str, float], covariance: FloatArray, speed: FloatArray) -> dict[str, float]:
+    """What physics demands of the coefficients, in standard deviations on its right side."""
+    place = {name: number for number, name in enumerate(k)}
+
+    def distance(value: float, slopes: dict[str, float]) -> float:
+        slope = np.zeros(len(k))
+        for name, share in slopes.items():
+            slope[place[name]] = share
+        return value / max(float(slope @ covariance @ slope), 1e-300) ** 0.5
+
+    k1, m22, k5 = k["k1"], k["k3"] + k["j2"], k["k5"]
+    found = {
+        "M22 > 0": distance(m22, {"k3": 1, "j2": 1}),
+        "k5 > 0": distance(k5, {"k5": 1}),
+        "det M > 0": distance(
+            k5 * m22 + k["k3"] * k["j2"] - k1**2, {"k1": -2 * k1, "k3": k5 + k["j2"], "k5": m22, "j2": k5 + k["k3"]}
+        ),
+        "that the friction of joint 1 brakes": distance(k["k6"] * speed[0] + k["f1"], {"k6": float(speed[0]), "f1": 1}),
+        "that the friction of joint 2 brakes": distance(k["k7"] * speed[1] + k["f2"], {"k7": float(speed[1]), "f2": 1}),
+    }
+    if "k2" not in k:
+        return found | {"k1 > 0": distance(k1, {"k1": 1})}
+    first, second, fourth = (distance(k[name], {name: 1}) for name in ("k1", "k2", "k4"))
+    both = copysign(min(abs(first), abs(second)), first * second)
+    return found | {"k1 k2 > 0": both, "k2 > 0": second, "k4 > 0": fourth}

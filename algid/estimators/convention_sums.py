@@ -1,0 +1,149 @@
+"""Sums over a log's windows that judge conventions: moments of mapped angles, solved for many conventions at once.
+
+See `algid.estimators.conventions` for what a convention is, and for why zeros, signs and order of torques need no pass
+over the log of their own.
+
+======  ==================================================================  ================
+symbol  name                                                                shape
+======  ==================================================================  ================
+X       moments of the columns `COLUMNS`, by joint and window               (2, 15, R)
+b       moments of the two torques as recorded                              (2, R)
+c       coefficients under one convention's zeros, `ZEROED`                 (q,), q ≤ 12
+T       c's place among the columns, for the zeros δ1 and δ2                (15, q)
+======  ==================================================================  ================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.estimators.conventions import Convention
+from algid.estimators.modulating_functions import OVERLAP, Windows
+from algid.model import sine_cosine
+from algid.signals.filters import correlate, differentiator, half_length
+
+COLUMNS = ("k1", "k1'", "k2", "k2'", "k3", "k4", "k4'", "k5", "k6", "k7", "f1", "f2", "o1", "o2", "j2")
+ZEROED = tuple(name for name in COLUMNS if not name.endswith("'"))
+WINDOW = 0.4  # s
+_BANDWIDTH = 40.0  # Hz, of the velocity beside k1
+_COULOMB_SPEED = 0.1  # rad/s
+_REWEIGHTINGS = 4
+_FLOOR = 1e-9  # of a torque's power: a residual below it is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class ConventionSums:
+    """Sums over the windows of a log whose angles were mapped.
+
+    Gram matrices of the columns (2, 15, 15), their products with both recorded torques (2, 15, 2), the power of these
+    (2,), and the joints' RMS speeds (2,) in rad/s.
+    """
+
+    gram: FloatArray
+    cross: FloatArray
+    power: FloatArray
+    speed: FloatArray
+    independent: float
+
+
+@dataclass(frozen=True, eq=False)
+class ThinnedLog:
+    """Angles and torques (2, N) as they were read, `dt` s apart, velocities (2, N - 2 `reach`) and windows' kernels."""
+
+    theta: FloatArray
+    omega: FloatArray
+    tau: FloatArray
+    dt: float
+    reach: int
+    windows: Windows
+    kernels: FloatArray
+
+
+def thinned(theta: FloatArray, tau: FloatArray, dt: float, rate: float, longest: float) -> ThinnedLog:
+    """Means over as many samples as leave `rate` Hz, of the first `longest` s."""
+    width = max(1, round(1 / (rate * dt)))
+    count = min(theta.shape[1], round(longest / dt)) // width
+    theta, tau = (signal[:, : count * width].reshape(2, count, width).mean(axis=2) for signal in (theta, tau))
+    dt *= width
+    bandwidth = max(min(_BANDWIDTH, 0.2 / dt), 6.0 / WINDOW)
+    windows = Windows(dt, WINDOW, 0.0, bandwidth)
+    omega = correlate(theta, differentiator(dt, bandwidth))
+    return ThinnedLog(theta, omega, tau, dt, half_length(dt, bandwidth), windows, windows.kernels())
+
+
+def summed(angles: Convention, log: ThinnedLog) -> tuple[ConventionSums, ConventionSums]:
+    """Sums for angles so mapped: with the second motor in its joint, and with it at the base."""
+    theta, omega = angles.angles(log.theta[:, log.reach : -log.reach]), angles.angles(log.omega)  # linear without zeros
+    tau, windows = log.tau[:, log.reach : -log.reach], log.windows
+    weight, slope, bend = log.kernels
+    (s1, s2), (c1, c2) = sine_cosine(theta)
+    friction = np.tanh(omega / _COULOMB_SPEED)
+    centripetal = omega[0] * (omega[0] + omega[1])
+    weighed = [centripetal * s2, centripetal * c2, c1, s1, c1 * c2 - s1 * s2, s1 * c2 + c1 * s2, *friction, *tau]
+    turned2, turning2, c1_, s1_, c12_, s12_, f1, f2, *b = windows.moments(np.stack(weighed), weight)
+    slope1, slope2, momentum, momentum_ = windows.moments(np.stack([*theta, c2 * omega[0], s2 * omega[0]]), slope)
+    bend1, bend2, s2_bend, c2_bend = windows.moments(np.stack([*theta, s2, c2]), bend)
+    zeros, one = np.zeros_like(f1), np.ones_like(f1)
+    columns = {
+        "k1": (s2_bend - 2 * momentum, turned2 - momentum),
+        "k1'": (c2_bend + 2 * momentum_, turning2 + momentum_),
+        "k2": (c12_, c12_),
+        "k2'": (-s12_, -s12_),
+        "k3": (bend1 + bend2, bend1 + bend2),
+        "k4": (c1_, zeros),
+        "k4'": (-s1_, zeros),
+        "k5": (bend1, zeros),
+        "k6": (-slope1, zeros),
+        "k7": (zeros, -slope2),
+        "f1": (f1, zeros),
+        "f2": (zeros, f2),
+        "o1": (one, zeros),
+        "o2": (zeros, one),
+        "j2": (zeros, bend2),
+    }
+    X = np.array([columns[name] for name in COLUMNS]).swapaxes(0, 1)
+    torques = np.array(b)
+    speed = np.sqrt(np.mean(omega**2, axis=1))
+    independent = X.shape[2] / OVERLAP
+    drives = (X, np.stack([X[0] - X[1], X[1]]))
+    sums = [
+        ConventionSums(
+            Y @ Y.swapaxes(1, 2),
+            Y @ torques.T,
+            np.sum(torques**2, axis=1),
+            speed,
+            independent,
+        )
+        for Y in drives
+    ]
+    return sums[0], sums[1]
+
+
+def solved(
+    sums: ConventionSums, families: Sequence[Convention], T: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Weighted least squares for each of F families with each T of (Z, 15, q), F Z fits.
+
+    Gives c (F Z, q), shares left (F Z, 2) and covariances (F Z, q, q).
+    """
+    order = np.array([[1, 0] if family.torques_swapped else [0, 1] for family in families])
+    signs = np.array([family.torque_signs for family in families])
+    cross = signs[:, :, None] * sums.cross[[0, 1], :, order]
+    power = np.repeat(sums.power[order], T.shape[0], axis=0)
+    gram = np.tile(T.swapaxes(1, 2)[:, None] @ sums.gram @ T[:, None], (len(families), 1, 1, 1))
+    aimed = np.einsum("zxi,fax->fzai", T, cross).reshape(len(power), 2, -1)
+    weight, ridge = 1 / power, 1e-12 * np.eye(T.shape[2])
+    for _ in range(_REWEIGHTINGS):
+        normal = np.einsum("za,zaij->zij", weight, gram)
+        size = np.sqrt(np.maximum(np.einsum("zii->zi", normal), 1e-140))
+        scale = size[:, :, None] * size[:, None, :]
+        inverse = np.linalg.inv(normal / scale + ridge) / scale
+        c = np.einsum("zij,za,zaj->zi", inverse, weight, aimed)
+        squares = power - 2 * np.einsum("zai,zi->za", aimed, c) + np.einsum("zi,zaij,zj->za", c, gram, c)
+        squares = np.maximum(squares, _FLOOR * power)
+        weight = sums.independent / squares
+    return c, squares / power, inverse
