@@ -183,6 +183,8 @@ def test_the_policy_names_every_script_that_runs_and_no_other(shared: bool) -> N
         assert source[0] == f"'nonce-{nonce[1]}'"
         other = page(document(Section((arm(), figure("two")))), shared_library=True)
         assert nonce[1] not in other  # nobody can foretell it from another page
+        worded = page(replace(document(Section((arm(), figure("one")))), facts="others"), shared_library=True)
+        assert nonce[1] not in worded  # nor from the same figures
     else:
         assert nonce is None
         assert source[0].startswith("'sha256-")
@@ -197,6 +199,8 @@ def test_the_script_is_handed_every_panel_in_its_place() -> None:
     told = [(panel["id"], panel["figure"], panel["columns"], panel["height"]) for panel in data["panels"]]
     assert told == [("one-0", "one", "one", 100), ("two-0", "two", "two", 100), ("two-1", "two", "two", 101)]
     assert all(text.count(f'id="{key}"') == 1 for key, *_ in told)
+    assert text.index('class="panels two"') > text.index('id="two"') > text.index('class="panels"')
+    assert text.count('<div class="panels two">') == text.count('<div class="panels">') == 1
     assert set(data["template"]["layout"]) >= {"xaxis", "yaxis", "paper_bgcolor"}
 
 
@@ -246,6 +250,7 @@ def test_cells_say_what_they_hold() -> None:
     assert '<td class="number" data-label="±">0.1</td>' in text
     assert '<td class="text" data-label="Why">yes</td>' in text  # means nothing without its heading
     assert f'<td class="text long">{"x" * 41}</td>' in text
+    assert 'class="text long"' not in table_html(replace(WIDE, rows=(("k", "1", "", "OK", "x" * 40),)))
     assert '<th scope="row">k&lt;2&gt;</th>' in text
     assert text.count('<th scope="col" class="number">') == 2
     assert '<p class="note">A note &amp; more.</p>' in text

@@ -12,10 +12,10 @@ from rich.console import Console
 from algid.report.document import Table
 from algid.report.markdown import escaped, markdown
 from algid.report.page import FIRST, TOLD_ELSEWHERE, page_html, result_document, write_report
-from algid.report.tables import estimate_tables, flat_settings, log_tables, settings_table
+from algid.report.tables import estimate_tables, flat_settings, log_tables, settings_table, terms_tables
 from algid.report.terminal import print_document
 from algid.report.text import digits_of, resolved, significant
-from algid.results import Estimate, Result, Status, TorquePrediction, result_json
+from algid.results import Estimate, Result, Status, TermCriterion, TorquePrediction, result_json
 from tests.report.folders import estimate, hostile
 
 
@@ -188,3 +188,28 @@ def test_settings_table_keeps_a_table_whole() -> None:
 def test_estimates_that_are_not_ok_stand_out(result: Result) -> None:
     weak = {"k1": estimate(1.0, 0.5, "kg m^2", Status.WEAK_EXCITATION)}
     assert "WEAK_EXCITATION" in terminal(result.model_copy(update={"parameters": weak}))
+
+
+def test_a_truth_of_zero_has_no_error_in_percent(result: Result) -> None:
+    bare = result.model_copy(update={"table4": [], "truth": {"k1": 0.0, "k2": 2.0}})
+    parameters = estimate_tables(bare)[0]
+    heads = [column.heading for column in parameters.columns]
+    rows = {row[0]: dict(zip(heads, row, strict=True)) for row in parameters.rows}
+    assert (rows["k1"]["Truth"], rows["k1"]["Error %"]) == ("0", "–")
+    k2 = result.parameters["k2"].estimate
+    assert k2 is not None
+    assert float(rows["k2"]["Error %"]) == pytest.approx(100 * abs(k2 - 2.0) / 2.0, rel=1e-3)
+
+
+def test_a_term_that_lowers_the_error_has_a_minus(result: Result) -> None:
+    assert result.fit is not None
+    terms = [
+        TermCriterion(term="coulomb", kept=True, gain_heldout=0.5, evidence=40.0, why="kept"),
+        TermCriterion(term="offset", kept=False, delta_bic=3.25, why="left out"),
+    ]
+    (table,) = terms_tables(result.model_copy(update={"fit": result.fit.model_copy(update={"terms": terms})}))
+    assert table.rows == (
+        ("coulomb", "–", "-50.00", "+40.0", "yes", "kept"),
+        ("offset", "+3.2", "–", "–", "no", "left out"),
+    )
+    assert terms_tables(result.model_copy(update={"fit": None})) == ()

@@ -69,3 +69,13 @@ def test_a_path_that_fits_nowhere_breaks_and_numbers_do_not() -> None:
     text = printed(table, 60)
     assert "1234567890" in text
     assert "".join(path.split()) in "".join(part for part in text.split() if part != "1234567890")
+
+
+@pytest.mark.parametrize(("rank", "kept"), [(2, False), (1, True), (0, True)])
+def test_words_break_before_a_column_that_is_missed_most_goes(rank: int, kept: bool) -> None:
+    columns = (Column("Name", "name"), Column("Why", "text"), Column("Extra", "text", rank=rank))
+    table = Table("T", columns, (("k1", "some words that may well break into lines", "aside"),))
+    text = printed(table, 40)
+    assert ("Extra" in text) is ("aside" in text) is kept
+    assert all(word in text for word in table.rows[0][1].split())
+    assert "Extra" in printed(table, 80)

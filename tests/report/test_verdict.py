@@ -192,3 +192,68 @@ def test_one_document_holds_what_every_format_shows(result: Result) -> None:
         assert (table.title in shown) is (table.depth is Depth.TERMINAL)
     assert {table.depth for table in made.tables(*Depth)} == set(Depth)
     assert made.verdict.sentence.partition(":")[0] in shown
+
+
+def predicted(one: float, two: float) -> TorquePrediction:
+    return TorquePrediction(rmse=(1, 1), nrmse=(1, 1), r2=(one, two), filter="none")
+
+
+@pytest.mark.parametrize(
+    ("r2", "level", "words"),
+    [
+        ((0.91, 0.93), "good", "the model explains 91.00 % of joint 1's torque and 93.00 % of joint 2's"),
+        ((0.995, 0.995), "good", "the model explains 99.50 % of the torque of both joints"),
+        ((0.89, 0.99), "reservations", "but the model explains only 89 % of the torque of joint 1."),
+        ((0.99, 0.51), "reservations", "but the model explains only 51 % of the torque of joint 2."),
+        ((0.45, 0.99), "failed", "Failed: the model explains only 45 % of the torque of joint 1;"),
+        ((-0.2, 0.99), "failed", "Failed: the model predicts the torque of joint 1 worse than its mean does;"),
+    ],
+)
+def test_what_the_model_explains_decides(result: Result, r2: tuple[float, float], level: str, words: str) -> None:
+    found = verdict(with_fit(result, residual=predicted(*r2)))
+    assert (found.level, words in found.sentence) == (level, True), found.sentence
+
+
+@pytest.mark.parametrize(
+    ("lost", "sentence"),
+    [
+        (4, "With reservations: 4 of 8 parameters are identified, but "),
+        (5, "Failed: only 3 of 8 parameters could be identified; do not use these numbers."),
+    ],
+)
+def test_half_of_the_parameters_must_be_identified(result: Result, lost: int, sentence: str) -> None:
+    none = Estimate(estimate=None, unit="kg m^2", status=Status.NOT_IDENTIFIABLE)
+    names = list(result.parameters)
+    parameters = {name: none if place < lost else result.parameters[name] for place, name in enumerate(names)}
+    payload = {"m_p": result.payload["m_p"]}
+    found = verdict(result.model_copy(update={"parameters": parameters, "payload": payload, "table4": []}))
+    assert found.sentence.startswith(sentence)
+
+
+@pytest.mark.parametrize(("sigmas", "reasons"), [(3.9, ()), (4.5, ("k1 lies 4.5 σ from the truth",))])
+def test_four_sigma_from_the_truth_are_too_far(result: Result, sigmas: float, reasons: tuple[str, ...]) -> None:
+    (row,) = [row for row in result.table4 if row.parameter == "k1"]
+    assert row.estimate is not None
+    assert row.std is not None
+    far = row.model_copy(update={"truth": row.estimate + sigmas * row.std, "error_percent": 0.1})
+    assert verdict(result.model_copy(update={"table4": [far]})).reasons == reasons
+
+
+def test_praise_tells_the_widest_interval_in_percent(result: Result) -> None:
+    found = verdict(with_parameter(result, "k2", estimate(-2.0, 0.1, "N m")))
+    assert "the least certain, k2, to ±9.8 % (95 %)" in found.sentence  # 1.96 times 5 %
+
+
+def test_a_command_is_forced_once(result: Result) -> None:
+    cause = Cause(cause="θ1 is measured from hanging", flags=["--zero", "hanging"])
+    told = result.model_copy(update={"causes": [cause], "settings": {"command": "algid identify a.csv --force"}})
+    assert verdict(implausible(told)).command == "algid identify a.csv --force --zero hanging"
+
+
+def test_a_bound_without_a_distance_does_not_hide_a_useless_model(result: Result) -> None:
+    near = [Bound(bound="k7 >= 0", value=0.0, distance_sigma=None)]
+    found = verdict(implausible(result, broken_bounds=near, residual=predicted(-0.3, 0.9)))
+    assert found.sentence.startswith("Failed: the model predicts the torque of joint 1 worse than its mean does;")
+    fine = verdict(implausible(result, broken_bounds=near))
+    assert fine.sentence.startswith("Failed: the estimates break k7 >= 0;")
+    assert verdict(implausible(result)).sentence.startswith("Failed: physics forbids these estimates;")
