@@ -91,7 +91,7 @@ def judged(
     if not reasons:
         return Verdict("good", statement)
     more = len(reasons) - 1
-    rest = {0: "", 1: ", and there is one more reason below"}.get(more, f", and {more:,} more reasons below")
+    rest = {0: "", 1: ", and there is one more reason below"}.get(more, f", and {counted(more, 'more reason')} below")
     return Verdict("reservations", f"{statement}, but {first or reasons[0]}{rest}", reasons, cause, command)
 
 
