@@ -12,7 +12,7 @@ from algid.cli.settings import Choice, takes_profile
 
 if TYPE_CHECKING:
     from algid.log import Log, Notice
-    from algid.progress import Told
+    from algid.progress import Progress
 
 
 @takes_profile
@@ -40,18 +40,18 @@ def convert(
     reader = open_log(source, choice.profile())
     notices: list[Notice] = []
 
-    def noted(told: Told | None) -> Iterator[Log]:
+    def noted(shown: Progress | None) -> Iterator[Log]:
         """The blocks; keeps their notices, and tells how far the writing has come."""
         done = 0
         for block in reader.blocks():
             notices.extend(block.notices)
             yield block
             done += len(block)
-            if told is not None:
-                told("writing", done, reader.rows)
+            if shown is not None:
+                shown("writing", done, reader.rows)
 
-    with progress("samples") as told:
-        write_log(target, noted(told), truth=reader.origin.truth)
+    with progress("samples") as shown:
+        write_log(target, noted(shown), truth=reader.origin.truth)
     for notice in notices:
         typer.echo(f"{notice.code}: {notice.text}", err=True)
     raise typer.Exit(3 if any(notice.lossy for notice in notices) else 0)

@@ -125,8 +125,8 @@ def design(
     known = prior_of(prior, None if wished is None else wished[1] > 0, KnownBefore(l1, l2, payload, prior_error))
     noise = _noise(known, position_noise, torque_noise, noise_from)
     campaign = _campaign(known, asked, noise, wanted, drive, margin, seed)
-    with one_blas_thread(), progress("steps", quiet) as told:
-        planned = plan(campaign, told)
+    with one_blas_thread(), progress("steps", quiet) as shown:
+        planned = plan(campaign, shown)
     warnings = [*known.warnings]
     if planned.interrupted:
         warnings.append("the search was broken off: this is the best motion until then")

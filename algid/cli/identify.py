@@ -77,7 +77,7 @@ def identify(
     keep_freed()
     settings = choice.settings()
     bare, burdened = (logs, loaded or []) if parameters is None else ([], [*logs, *(loaded or [])])
-    with progress("samples", quiet) as told:
+    with progress("samples", quiet) as shown:
         result = run(
             bare,
             burdened,
@@ -90,7 +90,7 @@ def identify(
             report=report,
             export=export is not None,
             command=shlex.join(["algid", *sys.argv[1:]]),
-            told=told,
+            progress=shown,
         )
     if verbose:
         _tell(result)

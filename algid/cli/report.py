@@ -92,10 +92,10 @@ def _identification(folder: Path, form: ResultFormat, shared_library: bool, *, m
     from algid.results import read_result
 
     result = read_result(folder)
-    with progress("samples") as told:
-        written = [write_report(folder, shared_library, told), write_markdown(folder)]
+    with progress("samples") as shown:
+        written = [write_report(folder, shared_library, shown), write_markdown(folder)]
         if mcap:
-            written.append(export_mcap(folder, told))
+            written.append(export_mcap(folder, shown))
     print_result(result, form)
     return written, lambda: gallery(folder, result).every
 

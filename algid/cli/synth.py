@@ -113,8 +113,8 @@ def synth(
                 )
         plan = read_plan(motion)
         refuse_existing_logs(roles)
-        with progress("samples") as told:
-            logs = rehearse(described, plan, Recording(rate, duration or plan.duration, sensors=sensors), told)
+        with progress("samples") as shown:
+            logs = rehearse(described, plan, Recording(rate, duration or plan.duration, sensors=sensors), shown)
     else:
         recording = Recording(rate=rate, duration=1.0 if duration is None else duration, sensors=sensors)
         if initial is not None:
@@ -130,11 +130,11 @@ def synth(
             drive = held(drive, rate, recording.duration, "zoh" if torque_hold is Hold.ZOH else "foh")
         schedule = None if payload_schedule is None else _schedule(payload_schedule)
         refuse_existing_logs(roles if schedule is None else ("schedule",))
-        with progress("samples") as told:
+        with progress("samples") as shown:
             if schedule is None:
-                logs = [*synthesise(described, drive, recording, told)][: len(roles)]
+                logs = [*synthesise(described, drive, recording, shown)][: len(roles)]
             else:
-                logs = [with_schedule(described, drive, recording, schedule, told)]
+                logs = [with_schedule(described, drive, recording, schedule, shown)]
     for log in logs:
         path = out / f"{log.origin.path}.{kind.value}"
         write_log(path, log, truth=log.origin.truth, kind=kind.value)

@@ -47,9 +47,9 @@ def track(
     folder = track_folder(str(log), out)
     refuse_existing(folder, force)
     settings = {"command": shlex.join(["algid", *sys.argv[1:]])}
-    with progress("passes", quiet) as told:
-        if told is not None:
-            told("weighing the payload", 0, 0)
+    with progress("passes", quiet) as shown:
+        if shown is not None:
+            shown("weighing the payload", 0, 0)
         result = track_log(log, parameters, l1=l1, l2=l2, profile=choice.profile(), settings=settings)
         with whole_folder(folder, force) as temporary:
             write_track(result, temporary, mcap=export is Export.MCAP)

@@ -62,8 +62,8 @@ def validate(
         model, warnings, meaning = predictor_of(known, str(result)), (), reused(meaning, known)
     gravity = model.model.gravity
     sources = open_sources(logs, "unloaded", meaning, gravity) + open_sources(loaded, "loaded", meaning, gravity)
-    with progress("samples") as told:
-        survey = Survey(sources, told)
+    with progress("samples") as shown:
+        survey = Survey(sources, shown)
         survey.begin("prediction")
         found = judge(model, survey)
         rolled = roll(model, survey) if simulate else None

@@ -17,13 +17,13 @@ from algid.design.position import JUDGED_RATE, PositionProblem
 from algid.design.swing import sampled
 from algid.design.torque import TorqueProblem, search
 from algid.model import Motion
-from algid.progress import Told
+from algid.progress import Progress
 
 Drive = Literal["position", "torque"]
 MARGIN = 0.05  # of each limit, kept for what a controller overshoots while its model is a fifth wrong
 ARMS = 20  # of the belief, of which the worst is reported
 OPEN = 0.5  # relative bound from which on an estimate would be called not identifiable
-SECOND = 1.0  # s: for how long each stretch of the motion is, of which is told what it teaches
+SECOND = 1.0  # s: for how long each stretch of the motion is, of which it is said what it teaches
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,13 +118,13 @@ class Design:
         return sorted(pairs, key=lambda pair: -pair[1])
 
 
-def plan(campaign: Campaign, told: Told | None = None) -> Design:
+def plan(campaign: Campaign, progress: Progress | None = None) -> Design:
     """Plan the motion of a campaign.
 
     Parameters
     ----------
     campaign : Campaign
-    told : callable
+    progress : callable
         Called as the search goes on.
 
     Raises
@@ -135,17 +135,17 @@ def plan(campaign: Campaign, told: Told | None = None) -> Design:
         If it is interrupted before there is a motion; later, the best so far is the plan.
     """
     t = np.arange(round(campaign.duration * campaign.experiment.rate) + 1) / campaign.experiment.rate
-    return _swung(campaign, t, told) if campaign.drive == "torque" else _guided(campaign, t, told)
+    return _swung(campaign, t, progress) if campaign.drive == "torque" else _guided(campaign, t, progress)
 
 
-def _guided(campaign: Campaign, t: FloatArray, told: Told | None) -> Design:
+def _guided(campaign: Campaign, t: FloatArray, progress: Progress | None) -> Design:
     """The plan under position control: one motion, whatever the arm."""
     kept = campaign.limits.within(campaign.margin)
     experiment, belief = campaign.experiment, campaign.belief
     loads = [belief.load(loaded) for loaded in experiment.kinds]
     rest = resting(kept, experiment.shared.model, loads)
     problem = PositionProblem(experiment, belief, kept, campaign.asked, campaign.duration, rest)
-    found = optimise(problem, experiment.rate, campaign.seed, told)
+    found = optimise(problem, experiment.rate, campaign.seed, progress)
     motion = problem.family.motion(found.x, problem.family.basis(t))
     slopes = Slopes(experiment.shared.model, motion, experiment.rate)
     kinds = (False, True) if experiment.shared.payload else (False,)
@@ -154,14 +154,14 @@ def _guided(campaign: Campaign, t: FloatArray, told: Told | None) -> Design:
     return _judged(campaign, t, dict.fromkeys(kinds, motion), torque, used, found.interrupted)
 
 
-def _swung(campaign: Campaign, t: FloatArray, told: Told | None) -> Design:
+def _swung(campaign: Campaign, t: FloatArray, progress: Progress | None) -> Design:
     """The plan of an open loop: one torque, under which every arm and load moves in its own way."""
     limits = campaign.limits.within(campaign.margin)
     start = limits.middle if campaign.experiment.shared.model.gravity == 0 else np.array(HANGING)
     problem = TorqueProblem(
         campaign.experiment, campaign.belief, limits, campaign.asked, campaign.duration, start, campaign.seed
     )
-    x, interrupted = search(problem, campaign.seed, told)
+    x, interrupted = search(problem, campaign.seed, progress)
     swung = problem.checked(x)
     motions = {loaded: sampled(swung.t, motion, t) for loaded, motion in swung.motions.items()}
     torque = dict.fromkeys(motions, problem.torques(swung.x, t))

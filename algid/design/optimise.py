@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.progress import Told
+from algid.progress import Progress
 
 _DONE = 1e-5  # change of the figure at which a stage ends
 _HALVINGS = 24
@@ -77,7 +77,7 @@ class Found:
     interrupted: bool
 
 
-def optimise(problem: Problem, rate: float, seed: int, told: Told | None = None) -> Found:
+def optimise(problem: Problem, rate: float, seed: int, progress: Progress | None = None) -> Found:
     """The best motion that the search finds; the best so far where it is interrupted.
 
     Parameters
@@ -86,7 +86,7 @@ def optimise(problem: Problem, rate: float, seed: int, told: Told | None = None)
     rate : float, Hz
         Samples a second at which the limits are kept in the end.
     seed : int
-    told : callable
+    progress : callable
         Called with how many iterations of how many are done.
 
     Raises
@@ -94,7 +94,7 @@ def optimise(problem: Problem, rate: float, seed: int, told: Told | None = None)
     KeyboardInterrupt
         If it is interrupted before there is a motion to keep.
     """
-    search = _Search(problem, rate, told)
+    search = _Search(problem, rate, progress)
     try:
         rng = np.random.default_rng(seed)
         room = 0.5 * (1 + max(_EASY, problem.excess(problem.rest, FIRST.rate)))
@@ -134,8 +134,8 @@ def kept(problem: Problem, x: FloatArray, rate: float, most: float = 1.0) -> Flo
 class _Search:
     """Runs stages, remembers the best motion that keeps the limits, and tells how far it has come."""
 
-    def __init__(self, problem: Problem, rate: float, told: Told | None) -> None:
-        self._problem, self._rate, self._told = problem, rate, told
+    def __init__(self, problem: Problem, rate: float, progress: Progress | None) -> None:
+        self._problem, self._rate, self._progress = problem, rate, progress
         self.best: tuple[FloatArray, float] | None = None
         self.current: FloatArray | None = None
         self._rows = 1
@@ -166,8 +166,8 @@ class _Search:
         def step(x: FloatArray) -> None:
             self.current = x.copy()
             self._done += 1
-            if self._told is not None:
-                self._told("searching", self._done, self._total)
+            if self._progress is not None:
+                self._progress("searching", self._done, self._total)
 
         limits = {"type": "ineq", "fun": lambda x: at(x).room, "jac": lambda x: at(x).room_gradient}
         ended = minimize(

@@ -23,7 +23,7 @@ from algid.design.position import Fourier
 from algid.design.swing import FAST, Swings, step_for, swing
 from algid.errors import SettingError
 from algid.model import Motion, regressor
-from algid.progress import Told
+from algid.progress import Progress
 
 POPULATION = 24
 GENERATIONS = 30
@@ -143,8 +143,8 @@ class TorqueProblem:
             motions = [swings.motion(column) for column in columns]
             most = max(float(row.u.max()) for row in self._used(x, swings.t, motions))
             beyond = max(0.0, most - 1.0)
-            told = self._bound(dict(zip(kinds, motions, strict=False))) if beyond < _LOST else 1.0
-            found.append(np.log(told) + _PENALTY * min(beyond, 1e3))
+            bound = self._bound(dict(zip(kinds, motions, strict=False))) if beyond < _LOST else 1.0
+            found.append(np.log(bound) + _PENALTY * min(beyond, 1e3))
         return np.array(found)
 
     def _bound(self, motions: dict[bool, Motion]) -> float:
@@ -191,7 +191,7 @@ class TorqueProblem:
         return Swung(shrunk, swings.t, dict(zip(kinds, motions, strict=False)), worst)
 
 
-def search(problem: TorqueProblem, seed: int, told: Told | None = None) -> tuple[FloatArray, bool]:
+def search(problem: TorqueProblem, seed: int, progress: Progress | None = None) -> tuple[FloatArray, bool]:
     """The best pattern found (n,), and whether the search was broken off.
 
     An evolution strategy with weighted recombination and a step size for each number (Ros & Hansen 2008 restrict
@@ -222,8 +222,8 @@ def search(problem: TorqueProblem, seed: int, told: Told | None = None) -> tuple
                 variance = weights @ (chosen - middle) ** 2
                 middle, spread = moved, np.sqrt(0.8 * spread**2 + 0.2 * variance)
             patterns = middle + spread * rng.standard_normal((POPULATION, problem.size))
-            if told is not None:
-                told("searching", generation + 1, GENERATIONS)
+            if progress is not None:
+                progress("searching", generation + 1, GENERATIONS)
     except KeyboardInterrupt:
         if best is None:
             raise

@@ -26,7 +26,7 @@ from algid.estimators.weak import Source, WeakSettings
 from algid.estimators.weak import fit as weak_fit
 from algid.estimators.whitening import NoiseLevels
 from algid.model import Model
-from algid.progress import Told
+from algid.progress import Progress
 from algid.signals.differences import Stencil
 
 _STEPS = 20
@@ -85,7 +85,7 @@ def fit(
     unloaded: Sequence[Source],
     loaded: Sequence[Source] = (),
     settings: RefinedSettings | None = None,
-    told: Told | None = None,
+    progress: Progress | None = None,
 ) -> Fit:
     """Most likely parameters of the arm, and of its payload where there are loaded logs.
 
@@ -94,7 +94,7 @@ def fit(
     unloaded, loaded : sequences of callables
         Each gives a fresh iterable of `Segment`, the stretches of one log in time; it is called several times.
     settings : RefinedSettings
-    told : callable
+    progress : callable
         Called with each step of the training and how many samples of how many it has gone over.
 
     Returns
@@ -117,7 +117,7 @@ def fit(
     settings, prior = replace(settings, prior=_anchored(start)), settings.prior
     logs = [*_opened(unloaded, False, shared, settings), *_opened(loaded, True, shared, settings)]
     try:
-        beta, outcomes, iterations, end = _train(shared, logs, start.values, settings, told)
+        beta, outcomes, iterations, end = _train(shared, logs, start.values, settings, progress)
         if end == "refuted":
             return replace(start, note=_REFUTED, iterations=iterations)
         settled = end == "settled" and bool(np.all(np.isfinite(beta)))
@@ -180,7 +180,7 @@ def _opened(
 
 
 def _train(
-    shared: Shared, logs: Sequence[LogEvidence], beta: FloatArray, settings: RefinedSettings, tell: Told | None
+    shared: Shared, logs: Sequence[LogEvidence], beta: FloatArray, settings: RefinedSettings, progress: Progress | None
 ) -> tuple[FloatArray, list[Outcome], int, End]:
     """Parameters, the last pass over each log, steps taken, and how the alternation ended."""
     total = sum(log.trained for log in logs)
@@ -190,16 +190,16 @@ def _train(
         for log in logs:
             outcomes.append(log.train(shared.coefficients(beta, log.loaded)))
             done += log.trained
-            if tell is not None:
-                tell(f"fitting, step {iteration}", done, total)
+            if progress is not None:
+                progress(f"fitting, step {iteration}", done, total)
         better, S, _ = combine(shared, [outcome.information for outcome in outcomes], beta, settings.prior)
         free = settings.noise is None and iteration <= _NOISE_STEPS
-        told = max(map(LogEvidence.improve_noise, logs, outcomes)) if free else 0.0
+        improved = max(map(LogEvidence.improve_noise, logs, outcomes)) if free else 0.0
         moved = _distance(better - beta, S)
         beta = better
         if settings.noise is None and any(log.refuted for log in logs):
             return beta, outcomes, iteration, "refuted"
-        if iteration > 1 and moved < _SETTLED and told < _NOISE_SETTLED:
+        if iteration > 1 and moved < _SETTLED and improved < _NOISE_SETTLED:
             return beta, outcomes, iteration, "settled"
     return beta, outcomes, _STEPS, "unsettled"
 

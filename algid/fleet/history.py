@@ -11,7 +11,7 @@ from algid.errors import ResultError
 from algid.files import whole_file
 from algid.fleet.drift import FEWEST, SPAN, windows
 from algid.fleet.findings import mislabelled, outliers
-from algid.progress import Told
+from algid.progress import Progress
 from algid.words import counted
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 MONTH_DAYS = 30.4375
 PARAMETERS = ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "f1", "f2", "o1", "o2", "j2")
-FEWEST_PEERS = 3  # logs of a robot, among which one can be told from the others
+FEWEST_PEERS = 3  # logs of a robot, among which one can be known from the others
 
 
 def read_jobs(path: Path) -> pl.DataFrame:
@@ -114,7 +114,7 @@ class History:
         return {**rows, "untested": self.untested}
 
 
-def history_of(path: Path, progress: Told | None = None) -> History:
+def history_of(path: Path, progress: Progress | None = None) -> History:
     """The history in ``jobs.parquet`` at `path`; `progress` hears how many parameters have been followed.
 
     Raises

@@ -68,7 +68,7 @@ def run_fit(survey: Survey, settings: Settings, chosen: Selection, prior: Prior 
     Parameters
     ----------
     survey : Survey
-        Of the logs; its `told` is told the refined estimator's steps too.
+        Of the logs; its `progress` is called with the refined estimator's steps too.
     settings : Settings
     chosen : Selection
         The torque's model, and whether a delay is estimated.
@@ -103,7 +103,7 @@ def run_fit(survey: Survey, settings: Settings, chosen: Selection, prior: Prior 
                 prior=prior,
                 weak=ours,
             )
-            fit = refined.fit(unloaded, loaded, refining, survey.told)
+            fit = refined.fit(unloaded, loaded, refining, survey.progress)
             if fit.note:
                 fit = _foretelling(fit, unloaded, loaded, ours, settings, prior)
     except ValueError as error:

@@ -19,7 +19,7 @@ from algid.identification.series import write_fit_series
 from algid.identification.source import LogLike, LogSource, open_sources, read_otherwise, tell_twins
 from algid.identification.summary import result_of
 from algid.identification.survey import Survey
-from algid.progress import Told
+from algid.progress import Progress
 from algid.results import Result, read_result, write_result
 from algid.runtime import one_blas_thread
 from algid.settings import Settings
@@ -59,7 +59,7 @@ def identify(
     export: bool = False,
     command: str | None = None,
     shared_library: bool = False,
-    told: Told | None = None,
+    progress: Progress | None = None,
 ) -> Result:
     """Identify the constants k1 … k7 of an arm and, from loaded logs, its tip payload.
 
@@ -86,7 +86,7 @@ def identify(
         The command line behind the call, for the result.
     shared_library : bool
         Put the pages' plotting library once beside the result folders instead of into each page.
-    told : callable
+    progress : callable
         Called with the stage and how many samples of how many it has gone over, as the work goes on.
 
     Returns
@@ -110,7 +110,7 @@ def identify(
         open_sources(unloaded, "unloaded", profile, settings.gravity),
         open_sources(loaded, "loaded", profile, settings.gravity),
     )
-    survey = Survey(sources, told)
+    survey = Survey(sources, progress)
     said = {} if profile is None else profile.model_dump(mode="json", exclude_unset=True)
     if not survey.unloaded and (earlier is None or not survey.loaded):
         raise ValueError("an unloaded log is needed, or parameters and a loaded log")
@@ -128,11 +128,11 @@ def identify(
             result = result.model_copy(update={"settings": result.settings | {"command": command}})
         write_result(result, temporary / "result.json")
         if report:
-            _write_pages(temporary, result, shared_library, told)
+            _write_pages(temporary, result, shared_library, progress)
         if export:
             from algid.report.export import export_mcap
 
-            export_mcap(temporary, told)
+            export_mcap(temporary, progress)
     return result
 
 
@@ -229,11 +229,11 @@ def _firsts(survey: Survey) -> tuple[LogSource | None, LogSource | None]:
     return next(iter(survey.unloaded), None), next(iter(survey.loaded), None)
 
 
-def _write_pages(folder: Path, result: Result, shared_library: bool, told: Told | None) -> None:
+def _write_pages(folder: Path, result: Result, shared_library: bool, progress: Progress | None) -> None:
     from algid.report.markdown import markdown
     from algid.report.page import result_document, write_report
 
-    if told is not None:
-        told("report", 0, 0)
+    if progress is not None:
+        progress("report", 0, 0)
     (folder / "report.md").write_text(markdown(result_document(result)), encoding="utf-8")
-    write_report(folder, shared_library, told)
+    write_report(folder, shared_library, progress)

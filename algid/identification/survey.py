@@ -8,7 +8,7 @@ from itertools import chain, islice
 
 from algid.identification.source import LogSource
 from algid.log import Log, Notice
-from algid.progress import Told
+from algid.progress import Progress
 from algid.results import LogSummary
 from algid.runtime import Beside
 from algid.signals.segments import Segment, segments
@@ -32,19 +32,19 @@ class Seen:
 class Survey:
     """Goes over logs as often as an estimator asks, and keeps what the first pass over each shows.
 
-    Hashing and the named checks run beside the first pass; whoever wants to know how far a pass has come is told.
+    Hashing and the named checks run beside the first pass; whoever wants to know how far a pass has come is called.
     Logs of `MOST_KEPT` samples in all are read once and kept; longer ones are read again for each pass.
 
     Parameters
     ----------
     logs : the logs, unloaded ones first
-    told : callable
+    progress : callable
         Called with the stage and how many samples of how many it has gone over.
     """
 
-    def __init__(self, logs: Sequence[LogSource], told: Told | None = None) -> None:
+    def __init__(self, logs: Sequence[LogSource], progress: Progress | None = None) -> None:
         self.logs = tuple(logs)
-        self.told = told
+        self.progress = progress
         self._seen: dict[LogSource, Seen] = {}
         self._findings: dict[LogSource, tuple[Notice, ...]] = {}
         self._digests: dict[LogSource, Beside[str]] = {}
@@ -140,14 +140,14 @@ class Survey:
 
     def _tell(self, log: LogSource, rows: int) -> None:
         """A pass over `log` has come as far as `rows` samples; 0 starts one. The first over a log reads it."""
-        if self.told is None:
+        if self.progress is None:
             return
         words = self._stage if log in self._seen else "reading"
         if words != self._words or (rows == 0 and log in self._done):
             self._words, self._done = words, {}
         self._done[log] = rows
         expected = [self._seen[one].rows if one in self._seen else one.promised for one in self._over]
-        self.told(words, sum(self._done.values()), sum(expected) if all(expected) else 0)
+        self.progress(words, sum(self._done.values()), sum(expected) if all(expected) else 0)
 
 
 def _with_end(blocks: Iterator[Log], promised: int) -> Iterator[tuple[Log, bool]]:

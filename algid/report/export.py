@@ -28,7 +28,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.files import whole_file
-from algid.progress import Told
+from algid.progress import Progress
 from algid.report.reduce import blocks, by_log, columns_of, row_count
 from algid.results import read_result
 from algid.ros2 import HEADER, JOINT_STATE, JOINT_STATE_DEFINITION
@@ -45,7 +45,7 @@ SIGNALS = (
 ROWS = 1 << 14
 
 
-def export_mcap(folder: Path, told: Told | None = None) -> Path:
+def export_mcap(folder: Path, progress: Progress | None = None) -> Path:
     """Write `estimates.mcap` into the result folder `folder`, telling how far it has come.
 
     The messages bear the log's own stamps where each Parquet file tells its logs' first ones, in ns, as a
@@ -65,7 +65,7 @@ def export_mcap(folder: Path, told: Told | None = None) -> Path:
     with whole_file(path) as temporary, temporary.open("wb") as stream:
         writer = Writer(stream, compression=CompressionType.ZSTD)
         writer.start(profile="ros2", library=f"algid {result.version}")
-        _write_torques(writer, folder / "torque.parquet", len(result.logs), told)
+        _write_torques(writer, folder / "torque.parquet", len(result.logs), progress)
         for name in ("estimates", "loaded"):
             write_series(writer, folder / f"{name}.parquet", f"/algid/{name}")
         writer.finish()  # type: ignore[no-untyped-call]
@@ -76,12 +76,12 @@ def start_stamps(path: Path, logs: int) -> list[int]:
     """First stamp in ns of each of the file's logs; zero where it does not tell."""
     import pyarrow.parquet
 
-    told = (pyarrow.parquet.read_schema(path).metadata or {}).get(START_KEY)
-    known = [int(stamp) for stamp in json.loads(told)] if told else []
+    starts = (pyarrow.parquet.read_schema(path).metadata or {}).get(START_KEY)
+    known = [int(stamp) for stamp in json.loads(starts)] if starts else []
     return (known + [0] * logs)[:logs]
 
 
-def _write_torques(writer: Writer, path: Path, logs: int, told: Told | None) -> None:
+def _write_torques(writer: Writer, path: Path, logs: int, progress: Progress | None) -> None:
     if not path.is_file():
         return
     starts = start_stamps(path, logs)
@@ -107,8 +107,8 @@ def _write_torques(writer: Writer, path: Path, logs: int, told: Told | None) -> 
             for stamp, values in zip(stamps, rows, strict=True):
                 writer.add_message(channels[topic], stamp, message(stamp, values), stamp)
         done += len(stamps)
-        if told is not None:
-            told("export", done, total)
+        if progress is not None:
+            progress("export", done, total)
 
 
 def write_series(writer: Writer, path: Path, topic: str) -> None:
@@ -171,8 +171,8 @@ class JointStates:
 
     def message(self, stamp_ns: int, values: Sequence[float]) -> bytes:
         """One message of two torques, or of two angles, two velocities and two torques."""
-        told = [*values[:2], _TWO, *values[2:4], _TWO, *values[4:]] if self._whole else values
-        return _ENCAPSULATION + _stamp(stamp_ns) + self._constant + self._values.pack(*told)
+        fields = [*values[:2], _TWO, *values[2:4], _TWO, *values[4:]] if self._whole else values
+        return _ENCAPSULATION + _stamp(stamp_ns) + self._constant + self._values.pack(*fields)
 
 
 def numbers_message(stamp_ns: int, values: list[float]) -> bytes:

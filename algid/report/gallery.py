@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from algid.errors import ResultError
-from algid.progress import Told
+from algid.progress import Progress
 from algid.report.figures.base import Figure, Missing
 from algid.report.figures.convergence import LOADED, convergence
 from algid.report.figures.convergence import TITLE as CONVERGENCE
@@ -44,14 +44,14 @@ class Gallery:
         return [*self.figures, *self.paper]
 
 
-def gallery(folder: Path, result: Result, told: Told | None = None) -> Gallery:
+def gallery(folder: Path, result: Result, progress: Progress | None = None) -> Gallery:
     """Every figure that the folder gives, in the page's order."""
     result = drawable(result)
     estimates, loaded, torques, left, so_far, seconds = (
         folder / f"{name}.parquet"
         for name in ("estimates", "loaded", "torque", "innovations", "running", "information")
     )
-    found = _try("torque", f"{TORQUE}, residual, coverage", torques, lambda: read_torque(torques, told))
+    found = _try("torque", f"{TORQUE}, residual, coverage", torques, lambda: read_torque(torques, progress))
     read = None if isinstance(found, Missing) else found
     figures: list[Figure | Missing] = []
     if isinstance(found, Missing):

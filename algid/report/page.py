@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from algid.files import whole_file
-from algid.progress import Told
+from algid.progress import Progress
 from algid.report.arm import arm_of
 from algid.report.document import Bullets, Document, Drawn, Fold, ReadingAid, Section, Table
 from algid.report.drawings import bars, forest
@@ -37,7 +37,7 @@ TERMS_READING = (
 )
 
 
-def write_report(folder: Path, shared_library: bool = False, told: Told | None = None) -> Path:
+def write_report(folder: Path, shared_library: bool = False, progress: Progress | None = None) -> Path:
     """Write `report.html` into the result folder `folder`, from what it holds.
 
     Parameters
@@ -48,7 +48,7 @@ def write_report(folder: Path, shared_library: bool = False, told: Told | None =
     shared_library : bool
         Whether the plotting library stands once beside the folder, for a folder of many results, instead
         of inside the page.
-    told : callable
+    progress : callable
         Called as samples of the torque are read.
 
     Raises
@@ -62,7 +62,7 @@ def write_report(folder: Path, shared_library: bool = False, told: Told | None =
     script = folder.parent / LIBRARY
     if shared_library and not (script.is_file() and script.stat().st_size == len(library().script.encode())):
         _write(script, library().script)
-    return _write(folder / "report.html", page_html(folder, result, shared_library, told))
+    return _write(folder / "report.html", page_html(folder, result, shared_library, progress))
 
 
 def write_markdown(folder: Path) -> Path:
@@ -76,9 +76,9 @@ def _write(path: Path, text: str) -> Path:
     return path
 
 
-def page_html(folder: Path, result: Result, shared_library: bool = False, told: Told | None = None) -> str:
+def page_html(folder: Path, result: Result, shared_library: bool = False, progress: Progress | None = None) -> str:
     """The text of the page of `result`; with `shared_library` it asks for the library beside the folder."""
-    return page(result_document(result, gallery(folder, result, told)), shared_library)
+    return page(result_document(result, gallery(folder, result, progress)), shared_library)
 
 
 def result_document(result: Result, shown: Gallery | None = None) -> Document:

@@ -6,14 +6,14 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from algid.progress import Told
+from algid.progress import Progress
 
 WIDEST = 40
 BESIDE = 60  # columns that words, counts and the time left take beside the bar
 
 
 @contextmanager
-def progress(unit: str, quiet: bool = False) -> Iterator[Told | None]:
+def progress(unit: str, quiet: bool = False) -> Iterator[Progress | None]:
     """Show a bar while the block runs; give what the block is to tell its progress to, None where nobody looks.
 
     What is done of each stage is counted in `unit`. The bar is gone once the block has ended.
@@ -30,7 +30,7 @@ def progress(unit: str, quiet: bool = False) -> Iterator[Told | None]:
     parts = (TextColumn("{task.description}", markup=False), BarColumn(width), counts, TimeRemainingColumn())
     with Progress(*parts, console=console, transient=True, redirect_stdout=False) as bar:
 
-        def told(stage: str, done: int, total: int) -> None:
+        def shown(stage: str, done: int, total: int) -> None:
             known = total if total >= done else 0
             counts = f"{done:,} of {known:,} {unit}" if known else f"{done:,} {unit}" if done else ""
             task = next(iter(bar.tasks), None)
@@ -41,4 +41,4 @@ def progress(unit: str, quiet: bool = False) -> Iterator[Told | None]:
                 bar.remove_task(task.id)
             bar.add_task(stage, total=known or None, completed=done, counts=counts)
 
-        yield told
+        yield shown

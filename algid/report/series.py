@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.progress import Told
+from algid.progress import Progress
 from algid.report.reduce import (
     Block,
     MinMax,
@@ -186,14 +186,14 @@ class TorqueLog:
     reduced: bool
 
 
-def read_torque(path: Path, told: Told | None = None) -> TorqueLog:
+def read_torque(path: Path, progress: Progress | None = None) -> TorqueLog:
     """Read `path`, telling how far. Raises `ResultError` where it cannot be read or lacks a column."""
     total = row_count(path)
     gathering = _Gathering(total)
     for log, block in by_log(blocks(path, COLUMNS)):
         gathering.take(log, block)
-        if told is not None:
-            told("report", sum(span.samples for span in gathering.ranges.values()), total)
+        if progress is not None:
+            progress("report", sum(span.samples for span in gathering.ranges.values()), total)
     return gathering.result()
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from algid.arm import with_payload
 from algid.log import Log, Truth
-from algid.progress import Told
+from algid.progress import Progress
 from algid.synth.cases import Case
 from algid.synth.excitation import Hold, SampledTorque, Torque, no_torque, wide_multi_sine
 from algid.synth.follow import Reference, follow
@@ -55,8 +55,8 @@ def held(torque: Torque, rate: float, duration: float, hold: Hold) -> SampledTor
     return SampledTorque(t, torque(t), hold)
 
 
-def synthesise(case: Case, torque: Torque, recording: Recording, told: Told | None = None) -> tuple[Log, Log]:
-    """The unloaded and the loaded log of a case; the loaded one has noise of its own. `told` hears how far each is."""
+def synthesise(case: Case, torque: Torque, recording: Recording, progress: Progress | None = None) -> tuple[Log, Log]:
+    """The unloaded and the loaded log of a case, each with noise of its own; `progress` hears how far each is."""
     initial = np.array(recording.initial)
     logs: list[Log] = []
     for payload in (0.0, case.payload):
@@ -64,12 +64,12 @@ def synthesise(case: Case, torque: Torque, recording: Recording, told: Told | No
         sensors = replace(recording.sensors, seed=recording.sensors.seed + len(logs))
         k = with_payload(case.arm.constants(), case.arm.payload_constants(payload))
         t = sample_times(recording.rate, recording.duration, sensors)
-        motion = simulate(k, torque, t, initial[:2], initial[2:], _counted(told, role, recording))
+        motion = simulate(k, torque, t, initial[:2], initial[2:], _counted(progress, role, recording))
         logs.append(record(motion, sensors, Truth(case.arm, payload, case.name), f"{case.name}-{role}"))
     return logs[0], logs[1]
 
 
-def rehearse(case: Case, plan: Reference, recording: Recording, told: Told | None = None) -> list[Log]:
+def rehearse(case: Case, plan: Reference, recording: Recording, progress: Progress | None = None) -> list[Log]:
     """The unloaded and, with a payload, the loaded log of a case whose controller follows a plan from its start."""
     logs: list[Log] = []
     bare = case.arm.constants()
@@ -78,7 +78,7 @@ def rehearse(case: Case, plan: Reference, recording: Recording, told: Told | Non
         k = with_payload(bare, case.arm.payload_constants(payload))
         sensors = replace(recording.sensors, seed=recording.sensors.seed + bool(payload))
         t = sample_times(recording.rate, recording.duration, sensors)
-        motion = follow(k, plan, t, bare, bool(payload), _counted(told, role, recording))
+        motion = follow(k, plan, t, bare, bool(payload), _counted(progress, role, recording))
         logs.append(record(motion, sensors, Truth(case.arm, payload, case.name), f"{case.name}-{role}"))
     return logs
 
@@ -88,7 +88,7 @@ def with_schedule(
     torque: Torque,
     recording: Recording,
     schedule: Sequence[tuple[float, float]],
-    told: Told | None = None,
+    progress: Progress | None = None,
 ) -> Log:
     """A log during which the payload changes: pairs of time in s, increasing, and payload in kg from then on.
 
@@ -115,7 +115,7 @@ def with_schedule(
             continue
         k = with_payload(case.arm.constants(), case.arm.payload_constants(mass))
         every = np.unique(np.concatenate([[start], own, [close]]))
-        motion = simulate(k, torque, every, state[:2], state[2:], _counted(told, "schedule", recording))
+        motion = simulate(k, torque, every, state[:2], state[2:], _counted(progress, "schedule", recording))
         state = np.concatenate([motion.theta[:, -1], motion.omega[:, -1]])
         kept = np.isin(every, own)
         parts.append(SimulatedMotion(own, motion.theta[:, kept], motion.omega[:, kept], motion.tau[:, kept]))
@@ -126,9 +126,9 @@ def with_schedule(
     return record(whole, recording.sensors, truth, f"{case.name}-schedule")
 
 
-def _counted(told: Told | None, stage: str, recording: Recording) -> Callable[[float], None] | None:
+def _counted(progress: Progress | None, stage: str, recording: Recording) -> Callable[[float], None] | None:
     """Tells a time that the simulation has come to in samples."""
-    if told is None:
+    if progress is None:
         return None
     total = round(recording.rate * recording.duration) + 1
-    return lambda now: told(stage, min(round(recording.rate * now) + 1, total), total)
+    return lambda now: progress(stage, min(round(recording.rate * now) + 1, total), total)

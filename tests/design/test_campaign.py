@@ -22,7 +22,7 @@ from algid.design.prior import KnownBefore, prior_of
 from algid.design.request import limits_of, request
 from algid.errors import AlgidError, SettingError
 from algid.estimators.whitening import NoiseLevels
-from algid.progress import Told
+from algid.progress import Progress
 from algid.readers import read_log
 from tests.cli.commands import app
 
@@ -127,8 +127,8 @@ def test_a_search_that_is_broken_off_keeps_the_best_so_far() -> None:
         if calls == 20:
             raise KeyboardInterrupt
 
-    told: Told = impatient
-    found = plan(campaign(), told)
+    progress: Progress = impatient
+    found = plan(campaign(), progress)
     assert found.interrupted
     assert np.isfinite(found.largest)
     assert max(used for _, used in found.binding) <= 1.0

@@ -70,7 +70,7 @@ def test_stretches_too_short_to_tell_are_left_out_and_each_step_is_told(bench: B
     log = bench.log(sigma=1e-3).part(0, 2000)
     crumb = Segment(3.0, DT, log.theta[:, :30], log.tau[:, :30])
     told: list[tuple[str, int, int]] = []
-    fit = refined.fit([lambda: [log, crumb]], told=lambda *what: told.append(what))
+    fit = refined.fit([lambda: [log, crumb]], progress=lambda *what: told.append(what))
     np.testing.assert_array_equal(fit.values, refined.fit([lambda: [log]]).values)
     assert [stage for stage, _, _ in told] == [f"fitting, step {step}" for step in range(1, fit.iterations + 1)]
     assert {(done, total) for _, done, total in told} == {(2000, 2000)}

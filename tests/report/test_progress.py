@@ -104,7 +104,7 @@ def test_every_stage_comes_to_its_end(estimator: str, log: Log, tmp_path: Path) 
     settings = Settings(estimator=estimator)  # type: ignore[arg-type]
     other = replace(log, theta=log.theta + 1e-9)  # the same log twice would be one
     logs = [log, other] if estimator != "paper" else log
-    identify(logs, None, settings, out=tmp_path, told=lambda *c: calls.append(c))
+    identify(logs, None, settings, out=tmp_path, progress=lambda *c: calls.append(c))
     stages = dict.fromkeys(stage for stage, _, _ in calls)
     samples = (2 if estimator != "paper" else 1) * len(log)
     assert next(iter(stages)) == "reading"
@@ -117,4 +117,4 @@ def test_every_stage_comes_to_its_end(estimator: str, log: Log, tmp_path: Path) 
 
 
 def test_a_told_identification_finds_the_same(log: Log) -> None:
-    assert identify(log, told=lambda *_: None) == identify(log)
+    assert identify(log, progress=lambda *_: None) == identify(log)
