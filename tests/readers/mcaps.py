@@ -8,9 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 
+from algid.log import Log
 from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
+
+TOPIC = "/joint_states"
 
 
 @dataclass
@@ -86,3 +91,65 @@ def write_mcap(
 
 
 NO_INDEX = {"index_types": IndexType.NONE, "use_statistics": False, "use_summary_offsets": False}
+
+
+def messages_of(log: Log, **options: Any) -> list[tuple[str, int, bytes]]:
+    """The log's samples as JointState messages."""
+    omega = log.omega if log.omega is not None else np.empty((0, len(log)))
+    return [
+        (
+            TOPIC,
+            stamp,
+            joint_state(
+                stamp,
+                position=log.theta[:, row].tolist(),
+                velocity=omega[:, row].tolist(),
+                effort=log.tau[:, row].tolist(),
+                **options,
+            ).done(),
+        )
+        for row, stamp in enumerate(log.stamp_ns.tolist())
+    ]
+
+
+def protobuf_schema() -> tuple[bytes, Any]:
+    """A file descriptor set of a joint state, and the message class."""
+    from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
+
+    file = descriptor_pb2.FileDescriptorProto(name="arm.proto", package="arm", syntax="proto3")
+    file.dependency.append("google/protobuf/timestamp.proto")
+    message = file.message_type.add(name="State")
+    kinds = {"name": (9, 3), "position": (1, 3), "velocity": (1, 3), "effort": (1, 3), "mode": (17, 1)}
+    message.field.add(name="timestamp", number=1, type=11, label=1, type_name=".google.protobuf.Timestamp")
+    for number, (name, (kind, label)) in enumerate(kinds.items(), start=2):
+        message.field.add(name=name, number=number, type=kind, label=label)
+    stamp = descriptor_pb2.FileDescriptorProto()
+    timestamp_pb2.DESCRIPTOR.CopyToProto(stamp)
+    pool = descriptor_pool.DescriptorPool()
+    pool.Add(stamp)
+    pool.Add(file)
+    state = message_factory.GetMessageClass(pool.FindMessageTypeByName("arm.State"))
+    return descriptor_pb2.FileDescriptorSet(file=[stamp, file]).SerializeToString(), state
+
+
+def chunks_of(path: Path) -> list[Any]:
+    """The chunk indexes of a file as the `mcap` package reads them."""
+    with path.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    return list(summary.chunk_indexes)
+
+
+def small_chunks(path: Path, rows: int = 1000, **options: Any) -> None:
+    """Joint states, each in a chunk of its own."""
+    schemas = {"/joint_states": (JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode())}
+    wave = np.sin(np.arange(rows) * 0.01)
+    messages = (
+        (
+            "/joint_states",
+            row * 10**6,
+            joint_state(row * 10**6, position=(wave[row], 0.5), effort=(1.0, -wave[row])).done(),
+        )
+        for row in range(rows)
+    )
+    write_mcap(path, messages, schemas, chunk_size=1, **options)

@@ -1,22 +1,18 @@
-"""MCAP as the field writes it: encodings, layouts, broken indexes, cut files, damaged chunks."""
+"""MCAP as the field writes it: encodings, layouts, packings, splits, and many small chunks."""
 
 from __future__ import annotations
 
 import json
 import math
-import re
-import struct
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import zstandard
-from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType
 
 from algid.errors import LogError
-from algid.log import Log
 from algid.profile import Profile
 from algid.readers import open_log, read_log
 from algid.readers.mcap import opened
@@ -27,31 +23,19 @@ from algid.readers.mcap.framing import File
 from algid.readers.mcap.json import _Paths
 from algid.readers.mcap.load import batches
 from algid.readers.mcap.messages import Messages
-from algid.ros2 import HEADER, JOINT_STATE, JOINT_STATE_DEFINITION
+from algid.ros2 import HEADER
 from algid.writers import write_log
 from tests.readers.logs import EPOCH_NS, noise_log, same
-from tests.readers.mcaps import NO_INDEX, Cdr, joint_state, write_mcap
-
-TOPIC = "/joint_states"
-
-
-def messages_of(log: Log, **options: Any) -> list[tuple[str, int, bytes]]:
-    """The log's samples as JointState messages."""
-    omega = log.omega if log.omega is not None else np.empty((0, len(log)))
-    return [
-        (
-            TOPIC,
-            stamp,
-            joint_state(
-                stamp,
-                position=log.theta[:, row].tolist(),
-                velocity=omega[:, row].tolist(),
-                effort=log.tau[:, row].tolist(),
-                **options,
-            ).done(),
-        )
-        for row, stamp in enumerate(log.stamp_ns.tolist())
-    ]
+from tests.readers.mcaps import (
+    NO_INDEX,
+    TOPIC,
+    Cdr,
+    joint_state,
+    messages_of,
+    protobuf_schema,
+    small_chunks,
+    write_mcap,
+)
 
 
 @pytest.mark.parametrize("compression", list(CompressionType))
@@ -173,26 +157,6 @@ def test_json_joint_states(tmp_path: Path) -> None:
     assert same(read_log(tmp_path / "log.mcap", Profile(joints=("a", "b"))), log)
 
 
-def protobuf_schema() -> tuple[bytes, Any]:
-    """A file descriptor set of a joint state, and the message class."""
-    from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
-
-    file = descriptor_pb2.FileDescriptorProto(name="arm.proto", package="arm", syntax="proto3")
-    file.dependency.append("google/protobuf/timestamp.proto")
-    message = file.message_type.add(name="State")
-    kinds = {"name": (9, 3), "position": (1, 3), "velocity": (1, 3), "effort": (1, 3), "mode": (17, 1)}
-    message.field.add(name="timestamp", number=1, type=11, label=1, type_name=".google.protobuf.Timestamp")
-    for number, (name, (kind, label)) in enumerate(kinds.items(), start=2):
-        message.field.add(name=name, number=number, type=kind, label=label)
-    stamp = descriptor_pb2.FileDescriptorProto()
-    timestamp_pb2.DESCRIPTOR.CopyToProto(stamp)
-    pool = descriptor_pool.DescriptorPool()
-    pool.Add(stamp)
-    pool.Add(file)
-    state = message_factory.GetMessageClass(pool.FindMessageTypeByName("arm.State"))
-    return descriptor_pb2.FileDescriptorSet(file=[stamp, file]).SerializeToString(), state
-
-
 def test_protobuf_joint_states(tmp_path: Path) -> None:
     data, state = protobuf_schema()
     log = noise_log(300, start_ns=EPOCH_NS - EPOCH_NS % 10**9 - 10**8)
@@ -225,135 +189,6 @@ def test_stamps_that_stand_still_give_way_to_log_times(tmp_path: Path) -> None:
     found = read_log(tmp_path / "log.mcap")
     assert same(found, log)
     assert [notice.code for notice in found.notices] == ["LOG_TIME"]
-
-
-@pytest.mark.parametrize("share", [0.3, 0.7, 0.95])
-def test_a_cut_file_yields_what_is_there(share: float, tmp_path: Path) -> None:
-    log = noise_log(2000, start_ns=EPOCH_NS)
-    write_mcap(tmp_path / "whole.mcap", messages_of(log))
-    content = (tmp_path / "whole.mcap").read_bytes()
-    (tmp_path / "cut.mcap").write_bytes(content[: int(share * len(content))])
-    found = read_log(tmp_path / "cut.mcap")
-    assert share - 0.15 < len(found) / len(log) <= 1
-    assert same(found, log.part(0, len(found)))
-    assert any(notice.lossy for notice in found.notices)
-
-
-@pytest.mark.parametrize("compression", list(CompressionType))
-@pytest.mark.parametrize("options", [{}, {"enable_crcs": False}])
-def test_a_chunk_that_breaks_off_yields_its_whole_messages(
-    compression: CompressionType, options: dict[str, Any], tmp_path: Path
-) -> None:
-    log = noise_log(20_000, start_ns=EPOCH_NS)
-    write_mcap(tmp_path / "whole.mcap", messages_of(log), compression=compression, chunk_size=1 << 24, **options)
-    content = (tmp_path / "whole.mcap").read_bytes()
-    with (tmp_path / "whole.mcap").open("rb") as stream:
-        summary = make_reader(stream).get_summary()
-    assert summary is not None
-    (chunk,) = summary.chunk_indexes
-    (tmp_path / "cut.mcap").write_bytes(content[: chunk.chunk_start_offset + chunk.chunk_length * 6 // 10])
-    found = read_log(tmp_path / "cut.mcap")
-    # zstd and lz4 lose the block that breaks off, 128 and 64 KiB of about 3 MB
-    assert 0.53 < len(found) / len(log) < 0.61
-    assert same(found, log.part(0, len(found)))
-    notices = {notice.code: notice for notice in found.notices if notice.lossy}
-    assert notices.keys() == {"CUT_OFF", "TORN_CHUNK"}
-    assert f"{len(found):,} messages" in notices["TORN_CHUNK"].text
-    assert "could not be checked" in notices["TORN_CHUNK"].text
-    told = re.search(r"about ([\d,]+) are lost", notices["TORN_CHUNK"].text)
-    assert told is not None
-    # all messages are of one size, the schema and the channel are the rest
-    assert abs(int(told[1].replace(",", "")) - (len(log) - len(found))) < 200
-
-
-def test_a_torn_chunk_that_is_damaged_too_is_left_out(tmp_path: Path) -> None:
-    log = noise_log(3000, start_ns=EPOCH_NS)
-    write_mcap(tmp_path / "whole.mcap", messages_of(log), chunk_size=1 << 17)
-    content = bytearray((tmp_path / "whole.mcap").read_bytes())
-    with (tmp_path / "whole.mcap").open("rb") as stream:
-        summary = make_reader(stream).get_summary()
-    assert summary is not None
-    last = summary.chunk_indexes[-1]
-    place = last.chunk_start_offset + 60  # within the frame's header and first block
-    content[place : place + 20] = b"\xff" * 20
-    (tmp_path / "cut.mcap").write_bytes(content[: last.chunk_start_offset + last.chunk_length // 2])
-    found = read_log(tmp_path / "cut.mcap")
-    assert same(found, log.part(0, len(found)))
-    assert {"CUT_OFF", "DAMAGED_CHUNK"} <= {notice.code for notice in found.notices if notice.lossy}
-
-
-def test_a_flipped_bit_costs_its_chunk_and_is_told(tmp_path: Path) -> None:
-    log = noise_log(2000, start_ns=EPOCH_NS)
-    write_mcap(tmp_path / "log.mcap", messages_of(log), compression=CompressionType.NONE)
-    content = bytearray((tmp_path / "log.mcap").read_bytes())
-    place = content.index(struct.pack("<d", log.theta[0, 1000]))
-    content[place] ^= 1
-    (tmp_path / "log.mcap").write_bytes(content)
-    found = read_log(tmp_path / "log.mcap")
-    assert len(found) > 1900
-    assert log.theta[0, 1000] not in found.theta
-    (notice,) = found.notices
-    assert notice.code == "DAMAGED_CHUNK"
-    assert notice.lossy
-    assert f"{len(log) - len(found):,} messages are missing" in notice.text
-
-
-def test_a_message_index_that_lies_is_not_believed(tmp_path: Path) -> None:
-    log = noise_log(300, start_ns=EPOCH_NS)
-    write_mcap(tmp_path / "log.mcap", messages_of(log), compression=CompressionType.NONE)
-    content = bytearray((tmp_path / "log.mcap").read_bytes())
-    with (tmp_path / "log.mcap").open("rb") as stream:
-        summary = make_reader(stream).get_summary()
-    assert summary is not None
-    (index,) = summary.chunk_indexes[0].message_index_offsets.values()
-    struct.pack_into("<Q", content, index + 15 + 8, 31)  # the first message's offset
-    (tmp_path / "log.mcap").write_bytes(content)
-    assert same(read_log(tmp_path / "log.mcap"), log)
-
-
-def test_a_file_of_which_damage_left_nothing_says_so_and_where(tmp_path: Path) -> None:
-    log = noise_log(100, start_ns=EPOCH_NS)
-    write_mcap(tmp_path / "log.mcap", messages_of(log), compression=CompressionType.NONE, chunk_size=1 << 20)
-    whole = (tmp_path / "log.mcap").read_bytes()
-    with (tmp_path / "log.mcap").open("rb") as stream:
-        summary = make_reader(stream).get_summary()
-    assert summary is not None
-    (chunk,) = summary.chunk_indexes
-    content = bytearray(whole)
-    content[content.index(struct.pack("<d", log.theta[0, 50]))] ^= 1
-    (tmp_path / "log.mcap").write_bytes(content)
-    with pytest.raises(LogError, match=rf"damaged \(.*checksum.*byte {chunk.chunk_start_offset + 9}\).*no topic"):
-        read_log(tmp_path / "log.mcap")
-    content[content.rindex(b"JointState")] ^= 1  # in the summary
-    (tmp_path / "log.mcap").write_bytes(content)
-    with pytest.raises(LogError, match=r"damaged \(its summary: its checksum is wrong; .*\).*no topic"):
-        read_log(tmp_path / "log.mcap")
-    (tmp_path / "log.mcap").write_bytes(whole[: chunk.chunk_start_offset + 100])
-    with pytest.raises(LogError, match=rf"damaged \(.*breaks off at byte {chunk.chunk_start_offset}\).*no topic"):
-        read_log(tmp_path / "log.mcap")
-
-
-def test_damage_is_not_blamed_for_a_choice_that_is_missing(tmp_path: Path) -> None:
-    names = [f"joint{number}" for number in range(7)]
-    messages = [(TOPIC, row, joint_state(row, names, [0.0] * 7, (), [1.0] * 7).done()) for row in range(100)]
-    write_mcap(tmp_path / "log.mcap", messages, compression=CompressionType.NONE)
-    content = (tmp_path / "log.mcap").read_bytes()
-    (tmp_path / "log.mcap").write_bytes(content[: len(content) // 2])
-    with pytest.raises(LogError, match="has 7 joints") as caught:
-        read_log(tmp_path / "log.mcap")
-    assert "damaged" not in str(caught.value)
-
-
-def test_a_chunk_that_claims_too_much_is_left_out_unread(tmp_path: Path) -> None:
-    log = noise_log(500, start_ns=EPOCH_NS)
-    write_mcap(tmp_path / "log.mcap", messages_of(log))
-    content = bytearray((tmp_path / "log.mcap").read_bytes())
-    place = content.index(b"\x04\0\0\0zstd")
-    struct.pack_into("<Q", content, place - 12, 1 << 60)
-    (tmp_path / "log.mcap").write_bytes(content)
-    found = read_log(tmp_path / "log.mcap")
-    assert 0 < len(found) < len(log)
-    assert any(notice.code == "DAMAGED_CHUNK" and notice.lossy for notice in found.notices)
 
 
 def test_a_file_compressed_as_a_whole_is_refused(tmp_path: Path) -> None:
@@ -409,95 +244,6 @@ def test_nan_in_a_message_is_refused(tmp_path: Path) -> None:
         read_log(tmp_path / "log.mcap")
 
 
-def chunks_of(path: Path) -> list[Any]:
-    """The chunk indexes of a file as the `mcap` package reads them."""
-    with path.open("rb") as stream:
-        summary = make_reader(stream).get_summary()
-    assert summary is not None
-    return list(summary.chunk_indexes)
-
-
-@pytest.mark.parametrize("chunked", [True, False])
-@pytest.mark.parametrize("length", [0, 3, 1 << 20, 1 << 63, (1 << 64) - 1])
-def test_behind_a_broken_record_the_next_whole_one_is_found(length: int, chunked: bool, tmp_path: Path) -> None:
-    log = noise_log(2000, start_ns=EPOCH_NS)
-    path = tmp_path / "log.mcap"
-    options: dict[str, Any] = {} if chunked else NO_INDEX
-    write_mcap(path, messages_of(log), use_chunking=chunked, **options)
-    content = bytearray(path.read_bytes())
-    if chunked:
-        place = chunks_of(path)[len(chunks_of(path)) // 2].chunk_start_offset
-        content[-8:] = b"no magic"
-    else:
-        size = len(messages_of(log)[1000][2])
-        place = content.rindex(
-            struct.pack("<BQ", 5, 22 + size), 0, content.index(struct.pack("<d", log.theta[0, 1000]))
-        )
-    struct.pack_into("<Q", content, place + 1, length)
-    path.write_bytes(content)
-    found = read_log(path)
-    lost = len(log) - len(found)
-    assert 1 <= lost <= (40 if chunked else 8)
-    assert np.isin(found.theta, log.theta).all()
-    assert found.stamp_ns[0] == log.stamp_ns[0]
-    assert found.stamp_ns[-1] == log.stamp_ns[-1]
-    assert any(notice.lossy and f"byte {place}" in notice.text for notice in found.notices)
-
-
-def test_a_chunk_that_claims_to_go_on_yields_its_messages_and_those_behind_it(tmp_path: Path) -> None:
-    log = noise_log(2000, start_ns=EPOCH_NS)
-    path = tmp_path / "log.mcap"
-    write_mcap(path, messages_of(log), compression=CompressionType.NONE)
-    content = bytearray(path.read_bytes())
-    chunk = chunks_of(path)[3]
-    more = len(content)  # both lengths lie, and agree with one another
-    struct.pack_into("<Q", content, chunk.chunk_start_offset + 1, chunk.chunk_length - 9 + more)
-    (size,) = struct.unpack_from("<Q", content, chunk.chunk_start_offset + 9 + 32)
-    struct.pack_into("<Q", content, chunk.chunk_start_offset + 9 + 32, size + more)
-    content[-8:] = b"no magic"
-    path.write_bytes(content)
-    found = read_log(path)
-    assert same(found, log)
-    assert any(notice.code == "BROKEN_RECORD" and notice.lossy for notice in found.notices)
-
-
-def test_a_file_cut_between_two_records_is_called_cut(tmp_path: Path) -> None:
-    log = noise_log(2000, start_ns=EPOCH_NS)
-    path = tmp_path / "log.mcap"
-    write_mcap(path, messages_of(log))
-    chunk = chunks_of(path)[5]
-    path.write_bytes(path.read_bytes()[: chunk.chunk_start_offset])
-    found = read_log(path)
-    assert same(found, log.part(0, len(found)))
-    assert any(notice.code == "CUT_OFF" and notice.lossy for notice in found.notices)
-
-
-def test_messages_of_a_damaged_chunk_are_counted_by_its_index(tmp_path: Path) -> None:
-    log = noise_log(2000, start_ns=EPOCH_NS)
-    path = tmp_path / "log.mcap"
-    write_mcap(path, messages_of(log), compression=CompressionType.NONE, use_statistics=False)
-    content = bytearray(path.read_bytes())
-    content[content.index(struct.pack("<d", log.theta[0, 1000]))] ^= 1
-    path.write_bytes(content)
-    found = read_log(path)
-    assert any(f"{len(log) - len(found):,} messages are missing" in notice.text for notice in found.notices)
-
-
-def small_chunks(path: Path, rows: int = 3000, **options: Any) -> None:
-    """Joint states, each in a chunk of its own."""
-    schemas = {"/joint_states": (JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode())}
-    wave = np.sin(np.arange(rows) * 0.01)
-    messages = (
-        (
-            "/joint_states",
-            row * 10**6,
-            joint_state(row * 10**6, position=(wave[row], 0.5), effort=(1.0, -wave[row])).done(),
-        )
-        for row in range(rows)
-    )
-    write_mcap(path, messages, schemas, chunk_size=1, **options)
-
-
 @pytest.mark.parametrize("index", [IndexType.ALL, IndexType.NONE])
 def test_small_chunks_are_loaded_many_at_a_time(
     index: IndexType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -512,23 +258,10 @@ def test_small_chunks_are_loaded_many_at_a_time(
 
     monkeypatch.setattr(Decoder, "columns", counted)
     log = read_log(tmp_path / "a.mcap")
-    assert len(log) == 3000
-    assert np.array_equal(log.theta[0], np.sin(np.arange(3000) * 0.01))
-    assert sum(decoded) == 3000
-    assert len(decoded) <= 30
-
-
-def test_one_damaged_chunk_among_many_small_ones_is_left_out_alone(tmp_path: Path) -> None:
-    path = tmp_path / "a.mcap"
-    small_chunks(path, compression=CompressionType.NONE)
-    content = bytearray(path.read_bytes())
-    content[content.index(struct.pack("<d", np.sin(1500 * 0.01)))] ^= 1
-    path.write_bytes(content)
-    log = read_log(path)
-    assert len(log) == 2999
-    assert 1500 * 10**6 not in log.stamp_ns
-    assert [(one.code, one.lossy) for one in log.notices if one.lossy] == [("DAMAGED_CHUNK", True)]
-    assert "1 message is missing" in next(one.text for one in log.notices if one.lossy)
+    assert len(log) == 1000
+    assert np.array_equal(log.theta[0], np.sin(np.arange(1000) * 0.01))
+    assert sum(decoded) == 1000
+    assert len(decoded) <= 10
 
 
 def test_small_chunks_that_unpack_to_much_are_not_held_together(
@@ -553,9 +286,9 @@ def test_a_file_without_summary_is_walked_once_for_all_passes(tmp_path: Path, mo
     monkeypatch.setattr("algid.readers.mcap.catalogue", counted)
     reader = open_log(tmp_path / "a.mcap")
     first, second = (sum(map(len, reader.blocks())) for _ in range(2))
-    assert (first, second, len(walks)) == (3000, 3000, 1)
-    small_chunks(tmp_path / "a.mcap", rows=2000, index_types=IndexType.NONE)
-    assert sum(map(len, reader.blocks())) == 2000
+    assert (first, second, len(walks)) == (1000, 1000, 1)
+    small_chunks(tmp_path / "a.mcap", rows=600, index_types=IndexType.NONE)
+    assert sum(map(len, reader.blocks())) == 600
     assert len(walks) == 2
 
 
@@ -578,19 +311,6 @@ def test_a_json_path_is_looked_up_once_among_many_fields() -> None:
     ]
     assert found.value(["x"]) == 1
     assert found.value(["x", "y"]) is None
-
-
-def test_a_chunk_that_claims_to_be_empty_and_is_not_is_told(tmp_path: Path) -> None:
-    path = tmp_path / "a.mcap"
-    small_chunks(path, rows=50, index_types=IndexType.NONE)
-    with opened(path) as (_, found):
-        place = found.spans[3].start + 16
-    content = bytearray(path.read_bytes())
-    content[place : place + 8] = bytes(8)
-    path.write_bytes(content)
-    log = read_log(path)
-    assert len(log) == 49
-    assert [notice.code for notice in log.notices if notice.lossy] == ["DAMAGED_CHUNK"]
 
 
 @pytest.mark.parametrize("moved", [0.0, 0.3])

@@ -25,8 +25,7 @@ from algid.readers.mcap.framing import DamagedError, File
 from algid.readers.mcap.messages import records_in
 from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from tests.readers.logs import EPOCH_NS, noise_log, same
-from tests.readers.mcaps import joint_state, write_mcap
-from tests.readers.test_mcap import TOPIC, messages_of, protobuf_schema
+from tests.readers.mcaps import TOPIC, joint_state, messages_of, protobuf_schema, write_mcap
 
 
 def json_messages(log: Log, **more: Any) -> list[tuple[str, int, bytes]]:
@@ -318,14 +317,15 @@ MESSAGES = [struct.pack("<BQHIQQ", 5, 22 + size, 1, 0, 0, 0) + bytes(size) for s
 
 
 @pytest.mark.parametrize(
-    ("content", "reason"),
+    ("content", "size", "reason"),
     [
-        (b"\x4d" + bytes(8), "records that are no messages"),
-        (MESSAGES[0], "a message of 0 bytes"),
-        (MESSAGES[0] + MESSAGES[1], "of 0 bytes|of more parts than|more small messages"),
+        (b"\x4d" + bytes(8), 10_000_000, "records that are no messages"),
+        (MESSAGES[0], 10_000_000, "a message of 0 bytes"),
+        (MESSAGES[0] + MESSAGES[1], 50_000_000, "of 0 bytes|of more parts than|more small messages"),
     ],
+    ids=["others", "alike", "mixed"],
 )
-def test_a_chunk_of_countless_small_records_is_bounded(content: bytes, reason: str, tmp_path: Path) -> None:
-    (tmp_path / "log.mcap").write_bytes(bomb(content * (50_000_000 // len(content))))
+def test_a_chunk_of_countless_small_records_is_bounded(content: bytes, size: int, reason: str, tmp_path: Path) -> None:
+    (tmp_path / "log.mcap").write_bytes(bomb(content * (size // len(content))))
     with pytest.raises(LogError, match=reason):
         read_log(tmp_path / "log.mcap")
