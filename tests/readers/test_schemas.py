@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import zstandard
-from google.protobuf import descriptor_pb2
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from mcap.writer import Writer
 
 from algid.errors import LogError
@@ -295,6 +295,42 @@ def test_a_protobuf_number_written_in_another_type_is_no_number() -> None:
             protobuf.walk(wrong, "arm.State", types)
     packed = protobuf.walk(b"\x32\x03\x02\x04\x06", "arm.State", types)
     assert packed.find("mode[2]") is not None
+
+
+@pytest.mark.parametrize(
+    ("kind", "values"),
+    [
+        pytest.param(1, [0.0, -1.5, 1e300, 5e-324], id="double"),
+        pytest.param(2, [0.0, -1.5, 3.4e38], id="float"),
+        pytest.param(3, [0, 1, -1, 2**63 - 1, -(2**63)], id="int64"),
+        pytest.param(4, [0, 1, 127, 128, 2**63 - 1, 2**63, 2**64 - 1], id="uint64"),
+        pytest.param(5, [0, 1, -1, 2**31 - 1, -(2**31)], id="int32"),
+        pytest.param(6, [0, 2**63, 2**64 - 1], id="fixed64"),
+        pytest.param(7, [0, 2**31, 2**32 - 1], id="fixed32"),
+        pytest.param(8, [False, True], id="bool"),
+        pytest.param(13, [0, 128, 2**31, 2**32 - 1], id="uint32"),
+        pytest.param(15, [0, -1, -(2**31)], id="sfixed32"),
+        pytest.param(16, [0, -1, -(2**63)], id="sfixed64"),
+        pytest.param(17, [0, 1, -1, 2**31 - 1, -(2**31)], id="sint32"),
+        pytest.param(18, [0, 1, -1, 2**63 - 1, -(2**63)], id="sint64"),
+    ],
+)
+def test_every_protobuf_number_is_read_as_protobuf_itself_wrote_it(kind: int, values: list[float]) -> None:
+    file = descriptor_pb2.FileDescriptorProto(name="n.proto", package="n", syntax="proto3")
+    file.message_type.add(name="N").field.add(name="value", number=1, type=kind, label=1)
+    pool = descriptor_pool.DescriptorPool()
+    pool.Add(file)
+    written = message_factory.GetMessageClass(pool.FindMessageTypeByName("n.N"))
+    messages = [written(value=value).SerializeToString() for value in values]
+    types = protobuf.parse("n.N", descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString())
+    content = b"".join(struct.pack("<BQHIQQ", 5, 22 + len(one), 1, 0, 0, 0) + one for one in messages)
+    decoder = ColumnDecoder({"value": "value"}, bool, walk=lambda data: protobuf.walk(data, "n.N", types))
+    held, columns = decoder.columns(records_in(content).of({1}))
+    assert held.all()
+    parsed = [float(written.FromString(one).value) for one in messages]
+    assert (
+        columns["value"].astype(np.float64).tolist() == parsed == np.array(values, "f4" if kind == 2 else "f8").tolist()
+    )
 
 
 def bomb(content: bytes) -> bytes:

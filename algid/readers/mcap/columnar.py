@@ -39,13 +39,15 @@ class ExcessError(Exception):
 
 @dataclass(frozen=True)
 class Numbers:
-    """`count` numbers side by side at byte `offset`: a NumPy type, or "varint" in `width` bytes."""
+    """`count` numbers side by side at byte `offset`: a NumPy type, or a varint in `width` bytes.
+
+    That is "varint" in two's complement, "unsigned", or "zigzag" with the sign in its lowest bit.
+    """
 
     offset: int
     kind: str
     count: int = 1
     width: int = 0
-    zigzag: bool = False
 
 
 @dataclass
@@ -143,11 +145,12 @@ class Layout:
         octets, columns = table.view(np.uint8), Fields()
         for name, at in (self.fields or {}).items():
             start, rows = self.lead + at.offset, octets.shape[0]
-            if at.kind == "varint":  # in base 128, the lowest seven bits first
+            if at.kind in ("varint", "unsigned", "zigzag"):  # in base 128, the lowest seven bits first
                 digits = (octets[:, start : start + at.width] & 0x7F).astype(np.uint64)
                 total = np.bitwise_or.reduce(digits << (7 * np.arange(at.width, dtype=np.uint64)), axis=1)
-                signed = (total >> np.uint64(1)) ^ (np.uint64(0) - (total & np.uint64(1)))
-                columns[name] = (signed if at.zigzag else total).view(np.int64)
+                if at.kind == "zigzag":
+                    total = (total >> np.uint64(1)) ^ (np.uint64(0) - (total & np.uint64(1)))
+                columns[name] = total if at.kind == "unsigned" else total.view(np.int64)
             elif at.kind == "zero":  # a number that protobuf leaves out because it is zero
                 columns[name] = np.zeros(rows)
             else:

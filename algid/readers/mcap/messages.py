@@ -53,6 +53,8 @@ class Records:
     @property
     def channels_seen(self) -> frozenset[int]:
         """The channels that have messages here."""
+        if not self.offsets.size:
+            return frozenset()
         channels = self.channels
         return frozenset(channels.tolist() if channels.size < _FEW else np.unique(channels).tolist())
 

@@ -21,6 +21,7 @@ from algid.words import counted
 _FIXED = {1: "<f8", 2: "<f4", 6: "<u8", 7: "<u4", 15: "<i4", 16: "<i8"}
 _VARINTS = {3, 4, 5, 8, 13, 14, 17, 18}
 _ZIGZAG = {17, 18}
+_UINT64 = 4
 _STRING, _MESSAGE, _BYTES, _REPEATED = 9, 11, 12, 3
 _DEEPEST = 32
 _LONGEST = 1 << 20
@@ -194,7 +195,8 @@ def _walk(data: bytes, start: int, end: int, kind: str, prefix: str, shape: Shap
 def _number(first: int, stop: int, wire: int, field: ProtobufField, path: str, shape: Shape) -> None:
     if wire == 0 and field.type in _VARINTS:
         shape.flags.extend(range(first, stop))
-        shape.numbers[path] = Numbers(first, "varint", 1, stop - first, field.type in _ZIGZAG)
+        kind = "zigzag" if field.type in _ZIGZAG else "unsigned" if field.type == _UINT64 else "varint"
+        shape.numbers[path] = Numbers(first, kind, 1, stop - first)
     elif wire in (1, 5) and field.type in _FIXED and int(_FIXED[field.type][-1]) == stop - first:
         shape.numbers[path] = Numbers(first, _FIXED[field.type])
     elif wire != 2:
