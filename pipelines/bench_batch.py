@@ -219,8 +219,8 @@ def main(folder: Path, count: int = 1000, killed: int = 50) -> None:
         shutil.copy(path, small)
     seconds = run(small, out, "--workers", "2")
     for whom, times, same in kills(small, out, killed, seconds):
-        told = "the same bytes" if same else "DIFFERENT"
-        print(f"| {times} kills of {whom} at random instants | as undisturbed | {told} |", flush=True)
+        outcome = "the same bytes" if same else "DIFFERENT"
+        print(f"| {times} kills of {whom} at random instants | as undisturbed | {outcome} |", flush=True)
 
 
 if __name__ == "__main__":

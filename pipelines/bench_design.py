@@ -197,12 +197,12 @@ def main() -> None:
         values = list(pool.map(partial(worth, randoms=options.randoms), names))
         jobs: list[Job] = [(name, None, options.draws) for name in names] if options.draws else []
         jobs += [(name, error, -(-options.draws // len(WRONG))) for name in names for error in WRONG if options.draws]
-        told = list(pool.map(_rehearsed, jobs))
-    figures = judged(values, told)
+        rehearsals = list(pool.map(_rehearsed, jobs))
+    figures = judged(values, rehearsals)
     options.out.mkdir(parents=True, exist_ok=True)
-    text = markdown(values, told, figures)
+    text = markdown(values, rehearsals, figures)
     (options.out / "design.md").write_text(text, encoding="utf-8")
-    content = {"worth": values, "rehearsed": told, "figures": figures}
+    content = {"worth": values, "rehearsed": rehearsals, "figures": figures}
     (options.out / "design.json").write_text(json.dumps(content, indent=1), encoding="utf-8")
     print(text)
     raise SystemExit(0 if all(figure["reached"] for figure in figures) else 1)
@@ -212,7 +212,7 @@ def _rehearsed(job: Job) -> Row:
     return rehearsed(*job)
 
 
-def judged(values: list[Row], told: list[Row]) -> list[Row]:
+def judged(values: list[Row], rehearsals: list[Row]) -> list[Row]:
     """Each figure asked for beside what was measured."""
     figures = [
         _figure("largest bound over the random motions' median", 0.5, max(row["over_random"] for row in values)),
@@ -223,13 +223,16 @@ def judged(values: list[Row], told: list[Row]) -> list[Row]:
         ),
         _figure("processor seconds of a design", 60.0, max(row["cpu_seconds"] for row in values)),
     ]
-    if told:
-        right, off = ratios([row for row in told if not row["wrong"]]), ratios([row for row in told if row["wrong"]])
+    if rehearsals:
+        right, off = (
+            ratios([row for row in rehearsals if not row["wrong"]]),
+            ratios([row for row in rehearsals if row["wrong"]]),
+        )
         figures += [
             _figure("error over predicted ±, all arms, most (true prior)", 1.1, max(right.values())),
             _figure("error over predicted ±, all arms, least (true prior), inverted", 1 / 0.9, 1 / min(right.values())),
             _figure("error over predicted ±, most (masses 20 % wrong)", 1.3, max(off.values())),
-            _figure("share of a limit used by any true arm", 1.0, max(row["used"] for row in told)),
+            _figure("share of a limit used by any true arm", 1.0, max(row["used"] for row in rehearsals)),
         ]
     return figures
 
@@ -238,7 +241,7 @@ def _figure(what: str, asked: float, measured: float) -> Row:
     return {"figure": what, "at_most": asked, "measured": measured, "reached": measured <= asked}
 
 
-def markdown(values: list[Row], told: list[Row], figures: list[Row]) -> str:
+def markdown(values: list[Row], rehearsals: list[Row], figures: list[Row]) -> str:
     """The tables as text."""
     lines = ["| figure | asked | measured | |", "|---|---|---|---|"]
     lines += [
@@ -250,7 +253,7 @@ def markdown(values: list[Row], told: list[Row], figures: list[Row]) -> str:
     columns = ("design_percent", "random_median_percent", "random_best_percent", "condition_percent", "cpu_seconds")
     lines += [f"| {row['arm']} | " + " | ".join(f"{row[name]:.3g}" for name in columns) + " |" for row in values]
     for wrongly, title in ((False, "true prior"), (True, "masses 20 % wrong")):
-        rows = [row for row in told if row["wrong"] == wrongly]
+        rows = [row for row in rehearsals if row["wrong"] == wrongly]
         if not rows:
             continue
         lines += ["", f"Error over predicted ±, {title}:", "", f"| arm | {' | '.join(rows[0]['names'])} | limit used |"]

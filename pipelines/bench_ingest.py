@@ -81,8 +81,8 @@ def peak_above_arrays(path: Path) -> float:
     code = (
         "import re, sys; from pathlib import Path; from algid.readers import read_log\n"
         "import algid.readers.mcap.plan, zstandard, mcap.records, mcap.data_stream\n"
-        "told = lambda: Path('/proc/self/status').read_text()\n"
-        "status = lambda key: int(re.search(key + r':\\s*(\\d+)', told())[1]) * 1024\n"
+        "words = lambda: Path('/proc/self/status').read_text()\n"
+        "status = lambda key: int(re.search(key + r':\\s*(\\d+)', words())[1]) * 1024\n"
         "Path('/proc/self/clear_refs').write_text('5')\n"  # forget the peak of the imports
         "before = status('VmRSS'); log = read_log(sys.argv[1])\n"
         "arrays = sum(a.nbytes for a in (log.stamp_ns, log.theta, log.tau, log.omega))\n"
@@ -92,9 +92,9 @@ def peak_above_arrays(path: Path) -> float:
     return float(done.stdout)
 
 
-def row(name: str, aim: str, figure: str, told: str) -> None:
+def row(name: str, aim: str, figure: str, detail: str) -> None:
     """Print one row of the table."""
-    print(f"| {name} | {aim} | {figure} | {told} |", flush=True)
+    print(f"| {name} | {aim} | {figure} | {detail} |", flush=True)
 
 
 def joints(folder: Path) -> None:
@@ -105,8 +105,8 @@ def joints(folder: Path) -> None:
     if not path.exists():
         bench_files.joint_and_imu(path)
     limit, ours = medians(11, lambda: decompress(path), lambda: read_log(path))
-    told = f"{ours:.3f} s, decompression {limit:.3f} s"
-    row("1,000,000 JointState + 200,000 Imu, zstd, to decompression", "≤ 3", f"{ours / limit:.2f}", told)
+    detail = f"{ours:.3f} s, decompression {limit:.3f} s"
+    row("1,000,000 JointState + 200,000 Imu, zstd, to decompression", "≤ 3", f"{ours / limit:.2f}", detail)
     start = time.perf_counter()
     theirs = peer(path, DecoderFactory(), "/joint_states")
     slow = time.perf_counter() - start
@@ -127,8 +127,8 @@ def protobuf(folder: Path) -> None:
     theirs = peer(path, DecoderFactory(), "/arm")
     slow = time.perf_counter() - start
     equal = "bit-exact" if theirs is not None and same(read_log(path), theirs) else "DIFFERENT"
-    told = f"{ours:.3f} s against {slow:.2f} s, {equal}"
-    row("100,000 protobuf, mcap-protobuf-support to algid", "≥ 15", f"{slow / ours:.0f}", told)
+    detail = f"{ours:.3f} s against {slow:.2f} s, {equal}"
+    row("100,000 protobuf, mcap-protobuf-support to algid", "≥ 15", f"{slow / ours:.0f}", detail)
 
 
 def cameras(folder: Path) -> None:
@@ -143,12 +143,12 @@ def cameras(folder: Path) -> None:
         (topic,) = plan(file, found, None).topics
         for _ in topic.tables(str(path), file, found, 1 << 18):
             pass
-        told = f"{file.read_bytes / 1e6:.0f} MB of {file.size / 1e6:.0f} MB"
+        detail = f"{file.read_bytes / 1e6:.0f} MB of {file.size / 1e6:.0f} MB"
         row(
             "2 GB with cameras, bytes read to the channel's chunks",
             "≤ 2",
             f"{file.read_bytes / needed:.2f}",
-            told,
+            detail,
         )
 
 
@@ -163,8 +163,8 @@ def flat(folder: Path) -> None:
             lambda path=path: read_log(path),  # type: ignore[misc]
             lambda path=path: [len(block) for block in open_log(path).blocks()],  # type: ignore[misc]
         )
-        told = f"{ours:.3f} s against {theirs:.3f} s; in blocks {blocks:.3f} s"
-        row(f"1,000,000 rows of {kind}, to polars", "≤ 1.3", f"{ours / theirs:.2f}", told)
+        detail = f"{ours:.3f} s against {theirs:.3f} s; in blocks {blocks:.3f} s"
+        row(f"1,000,000 rows of {kind}, to polars", "≤ 1.3", f"{ours / theirs:.2f}", detail)
 
 
 def main() -> None:

@@ -162,5 +162,5 @@ PEERS: dict[str, Callable[[Path], Any]] = {
 }
 
 if __name__ == "__main__":
-    told = PEERS[sys.argv[1]](Path(sys.argv[2]))
-    print(json.dumps(told.tolist() if isinstance(told, np.ndarray) else told))
+    found = PEERS[sys.argv[1]](Path(sys.argv[2]))
+    print(json.dumps(found.tolist() if isinstance(found, np.ndarray) else found))

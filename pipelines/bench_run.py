@@ -45,8 +45,8 @@ def run(command: Sequence[str]) -> Cost:
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
     launcher = [sys.executable, "-I", "-S", "-c", _LAUNCH, *command]
-    told = subprocess.run(launcher, capture_output=True, text=True, env=environment, check=True).stdout
-    output, _, figures = told.rstrip().rpartition("\n")
+    text = subprocess.run(launcher, capture_output=True, text=True, env=environment, check=True).stdout
+    output, _, figures = text.rstrip().rpartition("\n")
     code, wall, cpu, peak = json.loads(figures)
     if code not in (0, 3):  # 3: algid tells that a constant could not be identified
         raise RuntimeError(f"{' '.join(command)}: exit code {code}\n{output}")

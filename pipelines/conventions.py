@@ -1,9 +1,9 @@
-"""Which wrong conventions of a log are told, and by what: `make conventions`.
+"""Which wrong conventions of a log are noticed, and by what: `make conventions`.
 
 Each arm is simulated with and without friction, its log spoiled by one mistake and identified with no flag. A row
 passes where a right log is called right, and where a wrong one has failed (exit 3) and the convention that is named
-brings the constants back; sensors that fail, and logs in each other's place, must be told by their code, never be Good,
-and have failed where an error is beyond `FAR` of its own σ. Rows that no log can tell stand at the end. Writes
+brings the constants back; sensors that fail, and logs in each other's place, must be named by their code, never be
+Good, and have failed where an error is beyond `FAR` of its own σ. Rows that no log can tell stand at the end. Writes
 `conventions.md` into the output folder.
 """
 
@@ -147,17 +147,17 @@ def row(
     if name == "nothing" or name in INVISIBLE:
         passed = named is None and found.level != "failed"
     elif name in SPOILED:
-        passed, words = _told(result, SPOILED[name][1], k), SPOILED[name][1]
+        passed, words = _noticed(result, SPOILED[name][1], k), SPOILED[name][1]
     else:
         passed = found.level == "failed" and named is not None and mended(log, k)
     return _line(name, arm, friction, f"{furthest(result, k):.3g}", LEVEL_WORDS[found.level], words, passed)
 
 
-def _told(result: Result, code: str, k: FloatArray) -> bool:
-    """Whether a result tells `code`, is not Good, and has no error beyond `FAR` without having failed."""
+def _noticed(result: Result, code: str, k: FloatArray) -> bool:
+    """Whether a result names `code`, is not Good, and has no error beyond `FAR` without having failed."""
     level = verdict(result).level
-    told = any(code in warning for warning in result.warnings)
-    return told and level != "good" and (level == "failed" or furthest(result, k) <= FAR)
+    named = any(code in warning for warning in result.warnings)
+    return named and level != "good" and (level == "failed" or furthest(result, k) <= FAR)
 
 
 def _line(name: str, arm: str, friction: bool, far: str, level: str, words: str, passed: bool) -> tuple[str, bool]:
@@ -173,7 +173,7 @@ def exchanged(arm: str, k: FloatArray, *, friction: bool) -> tuple[str, bool]:
         for kind in (True, False)
     )
     result = identify(loaded, unloaded, report=False)
-    passed = _told(result, "EXCHANGED_LOGS", k)
+    passed = _noticed(result, "EXCHANGED_LOGS", k)
     far, level = f"{furthest(result, k):.3g}", LEVEL_WORDS[verdict(result).level]
     return _line(EXCHANGED, arm, friction, far, level, "EXCHANGED_LOGS", passed)
 

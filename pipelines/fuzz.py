@@ -151,16 +151,16 @@ def outcome(path: Path, log: Log | None) -> tuple[str, str]:
 
 
 def _compared(found: Log, log: Log) -> tuple[str, str]:
-    """A log that lacks samples must call that a loss; other values must be told of."""
+    """A log that lacks samples must call that a loss; other values must be noticed."""
     names = ("stamp_ns", "theta", "tau", "omega")
     same = all(_equal(getattr(found, name), getattr(log, name)) for name in names)
     if same and found.origin.truth == log.origin.truth:
         return "same", ""
     if len(found) < len(log) and np.isin(found.stamp_ns, log.stamp_ns).all():
-        told = any(notice.lossy for notice in found.notices)
+        noticed = any(notice.lossy for notice in found.notices)
     else:
-        told = bool(found.notices)
-    return ("told", "") if told else ("silent", f"{len(found)} samples of {len(log)}, truth {found.origin.truth}")
+        noticed = bool(found.notices)
+    return ("told", "") if noticed else ("silent", f"{len(found)} samples of {len(log)}, truth {found.origin.truth}")
 
 
 def _equal(one: np.ndarray | None, other: np.ndarray | None) -> bool:

@@ -1,4 +1,4 @@
-"""Payloads weighed on the residuals of real arms: is none told as none, and are injected ones inside their intervals?
+"""Payloads weighed on the residuals of real arms: is none found none, and are injected ones inside their intervals?
 
     python -m pipelines.payload_residuals ../shared/data --draws 100
 
@@ -89,10 +89,10 @@ def _explained(name: str, logs: tuple[Segment, ...], lengths: tuple[float, float
     shared = Shared(model, payload=True, lengths={"l1": lengths[0], "l2": lengths[1]})
     loaded = shared.coefficients(np.append(fit.values, 1.0), loaded=True) - fit.values
     slopes = tuple(
-        torque(model, fit.values + loaded, motion) - told for motion, told in zip(motions, explained, strict=True)
+        torque(model, fit.values + loaded, motion) - tau for motion, tau in zip(motions, explained, strict=True)
     )
     cut = [round(by.dropped / log.dt) for log in logs]
-    residuals = tuple((log.tau - told)[:, edge:-edge] for log, told, edge in zip(logs, explained, cut, strict=True))
+    residuals = tuple((log.tau - tau)[:, edge:-edge] for log, tau, edge in zip(logs, explained, cut, strict=True))
     value = dict(zip(fit.names, fit.values, strict=True))
     mass = max(value["k4"] / lengths[0], value["k2"] / lengths[1]) / model.gravity
     return RealArm(name, logs, explained, residuals, slopes, lengths, float(mass), taken)
@@ -158,11 +158,11 @@ def evaluate(folder: Path, draws: int, names: Sequence[str] = ("dfki", "kinova")
         with ProcessPoolExecutor(2) as pool:
             found = np.array(list(pool.map(weighed, jobs)))
         none, some = found[::2], found[1::2]
-        told = 100 * float(np.mean(np.isfinite(found[:, 1])))
+        finite = 100 * float(np.mean(np.isfinite(found[:, 1])))
         near = 100 * float(np.mean(np.abs(none[:, 0]) <= 2 * none[:, 1]))
         inside = 100 * float(np.mean(np.abs(some[:, 0]) <= some[:, 2]))
         rows += [
-            {"what": f"{name}: payload told as a number, %", "value": told, "asked": 100.0},
+            {"what": f"{name}: payload told as a number, %", "value": finite, "asked": 100.0},
             {"what": f"{name}: without payload |m_p| within 2 σ, % (93 or more)", "value": near, "asked": 93.0},
             {"what": f"{name}: injected payloads inside, % (90 to 98)", "value": inside, "asked": 90.0},
             {"what": f"{name}: median σ of m_p, kg", "value": float(np.median(found[:, 1])), "asked": None},

@@ -197,14 +197,14 @@ def _noise(prior: BelievedArm, position: float | None, torque: float | None, log
 
         found = read_log(log)
         measured = first_guess(found.theta, found.tau)
-    told = {}
+    levels = {}
     for flag, given, name in (("--position-noise", position, "theta"), ("--torque-noise", torque, "tau")):
         if given is not None:
-            told[name] = np.full(2, given)
+            levels[name] = np.full(2, given)
         elif measured is not None and np.all(getattr(measured, name) > 0):
-            told[name] = getattr(measured, name)
+            levels[name] = getattr(measured, name)
         else:
             raise SettingError(
                 f"{flag}: {prior.source} does not tell how noisy the sensors are; give it, or --noise-from LOG"
             )
-    return NoiseLevels(**told)
+    return NoiseLevels(**levels)

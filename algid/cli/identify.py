@@ -76,11 +76,11 @@ def identify(
         raise SettingError("--name: expected a name for the result folder, found ''; leave it out for the log's own")
     keep_freed()
     settings = choice.settings()
-    bare, burdened = (logs, loaded or []) if parameters is None else ([], [*logs, *(loaded or [])])
+    unloaded, loaded = (logs, loaded or []) if parameters is None else ([], [*logs, *(loaded or [])])
     with progress("samples", quiet) as shown:
         result = run(
-            bare,
-            burdened,
+            unloaded,
+            loaded,
             settings,
             parameters=parameters,
             profile=choice.profile(),
@@ -93,7 +93,7 @@ def identify(
             progress=shown,
         )
     if verbose:
-        _tell(result)
+        _print_reading(result)
     if not quiet:
         print_result(result, output)
         for note in result.notes:
@@ -103,14 +103,14 @@ def identify(
         raise typer.Exit(EXIT_INCOMPLETE)
 
 
-def _tell(result: Result) -> None:
+def _print_reading(result: Result) -> None:
     """What was read, and how, on standard error."""
     from algid.report.text import visible
 
     for log in result.logs:
         size = f"{counted(log.rows, 'sample')}, {log.duration:.6g} s at {log.rate:.6g} Hz"
-        told = f"{log.role} {log.path}: {size}, {log.format}"
-        print(visible(told), file=sys.stderr)
+        text = f"{log.role} {log.path}: {size}, {log.format}"
+        print(visible(text), file=sys.stderr)
         for signal, source in log.mapping.items():
             print(visible(f"  {signal} from {source}"), file=sys.stderr)
     for name, value in result.settings.items():

@@ -27,10 +27,10 @@ def page_html(design: Design, source: str, warnings: Sequence[str]) -> str:
 def design_document(design: Design, source: str, warnings: Sequence[str]) -> Document:
     """The report of a design for the arm that `source` tells of."""
     campaign, name = design.campaign, file_name(source)
-    told = sentence(design)
+    text = sentence(design)
     return Document(
         title=f"Design for {name}",
-        verdict=Verdict("reservations" if design.open_parameters else "good", told[0].lower() + told[1:].rstrip(".")),
+        verdict=Verdict("reservations" if design.open_parameters else "good", text[0].lower() + text[1:].rstrip(".")),
         sections=(
             Section((bound_table(design), limit_table(design), *_arm(design), *figures(design))),
             Section((Bullets(tuple(warnings)),) if warnings else (), "warnings", "Warnings"),

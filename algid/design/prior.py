@@ -134,8 +134,8 @@ def _parameters(shared: Shared, arm: Arm, mass: float) -> FloatArray:
 
 def _of_result(result: Result, source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedArm:
     model, left_out = _planned(model_of(result))
-    told = {name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None}
-    lengths = told | knowns.lengths
+    before = {name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None}
+    lengths = before | knowns.lengths
     value = {name: found.estimate for name, found in result.estimates.items()} | lengths
     mass = value.get("m_p") if knowns.payload is None else knowns.payload
     shared = _shared(model, mass, loaded, source, replace(knowns, **lengths))

@@ -103,7 +103,7 @@ class Candidate:
 
     @property
     def convincing(self) -> bool:
-        """Whether the log shows a real arm: every inertia is told, nothing is broken, the torque explained."""
+        """Whether the log shows a real arm: every inertia is determined, nothing is broken, the torque explained."""
         inertial = (self.demands[name] for name in _INERTIAL if name in self.demands)
         return not self.broken and min(inertial) > MET and float(self.left.max()) < EXPLAINED
 

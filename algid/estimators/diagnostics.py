@@ -163,10 +163,10 @@ def constrained(fit: Fit) -> Fit:
 
 
 def _named(bounds: Sequence[BrokenBound]) -> str:
-    told = (
+    sentences = (
         b.bound if b.distance is None else f"{b.bound} ({b.distance:.2g} standard deviations beyond)" for b in bounds
     )
-    return ", ".join(told)
+    return ", ".join(sentences)
 
 
 def _noted(fit: Fit, note: str) -> str:
@@ -268,16 +268,16 @@ def payload_distance(fit: Fit) -> float | None:
     The statistic compares the arm's constants with the loaded arm's, less the payload that fits best. Where they agree
     it is χ² with as many degrees of freedom as constants less those of the payload.
     """
-    kinds = [[log for log in fit.logs if log.loaded is loaded] for loaded in (False, True)]
+    kinds = [[log for log in fit.logs if log.loaded is kind] for kind in (False, True)]
     if not fit.shared.payload or not all(kinds):
         return None
-    bare, burdened = (_by_themselves(fit.shared, kind) for kind in kinds)
-    if not (bare[2] and burdened[2]):
+    unloaded, loaded = (_by_themselves(fit.shared, logs) for logs in kinds)
+    if not (unloaded[2] and loaded[2]):
         return None
     freedom = len(fit.shared.log_names) - (len(fit.shared.names) - len(fit.shared.log_names))
-    arm = Prior.of(fit.shared.log_names, bare[0], bare[1])
-    loaded = LogInformation(True, burdened[0], scaled_pinv(burdened[1])[None], np.zeros_like(burdened[0])[None])
-    _, _, value = combine(fit.shared, [loaded], fit.values, arm)
+    arm = Prior.of(fit.shared.log_names, unloaded[0], unloaded[1])
+    information = LogInformation(True, loaded[0], scaled_pinv(loaded[1])[None], np.zeros_like(loaded[0])[None])
+    _, _, value = combine(fit.shared, [information], fit.values, arm)
     return max(0.0, float(-ndtri(chdtrc(freedom, max(0.0, -2 * value)))))
 
 
@@ -304,11 +304,11 @@ def repeatability(fit: Fit) -> MassScatter | None:
     for log in loaded:
         slope = fit.shared.jacobian(fit.values, True)[:, place]
         S, g = log.total
-        told = float(slope @ S @ slope)
-        if told <= 0:
+        information = float(slope @ S @ slope)
+        if information <= 0:
             return None
         change = fit.shared.coefficients(fit.values, True) - log.c0
-        masses.append(fit.values[place] + float(slope @ (g - S @ change)) / told)
+        masses.append(fit.values[place] + float(slope @ (g - S @ change)) / information)
     n = len(masses)
     std = float(np.std(masses, ddof=1))
     low, high = (std * float(np.sqrt((n - 1) / chdtri(n - 1, tail))) for tail in (0.025, 0.975))
@@ -316,7 +316,7 @@ def repeatability(fit: Fit) -> MassScatter | None:
 
 
 def _by_themselves(shared: Shared, logs: Sequence[LogInformation]) -> tuple[FloatArray, FloatArray, bool]:
-    """Coefficients (q,) that logs of one kind give, their sandwich (q, q), and whether all of them are told."""
+    """Coefficients (q,) that logs of one kind give, their sandwich (q, q), and whether all of them are determined."""
     S = np.sum([log.total[0] for log in logs], axis=0)
     inverse = scaled_pinv(S)
     c = inverse @ np.sum([log.total[1] + log.total[0] @ log.c0 for log in logs], axis=0)

@@ -116,8 +116,8 @@ class Fit:
         along = null.T @ scaled
         if np.linalg.norm(along) > 1e-3 * np.linalg.norm(scaled):
             return float("inf")
-        told = (scaled - null @ along) / size
-        return float(np.sqrt(max(float(told @ self.covariance @ told), 0.0)))
+        determined = (scaled - null @ along) / size
+        return float(np.sqrt(max(float(determined @ self.covariance @ determined), 0.0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,8 +223,8 @@ def _satterthwaite(within: FloatArray, wide: FloatArray, freedom: int, logs: Seq
 
     What repeats are the logs of each kind, less one.
     """
-    told = np.diag(wide) > 0
-    share = float(np.mean(1 - np.diag(within)[told] / np.diag(wide)[told])) if told.any() else 0.0
+    known = np.diag(wide) > 0
+    share = float(np.mean(1 - np.diag(within)[known] / np.diag(wide)[known])) if known.any() else 0.0
     repeats = sum(max(0, sum(log.loaded is loaded for log in logs) - 1) for loaded in (False, True))
     return float(1 / (share**2 / max(1, repeats) + (1 - share) ** 2 / max(1, freedom)))
 

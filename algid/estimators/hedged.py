@@ -1,8 +1,8 @@
 """Error bars where the evidence that chose the model's terms was refuted.
 
-Terms are left out because the logs cannot tell them from nothing, and what cannot be told so is taken for zero: that
-narrows the error bars. Where the likelihood is refuted afterwards, the torque has errors that no term explains, and
-the same errors were weighed when the terms were. Error bars as if nothing had been left out let that in; the
+Terms are left out because the logs cannot tell them from nothing, and what cannot be distinguished is taken for zero:
+that narrows the error bars. Where the likelihood is refuted afterwards, the torque has errors that no term explains,
+and the same errors were weighed when the terms were. Error bars as if nothing had been left out let that in; the
 estimates stay, since the smaller model foretells better. (On inference after selection: Leeb & Pötscher 2005,
 Econometric Theory 21.) What differs from run to run shows it by itself: with `FEWEST_LOGS` logs nothing is widened.
 """
@@ -54,8 +54,8 @@ def hedged(
     larger = replace(settings, model=replace(settings.model, terms=terms), estimate_delay=delayed)
     general = weak.fit(unloaded, loaded, larger, dict(lengths or {}), prior)
     stds = zip(general.names, general.std, general.status, strict=True)
-    told = {name: std for name, std, status in stds if status == "OK"}
-    least = np.array([told.get(name, 0.0) for name in fit.names])
+    spreads = {name: std for name, std, status in stds if status == "OK"}
+    least = np.array([spreads.get(name, 0.0) for name in fit.names])
     covariance = widened(fit.covariance, np.diag(least**2))
     note = fit.note
     if note and not np.array_equal(covariance, fit.covariance):
@@ -89,6 +89,6 @@ def _doubt(fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], setti
         apart = joints_apart(normals, settings.model) if normals else None
         if apart is not None:
             first, second = f"{apart.first:.2g} {UNITS[apart.name]}", f"{apart.second:.2g}"
-            told = f"joint 1 by itself tells {apart.name} as {first} and joint 2 as {second}: one of them"
-            return f"{told} is hardly driven, or a term is missing; give a log that drives both"
+            sentence = f"joint 1 by itself tells {apart.name} as {first} and joint 2 as {second}: one of them"
+            return f"{sentence} is hardly driven, or a term is missing; give a log that drives both"
     return None

@@ -309,8 +309,8 @@ def _apart(sums: Sequence[Moments], c: FloatArray, loaded: bool) -> float:
     inverse = scaled_pinv(np.sum([log.total[0] for log in logs], axis=0))
     meat = np.sum([long_run_variance(log.g)[0] for log in logs], axis=0)
     std = np.sqrt(np.maximum(np.diag(inverse @ meat @ inverse), 0.0))
-    told = std < np.abs(better) + np.abs(least)  # what neither tells is not apart
-    return float(np.max(np.abs(better - least)[told] / std[told], initial=0.0))
+    determined = std < np.abs(better) + np.abs(least)  # what neither determines is not apart
+    return float(np.max(np.abs(better - least)[determined] / std[determined], initial=0.0))
 
 
 def _only_least_squares(sums: Moments, q: int) -> Moments:

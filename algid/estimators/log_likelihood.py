@@ -19,9 +19,9 @@ from algid.estimators.identifiability import Correlations, correlations
 from algid.estimators.innovations import ResidualSums, residual_sums
 from algid.estimators.noise import (
     VarianceScore,
-    change_told,
     first_guess,
     floored,
+    largest_change,
     newton_step,
     quantum,
     variance_score,
@@ -141,9 +141,9 @@ class LogEvidence:
             return 0.0
         S, _ = outcome.information.total
         better = floored(newton_step(self.noise, outcome.noise_score, S), self._floor)
-        told = change_told(self.noise, better, outcome.noise_score)
+        change = largest_change(self.noise, better, outcome.noise_score)
         self.noise = better
-        return told
+        return change
 
     def _linearise(self, c: FloatArray, theta: FloatArray, piece: Segment) -> Linearised:
         shared = self._shared

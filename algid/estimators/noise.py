@@ -51,7 +51,7 @@ class VarianceScore:
 
 
 def first_guess(theta: FloatArray, tau: FloatArray) -> NoiseLevels:
-    """White noise of angles and torques, told by their sixth differences, in which smooth motion leaves nothing.
+    """White noise of angles and torques, estimated from their sixth differences, in which smooth motion leaves nothing.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def newton_step(noise: NoiseLevels, score: VarianceScore, S: FloatArray) -> Nois
     return NoiseLevels(noise.theta * factor[:2], noise.tau * factor[2:])
 
 
-def change_told(before: NoiseLevels, after: NoiseLevels, score: VarianceScore) -> float:
+def largest_change(before: NoiseLevels, after: NoiseLevels, score: VarianceScore) -> float:
     """Largest change of a log variance, in its own standard deviations."""
     ratio = np.concatenate([after.theta / before.theta, after.tau / before.tau])
     return float(np.max(np.abs(2 * np.log(ratio)) * np.sqrt(np.diag(score.average))))

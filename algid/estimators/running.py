@@ -88,8 +88,8 @@ def _estimate(fit: Fit, logs: Sequence[LogInformation]) -> tuple[FloatArray, Flo
     known = examine(fit.names, beta, S, fit.moved)
     std = np.sqrt(np.maximum(np.diag(known.covariance), 0.0))
     lost = np.array([status == "NOT_IDENTIFIABLE" for status in fit.status])  # the fit may know better than its sums
-    told = np.array(known.determined) & ~lost
-    return np.where(told, beta, np.nan), np.where(told, std, np.nan)
+    determined = np.array(known.determined) & ~lost
+    return np.where(determined, beta, np.nan), np.where(determined, std, np.nan)
 
 
 def has_running(fit: Fit) -> bool:

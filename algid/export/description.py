@@ -129,8 +129,8 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
     SettingError
         If what is known leaves no positive mass or inertia.
     """
-    told = {name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None}
-    given = told | {name: value for name, value in knowns.given.items() if name in ("l1", "l2")}
+    before = {name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None}
+    given = before | {name: value for name, value in knowns.given.items() if name in ("l1", "l2")}
     coefficients = coefficients_of(result, file, given.get("l1"))
     numbers = _identified(coefficients)
     chosen = None
@@ -184,8 +184,10 @@ def _chosen(links: tuple[Link, Link], coefficients: Coefficients, knowns: Knowns
     masses = {name: "given" if getattr(knowns, name) is not None else "" for name in ("m1", "m2")}
     nearest = "chosen, nearest to a uniform link"
     horizontal = coefficients.model.gravity == 0
-    told = first_length(result)
-    l1 = "given" if knowns.l1 else f"identified, g k1 / k2{'' if told is None else f', ± {told[1]:.2g}'}"
+    by_constants = first_length(result)
+    l1 = (
+        "given" if knowns.l1 else f"identified, g k1 / k2{'' if by_constants is None else f', ± {by_constants[1]:.2g}'}"
+    )
     l2 = "given" if knowns.l2 else "identified with the payload" if _length(result.payload.get("l2")) else nearest
     both = masses["m1"] and masses["m2"]
     by2 = "identified, given m2" if masses["m2"] else "chosen with m2"

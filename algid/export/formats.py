@@ -17,7 +17,7 @@ from algid.results import Result, Status
 
 @dataclass(frozen=True)
 class Format:
-    """A format: its files' suffix, the text of an arm in it, what it is made of links, and what it may be told."""
+    """A format: its files' suffix, the text of an arm in it, what it is made of links, and which flags it takes."""
 
     suffix: str
     text: Callable[[Description], str]

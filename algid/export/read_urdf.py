@@ -24,7 +24,7 @@ from algid.words import counted
 
 GRAVITY = 9.81
 _PARALLEL = 1e-3  # sine of the angle between axes that count as one direction
-_BESIDE = 0.02  # of a link's length: a centre farther beside its line is told
+_BESIDE = 0.02  # of a link's length: a centre farther beside its line is warned of
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,8 +146,8 @@ class _Robot:
         inertial = self._links[link].find("inertial")
         if inertial is not None:
             mass = float(inertial.find("mass").attrib["value"])  # type: ignore[union-attr]
-            told = inertial.find("inertia").attrib  # type: ignore[union-attr]
-            xx, yy, zz, xy, xz, yz = (float(told[name]) for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
+            moments = inertial.find("inertia").attrib  # type: ignore[union-attr]
+            xx, yy, zz, xy, xz, yz = (float(moments[name]) for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
             inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
             second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
             body = _Body(mass, np.zeros(3), second).moved(*_origin(inertial))
@@ -188,13 +188,13 @@ class _Robot:
 def _origin(element: ET.Element) -> tuple[FloatArray, FloatArray]:
     """Rotation and place of an element's origin: roll, pitch, yaw about fixed axes."""
     origin = element.find("origin")
-    told = {} if origin is None else origin.attrib
-    roll, pitch, yaw = _three(told.get("rpy", "0 0 0"))
+    given = {} if origin is None else origin.attrib
+    roll, pitch, yaw = _three(given.get("rpy", "0 0 0"))
     (a, b, c), (p, q, r) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
     about_x = np.array([[1, 0, 0], [0, a, -p], [0, p, a]])
     about_y = np.array([[b, 0, q], [0, 1, 0], [-q, 0, b]])
     about_z = np.array([[c, -r, 0], [r, c, 0], [0, 0, 1]])
-    return about_z @ about_y @ about_x, _three(told.get("xyz", "0 0 0"))
+    return about_z @ about_y @ about_x, _three(given.get("xyz", "0 0 0"))
 
 
 def _axis(joint: ET.Element) -> FloatArray:

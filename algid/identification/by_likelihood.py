@@ -29,7 +29,7 @@ from algid.settings import Settings
 from algid.signals.segments import Segment
 
 NOTHING = 2.0
-"""Standard deviations: a coefficient nearer to zero is not told from it."""
+"""Standard deviations: a coefficient nearer to zero is not distinguished from it."""
 Pass = Callable[[], Iterable[Segment]]
 Predictions = Mapping[LogSource, PredictionSums]
 """What scores a prediction of a log by any coefficients."""
@@ -134,7 +134,7 @@ def residual_of(survey: Survey, settings: Settings, chosen: Selection, fit: Fit)
 def with_hedge(fit: Fit, survey: Survey, settings: Settings, chosen: Selection, prior: Prior | None) -> Fit:
     """The fit; where its likelihood is refuted, with what left-out terms could hide in its error bars: see `hedged`.
 
-    One that physics contradicts stays as sure as it is, so that the contradiction is told.
+    One that physics contradicts stays as sure as it is, so that the contradiction is reported.
     """
     if not (fit.note and settings.chooses):
         return fit

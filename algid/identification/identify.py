@@ -16,7 +16,7 @@ from algid.files import remove_stale, result_folder, whole_folder
 from algid.identification.by_paper import run_paper
 from algid.identification.outcome import Identified
 from algid.identification.series import write_fit_series
-from algid.identification.source import LogLike, LogSource, open_sources, read_otherwise, tell_twins
+from algid.identification.source import LogLike, LogSource, open_sources, read_otherwise, with_twins_marked
 from algid.identification.summary import result_of
 from algid.identification.survey import Survey
 from algid.progress import Progress
@@ -106,7 +106,7 @@ def identify(
     profile = profile if earlier is None else reused(profile, earlier.result)
     if profile is not None and "gravity" in profile.model_fields_set and settings.gravity == Settings.gravity:
         settings = replace(settings, gravity=profile.gravity)
-    sources = tell_twins(
+    sources = with_twins_marked(
         open_sources(unloaded, "unloaded", profile, settings.gravity),
         open_sources(loaded, "loaded", profile, settings.gravity),
     )

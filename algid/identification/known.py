@@ -105,13 +105,13 @@ def first_length(result: Result) -> tuple[float, float] | None:
 
 def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[str, ...]:
     """Sentences about given lengths far from what the result says of them: by itself, and by l1 = g k1 / k2."""
-    told = {name: (found.estimate, found.std) for name, found in result.payload.items() if name in ("l1", "l2")}
+    identified = {name: (found.estimate, found.std) for name, found in result.payload.items() if name in ("l1", "l2")}
     by_constants = first_length(result)
     if by_constants is not None:
-        told["l1"] = by_constants
+        identified["l1"] = by_constants
     sentences = []
     for name, given in lengths.items():
-        estimate, std = told.get(name, (None, None))
+        estimate, std = identified.get(name, (None, None))
         if estimate is None or not std:
             continue
         distance = abs(given - estimate) / std

@@ -133,19 +133,19 @@ def open_sources(
     return kept
 
 
-def tell_twins(unloaded: list[LogSource], loaded: list[LogSource]) -> list[LogSource]:
-    """All logs, unloaded ones first; a loaded one that is also given as unloaded tells so: its payload is nought."""
+def with_twins_marked(unloaded: list[LogSource], loaded: list[LogSource]) -> list[LogSource]:
+    """All logs, unloaded ones first; a loaded one that is also given as unloaded says so: its payload is nought."""
     lengths = {source.promised for source in unloaded if source.digest}
     if not any(source.digest and source.promised in lengths for source in loaded):
         return [*unloaded, *loaded]
     names = {source.digest(): source.name for source in unloaded if source.digest}
-    told = []
+    marked = []
     for source in loaded:
         twin = names.get(source.digest()) if source.digest else None
         text = f"SAME_LOG: {source.name} is {twin}, byte for byte: one log is given as unloaded and as loaded"
         said = () if twin is None else (Notice("SAME_LOG", f"{text}, which makes the payload nought"),)
-        told.append(replace(source, notices=(*source.notices, *said)))
-    return [*unloaded, *told]
+        marked.append(replace(source, notices=(*source.notices, *said)))
+    return [*unloaded, *marked]
 
 
 def _hash_of_arrays(log: Log) -> str:

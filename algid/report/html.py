@@ -19,11 +19,11 @@ SIGNS = {"good": "✓", "reservations": "!", "failed": "✕"}
 
 
 def banner(judged: Verdict) -> str:
-    """The verdict's sentence, what to run first, and the reasons that it does not tell itself, in its colour."""
+    """The verdict's sentence, what to run first, and the reasons that it does not say itself, in its colour."""
     cause = f'<p class="cause">Likely cause: {escaped(judged.cause)}</p>' if judged.cause else ""
     if judged.command:
         cause += f'<p class="cause">Run first: <code>{escaped(judged.command)}</code></p>'
-    reasons = f"<ul>{_listed(judged.untold)}</ul>" if judged.untold else ""
+    reasons = f"<ul>{_listed(judged.further_reasons)}</ul>" if judged.further_reasons else ""
     return (
         f'<div class="verdict {judged.level}"><span class="sign" aria-hidden="true">{SIGNS[judged.level]}</span>'
         f"<div><p><strong>{judged.word}</strong>{escaped(judged.rest)}</p>{cause}{reasons}</div></div>"

@@ -21,7 +21,7 @@ def markdown(document: Document) -> str:
         "",
         *([f"Likely cause: {escaped(judged.cause)}", ""] if judged.cause else []),
         *(["Run first:", "", *_code(judged.command), ""] if judged.command else []),
-        *(f"- {escaped(reason)}" for reason in judged.untold),
+        *(f"- {escaped(reason)}" for reason in judged.further_reasons),
         "",
         *map(markdown_table, document.tables(Depth.TERMINAL, Depth.MARKDOWN)),
     ]

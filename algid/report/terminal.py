@@ -35,11 +35,11 @@ def print_verdict(judged: Verdict, console: Console) -> None:
         console.print(Text.assemble(("Likely cause: ", "bold"), judged.cause))
     if judged.command:
         console.print(Text.assemble(("Run first:    ", "bold"), judged.command), soft_wrap=True)
-    if judged.untold:
+    if judged.further_reasons:
         points = RichTable.grid(padding=(0, 1))
         points.add_column()
         points.add_column(overflow="fold")
-        for reason in judged.untold:
+        for reason in judged.further_reasons:
             points.add_row(" •", Text(reason))
         console.print(points)
 

@@ -66,7 +66,7 @@ class Verdict:
         return self.word + self.rest
 
     @property
-    def untold(self) -> tuple[str, ...]:
+    def further_reasons(self) -> tuple[str, ...]:
         """The reasons that neither the sentence holds word by word, nor the cause."""
         cause = self.cause or self.sentence
         return tuple(reason for reason in self.reasons if reason not in self.sentence and cause not in reason)
@@ -230,15 +230,15 @@ def _reasons(result: Result) -> Iterator[str]:
     if result.fit is not None:
         yield from _fit_reasons(result.fit, " ".join(result.warnings))
     yield from _far_from_truth(result)
-    told = {f"{name} is not determined" for name, found in estimates.items() if found.estimate is None}
-    told |= {warning for warning in result.warnings if _is_implausible(result) and warning.startswith(BREAKS)}
-    yield from (f"algid warns: {visible(warning, 2 * LONGEST)}" for warning in result.warnings if warning not in told)
+    said = {f"{name} is not determined" for name, found in estimates.items() if found.estimate is None}
+    said |= {warning for warning in result.warnings if _is_implausible(result) and warning.startswith(BREAKS)}
+    yield from (f"algid warns: {visible(warning, 2 * LONGEST)}" for warning in result.warnings if warning not in said)
 
 
-def _fit_reasons(fit: FitSummary, told: str) -> Iterator[str]:
-    """What the fit holds against itself, less what the warnings have told."""
-    yield from (visible(direction) for direction in fit.unidentifiable if direction not in told)
-    yield from (f"{BREAKS} {_beyond(bound)}" for bound in fit.broken_bounds if bound.bound not in told)
+def _fit_reasons(fit: FitSummary, said: str) -> Iterator[str]:
+    """What the fit holds against itself, less what the warnings have said."""
+    yield from (visible(direction) for direction in fit.unidentifiable if direction not in said)
+    yield from (f"{BREAKS} {_beyond(bound)}" for bound in fit.broken_bounds if bound.bound not in said)
     coloured = [visible(name) for name, test in fit.whiteness.items() if not test.white]
     if coloured and fit.intervals == "likelihood":
         yield f"the residual of {joined(coloured)} is not white, though the intervals take it to be"

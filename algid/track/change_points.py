@@ -53,7 +53,7 @@ def edges(cells: Cells, arm: IdentifiedArm) -> Edges:
     """The changes of payload among `cells`.
 
     What a change would explain counts as an error at first, and no longer once the change is found: errors are
-    told again from what the stretches leave, until the changes stay.
+    estimated again from what the stretches leave, until the changes stay.
     """
     places: list[int] = [0, len(cells)]
     spans: list[tuple[int, int]] = []
@@ -225,7 +225,7 @@ def _misfit(cells: Cells, start: int, stop: int | None) -> FloatArray:
     A, B, rows = cells.A[start:stop], cells.B[start:stop], cells.rows[start:stop]
     own = B / np.maximum(A, 1e-300)
     order = np.argsort(own)
-    told = np.cumsum(A[order])
-    mass = float(own[order][min(np.searchsorted(told, told[-1] / 2), own.size - 1)])
+    running_sum = np.cumsum(A[order])
+    mass = float(own[order][min(np.searchsorted(running_sum, running_sum[-1] / 2), own.size - 1)])
     squares = cells.squares(mass)
     return np.asarray(squares - cells.rows * np.median(squares[start:stop] / rows))

@@ -53,8 +53,8 @@ def _payload(result: TrackResult) -> Figure:
         "Read: blue should run level, green within its band; orange is where it may step. "
         "A band that opens wide tells that the arm moved too little; double-click shows all of it."
     )
-    told = joined([mass_text(one) for one in found.stretches[:6]])
-    panel = Panel(traces, layout, f"Payload over time; stretches of {told} kg", height=380, sync=SYNC)
+    words = joined([mass_text(one) for one in found.stretches[:6]])
+    panel = Panel(traces, layout, f"Payload over time; stretches of {words} kg", height=380, sync=SYNC)
     return Figure("payload", "Payload in time", (panel,), reading, tuple(legend))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.estimators.noise import change_told, first_guess, floored, newton_step, quantum, variance_score
+from algid.estimators.noise import first_guess, floored, largest_change, newton_step, quantum, variance_score
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise
 from algid.model import Model
 from algid.signals.differences import HELD, POINTS, Stencil
@@ -141,6 +141,6 @@ def test_changes_count_in_their_own_deviations_and_levels_keep_their_floor(linea
     for place, deviations in enumerate((2.0, 3.0, 4.0, 5.0)):
         level = np.array([1.0, 2.0, 3.0, 4.0])
         level[place] *= np.exp(-0.05)  # the variance by 0.1
-        assert change_told(before, NoiseLevels(level[:2], level[2:]), score) == pytest.approx(0.1 * deviations)
+        assert largest_change(before, NoiseLevels(level[:2], level[2:]), score) == pytest.approx(0.1 * deviations)
     held = floored(before, NoiseLevels(np.array([1.5, 1.5]), np.array([3.5, 3.5])))
     assert [*held.theta, *held.tau] == [1.5, 2.0, 3.5, 4.0]

@@ -13,7 +13,7 @@ import pytest
 
 from algid.errors import LogError
 from algid.identification import source
-from algid.identification.source import LogSource, Staged, open_source, open_sources, sha256_of, tell_twins
+from algid.identification.source import LogSource, Staged, open_source, open_sources, sha256_of, with_twins_marked
 from algid.identification.survey import Survey
 from algid.log import Log, Notice, Origin, Truth
 from algid.synth.cases import load_case
@@ -126,9 +126,9 @@ def test_logs_of_lengths_of_their_own_are_not_hashed_before_the_first_pass() -> 
         raise AssertionError("hashed")
 
     one, two = (replace(open_source(moving(samples=n), "unloaded"), digest=never) for n in (300, 301))
-    assert tell_twins([one], [two]) == [one, two]
+    assert with_twins_marked([one], [two]) == [one, two]
     with pytest.raises(AssertionError, match="hashed"):
-        tell_twins([one], [replace(two, promised=300)])
+        with_twins_marked([one], [replace(two, promised=300)])
 
 
 def test_files_of_lengths_of_their_own_are_opened_without_hashing(
@@ -148,7 +148,7 @@ def test_files_of_lengths_of_their_own_are_opened_without_hashing(
 def test_a_loaded_twin_of_an_unloaded_log_tells_so_and_stays() -> None:
     bare = open_source(moving("bare.csv"), "unloaded")
     loaded = [open_source(moving("twin.csv"), "loaded"), open_source(moving("own.csv", samples=601), "loaded")]
-    found = tell_twins([bare], loaded)
+    found = with_twins_marked([bare], loaded)
     assert [source.name for source in found] == ["bare.csv", "twin.csv", "own.csv"]
     assert [len(source.notices) for source in found] == [0, 1, 0]
     assert found[1].notices[0].text.startswith("SAME_LOG: twin.csv is bare.csv, byte for byte")

@@ -340,7 +340,7 @@ def test_one_sentence_judges_every_report(reasons: tuple[str, ...], sentence: st
 def test_the_first_reason_may_be_told_shorter_and_stays_whole_below() -> None:
     found = judged("k is known", REASONS[1:], None, first="it jitters", cause="the wind", command="run")
     assert found.sentence == "With reservations: k is known, but it jitters, and there is one more reason below."
-    assert found.untold == REASONS[1:]
+    assert found.further_reasons == REASONS[1:]
     assert (found.cause, found.command) == ("the wind", "run")
     assert judged("k is known", (), None, cause="c", command="run") == Verdict("good", "k is known")
 

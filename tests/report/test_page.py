@@ -320,8 +320,8 @@ def test_what_was_tried_stands_second_with_what_it_gains(folder: Path, result: R
 def test_a_reason_that_the_verdict_tells_is_not_listed_again() -> None:
     told = "k1 is known, but k2 is singular"
     one = Verdict("reservations", told, ("k2 is singular", "it jitters"))
-    assert one.untold == ("it jitters",)
+    assert one.further_reasons == ("it jitters",)
     assert banner(one).count("k2 is singular") == 1
     cause = "θ1 is zero hanging; use --zero hanging"
     other = Verdict("failed", "M is not positive", (f"algid warns: a.csv: {cause}", "it jitters"), cause)
-    assert other.untold == ("it jitters",)
+    assert other.further_reasons == ("it jitters",)

@@ -31,7 +31,7 @@ class Legend:
 
 @dataclass(frozen=True)
 class Panel:
-    """One drawing area. `says` is what a screen reader is told; `sync` names panels that zoom together."""
+    """One drawing area. `says` is what a screen reader reads out; `sync` names panels that zoom together."""
 
     traces: list[Trace]
     layout: Layout

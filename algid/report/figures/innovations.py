@@ -17,7 +17,7 @@ WHITENED, SPECTRUM, TORQUE, CORRELATION = "whitened spectrum", "spectrum", "torq
 COLUMNS = ("quantity", "joint", "x", "value", "low", "high")
 FAINT = 0.02  # a correlation below which the estimator's test takes colour not to matter
 HEIGHT = 260
-MILLI = 0.5  # s: lags that end before are told in milliseconds
+MILLI = 0.5  # s: lags that end before are shown in milliseconds
 WHITE_READING = (
     "Read: white noise leaves 19 of 20 points and bars inside the blue band; a hump in the spectrum is motion that the "
     "model misses, bars that start high and fall are an error slower than the sampling."
@@ -169,8 +169,8 @@ def _count(curve: Curve) -> str:
 
 def _note(curves: Curves, joints: list[int], result: Result) -> str:
     """How many values lie inside the bands, and what the estimator's own test says."""
-    told = " and ".join(_count(curves[CORRELATION, joint]) for joint in joints)
-    note = f"Inside the band: {told} correlations of joints 1 and 2"
+    counts = " and ".join(_count(curves[CORRELATION, joint]) for joint in joints)
+    note = f"Inside the band: {counts} correlations of joints 1 and 2"
     white = [curves[WHITENED, joint] for joint in joints if (WHITENED, joint) in curves]
     note += f", {' and '.join(map(_count, white))} frequencies." if white else "."
     fit = result.fit
