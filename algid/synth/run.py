@@ -72,13 +72,13 @@ def synthesise(case: Case, torque: Torque, recording: Recording, progress: Progr
 def rehearse(case: Case, plan: Reference, recording: Recording, progress: Progress | None = None) -> list[Log]:
     """The unloaded and, with a payload, the loaded log of a case whose controller follows a plan from its start."""
     logs: list[Log] = []
-    bare = case.arm.constants()
+    unloaded = case.arm.constants()
     for payload in dict.fromkeys((0.0, case.payload)):
         role = "loaded" if payload else "unloaded"
-        k = with_payload(bare, case.arm.payload_constants(payload))
+        k = with_payload(unloaded, case.arm.payload_constants(payload))
         sensors = replace(recording.sensors, seed=recording.sensors.seed + bool(payload))
         t = sample_times(recording.rate, recording.duration, sensors)
-        motion = follow(k, plan, t, bare, bool(payload), _counted(progress, role, recording))
+        motion = follow(k, plan, t, unloaded, bool(payload), _counted(progress, role, recording))
         logs.append(record(motion, sensors, Truth(case.arm, payload, case.name), f"{case.name}-{role}"))
     return logs
 
@@ -92,7 +92,7 @@ def with_schedule(
 ) -> Log:
     """A log during which the payload changes: pairs of time in s, increasing, and payload in kg from then on.
 
-    Before the first time the arm is bare. An object is grasped and let go at the tip's own velocity, so that the
+    Before the first time the arm is unloaded. An object is grasped and let go at the tip's own velocity, so that the
     motion has no step. The truth that the log bears names the schedule.
 
     Raises

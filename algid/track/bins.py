@@ -58,7 +58,7 @@ class IdentifiedArm:
         return self.added(payload_constants(1.0, self.l1, self.l2, self.model.gravity))
 
     @property
-    def bare(self) -> float:
+    def tip_equivalent(self) -> float:
         """Mass in kg that at the tip has the inertia k3 of link 2 about joint 2."""
         return abs(float(self.k[self.model.names.index("k3")])) / self.l2**2
 

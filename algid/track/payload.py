@@ -56,7 +56,7 @@ class Track:
     are each change's time in s, and the times between which it surely lies. `colour` is the rows' variance over
     that of sensor noise, slow errors included: above one, the arm's model lacks something. `explained` is the share
     of the torque's power, noise aside, that arm and payload explain. `holes` (h, 2) are the times from and to which
-    the log has no samples. `bare` is the mass in kg that at the tip would weigh on joint 2 as link 2 does.
+    the log has no samples. `tip_equivalent` is the mass in kg that at the tip would weigh on joint 2 as link 2 does.
     """
 
     stretches: list[Stretch]
@@ -69,7 +69,7 @@ class Track:
     colour: float
     explained: float
     holes: FloatArray
-    bare: float
+    tip_equivalent: float
 
 
 def track(source: Pass, arm: IdentifiedArm, covariance: FloatArray) -> Track:
@@ -127,7 +127,7 @@ def _weigh(cells: Cells, found: Edges, inner: Sequence[Cells], arm: IdentifiedAr
         colour=colour,
         explained=float(1 - left / signal) if signal > 0 else 0.0,
         holes=np.stack([cells.end[wide], cells.start[wide + 1]], axis=1),
-        bare=arm.bare,
+        tip_equivalent=arm.tip_equivalent,
     )
 
 
@@ -156,9 +156,9 @@ def cut_to(segment: Segment, start: float, end: float, shift: float) -> Segment 
 
     `shift` is the time in s after which a logged torque acts.
     """
-    told = Stencil(segment.dt, shift).torques(len(segment))  # the others serve the stencil
-    first = round((start - segment.start) / segment.dt) - told.start
-    last = round((end - segment.start) / segment.dt) + len(segment) - told.stop
+    given = Stencil(segment.dt, shift).torques(len(segment))  # the others serve the stencil
+    first = round((start - segment.start) / segment.dt) - given.start
+    last = round((end - segment.start) / segment.dt) + len(segment) - given.stop
     first, last = max(0, first), min(len(segment), last)
     return segment.part(first, last) if last - first > 1 else None
 

@@ -62,7 +62,7 @@ def _result(found: dict[str, Any], curve: Block) -> TrackResult:
             colour=float(found["excess"]),
             explained=float(found["explained"]),
             holes=np.array(found["holes"], dtype=np.float64).reshape(-1, 2),
-            bare=float(found["bare"]),
+            tip_equivalent=float(found["bare"]),
         ),
         log=LogSummary.model_validate(found["log"]),
         arm=found["arm"]["path"],

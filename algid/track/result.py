@@ -46,7 +46,7 @@ class TrackResult:
     @property
     def statuses(self) -> list[StretchStatus]:
         """Of each stretch."""
-        return [_status(stretch, self.track.bare) for stretch in self.track.stretches]
+        return [_status(stretch, self.track.tip_equivalent) for stretch in self.track.stretches]
 
     @property
     def complete(self) -> bool:
@@ -61,8 +61,8 @@ class TrackResult:
         return next((mass for time, mass in reversed(self.schedule) if time <= middle), 0.0)
 
 
-def _status(stretch: Stretch, bare: float) -> StretchStatus:
-    if not stretch.std < UNDETERMINED * max(abs(stretch.m_p), bare):
+def _status(stretch: Stretch, tip_equivalent: float) -> StretchStatus:
+    if not stretch.std < UNDETERMINED * max(abs(stretch.m_p), tip_equivalent):
         return StretchStatus.WEAK_EXCITATION
     if stretch.m_p + FAR * stretch.std < 0:
         return StretchStatus.NEGATIVE_MASS
@@ -91,7 +91,7 @@ def track_json(result: TrackResult) -> str:
         "changes": [dict(zip(("t", "from", "to"), row, strict=True)) for row in result.track.changes.tolist()],
         "explained": result.track.explained,
         "excess": result.track.colour,
-        "bare": result.track.bare,
+        "bare": result.track.tip_equivalent,
         "holes": result.track.holes.tolist(),
         "schedule": result.schedule,
         "arm": {"path": result.arm, "sha256": result.arm_sha256, "sentence": result.arm_sentence},

@@ -68,7 +68,7 @@ def test_the_mass_is_the_least_squares_one_and_its_squares_are_those_it_leaves()
 def test_a_kilogram_at_the_tip_adds_table_2_to_the_constants() -> None:
     l1, l2, g = CASE.arm.l1, CASE.arm.l2, 9.81
     assert ARM.unit.tolist() == pytest.approx([l1 * l2, g * l2, l2**2, g * l1, l1**2, 0, 0])
-    assert ARM.bare == pytest.approx(CASE.arm.constants()[2] / l2**2)
+    assert ARM.tip_equivalent == pytest.approx(CASE.arm.constants()[2] / l2**2)
 
 
 def test_scores_shift_with_constants_and_lengths_by_their_derivatives() -> None:

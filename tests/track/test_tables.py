@@ -56,7 +56,7 @@ def track(masses: list[float], std: float = 0.001, **changes: object) -> TrackRe
         holes=np.zeros((0, 2)),
         explained=0.999,
         colour=1.0,
-        bare=0.05,
+        tip_equivalent=0.05,
     )
     made = TrackResult(
         track=found, log=LOG, arm="arm.algid", arm_sha256="1" * 64, arm_sentence=None, settings={"l1": 0.2}, version="1"
