@@ -60,7 +60,7 @@ def whole_file(path: Path) -> Iterator[Path]:
             temporary.chmod(0o666 & ~mask)
             temporary.replace(path)
     finally:
-        with suppress(OSError):  # it may never have been made: what is told is why, not that
+        with suppress(OSError):  # it may never have been made: what is reported is why, not that
             temporary.unlink()
 
 

@@ -96,7 +96,7 @@ class ChannelReading:
 
 @dataclass(frozen=True)
 class Reading:
-    """Everything that a reader decided, or was told, about a log: how to read it the same way again.
+    """Everything that a reader decided, or was given, about a log: how to read it the same way again.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ class Reading:
     topics : topics that were read, the one that sets the time first
     clock : 'header', 'log' (the recorder's times) or 'column'
         'header' stands for the messages' own stamps, unless they turn out to stand still.
-    time_unit : unit of the times, None where it is told by the values only
+    time_unit : unit of the times, None where it is known from the values only
     zero, second_angle, drive, passive, signs, offsets : as in a profile
         Signs and offsets are in those of the channels too.
     unwrap : whether each joint's jumps by a turn were made continuous

@@ -1,6 +1,6 @@
 """Profiles: what a log's names, units and signs mean, in a file `algid.toml` beside the logs.
 
-Everything is optional; what a profile leaves out is told from the log. A key that is not known is refused.
+Everything is optional; what a profile leaves out is taken from the log. A key that is not known is refused.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Logs out of an object store onto this machine: of MCAP and Parquet what is needed, of everything else the whole.
 
-The format's own reader says what it needs. What it finds where is told by a few small parts of the object: the
+The format's own reader says what it needs. What it finds where is known from a few small parts of the object: the
 summary and the heads of the message indexes of an MCAP file, the footer of a Parquet file. What is fetched of an
 object lies in a sparse file of its size, at its own places; the rest are zeros, which no MCAP or Parquet reader takes
 for data. An object without such parts, or of which nearly all is needed, is fetched whole; its hash is known then.
@@ -176,7 +176,7 @@ def naming(copies: dict[Path, str]) -> Iterator[None]:
 
 
 def _fetched_in_part(part: Partial, profile: Profile | None) -> bool:
-    """Fetch what a reader needs; False where that cannot be told, or is nearly everything."""
+    """Fetch what a reader needs; False where that cannot be known, or is nearly everything."""
     try:
         part.fetch([(0, len(framing.MAGIC)), (part.size - _TAIL, part.size)])
         head = part.read(0, len(framing.MAGIC))

@@ -188,8 +188,8 @@ def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
 def time_of(record: JobRecord) -> datetime | None:
     """When the job's logs were taken, in UTC: as its manifest says, or as its first stamp does."""
     if record.job.time is not None:
-        told = datetime.fromisoformat(record.job.time)
-        return told.replace(tzinfo=UTC) if told.tzinfo is None else told.astimezone(UTC)
+        taken = datetime.fromisoformat(record.job.time)
+        return taken.replace(tzinfo=UTC) if taken.tzinfo is None else taken.astimezone(UTC)
     if record.start_ns is None or record.start_ns < FIRST_EPOCH_NS:
         return None
     return datetime.fromtimestamp(record.start_ns * 1e-9, UTC)

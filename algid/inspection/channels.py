@@ -124,8 +124,8 @@ def _in_degrees(log: Log, name: str, text: str) -> Finding:
     of_angle = name.startswith("theta")
     flag = "--angle-unit " if of_angle else f"--set {name}.unit="
     motor = f", --set {name}.gear_ratio=N for the angle of a motor behind its gear" if of_angle else ""
-    told = f"{flag}deg{motor}, or {flag}rad where it is right (profile: unit or gear_ratio of [{name}])"
-    return Finding("DEGREES", f"{text}: {told}", True)
+    mend = f"{flag}deg{motor}, or {flag}rad where it is right (profile: unit or gear_ratio of [{name}])"
+    return Finding("DEGREES", f"{text}: {mend}", True)
 
 
 def spikes(log: Log) -> Iterator[Finding]:

@@ -47,12 +47,12 @@ def examine(log: Log, *, gravity: float = 9.81, whole: bool = True) -> tuple[Fin
         return tuple(found)
     mended = mend(log, tried())
     if mended is not None:
-        told = f"use {' '.join(map(shlex.quote, mended.flags))} (profile: {mended.lines})"
+        advice = f"use {' '.join(map(shlex.quote, mended.flags))} (profile: {mended.lines})"
         if mended.another:
-            text = f"{mended.words}, by all that physics says ({mended.contradiction}); {told}"
+            text = f"{mended.words}, by all that physics says ({mended.contradiction}); {advice}"
             found.append(Finding("WRONG_CONVENTION", text, flags=mended.flags))
         else:
-            found.append(Finding("ZERO_OFFSET", f"{mended.words}; {told}", flags=mended.flags))
+            found.append(Finding("ZERO_OFFSET", f"{mended.words}; {advice}", flags=mended.flags))
     elif gravity > 0 and (figures := dynamic_figures(log)) is not None:
         found += gravity_findings(figures)
     return tuple(found)

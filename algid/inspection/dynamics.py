@@ -42,7 +42,7 @@ class DynamicFigures:
     gravity_share : float
         Share of the torques' variance that is lost without gravity.
     seen : float
-        How far gravity's columns stand out of all others, 0 to 1: below 0.1 its direction is not told.
+        How far gravity's columns stand out of all others, 0 to 1: below 0.1 its direction is not known.
     inertia : float, kg m^2
         k3 + k5 of the fit.
     """

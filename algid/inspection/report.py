@@ -55,7 +55,7 @@ def look(path: Path, read: Callable[[], T]) -> Look[T]:
     Raises
     ------
     LogError
-        As `contents`; what `read` raises is told in `refused`.
+        As `contents`; what `read` raises stands in `refused`.
     """
     kind, entries = contents(path)
     try:
@@ -88,7 +88,7 @@ def contents(path: Path) -> tuple[str, tuple[Entry, ...]]:
         from algid.readers.arrays import frame_of
 
         frame = frame_of(path, kind)
-        return kind, tuple(Entry(name, str(told), frame.height) for name, told in frame.schema.items())
+        return kind, tuple(Entry(name, str(dtype), frame.height) for name, dtype in frame.schema.items())
     return kind, ()
 
 
@@ -99,11 +99,11 @@ def _topics(path: Path) -> Iterator[Entry]:
 
     with opened(path) as (file, found):
         for number, channel in sorted(found.channels.items()):
-            told = f"{schema_name(found, channel) or 'no schema'}, {channel.message_encoding}"
+            form = f"{schema_name(found, channel) or 'no schema'}, {channel.message_encoding}"
             count = None if found.counts is None else found.counts.get(number, 0)
             shown = number in list(found.channels)[:_MOST_SHOWN]
             joints, fields = fields_shown(file, found, number) if shown else ((), ())
-            yield Entry(channel.topic, told, count, joints[:_MOST_SHOWN], fields[:_MOST_SHOWN])
+            yield Entry(channel.topic, form, count, joints[:_MOST_SHOWN], fields[:_MOST_SHOWN])
 
 
 def _parquet(path: Path) -> Iterator[Entry]:
@@ -122,8 +122,8 @@ def _csv(path: Path, kind: str) -> Iterator[Entry]:
     head = head_of(path, kind)
     dialect = detect(path, head)
     rows = _known(lambda: counted_rows(path, kind, dialect))
-    for name, told in kinds(path, head, dialect).items():
-        yield Entry(name, told, rows)
+    for name, dtype in kinds(path, head, dialect).items():
+        yield Entry(name, dtype, rows)
 
 
 def _known(count: Callable[[], int]) -> int | None:

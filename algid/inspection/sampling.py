@@ -88,9 +88,9 @@ def lost_steps(log: Log) -> int:
     power = np.sum(around**2, axis=0)
     share = np.sum(own * around, axis=0) / np.maximum(power, 1e-300)
     off = np.sqrt(np.sum((own - share * around) ** 2, axis=0))
-    told = (power > np.quantile(power, 0.25)) & (off < _LOST * np.sqrt(power))
-    lost = int(np.count_nonzero(told & (np.abs(share - 2) < _LOST)))
-    chance = int(np.count_nonzero(told & (np.abs(share) < _LOST)))
+    clear = (power > np.quantile(power, 0.25)) & (off < _LOST * np.sqrt(power))
+    lost = int(np.count_nonzero(clear & (np.abs(share - 2) < _LOST)))
+    chance = int(np.count_nonzero(clear & (np.abs(share) < _LOST)))
     return lost if lost > max(_LOST_SHARE * len(log), _FEWEST, _AGAINST * chance) else 0
 
 
@@ -111,8 +111,8 @@ def rests(log: Log, whole: bool) -> Iterator[Finding]:
     end = log.duration - after
     parts = [(before, f"for its first {before:.3g} s", f"--start {before:.4g}", f"start = {before:.4g}")]
     parts += [(after, f"for its last {after:.3g} s", f"--end {end:.4g}", f"end = {end:.4g}")]
-    if told := [part for part in parts if part[0] >= _REST]:
-        _, words, flags, lines = zip(*told, strict=True)
+    if long := [part for part in parts if part[0] >= _REST]:
+        _, words, flags, lines = zip(*long, strict=True)
         text = (
             f"the arm rests {' and '.join(words)}; where friction holds it there, the torque is not that of the "
             f"weight: leave the rest out with {' '.join(flags)} (profile: {', '.join(lines)})"

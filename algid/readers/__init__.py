@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def open_log(path: str | Path, profile: Profile | None = None) -> TableReader:
-    """Open a log of any format, told from its content; its samples are read by `TableReader.blocks`.
+    """Open a log of any format, known from its content; its samples are read by `TableReader.blocks`.
 
     Parameters
     ----------

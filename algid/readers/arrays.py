@@ -85,8 +85,8 @@ def frame_of(path: Path, kind: str) -> pl.DataFrame:
     except LogError:
         raise
     except Exception as error:  # whatever a damaged file makes of NumPy, SciPy or polars
-        told = str(error).split("\n", maxsplit=1)[0][:200]
-        raise LogError(f"{path}: the {kind} file cannot be read ({type(error).__name__}: {told})") from error
+        reason = str(error).split("\n", maxsplit=1)[0][:200]
+        raise LogError(f"{path}: the {kind} file cannot be read ({type(error).__name__}: {reason})") from error
     if flat.width > MOST_COLUMNS:
         raise LogError(f"{path}: {counted(flat.width, 'column')}; expected {MOST_COLUMNS} at most")
     return flat

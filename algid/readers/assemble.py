@@ -86,7 +86,7 @@ class TableReader:
         return Log(room.stamp_ns, room.theta, room.tau, self.origin, room.omega, notices)
 
     def _samples(self, rows: int) -> Iterator[tuple[SampleTable, tuple[Notice, ...]]]:
-        """Checked and sorted tables that are not empty, with what is to be told of each."""
+        """Checked and sorted tables that are not empty, with what is to be said of each."""
         notices, total = self.notices, 0
         held: tuple[SampleTable, tuple[Notice, ...]] | None = None
         for table in cut(self._finite(self._within(in_order(self.origin.path, self.tables(rows)))), rows):
@@ -97,8 +97,8 @@ class TableReader:
                 total += len(table)
                 held, notices = (table, notices), ()
         if total < 2:
-            told = held[1] + notices if held else notices
-            worst = sorted(told, key=lambda notice: not notice.lossy)[:1]
+            said = held[1] + notices if held else notices
+            worst = sorted(said, key=lambda notice: not notice.lossy)[:1]
             why = "".join(f" ({notice.text})" for notice in worst)
             raise LogError(f"{self.origin.path}: {counted(total, 'sample')}; a log needs two at least{why}")
         if held is not None:  # what the last tables tell, also where they are empty

@@ -115,8 +115,8 @@ def open_bag(path: Path, profile: Profile) -> TableReader:
     named = {name: profile.place(name) for name in CHANNELS if profile.channel(name).source}
     topic, sources, reading = profile.topic, dict[str, tuple[str, str]](), Reading(joints_told="profile")
     if not named.keys() >= set(JOINT_CHANNELS):
-        topic, sources, reading, told = _usual(path, profile)
-        said += told
+        topic, sources, reading, order = _usual(path, profile)
+        said += order
     for name, (own, field) in named.items():
         home = own or topic
         if home is None:
@@ -145,7 +145,7 @@ def open_bag(path: Path, profile: Profile) -> TableReader:
 
 
 def _usual(path: Path, profile: Profile) -> tuple[str, dict[str, tuple[str, str]], Reading, tuple[Notice, ...]]:
-    """The topic of the first message of joint states that fits, its channels' sources, its joints, what to tell."""
+    """The topic of the first message of joint states that fits, its channels' sources, its joints, what to say."""
     joints = profile.joints
     seen: set[str] = set()
     for topic, _, message in _messages(path, profile.topic, _TYPE):
@@ -247,8 +247,8 @@ def _messages(path: Path, topic: str | None, kind: str | None = None) -> Iterato
     except (LogError, GeneratorExit):
         raise
     except Exception as error:  # whatever a damaged bag makes of a third package
-        told = str(error).split("\n", maxsplit=1)[0][:200]
-        raise LogError(f"{path}: the bag cannot be read ({type(error).__name__}: {told})") from error
+        reason = str(error).split("\n", maxsplit=1)[0][:200]
+        raise LogError(f"{path}: the bag cannot be read ({type(error).__name__}: {reason})") from error
 
 
 def _loose(path: Path, topic: str | None, kind: str | None, store: Typestore) -> Iterator[tuple[str, int, Any]]:

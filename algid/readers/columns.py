@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class Columns:
     """By canonical channel its column; the units that names state; the unit of time, where known.
 
-    `time_told`: a name or a profile states the unit of time; otherwise it is only taken to be so. `others` has by
+    `time_stated`: a name or a profile states the unit of time; otherwise it is only taken to be so. `others` has by
     joint the column of its angle, of the joints that are not read; `reading` says which are and who said so.
     """
 
@@ -29,13 +29,13 @@ class Columns:
     units: Mapping[str, str]
     time_unit: str | None
     notices: tuple[Notice, ...] = ()
-    time_told: bool = False
+    time_stated: bool = False
     reading: Reading = field(default_factory=Reading)
     others: Mapping[str, str] = field(default_factory=dict)
 
     def dated(self) -> Columns:
         """The same with a time that holds dates or durations, which come in ns."""
-        return replace(self, time_unit="ns", time_told=True)
+        return replace(self, time_unit="ns", time_stated=True)
 
 
 def assign(
@@ -50,7 +50,7 @@ def assign(
         Every column of the file.
     profile : Profile
     stated : mapping
-        Units by column that the file tells elsewhere than in the columns' names.
+        Units by column that the file states elsewhere than in the columns' names.
     written : collection of str
         Columns that algid wrote into the file.
 
@@ -90,11 +90,11 @@ def assign(
     said += _of_foreign_units(path, sources, foreign, profile)
     said += _of_motors(path, sources, currents, profile)
     said += _of_other_units(sources, units, beside, profile)
-    time_told = profile.time_unit or units.get("t")
+    of_time = profile.time_unit or units.get("t")
     if all(sources[name] == name for name in ("t", *JOINT_CHANNELS)):
         units.setdefault("t", "s")  # algid's own names mean algid's own units
     others = other_joints(available, [sources["theta1"], sources["theta2"]])
-    return Columns(sources, units, time_told or units.get("t"), tuple(said), time_told is not None, reading, others)
+    return Columns(sources, units, of_time or units.get("t"), tuple(said), of_time is not None, reading, others)
 
 
 def _sources(
@@ -124,8 +124,8 @@ def _sources(
     missing = [name for name in ("t", *JOINT_CHANNELS) if name not in sources]
     if missing:
         flags, lines = _naming(missing)
-        told = f"{path}: no column for {', '.join(missing)}; found {_listed(available)}"
-        raise LogError(f"{told}; name them: {flags} (profile: {lines})")
+        text = f"{path}: no column for {', '.join(missing)}; found {_listed(available)}"
+        raise LogError(f"{text}; name them: {flags} (profile: {lines})")
     return sources, choice
 
 
@@ -147,22 +147,24 @@ def _of_foreign_units(
     """What to say of units that no joint's signal has; they are refused unless the user names the right one."""
     for name in [name for name in foreign if name in CHANNELS]:
         states = f"the column {sources[name]!r} for {name}"
-        told = profile.channel(name).unit
-        if told is None:
+        given = profile.channel(name).unit
+        if given is None:
             usual = "N m" if name.startswith("tau") else "rad"
             raise LogError(
                 f"{path}: {states} is in {foreign[name]!r}, which is no unit of a joint; say its "
                 f'unit if that is wrong: --set {name}.unit="{usual}" (profile: unit = "{usual}" of [{name}])'
             )
-        yield Notice("FOREIGN_UNIT", f"{states} states the unit {foreign[name]!r}, and is taken for {told} as told")
+        yield Notice("FOREIGN_UNIT", f"{states} states the unit {foreign[name]!r}, and is taken for {given} as told")
 
 
 def _of_motors(path: str, sources: Mapping[str, str], currents: Sequence[str], profile: Profile) -> Iterator[Notice]:
-    """What to say of motors' signals; beside joints' they are refused unless the user tells the gear."""
+    """What to say of motors' signals; beside joints' they are refused unless the user gives the gear."""
     for name in currents:
-        told = profile.channel(name).unit
-        if told in TORQUE:
-            text = f"{sources[name]!r} for {name} is a current by its name, and is taken for a torque in {told} as told"
+        given = profile.channel(name).unit
+        if given in TORQUE:
+            text = (
+                f"{sources[name]!r} for {name} is a current by its name, and is taken for a torque in {given} as told"
+            )
             yield Notice("CURRENT_AS_TORQUE", text)
     motors = [name for name in JOINT_CHANNELS if on_motor_side(sources[name])]
     geared = [name for name in CHANNELS if "gear_ratio" in profile.channel(name).model_fields_set]
@@ -182,12 +184,12 @@ def _of_other_units(
 ) -> Iterator[Notice]:
     """What to say where a file states another unit than the user does, or another beside a name than in it."""
     for name, unit in units.items():
-        told = profile.time_unit if name == "t" else profile.channel(name).unit
+        given = profile.time_unit if name == "t" else profile.channel(name).unit
         other = unit_of(beside.get(name, unit))
-        if told not in (None, unit) and not (told in TORQUE and unit in CURRENT):
-            text = f"the file states the unit {unit} for {name} ({sources[name]!r}), which is taken for {told} as told"
+        if given not in (None, unit) and not (given in TORQUE and unit in CURRENT):
+            text = f"the file states the unit {unit} for {name} ({sources[name]!r}), which is taken for {given} as told"
             yield Notice("OTHER_UNIT", text)
-        elif told is None and other not in (None, unit):
+        elif given is None and other not in (None, unit):
             text = (
                 f"the file states the unit {other} beside {name}; its name, {sources[name]!r}, says {unit}, which holds"
             )

@@ -73,7 +73,7 @@ def counted_rows(path: Path, kind: str, dialect: Dialect) -> int:
 def _frames(
     path: Path, kind: str, dialect: Dialect, columns: Columns, rows: int, most: int | None
 ) -> Iterator[pl.DataFrame]:
-    """Frames of about `rows` rows, over the first `most` rows where that is told."""
+    """Frames of about `rows` rows, over the first `most` rows where that is given."""
     import polars as pl
 
     done = 0
@@ -91,10 +91,10 @@ def _frames(
             if most is not None and done >= most:
                 return
     except pl.exceptions.PolarsError as error:
-        told = str(error).split("\n", maxsplit=1)[0]
-        found = re.search(r"could not parse `(.*?)` as dtype `\w+` at column '(\d+)'", told, re.DOTALL)
+        reason = str(error).split("\n", maxsplit=1)[0]
+        found = re.search(r"could not parse `(.*?)` as dtype `\w+` at column '(\d+)'", reason, re.DOTALL)
         if found is None:
-            raise LogError(f"{path}: the table cannot be read past row {done}: {told[:200]}") from error
+            raise LogError(f"{path}: the table cannot be read past row {done}: {reason[:200]}") from error
         raise LogError(
             f"{path}: column {dialect.columns[int(found[2])]!r}, past row {done}: expected a number, found "
             f"{found[1][:40]!r}; mend the file or name another column"

@@ -39,12 +39,12 @@ class Pages:
 
     @property
     def values(self) -> int:
-        """How many values they hold, -1 where that is not told."""
+        """How many values they hold, -1 where that is not stated."""
         return self.numbers.get(_VALUES, -1)
 
     @property
     def first(self) -> int:
-        """Where the first of them stands; 0 where that is not told."""
+        """Where the first of them stands; 0 where that is not stated."""
         offsets = (self.numbers.get(number, 0) for number in (_DICTIONARY, _DATA))
         return min((offset for offset in offsets if offset), default=0)
 
@@ -56,7 +56,7 @@ class Pages:
 
 @dataclass
 class Group:
-    """A row group: its rows, -1 where they are not told, and its columns."""
+    """A row group: its rows, -1 where they are not stated, and its columns."""
 
     rows: int = -1
     columns: list[Pages] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""Frames of a flat log's columns made into tables: their clock is told, rows that lack a value go, sums are verified.
+"""Frames of a flat log's columns made into tables: their clock is found, rows that lack a value go, sums are verified.
 
 float64 seconds since 1970 resolve 0.24 µs, so whole and fractional seconds are converted apart.
 """
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from algid.profile import Profile
 
     Frames = Callable[[Columns, int, int | None], Iterator[pl.DataFrame]]
-    """A fresh pass over columns in frames of so many rows, one column a channel; over the first rows only if told."""
+    """A fresh pass over columns in frames of so many rows, one column a channel; over the first rows only if given."""
 
 NO_COMPANION = Companion(None, {})
 MOST_COLUMNS = 4096
@@ -209,7 +209,7 @@ def tables(
             stamps = to_nanoseconds(times, unit or "s")
         except ValueError as error:
             raise LogError(f"{path}: {error} in column {columns.sources['t']!r}, past row {done}") from error
-        if unit and not (done or columns.time_told):
+        if unit and not (done or columns.time_stated):
             notices += _slow(columns.sources["t"], stamps, unit)
         channels = {name: frame[name].to_numpy() for name in frame.columns if name != "t"}
         done += frame.height
@@ -223,7 +223,7 @@ def tables(
 
 
 def _slow(column: str, stamps: IntArray, unit: str) -> list[Notice]:
-    """What to say where nobody told the unit of time and samples are too far apart for an arm."""
+    """What to say where nobody gave the unit of time and samples are too far apart for an arm."""
     step = _median_step(stamps - stamps[:1])
     if step <= _SLOWEST_NS:
         return []
@@ -236,7 +236,7 @@ def _slow(column: str, stamps: IntArray, unit: str) -> list[Notice]:
 
 
 def _complete(path: str, frames: Iterator[pl.DataFrame]) -> Iterator[tuple[pl.DataFrame, tuple[Notice, ...]]]:
-    """Frames without nulls: rows that lack a value are dropped and told of; the last row may break off."""
+    """Frames without nulls: rows that lack a value are dropped and counted; the last row may break off."""
     rows, lost, held = 0, 0, None
     for frame in frames:
         if held is not None:

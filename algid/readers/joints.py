@@ -1,4 +1,4 @@
-"""Which of two joints is the first along the arm, told by their names; and whether those not read are held still."""
+"""Which of two joints is the first along the arm, known from their names; and whether those not read are held still."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _LETTERS = {"a": 1, "b": 2, "i": 1, "ii": 2, "one": 1, "two": 2}
 
 
 def along_the_arm(names: Sequence[str]) -> tuple[tuple[str, str], Literal["names", "order"]]:
-    """The two joints from the base outwards, and whether their names told so or only their order in the log.
+    """The two joints from the base outwards, and whether their names say so or only their order in the log.
 
     Names tell by the one number in which they differ, by a place on an arm or leg (shoulder before elbow, base
     before anything), or by the letters a and b.
@@ -119,10 +119,10 @@ def moving_joints(positions: Mapping[str, str], tables: Tables, unit: float = 1.
     if not moved:
         return ()
     furthest = sorted(moved, key=lambda joint: -moved[joint])
-    told = ", ".join(f"{joint} by {moved[joint]:.2g} rad" for joint in furthest[:_NAMED])
+    listed = ", ".join(f"{joint} by {moved[joint]:.2g} rad" for joint in furthest[:_NAMED])
     more = f" and {len(moved) - _NAMED} more" if len(moved) > _NAMED else ""
     text = (
-        f"{counted(len(moved), 'other joint moves', 'other joints move')} meanwhile: {told}{more} (in the first "
+        f"{counted(len(moved), 'other joint moves', 'other joints move')} meanwhile: {listed}{more} (in the first "
         f"{counted(len(table), 'sample')}); what that does to the torques is in no two-link model: hold them still"
     )
     return (Notice("OTHER_JOINTS", text),)

@@ -142,7 +142,7 @@ def choose(
         The two joints to take where a log has more: numbers, or names as in ``/joint_states/elbow/position`` or
         ``elbow_pos``.
     named : collection of str
-        Canonical channels whose columns are told: what is chosen for them need not be plain.
+        Canonical channels whose columns are given: what is chosen for them need not be plain.
     passive : 1, 2 or None
         The joint without a motor, whose torque need not be there.
 
@@ -184,7 +184,7 @@ def choose(
 
 
 def _pairs(parts: dict[str, Name], joints: tuple[str, str] | None) -> dict[str, str]:
-    """By canonical channel its column, of the quantities that stand there for two joints, or for the two told."""
+    """By canonical channel its column, of the quantities that stand there for two joints, or for the two given."""
     chosen: dict[str, str] = {}
     for quantity in ("theta", "tau", "omega"):
         for stem in STEMS[quantity]:
@@ -200,7 +200,7 @@ def _pairs(parts: dict[str, Name], joints: tuple[str, str] | None) -> dict[str, 
 
 
 def _two(by_joint: dict[str, str], joints: tuple[str, str] | None) -> tuple[str, str] | None:
-    """The columns of the two joints told, else of the two there are, from the base outwards where their names tell."""
+    """The columns of the two joints given, else of the two there are, from the base outwards where their names tell."""
     if joints:
         found = [[key for key in by_joint if joint.lower() in (key, key.rpartition("/")[2])] for joint in joints]
         return (by_joint[found[0][0]], by_joint[found[1][0]]) if all(len(keys) == 1 for keys in found) else None

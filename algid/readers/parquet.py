@@ -142,8 +142,8 @@ def _readable(path: Path) -> Iterator[None]:
 
 
 def _damaged(path: Path, error: BaseException) -> LogError:
-    told = str(error).split("\n", maxsplit=1)[0][:200]
-    return LogError(f"{path}: the Parquet file is damaged or not one that can be read ({told}); copy it again")
+    reason = str(error).split("\n", maxsplit=1)[0][:200]
+    return LogError(f"{path}: the Parquet file is damaged or not one that can be read ({reason}); copy it again")
 
 
 def _footer(path: Path) -> Footer:
@@ -180,7 +180,7 @@ class _Groups:
     checked: bool = False
 
     def frames(self, columns: Columns, rows: int, most: int | None) -> Iterator[pl.DataFrame]:
-        """Frames of `rows` rows, the last of fewer, over the first `most` rows where that is told.
+        """Frames of `rows` rows, the last of fewer, over the first `most` rows where that is given.
 
         Columns come in two lots, since one lot takes one core.
         """
@@ -220,7 +220,7 @@ def _check_pages(path: Path, roots: Collection[str], summed: Collection[str] = (
 
 def _check_column(path: Path, stream: BinaryIO, pages: Pages, most: float, *, checksums: bool) -> None:
     place, seen = pages.first, 0
-    # the rows of a page of lists are not told
+    # the rows of a page of lists are not stated
     while place < pages.end and (seen < most or len(pages.path) > 1):
         stream.seek(place)
         try:

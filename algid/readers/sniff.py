@@ -1,4 +1,4 @@
-"""Which format a file has, told from its content: names lie, first bytes do not.
+"""Which format a file has, known from its content: names lie, first bytes do not.
 
 Compressed text, piece by piece, in bounded memory.
 """

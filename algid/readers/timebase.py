@@ -120,11 +120,11 @@ class Series:
 
     def error(self) -> str:
         """What linear interpolation costs: an eighth of the second differences, root mean square."""
-        told = []
+        costs = []
         for name, values in self.table.columns.items():
             bend = np.diff(values, 2) / 8
-            told.append(f"{name} {float(np.sqrt(np.mean(bend**2))) if bend.size else 0.0:.2g}")
-        return ", ".join(told)
+            costs.append(f"{name} {float(np.sqrt(np.mean(bend**2))) if bend.size else 0.0:.2g}")
+        return ", ".join(costs)
 
 
 def whole_topic(path: str, topic: str, channels: Collection[str], tables: Iterator[SampleTable]) -> Series:

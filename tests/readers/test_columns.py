@@ -82,7 +82,7 @@ def test_who_said_which_joint_is_the_first() -> None:
 
 
 @pytest.mark.parametrize(
-    ("header", "settings", "unit", "told"),
+    ("header", "settings", "unit", "stated"),
     [
         (PLAIN, {}, None, False),
         ("time_ms q1 q2 tau1 tau2", {}, "ms", True),
@@ -91,11 +91,11 @@ def test_who_said_which_joint_is_the_first() -> None:
         ("t theta1 theta2 tau1 tau2", {}, "s", False),
     ],
 )
-def test_the_unit_of_time(header: str, settings: dict[str, Any], unit: str | None, told: bool) -> None:
+def test_the_unit_of_time(header: str, settings: dict[str, Any], unit: str | None, stated: bool) -> None:
     """algid's own names mean seconds, and still are only taken to."""
     found = assigned(header, settings)
-    assert (found.time_unit, found.time_told) == (unit, told)
-    assert (found.dated().time_unit, found.dated().time_told) == ("ns", True)
+    assert (found.time_unit, found.time_stated) == (unit, stated)
+    assert (found.dated().time_unit, found.dated().time_stated) == ("ns", True)
 
 
 def said(found: Columns) -> list[tuple[str, str]]:

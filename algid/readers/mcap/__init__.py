@@ -45,8 +45,8 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
             places = list(dict.fromkeys(found.damage))
             where = "; ".join(places[:3]) + (f"; {len(places) - 3} more" if len(places) > 3 else "")
             left = str(error).removeprefix(f"{paths[0]}: ")
-            told = f"the MCAP file is damaged ({where}); copy it again; in what is left: {left}"
-            raise LogError(f"{paths[0]}: {told}") from error
+            text = f"the MCAP file is damaged ({where}); copy it again; in what is left: {left}"
+            raise LogError(f"{paths[0]}: {text}") from error
         truth = found.truth(paths[0])
         main = wanted.topics[0]
         rows = main.count(found)

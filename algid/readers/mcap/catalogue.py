@@ -115,9 +115,9 @@ class Catalogue:
         kind, known = (records.Schema, self.schemas) if code == framing.SCHEMA else (records.Channel, self.channels)
         one = parse(kind, content)
         if known.get(one.id, one) != one:
-            told = f"{kind.__name__.lower()} {one.id} is defined anew and differently"
+            text = f"{kind.__name__.lower()} {one.id} is defined anew and differently"
             using = (channel.id for channel in self.channels.values() if channel.schema_id == one.id)
-            raise RedefinedError(told, [one.id] if code == framing.CHANNEL else using)
+            raise RedefinedError(text, [one.id] if code == framing.CHANNEL else using)
         if one.id in known:
             self._agreed[code, content] = one
         return one
@@ -246,7 +246,7 @@ def _walked(file: File) -> Catalogue:
     for span in spans.all():
         try:
             records = span.records(file, file.read(span.start, span.length + span.index_length))
-        except DamagedError as error:  # told of when it is read
+        except DamagedError as error:  # reported when it is read
             found.damage.append(f"{error} (at byte {span.start})")
             found.spans.append(span)
             continue
@@ -293,7 +293,7 @@ class _Spans:
 
 
 def _missing(file: File, gaps: list[Gap], ended: int | None, found: Catalogue) -> list[Notice]:
-    """What to tell of gaps in the data, and of a file that breaks off; `ended` is where the data end, if they do."""
+    """What to say of gaps in the data, and of a file that breaks off; `ended` is where the data end, if they do."""
     inside = [gap for gap in gaps if ended is None or gap.start < ended]
     last = inside.pop() if inside and inside[-1].end == file.size else None
     said = []
@@ -307,8 +307,8 @@ def _missing(file: File, gaps: list[Gap], ended: int | None, found: Catalogue) -
         found.damage += [f"no record at byte {gap.start}" for gap in inside]
     if last is not None:
         length = counted(last.end - last.start, "byte")
-        told = f"chunk of {length}, read as far as it goes" if last.torn else f"record of {length}, left out"
-        text = f"the file breaks off: an unfinished {told}"
+        piece = f"chunk of {length}, read as far as it goes" if last.torn else f"record of {length}, left out"
+        text = f"the file breaks off: an unfinished {piece}"
         said.append(Notice("CUT_OFF", text, lossy=True))
         found.damage.append(f"it breaks off at byte {last.start}")
     elif ended is None:

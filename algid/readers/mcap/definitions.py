@@ -88,8 +88,8 @@ def _fields(name: str, text: str) -> tuple[Field, ...]:
             continue
         size = found["size"]
         if size and len(size.removeprefix("<=")) > _LONGEST_NUMBER:
-            told = f"a length of {counted(len(size), 'digit')} in the line {line.strip()[:60]!r}"
-            raise DefinitionError(f"{name}: {told}")
+            wrong = f"a length of {counted(len(size), 'digit')} in the line {line.strip()[:60]!r}"
+            raise DefinitionError(f"{name}: {wrong}")
         count = None if found["array"] is None else int(size) if size.isdigit() else -1
         fields.append(Field(found["name"], found["type"], count))
     if len(fields) > _MOST_FIELDS:
@@ -227,8 +227,8 @@ class _Parser:
                 while self._next() != ";":
                     pass
             else:
-                told = f"{kind[:40]!r} where module, struct, typedef or const was expected"
-                raise DefinitionError(f"{self.root}: {told}")
+                wrong = f"{kind[:40]!r} where module, struct, typedef or const was expected"
+                raise DefinitionError(f"{self.root}: {wrong}")
 
     def _structure(self, scope: tuple[str, ...]) -> None:
         name, members = self._next(), []

@@ -1,4 +1,4 @@
-"""Where a channel's messages lie within unpacked records: told by the message indexes, proved by the records.
+"""Where a channel's messages lie within unpacked records: given by the message indexes, proved by the records.
 
 An index has no checksum of its own, so it is believed only where the records it names, with the few others
 in between, tile the chunk without a gap. Otherwise the records are walked one by one.

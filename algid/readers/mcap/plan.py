@@ -1,4 +1,4 @@
-"""Which topics and fields to read: told by a profile, else found by looking at the first messages."""
+"""Which topics and fields to read: given by a profile, else found by looking at the first messages."""
 
 from __future__ import annotations
 
@@ -118,8 +118,8 @@ def _topic(
             best = (kind, missing, known, stamp)
     if best is None:
         mend = '--topic NAME, or --set CHANNEL.topic=NAME for one channel (profile: topic = "NAME")'
-        told = f"there is no message on topic {name!r}; found {listed(found)}; name another: {mend}"
-        raise NothingFoundError(f"{file.path}: {told}")
+        text = f"there is no message on topic {name!r}; found {listed(found)}; name another: {mend}"
+        raise NothingFoundError(f"{file.path}: {text}")
     kind, missing, known, stamp = best
     for channel in missing:
         raise LogError(
@@ -158,9 +158,9 @@ def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> _Usua
                     fitting.setdefault(name, usual)
                     break
                 if repeated := repeated_name(shape):
-                    told = f"messages on {name!r} name the joint {repeated!r} twice; name the fields by their places, "
+                    text = f"messages on {name!r} name the joint {repeated!r} twice; name the fields by their places, "
                     mend = '--set theta1.source="position[0]" … (profile: source = "position[0]" of [theta1] …)'
-                    refused.append(LogError(f"{file.path}: {told}{mend}"))
+                    refused.append(LogError(f"{file.path}: {text}{mend}"))
                 if len(joints) > 2 or (joints and profile and profile.joints):
                     many[name] = joints
                 elif not joints and names:
@@ -179,16 +179,16 @@ def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> _Usua
         )
     if many:
         name, joints = next(iter(many.items()))
-        told = f"{name!r} has {counted(len(joints), 'joint')} ({', '.join(joints[:12])})"
-        raise LogError(f"{file.path}: {told}; choose: --joints A,B (profile: joints = […])")
+        text = f"{name!r} has {counted(len(joints), 'joint')} ({', '.join(joints[:12])})"
+        raise LogError(f"{file.path}: {text}; choose: --joints A,B (profile: joints = […])")
     if refused:
         raise refused[0]
     if profile is not None and all(profile.channel(name).source for name in JOINT_CHANNELS):
         return None
     wanted = f"the joints {profile.joints}" if profile and profile.joints else "positions and efforts of two joints"
     mend = "--topic NAME --joints A,B, or --set tau1.topic=NAME --set tau1.source=FIELD … (profile: topic, joints, …)"
-    told = "; ".join([*dict.fromkeys(lacking)][:4]) or listed(found)
-    raise NothingFoundError(f"{file.path}: no topic holds {wanted}; found {told}; name topics and fields: {mend}")
+    there = "; ".join([*dict.fromkeys(lacking)][:4]) or listed(found)
+    raise NothingFoundError(f"{file.path}: no topic holds {wanted}; found {there}; name topics and fields: {mend}")
 
 
 def _fitting(topic: str, shape: Shape, joints: list[str], profile: Profile | None) -> _Usual | None:

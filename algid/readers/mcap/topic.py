@@ -1,4 +1,4 @@
-"""Which topic, and which fields of its messages, are the joints': told by a profile or by the messages.
+"""Which topic, and which fields of its messages, are the joints': given by a profile or found in the messages.
 
 One topic's numbers as tables: the channels that carry it, its fields, its clock.
 """
@@ -126,8 +126,8 @@ class Topic:
         """
         channels = channels_of(found, self.name, self.type)
         if not channels:
-            told = f"{path}: topic {self.name!r} is not in this file"
-            yield SampleTable(np.empty(0, np.int64), {}, (Notice("NO_TOPIC", told, lossy=True),))
+            text = f"{path}: topic {self.name!r} is not in this file"
+            yield SampleTable(np.empty(0, np.int64), {}, (Notice("NO_TOPIC", text, lossy=True),))
             return
         channel: Any = found.channels[min(channels)]
         wanted = dict(self.fields.paths)
@@ -173,8 +173,8 @@ class Topic:
                 still = self.clock != "header" and len(table) > 1 and not np.any(header != header[0])
                 self._chosen = "log" if still else "header"
                 if still:
-                    told = f"header stamps of {self.name!r} stand still at {header[0]} ns"
-                    notices = (Notice("LOG_TIME", f"{told}: the recorder's times are taken"),)
+                    text = f"header stamps of {self.name!r} stand still at {header[0]} ns"
+                    notices = (Notice("LOG_TIME", f"{text}: the recorder's times are taken"),)
             stamps = header if self._chosen == "header" else stamps
         if stamps is table.stamp_ns and len(table) and stamps.min() < 0:
             raise LogError(
@@ -219,6 +219,6 @@ class Topic:
             others &= frozenset[int]().union(*(span.channels or () for span in found.spans))
         if others:
             types = ", ".join(sorted({schema_name(found, found.channels[one]) or "no schema" for one in others})[:4])
-            told = f"topic {self.name!r} also carries messages of another type or definition ({types})"
-            said.append(Notice("OTHER_TYPE", f"{told}; they were not read", lossy=True))
+            text = f"topic {self.name!r} also carries messages of another type or definition ({types})"
+            said.append(Notice("OTHER_TYPE", f"{text}; they were not read", lossy=True))
         return said
