@@ -229,7 +229,10 @@ def _remove_unheld(found: Path) -> None:
 def _held(place: Path, strictly: bool) -> Iterator[None]:
     """Hold a file or folder; the system lets go of it however this process ends.
 
-    Not every file system can: raises `OSError` there, or where another process holds it, if asked to be strict.
+    Raises
+    ------
+    OSError
+        If the place cannot be opened; and, `strictly`, if its file system cannot hold it or another process does.
     """
     handle = os.open(place, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
     try:

@@ -48,8 +48,10 @@ def fetched() -> bytes:
 
     Raises
     ------
+    FileNotFoundError
+        If npm is missing.
     OSError, subprocess.SubprocessError
-        If npm is missing or fails.
+        If it fails.
     ValueError
         If it gives another script than the one that was tested.
     """

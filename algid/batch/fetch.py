@@ -198,6 +198,11 @@ def _wanted_of_mcap(part: Partial, profile: Profile | None) -> list[Range]:
     """The chunks that hold the joints, with the indexes behind them.
 
     The catalogue looks at the summary, and beyond it at heads of message indexes, metadata, and what lies between.
+
+    Raises
+    ------
+    UnforeseenError
+        If the file has no summary, one too large to fetch, or one that makes the catalogue look at the whole file.
     """
     from mcap import records
 

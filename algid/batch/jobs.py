@@ -181,7 +181,7 @@ def jobs_of(sources: Sequence[str], out: str, alone: str = "logs") -> list[Job]:
             raise SettingError(f"{source}: cannot look there ({error}); check its name and rights") from error
         for job in found:
             if job.name in jobs and jobs[job.name] != job:
-                raise _twice(job.name, jobs[job.name], job)
+                raise SettingError(_same_name(job.name, jobs[job.name], job))
             jobs[job.name] = job
     return [jobs[name] for name in sorted(jobs)]
 
@@ -236,11 +236,11 @@ def _paired(logs: Iterable[tuple[str, str]], alone: str) -> list[Job]:
         before = jobs.get(name, Job(name, robot=os.path.dirname(name) or None))  # noqa: PTH120  # a name, not a path
         now = replace(before, loaded=(path,)) if loaded else replace(before, logs=(path,))
         if before.loaded if loaded else before.logs:
-            raise _twice(name, before, now)
+            raise SettingError(_same_name(name, before, now))
         jobs[name] = now
     return list(jobs.values())
 
 
-def _twice(name: str, first: Job, second: Job) -> SettingError:
+def _same_name(name: str, first: Job, second: Job) -> str:
     paths = ", ".join([*first.logs, *first.loaded, *second.logs, *second.loaded])
-    return SettingError(f"{name}: two jobs of one name ({paths}); rename a log, or name the jobs in a manifest")
+    return f"{name}: two jobs of one name ({paths}); rename a log, or name the jobs in a manifest"

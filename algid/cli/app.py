@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import os
 from collections.abc import Callable, Iterable, Sequence
@@ -65,6 +66,11 @@ def _root(
     pass
 
 
+def _help(command: Callable[..., Any]) -> str:
+    """What users read of a command's docstring: all but what it raises, which reaches them as a line and exit code."""
+    return inspect.cleandoc(command.__doc__ or "").partition("\n\nRaises\n")[0]
+
+
 def gathered(names: Iterable[str], *, listed: bool = False) -> typer.Typer:
     """The application with the commands `names`, and with the profiles' where none of them is alone.
 
@@ -80,10 +86,11 @@ def gathered(names: Iterable[str], *, listed: bool = False) -> typer.Typer:
     wanted = list(names)
     for name in wanted:
         command = COMMANDS[name]()
-        made.command(name, cls=FiniteCommand, help=command.__doc__)((lambda: None) if listed else command)
+        made.command(name, cls=FiniteCommand, help=_help(command))((lambda: None) if listed else command)
     if len(wanted) != 1:
         profiles = typer.Typer(help="Profiles tell what a log's names, units and signs mean.", no_args_is_help=True)
-        profiles.command("new")(import_module("algid.cli.profile").new)
+        new = import_module("algid.cli.profile").new
+        profiles.command("new", help=_help(new))(new)
         made.add_typer(profiles, name="profile")
     return made
 

@@ -52,6 +52,11 @@ def batch(
     is done by the next run.
 
     Example: algid batch logs/ -o results --workers 2
+
+    Raises
+    ------
+    SettingError
+        If workers or their memory are given beside a scheduler, or the sources hold no log.
     """
     from algid.batch.jobs import jobs_of
     from algid.batch.lock import locked

@@ -31,6 +31,11 @@ def check(
     """Compare a result's errors with their limits, row by row; exit code 1 when one is over.
 
     Example: algid check case1-unloaded.algid --against truth --max-error 0.5
+
+    Raises
+    ------
+    typer.Exit
+        With `EXIT_FAILED` where an error is over its limit.
     """
     from algid.check import failed, judge
     from algid.results import read_result

@@ -19,6 +19,11 @@ def compare(
     """Lay results side by side: differences in σ from the first one, and which settings differ.
 
     Example: algid compare monday.algid friday.algid -o friday
+
+    Raises
+    ------
+    SettingError
+        If there are fewer than two results.
     """
     from rich.console import Console
 

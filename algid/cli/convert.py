@@ -27,6 +27,13 @@ def convert(
     Exit code 3 where samples of IN are missing.
 
     Example: algid convert rosbag2_2026/ arm.parquet --joints shoulder,elbow --zero hanging
+
+    Raises
+    ------
+    OutputError
+        If no format has the suffix of OUT, or OUT exists and may not be overwritten.
+    typer.Exit
+        At the end: with 3 where samples are missing, else with 0.
     """
     from algid.errors import OutputError
     from algid.readers import open_log

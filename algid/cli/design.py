@@ -90,6 +90,11 @@ def design(
     Ctrl-C ends the search early and keeps the best motion so far. Exit code 3 tells that a parameter stays open.
 
     Example: algid design case1 --range 1.2 --speed 3 --torque 1.5 --position-noise 1e-3 --torque-noise 1e-2
+
+    Raises
+    ------
+    typer.Exit
+        With `EXIT_INCOMPLETE` where a parameter stays open.
     """
     import shlex
 

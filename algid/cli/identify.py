@@ -59,6 +59,13 @@ def identify(
     Exit code 3 tells that a parameter could not be identified, that samples were lost, or that the result failed.
 
     Example: algid identify run-unloaded.mcap --loaded run-loaded.mcap -o results
+
+    Raises
+    ------
+    SettingError
+        If a log of estimates is asked for without a report, or the result's name is empty.
+    typer.Exit
+        With `EXIT_INCOMPLETE` where a parameter is not identified, samples are lost, or the verdict is Failed.
     """
     import shlex
 

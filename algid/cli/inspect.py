@@ -31,6 +31,11 @@ def inspect(
     Exit code 2 for a log that would be refused, 3 where samples are missing.
 
     Example: algid inspect arm.mcap --joints shoulder,elbow --zero hanging
+
+    Raises
+    ------
+    typer.Exit
+        At the end: with 2 for a log that would be refused, 3 where samples are missing, else with 0.
     """
     import json
 

@@ -18,6 +18,11 @@ def new(
     """Write a profile with everything that can be set, filled in with what a log tells.
 
     Example: algid profile new arm.mcap -o algid.toml
+
+    Raises
+    ------
+    OutputError
+        If the profile exists and may not be overwritten.
     """
     from algid.errors import OutputError
     from algid.files import whole_file

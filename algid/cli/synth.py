@@ -86,6 +86,11 @@ def synth(
     Velocities are in the logs only where angles are exact: with noise or an encoder the arm measures none.
 
     Example: algid synth case1 -o logs --position-noise 1e-3 --torque-noise 1e-2 --duration 10 --torque wide
+
+    Raises
+    ------
+    SettingError
+        If a flag contradicts the planned motion, or the duration is less than two samples.
     """
     from algid.errors import SettingError
     from algid.files import refuse_existing

@@ -35,6 +35,11 @@ def track(
     Exit code 3 tells that a stretch could not be weighed, that samples were lost, or that the track failed.
 
     Example: algid track picking.mcap --parameters case1-unloaded.algid -o tracks
+
+    Raises
+    ------
+    typer.Exit
+        With `EXIT_INCOMPLETE` where a stretch is not weighed, samples are lost, or the verdict is Failed.
     """
     import shlex
 

@@ -40,6 +40,11 @@ def validate(
     """Print RMSE, normalised RMSE and R² of the predicted torque; exit code 1 past --max-nrmse.
 
     Example: algid validate run1-unloaded.algid run2-unloaded.mcap --max-nrmse 0.3
+
+    Raises
+    ------
+    typer.Exit
+        With `EXIT_FAILED` where a limit is given and the normalised RMSE is past it or missing.
     """
     from algid.identification.identify import reused
     from algid.identification.source import open_sources, read_otherwise

@@ -83,19 +83,16 @@ def links_of(k: Mapping[str, float], gravity: float, l1: float, knowns: Knowns, 
     arm = _Free(s2, h2, h, k["k4"] / gravity if gravity else None, l1, knowns)
     low, high = s2**2 / h2, h / l1**2
     if not low < high:
-        raise _refused(file, knowns, f"the rotor leaves link 1 no inertia: k5 - rotor1 is {h:.4g} kg m²", "rotor1")
+        why = f"the rotor leaves link 1 no inertia: k5 - rotor1 is {h:.4g} kg m²"
+        raise SettingError(_refusal(file, knowns, why, "rotor1"))
     if knowns.m1 is not None and gravity:
         low, high = _within(arm, knowns.m1, low, high, file, knowns)
     m2 = knowns.m2
     if m2 is None:
         m2 = arm.nearest(low, high)
     elif not low < m2 < high:
-        raise _refused(
-            file,
-            knowns,
-            f"with link 2 of {m2:g} kg an inertia comes out negative; between {low:.4g} and {high:.4g} kg",
-            "m2",
-        )
+        why = f"with link 2 of {m2:g} kg an inertia comes out negative; between {low:.4g} and {high:.4g} kg"
+        raise SettingError(_refusal(file, knowns, why, "m2"))
     return arm.first(m2), arm.second(m2)
 
 
@@ -107,14 +104,15 @@ def _within(arm: _Free, m1: float, low: float, high: float, file: str, knowns: K
     if square > 0:
         low, high = max(low, middle - math.sqrt(square)), min(high, middle + math.sqrt(square))
     if square <= 0 or low >= high:
-        raise _refused(file, knowns, f"with link 1 of {m1:g} kg a mass or an inertia comes out negative", "m1")
+        why = f"with link 1 of {m1:g} kg a mass or an inertia comes out negative"
+        raise SettingError(_refusal(file, knowns, why, "m1"))
     return low, high
 
 
-def _refused(file: str, knowns: Knowns, why: str, name: str) -> SettingError:
+def _refusal(file: str, knowns: Knowns, why: str, name: str) -> str:
     others = " or ".join(f"--{other}" for other in knowns.given if other != name)
     flag = "--" + name
-    return SettingError(f"{flag}: {file}: {why}; check {flag}{' or ' + others if others else ''}, or leave it out")
+    return f"{flag}: {file}: {why}; check {flag}{' or ' + others if others else ''}, or leave it out"
 
 
 @dataclass(frozen=True)

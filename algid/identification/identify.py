@@ -98,6 +98,8 @@ def identify(
     ------
     AlgidError
         If a log cannot be used, or nothing can be written.
+    SettingError
+        If logs are to be cross-validated of which there is one alone.
     ValueError
         If there is neither an unloaded log nor `parameters`.
     """

@@ -131,9 +131,14 @@ def pieces(path: Path, name: str, size: int = _PIECE) -> Iterator[bytes]:
 
 
 def _zstd(raw: BinaryIO) -> Iterator[bytes]:
-    """The unpacked bytes of one zstd frame after another; `EOFError` where the last one breaks off.
+    """The unpacked bytes of one zstd frame after another.
 
     A stream reader of the library takes a cut file for a whole one.
+
+    Raises
+    ------
+    EOFError
+        If the last frame breaks off, or one is damaged.
     """
     import zstandard
 

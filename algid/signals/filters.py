@@ -98,6 +98,11 @@ def butterworth(x: FloatArray, dt: float, cutoff: float, order: int) -> FloatArr
     Its response |H|² = |1 + z|^2n / (|1 + z|^2n + γ |1 - z|^2n), γ = tan(π cutoff dt)^-2n, is that of the minimum
     of |S (y - x)|² + γ |D y|² with the n-fold sum S and difference D of neighbours: one banded system, whose ends
     are free. N must be above n.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the system is not positive definite in double precision: the cutoff is too low for the order.
     """
     from scipy.linalg import lapack
 

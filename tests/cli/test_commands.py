@@ -84,6 +84,15 @@ def test_help_has_an_example_for_every_command() -> None:
     assert "--install-completion" in Outcome("--help").out
 
 
+@pytest.mark.parametrize("command", ["convert", "profile new"])
+def test_help_leaves_out_what_the_function_raises(command: str) -> None:
+    name, *rest = command.split()
+    shown = Outcome(name, *rest, "--help").out
+    assert f"Example: algid {command} " in shown
+    assert "Raises" not in shown
+    assert "OutputError" not in shown
+
+
 def test_help_of_synth_names_its_options() -> None:
     shown = Outcome("synth", "--help").out
     for option in ("--format", "--rate", "--duration", "--torque", "--initial", "--encoder-bits", "--jitter", "--drop"):

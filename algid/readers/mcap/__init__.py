@@ -31,7 +31,9 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
     Raises
     ------
     LogError
-        If no topic holds the joints, a message is encoded in an unknown way, or the file cannot be read.
+        If a message is encoded in an unknown way, or the file cannot be read or is damaged and holds no joints.
+    NothingFoundError
+        If no topic of a sound file holds the joints.
     """
     from algid.readers.mcap.plan import NothingFoundError, plan
 

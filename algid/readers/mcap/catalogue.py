@@ -187,6 +187,11 @@ def _check_listed(file: File, chunks: list[ChunkIndex], statistics: Any, end: in
 
     Chunks lie in the file and do not overlap, their indexes list as many messages as the statistics count, for every
     channel, and no message or chunk stands beside those that are listed.
+
+    Raises
+    ------
+    DamagedError
+        If any of that is not so.
     """
     for chunk in chunks:
         last = chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length

@@ -128,7 +128,7 @@ def _opened(file: File, catalogue: Catalogue, span: Span, channels: frozenset[in
     """What a span holds, or the batch that says why it is lost.
 
     No message is read behind a record that gives its channel another meaning.
-    """
+    """  # noqa: DOC501  # what is raised is caught here: it is why the span is lost
     content = b""
     try:
         content = file.read(span.start, span.length + span.index_length)
