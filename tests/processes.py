@@ -29,6 +29,8 @@ from algid.runtime import bound_by_environment
 ROOT = Path(__file__).parents[1]
 SERVER = "from tests.processes import serve; serve()"
 LARGEST = 1 << 20  # bytes of a request
+FRESH = "ALGID_TESTS_FRESH"
+"""Set where a fork of what is loaded cannot be trusted: old Arrow and Polars leave locks held in it."""
 LOADED = (
     "polars", "pyarrow.csv", "pyarrow.fs", "pyarrow.parquet", "scipy.integrate", "scipy.interpolate", "scipy.linalg",
     "scipy.optimize", "scipy.stats", "plotly.graph_objects", "plotly.subplots", "rich.progress",
@@ -55,7 +57,13 @@ def begin(
     *arguments: object, stdout: int, stderr: int, cwd: Path | None = None, env: Mapping[str, str] | None = None
 ) -> Callable[[], int]:
     """Start `algid` with these descriptors; what is returned waits for its end and gives the exit code."""
-    request = {"argv": ["algid", *map(str, arguments)], "cwd": str(cwd or Path.cwd()), "env": dict(env or os.environ)}
+    argv, own_env = ["algid", *map(str, arguments)], dict(env or os.environ)
+    if FRESH in os.environ:
+        command = [sys.executable, "-m", *argv]
+        return subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=stdout, stderr=stderr, cwd=cwd, env=own_env
+        ).wait
+    request = {"argv": argv, "cwd": str(cwd or Path.cwd()), "env": own_env}
     server = _server()
     socket.send_fds(server, [json.dumps(request).encode()], [stdout, stderr])
 
