@@ -28,7 +28,7 @@ BETWEEN = frozenset(
     )
 )
 """What no adjective of a noun is."""
-TEXTS = ("kind", "name", "times", "told", "wider")
+TEXTS = ("kind", "listed", "name", "times", "wider")
 """Names of what is text already."""
 
 

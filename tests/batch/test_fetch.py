@@ -57,6 +57,7 @@ def _same(copy: Staged, path: Path, profile: Profile | None = None) -> bool:
     return _told(one) == _told(other)
 
 
+@pytest.mark.slow
 def test_of_a_log_with_cameras_the_joints_chunks_are_fetched(served: Served, log: Log, tmp_path: Path) -> None:
     path = tmp_path / "cameras.mcap"
     with_cameras(path, log, images=32)

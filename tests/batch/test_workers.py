@@ -64,6 +64,7 @@ def test_arguments_that_cannot_travel_fail_their_own_call(workers: Workers) -> N
     assert workers.submit(calls.add, 1, 1).result() == 2
 
 
+@pytest.mark.slow
 def test_a_call_past_its_time_fails_alone_and_its_worker_is_replaced() -> None:
     with Workers(1, timeout=3.0) as executor:  # the first call waits for the process, not within its time
         futures = [executor.submit(calls.spin), executor.submit(calls.add, 1, 1)]

@@ -45,6 +45,7 @@ def test_a_failure_is_one_for_a_reader_that_leaves_too(result: Path) -> None:
     assert done.returncode == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
 def test_terminals_without_greek_are_spelled_to(result: Path, encoding: str) -> None:
     env = {**os.environ, "PYTHONIOENCODING": encoding, "COLUMNS": "80"}

@@ -58,6 +58,7 @@ def on_a_terminal(*arguments: object, **environment: str) -> tuple[str, str]:
         return printed.read().decode(), seen.decode()
 
 
+@pytest.mark.slow
 def test_a_terminal_is_shown_stages_and_samples_and_is_left_clean(path: Path, tmp_path: Path) -> None:
     printed, seen = on_a_terminal("identify", path, "-o", tmp_path)
     assert "reading" in seen

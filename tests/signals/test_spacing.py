@@ -148,6 +148,7 @@ def simulated(extra: FloatArray, late: FloatArray) -> Log:
     return Log(np.rint(stamps * 1e9).astype(np.int64), theta, tau, Origin("log", "test", {}))
 
 
+@pytest.mark.slow
 def test_pairs_two_microseconds_apart_leave_the_estimates_alone() -> None:
     nothing = np.array([], np.int64)
     four = np.array([500, 1400, 2300, 3700])

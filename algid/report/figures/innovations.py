@@ -169,8 +169,8 @@ def _count(curve: Curve) -> str:
 
 def _note(curves: Curves, joints: list[int], result: Result) -> str:
     """How many values lie inside the bands, and what the estimator's own test says."""
-    counts = " and ".join(_count(curves[CORRELATION, joint]) for joint in joints)
-    note = f"Inside the band: {counts} correlations of joints 1 and 2"
+    listed = " and ".join(_count(curves[CORRELATION, joint]) for joint in joints)
+    note = f"Inside the band: {listed} correlations of joints 1 and 2"
     white = [curves[WHITENED, joint] for joint in joints if (WHITENED, joint) in curves]
     note += f", {' and '.join(map(_count, white))} frequencies." if white else "."
     fit = result.fit
