@@ -1,8 +1,8 @@
 """What tells that estimates are wrong: bounds of physics, terms without worth, logs of another arm.
 
-Physics demands a positive definite mass matrix, no negative friction, mass or length. M(θ) is positive definite for
-every θ2 where M22 > 0 and det M > 0; the determinant is concave in cos θ2, so its least value lies at θ2 = 0 or
-θ2 = π. Eq. (2), with the rotor inertia j2 in M22.
+Physics demands a positive definite mass matrix, no negative friction, mass, inertia k5 or length. M(θ) is positive
+definite for every θ2 where M22 > 0 and det M > 0; the determinant is concave in cos θ2, so its least value lies at
+θ2 = 0 or θ2 = π. Eq. (2), with the rotor inertia j2 in M22.
 
 A term's worth is the fall of the likelihood when its coefficients are set to zero, which near the estimate is
 the Wald statistic. It is formed with the covariance that the error bars rest on, so that coloured residuals do
@@ -26,7 +26,7 @@ from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Normal
 from algid.model import TERMS, Model
 
-_NOT_NEGATIVE = ("k6", "k7", "f1", "f2", "j2", "m_p", "l1", "l2")
+_NOT_NEGATIVE = ("k5", "k6", "k7", "f1", "f2", "j2", "m_p", "l1", "l2")
 _NUDGE = 1e-6  # of a parameter's size: step of the differences
 FAR_BEYOND = 3.0
 """Standard deviations past a bound of physics that chance does not explain."""

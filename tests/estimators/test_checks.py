@@ -269,6 +269,9 @@ def test_constants_of_no_length_and_exchanged_logs_break_bounds(bench: Bench) ->
     assert broken.distance is not None
     assert broken.distance > 20
     assert not [bound for bound in broken_bounds(fit) if bound.bound == "k1 k2 >= 0"]
+    inside_out = replace(fit, values=fit.values * np.array([1, 1, -1, 1, -1, 1, 1]))  # det M is positive again
+    (broken,) = [bound for bound in broken_bounds(inside_out) if bound.bound == "k5 >= 0"]
+    assert broken.distance == pytest.approx(fit.values[4] / fit.std[4])
     both = weak.fit([lambda: [bench.log(loaded=True, sigma=1e-3)]], [lambda: [bench.log(sigma=1e-3)]])
     assert any(warning.startswith("EXCHANGED_LOGS") for warning in fit_warnings(both))
     right = weak.fit([lambda: [bench.log(sigma=1e-3)]], [lambda: [bench.log(loaded=True, sigma=1e-3)]])
