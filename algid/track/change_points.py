@@ -135,17 +135,21 @@ def cuts(A: FloatArray, B: FloatArray, penalty: float, shortest: int) -> list[in
     best = np.full(count + 1, np.inf)
     best[0] = -penalty
     last = np.zeros(count + 1, dtype=np.int64)
+    # A start that a cut at `end` would serve as well is of no more use where that cut may stand: `shortest` later.
+    until = np.full(count + 1, count + 1)
     open_: list[int] = []
     for end in range(shortest, count + 1):
         if end == shortest or end - shortest >= shortest:
             open_.append(end - shortest)
         starts = np.array(open_)
+        starts = starts[until[starts] > end]
         information = np.maximum(a[end] - a[starts], 1e-300)
         value = best[starts] - (b[end] - b[starts]) ** 2 / information
         place = int(np.argmin(value))
         best[end], last[end] = value[place] + penalty, starts[place]
-        kept = value <= best[end]
-        open_ = starts[kept].tolist()
+        beaten = starts[value > best[end]]
+        until[beaten] = np.minimum(until[beaten], end + shortest)
+        open_ = starts.tolist()
     found = [int(last[-1])]
     while found[-1] > 0:
         found.append(int(last[found[-1]]))

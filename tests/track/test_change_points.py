@@ -6,7 +6,7 @@ from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from algid.arm import FloatArray
@@ -52,6 +52,7 @@ def brute(A: FloatArray, B: FloatArray, penalty: float, shortest: int) -> list[i
 
 
 @settings(max_examples=60)
+@example(seed=10_000, count=13, shortest=3, penalty=3.0)  # a start that was given up before its better might stand
 @given(seed=st.integers(0, 10_000), count=st.integers(3, 13), shortest=st.integers(1, 4), penalty=st.floats(0.1, 30.0))
 def test_cuts_are_the_best_of_all(seed: int, count: int, shortest: int, penalty: float) -> None:
     rng = np.random.default_rng(seed)
