@@ -156,10 +156,10 @@ def constrained(fit: Fit) -> Fit:
         disobeyed = broken_bounds(moved)
         if not disobeyed:
             note = f"--constrain enforces {_named(enforced)}, which the logs contradict"
-            return replace(moved, note=_noted(fit, note))
+            return moved.noted(note)
     note = f"--constrain cannot obey {_named(disobeyed)}: no estimates within the bounds were found"
     status: tuple[Status, ...] = tuple("NOT_CONVERGED" if word == "OK" else "NOT_IDENTIFIABLE" for word in fit.status)
-    return replace(fit, converged=False, status=status, note=_noted(fit, note))
+    return replace(fit, converged=False, status=status).noted(note)
 
 
 def _named(bounds: Sequence[BrokenBound]) -> str:
@@ -167,10 +167,6 @@ def _named(bounds: Sequence[BrokenBound]) -> str:
         b.bound if b.distance is None else f"{b.bound} ({b.distance:.2g} standard deviations beyond)" for b in bounds
     )
     return ", ".join(sentences)
-
-
-def _noted(fit: Fit, note: str) -> str:
-    return note if fit.note is None else f"{fit.note}; {note}"
 
 
 _UNLIKE = 0.5  # of the larger of two values: more than any error of a model that is of use

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
@@ -102,6 +102,16 @@ class Fit:
         """95 % intervals (Q, 2)."""
         half = self.quantile * self.std
         return np.stack([self.values - half, self.values + half], axis=1)
+
+    def marked(self, status: Status, names: Collection[str] | None = None) -> Fit:
+        """The fit with `status` in the place of OK, for the parameters `names`, by default all."""
+        own = zip(self.names, self.status, strict=True)
+        marked = (status if word == "OK" and (names is None or name in names) else word for name, word in own)
+        return replace(self, status=tuple(marked))
+
+    def noted(self, note: str) -> Fit:
+        """The fit with one more thing to say of it."""
+        return replace(self, note=note if self.note is None else f"{self.note}; {note}")
 
     def spread(self, share: FloatArray) -> float:
         """Standard deviation of the sum `share` (Q,) @ values; infinite where the logs leave that sum open.

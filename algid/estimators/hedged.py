@@ -17,7 +17,7 @@ import numpy as np
 from algid.estimators import weak
 from algid.estimators.combine import FEWEST_LOGS, Prior
 from algid.estimators.diagnostics import joints_apart
-from algid.estimators.fit import Fit, Status, widened
+from algid.estimators.fit import Fit, widened
 from algid.estimators.identifiability import STILL
 from algid.estimators.selection import FIRST_TERMS
 from algid.estimators.weak import Source, WeakSettings
@@ -64,13 +64,8 @@ def hedged(
             added.append("delay")
         note = f"{note}, with error bars as if it had {', '.join(added)} too"
     doubt = _doubt(fit, unloaded, loaded, settings)
-    if doubt is None:
-        return replace(fit, covariance=covariance, note=note)
-    status: tuple[Status, ...] = tuple(
-        "WEAK_EXCITATION" if word == "OK" and name in RIGID else word
-        for name, word in zip(fit.names, fit.status, strict=True)
-    )
-    return replace(fit, covariance=covariance, status=status, note=f"{note}; {doubt}" if note else doubt)
+    fit = replace(fit, covariance=covariance, note=note)
+    return fit if doubt is None else fit.marked("WEAK_EXCITATION", RIGID).noted(doubt)
 
 
 def _doubt(fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings) -> str | None:

@@ -111,8 +111,7 @@ def fit(
             c[-1] = 0.0
         found = _solved(sources, settings, c, kind)
         if found is None:
-            status = tuple("NOT_CONVERGED" if word == "OK" else word for word in start.status)
-            return replace(start, status=status, converged=False)
+            return replace(start.marked("NOT_CONVERGED"), converged=False)
         logs += found
     if shared.delay:
         logs = [replace(log, c0=np.append(log.c0[:-1], log.c0[-1] + base)) for log in logs]

@@ -126,8 +126,7 @@ def fit(
     except np.linalg.LinAlgError:
         settled, iterations = False, 0
     if not settled:
-        failed = tuple("NOT_CONVERGED" if word == "OK" else word for word in start.status)
-        return replace(start, status=failed, converged=False, iterations=iterations)
+        return replace(start.marked("NOT_CONVERGED"), converged=False, iterations=iterations)
     whiteness = judge(reduce(add, [outcome.innovations for outcome in outcomes]))
     informations = [outcome.information for outcome in outcomes]
     samples = int(_count(outcomes))
