@@ -36,6 +36,9 @@ from algid.signals.differences import HELD, POINTS, Stencil, held_torque
 from algid.signals.filters import recursion
 from algid.signals.segments import Segment
 
+_ROUNDING = 8 * np.finfo(np.float64).eps
+"""A pivot's least share of its diagonal: below it, every digit of the pivot is lost."""
+
 
 @dataclass(frozen=True, eq=False)
 class NoiseLevels:
@@ -257,7 +260,12 @@ def covariance_factor(H: FloatArray, *, held: bool = False) -> FloatArray:
     correlation = np.convolve(HELD, HELD)[2:] if held else np.ones(1)
     for lag, value in enumerate(correlation):
         band[:, :, 2 * lag] += value
+    diagonal = band[:, :, 0].ravel().copy()
     factor, info = lapack.dpbtrf(band.reshape(2 * n, -1).T, lower=1, overwrite_ab=1)
+    if info == 0:
+        # Whether a pivot of nothing but rounding comes out below zero depends on the processor's kernels.
+        lost = np.flatnonzero(factor[0] ** 2 < _ROUNDING * diagonal)
+        info = lost[0] + 1 if lost.size else 0
     if info != 0:
         raise np.linalg.LinAlgError(f"the covariance of the torque residual is not positive definite (row {info})")
     return factor

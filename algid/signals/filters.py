@@ -6,8 +6,8 @@ Time Signal Processing, sec. 7.5), and exact for angles that are polynomials of 
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
-from math import comb
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from algid.arm import FloatArray
 _KAISER_BETA = 7.0  # stop band at -70 dB
 _PERIODS = 2.5  # half length of a kernel in periods of its bandwidth
 _LEAST = 3  # half length that three odd moments ask for, however slowly a log was sampled
+_SETTLED = 1.0  # periods of a Butterworth cutoff, times its order, after which it forgets to some 1e-4
 _ROWS = 32  # outputs a matrix product makes at once
 
 
@@ -87,41 +88,62 @@ def smoothed(x: FloatArray, dt: float, bandwidth: float) -> FloatArray:
     kernel = smoother(dt, bandwidth)
     reach = min(kernel.size // 2, x.shape[1] - 1)
     kernel = kernel[kernel.size // 2 - reach : kernel.size // 2 + reach + 1]
-    before = 2 * x[:, :1] - x[:, reach:0:-1]
-    after = 2 * x[:, -1:] - x[:, -2 : -reach - 2 : -1]
-    return correlate(np.concatenate([before, x, after], axis=1), kernel / kernel.sum())
+    return correlate(_reflected(x, reach), kernel / kernel.sum())
 
 
 def butterworth(x: FloatArray, dt: float, cutoff: float, order: int) -> FloatArray:
     """Signals (m, N) after a digital Butterworth filter of `order` and `cutoff` Hz, forwards and backwards.
 
-    Its response |H|² = |1 + z|^2n / (|1 + z|^2n + γ |1 - z|^2n), γ = tan(π cutoff dt)^-2n, is that of the minimum
-    of |S (y - x)|² + γ |D y|² with the n-fold sum S and difference D of neighbours: one banded system, whose ends
-    are free. N must be above n.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If the system is not positive definite in double precision: the cutoff is too low for the order.
+    The filter is the bilinear transform of the analogue one, in sections of second order (Oppenheim & Schafer,
+    Discrete-Time Signal Processing, sec. 6.3 and 7.1). Both ends continue by point reflection, over
+    `_SETTLED` × `order` periods of the cutoff. The sections start at rest around the first sample: constants are
+    kept exactly.
+    N must be above 1.
     """
+    reach = min(math.ceil(_SETTLED * order / (cutoff * dt)), x.shape[1] - 1)
+    y = _reflected(x, reach)
+    for _ in range(2):  # there, and back again
+        start = y[:, :1].copy()
+        y = y - start
+        for numerator, denominator in _sections(cutoff * dt, order):
+            y = _section(numerator, denominator, y)
+        y = (y + start)[:, ::-1]
+    return np.ascontiguousarray(y[:, reach : reach + x.shape[1]])
+
+
+def _sections(cutoff: float, order: int) -> list[tuple[FloatArray, FloatArray]]:
+    """Numerators and denominators (3,) of a Butterworth low pass; `cutoff` in periods a sample."""
+    warped = np.tan(np.pi * cutoff)
+    sections = []
+    for pair in range(order // 2):
+        damping = 2 * np.sin(np.pi * (2 * pair + 1) / (2 * order)) * warped
+        scale = 1 + damping + warped**2
+        numerator = warped**2 / scale * np.array([1.0, 2.0, 1.0])
+        denominator = np.array([1.0, 2 * (warped**2 - 1) / scale, (1 - damping + warped**2) / scale])
+        sections.append((numerator, denominator))
+    if order % 2:
+        numerator = warped / (1 + warped) * np.array([1.0, 1.0, 0.0])
+        sections.append((numerator, np.array([1.0, (warped - 1) / (1 + warped), 0.0])))
+    return sections
+
+
+def _section(numerator: FloatArray, denominator: FloatArray, x: FloatArray) -> FloatArray:
+    """Signals (m, N) after one section that was at rest before them: a triangular banded system."""
     from scipy.linalg import lapack
 
-    wanted = x.shape[1] - order
-    sums = np.array([comb(order, k) for k in range(order + 1)], dtype=np.float64)
-    differences = sums * (-1.0) ** np.arange(order + 1)
-    gamma = float(np.tan(np.pi * cutoff * dt)) ** (-2 * order)
-    band = np.zeros((order + 1, x.shape[1]))
-    for b in range(order + 1):
-        for a in range(b, order + 1):
-            band[a - b, b : b + wanted] += sums[a] * sums[b] + gamma * differences[a] * differences[b]
-    summed = sum(weight * x[:, k : k + wanted] for k, weight in enumerate(sums))
-    rhs = np.zeros_like(x)
-    for k, weight in enumerate(sums):
-        rhs[:, k : k + wanted] += weight * summed
-    _, y, info = lapack.dpbsv(band, rhs.T, lower=1, overwrite_ab=1)
-    if info != 0:
-        raise np.linalg.LinAlgError(f"the filter's system is not positive definite (row {info})")
-    return np.ascontiguousarray(y.T)
+    driven = numerator[0] * x
+    driven[:, 1:] += numerator[1] * x[:, :-1]
+    driven[:, 2:] += numerator[2] * x[:, :-2]
+    band = np.tile(denominator, (x.shape[1], 1)).T
+    y, _ = lapack.dtbtrs(band, driven.T, uplo="L", diag="U")
+    return np.asarray(y.T)
+
+
+def _reflected(x: FloatArray, reach: int) -> FloatArray:
+    """Signals (m, N + 2 reach) that continue by point reflection about their first and last samples."""
+    before = 2 * x[:, :1] - x[:, reach:0:-1]
+    after = 2 * x[:, -1:] - x[:, -2 : -reach - 2 : -1]
+    return np.concatenate([before, x, after], axis=1)
 
 
 def recursion(
