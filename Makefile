@@ -26,15 +26,17 @@ test: setup
 test-slow: setup
 	$(BIN)/python -m pytest -m slow
 
-# Sums in another order, as another processor takes them: OpenBLAS's kernels for AVX-512 where there is AVX-512, else
-# those for SSE; NumPy without AVX2 and AVX-512.
+# Sums in another order, as other processors take them: two of OpenBLAS's kernels that are not the default here, and
+# NumPy without AVX2 and AVX-512.
 test-processor: setup
-	OPENBLAS_CORETYPE=$$(grep -q avx512f /proc/cpuinfo && echo SkylakeX || echo Nehalem) \
-	NPY_DISABLE_CPU_FEATURES="X86_V3 X86_V4 AVX512_ICL AVX512_SPR" \
-	$(BIN)/python -m pytest tests/test_arm.py tests/estimators tests/signals tests/synth \
-		$(addprefix tests/track/test_, track.py cells.py change_points.py) \
-		$(addprefix tests/identification/test_, identify.py known.py outcome.py passive.py series.py streaming.py \
-			torque_scale.py validate.py velocities.py)
+	@for kernel in $$($(BIN)/python -m pipelines.kernels); do \
+	  echo "== OpenBLAS's kernels for $$kernel"; \
+	  OPENBLAS_CORETYPE=$$kernel NPY_DISABLE_CPU_FEATURES="X86_V3 X86_V4 AVX512_ICL AVX512_SPR" \
+	  $(BIN)/python -m pytest tests/test_arm.py tests/estimators tests/signals tests/synth \
+	    $(addprefix tests/track/test_, track.py cells.py change_points.py) \
+	    $(addprefix tests/identification/test_, identify.py known.py outcome.py passive.py series.py streaming.py \
+	      torque_scale.py validate.py velocities.py) || exit; \
+	done
 
 check: setup
 	$(BIN)/ruff format --check .

@@ -114,8 +114,11 @@ def test_commands_run_as_they_stand(page: str, tmp_path: Path, request: pytest.F
 def test_the_readme_installs_from_a_clean_clone(tmp_path: Path) -> None:
     """With the network: what `make setup` installs has to be had."""
     block = next(one for one in blocks(PAGES["README"].read_text(encoding="utf-8")) if one.info == "sh install")
-    done = run(block.text.replace("…", str(ROOT)) + "which algid\nalgid --version\n", tmp_path)
+    assert block.text.splitlines()[1:] == ["make demo", "make test"]
+    steps = block.text.replace("…", str(ROOT)).replace("make test", ". .venv/bin/activate")  # these are its tests
+    done = run(steps + "which algid\nalgid --version\n", tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
+    assert "Table 4" in done.stdout
     assert done.stdout.splitlines()[-2:] == [str(tmp_path / "algid/.venv/bin/algid"), f"algid {algid.__version__}"]
 
 
