@@ -8,7 +8,8 @@ READY := $(VENV)/.ready
 help:
 	@echo "make demo       synthesise, identify and print Table 4 beside the paper's"
 	@echo "make test       set up and run the tests"
-	@echo "make test-processor  the numerical tests as another processor rounds"
+	@echo "make test-processor  the numerical tests as two other processors round"
+	@echo "make test-pythons  the quick tests with Python 3.12 and 3.13 where they are found"
 	@echo "make test-slow  statistics of intervals, kills of batches, pages in a browser: some minutes"
 	@echo "make check      format, lint, types, tests: what every commit passes"
 	@echo "make pipelines  both cases through every format, failing when a reported error grows"

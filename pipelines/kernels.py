@@ -30,7 +30,7 @@ def processor_features(cpuinfo: str) -> set[str]:
 
 def default_kernel() -> str:
     """The kernel that OpenBLAS chooses here; empty where NumPy uses another library."""
-    import numpy  # noqa: F401, PLC0415 (it loads the library that is asked)
+    import numpy  # noqa: F401 (it loads the library that is asked)
     from threadpoolctl import threadpool_info
 
     names = [library.get("architecture", "") for library in threadpool_info()]
