@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from algid.errors import OutputError, SettingError
+from algid.limits import LIMITS
 
 if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
@@ -64,26 +65,22 @@ def whole_file(path: Path) -> Iterator[Path]:
             temporary.unlink()
 
 
-LARGEST_TEXT = 1 << 26
-"""Bytes of a file that is read whole: profiles, limits, manifests, results have some thousand."""
-
-
 def read_whole(path: Path) -> bytes:
     """The content of a file that an option names, or that stands in a result's folder.
 
     Raises
     ------
     OSError
-        If it cannot be read, has more than `LARGEST_TEXT` bytes, or is no regular file: a pipe would be waited for,
-        and a device has no end.
+        If it cannot be read, has more bytes than `FileLimits.text_bytes`, or is no regular file: a pipe would be waited
+        for, and a device has no end.
     """
     handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)  # else opening a pipe waits already
     with os.fdopen(handle, "rb") as stream:
         found = os.fstat(handle)
         if not stat.S_ISREG(found.st_mode):
             raise OSError(errno.EINVAL, "it is no regular file", str(path))
-        if found.st_size > LARGEST_TEXT:
-            raise OSError(errno.EFBIG, f"it has more than {LARGEST_TEXT >> 20} MiB", str(path))
+        if found.st_size > LIMITS.text_bytes:
+            raise OSError(errno.EFBIG, f"it has more than {LIMITS.text_bytes >> 20} MiB", str(path))
         return stream.read()
 
 

@@ -16,6 +16,7 @@ from tests.layers import PURE, Room, breaches, cycles, imported, parsed, room
 ROOT = Path(algid.__file__).parent
 TABLE: dict[str, Room] = {  # lower rooms first
     "errors": room(),
+    "limits": room(),
     "progress": room(),
     "ros2": room(),
     "runtime": room(packages="threadpoolctl"),
@@ -26,7 +27,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "log": room("arm", "numpy"),
     "signals": room("arm log", "numpy scipy", PURE),
     "estimators": room("arm model progress signals", "numpy scipy", PURE),
-    "files": room("errors", "pydantic"),
+    "files": room("errors limits", "pydantic"),
     "stores": room("errors files", "pyarrow"),
     "profile": room("errors files units", "pydantic"),
     "settings": room("errors model signals"),
@@ -35,7 +36,8 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "table4": room("arm log results synth", "numpy"),
     "writers": room("errors files log ros2", "mcap numpy polars pyarrow"),
     "readers": room(
-        "arm errors log profile runtime units words", "google lz4 mcap numpy polars pyarrow rosbags scipy zstandard"
+        "arm errors limits log profile runtime units words",
+        "google lz4 mcap numpy polars pyarrow rosbags scipy zstandard",
     ),
     "inspection": room("arm errors estimators log profile readers signals words", "numpy"),
     "report": room(
@@ -49,7 +51,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "api": room("log synth"),
     "batch": room(
-        "errors files identification profile readers report results runtime settings stores",
+        "errors files identification limits profile readers report results runtime settings stores",
         "distributed mcap polars pyarrow",
     ),
     "track": room(

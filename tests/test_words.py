@@ -62,6 +62,8 @@ def fixed(value: ast.FormattedValue) -> bool:
     name = inner.attr if isinstance(inner, ast.Attribute) else inner.id if isinstance(inner, ast.Name) else ""
     if name in TEXTS:
         return True
+    if isinstance(inner, ast.Attribute) and ast.unparse(inner.value) == "LIMITS":
+        return True
     digits = ast.unparse(value.format_spec) if value.format_spec else ""
     return value.conversion != -1 or bool(name and name == name.upper()) or bool(re.search(r"\.[1-9]\d*[efg]", digits))
 
@@ -88,6 +90,8 @@ def unhelped(source: str) -> Iterator[str]:
         ("f\"{counted(n, 'sample')} of it\"", []),
         ('f"{name} has no sample"', []),
         ('f"{MOST} rows"', []),
+        ('f"{LIMITS.columns} columns"', []),
+        ('f"{file.columns} columns"', ["1: {file.columns} columns"]),
         ('f"{far:.2g} standard deviations"', []),
     ],
 )

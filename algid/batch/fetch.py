@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from algid.errors import AlgidError, LogError
 from algid.identification.source import Staged
+from algid.limits import LIMITS
 from algid.readers.mcap import framing
 from algid.readers.mcap.catalogue import between, catalogue, channels_of
 from algid.readers.mcap.framing import DamagedError, File
@@ -42,7 +43,6 @@ _PIECE = 1 << 23
 _REQUESTS = 8
 _TAIL = 1 << 16
 _MCAP_END = 37  # footer record and magic
-_LARGEST_END = 1 << 28
 _INDEX_HEAD = 15  # bytes of a message index record that name its channel and size
 _METADATA_INDEX = 0x0D
 
@@ -210,7 +210,7 @@ def _wanted_of_mcap(part: Partial, profile: Profile | None) -> list[Range]:
 
     (start,) = struct.unpack("<Q", part.read(part.size - _MCAP_END + 9, 8))
     end = part.size - _MCAP_END
-    if not 0 < start < end or end - start > _LARGEST_END:
+    if not 0 < start < end or end - start > LIMITS.summary_bytes:
         raise UnforeseenError("no summary")
     part.fetch([(start, part.size)])
     content, wanted, chunks = part.read(start, end - start), [], []
@@ -221,7 +221,7 @@ def _wanted_of_mcap(part: Partial, profile: Profile | None) -> list[Range]:
             wanted += [(offset, offset + _INDEX_HEAD) for offset in chunks[-1].message_index_offsets.values()]
         elif record.code == _METADATA_INDEX:
             place = framing.parse(records.MetadataIndex, body)
-            if place.length <= framing.SMALL_RECORD:
+            if place.length <= LIMITS.record_bytes:
                 wanted.append((place.offset, place.offset + place.length))
     chunks.sort(key=lambda chunk: chunk.chunk_start_offset)
     part.fetch([*wanted, *((first, last) for first, last in between(chunks, start) if last - first <= SMALL)])
@@ -241,7 +241,7 @@ def _wanted_of_parquet(part: Partial, profile: Profile | None) -> list[Range]:
     from algid.readers.parquet import open_parquet
 
     start = part.size - 8 - int.from_bytes(part.read(part.size - 8, 4), "little")
-    if part.size - start > _LARGEST_END:
+    if part.size - start > LIMITS.summary_bytes:
         raise UnforeseenError("no footer")
     part.fetch([(start, part.size)])
     try:

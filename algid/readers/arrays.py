@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.errors import LogError
+from algid.limits import LIMITS
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign
-from algid.readers.frames import MOST_COLUMNS, WIDEST, cells, flat_reader, number, of_numbers
+from algid.readers.frames import cells, flat_reader, number, of_numbers
 from algid.readers.names import TIMES
 from algid.readers.parquet import units_of_schema
 from algid.words import counted
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
     import polars as pl
 
     from algid.profile import Profile
-
-_LARGEST = 1 << 30
 
 
 def open_arrays(path: Path, kind: str, profile: Profile) -> TableReader:
@@ -72,7 +71,7 @@ def frame_of(path: Path, kind: str) -> pl.DataFrame:
     """
     import polars as pl
 
-    if path.stat().st_size > _LARGEST:
+    if path.stat().st_size > LIMITS.whole_bytes:
         raise LogError(f"{path}: a {kind} file of more than 1 GiB is not read as a whole; save it as Parquet")
     try:
         if kind == "feather":
@@ -87,8 +86,8 @@ def frame_of(path: Path, kind: str) -> pl.DataFrame:
     except Exception as error:  # whatever a damaged file makes of NumPy, SciPy or polars
         reason = str(error).split("\n", maxsplit=1)[0][:200]
         raise LogError(f"{path}: the {kind} file cannot be read ({type(error).__name__}: {reason})") from error
-    if flat.width > MOST_COLUMNS:
-        raise LogError(f"{path}: {counted(flat.width, 'column')}; expected {MOST_COLUMNS} at most")
+    if flat.width > LIMITS.columns:
+        raise LogError(f"{path}: {counted(flat.width, 'column')}; expected {LIMITS.columns} at most")
     return flat
 
 
@@ -102,7 +101,7 @@ def _npy(path: Path) -> dict[str, NDArray[Any]]:
 def _npz(path: Path) -> dict[str, NDArray[Any]]:
     with zipfile.ZipFile(path) as archive:
         claimed = sum(entry.file_size for entry in archive.infolist())
-    if claimed > _LARGEST:
+    if claimed > LIMITS.whole_bytes:
         raise LogError(f"{path}: the archive claims {counted(claimed, 'byte')} unpacked; save it as Parquet")
     with np.load(path, allow_pickle=False) as archive:
         return dict(archive)
@@ -142,7 +141,7 @@ def _columns(path: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArra
     for name, array in numbers.items():
         if array.shape == (rows,):
             columns[name] = _native(array)
-        elif array.ndim == 2 and rows in array.shape and min(array.shape) <= WIDEST:
+        elif array.ndim == 2 and rows in array.shape and min(array.shape) <= LIMITS.list_cells:
             upright = array if array.shape[0] == rows else array.T
             columns |= {f"{name}[{place}]": _native(upright[:, place]) for place in range(upright.shape[1])}
     return columns

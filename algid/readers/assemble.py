@@ -12,6 +12,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.errors import LogError
+from algid.limits import LIMITS
 from algid.log import Log, Notice, Origin
 from algid.readers.convert import ROWS, Conversion, Gatherer, channel_readings
 from algid.readers.table import BLOCK_ROWS, SampleTable, cut
@@ -20,9 +21,6 @@ from algid.words import counted
 
 if TYPE_CHECKING:
     from algid.profile import Profile
-
-_LARGEST = 1e100
-"""Beyond this a value is no angle and no torque, and its square would overflow."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +133,9 @@ class TableReader:
                 yield held
             held = table
             if "NOT_FINITE" in self.origin.reading.accepted:
-                good = np.all([np.abs(values) < _LARGEST for values in self._measured(table).values()], axis=0)
+                good = np.all(
+                    [np.abs(values) < LIMITS.largest_value for values in self._measured(table).values()], axis=0
+                )
                 dropped += len(table) - int(np.count_nonzero(good))
                 held = table.take(good)
             else:
@@ -155,15 +155,15 @@ class TableReader:
 
     def _check(self, name: str, values: FloatArray, first: int) -> None:
         # one pass without an array of its own: a small sum of squares has no large term, and no NaN
-        if np.einsum("i,i->", values, values) < _LARGEST:
+        if np.einsum("i,i->", values, values) < LIMITS.largest_value:
             return
-        wrong = np.flatnonzero(~(np.abs(values) < _LARGEST))
+        wrong = np.flatnonzero(~(np.abs(values) < LIMITS.largest_value))
         if wrong.size:
             row = int(wrong[0])
             source = self.origin.mapping.get(name, name)
             raise LogError(
                 f"{self.origin.path}: {name} ({source}) in sample {first + row + 1}: "
-                f"expected a finite number below {_LARGEST:g} in size, found {values[row]}; "
+                f"expected a finite number below {LIMITS.largest_value:g} in size, found {values[row]}; "
                 "cut that part out with --start and --end (profile: start, end), or leave such samples out: "
                 '--accept NOT_FINITE (profile: accept = ["NOT_FINITE"])'
             )

@@ -14,6 +14,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.errors import LogError
+from algid.limits import LIMITS
 from algid.log import ChannelReading, IntArray
 from algid.readers.table import CHANNELS, JOINT_CHANNELS, VELOCITIES, SampleTable
 from algid.units import CURRENT, TORQUE, VELOCITY
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
 
 ROWS = 1 << 16
 """Rows a table: few enough to stay in a core's cache between decoding and copying."""
-_MOST_AT_ONCE = 1 << 26
-"""Rows to reserve on a file's word alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +62,7 @@ class Gatherer:
     """
 
     def __init__(self, rows: int, *, velocity: bool) -> None:
-        self._room = Room.empty(min(rows, _MOST_AT_ONCE), velocity=velocity)
+        self._room = Room.empty(min(rows, LIMITS.reserved_rows), velocity=velocity)
         self._used = 0
 
     def __len__(self) -> int:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from algid.errors import LogError
+from algid.limits import LIMITS
 from algid.readers.stated import in_text
 from algid.units import is_foreign, unit_of
 from algid.words import counted
@@ -18,9 +19,6 @@ _SEPARATORS = (";", "\t", ",", "|")
 _NUMBER = re.compile(r"^[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?$|^[+-]?(nan|inf|infinity)$", re.IGNORECASE)
 _WHOLE = re.compile(r"^[+-]?\d{1,19}$")
 _DATE = re.compile(r"^\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}")
-_MOST_TITLES = 40
-_LONGEST_LINE = 1 << 16
-_MOST_COLUMNS = 4096
 
 
 @dataclass(frozen=True)
@@ -94,7 +92,7 @@ def detect(path: Path, head: bytes) -> Dialect:
 
 def _below_titles(data: list[tuple[int, str]]) -> list[tuple[int, str]]:
     """Numbered lines without those above the header, which has as many cells as the rows of numbers under it."""
-    for first in range(min(len(data), _MOST_TITLES)):
+    for first in range(min(len(data), LIMITS.title_lines)):
         for separator in (*_SEPARATORS, ""):
             table = [split(line, separator) for _, line in data[first : first + 5]]
             rows = table[2:] if len(table) > 2 and _units(table[0], table[1]) else table[1:]
@@ -147,12 +145,14 @@ def _lines(path: Path, head: bytes) -> list[str]:
         raise LogError(f"{path}: the text is UTF-16; save it as UTF-8")
     text = head.decode("utf-8-sig", errors="replace")
     lines = re.split("\r\n|\n", text)
-    if max(map(len, lines[:-1] or lines)) >= _LONGEST_LINE - 4 or (len(lines) == 1 and len(head) >= _LONGEST_LINE):
+    if max(map(len, lines[:-1] or lines)) >= LIMITS.line_bytes - 4 or (
+        len(lines) == 1 and len(head) >= LIMITS.line_bytes
+    ):
         raise LogError(f"{path}: a line of more than 65,000 characters; expected a table of a few columns")
     lone = next((number for number, line in enumerate(lines, start=1) if "\r" in line.rstrip("\r")), None)
     if lone is not None:
         raise LogError(f"{path}: line {lone} holds carriage returns alone, without line feeds; save it with line feeds")
-    return lines if len(head) < _LONGEST_LINE else lines[:-1]
+    return lines if len(head) < LIMITS.line_bytes else lines[:-1]
 
 
 def _comment(line: str, comment: str | None) -> bool:
@@ -191,8 +191,8 @@ def _checked(
     rows: list[str],
     first: str,
 ) -> Dialect:
-    if len(columns) > _MOST_COLUMNS:
-        raise LogError(f"{path}: {counted(len(columns), 'column')}; expected {_MOST_COLUMNS} at most")
+    if len(columns) > LIMITS.columns:
+        raise LogError(f"{path}: {counted(len(columns), 'column')}; expected {LIMITS.columns} at most")
     cells = split(first, separator)
     if len(cells) != len(columns):
         raise LogError(

@@ -12,6 +12,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from algid.limits import LIMITS
+
 _STOP, _TRUE, _FALSE, _BYTE, _SHORT, _INT, _LONG, _DOUBLE, _BINARY, _LIST, _SET, _MAP, _STRUCT = range(13)
 _ENCRYPTION = {(8,), (4, 1, 8), (4, 1, 9)}
 """Fields: the file's encryption; of each row group's columns how they are encrypted, and their metadata so."""
@@ -22,8 +24,6 @@ _VALUES, _SIZE, _DATA, _DICTIONARY = 5, 7, 9, 11
 _DICTIONARY_VALUES = (7, 1)
 _PAGE_VALUES = ((5, 1), _DICTIONARY_VALUES, (8, 1))
 """Values of a page, in the header of its kind."""
-_DEEPEST = 16
-_MOST_VALUES = 5_000_000
 
 
 class FooterError(Exception):
@@ -131,7 +131,7 @@ def page_header(head: bytes) -> PageHeader:
             if kind in (_SHORT, _INT, _LONG):
                 value, place = _varint(head, place)
                 kept[inside, number] = value >> 1 ^ -(value & 1)
-            elif kind == _STRUCT and len(outer) < _DEEPEST:
+            elif kind == _STRUCT and len(outer) < LIMITS.parquet_footer_depth:
                 outer.append((inside, number))
                 inside, number = number if len(outer) == 1 else -1, 0
             elif kind == _BINARY:
@@ -190,7 +190,7 @@ class _Reader:
     def value(self, kind: int, path: tuple[int, ...], depth: int) -> None:
         """Pass over a value."""
         self.values += 1
-        if depth > _DEEPEST or self.values > _MOST_VALUES:
+        if depth > LIMITS.parquet_footer_depth or self.values > LIMITS.parquet_footer_values:
             raise FooterError("it holds more values than any real one")
         if kind == _STRUCT:
             self.struct(path, depth)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.errors import LogError
+from algid.limits import LIMITS
 from algid.log import Companion, IntArray, Notice, Origin, add, word_sum
 from algid.readers.assemble import TableReader, reader_of
 from algid.readers.columns import Columns
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
     """A fresh pass over columns in frames of so many rows, one column a channel; over the first rows only if given."""
 
 NO_COMPANION = Companion(None, {})
-MOST_COLUMNS = 4096
-WIDEST = 64
 _LOOKED = 1 << 14
 """Samples in which the joints that are not read are looked at."""
 
@@ -92,7 +91,7 @@ def cells(schema: Mapping[str, pl.DataType], width: Callable[[str], int]) -> dic
             continue
         size = width(column) if isinstance(kind, pl.List) else kind.size
         lists = cell.list if isinstance(kind, pl.List) else cell.arr
-        for place in range(min(size, WIDEST)):
+        for place in range(min(size, LIMITS.list_cells)):
             found[f"{column}[{place}]"] = lists.get(place, null_on_oob=True), cast("pl.DataType", kind.inner)
     return found
 
@@ -130,7 +129,6 @@ def number(name: str, cell: pl.Expr, kind: pl.DataType) -> pl.Expr:
 
 
 _EPOCH = (("s", 1e8, 1e11), ("ms", 1e11, 1e14), ("us", 1e14, 1e17), ("ns", 1e17, 1e20))
-_LARGEST = 9.2e18
 _STEPS = (("s", 0.2), ("ms", 50.0), ("us", 50_000.0))
 _SLOWEST_NS = 200_000_000
 """A longer median step is no recording of an arm in motion: it has 5 Hz at least."""
@@ -173,7 +171,7 @@ def to_nanoseconds(times: NDArray[Any], unit: str) -> IntArray:
     whole = np.issubdtype(times.dtype, np.integer)
     if not (whole or np.all(np.isfinite(times))):
         raise ValueError("a time that is not finite")
-    if times.size and max(abs(times.min().item()), abs(times.max().item())) * factor > _LARGEST:
+    if times.size and max(abs(times.min().item()), abs(times.max().item())) * factor > LIMITS.largest_time_ns:
         raise ValueError("a time beyond 292 years")
     if whole:
         whole_ns = times.astype(np.int64, copy=False)

@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from algid.errors import LogError
+from algid.limits import LIMITS
 from algid.log import CANONICAL_COLUMNS, KEY, Notice, loads
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign
 from algid.readers.footer import Footer, FooterError, Pages, page_header, parsed
-from algid.readers.frames import MOST_COLUMNS, NO_COMPANION, cells, flat_reader, number, of_numbers
+from algid.readers.frames import NO_COMPANION, cells, flat_reader, number, of_numbers
 from algid.readers.stated import in_metadata
 from algid.words import counted
 
@@ -24,9 +25,7 @@ if TYPE_CHECKING:
 
     from algid.profile import Profile
 
-_LARGEST_FOOTER = 1 << 26
-_NO_UNIT, _LONGEST_UNIT = ("", "-", "1", "none", "null", "unknown", "dimensionless"), 40
-_LARGEST_HEADER = 1 << 14
+_NO_UNIT = ("", "-", "1", "none", "null", "unknown", "dimensionless")
 _NO_SUMS = Notice("NO_CHECKSUM", "the file has no sums of its values, as algid's have: changes would go unseen")
 
 
@@ -43,8 +42,8 @@ def open_parquet(path: Path, profile: Profile) -> TableReader:
     import pyarrow.parquet as pq
 
     schema = schema_of(path)
-    if len(schema) > MOST_COLUMNS:
-        raise LogError(f"{path}: {counted(len(schema), 'column')}; expected {MOST_COLUMNS} at most")
+    if len(schema) > LIMITS.columns:
+        raise LogError(f"{path}: {counted(len(schema), 'column')}; expected {LIMITS.columns} at most")
 
     def width(column: str) -> int:
         _check_pages(path, {column}, most=1)
@@ -120,7 +119,7 @@ def units_of_schema(schema: pa.Schema, roots: Mapping[str, str]) -> dict[str, st
         own = _decoded(schema.field(root).metadata) if schema.names.count(root) == 1 else {}
         unit = next((value for key, value in own.items() if key.lower() in ("unit", "units")), "").strip()
         if unit.lower() not in _NO_UNIT:
-            found[name] = unit[:_LONGEST_UNIT]
+            found[name] = unit[: LIMITS.unit_letters]
     return found
 
 
@@ -153,10 +152,10 @@ def _footer(path: Path) -> Footer:
         tail = stream.read(8)
         length = int.from_bytes(tail[:4], "little")
         stream.seek(max(0, size - 8 - length))
-        footer = stream.read(min(length, _LARGEST_FOOTER))
+        footer = stream.read(min(length, LIMITS.parquet_footer_bytes))
     if tail[4:] != b"PAR1":
         raise LogError(f"{path}: the Parquet file is cut off: its footer is missing, so nothing can be read of it")
-    if length + 12 > size or length > _LARGEST_FOOTER:
+    if length + 12 > size or length > LIMITS.parquet_footer_bytes:
         raise LogError(
             f"{path}: the Parquet footer claims {counted(length, 'byte')} of a file of {size}; copy the file again"
         )
@@ -224,7 +223,7 @@ def _check_column(path: Path, stream: BinaryIO, pages: Pages, most: float, *, ch
     while place < pages.end and (seen < most or len(pages.path) > 1):
         stream.seek(place)
         try:
-            header = page_header(stream.read(min(_LARGEST_HEADER, pages.end - place)))
+            header = page_header(stream.read(min(LIMITS.parquet_header_bytes, pages.end - place)))
         except FooterError:  # old writers count the bytes otherwise; polars tells of what is damaged
             return
         largest = header.unpacked if header.dictionary else pages.values

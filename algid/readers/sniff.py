@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from algid.errors import LogError
+from algid.limits import LIMITS
 from algid.words import counted
 
 MCAP = b"\x89MCAP0\r\n"
@@ -26,7 +27,6 @@ _KINDS = (
     *((MCAP, "mcap"), (PARQUET, "parquet"), (BAG, "bag"), (SQLITE, "db3"), (b"ARROW1", "feather")),
     *((b"\x93NUMPY", "npy"), (b"MATLAB ", "mat")),
 )
-_HEAD = 1 << 16
 _EMPTY_LINES = re.compile(rb"\n[\r\n]*\n")
 
 
@@ -51,7 +51,7 @@ def sniff(path: Path) -> str:
             found = "it is no regular file" if path.exists() else "there is no such file"
             raise LogError(f"{path}: {found}; expected a log in MCAP, Parquet or CSV; check the name")
         with path.open("rb") as stream:
-            head = stream.read(_HEAD)
+            head = stream.read(LIMITS.head_bytes)
     except (OSError, ValueError) as error:
         raise LogError(f"{str(path)!r}: the log cannot be read ({error}); check the name and rights") from error
     return _by_content(path, head)
@@ -95,11 +95,8 @@ def looks_like_text(head: bytes) -> bool:
 
 
 _PIECE = 1 << 24
-_LONGEST_LINE = 1 << 16
 _PACKED = 1 << 11
 """Bytes given to zstd at a time: they unpack to 64 MiB at most, since a block of four bytes makes 128 KiB."""
-_FREE_BYTES, _BYTES_A_BYTE = 256 << 20, 250
-"""What a compressed table may unpack to: rows of numbers pack 3 to 20 times, a log at rest a hundred times."""
 
 
 def pieces(path: Path, name: str, size: int = _PIECE) -> Iterator[bytes]:
@@ -112,7 +109,7 @@ def pieces(path: Path, name: str, size: int = _PIECE) -> Iterator[bytes]:
     """
     try:
         with path.open("rb") as raw:
-            most = _FREE_BYTES + _BYTES_A_BYTE * os.fstat(raw.fileno()).st_size
+            most = LIMITS.free_text_bytes + LIMITS.text_a_byte * os.fstat(raw.fileno()).st_size
             if name == "csv":
                 yield from iter(lambda: raw.read(size), b"")
                 return
@@ -142,7 +139,7 @@ def _zstd(raw: BinaryIO) -> Iterator[bytes]:
     """
     import zstandard
 
-    window = zstandard.ZstdDecompressor(max_window_size=1 << 27)
+    window = zstandard.ZstdDecompressor(max_window_size=LIMITS.zstd_window_bytes)
     packed = raw.read(_PACKED)
     try:
         while packed:
@@ -177,13 +174,13 @@ def whole_lines(path: Path, name: str) -> Iterator[bytes]:
     LogError
         As `pieces`, and if a line is no table's.
     """
-    rest, head = b"", _HEAD
+    rest, head = b"", LIMITS.head_bytes
     for piece in pieces(path, name):
         text = rest + piece[:head] + _EMPTY_LINES.sub(b"\n", piece[head:])
         head = max(0, head - len(piece))
         end = text.rfind(b"\n") + 1
         rest = text[end:]
-        if len(rest) > _LONGEST_LINE:
+        if len(rest) > LIMITS.line_bytes:
             raise LogError(f"{path}: a line of more than 65,000 characters; expected rows of numbers")
         if end:
             yield text[:end]
@@ -193,4 +190,4 @@ def whole_lines(path: Path, name: str) -> Iterator[bytes]:
 
 def head_of(path: Path, name: str) -> bytes:
     """The first unpacked bytes, 64 KiB at most."""
-    return next(pieces(path, name, _HEAD), b"")[:_HEAD]
+    return next(pieces(path, name, LIMITS.head_bytes), b"")[: LIMITS.head_bytes]

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from typing import TypeGuard
 
+from algid.limits import LIMITS
 from algid.readers.names import CURRENTS, STEMS, TIMES, take_apart
 from algid.units import ANGLE, CURRENT, NANOSECONDS, TORQUE, is_foreign, unit_of
 
@@ -23,8 +24,6 @@ _STATEMENT = re.compile(
     re.IGNORECASE,
 )
 _UNITS_LINE = re.compile(r"^\s*units?\s*[:=]\s*(?P<list>.+)$", re.IGNORECASE)
-_MOST_LINES, _LONGEST = 64, 2000
-"""Lines, and characters of one, that are looked at."""
 _WORDS = {
     "theta": {*STEMS["theta"], "joint angles", "joint positions"},
     "omega": {*STEMS["omega"], "speeds"},
@@ -37,8 +36,8 @@ _UNITS: dict[str, Mapping[str, float]] = {"theta": ANGLE, "tau": {**TORQUE, **CU
 def in_text(lines: Iterable[str], columns: Sequence[str]) -> dict[str, str]:
     """By column the unit that one of the `lines` states; the first statement that names it holds."""
     found: dict[str, str] = {}
-    for line in islice(lines, _MOST_LINES):
-        text = " ".join(line[:_LONGEST].split())
+    for line in islice(lines, LIMITS.stated_lines):
+        text = " ".join(line[: LIMITS.stated_letters].split())
         listed = _UNITS_LINE.match(text)
         for column, unit in _listed(listed["list"], columns) if listed else _statements(text, columns):
             found.setdefault(column, unit)

@@ -15,7 +15,8 @@ import typer
 from typer.testing import CliRunner
 
 from algid.errors import AlgidError
-from algid.files import LARGEST_TEXT, read_whole
+from algid.files import read_whole
+from algid.limits import LIMITS
 from tests.cli.commands import app
 
 WRITTEN = {"out", "save_plots", "scratch"}
@@ -144,6 +145,6 @@ def test_devices_and_giants_are_not_read_whole(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="no regular file"):
         read_whole(Path("/dev/zero"))
     with (tmp_path / "giant").open("wb") as stream:
-        stream.truncate(LARGEST_TEXT + 1)
+        stream.truncate(LIMITS.text_bytes + 1)
     with pytest.raises(OSError, match="more than 64 MiB"):
         read_whole(tmp_path / "giant")

@@ -32,6 +32,7 @@ from algid.readers import read_log
 from algid.readers.mcap.framing import DamagedError, unpack
 from algid.writers import write_log
 from pipelines.mutations import clean_files, clean_log, damage
+from tests.conftest import Limited
 from tests.readers.logs import TRUTH, same
 
 
@@ -159,8 +160,8 @@ def test_empty_lines_without_end_take_no_memory(end: bytes, tmp_path: Path) -> N
     tracemalloc.stop()
 
 
-def test_text_that_unpacks_to_more_than_any_table_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("algid.readers.sniff._FREE_BYTES", 1 << 24)
+def test_text_that_unpacks_to_more_than_any_table_is_refused(tmp_path: Path, limited: Limited) -> None:
+    limited(free_text_bytes=1 << 24)
     stream = zstandard.ZstdCompressor().compressobj()
     with (tmp_path / "log.csv.zst").open("wb") as file:
         file.write(stream.compress(TABLE))

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from algid.errors import LogError
+from algid.limits import LIMITS
 from algid.log import KEY, Notice, Truth, loads
 from algid.readers.mcap import framing
 from algid.readers.mcap.framing import ChunkIndex, DamagedError, File, claimed, parse, unpack
@@ -21,8 +22,6 @@ from algid.readers.mcap.messages import Records, records_in
 from algid.readers.mcap.salvage import Gap, salvaged
 from algid.words import counted
 
-_MOST_INDEXES = 2_000_000
-_MOST_SPANS = 100_000
 _SPAN = 1 << 23
 _LOOSE, _TORN = -1, -2
 
@@ -200,8 +199,8 @@ def _check_listed(file: File, chunks: list[ChunkIndex], statistics: Any, end: in
     if statistics.chunk_count != len(chunks):
         raise DamagedError(f"it lists {len(chunks)} of {counted(statistics.chunk_count, 'chunk')}")
     if all(chunk.message_index_length for chunk in chunks):
-        if sum(len(chunk.message_index_offsets) for chunk in chunks) > _MOST_INDEXES:
-            raise DamagedError(f"it claims more than {_MOST_INDEXES} message indexes")
+        if sum(len(chunk.message_index_offsets) for chunk in chunks) > LIMITS.message_indexes:
+            raise DamagedError(f"it claims more than {LIMITS.message_indexes} message indexes")
         listed: dict[int, int] = {}
         for channel, offset in (pair for chunk in chunks for pair in chunk.message_index_offsets.items()):
             code, _, named, size = struct.unpack("<BQHI", file.read(offset, 15))
@@ -238,7 +237,7 @@ def _walked(file: File) -> Catalogue:
                     spans.append(record.torn.start, record.end - record.torn.start, _TORN)
             elif record.code == framing.DATA_END:
                 ended = record.start
-            elif record.code in (framing.SCHEMA, framing.CHANNEL) and record.length <= framing.SMALL_RECORD:
+            elif record.code in (framing.SCHEMA, framing.CHANNEL) and record.length <= LIMITS.record_bytes:
                 _define(found, record.code, file.read(record.start, record.length), record.start)
             elif record.code == framing.METADATA:
                 _keep_metadata(file, record, found)
@@ -285,8 +284,8 @@ class _Spans:
 
     def append(self, start: int, length: int, kind: int) -> None:
         """Take in a span of its own."""
-        if len(self._places) == _MOST_SPANS:
-            raise DamagedError(f"more than {_MOST_SPANS} chunks, or messages apart from each other")
+        if len(self._places) == LIMITS.spans:
+            raise DamagedError(f"more than {LIMITS.spans} chunks, or messages apart from each other")
         self._places.append([start, length, kind])
 
     def all(self) -> list[Span]:
@@ -336,7 +335,7 @@ def _define(found: Catalogue, code: int, content: bytes, place: int) -> None:
 def _keep_metadata(file: File, record: framing.Record, found: Catalogue) -> None:
     from mcap import records
 
-    if record.length > framing.SMALL_RECORD:
+    if record.length > LIMITS.record_bytes:
         return
     try:
         metadata = parse(records.Metadata, file.read(record.start, record.length))

@@ -16,17 +16,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from algid.limits import LIMITS
 from algid.readers.mcap.messages import Messages
 from algid.words import counted
 
-MOST_PARTS = 100_000
-"""Fields, structures and strings a message may be made of; a list of numbers is one."""
-LARGEST_MESSAGE = 1 << 24
-"""Bytes; a joint state has some hundred."""
 _WORK_A_WALK, _WORK_A_SIZE = 200, 20
 _TOO_MANY = "messages of so many layouts that no recorder writes them"
-_MOST_WORDS = 1 << 22
-"""Words that all remembered layouts may fix together."""
 
 
 class MisfitError(Exception):
@@ -69,11 +64,11 @@ class Shape:
         Raises
         ------
         MisfitError
-            If they are more than `MOST_PARTS`.
+            If they are more than `FileLimits.message_parts`.
         """
         self.parts += parts
-        if self.parts > MOST_PARTS:
-            raise MisfitError(f"a message of more than {MOST_PARTS} parts")
+        if self.parts > LIMITS.message_parts:
+            raise MisfitError(f"a message of more than {LIMITS.message_parts} parts")
 
     def fix(self, start: int, end: int) -> None:
         """Note that the bytes [start, end) fix the shape."""
@@ -109,9 +104,6 @@ class Shape:
             return None
         return Numbers(found.offset + index * int(found.kind[-1]), found.kind)
 
-
-MOST_LAYOUTS = 256
-"""Past so many layouts of one size messages are walked one by one."""
 
 Walk = Callable[[bytes], Shape]
 Fields = dict[str, NDArray[np.generic]]
@@ -250,7 +242,7 @@ class ColumnDecoder(Decoder):
         for rows in filter(len, np.split(order, np.flatnonzero(np.diff(messages.sizes[order])) + 1)):
             size = int(messages.sizes[rows[0]])
             self.spend(_WORK_A_SIZE, _TOO_MANY)
-            if size > LARGEST_MESSAGE:
+            if size > LIMITS.message_bytes:
                 self.misfitting(f"messages of {counted(size, 'byte')}", rows.size)
                 continue
             for chosen, fields in self._of_one_size(messages, size, rows):
@@ -281,7 +273,7 @@ class ColumnDecoder(Decoder):
                 left = left[1:]
                 continue
             if tried == len(known):
-                if len(known) == MOST_LAYOUTS or self._words > _MOST_WORDS:
+                if len(known) == LIMITS.layouts or self._words > LIMITS.layout_words:
                     if one.fields is not None:
                         yield rows[left[:1]], one.read(table[left[:1]])
                     left = left[1:]  # one by one from here: what is remembered must not grow with the file

@@ -13,6 +13,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
+from algid.limits import LIMITS
 from algid.words import counted
 
 PRIMITIVES = {
@@ -26,12 +27,6 @@ _SHORT = {
 _FIELD = re.compile(
     r"^(?P<type>[A-Za-z][\w/]*)(?P<bound><=\d+)?(?P<array>\[(?P<size>(<=)?\d*)\])?\s+(?P<name>[A-Za-z]\w*)\s*(?P<rest>.*)$"
 )
-_MOST_FIELDS = 4096
-_DEEPEST = 32
-"""Types, typedefs and modules within one another."""
-_LONGEST = 1 << 20
-_LONGEST_NUMBER = 10
-"""Digits of a length: 32 bits have so many."""
 
 
 class DefinitionError(Exception):
@@ -73,8 +68,10 @@ def parse_msg(root: str, text: str) -> Types:
 
 
 def _check_length(root: str, text: str) -> None:
-    if len(text) > _LONGEST:
-        raise DefinitionError(f"{root}: a definition of {counted(len(text), 'character')}; expected {_LONGEST} at most")
+    if len(text) > LIMITS.definition_letters:
+        raise DefinitionError(
+            f"{root}: a definition of {counted(len(text), 'character')}; expected {LIMITS.definition_letters} at most"
+        )
 
 
 def _fields(name: str, text: str) -> tuple[Field, ...]:
@@ -87,12 +84,12 @@ def _fields(name: str, text: str) -> tuple[Field, ...]:
         if found is None or found["rest"].startswith("="):
             continue
         size = found["size"]
-        if size and len(size.removeprefix("<=")) > _LONGEST_NUMBER:
+        if size and len(size.removeprefix("<=")) > LIMITS.length_digits:
             wrong = f"a length of {counted(len(size), 'digit')} in the line {line.strip()[:60]!r}"
             raise DefinitionError(f"{name}: {wrong}")
         count = None if found["array"] is None else int(size) if size.isdigit() else -1
         fields.append(Field(found["name"], found["type"], count))
-    if len(fields) > _MOST_FIELDS:
+    if len(fields) > LIMITS.definition_fields:
         raise DefinitionError(f"{name}: {counted(len(fields), 'field')}")
     # an empty structure takes one byte, since IDL has none
     return tuple(fields) or (Field("structure_needs_at_least_one_member", "uint8", None),)
@@ -112,11 +109,11 @@ def _resolved(field: Field, owner: str, types: Types) -> Field:
 
 def _check_depth(name: str, types: Types, known: dict[str, int], above: int = 0) -> int:
     """Types below one another under `name`, each looked at once, however often it is used; too many are refused."""
-    if name not in known and above <= _DEEPEST:
+    if name not in known and above <= LIMITS.definition_depth:
         below = (_check_depth(field.type, types, known, above + 1) for field in types[name] if field.type in types)
         known[name] = 1 + max(below, default=0)
-    if above + known.get(name, 1) > _DEEPEST:
-        raise DefinitionError(f"{name}: types nested more than {_DEEPEST} deep")
+    if above + known.get(name, 1) > LIMITS.definition_depth:
+        raise DefinitionError(f"{name}: types nested more than {LIMITS.definition_depth} deep")
     return known[name]
 
 
@@ -183,7 +180,7 @@ class _Definitions:
 
     def resolved(self, owner: str, name: str, spec: _Spec) -> Field:
         """The member `name` of `owner` with its type's full name."""
-        for _ in range(_DEEPEST):
+        for _ in range(LIMITS.definition_depth):
             if spec.name in PRIMITIVES or spec.name in TEXTS:
                 return Field(name, spec.name, spec.count)
             meant = next((one for one in spec.candidates() if one in self.structures or one in self.typedefs), None)
@@ -195,7 +192,7 @@ class _Definitions:
             if alias.count is not None and spec.count is not None:
                 raise DefinitionError(f"{owner}: {name!r} is a list of lists")
             spec = _Spec(alias.name, alias.scope, alias.count if spec.count is None else spec.count)
-        raise DefinitionError(f"{owner}: typedefs of {name!r} nested more than {_DEEPEST} deep")
+        raise DefinitionError(f"{owner}: typedefs of {name!r} nested more than {LIMITS.definition_depth} deep")
 
 
 @dataclass
@@ -209,8 +206,8 @@ class _Parser:
 
     def definitions(self, scope: tuple[str, ...]) -> None:
         """Definitions up to the end, or to the brace that closes a module."""
-        if len(scope) > _DEEPEST:
-            raise DefinitionError(f"{self.root}: modules nested more than {_DEEPEST} deep")
+        if len(scope) > LIMITS.definition_depth:
+            raise DefinitionError(f"{self.root}: modules nested more than {LIMITS.definition_depth} deep")
         while self.place < len(self.tokens) and not (scope and self.tokens[self.place] == "}"):
             self._annotations()
             kind = self._next()
@@ -288,7 +285,7 @@ class _Parser:
 
     def _number(self, end: str) -> int:
         token = self._next()
-        if not token.isdecimal() or len(token) > _LONGEST_NUMBER or int(token) == 0:
+        if not token.isdecimal() or len(token) > LIMITS.length_digits or int(token) == 0:
             raise DefinitionError(f"{self.root}: {token[:40]!r} where a length was expected")
         self._expect(end)
         return int(token)

@@ -19,32 +19,25 @@ from types import TracebackType
 from typing import Any, NamedTuple
 
 from algid.errors import LogError
+from algid.limits import LIMITS
 from algid.words import counted
 
 MAGIC = b"\x89MCAP0\r\n"
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = range(1, 9)
 STATISTICS, METADATA, METADATA_INDEX, DATA_END = 0x0B, 0x0C, 0x0D, 0x0F
 FRAME = struct.Struct("<BQ")
-SMALL_RECORD = 1 << 24
 _FOOTER_SIZE = 9 + 20 + 8
-_LARGEST_SUMMARY = 1 << 28
-LARGEST_CHUNK = 1 << 28
-"""A recorder closes a chunk at some MiB; beyond 256 MiB it is a mistake or an attack."""
 _WINDOW = 1 << 20
 _PIECE = 1 << 20
-MOST_OTHERS = 300_000
-"""Schemas, channels and the like side by side; ids end at 65,535."""
 PEEK = FRAME.size + 80
 """Bytes that tell a record's kind: its frame, and the head of a chunk."""
-_FREE_BYTES, _BYTES_A_BYTE = 384 << 20, 250
-"""What a file may unpack to: logs of joints pack 5 to 50 times, logs at rest up to a hundred times."""
-_FREE_WORK, _WORK_A_BYTE = 1_500_000, 4
-"""What a file may have done message by message, in steps of about a microsecond."""
+_SMALL = LIMITS.record_bytes
+_CHUNK = LIMITS.chunk_bytes
 SIZES = {
-    HEADER: (8, SMALL_RECORD), FOOTER: (20, 20), SCHEMA: (14, SMALL_RECORD), CHANNEL: (16, SMALL_RECORD),
-    MESSAGE: (22, LARGEST_CHUNK), CHUNK: (40, LARGEST_CHUNK), MESSAGE_INDEX: (6, LARGEST_CHUNK),
-    CHUNK_INDEX: (60, SMALL_RECORD), 0x09: (36, 1 << 62), 0x0A: (52, SMALL_RECORD), STATISTICS: (46, SMALL_RECORD),
-    METADATA: (8, 1 << 62), METADATA_INDEX: (20, SMALL_RECORD), 0x0E: (17, 17), DATA_END: (4, 4),
+    HEADER: (8, _SMALL), FOOTER: (20, 20), SCHEMA: (14, _SMALL), CHANNEL: (16, _SMALL),
+    MESSAGE: (22, _CHUNK), CHUNK: (40, _CHUNK), MESSAGE_INDEX: (6, _CHUNK),
+    CHUNK_INDEX: (60, _SMALL), 0x09: (36, 1 << 62), 0x0A: (52, _SMALL), STATISTICS: (46, _SMALL),
+    METADATA: (8, 1 << 62), METADATA_INDEX: (20, _SMALL), 0x0E: (17, 17), DATA_END: (4, 4),
 }  # fmt: skip
 """By operation code the least and the largest length that a record has."""
 
@@ -108,7 +101,7 @@ class File:
     def unpacks(self, size: int) -> None:
         """Count bytes that a chunk claims to unpack to; `DamagedError` where no honest file of this size claims so."""
         self._unpacked += size
-        if self._unpacked > _FREE_BYTES + _BYTES_A_BYTE * self.size:
+        if self._unpacked > LIMITS.free_unpacked_bytes + LIMITS.unpacked_a_byte * self.size:
             raise DamagedError(
                 f"the chunks of a file of {counted(self.size, 'byte')} claim {counted(self._unpacked, 'byte')} so far"
             )
@@ -116,7 +109,7 @@ class File:
     def works(self, steps: int) -> bool:
         """Count steps of some microsecond each; False where no honest file of this size asks for so many."""
         self._work += steps
-        return self._work <= _FREE_WORK + _WORK_A_BYTE * self.size
+        return self._work <= LIMITS.free_work + LIMITS.work_a_byte * self.size
 
 
 @dataclass(frozen=True)
@@ -187,8 +180,8 @@ def walk_bytes(content: bytes | memoryview, start: int, end: int) -> Iterator[Re
         if start + FRAME.size + length > end:
             raise BrokenOffError(start, Record(code, start + FRAME.size, length))
         others += code != MESSAGE
-        if others > MOST_OTHERS:
-            raise DamagedError(f"more than {MOST_OTHERS} records that are no messages")
+        if others > LIMITS.other_records:
+            raise DamagedError(f"more than {LIMITS.other_records} records that are no messages")
         yield Record(code, start + FRAME.size, length)
         start += FRAME.size + length
 
@@ -210,7 +203,7 @@ def summary(file: File) -> tuple[int, bytes]:
         raise DamagedError("its footer is damaged")
     if start == 0:
         return 0, b""
-    if not 8 <= start <= end or end - start > _LARGEST_SUMMARY:
+    if not 8 <= start <= end or end - start > LIMITS.summary_bytes:
         raise DamagedError(f"its footer claims a summary at byte {start}")
     content = file.read(start, end - start)
     if crc and zlib.crc32(tail[:25], zlib.crc32(content)) != crc:
@@ -265,13 +258,13 @@ def claimed(content: bytes) -> int:
     Raises
     ------
     DamagedError
-        If they are more than `LARGEST_CHUNK`.
+        If they are more than `FileLimits.chunk_bytes`.
     """
     if len(content) < 40:
         raise DamagedError("a chunk breaks off")
     (size,) = struct.unpack_from("<Q", content, 16)
-    if size > LARGEST_CHUNK:
-        raise DamagedError(f"a chunk claims {counted(size, 'byte')} unpacked, more than {LARGEST_CHUNK}")
+    if size > LIMITS.chunk_bytes:
+        raise DamagedError(f"a chunk claims {counted(size, 'byte')} unpacked, more than {LIMITS.chunk_bytes}")
     return int(size)
 
 
@@ -283,7 +276,7 @@ def unpack(content: bytes, *, torn: bool = False) -> bytes:
     Raises
     ------
     DamagedError
-        If the chunk is larger than `LARGEST_CHUNK`, packed in an unknown way, or not what its CRC says.
+        If the chunk is larger than `FileLimits.chunk_bytes`, packed in an unknown way, or not what its CRC says.
     """
     size = claimed(content)
     crc, name_length = struct.unpack_from("<II", content, 24)

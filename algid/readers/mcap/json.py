@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from algid.limits import LIMITS
 from algid.readers.mcap.columnar import Decoder, Fields, MisfitError, Numbers, Shape
 from algid.readers.mcap.messages import Messages
 from algid.words import counted
 
-_LARGEST = 1 << 20
 _BYTES_A_STEP, _COMMAS_A_STEP, _STEPS_A_COLON = 64, 8, 2
 """What parsing takes: bytes of text, numbers of a list, fields of an object; the last are by far the slowest."""
 _TOO_MUCH = "more text than any recorder's file of this size"
@@ -39,8 +39,8 @@ def walk(payload: bytes) -> Shape:
 
 
 def _object(payload: bytes) -> dict[str, Any]:
-    if len(payload) > _LARGEST:
-        raise MisfitError(f"a JSON message of {counted(len(payload), 'byte')}; expected {_LARGEST} at most")
+    if len(payload) > LIMITS.json_bytes:
+        raise MisfitError(f"a JSON message of {counted(len(payload), 'byte')}; expected {LIMITS.json_bytes} at most")
     try:
         found = json.loads(payload)
     except (ValueError, RecursionError) as error:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from algid.limits import LIMITS
 from algid.log import IntArray
 from algid.readers.mcap import framing
 from algid.readers.mcap.framing import BrokenOffError, DamagedError
@@ -21,7 +22,6 @@ from algid.readers.mcap.framing import BrokenOffError, DamagedError
 HEAD = 31
 """Bytes of a message record before its payload: code, length, channel, sequence, log and publish time."""
 _LEAST = HEAD - 9
-_MOST_GAPS = 256
 _SMALL = 1 << 13
 """Bytes; NumPy takes as long to look at an index as a walk over so many."""
 _FEW = 256
@@ -129,8 +129,8 @@ def _walked(octets: NDArray[np.uint8], content: bytes, works: Callable[[int], bo
             offsets.append(place)
         else:
             others.append((code, content[start : start + length]))
-            if len(others) > framing.MOST_OTHERS:
-                raise DamagedError(f"more than {framing.MOST_OTHERS} records that are no messages")
+            if len(others) > LIMITS.other_records:
+                raise DamagedError(f"more than {LIMITS.other_records} records that are no messages")
         if code == framing.MESSAGE and not len(offsets) & _SOME and not works(_SOME // 2):
             raise DamagedError("more small messages than in any honest file of this size")
         place = start + length
@@ -171,7 +171,7 @@ def _indexed(octets: NDArray[np.uint8], content: bytes, index: bytes) -> Records
         return None
     ends = records + 9 + lengths.astype(np.int64)
     gaps = np.flatnonzero(ends[:-1] != records[1:])
-    if gaps.size > _MOST_GAPS:
+    if gaps.size > LIMITS.index_gaps:
         return None
     borders = [(0, int(records[0])), *((int(ends[gap]), int(records[gap + 1])) for gap in gaps)]
     borders.append((int(ends[-1]), len(content)))

@@ -7,11 +7,12 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from algid.errors import LogError
+from algid.limits import LIMITS
 from algid.log import Notice, Reading
 from algid.readers.joints import along_the_arm, order_notice
 from algid.readers.mcap.catalogue import Catalogue, channels_of, kinds, schema_name
 from algid.readers.mcap.codec import walk_for
-from algid.readers.mcap.columnar import LARGEST_MESSAGE, MisfitError, Shape
+from algid.readers.mcap.columnar import MisfitError, Shape
 from algid.readers.mcap.framing import File
 from algid.readers.mcap.load import batches
 from algid.readers.mcap.topic import (
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from algid.profile import Profile
 
 _SAMPLES = 64
-_MOST_CANDIDATES = 256
 _LETTERS_A_STEP, _BYTES_A_STEP = 4, 4
 """Letters of a definition, and bytes of a message, that are read in a step of work."""
 _USUAL = "/joint_states"
@@ -230,7 +230,7 @@ def _candidates(file: File, found: Catalogue, profile: Profile | None) -> list[t
         known = schema is not None and (schema.name in JOINT_STATE + DYNAMIC_JOINT_STATE or b"effort" in schema.data)
         if known or channel.message_encoding == "json":
             some.append(place)
-    if len(some) > _MOST_CANDIDATES:
+    if len(some) > LIMITS.topics:
         raise LogError(
             f"{file.path}: {counted(len(some), 'topic')} may hold joint states: --topic NAME (profile: topic = …)"
         )
@@ -254,7 +254,7 @@ def _paths_of(name: str, count: int, joints: tuple[str, ...]) -> list[str]:
     """The paths of a field's numbers: one, none, or one a place."""
     if count < 2:
         return [name if count else f"{name} (empty)"]
-    return [f"{name}[{place}]" for place in (joints if len(joints) == count else range(min(count, 64)))]
+    return [f"{name}[{place}]" for place in (joints if len(joints) == count else range(min(count, LIMITS.joint_cells)))]
 
 
 def _shapes(file: File, found: Catalogue, topic: str, type_name: str) -> Iterator[Shape]:
@@ -282,7 +282,7 @@ def _shapes(file: File, found: Catalogue, topic: str, type_name: str) -> Iterato
         for start, size in zip(messages.starts[:_SAMPLES], messages.sizes[:_SAMPLES], strict=True):
             _work(file, topic, size // _BYTES_A_STEP)
             try:
-                shape = walk(messages.content[start : start + min(size, LARGEST_MESSAGE)].tobytes())
+                shape = walk(messages.content[start : start + min(size, LIMITS.message_bytes)].tobytes())
             except MisfitError as error:
                 misfit = error
                 continue

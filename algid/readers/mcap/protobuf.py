@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from algid.limits import LIMITS
 from algid.readers.mcap.columnar import MisfitError, Numbers, Shape
 from algid.readers.mcap.definitions import DefinitionError
 from algid.words import counted
@@ -23,8 +24,6 @@ _VARINTS = {3, 4, 5, 8, 13, 14, 17, 18}
 _ZIGZAG = {17, 18}
 _UINT64 = 4
 _STRING, _MESSAGE, _BYTES, _REPEATED = 9, 11, 12, 3
-_DEEPEST = 32
-_LONGEST = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -51,8 +50,10 @@ def parse(root: str, data: bytes) -> Types:
     from google.protobuf.descriptor_pb2 import FileDescriptorSet
     from google.protobuf.message import DecodeError
 
-    if len(data) > _LONGEST:
-        raise DefinitionError(f"{root}: a descriptor of {counted(len(data), 'byte')}; expected {_LONGEST} at most")
+    if len(data) > LIMITS.definition_letters:
+        raise DefinitionError(
+            f"{root}: a descriptor of {counted(len(data), 'byte')}; expected {LIMITS.definition_letters} at most"
+        )
     try:
         found = {
             name: message
@@ -158,7 +159,7 @@ class _Absent:
 
 
 def _walk(data: bytes, start: int, end: int, kind: str, prefix: str, shape: Shape, absent: _Absent, depth: int) -> None:
-    if depth > _DEEPEST:
+    if depth > LIMITS.definition_depth:
         raise MisfitError("messages nested too deep")
     fields: Mapping[int, ProtobufField] = absent.types[kind]
     seen: dict[str, int] = {}

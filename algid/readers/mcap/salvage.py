@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from algid.limits import LIMITS
 from algid.readers.mcap import framing
 from algid.readers.mcap.framing import (
     FRAME,
@@ -28,8 +29,6 @@ from algid.readers.mcap.framing import (
 _WINDOW = 1 << 20
 _FOLLOWERS = 3
 """Records in a row that are looked at before a place is believed to be one."""
-_MOST_TRIED = 50_000
-_MOST_OTHERS = 1_000_000
 _OUTER = (framing.CHUNK, framing.MESSAGE_INDEX, framing.DATA_END)
 """What cannot stand within a chunk."""
 _ANY = (*_OUTER, framing.SCHEMA, framing.CHANNEL, framing.MESSAGE, framing.METADATA)
@@ -61,8 +60,8 @@ def salvaged(file: File, start: int) -> Iterator[Record | Gap]:
             for record in framing.walk(file, start, file.size):
                 start = record.end
                 others += record.code not in (framing.MESSAGE, framing.CHUNK, framing.MESSAGE_INDEX)
-                if others > _MOST_OTHERS:
-                    raise DamagedError(f"more than {_MOST_OTHERS} records that are neither messages nor chunks")
+                if others > LIMITS.file_records:
+                    raise DamagedError(f"more than {LIMITS.file_records} records that are neither messages nor chunks")
                 yield record
                 if record.code == framing.FOOTER:
                     break
@@ -84,7 +83,7 @@ def _next(file: File, start: int, tried: int, among: Collection[int]) -> tuple[i
         for place in np.flatnonzero(fits).tolist():
             if int(codes[place]) not in among:
                 continue
-            if tried >= _MOST_TRIED:
+            if tried >= LIMITS.salvage_places:
                 return file.size, tried
             tried += 1
             if _is_record(file, base + place, among):

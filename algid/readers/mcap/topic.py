@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.errors import LogError
+from algid.limits import LIMITS
 from algid.log import IntArray, Notice
 from algid.readers.mcap.catalogue import Catalogue, channels_of, schema_name
 from algid.readers.mcap.codec import decoder_for
@@ -25,7 +26,6 @@ from algid.words import counted
 JOINT_STATE = ("sensor_msgs/msg/JointState", "sensor_msgs/JointState")
 DYNAMIC_JOINT_STATE = ("control_msgs/msg/DynamicJointState", "control_msgs/DynamicJointState")
 _QUANTITIES = {"theta": "position", "tau": "effort", "omega": "velocity"}
-_MOST_JOINTS, _MOST_OTHERS = 256, 32
 _STAMPS = ("header.stamp", "stamp", "timestamp", "time", "header.timestamp")
 _PARTS = (("sec", "nanosec"), ("sec", "nsec"), ("seconds", "nanos"), ("secs", "nsecs"))
 
@@ -50,13 +50,13 @@ def stamp_paths(shape: Shape) -> tuple[str, str] | None:
 
 def joint_names(shape: Shape) -> list[str]:
     """The joints that a message of this shape has both a position and an effort for."""
-    names = names_in(shape) or tuple(str(place) for place in range(64))
+    names = names_in(shape) or tuple(str(place) for place in range(LIMITS.joint_cells))
     return [name for name in names if _path(shape, name, "theta") and _path(shape, name, "tau")]
 
 
 def other_positions(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:
     """By joint the path of its position, of those that a message names beside `joints`."""
-    names = [name for name in names_in(shape) if name not in joints][:_MOST_OTHERS]
+    names = [name for name in names_in(shape) if name not in joints][: LIMITS.other_joints]
     return {name: path for name in names if (path := _path(shape, name, "theta")) is not None}
 
 
@@ -69,7 +69,7 @@ def repeated_name(shape: Shape) -> str | None:
 def names_in(shape: Shape) -> tuple[str, ...]:
     """The joints that a message of this shape names."""
     lists = [texts for path, texts in shape.texts.items() if path in ("name", "names", "joint_names")]
-    return lists[0][:_MOST_JOINTS] if lists else ()
+    return lists[0][: LIMITS.joints] if lists else ()
 
 
 def joint_fields(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:
@@ -93,7 +93,6 @@ def _path(shape: Shape, joint: str, quantity: str) -> str | None:
 
 
 _STAMP = ("sec", "nanosec")
-_MOST_SECONDS, _MOST_NANOSECONDS = 9.2e9, 9.2e18
 
 
 @dataclass
@@ -187,7 +186,7 @@ class Topic:
 
     def _nanoseconds(self, path: str, seconds: NDArray[Any], nanoseconds: NDArray[Any]) -> IntArray:
         """Stamps (N,) of headers in ns."""
-        for values, largest in ((seconds, _MOST_SECONDS), (nanoseconds, _MOST_NANOSECONDS)):
+        for values, largest in ((seconds, LIMITS.stamp_seconds), (nanoseconds, LIMITS.largest_time_ns)):
             wrong = np.flatnonzero(~(np.abs(values.astype(np.float64)) < largest))
             if wrong.size:
                 raise LogError(

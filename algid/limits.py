@@ -1,0 +1,117 @@
+"""Bounds on what a file may claim, ask for or hold: one object, so that none is forgotten and each can be tested.
+
+A size, a count or a depth that stands in a file is anybody's. Whatever loops over such a number, or reserves memory for
+it, compares it with a bound from here first. Each is far beyond what a recorder of a two-link arm writes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class FileLimits:
+    """The bounds; sizes are in bytes where nothing else is said.
+
+    A pair ``free_…`` and ``…_a_byte`` bounds what a file of n bytes may ask for: free + n · a_byte.
+    """
+
+    # settings, profiles, manifests, results
+    text_bytes: int = 1 << 26
+    """Of a file that is read whole: profiles, limits, manifests, results have some thousand."""
+
+    # tables of every format
+    columns: int = 4096
+    list_cells: int = 64
+    """Cells that are taken of a column of lists or a matrix; a joint has one."""
+    joint_cells: int = 64
+    """Joints that are taken of messages whose lists have no names."""
+    whole_bytes: int = 1 << 30
+    """Of a file that is read as a whole: NumPy, MATLAB, Feather."""
+    reserved_rows: int = 1 << 26
+    """Rows to reserve memory for on a file's word alone."""
+    largest_value: float = 1e100
+    """Beyond this a value is no angle and no torque, and its square would overflow."""
+    largest_time_ns: float = 9.2e18
+    """int64 nanoseconds end at 292 years."""
+
+    # text
+    head_bytes: int = 1 << 16
+    """Of a file that are looked at to know its format and its dialect."""
+    line_bytes: int = 1 << 16
+    """Of one line of a table."""
+    title_lines: int = 40
+    """Lines above a table's header that are passed over."""
+    stated_lines: int = 64
+    """Lines above a table that are looked at for units."""
+    stated_letters: int = 2000
+    """Of one such line."""
+    unit_letters: int = 40
+    """Of a unit that a schema states."""
+    free_text_bytes: int = 256 << 20
+    text_a_byte: int = 250
+    """What a compressed table may unpack to: rows of numbers pack 3 to 20 times, a log at rest a hundred times."""
+    zstd_window_bytes: int = 1 << 27
+
+    # Parquet
+    parquet_footer_bytes: int = 1 << 26
+    parquet_footer_values: int = 5_000_000
+    parquet_footer_depth: int = 16
+    parquet_header_bytes: int = 1 << 14
+    """Of a page's header."""
+
+    # MCAP
+    record_bytes: int = 1 << 24
+    """Of a record that is neither a message, a chunk nor an attachment."""
+    summary_bytes: int = 1 << 28
+    chunk_bytes: int = 1 << 28
+    """Of a chunk, packed and unpacked: a recorder closes one at some MiB; more is a mistake or an attack."""
+    other_records: int = 300_000
+    """Schemas, channels and the like side by side; ids end at 65,535."""
+    file_records: int = 1_000_000
+    """Records of a whole file that are neither messages, chunks nor message indexes."""
+    salvage_places: int = 50_000
+    """Places of a damaged file that are tried for a record."""
+    message_indexes: int = 2_000_000
+    spans: int = 100_000
+    """Chunks, and messages apart from each other."""
+    index_gaps: int = 256
+    """Gaps between messages of a chunk, beyond which its index is not followed."""
+    free_unpacked_bytes: int = 384 << 20
+    unpacked_a_byte: int = 250
+    """What a file may unpack to: logs of joints pack 5 to 50 times, logs at rest up to a hundred times."""
+    free_work: int = 1_500_000
+    work_a_byte: int = 4
+    """What a file may have done message by message, in steps of about a microsecond."""
+
+    # messages
+    message_bytes: int = 1 << 24
+    """Of one message; a joint state has some hundred."""
+    message_parts: int = 100_000
+    """Fields, structures and strings a message may be made of; a list of numbers is one."""
+    layouts: int = 256
+    """Past so many layouts of one size messages are walked one by one."""
+    layout_words: int = 1 << 22
+    """Words that all remembered layouts may fix together."""
+    definition_letters: int = 1 << 20
+    """Of a schema: a ROS 2 definition's letters, a Protobuf descriptor's bytes."""
+    definition_fields: int = 4096
+    definition_depth: int = 32
+    """Types, typedefs, modules and Protobuf messages within one another."""
+    length_digits: int = 10
+    """Of a length in a definition: 32 bits have so many."""
+    json_bytes: int = 1 << 20
+    """Of one JSON message."""
+    joints: int = 256
+    """Names of joints in one message."""
+    other_joints: int = 32
+    """Joints that are not read and are looked at."""
+    topics: int = 256
+    """Topics that may hold joint states, beyond which one must be named."""
+    stamp_seconds: float = 9.2e9
+
+    # bags
+    bag_metadata_bytes: int = 1 << 24
+
+
+LIMITS = FileLimits()
