@@ -30,6 +30,7 @@ _DIFFERENCE = 6  # order of the difference that leaves only noise of a smooth si
 _PROBES = 8
 _LARGEST_STEP = 2.0  # in log σ²
 _SMALLEST = 1e-12  # relative to the signal: below it floating point is the noise
+_MOTORLESS = 1e-3  # of the other joint's torque: what bearings and cables exert on a joint without a motor, at least
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +62,14 @@ def first_guess(theta: FloatArray, tau: FloatArray) -> NoiseLevels:
     -------
     NoiseLevels
         The differences' median size over 0.6745 √C(12, 6); their root mean square where most of them are zero.
+
+    Notes
+    -----
+    The torque of a joint without a motor is logged as zero, and is none exactly: its bearings rub, its cables pull.
     """
-    return NoiseLevels(_white_noise(theta), _white_noise(tau))
+    rms = np.sqrt(np.mean(tau**2, axis=1))
+    least = np.where(rms > 0, 0.0, _MOTORLESS * rms.max())
+    return NoiseLevels(_white_noise(theta), np.maximum(_white_noise(tau), least))
 
 
 def _white_noise(signal: FloatArray) -> FloatArray:

@@ -356,8 +356,7 @@ def first_payload(shared: Shared, arm: FloatArray, loaded: LogInformation) -> Fl
     hold = Prior.of(shared.log_names, arm, scaled_pinv(loaded.total[0]) * 1e-4)
     for mass in _FIRST_MASSES:
         guess = {"m_p": mass} | {
-            length: _length_of(shared, (loaded.c0 - arm) / (mass * shared.model.gravity), name)
-            for length, name in (("l1", "k4"), ("l2", "k2"))
+            length: _length_of(shared, loaded.c0 - arm, mass, name) for length, name in (("l1", "k4"), ("l2", "k2"))
         }
         start = np.concatenate([arm, [guess[name] for name in shared.names[arm.size :]]])
         beta, _, value = combine(shared, [loaded], start, hold)
@@ -366,7 +365,9 @@ def first_payload(shared: Shared, arm: FloatArray, loaded: LogInformation) -> Fl
     return start if best is None else best
 
 
-def _length_of(shared: Shared, lengths: FloatArray, name: str) -> float:
-    """The length in m that the change of the gravity constant `name` tells, where that is a length."""
-    length = float(lengths[shared.log_names.index(name)]) if name in shared.log_names else np.nan
+def _length_of(shared: Shared, change: FloatArray, mass: float, name: str) -> float:
+    """The length in m that the change of the gravity constant `name` by `mass` kg tells, where that is a length."""
+    if name not in shared.log_names:
+        return _FIRST_LENGTH
+    length = float(change[shared.log_names.index(name)]) / (mass * shared.model.gravity)
     return length if 0.01 < length < 10 else _FIRST_LENGTH

@@ -84,6 +84,7 @@ def open_source(
         If the log cannot be opened, or its metadata name another payload than its role.
     """
     if isinstance(log, Log):
+        log = _in_radians(log)
         source = LogSource(
             log.origin.path, role, log.origin, lambda: iter([log]), len(log), gravity, partial(_hash_of_arrays, log)
         )
@@ -146,6 +147,15 @@ def with_twins_marked(unloaded: list[LogSource], loaded: list[LogSource]) -> lis
         said = () if twin is None else (Notice("SAME_LOG", f"{text}, which makes the payload nought"),)
         marked.append(replace(source, notices=(*source.notices, *said)))
     return [*unloaded, *marked]
+
+
+def _in_radians(log: Log) -> Log:
+    """A log whose angles no reader made: they are rad by the definition of `Log`, however often its joints turn."""
+    reading = log.origin.reading
+    if "theta1" in reading.channels or "DEGREES" in reading.accepted:
+        return log
+    accepted = replace(reading, accepted=(*reading.accepted, "DEGREES"))
+    return replace(log, origin=replace(log.origin, reading=accepted))
 
 
 def _hash_of_arrays(log: Log) -> str:

@@ -144,3 +144,12 @@ def test_changes_count_in_their_own_deviations_and_levels_keep_their_floor(linea
         assert largest_change(before, NoiseLevels(level[:2], level[2:]), score) == pytest.approx(0.1 * deviations)
     held = floored(before, NoiseLevels(np.array([1.5, 1.5]), np.array([3.5, 3.5])))
     assert [*held.theta, *held.tau] == [1.5, 2.0, 3.5, 4.0]
+
+
+def test_a_torque_that_is_none_has_a_share_of_the_others_as_noise() -> None:
+    """Bearings rub and cables pull on a joint without a motor: its zero is not exact."""
+    t = np.arange(2000) * 1e-3
+    tau = np.stack([np.sin(9 * t), np.zeros_like(t)])
+    rms = float(np.sqrt(np.mean(tau[0] ** 2)))
+    np.testing.assert_allclose(first_guess(np.stack([t, t]), tau).tau[1], 1e-3 * rms, rtol=1e-12)
+    np.testing.assert_allclose(first_guess(np.stack([t, t]), tau[::-1]).tau[0], 1e-3 * rms, rtol=1e-12)

@@ -15,10 +15,15 @@ import algid
 from algid import results
 from algid.errors import LogError, OutputError, ResultError, SettingError
 from algid.identification.identify import identify
+from algid.identification.source import open_source
+from algid.inspection.checks import noticed
 from algid.log import Log
 from algid.report.verdict import verdict
 from algid.results import Status, read_result, result_schema
 from algid.settings import Settings
+from algid.synth.cases import load_case
+from algid.synth.excitation import wide_multi_sine
+from algid.synth.run import Recording, synthesise
 from algid.synth.sensors import Sensors
 
 PAPER = Settings(estimator="paper")
@@ -281,3 +286,23 @@ def test_a_log_whose_lost_samples_were_renumbered_has_failed_unless_it_is_accept
     accepted = algid.identify(replace(lost, origin=replace(lost.origin, reading=reading)), report=False, settings=WEAK)
     assert any(one.status is Status.OK for one in accepted.parameters.values())
     assert any("LOST_SAMPLES" in warning for warning in accepted.warnings)
+
+
+def test_a_log_in_memory_is_in_radians_however_often_its_joints_turn(noisy: tuple[Log, Log]) -> None:
+    """`Log` has rad by its definition: what looks like degrees is said, and refuses nothing."""
+    wide = replace(noisy[0], theta=noisy[0].theta * 40, omega=None)
+    (block,) = open_source(wide, "unloaded").blocks()
+    assert "DEGREES" in [notice.code for notice in noticed(block)]
+    with pytest.raises(LogError, match="DEGREES"):
+        noticed(wide)
+
+
+def test_a_payload_without_gravity_raises_no_warning_of_numpy() -> None:
+    """Its weight tells no length then: the weak estimate starts from a usual one."""
+    flat = replace(load_case("case1").arm, g=0.0)
+    case = replace(load_case("case1"), arm=flat)
+    recording = Recording(rate=500.0, duration=4.0, sensors=Sensors(position_noise=1e-4, torque_noise=1e-3))
+    logs = synthesise(case, wide_multi_sine(flat, 3), recording)
+    result = identify(*logs, replace(WEAK, gravity=0.0, l1=flat.l1))
+    found = result.payload["m_p"]
+    assert found.estimate == pytest.approx(case.payload, rel=0.02)

@@ -24,6 +24,8 @@ from algid.signals.segments import Segment
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
+from algid.track.result import track_json
+from algid.track.run import track_log
 from tests.cli.commands import app
 from tests.intervals import holds_95, in_axes
 
@@ -118,3 +120,24 @@ def test_a_torque_that_is_zero_is_refused_until_the_joint_is_called_passive(tmp_
     done = CliRunner().invoke(app, ["identify", str(file), "--passive", "2", "-o", str(tmp_path), "--no-report"])
     assert done.exit_code == 0, done.output
     assert "EFFORT_ZERO" not in done.output
+
+
+def test_a_weak_result_tracks_and_designs_where_a_joint_has_no_motor(tmp_path: Path) -> None:
+    """It has no noise levels: the log's first stretch tells them, that of the motorless joint by the other's torque."""
+    log = logged(moved("case1", 2), 0)
+    stamps = np.arange(len(log), dtype=np.int64) * round(1e9 * DT)
+    origin = Origin("pendubot.csv", "csv", {}, reading=Reading(passive=2))
+    memory = Log(stamps, log.theta, log.tau, origin)
+    identify(memory, settings=Settings(estimator="weak", model="plain"), out=tmp_path, report=False)
+    found = track_log(memory, tmp_path / "pendubot.algid", l1=0.162, l2=0.123)
+    assert found.complete
+    assert "NaN" not in track_json(found)
+    file = tmp_path / "pendubot.csv"
+    columns = np.column_stack([np.arange(len(log)) * DT, *log.theta, *log.tau])
+    np.savetxt(file, columns, delimiter=",", header="t,theta1,theta2,tau1,tau2", comments="")
+    sure = ["--runs", "1,0", "--duration", "1", "--drive", "torque", "--noise-from", str(file)]
+    bounds = ["--range", "1.2", "--speed", "3", "--torque", "1.5,0"]
+    folder = str(tmp_path / "pendubot.algid")
+    done = CliRunner().invoke(app, ["design", folder, *bounds, *sure, "-o", str(tmp_path)])
+    assert "nan" not in done.output, done.output
+    assert done.exit_code in (0, 3), done.output
