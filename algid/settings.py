@@ -20,15 +20,6 @@ def flag(name: str) -> str:
     return "--" + name.replace("_", "-")
 
 
-def _delay(text: str) -> float | Literal["estimate"]:
-    if text == "estimate":
-        return "estimate"
-    try:
-        return float(text)
-    except ValueError:
-        raise SettingError(f"--delay: expected seconds or 'estimate', found {text!r}") from None
-
-
 def _poles(text: str) -> tuple[complex, ...]:
     """Six poles out of text; complex ones like -80+20j."""
     from algid.signals.observers import observer_gain
@@ -65,12 +56,8 @@ class Settings:
     gravity : float, m/s^2, 0 for an arm that moves in a horizontal plane
     model : 'auto', 'plain', or terms of the torque between commas
         Names in `algid.model.TERMS`, and delay; 'auto' lets the logs choose.
-    friction : 'viscous' or 'coulomb'
-    torque_offset, rotor_inertia : bool
-        These three are short forms of terms in `model`, as is a delay of 'estimate': with one of them nothing else
-        is chosen.
     torque_hold : 'foh' or 'zoh'
-    delay : float, s, between torque and angle, or 'estimate'
+    delay : float, s, between torque and angle, where it is known; the term `delay` estimates it
     l1, l2 : float, m, link lengths where known
     payload_mass : float, kg, the payload's where it is known
         Then the gain of the torques follows: what the log's torques have to be multiplied by.
@@ -110,16 +97,11 @@ class Settings:
             "asymmetry, load, offset, rotor, gain, zero, lag, delay, like coulomb,rotor.",
         },
     )
-    friction: Literal["viscous", "coulomb"] = field(
-        default="viscous", metadata={"help": "Viscous, or viscous and Coulomb: --model coulomb."}
-    )
-    torque_offset: bool = field(default=False, metadata={"help": "Estimate torque offsets: --model offset."})
-    rotor_inertia: bool = field(default=False, metadata={"help": "Estimate joint 2's rotor: --model rotor."})
     torque_hold: Literal["foh", "zoh"] = field(
         default="foh", metadata={"help": "Torque between samples: ramped or held."}
     )
-    delay: float | Literal["estimate"] = field(
-        default=0.0, metadata={"help": "From torque to angle, s, or 'estimate'.", "parse": _delay}
+    delay: float = field(
+        default=0.0, metadata={"help": "From torque to angle, s, where known; --model delay estimates it."}
     )
     l1: float | None = field(default=None, metadata={"help": "Length of link 1, m, where known."})
     l2: float | None = field(default=None, metadata={"help": "Length of link 2, m, where known."})
@@ -138,8 +120,8 @@ class Settings:
                 raise SettingError(f"{flag(name)}: expected a number above {low:g}, found {value:g}")
         if not 0.0 <= self.gravity < math.inf:
             raise SettingError(f"--gravity: expected a number of 0 or more, found {self.gravity:g}")
-        if self.delay != "estimate" and not math.isfinite(self.delay):
-            raise SettingError(f"--delay: expected seconds or 'estimate', found {self.delay:g}")
+        if not math.isfinite(self.delay):
+            raise SettingError(f"--delay: expected seconds, found {self.delay:g}")
         if self.model not in ("auto", "plain"):
             self._check_terms()
         if self.estimator == "paper":
@@ -154,6 +136,7 @@ class Settings:
         SettingError
             As for a new one.
         """
+        content = _without_short_forms(content)
         known = {f.name: content[f.name] for f in fields(cls) if f.name in content}
         if known.get("poles") is not None:
             known["poles"] = tuple(complex(pole) if isinstance(pole, str) else float(pole) for pole in known["poles"])
@@ -161,20 +144,15 @@ class Settings:
 
     @property
     def terms(self) -> tuple[str, ...]:
-        """Terms asked for, by name or by a short form; "delay" where it is to be estimated."""
-        listed = () if self.model in ("auto", "plain") else tuple(name.strip() for name in self.model.split(","))
-        short = {
-            "coulomb": self.friction == "coulomb",
-            "offset": self.torque_offset,
-            "rotor": self.rotor_inertia,
-            "delay": self.delay == "estimate",
-        }
-        return tuple(dict.fromkeys((*listed, *(term for term, asked in short.items() if asked))))
+        """Terms asked for, by name; "delay" where it is to be estimated."""
+        if self.model in ("auto", "plain"):
+            return ()
+        return tuple(dict.fromkeys(name.strip() for name in self.model.split(",")))
 
     @property
     def chooses(self) -> bool:
         """Whether the logs choose the terms."""
-        return self.model == "auto" and not self.terms
+        return self.model == "auto"
 
     @property
     def luenberger(self) -> bool:
@@ -191,7 +169,7 @@ class Settings:
         hold = 0.5 * dt if self.torque_hold == "zoh" else 0.0
         if found_delay is not None:
             return hold + found_delay
-        return hold + (0.0 if self.delay == "estimate" else self.delay)
+        return hold + self.delay
 
     def as_json(self) -> dict[str, Any]:
         """For `result.json`; complex poles as text, the paper's where none are set."""
@@ -220,7 +198,7 @@ class Settings:
                 f"--model {self.model}: the paper's method has no such terms; use --estimator refined or weak"
             )
         ours = {f.name: f.default for f in fields(self)}
-        lacking = ("friction", "torque_offset", "rotor_inertia", "delay", "l1", "l2", "payload_mass")
+        lacking = ("delay", "l1", "l2", "payload_mass")
         for name in (*lacking, "constrain", "cross_validate"):
             if getattr(self, name) != ours[name]:
                 raise SettingError(
@@ -228,3 +206,23 @@ class Settings:
                 )
         if self.gravity == 0:
             raise SettingError("--gravity 0: the paper's payload needs gravity; use --estimator refined or weak")
+
+
+_SHORT_FORMS = {
+    ("friction", "coulomb"): "coulomb",
+    ("torque_offset", True): "offset",
+    ("rotor_inertia", True): "rotor",
+    ("delay", "estimate"): "delay",
+}
+"""Settings of results before schema 3 that stood for a term of the model."""
+
+
+def _without_short_forms(content: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings of a result, where `model` alone names the terms."""
+    short = [term for (name, value), term in _SHORT_FORMS.items() if content.get(name) == value]
+    if not short:
+        return dict(content)
+    model = content.get("model", "auto")
+    listed = [] if model in ("auto", "plain") else [name.strip() for name in str(model).split(",")]
+    delay = 0.0 if content.get("delay") == "estimate" else content.get("delay", 0.0)
+    return {**content, "model": ",".join(dict.fromkeys([*listed, *short])), "delay": delay}

@@ -137,7 +137,7 @@ def arm_for(scene: Scene, log: Log, rng: np.random.Generator) -> tuple[Identifie
     if not scene.identified:
         noise = NoiseLevels(np.full(2, SIGMA_THETA), np.full(2, SIGMA_TAU))
         return IdentifiedArm(Model(), CASE.arm.constants(), CASE.arm.l1, CASE.arm.l2, noise), np.zeros((9, 9))
-    settings = Settings(friction="coulomb") if scene.modelled else Settings()
+    settings = Settings(model="coulomb") if scene.modelled else Settings()
     bare, burdened = (drawn(one, scene, rng) for one in calibration())
     result = identify(bare, burdened, settings, report=False)
     return arm_of(result, next(segments([log])))

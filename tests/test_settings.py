@@ -29,7 +29,7 @@ def test_every_setting_is_an_option_with_its_default_and_help() -> None:
     [
         Settings(),
         Settings(estimator="paper", poles=(-50 + 20j, -50 - 20j, -60.0, -80.0, -90.0, -100.0), window=1.5),
-        Settings(friction="coulomb", delay="estimate", torque_hold="zoh", l1=0.3, cross_validate=True),
+        Settings(model="coulomb,delay", torque_hold="zoh", l1=0.3, cross_validate=True),
     ],
 )
 def test_a_result_gives_its_settings_back(settings: Settings) -> None:
@@ -42,14 +42,18 @@ def test_a_result_gives_its_settings_back(settings: Settings) -> None:
 
 def test_text_of_an_option_that_means_nothing_names_the_option() -> None:
     defaults = {field.name: field.default for field in fields(Settings)}
-    for name, text in (("delay", "soon"), ("poles", "1,2,3"), ("poles", "a,b")):
+    for name, text in (("poles", "1,2,3"), ("poles", "a,b")):
         with pytest.raises(SettingError, match=f"^{flag(name)}"):
-            Choice(defaults | {"delay": "0", name: text}, {}).settings()
+            Choice(defaults | {name: text}, {}).settings()
 
 
-def test_short_forms_and_lists_name_the_same_terms() -> None:
-    short = Settings(friction="coulomb", torque_offset=True, rotor_inertia=True, delay="estimate")
-    assert set(short.terms) == set(Settings(model="coulomb, offset,rotor,delay").terms)
+def test_short_forms_of_older_results_name_terms_of_the_model() -> None:
+    older = {"friction": "coulomb", "torque_offset": True, "rotor_inertia": True, "delay": "estimate"}
+    short = Settings.of({"model": "auto", **older})
+    assert short == Settings(model="coulomb,offset,rotor,delay")
+    assert Settings.of({"model": "rotor", "friction": "coulomb"}).terms == ("rotor", "coulomb")
+    plain = {"friction": "viscous", "torque_offset": False, "rotor_inertia": False, "delay": 0.002}
+    assert Settings.of({"model": "auto", **plain}) == Settings(delay=0.002)
     assert Settings().chooses
     assert not short.chooses
     assert not Settings(model="plain").chooses

@@ -22,7 +22,6 @@ from algid.cli.completion import (
     refusing_checks,
     settings_of_profile,
     terms,
-    words,
 )
 from algid.errors import SettingError
 from algid.settings import Settings, flag
@@ -32,10 +31,10 @@ if TYPE_CHECKING:
 
 MODEL, METHOD, LOG = "The arm's model", "Method", "What the log means"
 """Panels of a command's help."""
-MODELLED = ("gravity", "model", "friction", "torque_offset", "rotor_inertia", "torque_hold", "delay", "l1", "l2")
+MODELLED = ("gravity", "model", "torque_hold", "delay", "l1", "l2")
 
 
-COMPLETED = {"model": listed(terms), "delay": words("estimate")}
+COMPLETED = {"model": listed(terms)}
 """Settings that are text and take some words."""
 
 OF_PROFILE: Mapping[str, tuple[Any, str, Completion | None]] = {

@@ -199,7 +199,7 @@ def _weak_settings(settings: Settings, chosen: Selection) -> weak.WeakSettings:
         model=chosen.model,
         bandwidth=None if own_velocities else settings.bandwidth,
         hold=settings.torque_hold,
-        delay=0.0 if settings.delay == "estimate" else settings.delay,
+        delay=settings.delay,
         estimate_delay=chosen.delay,
     )
     return ours if settings.window is None else replace(ours, window=settings.window)

@@ -155,7 +155,7 @@ def test_bad_logs_get_one_line_and_nothing_is_written(change: str, logs: Path, t
         (("synth", "case1", "--torque", "nothing-like-it"), "--torque nothing-like-it"),
         (("identify", "x.csv", "--delay", "soon"), "--delay"),
         (("identify", "x.csv", "--poles", "1,2,3"), "--poles"),
-        (("identify", "x.csv", "--estimator", "paper", "--friction", "coulomb"), "--friction"),
+        (("identify", "x.csv", "--estimator", "paper", "--model", "coulomb"), "--model"),
         (("check", "nothing.algid"), "nothing.algid"),
         (("identify", "--parameters", "nothing.algid", "x.csv"), "nothing.algid"),
     ],

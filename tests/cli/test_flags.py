@@ -171,8 +171,7 @@ TERMS = "coulomb, offset, rotor, stribeck, asymmetry, load, gain, zero, lag, del
 OF_SETTINGS = [
     ("--model", "magic", f"--model: expected auto, plain or some of {TERMS}; found 'magic'"),
     ("--model", "stribeck", "--model: stribeck has no meaning without coulomb; add coulomb to the list"),
-    ("--delay", "soon", "--delay: expected seconds or 'estimate', found 'soon'"),
-    ("--delay", "inf", "--delay: expected seconds or 'estimate', found inf"),
+    ("--delay", "inf", "--delay: expected a finite number, found inf"),
     ("--poles", "a,b", "--poles a,b: expected numbers between commas; give six like -80,-390,-391,-392,-393,-394"),
     ("--window", "0", "--window: expected a number above 0, found 0"),
     ("--bandwidth", "-1", "--bandwidth: expected a number above 0, found -1"),

@@ -73,7 +73,7 @@ def test_an_impossible_arm_is_refused(result: Result, tmp_path: Path) -> None:
 
 def test_friction_of_a_real_arm_is_planned_for_and_what_cannot_be_is_said(tmp_path: Path) -> None:
     logs = algid.synthesise("case1", duration=2.0, rate=500.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
-    settings = Settings(friction="coulomb", torque_offset=True)
+    settings = Settings(model="coulomb,offset")
     belief = prior_of(saved(algid.identify(*logs, settings), tmp_path), None, KnownBefore()).belief
     assert {"f1", "f2", "o1", "o2"} <= set(belief.shared.names)
     asked = asked_for(belief, None, "it")

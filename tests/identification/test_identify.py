@@ -143,8 +143,8 @@ def test_weak_excitation_by_likelihood_names_what_is_missing() -> None:
 
 
 def test_settings_that_the_paper_lacks_are_refused() -> None:
-    with pytest.raises(SettingError, match="--friction"):
-        Settings(estimator="paper", friction="coulomb")
+    with pytest.raises(SettingError, match="--model"):
+        Settings(estimator="paper", model="coulomb")
     with pytest.raises(SettingError, match="window"):
         Settings(window=-1.0)
 
@@ -174,7 +174,7 @@ def test_real_arm_is_identified(shared_data: Path) -> None:
     logs = sorted((shared_data / "dfki" / "C1_sysid").glob("*.csv"))[:3]
     from algid.profile import Profile, with_settings
 
-    settings = Settings(friction="coulomb", torque_offset=True)
+    settings = Settings(model="coulomb,offset")
     result = identify(logs, None, settings, profile=with_settings(Profile(), {"zero": "hanging"}))
     assert result.fit is not None
     assert result.fit.residual is not None
@@ -206,10 +206,10 @@ def test_a_result_names_the_estimator_whose_numbers_it_holds(shared_data: Path) 
 
     logs = sorted((shared_data / "dfki" / "C1_sysid").glob("*.csv"))
     profile = with_settings(Profile(), {"zero": "hanging"})
-    result = identify(logs[:2], None, Settings(friction="coulomb"), profile=profile)
+    result = identify(logs[:2], None, Settings(model="coulomb"), profile=profile)
     assert result.estimator in ("weak", "instruments")  # whichever foretells the logs left out better
     assert result.settings["estimator"] == "refined"
-    own = identify(logs[:2], None, Settings(friction="coulomb", estimator=result.estimator), profile=profile)  # type: ignore[arg-type]
+    own = identify(logs[:2], None, Settings(model="coulomb", estimator=result.estimator), profile=profile)  # type: ignore[arg-type]
     for name, found in own.parameters.items():
         shown = result.parameters[name]
         assert found.estimate is not None
@@ -245,7 +245,7 @@ def test_an_impossible_arm_has_no_status_ok(estimator: str, noisy: tuple[Log, Lo
 @pytest.mark.parametrize("change", ["joint 2 flipped", "torque flipped"])
 def test_constrain_obeys_every_bound(change: str, noisy: tuple[Log, Log]) -> None:
     logs = [flipped(log) if change == "joint 2 flipped" else replace(log, tau=-log.tau) for log in noisy]
-    settings = Settings(estimator="weak", constrain=True, friction="coulomb", rotor_inertia=True)
+    settings = Settings(estimator="weak", constrain=True, model="coulomb,rotor")
     result = identify(logs[0], logs[1], settings)
     found = {name: e.estimate for name, e in result.estimates.items() if e.estimate is not None}
     assert all(found[name] >= 0 for name in ("k6", "k7", "f1", "f2", "j2", "m_p", "l1", "l2") if name in found)

@@ -30,7 +30,7 @@ NAMES = [f"k{n}" for n in range(1, 8)]
 @pytest.fixture(scope="module")
 def weighed() -> Result:
     logs = algid.synthesise("case1", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2, seed=1))
-    return identify(*logs, Settings(friction="coulomb"), report=False)
+    return identify(*logs, Settings(model="coulomb"), report=False)
 
 
 def changed(result: Result, group: str, name: str, **values: object) -> Result:
@@ -52,7 +52,7 @@ def test_the_model_is_the_fits_or_that_of_the_settings(weighed: Result) -> None:
     kept = weighed.model_copy(update={"fit": weighed.fit.model_copy(update={"model": other})})
     assert model_of(kept) == Model(("rotor",), 9.81, 0.77, 0.55)
     assert model_of(without_fit(weighed)) == Model(("coulomb",))
-    asked = without_fit(weighed, model="rotor,delay", friction="viscous", delay="estimate", gravity=1.6)
+    asked = without_fit(weighed, model="rotor,delay", gravity=1.6)
     assert model_of(asked) == Model(("rotor",), 1.6)
 
 

@@ -98,7 +98,7 @@ def test_the_torque_acts_after_its_delay_and_half_its_hold(result: Result, first
     assert arm_of(_with(result, delay=0.0, torque_hold="foh"), first)[0].shift == 0.0
     assert arm_of(_with(result, delay=0.004, torque_hold="foh"), first)[0].shift == 0.004
     assert arm_of(_with(result, delay=0.004, torque_hold="zoh"), first)[0].shift == pytest.approx(0.004 + first.dt / 2)
-    found = _with(result, delay="estimate", torque_hold="foh")
+    found = _with(result, model="delay", torque_hold="foh")
     assert arm_of(found, first)[0].shift == 0.0
     delay = result.parameters["k1"].model_copy(update={"estimate": 0.007, "unit": "s"})
     estimated = found.model_copy(update={"parameters": {**result.parameters, "delay": delay}})
