@@ -25,7 +25,7 @@ from algid.limits import LIMITS
 from algid.readers.mcap import framing
 from algid.readers.mcap.catalogue import between, catalogue, channels_of
 from algid.readers.mcap.framing import DamagedError, File
-from algid.readers.mcap.load import spans_of
+from algid.readers.mcap.load import spans_beside, spans_of
 from algid.stores import reading
 
 if TYPE_CHECKING:
@@ -229,7 +229,8 @@ def _wanted_of_mcap(part: Partial, profile: Profile | None) -> list[Range]:
     part.on_demand = True
     topics = plan(part, found, profile).topics
     channels = frozenset[int]().union(*(channels_of(found, topic.name, topic.type) for topic in topics))
-    return [(span.start, span.start + span.length + span.index_length) for span in spans_of(found, channels)]
+    spans = [*spans_of(found, channels), *spans_beside(found, channels)]
+    return [(span.start, span.start + span.length + span.index_length) for span in spans]
 
 
 def _wanted_of_parquet(part: Partial, profile: Profile | None) -> list[Range]:

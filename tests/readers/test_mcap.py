@@ -79,6 +79,35 @@ def test_names_that_change_place_are_followed(tmp_path: Path) -> None:
     assert [notice.code for notice in found.notices] == ["OTHER_MESSAGES"]
 
 
+@pytest.mark.parametrize("encoding", ["cdr", "json"])
+@pytest.mark.parametrize("lacking", ["effort", "position"])
+def test_messages_that_lack_a_quantity_are_lost_and_those_of_other_joints_are_not(
+    lacking: str, encoding: str, tmp_path: Path
+) -> None:
+    log = noise_log(90, start_ns=EPOCH_NS, velocity=False)
+    messages = []
+    for row, stamp in enumerate(log.stamp_ns.tolist()):
+        values = {"position": log.theta[:, row].tolist(), "effort": log.tau[:, row].tolist()}
+        if row % 3 == 1:
+            values[lacking] = []
+        names = ["other"] if row % 3 == 2 else ["j1", "j2"]
+        cut = {key: one[: len(names)] for key, one in values.items()}
+        data = joint_state(stamp, names, **cut).done()
+        if encoding == "json":
+            stamps = {"sec": stamp // 10**9, "nanosec": stamp % 10**9}
+            data = json.dumps({"header": {"stamp": stamps}, "name": names, **cut}).encode()
+        messages.append((TOPIC, stamp, data))
+    write_mcap(tmp_path / "log.mcap", messages, encoding=encoding)
+    found = read_log(tmp_path / "log.mcap")
+    assert found.stamp_ns.tolist() == log.stamp_ns[::3].tolist()
+    told = {notice.code: (notice.lossy, notice.text) for notice in found.notices}
+    fields = f"{lacking}[j1], {lacking}[j2]"
+    assert told == {
+        "LACKING_MESSAGES": (True, f"30 messages on '/joint_states' left out for want of {fields}"),
+        "OTHER_MESSAGES": (False, "30 messages on '/joint_states' left out: of other joints"),
+    }
+
+
 def test_joints_named_by_numbers_are_not_places(tmp_path: Path) -> None:
     log = noise_log(20, start_ns=EPOCH_NS, velocity=False)
     messages = []

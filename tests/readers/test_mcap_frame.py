@@ -96,6 +96,24 @@ def shorter(records: Records) -> Records:
     return [one for one in records if one is not last]
 
 
+def hidden_index(records: Records) -> Records:
+    """The second chunk lists none of its indexes, and the statistics do not count their messages."""
+    chunk = [one for one in records if isinstance(one, ChunkIndex)][1]
+    (channel,) = chunk.message_index_offsets
+    count = (chunk.message_index_length - 15) // 16
+    chunk.message_index_offsets = {}
+    changing(Statistics, lambda one: one.channel_message_counts.update({channel: len(LOG) - count}))(records)
+    return records
+
+
+def cut_index(records: Records) -> Records:
+    """The third chunk has no index as it is told, the second one that ends before its own."""
+    chunks = [one for one in hidden_index(records) if isinstance(one, ChunkIndex)]
+    chunks[2].message_index_offsets, chunks[2].message_index_length = {}, 0
+    chunks[1].message_index_length = 9
+    return records
+
+
 def misplaced(chunk: ChunkIndex) -> None:
     chunk.message_index_offsets = {number: place + 1 for number, place in chunk.message_index_offsets.items()}
 
@@ -129,6 +147,11 @@ WRONG: dict[str, tuple[Callable[[Records], Records], str]] = {
     "an index beside its place": (changing(ChunkIndex, misplaced), r"it claims a message index at byte \d+"),
     "chunks over one another": (overlapping, r"its chunks overlap at byte \d+"),
     "a chunk in no list": (hiding, r"it does not list what stands at byte \d+"),
+    "an index in no list": (hidden_index, r"it does not list what stands at byte \d+"),
+    "an index that ends before its end": (cut_index, r"a record at byte \d+ breaks off"),
+    "a channel without definition": (
+        changing(Channel, lambda one: setattr(one, "id", 5)), "it lists messages of a channel 1 that it does not define"
+    ),
     "a schema twice": (redefined(Schema, data=b"int8 x"), "schema 1 is defined anew and differently"),
     "a channel twice": (redefined(Channel, topic="/other"), "channel 1 is defined anew and differently"),
 }  # fmt: skip
@@ -365,3 +388,66 @@ def test_the_truth_in_the_metadata_is_read_where_it_can_be(tmp_path: Path) -> No
     found_log = read_log(path)
     assert found_log.origin.truth is None
     assert [(one.code, one.lossy) for one in found_log.notices] == [("DAMAGED_RECORD", False)]
+
+
+def hiding_one_of_two(path: Path, others: int) -> None:
+    """A file of small chunks, of which the summary hides the joints of one chunk that holds another channel too."""
+    messages = messages_of(LOG)
+    beside = [("/other", stamp, b"\0\1\0\0\7") for _, stamp, _ in messages[30 : 30 + others]]
+    mixed = [*messages[:30], *beside, *messages[30:]]
+    write_mcap(path, mixed, {"/other": ("a/msg/B", "ros2msg", b"int8 x")} if others else None, chunk_size=2000)
+
+
+def test_a_summary_that_hides_the_joints_of_a_chunk_is_not_used(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    hiding_one_of_two(path, 20)
+    shared = [chunk for chunk in chunks_of(path) if len(chunk.message_index_offsets) == 2]
+    assert shared
+
+    def hide(records: Records) -> Records:
+        (statistics,) = (one for one in records if isinstance(one, Statistics))
+        for chunk in (one for one in records if isinstance(one, ChunkIndex)):
+            if len(chunk.message_index_offsets) == 2:
+                places = sorted([*chunk.message_index_offsets.values(), _end_of(chunk)])
+                start = chunk.message_index_offsets.pop(1)
+                statistics.channel_message_counts[1] -= (places[places.index(start) + 1] - start - 15) // 16
+        return records
+
+    path.write_bytes(summarised(path.read_bytes(), hide))
+    found = read_log(path)
+    assert same(found, LOG)
+    assert [notice.code for notice in found.notices] == ["DAMAGED_SUMMARY"]
+    assert "does not list what stands at byte" in found.notices[0].text
+
+
+def _end_of(chunk: ChunkIndex) -> int:
+    return chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length
+
+
+@pytest.mark.parametrize("code", [3, 4])
+def test_a_definition_in_a_chunk_of_others_that_changes_the_joints_ends_them(code: int, tmp_path: Path) -> None:
+    """The chunk holds no message of the joints, so its index does not name them."""
+    path = tmp_path / "log.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=100, compression=CompressionType.NONE, enable_crcs=False)
+        writer.start()
+        one = writer.register_schema(JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode())
+        writer.register_channel(TOPIC, "cdr", one)
+        for row, (_, stamp, data) in enumerate(messages_of(LOG)):
+            if row == 50:
+                other = writer.register_schema("a/msg/B", "ros2msg", b"int8 x")
+                writer.add_message(writer.register_channel("/other", "cdr", other), stamp, b"\0\1\0\0\7", stamp)
+            writer.add_message(1, stamp, data, stamp)
+        writer.finish()  # type: ignore[no-untyped-call]
+    content = path.read_bytes()
+    assert [set(chunk.message_index_offsets) for chunk in chunks_of(path)] == [{1}] * 50 + [{2}] + [{1}] * 70
+    place = next(
+        place for place in range(content.index(b"/other") - 200, len(content))
+        if content[place] == code and content[place + 9 : place + 11] == b"\2\0"
+    )  # fmt: skip
+    path.write_bytes(poked(content, place + 9, "<H", 1))
+    found = read_log(path)
+    assert same(found, LOG.part(0, 50))
+    told = {notice.code: notice.text for notice in found.notices if notice.lossy}
+    assert "defined anew and differently" in told["DAMAGED_CHUNK"]
+    assert "70 messages are missing" in told["DAMAGED_CHUNK"]

@@ -8,7 +8,7 @@ start, record by record and past what is broken.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -71,11 +71,29 @@ class Catalogue:
     notices: list[Notice] = field(default_factory=list)
     damage: list[str] = field(default_factory=list)
     redefined: dict[int, int] = field(default_factory=dict)
+    beside: dict[frozenset[int], dict[int, int]] = field(default_factory=dict)
+    """By channels that are read: what chunks of others redefine, as `redefined`; looked for once for all passes."""
     _agreed: dict[tuple[int, bytes], Any] = field(default_factory=dict, repr=False)
 
     def copy(self) -> Catalogue:
         """One that reading may add to: damage that it meets, and ids that are redefined on the way."""
         return replace(self, damage=list(self.damage), redefined=dict(self.redefined))
+
+    def redefines(self, others: Iterable[tuple[int, bytes]], place: int) -> None:
+        """Note from which byte on ids have another meaning, out of code and content of a span's `others`.
+
+        Raises
+        ------
+        DamagedError
+            If a record cannot be read.
+        """
+        for code, content in others:
+            if code in (framing.SCHEMA, framing.CHANNEL):
+                try:
+                    self.checked(code, content)
+                except RedefinedError as error:
+                    for channel in error.channels:
+                        self.redefined[channel] = min(place, self.redefined.get(channel, place))
 
     def truth(self, path: Path) -> Truth | None:
         """What the metadata record "algid" tells of the simulated arm, None without one.
@@ -169,7 +187,7 @@ def _from_summary(file: File) -> Catalogue | None:
     if statistics is None or not chunks or not found.channels:
         return None
     chunks.sort(key=lambda one: one.chunk_start_offset)
-    _check_listed(file, chunks, statistics, start)
+    _check_listed(file, chunks, statistics, found.channels, start)
     found.counts = dict(statistics.channel_message_counts)
     for chunk in chunks:
         channels = frozenset(chunk.message_index_offsets) if chunk.message_index_length else None
@@ -181,11 +199,11 @@ def _from_summary(file: File) -> Catalogue | None:
     return found
 
 
-def _check_listed(file: File, chunks: list[ChunkIndex], statistics: Any, end: int) -> None:
+def _check_listed(file: File, chunks: list[ChunkIndex], statistics: Any, channels: Collection[int], end: int) -> None:
     """Hold what a summary lists against its own counts and against the file, up to the summary at `end`.
 
     Chunks lie in the file and do not overlap, their indexes list as many messages as the statistics count, for every
-    channel, and no message or chunk stands beside those that are listed.
+    channel, all of which are among those defined, and no message, chunk or index stands beside those that are listed.
 
     Raises
     ------
@@ -193,33 +211,63 @@ def _check_listed(file: File, chunks: list[ChunkIndex], statistics: Any, end: in
         If any of that is not so.
     """
     for chunk in chunks:
-        last = chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length
-        if not (chunk.chunk_length > 9 and last <= file.size):
+        if not (chunk.chunk_length > 9 and _end(chunk) <= file.size):
             raise DamagedError(f"it claims a chunk at byte {chunk.chunk_start_offset}")
     if statistics.chunk_count != len(chunks):
         raise DamagedError(f"it lists {len(chunks)} of {counted(statistics.chunk_count, 'chunk')}")
-    if all(chunk.message_index_length for chunk in chunks):
-        if sum(len(chunk.message_index_offsets) for chunk in chunks) > LIMITS.message_indexes:
-            raise DamagedError(f"it claims more than {LIMITS.message_indexes} message indexes")
-        listed: dict[int, int] = {}
-        for channel, offset in (pair for chunk in chunks for pair in chunk.message_index_offsets.items()):
-            code, _, named, size = struct.unpack("<BQHI", file.read(offset, 15))
-            if code != framing.MESSAGE_INDEX or named != channel or size % 16:
-                raise DamagedError(f"it claims a message index at byte {offset}")
-            listed[channel] = listed.get(channel, 0) + size // 16
-        if listed != {channel: count for channel, count in statistics.channel_message_counts.items() if count}:
-            raise DamagedError("its indexes and its statistics count different numbers of messages")
+    if sum(len(chunk.message_index_offsets) for chunk in chunks) > LIMITS.message_indexes:
+        raise DamagedError(f"it claims more than {LIMITS.message_indexes} message indexes")
+    counts: dict[int, int] = {}
+    for chunk in chunks:
+        for channel, count in _indexed(file, chunk):
+            counts[channel] = counts.get(channel, 0) + count
+    if undefined := counts.keys() - channels:
+        raise DamagedError(f"it lists messages of a channel {min(undefined)} that it does not define")
+    promised = {channel: count for channel, count in statistics.channel_message_counts.items() if count}
+    if all(chunk.message_index_length for chunk in chunks) and counts != promised:
+        raise DamagedError("its indexes and its statistics count different numbers of messages")
+    indexed = {_end(chunk) for chunk in chunks if chunk.message_index_length}
     for start, stop in between(chunks, end):
         if start > stop:
             raise DamagedError(f"its chunks overlap at byte {stop}")
         for record in framing.walk(file, start, stop):
-            if record.code in (framing.CHUNK, framing.MESSAGE):
+            hidden = record.code == framing.MESSAGE_INDEX and start in indexed
+            if hidden or record.code in (framing.CHUNK, framing.MESSAGE):
                 raise DamagedError(f"it does not list what stands at byte {record.start - 9}")
+
+
+def _indexed(file: File, chunk: ChunkIndex) -> Iterator[tuple[int, int]]:
+    """Channel and number of messages of each index behind a chunk.
+
+    Raises
+    ------
+    DamagedError
+        If one that is listed is not there, or one that is there is not listed: its messages would not be read.
+    """
+    listed = 0
+    for channel, offset in chunk.message_index_offsets.items():
+        code, length, named, size = struct.unpack("<BQHI", file.read(offset, 15))
+        if code != framing.MESSAGE_INDEX or named != channel or size % 16:
+            raise DamagedError(f"it claims a message index at byte {offset}")
+        listed += 9 + length
+        yield channel, size // 16
+    if listed == chunk.message_index_length:
+        return
+    start = chunk.chunk_start_offset + chunk.chunk_length
+    for record in framing.walk(file, start, _end(chunk)):  # what stands there though it is not listed
+        channel, size = struct.unpack("<HI", file.read(record.start, 6))
+        if record.code != framing.MESSAGE_INDEX or (size and channel not in chunk.message_index_offsets):
+            raise DamagedError(f"it does not list what stands at byte {record.start - 9}")
+
+
+def _end(chunk: ChunkIndex) -> int:
+    """Where a chunk and its indexes end."""
+    return chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length
 
 
 def between(chunks: list[ChunkIndex], end: int) -> list[tuple[int, int]]:
     """Bytes [start, end) around chunks in file order, up to the summary at `end`: neither these nor their indexes."""
-    ends = [chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length for chunk in chunks]
+    ends = [_end(chunk) for chunk in chunks]
     starts = [chunk.chunk_start_offset for chunk in chunks]
     return [pair for pair in zip([len(framing.MAGIC), *ends], [*starts, end], strict=True) if pair[0] != pair[1]]
 

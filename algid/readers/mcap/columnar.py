@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,6 +22,7 @@ from algid.words import counted
 
 _WORK_A_WALK, _WORK_A_SIZE = 200, 20
 _TOO_MANY = "messages of so many layouts that no recorder writes them"
+_NAMED = re.compile(r"[^\[\]]*\[([^\]]*)\]")
 
 
 class MisfitError(Exception):
@@ -104,6 +105,20 @@ class Shape:
             return None
         return Numbers(found.offset + index * int(found.kind[-1]), found.kind)
 
+    def of_others(self, paths: Iterable[str]) -> bool:
+        """Whether the message is of other joints than those that `paths` such as ``effort[elbow]`` name.
+
+        A message that names one of them, or numbers without any name, is no other publisher's: it lacks something.
+        """
+        joints = {found[1] for path in paths if (found := _NAMED.match(path)) and not found[1].isdigit()}
+        lists = [texts for texts in self.texts.values() if texts]
+        if not joints or any(joints.intersection(texts) for texts in lists):
+            return False
+        listed = {path.partition("[")[0] for path in paths}
+        return bool(lists) or not any(
+            one.count and path.partition("[")[0] in listed for path, one in self.numbers.items()
+        )
+
 
 Walk = Callable[[bytes], Shape]
 Fields = dict[str, NDArray[np.generic]]
@@ -121,6 +136,8 @@ class Layout:
     masks: NDArray[np.uint64]
     values: NDArray[np.uint64]
     fields: Mapping[str, Numbers] | None
+    lacks: tuple[str, ...] = ()
+    """Without fields: what is wanted and not there, nothing where the message is of other joints."""
 
     def matches(self, table: NDArray[np.uint64], rows: NDArray[np.intp]) -> NDArray[np.bool_]:
         """Which of the rows (R,) of messages (N, words) have this layout."""
@@ -161,8 +178,16 @@ def layout(payload: bytes, shape: Shape, wanted: Mapping[str, str]) -> Layout:
     words = np.flatnonzero(masks)
     whole = np.frombuffer(bytes(lead) + payload, np.uint64)
     found = {name: at for name, path in wanted.items() if (at := shape.find(path)) is not None}
-    complete = len(found) == len(wanted)
-    return Layout(lead, words, masks[words], whole[words] & masks[words], found if complete else None)
+    if len(found) == len(wanted):
+        return Layout(lead, words, masks[words], whole[words] & masks[words], found)
+    return Layout(lead, words, masks[words], whole[words] & masks[words], None, missing(shape, wanted))
+
+
+def missing(shape: Shape, wanted: Mapping[str, str]) -> tuple[str, ...]:
+    """Names of the `wanted` numbers that a message lacks; none where it is of other joints."""
+    if shape.of_others(wanted.values()):
+        return ()
+    return tuple(name for name, path in wanted.items() if shape.find(path) is None)
 
 
 def _lead(size: int) -> int:
@@ -183,15 +208,20 @@ class Decoder(ABC):
 
     Attributes
     ----------
-    skipped, misfits : int
-        Messages left out so far: those that lack a number wanted, and those that do not fit their schema.
+    skipped, lacking, misfits : int
+        Messages left out so far: those of other joints, those that lack a number wanted, and those that do not fit
+        their schema.
+    lacks : tuple of str
+        Names of the numbers that one of those messages lacks.
     misfit : str
-        Why the first of these does not; empty where all fit.
+        Why the first of the last does not; empty where all fit.
     """
 
     wanted: Mapping[str, str]
     works: Callable[[int], bool]
     skipped: int = 0
+    lacking: int = 0
+    lacks: tuple[str, ...] = ()
     misfits: int = 0
     misfit: str = ""
 
@@ -203,10 +233,10 @@ class Decoder(ABC):
         ExcessError
             If the messages ask for more work than any recorder's.
         """
-        misfits = self.misfits
+        before = self.misfits + self.lacking
         held = np.zeros(len(messages), np.bool_)
         fields = self.read(messages, held)
-        self.skipped += int(held.size - np.count_nonzero(held)) - (self.misfits - misfits)
+        self.skipped += int(held.size - np.count_nonzero(held)) - (self.misfits + self.lacking - before)
         return held, fields
 
     @abstractmethod
@@ -217,6 +247,12 @@ class Decoder(ABC):
         """Count messages that do not fit their schema."""
         self.misfits += messages
         self.misfit = self.misfit or why
+
+    def without(self, lacks: tuple[str, ...], messages: int = 1) -> None:
+        """Count messages that lack numbers, by name; none named where they are of other joints."""
+        if lacks:
+            self.lacking += messages
+            self.lacks = self.lacks or lacks
 
     def spend(self, steps: int, what: str) -> None:
         """Count work; `what` asks for too much of it is what the error says."""
@@ -274,7 +310,9 @@ class ColumnDecoder(Decoder):
                 continue
             if tried == len(known):
                 if len(known) == LIMITS.layouts or self._words > LIMITS.layout_words:
-                    if one.fields is not None:
+                    if one.fields is None:
+                        self.without(one.lacks)
+                    else:
                         yield rows[left[:1]], one.read(table[left[:1]])
                     left = left[1:]  # one by one from here: what is remembered must not grow with the file
                     continue
@@ -282,7 +320,9 @@ class ColumnDecoder(Decoder):
                 self._words += one.words.size
             fits = one.matches(table, left)
             tried += 1
-            if one.fields is not None and fits.any():
+            if one.fields is None:
+                self.without(one.lacks, int(np.count_nonzero(fits)))
+            elif fits.any():
                 whole = fits.all() and left.size == rows.size
                 yield (rows, one.read(table)) if whole else (rows[left[fits]], one.read(table[left[fits]]))
             left = left[~fits]

@@ -85,7 +85,20 @@ class JsonDecoder(Decoder):
             held[row] = None not in values
             if held[row]:
                 rows.append(values)
+            else:
+                self._without(found, values)
         return {name: _column([row[place] for row in rows]) for place, name in enumerate(self.wanted)}
+
+    def _without(self, found: dict[str, Any], values: list[int | float | None]) -> None:
+        shape = Shape()
+        try:
+            _walk(found, "", shape)
+        except MisfitError as error:
+            self.misfitting(str(error))
+            return
+        self.spend(shape.parts, _TOO_MUCH)
+        lacks = (name for name, value in zip(self.wanted, values, strict=True) if value is None)
+        self.without(() if shape.of_others(self.wanted.values()) else tuple(lacks))
 
 
 def _column(values: list[int | float]) -> NDArray[np.int64] | NDArray[np.float64]:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass
 
 from algid.log import Notice
-from algid.readers.mcap import framing
-from algid.readers.mcap.catalogue import Catalogue, RedefinedError, Span
+from algid.readers.mcap.catalogue import Catalogue, Span
 from algid.readers.mcap.framing import DamagedError, File, claimed, has_checksum
 from algid.readers.mcap.messages import Messages, Records, entries, joined
 from algid.runtime import executor
@@ -18,6 +18,9 @@ from algid.words import counted
 _AHEAD = 3
 _AHEAD_BYTES = 1 << 23
 """Chunks beyond this size are not read ahead, so that memory stays bounded by one of them."""
+
+_LOOKED_BESIDE, _SHARE_BESIDE = 1 << 22, 4
+"""Chunks of other channels that are looked at: so many bytes, and a quarter of those of the channels that are read."""
 
 _GROUP_BYTES, _GROUP_UNPACKED = 1 << 16, 1 << 21
 """Small chunks are loaded together up to these sizes, packed and unpacked."""
@@ -42,6 +45,46 @@ class MessageBatch:
 def spans_of(catalogue: Catalogue, channels: frozenset[int]) -> list[Span]:
     """The spans that may hold messages of the channels."""
     return [span for span in catalogue.spans if span.channels is None or span.channels & channels]
+
+
+def spans_beside(catalogue: Catalogue, channels: frozenset[int]) -> list[Span]:
+    """The first spans of other channels, as many as cost little beside those of `channels`.
+
+    They are looked at for definitions only: one may give a channel that is read another meaning.
+    """
+    own = spans_of(catalogue, channels)
+    left = _LOOKED_BESIDE + sum(span.length for span in own) // _SHARE_BESIDE
+    found: list[Span] = []
+    for span in catalogue.spans if own else ():
+        if span.channels is None or span.channels & channels:
+            continue
+        left -= span.length
+        if left < 0:
+            break
+        found.append(span)
+    return found
+
+
+def look_beside(file: File, catalogue: Catalogue, channels: frozenset[int]) -> None:
+    """Note what spans of other channels, as far as they are looked at, redefine."""
+    if channels not in catalogue.beside:
+        before, catalogue.redefined = catalogue.redefined, {}
+        with executor(2) as pool:
+            spans = spans_beside(catalogue, channels)
+            for span, others in zip(spans, pool.map(lambda span: _others(file, span), spans), strict=True):
+                with suppress(DamagedError):
+                    catalogue.redefines(others, span.start)
+        catalogue.beside[channels], catalogue.redefined = catalogue.redefined, before
+    for channel, place in catalogue.beside[channels].items():
+        catalogue.redefined[channel] = min(place, catalogue.redefined.get(channel, place))
+
+
+def _others(file: File, span: Span) -> tuple[tuple[int, bytes], ...]:
+    """Code and content of a span's records that are no messages; none of one that is damaged, which is not read."""
+    try:
+        return span.records(file, file.read(span.start, span.length + span.index_length)).others
+    except DamagedError:
+        return ()
 
 
 def batches(file: File, catalogue: Catalogue, channels: frozenset[int]) -> Iterator[MessageBatch]:
@@ -133,13 +176,7 @@ def _opened(file: File, catalogue: Catalogue, span: Span, channels: frozenset[in
     try:
         content = file.read(span.start, span.length + span.index_length)
         records = span.records(file, content)
-        for code, body in records.others:
-            if code in (framing.SCHEMA, framing.CHANNEL):
-                try:
-                    catalogue.checked(code, body)
-                except RedefinedError as error:
-                    for channel in error.channels:
-                        catalogue.redefined.setdefault(channel, span.start)
+        catalogue.redefines(records.others, span.start)
         if any(catalogue.redefined.get(channel, span.start + 1) <= span.start for channel in channels):
             raise DamagedError("a channel or its schema is defined anew and differently")
     except DamagedError as error:

@@ -1,7 +1,8 @@
 """Protocol buffers: the shape of one message, and the message types out of a FileDescriptorSet.
 
 A varint's width is fixed by the highest bits of its bytes, so those are the bytes that fix a shape, beside
-keys and lengths. A number that is zero is left out of proto3 messages: it is read as zero.
+keys and lengths. A plain number of proto3 that is zero is left out of its message: it is read as zero. A number that
+can be told to be unset is not: one of a oneof, an ``optional`` one, one of proto2, one of a message that is not there.
 
 google.protobuf reads the descriptors. Messages are walked by hand, since it does not tell where in a message a number
 stands: that is what lets a hundred thousand be read at once (`make bench-ingest` has the figure).
@@ -9,9 +10,8 @@ stands: that is what lets a hundred thousand be read at once (`make bench-ingest
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from algid.limits import LIMITS
@@ -24,16 +24,23 @@ _VARINTS = {3, 4, 5, 8, 13, 14, 17, 18}
 _ZIGZAG = {17, 18}
 _UINT64 = 4
 _STRING, _MESSAGE, _BYTES, _REPEATED = 9, 11, 12, 3
+_IMPLICIT = 2
+"""Of google.protobuf.FeatureSet.FieldPresence."""
 
 
 @dataclass(frozen=True)
 class ProtobufField:
-    """A field: its name, type number, message type where it is one, and whether it repeats."""
+    """A field: its name, type number, message type where it is one, and whether it repeats.
+
+    `implicit`: it is left out where it is zero. `oneof`: the number of the oneof that it is of, None if of none.
+    """
 
     name: str
     type: int
     message: str
     repeated: bool
+    implicit: bool
+    oneof: int | None
 
 
 Types = dict[str, dict[int, ProtobufField]]
@@ -56,7 +63,7 @@ def parse(root: str, data: bytes) -> Types:
         )
     try:
         found = {
-            name: message
+            name: (message, _implicit(file))
             for file in FileDescriptorSet.FromString(data).file
             for name, message in _messages(file.package, file.message_type)
         }
@@ -68,14 +75,29 @@ def parse(root: str, data: bytes) -> Types:
                 continue
             if name not in found:
                 raise DefinitionError(f"{root}: the type {name[:80]!r} is not defined")
-            types[name] = {
-                one.number: ProtobufField(one.name, one.type, one.type_name.lstrip("."), one.label == _REPEATED)
-                for one in found[name].field
-            }
+            message, implicit = found[name]
+            types[name] = {one.number: _field(one, implicit) for one in message.field}
             waiting += [one.message for one in types[name].values() if one.type == _MESSAGE]
     except (DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise DefinitionError(f"{root}: no set of descriptors ({error})") from error
     return types
+
+
+def _implicit(file: Any) -> bool:
+    """Whether a number of a file's messages is left out where it is zero, unless the number says otherwise."""
+    if file.syntax == "editions":
+        return int(file.options.features.field_presence) == _IMPLICIT
+    return str(file.syntax) == "proto3"
+
+
+def _field(one: Any, implicit: bool) -> ProtobufField:
+    oneof = one.oneof_index if one.HasField("oneof_index") else None  # an optional field of proto3 has one of its own
+    presence = int(one.options.features.field_presence)
+    implicit = presence == _IMPLICIT if presence else implicit
+    message = one.type_name.lstrip(".")
+    return ProtobufField(
+        one.name, one.type, message, one.label == _REPEATED, implicit=implicit and oneof is None, oneof=oneof
+    )
 
 
 def _messages(scope: str, messages: Any) -> Iterator[tuple[str, Any]]:
@@ -122,101 +144,145 @@ def walk(payload: bytes, root: str, types: Types) -> Shape:
     MisfitError
         If its bytes do not fit the schema.
     """
-    absent = _Absent(types, root)
-    shape = Shape(absent=absent)
-    _walk(payload, 0, len(payload), root, "", shape, absent, 0)
-    return shape
+    walk = _Walk(payload, types, root)
+    walk.message(0, len(payload), root, "", 0)
+    walk.shape.texts |= {path: tuple(found) for path, found in walk.texts.items()}
+    return walk.shape
 
 
-@dataclass(frozen=True)
-class _Absent:
-    """Which numbers a message leaves out: those of a stamp that is left out itself, too."""
+class _Walk:
+    """A walk over one message.
 
-    types: Types
-    root: str
-    lists: dict[str, int] = field(default_factory=dict)
-    """By path of a repeated field how many of it there are."""
+    `counts` has by path of a repeated field how many of it there are so far, `there` the paths of messages. A field
+    that comes again goes on where it ended, wherever it stands: so do the parts of a message that comes again.
+    """
 
-    def __call__(self, path: str) -> bool:
+    def __init__(self, data: bytes, types: Types, root: str) -> None:
+        self.data, self.types, self.root = data, types, root
+        self.counts: dict[str, int] = {}
+        self.there: set[str] = set()
+        self.texts: dict[str, list[str]] = {}
+        self.shape = Shape(absent=self.absent)
+
+    def absent(self, path: str) -> bool:
+        """Whether the message leaves the number at a path out because it is zero."""
         kind, done = self.root, ""
         *inner, last = path.split(".")
         for part in inner:
-            place = re.fullmatch(r"(.*)\[(\d{1,9})\]", part)
-            name, index = (place[1], int(place[2])) if place else (part, None)
-            found = self._named(kind, name)
-            done += name
-            if found is None or found.type != _MESSAGE or found.repeated != (index is not None):
+            found = self._named(kind, part.partition("[")[0])
+            done += part
+            if found is None or found.type != _MESSAGE or done not in self.there:
                 return False
-            if index is not None and index >= self.lists.get(done, 0):
-                return False
-            done += part.removeprefix(name) + "."
+            done += "."
             kind = found.message
         found = self._named(kind, last)
-        return found is not None and not found.repeated and (found.type in _FIXED or found.type in _VARINTS)
+        return found is not None and found.implicit and not found.repeated and _is_number(found)
 
     def _named(self, kind: str, name: str) -> ProtobufField | None:
         return next((one for one in self.types[kind].values() if one.name == name), None)
 
+    def message(self, start: int, end: int, kind: str, prefix: str, depth: int) -> None:
+        """Take in the fields of a message of type `kind`, whose bytes are [start, end)."""
+        if depth > LIMITS.definition_depth:
+            raise MisfitError("messages nested too deep")
+        fields: Mapping[int, ProtobufField] = self.types[kind]
+        chosen: dict[int, ProtobufField] = {}
+        last = start
+        for number, wire, first, stop, _ in _entries(self.data, start, end):
+            self.shape.count()
+            self.shape.fix(last, first)
+            last = stop
+            field = fields.get(number)
+            if field is None:
+                if wire == 0:
+                    self.shape.flags.extend(range(first, stop))
+                continue
+            if field.oneof is not None:
+                before = chosen.setdefault(field.oneof, field)
+                if before != field:  # the last one set holds
+                    self._unset(f"{prefix}{before.name}")
+                    chosen[field.oneof] = field
+            self._field(field, wire, first, stop, f"{prefix}{field.name}", depth)
+        self.shape.fix(last, end)
 
-def _walk(data: bytes, start: int, end: int, kind: str, prefix: str, shape: Shape, absent: _Absent, depth: int) -> None:
-    if depth > LIMITS.definition_depth:
-        raise MisfitError("messages nested too deep")
-    fields: Mapping[int, ProtobufField] = absent.types[kind]
-    seen: dict[str, int] = {}
-    texts: dict[str, list[str]] = {}
-    last = start
-    for number, wire, first, stop, _ in _entries(data, start, end):
-        shape.count()
-        shape.fix(last, first)
-        last = stop
-        field = fields.get(number)
-        if field is None:
-            if wire == 0:
-                shape.flags.extend(range(first, stop))
-            continue
-        path = f"{prefix}{field.name}"
-        index = seen.get(path, 0)
-        seen[path] = index + 1
+    def _field(self, field: ProtobufField, wire: int, first: int, stop: int, path: str, depth: int) -> None:
         if wire == 2 and field.type == _MESSAGE:
-            inner = f"{path}[{index}]." if field.repeated else f"{path}."
-            _walk(data, first, stop, field.message, inner, shape, absent, depth + 1)
+            place = f"{path}[{self._next(path)}]" if field.repeated else path
+            self.there.add(place)
+            self.message(first, stop, field.message, f"{place}.", depth + 1)
         elif wire == 2 and field.type == _STRING:
             if field.repeated:
-                shape.fix(first, stop)
-                texts.setdefault(path, []).append(data[first:stop].decode("utf-8", errors="replace"))
+                self.shape.fix(first, stop)
+                self.texts.setdefault(path, []).append(self.data[first:stop].decode("utf-8", errors="replace"))
         elif wire == 2 and field.type != _BYTES:
-            _packed(data, first, stop, field, path, shape)
+            self._packed(first, stop, field, path)
+        elif field.repeated:
+            self._single(path)
+            self._number(first, stop, wire, field, f"{path}[{self._next(path)}]")
         else:
-            _number(first, stop, wire, field, f"{path}[{index}]" if field.repeated else path, shape)
-    shape.fix(last, end)
-    shape.texts |= {path: tuple(found) for path, found in texts.items()}
-    absent.lists.update(seen)
+            self._number(first, stop, wire, field, path)
 
+    def _next(self, path: str, more: int = 1) -> int:
+        """The place of the next of a repeated field, and of `more` - 1 behind it."""
+        before = self.counts.get(path, 0)
+        self.counts[path] = before + more
+        return before
 
-def _number(first: int, stop: int, wire: int, field: ProtobufField, path: str, shape: Shape) -> None:
-    if wire == 0 and field.type in _VARINTS:
-        shape.flags.extend(range(first, stop))
-        kind = "zigzag" if field.type in _ZIGZAG else "unsigned" if field.type == _UINT64 else "varint"
-        shape.numbers[path] = Numbers(first, kind, 1, stop - first)
-    elif wire in (1, 5) and field.type in _FIXED and int(_FIXED[field.type][-1]) == stop - first:
-        shape.numbers[path] = Numbers(first, _FIXED[field.type])
-    elif wire != 2:
-        raise MisfitError(f"the field {field.name!r} is not encoded as its type says")
+    def _unset(self, path: str) -> None:
+        """Forget what was found of a field."""
+        for known in (self.shape.numbers, self.texts, self.counts):
+            for one in [one for one in known if one == path or one.startswith((f"{path}.", f"{path}["))]:
+                del known[one]
+        self.there = {one for one in self.there if one != path and not one.startswith(f"{path}.")}
 
+    def _single(self, path: str) -> None:
+        """Note the numbers of a list so far one by one, since more of it stand elsewhere."""
+        block = self.shape.numbers.pop(path, None)
+        if block is not None:
+            self.shape.count(block.count)
+            width = int(block.kind[-1])
+            for index in range(block.count):
+                self.shape.numbers[f"{path}[{index}]"] = Numbers(block.offset + index * width, block.kind)
 
-def _packed(data: bytes, first: int, stop: int, field: ProtobufField, path: str, shape: Shape) -> None:
-    if field.type in _FIXED:
-        width = int(_FIXED[field.type][-1])
-        if (stop - first) % width:
-            raise MisfitError(f"the list {field.name!r} has a broken length")
-        shape.numbers[path] = Numbers(first, _FIXED[field.type], (stop - first) // width)
-    elif field.type in _VARINTS:
-        index = 0
+    def _number(self, first: int, stop: int, wire: int, field: ProtobufField, path: str) -> None:
+        if wire == 0 and field.type in _VARINTS:
+            self.shape.flags.extend(range(first, stop))
+            kind = "zigzag" if field.type in _ZIGZAG else "unsigned" if field.type == _UINT64 else "varint"
+            self.shape.numbers[path] = Numbers(first, kind, 1, stop - first)
+        elif wire in (1, 5) and field.type in _FIXED and int(_FIXED[field.type][-1]) == stop - first:
+            self.shape.numbers[path] = Numbers(first, _FIXED[field.type])
+        elif wire != 2:
+            raise MisfitError(f"the field {field.name!r} is not encoded as its type says")
+
+    def _packed(self, first: int, stop: int, field: ProtobufField, path: str) -> None:
+        """Take in numbers side by side; a list may stand in several such runs."""
+        if not field.repeated or not _is_number(field):
+            raise MisfitError(f"the field {field.name!r} is not encoded as its type says")
+        if field.type in _FIXED:
+            self._block(first, stop, field, path)
+            return
         while first < stop:
-            shape.count()
-            _, after = _varint(data, first, stop)
-            _number(first, after, 0, field, f"{path}[{index}]", shape)
-            first, index = after, index + 1
-            shape.fix(after, after)
-    else:
-        raise MisfitError(f"the field {field.name!r} is not encoded as its type says")
+            self.shape.count()
+            _, after = _varint(self.data, first, stop)
+            self._number(first, after, 0, field, f"{path}[{self._next(path)}]")
+            first = after
+            self.shape.fix(after, after)
+
+    def _block(self, first: int, stop: int, field: ProtobufField, path: str) -> None:
+        kind = _FIXED[field.type]
+        width = int(kind[-1])
+        size = (stop - first) // width
+        if size * width != stop - first:
+            raise MisfitError(f"the list {field.name!r} has a broken length")
+        before = self._next(path, size)
+        if not before:
+            self.shape.numbers[path] = Numbers(first, kind, size)
+            return
+        self._single(path)
+        self.shape.count(size)
+        for index in range(size):
+            self.shape.numbers[f"{path}[{before + index}]"] = Numbers(first + index * width, kind)
+
+
+def _is_number(field: ProtobufField) -> bool:
+    return field.type in _FIXED or field.type in _VARINTS

@@ -19,7 +19,7 @@ from algid.readers.mcap.catalogue import Catalogue, channels_of, schema_name
 from algid.readers.mcap.codec import decoder_for
 from algid.readers.mcap.columnar import Decoder, ExcessError, Shape
 from algid.readers.mcap.framing import File
-from algid.readers.mcap.load import Account, batches
+from algid.readers.mcap.load import Account, batches, look_beside
 from algid.readers.table import VELOCITIES, SampleTable, stack
 from algid.words import counted
 
@@ -133,6 +133,7 @@ class Topic:
         if self.fields.stamp is not None and self.clock != "log":
             wanted |= dict(zip(_STAMP, self.fields.stamp, strict=True))
         decoder = decoder_for(path, channel, found.schemas.get(channel.schema_id), wanted, file.works)
+        look_beside(file, found, channels)
         account = Account()
         parts: list[SampleTable] = []
         size = 0
@@ -201,9 +202,12 @@ class Topic:
     def _left_out(self, decoder: Decoder, found: Catalogue, channels: frozenset[int]) -> list[Notice]:
         """What to say of messages that lack a field, do not fit, or are of another type, encoding or definition."""
         said = []
+        if decoder.lacking:
+            lacks = ", ".join(dict.fromkeys(decoder.wanted[name] for name in decoder.lacks))
+            text = f"{counted(decoder.lacking, 'message')} on {self.name!r} left out for want of {lacks}"
+            said.append(Notice("LACKING_MESSAGES", text, lossy=True))
         if decoder.skipped:
-            lacking = "velocities too" if any(name in decoder.wanted for name in VELOCITIES) else "both joints"
-            text = f"{counted(decoder.skipped, 'message')} on {self.name!r} left out for want of {lacking}"
+            text = f"{counted(decoder.skipped, 'message')} on {self.name!r} left out: of other joints"
             said.append(Notice("OTHER_MESSAGES", text))
         if decoder.misfits:
             text = (
