@@ -17,6 +17,7 @@ ROOT = Path(algid.__file__).parent
 TABLE: dict[str, Room] = {  # lower rooms first
     "errors": room(),
     "limits": room(),
+    "faults": room("errors"),
     "progress": room(),
     "ros2": room(),
     "runtime": room(packages="threadpoolctl"),
@@ -36,10 +37,10 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "table4": room("arm log results synth", "numpy"),
     "writers": room("errors files log ros2", "mcap numpy polars pyarrow"),
     "readers": room(
-        "arm errors limits log profile runtime units words",
+        "arm errors faults limits log profile runtime units words",
         "google lz4 mcap numpy polars pyarrow rosbags scipy zstandard",
     ),
-    "inspection": room("arm errors estimators log profile readers signals words", "numpy"),
+    "inspection": room("arm errors estimators faults log profile readers signals words", "numpy"),
     "report": room(
         "arm errors files progress results ros2 words", "matplotlib mcap numpy plotly polars pyarrow rich"
     ),
@@ -65,7 +66,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "export": room("arm errors files identification model report results words", "numpy scipy"),
     "fleet": room("errors files model progress report words", "numpy polars scipy"),
     "cli": room(
-        "batch check design errors estimators export files "
+        "batch check design errors estimators export faults files "
         "fleet identification inspection log model profile progress readers report results runtime "
         "settings stores synth track writers words",
         "numpy rich typer",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from types import FrameType
@@ -27,19 +28,39 @@ def main() -> None:
         signal.signal(number, stop)
     harden_streams()
     bound_by_environment()  # before anything loads numpy
-    from algid.cli.app import called
-    from algid.errors import AlgidError
+    code = _run()
+    if code:
+        sys.exit(code)
 
+
+def _run() -> int:
+    """Run the command; the outermost place, where every exception that is not meant to end it becomes a line."""
+    from algid.cli.output import complain
+    from algid.errors import AlgidError
+    from algid.faults import TRACEBACK, fault
+
+    found: BaseException
     try:
-        called(sys.argv[1:])()
+        try:
+            from algid.cli.app import called
+
+            called(sys.argv[1:])()
+        finally:
+            sys.stdout.flush()  # else a full disk is told by the interpreter, in its words
+        return 0
     except AlgidError as error:
-        # control characters from foreign names are made visible: they would break the line
-        line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in str(error))
-        print(f"algid: {line}", file=sys.stderr)
-        sys.exit(EXIT_USAGE)
+        line, code, found = str(error), EXIT_USAGE, error
     except _StoppedError:
-        print("algid: stopped; nothing half-written is left", file=sys.stderr)
+        complain("stopped; nothing half-written is left")
         raise
+    except (SystemExit, KeyboardInterrupt):
+        raise
+    except BaseException as error:  # whatever a library raises, a panic too
+        (line, code), found = fault(error), error
+    if os.environ.get(TRACEBACK) == "1":
+        sys.excepthook(type(found), found, found.__traceback__)
+    complain(line)
+    return code
 
 
 class _StoppedError(SystemExit):

@@ -13,6 +13,7 @@ import typer
 from typer.core import TyperCommand
 
 from algid import __version__
+from algid.cli.output import say
 from algid.errors import SettingError
 
 COMMANDS: dict[str, Callable[[], Callable[..., Any]]] = {
@@ -54,7 +55,7 @@ class FiniteCommand(TyperCommand):
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        print(f"algid {__version__}")
+        say(f"algid {__version__}")
         raise typer.Exit
 
 

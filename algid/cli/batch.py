@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from algid.cli import EXIT_FAILED, EXIT_INCOMPLETE
+from algid.cli.output import complain, say
 from algid.cli.settings import Choice, takes_settings
 
 if TYPE_CHECKING:
@@ -160,7 +161,7 @@ def _watch(running: Batch, sources: list[str], out: str, alone: str, retry_faile
             jobs = []
             if str(error) != complaint:
                 complaint = str(error)
-                typer.echo(f"algid: {complaint}", err=True)
+                complain(complaint)
         if jobs:
             ended, retry_failed = running.run(jobs, retry_failed), False
         running.stop.wait(LOOK_EVERY)
@@ -175,12 +176,12 @@ def _conclude(ended: Ended, stopped: bool, out: str, quiet: bool) -> None:
     failed = [record for record in ended.records if record.status in FAILURES]
     if not quiet:
         for record in failed:
-            typer.echo(f"{visible(record.job.name)}: {record.status.value}: {visible(record.reason)}")
+            say(f"{visible(record.job.name)}: {record.status.value}: {visible(record.reason)}")
         counts = {end: sum(record.status is end for record in ended.records) for end in End}
         summary = ", ".join(f"{count} {end.value}" for end, count in counts.items() if count)
-        typer.echo(f"{summary or 'nothing done'}; {ended.ran} run now, {ended.left} left; {out}/jobs.parquet")
+        say(f"{summary or 'nothing done'}; {ended.ran} run now, {ended.left} left; {out}/jobs.parquet")
     if ended.full is not None:
-        typer.echo(f"algid: {ended.full}; make room and run again: what is finished is kept", err=True)
+        complain(f"{ended.full}; make room and run again: what is finished is kept")
     if stopped and ended.full is None:
         raise typer.Exit(EXIT_STOPPED)
     if failed or ended.left or ended.full is not None:

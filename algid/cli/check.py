@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from algid.cli import EXIT_FAILED
+from algid.cli.output import say
 
 
 class Against(StrEnum):
@@ -42,6 +43,6 @@ def check(
 
     rows = judge(read_result(result), against.value, max_error, tolerance_file)
     for row in rows:
-        print(row.text)
+        say(row.text)
     if failed(rows):
         raise typer.Exit(EXIT_FAILED)

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from algid.cli.output import console, remark, say
 from algid.cli.report import ResultFormat
 from algid.errors import SettingError
 
@@ -25,8 +26,6 @@ def compare(
     SettingError
         If there are fewer than two results.
     """
-    from rich.console import Console
-
     from algid.report.comparison import compare as compared
     from algid.report.comparison import comparison_json
     from algid.report.markdown import markdown_table
@@ -38,18 +37,18 @@ def compare(
     read = [read_result(path) for path in results]
     found = compared(read, labels(results))
     if form is ResultFormat.TABLE:
-        console = Console()
+        terminal = console()
         for table in (found.estimates, found.settings):
-            print_table(table, console)
-            console.print()
+            print_table(table, terminal)
+            terminal.print()
     elif form is ResultFormat.MARKDOWN:
-        typer.echo("\n".join(markdown_table(table) for table in (found.estimates, found.settings)), nl=False)
+        say("\n".join(markdown_table(table) for table in (found.estimates, found.settings)), end="")
     else:
-        typer.echo(comparison_json(found, read), nl=False)
+        say(comparison_json(found, read), end="")
     if out is not None:
         from algid.report.comparison_page import write_comparison
 
-        typer.echo(f"wrote {write_comparison(found, read, out)}", err=True)
+        remark(f"wrote {write_comparison(found, read, out)}")
 
 
 def labels(paths: list[Path]) -> list[str]:

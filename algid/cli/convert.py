@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from algid.cli.output import remark
 from algid.cli.settings import Choice, takes_profile
 
 if TYPE_CHECKING:
@@ -60,5 +61,5 @@ def convert(
     with progress("samples") as shown:
         write_log(target, noted(shown), truth=reader.origin.truth)
     for notice in notices:
-        typer.echo(f"{notice.code}: {notice.text}", err=True)
+        remark(f"{notice.code}: {notice.text}")
     raise typer.Exit(3 if any(notice.lossy for notice in notices) else 0)

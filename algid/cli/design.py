@@ -11,6 +11,7 @@ import typer
 
 from algid.cli import EXIT_INCOMPLETE
 from algid.cli.completion import cases
+from algid.cli.output import console, remark, say
 from algid.cli.settings import two_names
 
 if TYPE_CHECKING:
@@ -98,8 +99,6 @@ def design(
     """
     import shlex
 
-    from rich.console import Console
-
     from algid.design.campaign import plan
     from algid.design.prior import KnownBefore, prior_of
     from algid.design.request import request
@@ -145,16 +144,16 @@ def design(
         write_design(planned, temporary, origin)
     if not quiet:
         if form is Shown.JSON:
-            print(design_json(planned, origin), end="")
+            say(design_json(planned, origin), end="")
         else:
-            print(sentence(planned))
-            console = Console()
+            say(sentence(planned))
+            terminal = console()
             for table in (bound_table(planned), limit_table(planned)):
-                console.print()
-                print_table(table, console)
+                terminal.print()
+                print_table(table, terminal)
         for warning in warnings:
-            typer.echo(f"warning: {warning}", err=True)
-        typer.echo(f"wrote {folder}", err=True)
+            remark(f"warning: {warning}")
+        remark(f"wrote {folder}")
     if planned.open_parameters:
         raise typer.Exit(EXIT_INCOMPLETE)
 

@@ -9,6 +9,8 @@ from typing import Annotated
 
 import typer
 
+from algid.cli.output import complain, remark
+
 
 class To(StrEnum):
     """What a result is exported to."""
@@ -43,7 +45,6 @@ def export(
     from algid.export.formats import FORMATS, exported
     from algid.export.links import Knowns
     from algid.files import refuse_existing, whole_file
-    from algid.report.text import visible
     from algid.results import read_result
 
     text, warnings = exported(read_result(result), str(result), to.value, Knowns(l1, l2, m1, m2, rotor1))
@@ -55,5 +56,5 @@ def export(
     with whole_file(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
     for warning in warnings:
-        typer.echo(f"algid: {visible(warning)}", err=True)
-    typer.echo(f"wrote {out}", err=True)
+        complain(warning)
+    remark(f"wrote {out}")

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from algid.cli.output import remark
 from algid.cli.report import ResultFormat, print_report
 
 
@@ -32,4 +33,4 @@ def fleet(
         written = write_history(history, batch if out is None else out, batch)
     print_report(fleet_document(history), lambda: json.dumps(history.as_dict(), indent=2, allow_nan=False) + "\n", form)
     for path in written:
-        typer.echo(f"wrote {path}", err=True)
+        remark(f"wrote {path}")

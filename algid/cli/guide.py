@@ -9,6 +9,8 @@ from typing import Annotated
 
 import typer
 
+from algid.cli.output import console, say
+
 
 class GuideTopic(StrEnum):
     """The pages of the guide."""
@@ -58,12 +60,11 @@ def guide(
     else:
         text = text_of(topic)
     if not sys.stdout.isatty():
-        print(text, end="")
+        say(text, end="")
         return
-    from rich.console import Console
     from rich.markdown import Markdown
 
-    Console(width=min(Console().width, 120)).print(Markdown(text))
+    console(width=min(console().width, 120)).print(Markdown(text))
 
 
 def text_of(topic: str) -> str:

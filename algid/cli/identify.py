@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from algid.cli import EXIT_INCOMPLETE
+from algid.cli.output import remark
 from algid.cli.report import ExportTo, ResultFormat, print_result
 from algid.cli.settings import Choice, takes_settings
 from algid.words import counted
@@ -104,8 +105,8 @@ def identify(
     if not quiet:
         print_result(result, output)
         for note in result.notes:
-            typer.echo(f"note: {visible(note)}", err=True)
-        typer.echo(f"wrote {visible(str(result_folder(result.log.path, out, name)))}", err=True)
+            remark(f"note: {visible(note)}")
+        remark(f"wrote {result_folder(result.log.path, out, name)}")
     if not result.complete or result.data_lost or verdict(result).level == "failed":
         raise typer.Exit(EXIT_INCOMPLETE)
 
@@ -117,8 +118,8 @@ def _print_reading(result: Result) -> None:
     for log in result.logs:
         size = f"{counted(log.rows, 'sample')}, {log.duration:.6g} s at {log.rate:.6g} Hz"
         text = f"{log.role} {log.path}: {size}, {log.format}"
-        print(visible(text), file=sys.stderr)
+        remark(visible(text))
         for signal, source in log.mapping.items():
-            print(visible(f"  {signal} from {source}"), file=sys.stderr)
+            remark(visible(f"  {signal} from {source}"))
     for name, value in result.settings.items():
-        print(visible(f"{name} = {value}"), file=sys.stderr)
+        remark(visible(f"{name} = {value}"))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from algid.cli.output import console, say
 from algid.cli.settings import Choice, takes_profile
 from algid.words import counted
 
@@ -39,17 +40,15 @@ def inspect(
     """
     import json
 
-    from rich.console import Console
-
     from algid.inspection.report import inspect_log
 
     found = inspect_log(log, choice.profile())
     if output == "json":
-        typer.echo(json.dumps(found.as_dict(), indent=2))
+        say(json.dumps(found.as_dict(), indent=2))
     else:
-        console = Console(highlight=False)
-        _print_content(found, console)
-        _print_worth(found, console)
+        terminal = console(highlight=False)
+        _print_content(found, terminal)
+        _print_worth(found, terminal)
     raise typer.Exit(2 if found.refused else 3 if found.lossy else 0)
 
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from algid.cli.inspect import plain
+from algid.cli.output import say
 
 
 def new(
@@ -33,4 +33,4 @@ def new(
     text = draft_profile(log)
     with whole_file(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    typer.echo(plain(f"{out}: written; edit it, then try: algid inspect {log} --profile {out}"))
+    say(f"{out}: written; edit it, then try: algid inspect {log} --profile {out}")

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from algid.cli.output import console, remark, say
+
 if TYPE_CHECKING:
     from algid.report.document import Document
     from algid.report.figures.base import Figure, Missing
@@ -80,7 +82,7 @@ def report(
 
             written += save(figures(), save_plots, folder.resolve().stem, plot_format.value)
         for path in written:
-            typer.echo(f"wrote {path}", err=True)
+            remark(f"wrote {path}")
 
 
 def _identification(folder: Path, form: ResultFormat, shared_library: bool, *, mcap: bool) -> Written:
@@ -130,12 +132,10 @@ def print_result(result: Result, form: ResultFormat) -> None:
 
 def print_report(document: Document, json: Callable[[], str], form: ResultFormat) -> None:
     """Print `document`, or what `json` gives, to stdout: nothing but it, so that it can be piped."""
-    from rich.console import Console
-
     from algid.report.markdown import markdown
     from algid.report.terminal import print_document
 
     if form is ResultFormat.TABLE:
-        print_document(document, Console())
+        print_document(document, console())
     else:
-        typer.echo(json() if form is ResultFormat.JSON else markdown(document), nl=False)
+        say(json() if form is ResultFormat.JSON else markdown(document), end="")

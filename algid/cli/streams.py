@@ -9,6 +9,8 @@ import sys
 import unicodedata
 from typing import Any
 
+from algid.errors import OutputError
+
 SPELLINGS = {
     "–": "-", "—": "-", "−": "-", "…": "...", "±": "+-", "•": "*", "·": "*", "×": "x", "∞": "inf", "°": " deg",
     "→": "->", "≤": "<=", "≥": ">=", "≈": "~", "Δ": "d", "α": "alpha", "θ": "theta", "σ": "sigma", "τ": "tau",
@@ -17,29 +19,49 @@ SPELLINGS = {
 
 
 class _Pipe(io.FileIO):
-    """A descriptor whose reader may leave, like ``head``: what is written after that goes nowhere."""
+    """A descriptor whose reader may leave, like ``head``, or whose disk may be full.
+
+    What is written after that goes nowhere. That a disk is full is raised, once, where there is a `name` to tell it by:
+    about standard error nobody can be told.
+    """
+
+    def __init__(self, handle: int, told_as: str | None) -> None:
+        super().__init__(handle, "wb", closefd=False)
+        self._told_as = told_as
 
     def write(self, data: Any, /) -> int:
         try:
             return super().write(data)
-        except BrokenPipeError:
-            nowhere = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(nowhere, self.fileno())
-            os.close(nowhere)
+        except OSError as error:
+            _to_nowhere(self.fileno())
+            if self._told_as is not None and not isinstance(error, BrokenPipeError):
+                reason = f"cannot write ({error.strerror}); send it elsewhere, or make room"
+                raise OutputError(f"{self._told_as}: {reason}") from error
             return memoryview(data).nbytes
+
+
+def _to_nowhere(handle: int) -> None:
+    """Have what is written to a descriptor go nowhere."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    if nowhere != handle:  # a closed one is the first that the system gives
+        os.dup2(nowhere, handle)
+        os.close(nowhere)
 
 
 def harden_streams() -> None:
     """Let this process print whatever it has to: to a reader that leaves, and in letters that the terminal lacks."""
     codecs.register_error("spelled", _spelled)
-    for name in ("stdout", "stderr"):
+    for name, handle, told_as in (("stdout", 1, "standard output"), ("stderr", 2, None)):
+        if getattr(sys, name) is None:  # closed: else the next file to be opened would be taken for it
+            _to_nowhere(handle)
+            setattr(sys, name, open(handle, "w", encoding="utf-8", closefd=False))  # noqa: SIM115
         stream = getattr(sys, name)
         try:
             handle = stream.fileno()
-        except (AttributeError, OSError, ValueError):  # none, or not of this process
+        except (AttributeError, OSError, ValueError):  # not of this process
             continue
         stream.flush()
-        raw = io.BufferedWriter(_Pipe(handle, "wb", closefd=False))
+        raw = io.BufferedWriter(_Pipe(handle, told_as))
         lines = name == "stderr" or stream.isatty()
         setattr(sys, name, io.TextIOWrapper(raw, stream.encoding, "spelled", line_buffering=lines))
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from algid.cli.completion import cases, or_files
+from algid.cli.output import say
 
 if TYPE_CHECKING:
     from algid.synth.cases import Case
@@ -143,7 +144,7 @@ def synth(
     for log in logs:
         path = out / f"{log.origin.path}.{kind.value}"
         write_log(path, log, truth=log.origin.truth, kind=kind.value)
-        print(path)
+        say(str(path))
 
 
 def _schedule(text: str) -> list[tuple[float, float]]:

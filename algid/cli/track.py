@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from algid.cli import EXIT_INCOMPLETE
+from algid.cli.output import remark
 from algid.cli.report import Export, ResultFormat, print_track
 from algid.cli.settings import Choice, takes_profile
 
@@ -60,6 +61,6 @@ def track(
             write_track(result, temporary, mcap=export is Export.MCAP)
     if not quiet:
         print_track(result, form)
-        typer.echo(f"wrote {folder}", err=True)
+        remark(f"wrote {folder}")
     if not result.complete or result.data_lost or verdict(result).level == "failed":
         raise typer.Exit(EXIT_INCOMPLETE)

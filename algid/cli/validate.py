@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from algid.cli import EXIT_FAILED
+from algid.cli.output import complain, say
 from algid.cli.report import ResultFormat
 from algid.cli.settings import Choice, takes_profile
 from algid.words import counted
@@ -54,7 +55,6 @@ def validate(
     from algid.identification.validate import validate as judge
     from algid.report.markdown import markdown_table
     from algid.report.progress import progress
-    from algid.report.text import visible
     from algid.results import read_result
 
     known, meaning = None, choice.profile()
@@ -74,24 +74,24 @@ def validate(
         rolled = roll(model, survey) if simulate else None
     summaries = [survey.summary(log) for log in survey.logs]
     for warning in (*warnings, *(() if known is None else read_otherwise(summaries, known, str(result)))):
-        typer.echo(f"algid: {visible(warning)}", err=True)
+        complain(warning)
     total = found.total
     over = max_nrmse is not None and (total is None or max(total.nrmse) > max_nrmse)
     every = {**found.logs, "all logs": total}
     simulation = {} if rolled is None else {**rolled.logs, "all logs": rolled.total}
     simulated = {name: _rows(one) for name, one in simulation.items()}
     if form is ResultFormat.TABLE:
-        typer.echo("\n".join(_lines(every, simulated)))
+        say("\n".join(_lines(every, simulated)))
         if over:
-            typer.echo(f"OVER: normalised RMSE past {max_nrmse:g}")
+            say(f"OVER: normalised RMSE past {max_nrmse:g}")
     elif form is ResultFormat.MARKDOWN:
-        typer.echo("\n".join(map(markdown_table, _tables(every, simulated))), nl=False)
+        say("\n".join(map(markdown_table, _tables(every, simulated))), end="")
     else:
         predictions = {name: None if one is None else one.model_dump(mode="json") for name, one in every.items()}
         content: dict[str, Any] = {"logs": predictions, "total": predictions.pop("all logs"), "over": over}
         if simulated:
             content["simulation"] = simulated
-        typer.echo(json.dumps(content, indent=2, allow_nan=False))
+        say(json.dumps(content, indent=2, allow_nan=False))
     if over:
         raise typer.Exit(EXIT_FAILED)
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from algid.errors import LogError
+from algid.faults import during
 from algid.inspection.checks import examine
 from algid.inspection.dynamics import DynamicFigures, dynamic_figures
 from algid.inspection.figures import ClockFigures, SignalFigures, clock_figures, signal_figures
@@ -57,7 +58,8 @@ def look(path: Path, read: Callable[[], T]) -> Look[T]:
     LogError
         As `contents`; what `read` raises stands in `refused`.
     """
-    kind, entries = contents(path)
+    with during("opening", path):
+        kind, entries = contents(path)
     try:
         return Look(kind, entries, found=read())
     except LogError as error:

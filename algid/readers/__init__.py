@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from algid.faults import during
 from algid.log import Log
 
 if TYPE_CHECKING:
@@ -29,9 +30,15 @@ def open_log(path: str | Path, profile: Profile | None = None) -> TableReader:
         If there is no such log, its format is unknown, it is damaged, or it lacks a channel.
     """
     from algid.profile import Profile
+
+    with during("opening", path):
+        return _opened(Path(path), profile or Profile())
+
+
+def _opened(path: Path, profile: Profile) -> TableReader:
+    """As `open_log`, by the kind of log that its content shows."""
     from algid.readers.sniff import sniff
 
-    path, profile = Path(path), profile or Profile()
     kind = sniff(path)
     if kind == "mcap":
         from algid.readers.mcap import open_mcap

@@ -12,6 +12,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.errors import LogError
+from algid.faults import during
 from algid.limits import LIMITS
 from algid.log import Log, Notice, Origin
 from algid.readers.convert import ROWS, Conversion, Gatherer, channel_readings
@@ -47,7 +48,8 @@ class TableReader:
         LogError
             If a value is not finite, time runs wrong, or there are fewer than two samples.
         """
-        return self._gathered(rows)
+        with during("reading", self.origin.path):
+            yield from self._gathered(rows)
 
     def whole(self) -> Log:
         """The whole log.
@@ -57,7 +59,8 @@ class TableReader:
         LogError
             As `blocks`.
         """
-        (log,) = self._gathered(sys.maxsize)
+        with during("reading", self.origin.path):
+            (log,) = self._gathered(sys.maxsize)
         return log
 
     def _gathered(self, most: int) -> Iterator[Log]:

@@ -22,6 +22,19 @@ def visible(text: str, longest: int = LONGEST) -> str:
     return shown if len(text) <= longest else shown + "…"
 
 
+def printable(text: str) -> str:
+    """`text` with every character that cannot be seen, but for line feeds and tabs, as an escape that JSON knows."""
+    if text.isascii() and text.replace("\n", "").replace("\t", "").isprintable():
+        return text
+    return "".join(c if c in "\n\t" or unicodedata.category(c) not in _HIDDEN else _as_json(c) for c in text)
+
+
+def _as_json(character: str) -> str:
+    """A character as JSON's strings may hold it: UTF-16 in hexadecimal."""
+    units = character.encode("utf-16-be", "surrogatepass")
+    return "".join(f"\\u{units[i : i + 2].hex()}" for i in range(0, len(units), 2))
+
+
 def _shown(character: str) -> str:
     if unicodedata.category(character) not in _HIDDEN:
         return character

@@ -1,0 +1,47 @@
+"""What commands print: the one place that makes text printable, whoever wrote it.
+
+A name in a log, a status in a result that was tampered with, a path: any may hold what drives a terminal.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from algid.report.text import printable
+
+if TYPE_CHECKING:
+    from rich.console import Console, ConsoleOptions, RenderableType
+    from rich.segment import Segment
+
+
+def say(text: str, *, end: str = "\n") -> None:
+    """Print to standard output, which carries results."""
+    print(printable(text), end=end)
+
+
+def remark(text: str) -> None:
+    """Print to standard error, which carries all that is no result."""
+    print(printable(text), file=sys.stderr)
+
+
+def complain(text: str) -> None:
+    """Print one line about what is wrong to standard error: no line feed of a foreign name breaks it."""
+    remark("algid: " + text.replace("\n", "\\n"))
+
+
+def console(**options: Any) -> Console:
+    """A terminal whose text is printable; `options` are those of rich."""
+    from rich.console import Console
+    from rich.segment import Segment
+
+    class Printable(Console):
+        """Shows what a segment would do to the terminal, but for what rich itself has it do."""
+
+        def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+            """The segments of `renderable`, their text printable."""
+            for segment in super().render(renderable, options):
+                yield segment if segment.control else Segment(printable(segment.text), segment.style)
+
+    return Printable(**options)

@@ -1,0 +1,77 @@
+"""What ends a command that nobody foresaw: one line for its user, and an exit code.
+
+An exception that a library raises about what it was given is told with the file and the stage. Any other is an error
+inside algid, and is called one.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+
+from algid.errors import AlgidError, text_of
+
+EXIT_USAGE = 2
+EXIT_INTERNAL = 70
+"""The number that sysexits.h gives to an internal error."""
+TRACEBACK = "ALGID_TRACEBACK"
+"""A variable of the environment: set to 1, it shows where an exception came from."""
+
+_OWN = str(Path(__file__).parent) + os.sep
+_MEANT = (AlgidError, SystemExit, KeyboardInterrupt, GeneratorExit)
+"""Exceptions that are no faults."""
+_LONGEST_REASON = 200
+
+
+@contextmanager
+def during(stage: str, file: object) -> Iterator[None]:
+    """Note on an exception from within the block what was being done, and with which file."""
+    try:
+        yield
+    except _MEANT:
+        raise
+    except BaseException as error:  # a panic in a library of Rust is no Exception
+        error.add_note(f"while {stage} {file}")
+        raise
+
+
+def fault(error: BaseException) -> tuple[str, int]:
+    """The line about an exception that is nobody's message, and the exit code that goes with it.
+
+    Parameters
+    ----------
+    error : BaseException
+        Neither an `AlgidError` nor what ends a program on purpose.
+
+    Returns
+    -------
+    str
+        What could not be done, why, and what to do.
+    int
+        `EXIT_USAGE` where memory, the system or a library refused a file; `EXIT_INTERNAL` where algid is wrong.
+    """
+    notes = [note for note in getattr(error, "__notes__", []) if note.startswith("while ")]
+    doing = notes[0] if notes else ""
+    place = f"{doing}: " if doing else ""
+    reason = text_of(error).partition("\n")[0][:_LONGEST_REASON]
+    trace = f"see where with {TRACEBACK}=1"
+    if isinstance(error, MemoryError):
+        return f"{place}not enough memory ({reason}); cut the log with --start and --end", EXIT_USAGE
+    if isinstance(error, OSError) and error.strerror:
+        name = "" if error.filename is None else f"{error.filename}: "
+        return f"{place}{name}{error.strerror}; mend that and run it again, or {trace}", EXIT_USAGE
+    if doing and not _ours(error.__traceback__):
+        remedy = "look at the file, or write it anew in another format"
+        return f"{place}a library cannot take it ({reason}); {remedy}; {trace}", EXIT_USAGE
+    return f"internal error: {place}{reason}; this is a fault of algid: report it, {trace}", EXIT_INTERNAL
+
+
+def _ours(trace: TracebackType | None) -> bool:
+    """Whether it was algid's own line that raised."""
+    last = None
+    while trace is not None:
+        last, trace = trace, trace.tb_next
+    return last is None or last.tb_frame.f_code.co_filename.startswith(_OWN)

@@ -1,0 +1,218 @@
+"""The outermost place: what nobody foresaw is one line and an exit code, and what is printed drives no terminal."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import algid.cli
+from algid.cli import _run, _StoppedError
+from algid.cli.output import console
+from algid.faults import EXIT_INTERNAL
+from algid.report.text import printable
+from tests.cli.commands import call
+from tests.processes import Outcome, begin
+
+
+class PanicError(BaseException):
+    """Raised as pyo3 raises what it calls a panic: no `Exception`."""
+
+
+def raising(error: BaseException) -> Callable[..., Any]:
+    """What raises it, from a file that is not algid's."""
+
+    def raise_it(*_: object, **__: object) -> object:
+        raise error
+
+    return raise_it
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Callable[..., Any]:
+    """Runs a command in this process as the console script does; gives its exit code and standard error."""
+    (tmp_path / "log.csv").write_text("t,theta1\n0,1\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("ALGID_TRACEBACK", raising=False)
+
+    def running(*arguments: str) -> tuple[object, str]:
+        monkeypatch.setattr(sys, "argv", ["algid", *arguments])
+        try:
+            code: object = _run()
+        except SystemExit as end:
+            code = end.code
+        return code, capsys.readouterr().err
+
+    return running
+
+
+@pytest.mark.parametrize(
+    ("raised", "code", "line"),
+    [
+        (
+            PanicError("index out of bounds\nnote: run with RUST_BACKTRACE"),
+            2,
+            (
+                "while opening log.csv: a library cannot take it (PanicError: index out of bounds); look at the file, "
+                "or write it anew in another format; see where with ALGID_TRACEBACK=1"
+            ),
+        ),
+        (
+            MemoryError("Unable to allocate 9 GiB"),
+            2,
+            (
+                "while opening log.csv: not enough memory (MemoryError: Unable to allocate 9 GiB); cut the log with "
+                "--start and --end"
+            ),
+        ),
+        (
+            OSError(5, "Input/output error", "log.csv"),
+            2,
+            (
+                "while opening log.csv: log.csv: Input/output error; mend that and run it again, or see where with "
+                "ALGID_TRACEBACK=1"
+            ),
+        ),
+    ],
+)
+def test_what_a_library_raises_names_the_file_and_the_stage(
+    raised: BaseException, code: int, line: str, run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("algid.inspection.report.sniff", raising(raised))
+    assert run("inspect", "log.csv") == (code, f"algid: {line}\n")
+
+
+def test_a_fault_of_algid_is_called_one(run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("algid.inspection.report.sniff", lambda _path: None)  # then algid's own line fails
+    line = (
+        "algid: internal error: while opening log.csv: AttributeError: 'NoneType' object has no attribute "
+        "'startswith'; this is a fault of algid: report it, see where with ALGID_TRACEBACK=1\n"
+    )
+    assert run("inspect", "log.csv") == (EXIT_INTERNAL, line)
+    monkeypatch.setenv("ALGID_TRACEBACK", "1")
+    code, told = run("inspect", "log.csv")
+    assert code == EXIT_INTERNAL
+    assert told.startswith("Traceback")
+    assert told.endswith(line)
+
+
+@pytest.mark.parametrize(("raised", "code"), [(_StoppedError(143), 143), (SystemExit(3), 3)])
+def test_an_end_that_is_meant_keeps_its_meaning(
+    raised: BaseException, code: int, run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("algid.inspection.report.sniff", raising(raised))
+    found, told = run("inspect", "log.csv")
+    assert found == code
+    assert told in ("", "algid: stopped; nothing half-written is left\n")
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("result")
+    noisy = ("--position-noise", "1e-3", "--torque-noise", "1e-2")
+    assert Outcome("synth", "case1", "-o", folder, "--torque", "wide", "--duration", "4", *noisy).code == 0
+    assert Outcome("identify", folder / "case1-unloaded.mcap", "-o", folder, "--no-report", "-q").code == 0
+    return folder / "case1-unloaded.algid"
+
+
+def test_a_full_standard_output_is_one_line_of_every_command(result: Path, tmp_path: Path) -> None:
+    log = result.parent / "case1-unloaded.mcap"
+    calls: tuple[tuple[object, ...], ...] = (
+        ("--help",),
+        ("--version",),
+        ("guide", "start"),
+        ("inspect", log),
+        ("identify", log, "-o", tmp_path, "--no-report"),
+        ("validate", result, log, "--format", "json"),
+        ("check", result, "--max-error", "50"),
+        ("compare", result, result),
+        ("report", result),
+        ("synth", "case1", "-o", tmp_path, "--duration", "0.1"),
+        ("profile", "new", log, "-o", tmp_path / "new.toml"),
+    )
+    for arguments in calls:
+        with Path("/dev/full").open("wb") as full, (tmp_path / "err").open("wb") as err:
+            code = begin(*arguments, stdout=full.fileno(), stderr=err.fileno())()
+        told = [line for line in (tmp_path / "err").read_text().splitlines() if not line.startswith(("wrote", "note"))]
+        assert code == 2, arguments
+        assert told == [
+            "algid: standard output: cannot write (No space left on device); send it elsewhere, or make room"
+        ], arguments
+
+
+def test_a_full_standard_error_changes_no_exit_code(tmp_path: Path) -> None:
+    with Path("/dev/full").open("wb") as full, (tmp_path / "out").open("wb") as out:
+        assert begin("check", "absent.algid", stdout=out.fileno(), stderr=full.fileno())() == 2
+        assert begin("--version", stdout=out.fileno(), stderr=full.fileno())() == 0
+
+
+def test_closed_streams_are_none_of_the_files_that_are_written(tmp_path: Path) -> None:
+    command = f"exec {sys.executable} -m algid synth case1 --duration 0.1 --format csv -o {tmp_path} >&- 2>&-"
+    assert subprocess.run(["sh", "-c", command], check=False, env={**os.environ}).returncode == 0
+    assert (tmp_path / "case1-loaded.csv").read_text().startswith("t,")
+    assert b".csv\n" not in (tmp_path / "case1-loaded.csv").read_bytes()
+
+
+HOSTILE = "a\x1b[31m\x07\x9b2J\u202e\u2028\U000e0041\x7f b"
+
+
+def test_a_tampered_result_drives_no_terminal(result: Path, tmp_path: Path) -> None:
+    content = json.loads((result / "result.json").read_text())
+    for row in content["table4"]:
+        row["parameter"] = HOSTILE
+    content |= {"version": HOSTILE, "estimator": HOSTILE, "warnings": [HOSTILE], "notes": [HOSTILE]}
+    content["log"]["path"] = HOSTILE
+    content["parameters"][HOSTILE] = content["parameters"].pop("k3") | {"unit": HOSTILE}
+    folder = tmp_path / "tampered.algid"
+    folder.mkdir()
+    (folder / "result.json").write_text(json.dumps(content))
+    for arguments in (
+        ("check", folder, "--max-error", "50"),
+        ("compare", folder, result),
+        ("compare", folder, result, "--format", "json"),
+        ("report", folder),
+        ("report", folder, "--format", "json"),
+        ("report", folder, "--format", "markdown"),
+        ("export", folder, "--to", "c"),
+        ("validate", folder, result.parent / "case1-unloaded.mcap"),
+    ):
+        done = call(*arguments)
+        shown = done.out + done.err
+        assert shown, arguments
+        assert printable(shown) == shown, (arguments, shown)
+        if "json" in arguments:
+            json.loads(done.out)
+
+
+def test_an_escape_is_jsons() -> None:
+    assert json.loads(f'"{printable(HOSTILE)}"') == HOSTILE
+    assert printable("θ ± 1\n\tok") == "θ ± 1\n\tok"
+
+
+def test_a_terminals_own_colours_pass_and_a_texts_do_not(capsys: pytest.CaptureFixture[str]) -> None:
+    from rich.text import Text
+
+    console(force_terminal=True, color_system="standard").print(Text("bad \x1b]0;title\x07", "bold"))
+    shown = capsys.readouterr().out
+    assert shown.startswith("\x1b[1mbad ")
+    assert "\x1b]0" not in shown
+
+
+def test_no_command_prints_but_through_the_one_place() -> None:
+    """`print`, typer's echo and a bare console know nothing of what drives a terminal."""
+    folder = Path(algid.cli.__file__).parent
+    found = []
+    for path in folder.glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            name = getattr(node.func, "attr", getattr(node.func, "id", "")) if isinstance(node, ast.Call) else ""
+            if name in ("print", "echo", "secho", "Console") and path.name != "output.py":
+                found.append((path.name, ast.unparse(node)))
+    allowed = ("console", "terminal.print", "print('algid: it runs on", "print(f'\\r\\x1b", "print('\\r\\x1b")
+    assert [one for one in found if not one[1].startswith(allowed)] == []
