@@ -86,9 +86,9 @@ class Workers(Executor):
         """Run ``fn(*args, **kwargs)`` in a worker."""
         future: Future[Any] = Future()
         try:
-            self._calls.put((future, pickle.dumps((fn, args, kwargs))))
-        except Exception as error:  # pickling runs the arguments' own code
-            future.set_exception(CallFailedError(text_of(error)))
+            self._calls.put((future, _packed((fn, args, kwargs))))
+        except CallFailedError as error:
+            future.set_exception(error)
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
@@ -197,9 +197,17 @@ def _answered(packed: bytes) -> bytes:
     """Run a call; whatever it raises becomes words, and the worker lives on."""
     try:
         fn, args, kwargs = pickle.loads(packed)
-        return pickle.dumps((True, fn(*args, **kwargs)))
+        return _packed((True, fn(*args, **kwargs)))
     except BaseException as error:
         return pickle.dumps((False, text_of(error)))
+
+
+def _packed(value: Any) -> bytes:
+    """A value as bytes. Raises `CallFailedError`, in words that are the same with every Python."""
+    try:
+        return pickle.dumps(value)
+    except Exception as error:  # pickling runs the value's own code
+        raise CallFailedError(f"cannot be pickled for a worker ({text_of(error)})") from error
 
 
 def _unpacked(packed: bytes) -> Any:
