@@ -6,14 +6,26 @@ A caller's mistake is a `ValueError`; numerics that fail on one window are a sta
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 LONGEST_TEXT = 2000  # characters
 LONGEST_CHAIN = 100
 
 
+# What stands before the @ of an object's URL; a slash in it should have been written %2F, and may not have been.
+_USER = re.compile(r"\b(s3|gs|az|abfss?)(:/{1,2})([^\s/?#]*@|[^\s/?#@]*:[^\s?#]*@)", re.IGNORECASE)
+_SECRET = re.compile(r"([?&][a-z_]*(?:secret|sig|key|password|token)[a-z_]*=)[^&\s]*", re.IGNORECASE)
+
+
 class AlgidError(Exception):
-    """Base of every error that the user of the command line can mend. Exit code 2."""
+    """Base of every error that the user of the command line can mend. Exit code 2.
+
+    Credentials in the URLs that its text names are left out.
+    """
+
+    def __init__(self, text: str = "") -> None:
+        super().__init__(without_credentials(text))
 
 
 class LogError(AlgidError):
@@ -32,13 +44,27 @@ class OutputError(AlgidError):
     """A file cannot be written where it was asked for."""
 
 
+def without_credentials(text: str) -> str:
+    """`text` with every URL of an object as it may be printed and kept: without users' names, passwords and tokens.
+
+    In Azure's URLs a name before the @ is the container's or the account's, and stays.
+    """
+
+    def kept(found: re.Match[str]) -> str:
+        scheme, mark, user = found.groups()
+        name = user.partition(":")[0].rstrip("@") if scheme.lower().startswith(("az", "abfs")) else ""
+        return f"{scheme}{mark}{name}{'@' if name else ''}"
+
+    return _SECRET.sub(r"\1", _USER.sub(kept, text)) if ":/" in text else text
+
+
 def text_of(error: BaseException) -> str:
     """What an exception says, cut to `LONGEST_TEXT`; with its type where algid did not raise it.
 
     Exceptions are anybody's: one that cannot even be printed is named by its type.
     """
     try:
-        text = str(error)[:LONGEST_TEXT]
+        text = without_credentials(str(error))[:LONGEST_TEXT]
     except BaseException:  # its own fault, whatever it is
         return type(error).__name__
     return text if isinstance(error, AlgidError) else f"{type(error).__name__}: {text}"

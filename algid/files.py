@@ -182,6 +182,23 @@ def _swap(temporary: Path, folder: Path) -> None:
     shutil.rmtree(aside, ignore_errors=True)
 
 
+def remove_whole(place: Path) -> None:
+    """Remove a file or a folder at once, if it is there; a link goes, and what it leads to stays.
+
+    Raises
+    ------
+    OSError
+        If it cannot be removed.
+    """
+    aside = place.with_name(f".{place.name}.{secrets.token_hex(4)}")
+    with suppress(FileNotFoundError):
+        place.rename(aside)
+        if aside.is_dir() and not aside.is_symlink():
+            shutil.rmtree(aside)
+        else:
+            aside.unlink()
+
+
 def remove_stale(folder: Path) -> None:
     """Remove what runs that were killed have left of `folder` half-written: such of which no process holds."""
     for found in folder.parent.glob(f".{glob.escape(folder.name)}.*"):

@@ -1,28 +1,46 @@
 """Where files live: a folder of this machine, or a prefix of an object store behind s3://, gs:// or az://.
 
 Files appear whole or not at all: on this machine through `algid.files.whole_file`, in object stores by their nature.
+
+A URL names an object by its key, percent-encoded: ``%3F`` for ``?``, ``%23`` for ``#``, ``%25`` for ``%``. Whatever
+else no URL may hold, such as blanks, may stand as it is. URLs of objects that are found below a prefix are encoded
+and keep the prefix's credentials; what is printed and kept of them is `public`.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
-from algid.errors import LogError, OutputError
-from algid.files import whole_file
+from algid.errors import AlgidError, LogError, OutputError, without_credentials
+from algid.files import remove_whole, whole_file
 
 if TYPE_CHECKING:
-    from pyarrow.fs import FileSystem
+    from pyarrow.fs import FileInfo, FileSystem
 
 SCHEMES = ("s3://", "gs://", "az://")
+_SAFE = "/%!$&'()*+,;=:@~"
+"""What stands in the path of a URL as it is, beside letters, digits and ``-._``."""
 
 
 def is_url(path: str) -> bool:
     """Whether a path is the URL of an object."""
     return path.startswith(SCHEMES)
+
+
+def public(path: str) -> str:
+    """A path or URL as it is printed and kept: without credentials."""
+    return without_credentials(path) if is_url(path) else path
+
+
+def shown(place: str) -> str:
+    """A folder's path or a URL as messages name it: without credentials, and without what follows the key."""
+    return public(place).partition("?")[0].rstrip("/") if is_url(place) else place
 
 
 @dataclass(frozen=True)
@@ -33,20 +51,23 @@ class Store:
     ----------
     filesystem : pyarrow's
     root : path within it
+    place : the root as it is printed
     folder : the same root, where it is a folder of this machine
     """
 
     filesystem: FileSystem
     root: str
+    place: str
     folder: Path | None = None
 
     def read(self, name: str) -> bytes | None:
-        """The content, or None where there is no such file."""
-        try:
-            with self.filesystem.open_input_file(f"{self.root}/{name}") as stream:
-                return bytes(stream.readall())
-        except FileNotFoundError:
-            return None
+        """The content, or None where there is no such file. Raises `LogError` where it cannot be read."""
+        with _translated(f"{self.place}/{name}", LogError, "it cannot be read"):
+            try:
+                with self.filesystem.open_input_file(f"{self.root}/{name}") as stream:
+                    return bytes(stream.readall())
+            except FileNotFoundError:
+                return None
 
     def write(self, name: str, content: bytes) -> None:
         """Write the whole file. Raises `OutputError`."""
@@ -54,26 +75,50 @@ class Store:
             with whole_file(self.folder / name) as temporary:
                 temporary.write_bytes(content)
             return
-        try:
-            with self.filesystem.open_output_stream(f"{self.root}/{name}") as stream:
-                stream.write(content)
-        except OSError as error:
-            raise OutputError(
-                f"{self.root}/{name}: cannot write there ({_first_line(error)}); check rights and name"
-            ) from error
+        with (
+            _translated(f"{self.place}/{name}", OutputError, "cannot write there"),
+            self.filesystem.open_output_stream(f"{self.root}/{name}") as stream,
+        ):
+            stream.write(content)
+
+    def remove(self, name: str) -> None:
+        """Remove a file, or a folder with all that is in it; nothing where there is none. Raises `OutputError`."""
+        from pyarrow.fs import FileType
+
+        path = f"{self.root}/{name}"
+        with _translated(f"{self.place}/{name}", OutputError, "it cannot be removed"):
+            if self.folder is not None:
+                remove_whole(self.folder / name)
+                return
+            kind = self.filesystem.get_file_info(path).type
+            if kind == FileType.Directory:
+                self.filesystem.delete_dir(path)
+            elif kind != FileType.NotFound:
+                self.filesystem.delete_file(path)
 
     def names(self, under: str) -> list[str]:
-        """Names of the files below the folder `under`, sorted; hidden ones are left out."""
+        """Names of the files below the folder `under`, sorted; hidden ones are left out.
+
+        Raises
+        ------
+        OutputError
+            If they cannot be listed, or the bucket that holds them does not exist.
+        """
         from pyarrow.fs import FileSelector, FileType
 
-        place = f"{self.root}/{under}".rstrip("/")
-        found = self.filesystem.get_file_info(FileSelector(place, recursive=True, allow_not_found=True))
+        path = f"{self.root}/{under}".rstrip("/")
+        with _translated(self.place, OutputError, "its objects cannot be listed"):
+            found = self.filesystem.get_file_info(FileSelector(path, recursive=True, allow_not_found=True))
+            bucket = self.root.partition("/")[0]
+            if not found and self.folder is None and not _is_there(self.filesystem.get_file_info(bucket)):
+                raise OutputError(f"{self.place}: there is no bucket {bucket}; check its name, or make it")
         files = (info for info in found if info.type == FileType.File and not info.base_name.startswith("."))
         return sorted(info.path.removeprefix(f"{self.root}/") for info in files)
 
     def exists(self, name: str) -> bool:
-        """Whether there is such a file."""
-        return bool(self.filesystem.get_file_info(f"{self.root}/{name}").is_file)
+        """Whether there is such a file. Raises `LogError` where that cannot be known."""
+        with _translated(f"{self.place}/{name}", LogError, "it cannot be looked at"):
+            return bool(self.filesystem.get_file_info(f"{self.root}/{name}").is_file)
 
 
 def open_store(place: str) -> Store:
@@ -87,9 +132,11 @@ def open_store(place: str) -> Store:
     from pyarrow.fs import LocalFileSystem
 
     if is_url(place):
-        return Store(*connect(place))
+        filesystem, path = connect(place)
+        return Store(filesystem, path, shown(place))
     folder = Path(place).absolute()
-    return Store(LocalFileSystem(), folder.as_posix().rstrip("/"), folder)
+    root = folder.as_posix().rstrip("/")
+    return Store(LocalFileSystem(), root, root, folder)
 
 
 def connect(url: str) -> tuple[FileSystem, str]:
@@ -100,34 +147,37 @@ def connect(url: str) -> tuple[FileSystem, str]:
     OutputError
         If the URL cannot be understood or reached.
     """
-    import pyarrow as pa
     from pyarrow.fs import FileSystem
 
-    try:
-        filesystem, path = FileSystem.from_uri(url.replace("az://", "abfs://", 1))
-    except (pa.ArrowException, OSError, ValueError) as error:
-        raise OutputError(f"{url}: the object store cannot be reached ({_first_line(error)}); check the URL") from error
-    return filesystem, path.rstrip("/")
+    if "#" in url:  # it would cut off the query, and with it the host that the credentials are for
+        raise OutputError(f"{url}: no # may stand in a URL; write %23 for one in a key")
+    base, mark, query = url.partition("?")
+    scheme, _, path = base.partition("://")
+    scheme = "abfs" if scheme == "az" else scheme
+    with _translated(url, OutputError, "the object store cannot be reached", "check the URL"):
+        path = quote(re.sub("%(?![0-9A-Fa-f]{2})", "%25", path), safe=_SAFE)
+        filesystem, found = FileSystem.from_uri(f"{scheme}://{path}{mark}{query}")
+    return filesystem, found.rstrip("/")
 
 
 def list_urls(url: str) -> list[tuple[str, str]]:
-    """Objects at or below a URL: each one's URL, and its name below it."""
-    store = Store(*connect(url))
+    """Objects at or below a URL: each one's URL, and its name below it. Raises `OutputError` as `Store.names` does."""
+    store = Store(*connect(url), shown(url))
     base, mark, query = url.partition("?")
-    scheme = base.partition("://")[0]
-    below = [(f"{scheme}://{store.root}/{name}{mark}{query}", name) for name in store.names("")]
+    below = [(f"{base.rstrip('/')}/{quote(name)}{mark}{query}", name) for name in store.names("")]
     return below or [(url, store.root.rpartition("/")[2])]
 
 
-def _first_line(error: BaseException) -> str:
-    """Of what an object store's client says."""
-    return str(error).split("\n", maxsplit=1)[0][:200]
-
-
 def object_stat(url: str) -> tuple[int, int]:
-    """Size in bytes and time of change in ns of an object; zeros where there is none."""
-    filesystem, path = connect(url)
-    info = filesystem.get_file_info(path)
+    """Size in bytes and time of change in ns of an object; zeros where there is none.
+
+    Raises
+    ------
+    LogError
+        If that cannot be known.
+    """
+    with reading(url) as (filesystem, path):
+        info = filesystem.get_file_info(path)
     return (info.size, info.mtime_ns) if info.is_file else (0, 0)
 
 
@@ -141,14 +191,52 @@ def reading(url: str) -> Iterator[tuple[Any, str]]:
         If the object cannot be read within the block.
     """
     filesystem, path = connect(url)
-    try:
+    with _translated(url, LogError, "it cannot be read"):
         yield filesystem, path
-    except OSError as error:
-        raise LogError(f"{url}: it cannot be read ({_first_line(error)}); check name and rights") from error
+
+
+@contextmanager
+def _translated(place: str, kind: type[AlgidError], what: str, do: str = "check name and rights") -> Iterator[None]:
+    """What a store's client raises becomes an error of ours that names the place, `what` cannot be done, what to do."""
+    import pyarrow as pa
+
+    try:
+        yield
+    except (OSError, UnicodeError, pa.ArrowException) as error:
+        raise kind(f"{place}: {what} ({_first_line(error)}); {do}") from error
+
+
+def _first_line(error: BaseException) -> str:
+    """Of what an object store's client says; before it is cut, so that no half of a secret stays."""
+    return without_credentials(str(error)).split("\n", maxsplit=1)[0][:200]
+
+
+def _is_there(info: FileInfo) -> bool:
+    from pyarrow.fs import FileType
+
+    return bool(info.type != FileType.NotFound)
 
 
 def put_folder(store: Store, name: str, folder: Path) -> None:
-    """Write the files of a folder below `name`; ``result.json`` comes last, so that it vouches for the others."""
-    files = sorted((path for path in folder.rglob("*") if path.is_file()), key=lambda p: (p.name == "result.json", p))
-    for path in files:
-        store.write(f"{name}/{path.relative_to(folder).as_posix()}", path.read_bytes())
+    """Make the files below `name` those of a folder.
+
+    ``result.json`` vouches for the others: the one that is there goes before any of them, the new one comes last.
+
+    Raises
+    ------
+    OutputError
+        If a file cannot be written, or one that is there cannot be removed.
+    """
+    files = {f"{name}/{path.relative_to(folder).as_posix()}": path for path in folder.rglob("*") if path.is_file()}
+    voucher = f"{name}/result.json"
+    there = store.names(name)
+    others = (files.keys() | there) - {voucher}
+    if others and voucher in there:
+        store.remove(voucher)
+    for file in sorted(others):
+        if file in files:
+            store.write(file, files[file].read_bytes())
+        else:
+            store.remove(file)
+    if voucher in files:
+        store.write(voucher, files[voucher].read_bytes())

@@ -21,26 +21,47 @@ from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.stores import connect
 from algid.writers.mcap import payloads
 
+DENIED = b"<?xml version='1.0'?><Error><Code>AccessDenied</Code><Message>Access Denied</Message></Error>"
+
 
 @dataclass
 class Served:
-    """A bucket of its own, the query behind an S3 URL, and the bytes that each answer to a GET had."""
+    """A bucket of its own, the query behind an S3 URL, and the bytes that each answer to a GET had.
+
+    `asked` has the method, path and authorization of each request, `denied` says which are answered by 403, and
+    `after` is called once a GET of a path is answered.
+    """
 
     bucket: str
     query: str
     answers: list[int] = field(default_factory=list)
+    asked: list[tuple[str, str, str]] = field(default_factory=list)
+    denied: Callable[[str, str], bool] = lambda _method, _path: False
+    after: Callable[[str], None] = lambda _path: None
 
-    def url(self, name: str) -> str:
+    def url(self, name: str, user: str = "") -> str:
         """The URL of an object or of a prefix."""
-        return f"s3://{self.bucket}/{name}{self.query}"
+        return f"s3://{user}{self.bucket}/{name}{self.query}"
+
+    def replace(self, name: str, content: bytes) -> None:
+        """Another object in the place of one, by no request: for use while one is answered."""
+        from moto.backends import get_backend
+
+        get_backend("s3")["123456789012"]["aws"].put_object(self.bucket, name, content)
 
     def counting(self, app: Callable[..., Iterable[bytes]]) -> Callable[..., Iterable[bytes]]:
         """The application, its answers counted."""
 
         def counted(environ: dict[str, Any], start: Any) -> list[bytes]:
+            method, path = environ["REQUEST_METHOD"], environ["PATH_INFO"].encode("latin-1").decode()
+            self.asked.append((method, path, environ.get("HTTP_AUTHORIZATION", "")))
+            if self.denied(method, path):
+                start("403 Forbidden", [("Content-Type", "application/xml")])
+                return [] if method == "HEAD" else [DENIED]
             content = list(app(environ, start))
-            if environ["REQUEST_METHOD"] == "GET":
+            if method == "GET":
                 self.answers.append(sum(map(len, content)))
+                self.after(path)
             return content
 
         return counted

@@ -26,9 +26,12 @@ from algid.readers.mcap import framing
 from algid.readers.mcap.catalogue import between, catalogue, channels_of
 from algid.readers.mcap.framing import DamagedError, File
 from algid.readers.mcap.load import spans_beside, spans_of
-from algid.stores import reading
+from algid.stores import public, reading
 
 if TYPE_CHECKING:
+    from pyarrow import NativeFile
+    from pyarrow.fs import FileSystem
+
     from algid.profile import Profile
 
 Range = tuple[int, int]
@@ -145,20 +148,43 @@ def staged(url: str, folder: Path, profile: Profile | None = None) -> Staged:
     Raises
     ------
     LogError
-        If there is no such object, or it cannot be read.
+        If there is no such object, it cannot be read, or another took its place meanwhile.
     """
-    from pyarrow.fs import LocalFileSystem, copy_files
-
     with reading(url) as (filesystem, path):
         folder.mkdir(parents=True, exist_ok=True)
         copy = folder / path.rpartition("/")[2]
-        with filesystem.open_input_file(path) as source:
-            if source.size() >= SMALL:
-                with Partial(copy, source=source) as part, naming({copy: url}):
-                    if _fetched_in_part(part, profile):
-                        return Staged(copy, url, whole=False)
-        copy_files(path, str(copy), source_filesystem=filesystem, destination_filesystem=LocalFileSystem())
-    return Staged(copy, url)
+        with _one_version(filesystem, path, url) as source, Partial(copy, source=source) as part:
+            with naming({copy: public(url)}):
+                in_part = part.size >= SMALL and _fetched_in_part(part, profile)
+            if not in_part:
+                part.fetch([(0, part.size)])
+    return Staged(copy, public(url), whole=not in_part)
+
+
+@contextmanager
+def _one_version(filesystem: FileSystem, path: str, url: str) -> Iterator[NativeFile]:
+    """An object, opened; looked at again when the block ends.
+
+    Requests for parts of an object tell nothing of each other: where it was replaced between two of them, what was
+    fetched is of neither, and what its reader complains of is not the cause.
+
+    Raises
+    ------
+    LogError
+        If another object stands in its place then.
+    """
+    with filesystem.open_input_file(path) as source:
+        found = source.metadata()
+        failure: Exception | None = None
+        try:
+            yield source
+        except (OSError, AlgidError) as error:
+            failure = error
+        with filesystem.open_input_file(path) as again:
+            if again.metadata() != found:
+                raise LogError(f"{url}: it was replaced while it was read; run again") from failure
+        if failure is not None:
+            raise failure
 
 
 @contextmanager

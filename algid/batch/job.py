@@ -16,7 +16,7 @@ from algid import __version__
 from algid.batch.fetch import naming, staged
 from algid.batch.jobs import Job
 from algid.batch.records import End, Input, JobRecord, estimates_of, hash_of, stat_of
-from algid.errors import chain_of, text_of
+from algid.errors import AlgidError, chain_of, text_of
 from algid.files import temporary_folder
 from algid.identification.identify import identify
 from algid.identification.source import Staged
@@ -24,7 +24,7 @@ from algid.report.verdict import verdict
 from algid.results import Result, Status
 from algid.runtime import keep_freed, keep_to_one_core
 from algid.settings import Settings
-from algid.stores import is_url, open_store, put_folder
+from algid.stores import is_url, open_store, public, put_folder
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -66,9 +66,7 @@ def run_task(task: Task) -> JobRecord | DiskFull:
     try:
         result = _identified(task)
     except BaseException as error:
-        chain = list(chain_of(error))
-        numbers = {one.errno for one in chain if isinstance(one, OSError)}
-        if not numbers.isdisjoint(NO_SPACE) or any(NO_SPACE_LEFT in text_of(one) for one in chain):
+        if is_full(error):
             return DiskFull(text_of(error))
         reason = TOO_LARGE if isinstance(error, MemoryError) else text_of(error)
         inputs = tuple(replace(one, sha256=hash_of(one.path)) for one in inputs)
@@ -91,18 +89,41 @@ def run_task(task: Task) -> JobRecord | DiskFull:
     )
 
 
+def is_full(error: BaseException) -> bool:
+    """Whether there was no space left, as an exception or what it came from says."""
+    chain = list(chain_of(error))
+    numbers = {one.errno for one in chain if isinstance(one, OSError)}
+    return not numbers.isdisjoint(NO_SPACE) or any(NO_SPACE_LEFT in text_of(one) for one in chain)
+
+
 def failed_record(task: Task, reason: str, status: End = End.FAILED, **known: Any) -> JobRecord:
     """The record of a task without result; `known` are other fields of it."""
     return _record(task, status=status, reason=reason, **{"inputs": inputs_of(task.job), **known})
 
 
+def kept(job: Job) -> Job:
+    """A job as records hold it: its URLs without credentials."""
+    logs, loaded = (tuple(map(public, paths)) for paths in (job.logs, job.loaded))
+    return replace(job, logs=logs, loaded=loaded, profile=None if job.profile is None else public(job.profile))
+
+
 def _record(task: Task, **known: Any) -> JobRecord:
-    return JobRecord(job=task.job, basis=task.basis, settings=task.settings.as_json(), version=__version__, **known)
+    return JobRecord(
+        job=kept(task.job), basis=task.basis, settings=task.settings.as_json(), version=__version__, **known
+    )
 
 
 def inputs_of(job: Job) -> tuple[Input, ...]:
     """The job's logs as they are now, not hashed."""
-    return tuple(stat_of(path) for path in (*job.logs, *job.loaded))
+    return tuple(map(_looked_at, (*job.logs, *job.loaded)))
+
+
+def _looked_at(path: str) -> Input:
+    """A log as it is now; as one that is not there where it cannot be looked at: its reader says why."""
+    try:
+        return stat_of(path)
+    except AlgidError:
+        return Input(public(path), 0, 0)
 
 
 def _identified(task: Task) -> Result:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from algid.errors import OutputError
 from algid.files import TEMPORARY
-from algid.stores import is_url
+from algid.stores import is_url, public
 
 LOCK = ".lock"
 
@@ -49,7 +49,7 @@ def lock_file(out: str) -> Path:
     """The file that stands for OUT: in it, or in the temporary folder where OUT is no folder."""
     if not is_url(out):
         return Path(out) / LOCK
-    name = hashlib.sha256(out.encode()).hexdigest()[:24]
+    name = hashlib.sha256(public(out).encode()).hexdigest()[:24]
     return Path(tempfile.gettempdir()) / f"{TEMPORARY}{os.getuid()}-{name}.lock"
 
 

@@ -16,9 +16,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from algid.batch.jobs import Job
+from algid.errors import LogError
 from algid.identification.source import sha256_of
 from algid.results import Result
-from algid.stores import Store, is_url, object_stat
+from algid.stores import Store, is_url, object_stat, public
 
 FOLDER = ".jobs"
 
@@ -38,6 +39,8 @@ FAILURES = (End.FAILED, End.KILLED)
 @dataclass(frozen=True)
 class Input:
     """A log as it was when the job started: size in bytes, times of change in ns, and what was in it.
+
+    A URL stands without the credentials that the job's own holds.
 
     `ctime_ns` is the file system's own time of change, which no tool can set back; 0 for an object in a store.
     """
@@ -72,14 +75,22 @@ class JobRecord:
 
 
 def stat_of(path: str) -> Input:
-    """Size and times of change of a log; of a folder, its files' total and latest. Zeros where there is none."""
+    """Size and times of change of a log; of a folder, its files' total and latest. Zeros where there is none.
+
+    Raises
+    ------
+    LogError
+        If it may be there and cannot be looked at.
+    """
     if is_url(path):
-        return Input(path, *object_stat(path))
+        return Input(public(path), *object_stat(path))
     try:
         files = filter(Path.is_file, Path(path).iterdir()) if Path(path).is_dir() else [Path(path)]
         found = [file.stat() for file in files]
-    except OSError:
+    except (FileNotFoundError, NotADirectoryError):
         return Input(path, 0, 0)
+    except OSError as error:
+        raise LogError(f"{path}: it cannot be looked at ({error.strerror}); check name and rights") from error
     mtime, ctime = (max((getattr(s, name) for s in found), default=0) for name in ("st_mtime_ns", "st_ctime_ns"))
     return Input(path, sum(s.st_size for s in found), mtime, ctime)
 
@@ -92,12 +103,29 @@ def hash_of(path: str) -> str | None:
         return None
 
 
-def unchanged(before: Input) -> bool:
-    """Whether a log holds what it held: by its size and times of change, and by its hash where one of these moved."""
-    now = stat_of(before.path)
+def unchanged(before: Input, path: str) -> bool:
+    """Whether the log at `path` holds what it held: by size and times of change, or by its hash where these moved.
+
+    Raises
+    ------
+    LogError
+        If it may be there and cannot be looked at.
+    """
+    now = stat_of(path)
     if replace(now, sha256=before.sha256) == before:
         return True
-    return now.size == before.size and before.sha256 is not None and hash_of(before.path) == before.sha256
+    return now.size == before.size and before.sha256 is not None and hash_of(path) == before.sha256
+
+
+def same_logs(before: Sequence[Input], now: Sequence[Input]) -> bool:
+    """Whether logs hold what they held: by their hashes where both are known, by their times of change elsewhere."""
+
+    def same(one: Input, other: Input) -> bool:
+        hashed = one.sha256 is not None and other.sha256 is not None
+        marks = [(i.path, i.size, i.sha256 if hashed else i.mtime_ns) for i in (one, other)]
+        return marks[0] == marks[1]
+
+    return len(before) == len(now) and all(map(same, before, now))
 
 
 def estimates_of(result: Result) -> dict[str, tuple[float | None, float | None, str]]:
@@ -115,7 +143,7 @@ def read_records(store: Store) -> dict[str, JobRecord]:
     """All records by job; one that cannot be read counts as none, so that its job runs again."""
     found = {}
     for name in store.names(FOLDER):
-        with suppress(ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        with suppress(ValueError, KeyError, TypeError, AttributeError, RecursionError, LogError):
             fields = json.loads(store.read(name) or b"")
             job = fields.pop("job")
             record = JobRecord(

@@ -9,11 +9,11 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import FrameType
 from typing import Any
 
-from algid.batch.job import DiskFull, Task, basis_of, failed_record, run_task
+from algid.batch.job import DiskFull, Task, basis_of, failed_record, is_full, kept, run_task
 from algid.batch.jobs import Job
 from algid.batch.records import (
     FAILURES,
@@ -21,19 +21,22 @@ from algid.batch.records import (
     Input,
     JobRecord,
     read_records,
+    same_logs,
     stat_of,
     unchanged,
     write_jobs,
     write_record,
 )
 from algid.batch.workers import CallFailedError, WorkerDiedError
-from algid.errors import OutputError, SettingError, text_of
+from algid.errors import AlgidError, OutputError, SettingError, text_of
 from algid.profile import Profile
 from algid.results import Result
 from algid.settings import Settings
 from algid.stores import Store
 
 MOST_KILLS = 3
+RUN_AGAIN = "run again: what is finished is kept"
+MAKE_ROOM = f"make room and {RUN_AGAIN}"
 LOOK_EVERY = 2.0  # s, for logs that have arrived
 _STOP_EVERY = 0.1  # s, for a stop
 
@@ -68,18 +71,23 @@ class Recipe:
 
 @dataclass(frozen=True)
 class BatchPlan:
-    """Tasks to run, records of jobs that cannot even start, and records that stand as they are."""
+    """Tasks to run, records of jobs that cannot even start, and records that stand as they are.
 
-    tasks: list[Task]
-    refused: list[JobRecord]
-    standing: list[JobRecord]
+    Of `unseen` jobs an earlier end is known, and it cannot be looked at whether their logs and results are as they
+    were: they fail this time, and what is known of them stays.
+    """
+
+    tasks: list[Task] = field(default_factory=list)
+    refused: list[JobRecord] = field(default_factory=list)
+    standing: list[JobRecord] = field(default_factory=list)
+    unseen: list[JobRecord] = field(default_factory=list)
 
 
 def plan(
     jobs: Iterable[Job], records: Mapping[str, JobRecord], recipe: Recipe, store: Store, retry_failed: bool = False
 ) -> BatchPlan:
     """Sort jobs by what is known of them; a job whose logs and settings are as they were is not run again."""
-    made = BatchPlan([], [], [])
+    made = BatchPlan()
     for job in jobs:
         try:
             task = recipe.task(job)
@@ -87,19 +95,24 @@ def plan(
             made.refused.append(recipe.refused(job, error))
             continue
         record = records.get(job.name)
-        if record is None or (retry_failed and record.status in FAILURES) or not _stands(record, task, store):
-            made.tasks.append(task)
-        else:
-            made.standing.append(record)
+        try:
+            if record is None or (retry_failed and record.status in FAILURES) or not _stands(record, task, store):
+                made.tasks.append(task)
+            else:
+                made.standing.append(record)
+        except AlgidError as error:
+            made.unseen.append(failed_record(task, str(error)))
     return made
 
 
 def _stands(record: JobRecord, task: Task, store: Store) -> bool:
-    if record.basis != task.basis or (record.job.logs, record.job.loaded) != (task.job.logs, task.job.loaded):
+    job = kept(task.job)
+    if record.basis != task.basis or (record.job.logs, record.job.loaded) != (job.logs, job.loaded):
         return False
     if record.status not in FAILURES and not store.exists(f"{task.job.name}.algid/result.json"):
         return False
-    return bool(record.inputs) and all(map(unchanged, record.inputs))
+    paths = (*task.job.logs, *task.job.loaded)
+    return len(record.inputs) == len(paths) and all(map(unchanged, record.inputs, paths))
 
 
 @dataclass(frozen=True)
@@ -113,12 +126,15 @@ class Progress:
 
 @dataclass(frozen=True)
 class Ended:
-    """How a batch ended: its jobs' records, how many were run now, and how many are left where it was stopped."""
+    """How a batch ended: its jobs' records, how many were run now, and how many are left where it was stopped.
+
+    `stopped` says why it could not go on, where it could not.
+    """
 
     records: list[JobRecord]
     ran: int
     left: int
-    full: str | None = None
+    stopped: str | None = None
 
 
 class Batch:
@@ -139,7 +155,7 @@ class Batch:
         self._store, self._recipe, self._executor = store, recipe, executor
         self._slots, self._progress = slots, progress
         self._kills: Counter[str] = Counter()
-        self._full: str | None = None
+        self._stopped: str | None = None
         self._ran = 0
         self.stop = threading.Event()
         """Set it, and `run` returns at once; what was running is left to whoever ends the executor."""
@@ -152,7 +168,8 @@ class Batch:
         earlier runs that are not among `jobs` keep their rows.
         """
         made = plan(jobs, self.records, self._recipe, self._store, retry_failed)
-        named = {job.name: job for job in jobs}
+        named = {job.name: kept(job) for job in jobs}
+        unseen = {record.job.name: record for record in made.unseen}
         for record in made.standing:
             if record.job != named[record.job.name]:
                 self._keep(replace(record, job=named[record.job.name]))
@@ -162,9 +179,9 @@ class Batch:
         try:
             write_jobs(self._store, [self.records[name] for name in sorted(self.records)])
         except OutputError as error:
-            self._full = self._full or str(error)
-        ended = [self.records[job.name] for job in jobs if job.name in self.records]
-        return Ended(ended, self._ran, left, self._full)
+            self._cannot_go_on(error)
+        now = {**self.records, **unseen}
+        return Ended([now[job.name] for job in jobs if job.name in now], self._ran, left, self._stopped)
 
     def _work(self, waiting: deque[Task]) -> int:
         """Run tasks; how many are left where the batch was stopped."""
@@ -200,21 +217,36 @@ class Batch:
         except Exception as error:  # of the executor's own: the other jobs go on
             return failed_record(task, text_of(error))
         if isinstance(ended, DiskFull):
-            self._stop_for_space(ended.reason)
+            self._stop_because(f"{ended.reason}; {MAKE_ROOM}")
             return None
         return ended
 
     def _keep(self, record: JobRecord) -> bool:
+        record = self._without_old_result(record)
         try:
             write_record(self._store, record)
         except OutputError as error:
-            self._stop_for_space(str(error))
+            self._cannot_go_on(error)
             return False
         self.records[record.job.name] = record
         return True
 
-    def _stop_for_space(self, reason: str) -> None:
-        self._full = reason
+    def _without_old_result(self, record: JobRecord) -> JobRecord:
+        """The record of a job; where it failed and its logs are others than before, their result is removed."""
+        before = self.records.get(record.job.name)
+        if record.status not in FAILURES or before is None or same_logs(before.inputs, record.inputs):
+            return record
+        try:
+            self._store.remove(f"{record.job.name}.algid")
+        except OutputError as error:
+            return replace(record, reason=f"{record.reason}; the result of what its log held before stays: {error}")
+        return record
+
+    def _cannot_go_on(self, error: OutputError) -> None:
+        self._stop_because(f"{error}; {MAKE_ROOM if is_full(error) else RUN_AGAIN}")
+
+    def _stop_because(self, reason: str) -> None:
+        self._stopped = self._stopped or reason
         self.stop.set()
 
 
@@ -222,14 +254,22 @@ class Settling:
     """Finds jobs whose logs have not changed since the look before: logs that are being written are left alone."""
 
     def __init__(self) -> None:
-        self._before: dict[str, Input] = {}
+        self._before: dict[str, Input | None] = {}
 
     def settled(self, jobs: Sequence[Job]) -> list[Job]:
         """Those of `jobs` whose logs are as the last call saw them, and hold something."""
-        now = {path: stat_of(path) for job in jobs for path in (*job.logs, *job.loaded)}
+        now = {path: _seen(path) for job in jobs for path in (*job.logs, *job.loaded)}
         before, self._before = self._before, now
-        still = {path for path, seen in now.items() if seen.size > 0 and seen == before.get(path)}
+        still = {p for p, seen in now.items() if p in before and seen == before[p] and (seen is None or seen.size > 0)}
         return [job for job in jobs if still.issuperset((*job.logs, *job.loaded))]
+
+
+def _seen(path: str) -> Input | None:
+    """A log as it is now, or None where it cannot be looked at: whoever reads it says why."""
+    try:
+        return stat_of(path)
+    except AlgidError:
+        return None
 
 
 @contextmanager

@@ -29,6 +29,7 @@ from typing import Any
 
 from algid.errors import SettingError, text_of
 from algid.files import temporary_folder
+from algid.stores import public
 
 # One thread a worker: more would fight for the same cores.
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "POLARS_MAX_THREADS", "ARROW_NUM_THREADS")
@@ -252,7 +253,7 @@ def cluster(address: str, out: str, timeout: float | None = None) -> Iterator[tu
         threads = sum(client.nthreads().values())
         if not threads:
             raise SettingError(f"--scheduler {address}: it has no workers; start dask worker {address}")
-        prefix = f"algid-{hashlib.sha256(out.encode()).hexdigest()[:16]}-"
+        prefix = f"algid-{hashlib.sha256(public(out).encode()).hexdigest()[:16]}-"
 
         def at_work(dask_worker: Any) -> bool:
             """Whether a worker, this runs on it, has a call of that batch in hand."""

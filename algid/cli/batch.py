@@ -172,6 +172,7 @@ def _conclude(ended: Ended, stopped: bool, out: str, quiet: bool) -> None:
     """Print what came of the jobs, and leave with the exit code that tells it."""
     from algid.batch.records import FAILURES, End
     from algid.report.text import visible
+    from algid.stores import shown
 
     failed = [record for record in ended.records if record.status in FAILURES]
     if not quiet:
@@ -179,12 +180,12 @@ def _conclude(ended: Ended, stopped: bool, out: str, quiet: bool) -> None:
             say(f"{visible(record.job.name)}: {record.status.value}: {visible(record.reason)}")
         counts = {end: sum(record.status is end for record in ended.records) for end in End}
         summary = ", ".join(f"{count} {end.value}" for end, count in counts.items() if count)
-        say(f"{summary or 'nothing done'}; {ended.ran} run now, {ended.left} left; {out}/jobs.parquet")
-    if ended.full is not None:
-        complain(f"{ended.full}; make room and run again: what is finished is kept")
-    if stopped and ended.full is None:
+        say(f"{summary or 'nothing done'}; {ended.ran} run now, {ended.left} left; {shown(out)}/jobs.parquet")
+    if ended.stopped is not None:
+        complain(ended.stopped)
+    elif stopped:
         raise typer.Exit(EXIT_STOPPED)
-    if failed or ended.left or ended.full is not None:
+    if failed or ended.left or ended.stopped is not None:
         raise typer.Exit(EXIT_FAILED)
     if any(record.status is End.INCOMPLETE for record in ended.records):
         raise typer.Exit(EXIT_INCOMPLETE)

@@ -193,7 +193,7 @@ def test_a_full_disk_stops_the_batch_and_keeps_what_is_finished(logs: Path, monk
     monkeypatch.setattr("algid.batch.job.identify", full)
     ended = _run(logs)
     assert (ended.ran, ended.left) == (1, 2)
-    assert ended.full is not None
+    assert ended.stopped is not None
     monkeypatch.undo()
     assert _run(logs).ran == 2
 

@@ -68,8 +68,7 @@ def test_a_batch_says_what_became_of_its_jobs(
         assert left == code
         shown = capsys.readouterr()
         assert shown.out.splitlines() == ([] if quiet else lines)
-        full = f"algid: {ended.full}; make room and run again: what is finished is kept\n"
-        assert shown.err == ("" if ended.full is None else full)
+        assert shown.err == ("" if ended.stopped is None else f"algid: {ended.stopped}\n")
 
 
 def test_progress_is_one_line_that_is_gone_at_the_end(
