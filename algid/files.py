@@ -6,22 +6,19 @@ TOML files are checked against a pydantic model, with errors that name file, pla
 from __future__ import annotations
 
 import errno
-import fcntl
-import glob
 import io
 import os
 import reprlib
-import secrets
 import shutil
 import stat
 import tempfile
-import time
 import tomllib
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from algid.construction import beside, put_in_place, remove_left, under_construction
 from algid.errors import OutputError, SettingError
 from algid.limits import LIMITS
 
@@ -37,32 +34,51 @@ def writing(place: Path | str, trouble: str = "cannot write") -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise OutputError(f"{place}: {trouble} ({error.strerror}); choose another folder with -o") from error
+        raise OutputError(f"{place}: {trouble} ({reason_of(error)}); choose another folder with -o") from error
+
+
+def reason_of(error: OSError) -> str:
+    """What the system says, in its own words: libraries put them into a text of their own."""
+    own = str(error).partition("\n")[0][:200]
+    known = next((words for words in map(os.strerror, _FULL) if words in own), None)
+    return error.strerror or known or own or type(error).__name__
+
+
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+"""What befalls a disk while it is written to."""
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
+def whole_file(path: Path, *, sweep: bool = True) -> Iterator[Path]:
     """Give a temporary name beside `path` to write to; it becomes `path` when the block ends well.
+
+    Parameters
+    ----------
+    path : Path
+    sweep : bool
+        Remove first what killed runs have left of it: this looks through the folder.
 
     Raises
     ------
     OutputError
         If the folder cannot be made or written to.
     """
-    temporary = path.parent / f".{path.name}.{secrets.token_hex(4)}"  # named before it is made, as below
-    try:
+    with ExitStack() as stack:
         with writing(path, "cannot write there"):
             path.parent.mkdir(parents=True, exist_ok=True)
-            temporary.touch(mode=0o600, exist_ok=False)
+            if sweep:
+                remove_left(path.parent, path.name)
+            temporary = stack.enter_context(under_construction(path, _touch))
         with writing(path):
             yield temporary
             mask = os.umask(0)
             os.umask(mask)
             temporary.chmod(0o666 & ~mask)
             temporary.replace(path)
-    finally:
-        with suppress(OSError):  # it may never have been made: what is reported is why, not that
-            temporary.unlink()
+
+
+def _touch(path: Path) -> None:
+    path.touch(mode=0o600, exist_ok=False)
 
 
 def read_whole(path: Path) -> bytes:
@@ -132,9 +148,9 @@ def first_misfit(error: ValidationError) -> str:
     return f"{place}: {said}, found {reprlib.repr(first['input']):.60}{more}"
 
 
-FRESH = 60.0  # s; a folder may be younger than the hold on it
-TEMPORARY = "algid-"
-"""What everything that algid puts into the system's temporary folder starts with."""
+EXISTS = "{}: exists already; choose another folder with -o, or replace it with --force"
+TEMPORARY = "algid"
+"""The name for which things are made in the system's temporary folder."""
 
 
 def result_folder(first_log: str, parent: Path, name: str | None = None) -> Path:
@@ -144,42 +160,46 @@ def result_folder(first_log: str, parent: Path, name: str | None = None) -> Path
 
 def refuse_existing(folder: Path, force: bool) -> None:
     """Raises `OutputError` where `folder` exists and is not to be replaced."""
-    if folder.exists() and not force:
-        raise OutputError(f"{folder}: exists already; choose another folder with -o, or replace it with --force")
+    if os.path.lexists(folder) and not force:
+        raise OutputError(EXISTS.format(folder))
 
 
 @contextmanager
-def whole_folder(folder: Path, force: bool) -> Iterator[Path]:
+def whole_folder(folder: Path, force: bool, *, sweep: bool = True) -> Iterator[Path]:
     """Give a temporary folder to write to; it becomes `folder` when the block ends well.
+
+    A folder that is replaced stands there, whole, until its successor does.
+
+    Parameters
+    ----------
+    folder : Path
+    force : bool
+        Replace one that exists.
+    sweep : bool
+        As of `whole_file`.
 
     Raises
     ------
     OutputError
-        If the folder cannot be made or written to, or exists and `force` is not set.
+        If the folder cannot be made or written to, or exists and `force` is not set, at the start or at the end.
     """
     refuse_existing(folder, force)
-    # Named before it is made: a signal may come as soon as it stands, and it must be taken away then too.
-    temporary = folder.parent / f".{folder.name}.{secrets.token_hex(4)}"
-    try:
+    with ExitStack() as stack:
         with writing(folder, "cannot write there"):
             folder.parent.mkdir(parents=True, exist_ok=True)
-            temporary.mkdir(mode=0o755)
+            if sweep:
+                remove_left(folder.parent, folder.name)
+            temporary = stack.enter_context(under_construction(folder, _make_folder))
         with writing(folder):
-            with _held(temporary, strictly=False):
-                yield temporary
-            _swap(temporary, folder)
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+            yield temporary
+            try:
+                put_in_place(temporary, folder, replace=force)
+            except FileExistsError as error:
+                raise OutputError(EXISTS.format(folder)) from error
 
 
-def _swap(temporary: Path, folder: Path) -> None:
-    if not folder.exists():
-        temporary.rename(folder)
-        return
-    aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}.old.", dir=folder.parent))
-    folder.rename(aside / folder.name)
-    temporary.rename(folder)
-    shutil.rmtree(aside, ignore_errors=True)
+def _make_folder(path: Path) -> None:
+    path.mkdir(mode=0o755)
 
 
 def remove_whole(place: Path) -> None:
@@ -190,21 +210,13 @@ def remove_whole(place: Path) -> None:
     OSError
         If it cannot be removed.
     """
-    aside = place.with_name(f".{place.name}.{secrets.token_hex(4)}")
+    aside = beside(place)
     with suppress(FileNotFoundError):
         place.rename(aside)
         if aside.is_dir() and not aside.is_symlink():
             shutil.rmtree(aside)
         else:
             aside.unlink()
-
-
-def remove_stale(folder: Path) -> None:
-    """Remove what runs that were killed have left of `folder` half-written: such of which no process holds."""
-    for found in folder.parent.glob(f".{glob.escape(folder.name)}.*"):
-        aside = found.name.startswith(f".{folder.name}.old.")
-        if not aside or folder.exists():  # else it may be all that is left of a result
-            _remove_unheld(found)
 
 
 @contextmanager
@@ -216,45 +228,15 @@ def temporary_folder() -> Iterator[Path]:
     OutputError
         If none can be made.
     """
-    place = Path(tempfile.gettempdir())
-    for found in place.glob(f"{TEMPORARY}*"):
-        _remove_unheld(found)
-    try:
-        folder = Path(tempfile.mkdtemp(prefix=TEMPORARY, dir=place))
-    except OSError as error:
-        raise OutputError(f"{place}: cannot write there ({error.strerror}); name another folder in TMPDIR") from error
-    try:
-        with _held(folder, strictly=False):
-            yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-
-
-def _remove_unheld(found: Path) -> None:
-    """Remove a file or folder that is this user's, not fresh, and held by no process."""
-    with suppress(OSError):
-        seen = found.lstat()
-        if seen.st_uid == os.getuid() and time.time() - seen.st_mtime > FRESH:
-            with _held(found, strictly=True):
-                shutil.rmtree(found) if found.is_dir() else found.unlink()
-
-
-@contextmanager
-def _held(place: Path, strictly: bool) -> Iterator[None]:
-    """Hold a file or folder; the system lets go of it however this process ends.
-
-    Raises
-    ------
-    OSError
-        If the place cannot be opened; and, `strictly`, if its file system cannot hold it or another process does.
-    """
-    handle = os.open(place, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
-    try:
+    with ExitStack() as stack:
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            if strictly:
-                raise
-        yield
-    finally:
-        os.close(handle)
+            place = Path(tempfile.gettempdir())
+            remove_left(place, TEMPORARY)
+            folder = stack.enter_context(under_construction(place / TEMPORARY, _make_own_folder))
+        except OSError as error:
+            raise OutputError(f"no temporary folder can be made ({reason_of(error)}); name one in TMPDIR") from error
+        yield folder
+
+
+def _make_own_folder(path: Path) -> None:
+    path.mkdir(mode=0o700)

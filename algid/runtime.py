@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future
@@ -39,6 +40,24 @@ def one_blas_thread() -> Iterator[None]:
 
     with threadpool_limits(limits=1, user_api="blas"):
         yield
+
+
+_NOT_ENDING = {
+    *("SIGKILL", "SIGSTOP", "SIGTSTP", "SIGTTIN", "SIGTTOU", "SIGCONT", "SIGCHLD", "SIGURG", "SIGWINCH", "SIGINFO"),
+    *("SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL", "SIGABRT", "SIGTRAP", "SIGSYS", "SIGEMT"),
+}
+"""Signals that nobody can handle, that end no process, or that tell of a fault in it."""
+
+
+def ending_signals() -> list[int]:
+    """Signals that would end this process; of those it was told to ignore, as by nohup, Ctrl-C and SIGTERM alone."""
+    others = {getattr(signal, name) for name in _NOT_ENDING if hasattr(signal, name)}
+    wanted = (signal.SIGINT, signal.SIGTERM)
+    return sorted(
+        number
+        for number in signal.valid_signals() - others
+        if number in wanted or signal.getsignal(number) not in (None, signal.SIG_IGN)
+    )
 
 
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h

@@ -72,7 +72,7 @@ class Store:
     def write(self, name: str, content: bytes) -> None:
         """Write the whole file. Raises `OutputError`."""
         if self.folder is not None:
-            with whole_file(self.folder / name) as temporary:
+            with whole_file(self.folder / name, sweep=False) as temporary:
                 temporary.write_bytes(content)
             return
         with (

@@ -15,6 +15,7 @@ from tests.layers import PURE, Room, breaches, cycles, imported, parsed, room
 
 ROOT = Path(algid.__file__).parent
 TABLE: dict[str, Room] = {  # lower rooms first
+    "construction": room(),
     "errors": room(),
     "limits": room(),
     "faults": room("errors"),
@@ -28,7 +29,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "log": room("arm", "numpy"),
     "signals": room("arm log", "numpy scipy", PURE),
     "estimators": room("arm model progress signals", "numpy scipy", PURE),
-    "files": room("errors limits", "pydantic"),
+    "files": room("construction errors limits", "pydantic"),
     "stores": room("errors files", "pyarrow"),
     "profile": room("errors files units", "pydantic"),
     "settings": room("errors model signals"),
@@ -52,7 +53,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "api": room("log synth"),
     "batch": room(
-        "errors files identification limits profile readers report results runtime settings stores",
+        "construction errors files identification limits profile readers report results runtime settings stores",
         "distributed mcap polars pyarrow",
     ),
     "track": room(

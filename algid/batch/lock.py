@@ -15,7 +15,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from algid.errors import OutputError
-from algid.files import TEMPORARY
 from algid.stores import is_url, public
 
 LOCK = ".lock"
@@ -50,7 +49,7 @@ def lock_file(out: str) -> Path:
     if not is_url(out):
         return Path(out) / LOCK
     name = hashlib.sha256(public(out).encode()).hexdigest()[:24]
-    return Path(tempfile.gettempdir()) / f"{TEMPORARY}{os.getuid()}-{name}.lock"
+    return Path(tempfile.gettempdir()) / f"algid-{os.getuid()}-{name}.lock"
 
 
 def _held(path: Path) -> int:

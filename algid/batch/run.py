@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import shutil
+import os
 import signal
 import threading
 from collections import Counter, deque
@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -28,9 +29,11 @@ from algid.batch.records import (
     write_record,
 )
 from algid.batch.workers import CallFailedError, WorkerDiedError
+from algid.construction import remove_left
 from algid.errors import AlgidError, OutputError, SettingError, text_of
 from algid.profile import Profile
 from algid.results import Result
+from algid.runtime import ending_signals
 from algid.settings import Settings
 from algid.stores import Store
 
@@ -274,14 +277,14 @@ def _seen(path: str) -> Input | None:
 
 @contextmanager
 def stopped_by_signals(stop: threading.Event) -> Iterator[None]:
-    """The first Ctrl-C or SIGTERM sets `stop`; a second one raises `KeyboardInterrupt`."""
+    """The first signal that would end the process sets `stop`; a second one raises `KeyboardInterrupt`."""
 
     def handle(_number: int, _frame: FrameType | None) -> None:
         if stop.is_set():
             raise KeyboardInterrupt
         stop.set()
 
-    before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, handle) for number in ending_signals()}
     try:
         yield
     finally:
@@ -290,15 +293,9 @@ def stopped_by_signals(stop: threading.Event) -> Iterator[None]:
 
 
 def sweep(store: Store) -> None:
-    """Remove what a killed run has left half-written; nothing else may be at work on the store."""
+    """Remove what a killed run has left half-written; links are not followed."""
     if store.folder is None:
         return
-    for path in [
-        *store.folder.rglob(".*.algid.*"),
-        *(store.folder / ".jobs").rglob(".*.json.*"),
-        *store.folder.glob(".jobs.parquet.*"),
-    ]:
-        if path.is_dir():
-            shutil.rmtree(path, ignore_errors=True)
-        else:
-            path.unlink(missing_ok=True)
+    for place, folders, _ in os.walk(store.folder):
+        remove_left(Path(place))
+        folders[:] = [name for name in folders if not name.endswith(".algid")]

@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import time
 from types import FrameType
 
 EXIT_FAILED = 1
 EXIT_USAGE = 2
 EXIT_INCOMPLETE = 3
+PATIENCE = 5.0  # s to clear up in after a signal, before a second one is heard
 
 
 def main() -> None:
@@ -18,14 +20,11 @@ def main() -> None:
         print("algid: it runs on Linux and macOS; on Windows, run it in WSL", file=sys.stderr)
         sys.exit(EXIT_USAGE)
     from algid.cli.streams import harden_streams
-    from algid.runtime import bound_by_environment
+    from algid.runtime import bound_by_environment, ending_signals
 
-    def stop(number: int, _frame: FrameType | None) -> None:
-        """Leave by an exception, so that what is half-written is taken away."""
-        raise _StoppedError(128 + number)
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, stop)
+    stopping = _Stopping()
+    for number in ending_signals():
+        signal.signal(number, stopping)
     harden_streams()
     bound_by_environment()  # before anything loads numpy
     code = _run()
@@ -61,6 +60,20 @@ def _run() -> int:
         sys.excepthook(type(found), found, found.__traceback__)
     complain(line)
     return code
+
+
+class _Stopping:
+    """Leave by an exception, so that what is half-written is taken away; what comes meanwhile has to wait."""
+
+    def __init__(self) -> None:
+        self._patient_until = 0.0
+
+    def __call__(self, number: int, _frame: FrameType | None) -> None:
+        now = time.monotonic()
+        if now < self._patient_until:
+            return
+        self._patient_until = now + PATIENCE
+        raise _StoppedError(128 + number)
 
 
 class _StoppedError(SystemExit):

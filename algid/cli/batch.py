@@ -80,14 +80,18 @@ def batch(
     store = open_store(out)
     with locked(out):
         sweep(store)
-        with (
-            _workers(out, scheduler, workers, bytes_each, timeout) as (executor, slots),
-            _progress(quiet) as progress,
-        ):
-            running = Batch(store, recipe, executor, slots, progress)
-            with stopped_by_signals(running.stop):
-                ended = _watch(running, sources, out, alone, retry_failed) if watch else running.run(jobs, retry_failed)
-        sweep(store)
+        try:
+            with (
+                _workers(out, scheduler, workers, bytes_each, timeout) as (executor, slots),
+                _progress(quiet) as progress,
+            ):
+                running = Batch(store, recipe, executor, slots, progress)
+                with stopped_by_signals(running.stop):
+                    ended = (
+                        _watch(running, sources, out, alone, retry_failed) if watch else running.run(jobs, retry_failed)
+                    )
+        finally:
+            sweep(store)
     _conclude(ended, running.stop.is_set() and not watch, out, quiet)
 
 

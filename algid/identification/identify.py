@@ -12,7 +12,7 @@ import numpy as np
 from algid.arm import CONSTANT_NAMES
 from algid.errors import LogError, ResultError, SettingError
 from algid.estimators.paper import SHORTEST
-from algid.files import remove_stale, result_folder, whole_folder
+from algid.files import result_folder, whole_folder
 from algid.identification.by_paper import run_paper
 from algid.identification.outcome import Identified
 from algid.identification.series import write_fit_series
@@ -122,9 +122,7 @@ def identify(
     if out is None:
         return _identified(survey, settings, earlier, said)
     folder = result_folder(sources[0].name, out, name)
-    if name is None:  # a batch sweeps its whole output once
-        remove_stale(folder)
-    with whole_folder(folder, force) as temporary:
+    with whole_folder(folder, force, sweep=name is None) as temporary:  # a batch sweeps its whole output once
         result = _identified(survey, settings, earlier, said, temporary, series=report)
         if command is not None:
             result = result.model_copy(update={"settings": result.settings | {"command": command}})

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from algid.files import FRESH, TEMPORARY
+from algid.construction import MARK
 
 
 @pytest.mark.slow
-def test_the_folder_of_a_killed_batch_is_removed_by_the_next_one_and_a_fresh_one_is_not(tmp_path: Path) -> None:
+def test_the_folder_of_a_killed_batch_is_removed_by_the_next_one(tmp_path: Path) -> None:
     place = tmp_path / "tmp"
     place.mkdir()
     (tmp_path / "broken.csv").write_text("t,theta1\n0,1\n")
@@ -32,17 +32,12 @@ def test_the_folder_of_a_killed_batch_is_removed_by_the_next_one_and_a_fresh_one
     killed.wait()
     assert left, "the batch made no folder"
 
-    fresh = place / f"{TEMPORARY}fresh"
-    fresh.mkdir()
-    for folder in (*left, foreign):
-        os.utime(folder, (time.time() - 2 * FRESH,) * 2)
     done = subprocess.run([*command, "--retry-failed"], env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 1, done.stderr
     assert not any(folder.exists() for folder in left)
-    assert fresh.exists()
     assert foreign.exists()
-    assert _folders(place) == [fresh]
+    assert _folders(place) == []
 
 
 def _folders(place: Path) -> list[Path]:
-    return [found for found in place.glob(f"{TEMPORARY}*") if found.is_dir()]
+    return [found for found in place.glob(f".algid{MARK}*") if found.is_dir()]

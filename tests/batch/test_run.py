@@ -176,7 +176,7 @@ def test_an_interrupted_batch_ends_as_an_undisturbed_one(logs: Path) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         _run(logs, Here(vanish))
-    (logs.parent / "out/r1/.b.algid.tmp").mkdir()
+    (logs.parent / "out/r1/.b.algid.algid-0123abcd").mkdir()
     sweep(open_store(str(logs.parent / "out")))
     _run(logs)
     assert _digest(logs.parent / "out") == undisturbed

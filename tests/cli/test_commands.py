@@ -298,7 +298,16 @@ def test_poles_that_are_no_numbers_are_told_in_words(logs: Path) -> None:
     assert "expected numbers between commas; give six like" in found.err
 
 
-@pytest.mark.parametrize(("sent", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+SLOW_SIGNALS = (signal.SIGUSR1, signal.SIGUSR2, signal.SIGALRM, signal.SIGQUIT, signal.SIGXCPU)
+
+
+@pytest.mark.parametrize(
+    ("sent", "code"),
+    [
+        *((number, 128 + number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)),
+        *(pytest.param(number, 128 + number, marks=pytest.mark.slow) for number in SLOW_SIGNALS),
+    ],
+)
 def test_a_stop_gets_one_line_and_leaves_nothing_half_written(
     sent: signal.Signals, code: int, logs: Path, tmp_path: Path
 ) -> None:
