@@ -23,7 +23,7 @@ import zstandard
 
 from algid.log import Log, Origin
 from algid.readers import open_log, read_log
-from algid.readers.mcap import opened
+from algid.readers.mcap import McapSource, opened
 from pipelines import bench_files
 
 COLUMNS = ["stamp_ns", "theta1", "theta2", "tau1", "tau2", "omega1", "omega2"]
@@ -80,7 +80,7 @@ def peak_above_arrays(path: Path) -> float:
     """MB of memory that reading a file takes beyond its arrays and what the imports take."""
     code = (
         "import re, sys; from pathlib import Path; from algid.readers import read_log\n"
-        "import algid.readers.mcap.plan, zstandard, mcap.records, mcap.data_stream\n"
+        "import algid.readers.messages.plan, zstandard, mcap.records, mcap.data_stream\n"
         "words = lambda: Path('/proc/self/status').read_text()\n"
         "status = lambda key: int(re.search(key + r':\\s*(\\d+)', words())[1]) * 1024\n"
         "Path('/proc/self/clear_refs').write_text('5')\n"  # forget the peak of the imports
@@ -137,11 +137,12 @@ def cameras(folder: Path) -> None:
     if not path.exists():
         bench_files.with_cameras(path)
     with opened(path) as (file, found):
+        source = McapSource(file, found)
         needed = sum(span.length for span in found.spans if span.channels and 1 in span.channels)
-        from algid.readers.mcap.plan import plan
+        from algid.readers.messages.plan import plan
 
-        (topic,) = plan(file, found, None).topics
-        for _ in topic.tables(str(path), file, found, 1 << 18):
+        (topic,) = plan(source, None).topics
+        for _ in topic.tables(source, 1 << 18):
             pass
         detail = f"{file.read_bytes / 1e6:.0f} MB of {file.size / 1e6:.0f} MB"
         row(

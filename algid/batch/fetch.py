@@ -22,10 +22,11 @@ from typing import TYPE_CHECKING, Any
 from algid.errors import AlgidError, LogError
 from algid.identification.source import Staged
 from algid.limits import LIMITS
-from algid.readers.mcap import framing
-from algid.readers.mcap.catalogue import between, catalogue, channels_of
+from algid.readers.mcap import McapSource, framing
+from algid.readers.mcap.catalogue import between, catalogue
 from algid.readers.mcap.framing import DamagedError, File
 from algid.readers.mcap.load import spans_beside, spans_of
+from algid.readers.messages.source import channels_of
 from algid.stores import public, reading
 
 if TYPE_CHECKING:
@@ -232,7 +233,7 @@ def _wanted_of_mcap(part: Partial, profile: Profile | None) -> list[Range]:
     """
     from mcap import records
 
-    from algid.readers.mcap.plan import plan
+    from algid.readers.messages.plan import plan
 
     (start,) = struct.unpack("<Q", part.read(part.size - _MCAP_END + 9, 8))
     end = part.size - _MCAP_END
@@ -253,8 +254,9 @@ def _wanted_of_mcap(part: Partial, profile: Profile | None) -> list[Range]:
     part.fetch([*wanted, *((first, last) for first, last in between(chunks, start) if last - first <= SMALL)])
     found = catalogue(part)  # a scan of the whole is unforeseen
     part.on_demand = True
-    topics = plan(part, found, profile).topics
-    channels = frozenset[int]().union(*(channels_of(found, topic.name, topic.type) for topic in topics))
+    source = McapSource(part, found)
+    topics = plan(source, profile).topics
+    channels = frozenset[int]().union(*(channels_of(source, topic.name, topic.type) for topic in topics))
     spans = [*spans_of(found, channels), *spans_beside(found, channels)]
     return [(span.start, span.start + span.length + span.index_length) for span in spans]
 

@@ -76,12 +76,12 @@ def contents(path: Path) -> tuple[str, tuple[Entry, ...]]:
     """
     kind = sniff(path)
     if kind == "mcap":
-        return kind, tuple(_topics(path))
+        return kind, _mcap(path)
     if kind == "rosbag2":
         from algid.readers.bag import bag_files
 
         bag = bag_files(path)
-        return kind, tuple(_topics(bag.paths[0])) if bag.kind == "mcap" else ()
+        return kind, _mcap(bag.paths[0]) if bag.kind == "mcap" else ()
     if kind == "parquet":
         return kind, tuple(_parquet(path))
     if kind.startswith("csv"):
@@ -94,18 +94,21 @@ def contents(path: Path) -> tuple[str, tuple[Entry, ...]]:
     return kind, ()
 
 
-def _topics(path: Path) -> Iterator[Entry]:
-    from algid.readers.mcap import opened
-    from algid.readers.mcap.catalogue import schema_name
-    from algid.readers.mcap.plan import fields_shown
+def _mcap(path: Path) -> tuple[Entry, ...]:
+    from algid.readers.mcap import messages_in
 
-    with opened(path) as (file, found):
-        for number, channel in sorted(found.channels.items()):
-            form = f"{schema_name(found, channel) or 'no schema'}, {channel.message_encoding}"
-            count = None if found.counts is None else found.counts.get(number, 0)
-            shown = number in list(found.channels)[:_MOST_SHOWN]
-            joints, fields = fields_shown(file, found, number) if shown else ((), ())
-            yield Entry(channel.topic, form, count, joints[:_MOST_SHOWN], fields[:_MOST_SHOWN])
+    with messages_in(path) as source:
+        return tuple(_topics(source))
+
+
+def _topics(source: Source) -> Iterator[Entry]:
+    from algid.readers.messages.plan import fields_shown
+
+    for place, (number, channel) in enumerate(sorted(source.channels.items())):
+        form = f"{channel.type or 'no schema'}, {channel.encoding}"
+        count = None if source.counts is None else source.counts.get(number, 0)
+        joints, fields = fields_shown(source, number) if place < _MOST_SHOWN else ((), ())
+        yield Entry(channel.topic, form, count, joints[:_MOST_SHOWN], fields[:_MOST_SHOWN])
 
 
 def _parquet(path: Path) -> Iterator[Entry]:
@@ -138,6 +141,7 @@ def _known(count: Callable[[], int]) -> int | None:
 
 if TYPE_CHECKING:
     from algid.profile import Profile
+    from algid.readers.messages.source import Source
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import struct
 
 import numpy as np
 
-from algid.readers.mcap.messages import alike, records_in
+from algid.readers.mcap.records import alike, records_in
 
 
 def message(number: int, size: int, code: int = 5) -> bytes:

@@ -18,11 +18,11 @@ from algid.readers import open_log, read_log
 from algid.readers.mcap import opened
 from algid.readers.mcap.catalogue import Catalogue
 from algid.readers.mcap.catalogue import catalogue as walk
-from algid.readers.mcap.columnar import Decoder
 from algid.readers.mcap.framing import File
-from algid.readers.mcap.json import _Paths
 from algid.readers.mcap.load import batches
-from algid.readers.mcap.messages import Messages
+from algid.readers.messages.batch import Messages
+from algid.readers.messages.columnar import Decoder
+from algid.readers.messages.json import _Paths
 from algid.ros2 import HEADER
 from algid.writers import write_log
 from tests.readers.logs import EPOCH_NS, noise_log, same

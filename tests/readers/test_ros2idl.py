@@ -14,7 +14,7 @@ from rosbags.typesys import Stores, get_types_from_idl, get_typestore
 from algid.errors import LogError
 from algid.profile import Profile
 from algid.readers import read_log
-from algid.readers.mcap.definitions import DefinitionError, parse_idl, parse_msg
+from algid.readers.messages.definitions import DefinitionError, parse_idl, parse_msg
 from tests.readers.logs import EPOCH_NS, noise_log, same
 from tests.readers.mcaps import Cdr, joint_state, write_mcap
 

@@ -18,11 +18,11 @@ from algid.errors import LogError
 from algid.log import Log
 from algid.profile import Profile
 from algid.readers import read_log
-from algid.readers.mcap import cdr, protobuf
-from algid.readers.mcap.columnar import ColumnDecoder, ExcessError, MisfitError
-from algid.readers.mcap.definitions import DefinitionError, parse_idl, parse_msg
 from algid.readers.mcap.framing import DamagedError, File
-from algid.readers.mcap.messages import records_in
+from algid.readers.mcap.records import records_in
+from algid.readers.messages import cdr, protobuf
+from algid.readers.messages.columnar import ColumnDecoder, ExcessError, MisfitError
+from algid.readers.messages.definitions import DefinitionError, parse_idl, parse_msg
 from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from tests.readers.logs import EPOCH_NS, noise_log, same
 from tests.readers.mcaps import TOPIC, joint_state, messages_of, protobuf_schema, write_mcap

@@ -4,25 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from algid.errors import LogError
-from algid.log import Origin
-from algid.readers.assemble import TableReader, reader_of
-from algid.readers.joints import moving_joints
+from algid.log import Truth
+from algid.readers.assemble import TableReader
 from algid.readers.mcap.catalogue import Catalogue, catalogue
 from algid.readers.mcap.framing import DamagedError, File
-from algid.readers.mcap.topic import Fields, Topic
-from algid.readers.table import BLOCK_ROWS, SampleTable
-from algid.readers.timebase import aligned, whole_topic
+from algid.readers.mcap.load import batches, look_beside
+from algid.readers.messages.batch import MessageBatch
+from algid.readers.messages.source import MessageChannel, Source
 
 if TYPE_CHECKING:
     from algid.profile import Profile
-
-
-_LOOKED = 1 << 14
-"""Messages whose other joints are looked at."""
 
 
 def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableReader:
@@ -35,50 +31,22 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
     NothingFoundError
         If no topic of a sound file holds the joints.
     """
-    from algid.readers.mcap.plan import NothingFoundError, plan
+    from algid.readers.messages.reader import open_messages
 
     known: Known = {}
-    with opened(paths[0], known) as (file, found):
-        try:
-            wanted = plan(file, found, profile)
-        except NothingFoundError as error:
-            if not found.damage:
-                raise
-            places = list(dict.fromkeys(found.damage))
-            where = "; ".join(places[:3]) + (f"; {len(places) - 3} more" if len(places) > 3 else "")
-            left = str(error).removeprefix(f"{paths[0]}: ")
-            text = f"the MCAP file is damaged ({where}); copy it again; in what is left: {left}"
-            raise LogError(f"{paths[0]}: {text}") from error
-        truth = found.truth(paths[0])
-        main = wanted.topics[0]
-        rows = main.count(found)
-        beside = moving_joints(
-            wanted.others,
-            lambda paths: Topic(main.name, main.type, Fields(paths, None), "log").tables(
-                str(file.path), file, found, _LOOKED
-            ),
-        )
     name = str(paths[0] if len(paths) == 1 else paths[0].parent)
-    origin = Origin(name, "mcap", wanted.mapping, truth, wanted.reading)
-
-    def tables(rows: int) -> Iterator[SampleTable]:
-        samples, others = _read(paths, main, rows, known), wanted.topics[1:]
-        if not others:
-            return samples
-        series = [whole_topic(name, one.name, one.fields.paths, _read(paths, one, BLOCK_ROWS, known)) for one in others]
-        return aligned(samples, series)
-
-    return reader_of(origin, tables, profile, wanted.units, (*wanted.notices, *beside), rows)
-
-
-def _read(paths: Sequence[Path], topic: Topic, rows: int, known: Known) -> Iterator[SampleTable]:
-    for path in paths:
-        with opened(path, known) as (file, found):
-            yield from topic.tables(str(path), file, found, rows)
+    return open_messages(name, "mcap", [partial(messages_in, path, known) for path in paths], profile)
 
 
 Known = dict[tuple[Path, int, int], Catalogue]
 """Catalogues by path, size and time of change: several passes go over a log, and one without a summary is walked."""
+
+
+@contextmanager
+def messages_in(path: Path, known: Known | None = None) -> Iterator[McapSource]:
+    """The messages of an opened file: see `opened`."""
+    with opened(path, known) as (file, found):
+        yield McapSource(file, found)
 
 
 @contextmanager
@@ -101,3 +69,45 @@ def opened(path: Path, known: Known | None = None) -> Iterator[tuple[File, Catal
             known[path, file.size, file.changed_ns] = found
             found = found.copy()
         yield file, found
+
+
+class McapSource(Source):
+    """The messages of an MCAP file that is open."""
+
+    def __init__(self, file: File, found: Catalogue) -> None:
+        self.path = str(file.path)
+        self.channels = {number: _channel(found, one) for number, one in found.channels.items()}
+        self.counts, self.span_ns = found.counts, found.span_ns
+        self.notices, self.damage = found.notices, found.damage
+        self._file, self._found = file, found
+
+    def batches(self, channels: frozenset[int]) -> Iterator[MessageBatch]:
+        """The messages of `channels` in file order; a damaged part yields its reason."""
+        return batches(self._file, self._found, channels)
+
+    def works(self, steps: int) -> bool:
+        """Count steps of some microsecond each; False where no honest file of this size asks for so many."""
+        return self._file.works(steps)
+
+    def check(self, channels: frozenset[int]) -> None:
+        """Look for what chunks of other channels define anew."""
+        look_beside(self._file, self._found, channels)
+
+    def used(self) -> frozenset[int]:
+        """The channels that have messages, as far as the file tells."""
+        spans = self._found.spans
+        if self.counts is None and all(span.channels is not None for span in spans):
+            return frozenset(self.channels) & frozenset[int]().union(*(span.channels or () for span in spans))
+        return super().used()
+
+    def truth(self) -> Truth | None:
+        """What the metadata tell of a simulated arm."""
+        return self._found.truth(self._file.path)
+
+
+def _channel(found: Catalogue, channel: object) -> MessageChannel:
+    schema = found.schemas.get(channel.schema_id)  # type: ignore[attr-defined]
+    topic, encoding = channel.topic, channel.message_encoding  # type: ignore[attr-defined]
+    if schema is None:
+        return MessageChannel(topic, "", encoding, "", b"")
+    return MessageChannel(topic, str(schema.name), encoding, schema.encoding, schema.data)

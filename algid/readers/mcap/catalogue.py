@@ -18,7 +18,7 @@ from algid.limits import LIMITS
 from algid.log import KEY, Notice, Truth, loads
 from algid.readers.mcap import framing
 from algid.readers.mcap.framing import ChunkIndex, DamagedError, File, claimed, parse, unpack
-from algid.readers.mcap.messages import Records, records_in
+from algid.readers.mcap.records import Records, records_in
 from algid.readers.mcap.salvage import Gap, salvaged
 from algid.words import counted
 
@@ -67,6 +67,7 @@ class Catalogue:
     channels: dict[int, Any] = field(default_factory=dict)
     spans: list[Span] = field(default_factory=list)
     counts: dict[int, int] | None = None
+    span_ns: tuple[int, int] | None = None
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     notices: list[Notice] = field(default_factory=list)
     damage: list[str] = field(default_factory=list)
@@ -189,6 +190,7 @@ def _from_summary(file: File) -> Catalogue | None:
     chunks.sort(key=lambda one: one.chunk_start_offset)
     _check_listed(file, chunks, statistics, found.channels, start)
     found.counts = dict(statistics.channel_message_counts)
+    found.span_ns = (statistics.message_start_time, statistics.message_end_time)
     for chunk in chunks:
         channels = frozenset(chunk.message_index_offsets) if chunk.message_index_length else None
         place, length = chunk.chunk_start_offset + 9, chunk.chunk_length - 9
@@ -390,26 +392,3 @@ def _keep_metadata(file: File, record: framing.Record, found: Catalogue) -> None
         found.metadata.setdefault(metadata.name, metadata.metadata)
     except DamagedError as error:
         found.notices.append(Notice("DAMAGED_RECORD", f"{error}; left out"))
-
-
-def channels_of(found: Catalogue, topic: str, type_name: str) -> frozenset[int]:
-    """Ids of the channels that carry a topic with messages of one type, defined and encoded as by the first of them."""
-    return kinds(found).get((topic, type_name), frozenset())
-
-
-def kinds(found: Catalogue) -> dict[tuple[str, str], frozenset[int]]:
-    """By topic and type the ids of its channels whose messages are defined and encoded as those of the first."""
-    groups: dict[tuple[str, str], tuple[Any, list[int]]] = {}
-    for number, channel in sorted(found.channels.items()):
-        schema = found.schemas.get(channel.schema_id)
-        meaning = (channel.message_encoding, schema and (schema.encoding, schema.data))
-        first, numbers = groups.setdefault((channel.topic, schema_name(found, channel)), (meaning, []))
-        if first == meaning:
-            numbers.append(number)
-    return {name: frozenset(numbers) for name, (_, numbers) in groups.items()}
-
-
-def schema_name(found: Catalogue, channel: Any) -> str:
-    """The type of a channel's messages, or nothing."""
-    schema = found.schemas.get(channel.schema_id)
-    return "" if schema is None else str(schema.name)

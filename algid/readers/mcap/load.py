@@ -8,12 +8,11 @@ from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass
 
-from algid.log import Notice
 from algid.readers.mcap.catalogue import Catalogue, Span
 from algid.readers.mcap.framing import DamagedError, File, claimed, has_checksum
-from algid.readers.mcap.messages import Messages, Records, entries, joined
+from algid.readers.mcap.records import Records, entries, joined
+from algid.readers.messages.batch import MessageBatch
 from algid.runtime import executor
-from algid.words import counted
 
 _AHEAD = 3
 _AHEAD_BYTES = 1 << 23
@@ -24,22 +23,6 @@ _LOOKED_BESIDE, _SHARE_BESIDE = 1 << 22, 4
 
 _GROUP_BYTES, _GROUP_UNPACKED = 1 << 16, 1 << 21
 """Small chunks are loaded together up to these sizes, packed and unpacked."""
-
-
-@dataclass(frozen=True)
-class MessageBatch:
-    """Messages of one span or of many small ones, or None and why those of one are lost.
-
-    Of a torn chunk also how much is there.
-    """
-
-    messages: Messages | None
-    checked: bool
-    reason: str = ""
-    torn: tuple[int, int] | None = None
-    """Bytes of a torn chunk's records, unpacked: what is there, and what there should be."""
-    lost: int = 0
-    """Messages that the index of a damaged chunk lists, where it has one."""
 
 
 def spans_of(catalogue: Catalogue, channels: frozenset[int]) -> list[Span]:
@@ -185,56 +168,3 @@ def _opened(file: File, catalogue: Catalogue, span: Span, channels: frozenset[in
     size = claimed(content) if span.torn else None
     broken = size is not None and size != records.content.size
     return _Sound(records, not span.loose and (has_checksum(content) or broken), size if broken else None)
-
-
-@dataclass
-class Account:
-    """What was lost on the way, for the notices at the end."""
-
-    spans: int = 0
-    reason: str = ""
-    unchecked: bool = False
-    found: int = 0
-    lost: int = 0
-    torn: tuple[int, int, int] | None = None
-    """Of a torn chunk the messages taken, and the bytes of its records that are there and that should be."""
-
-    def add(self, batch: MessageBatch) -> None:
-        """Count one batch."""
-        if batch.messages is None:
-            self.spans += 1
-            self.lost += batch.lost
-            self.reason = self.reason or batch.reason
-        else:
-            self.found += len(batch.messages)
-            self.unchecked |= not batch.checked and len(batch.messages) > 0
-            if batch.torn:
-                self.torn = (len(batch.messages), *batch.torn)
-
-    def notices(self, promised: int | None) -> list[Notice]:
-        """What to say; `promised` is how many messages the statistics promise."""
-        said = []
-        if self.spans:
-            missing = self.lost if promised is None else promised - self.found
-            text = f"{counted(self.spans, 'damaged chunk')} left out; the first: {self.reason}"
-            counting = f"; {counted(missing, 'message is missing', 'messages are missing')}" if missing else ""
-            said.append(Notice("DAMAGED_CHUNK", text + counting, lossy=True))
-        elif promised is not None and promised != self.found:
-            text = f"the file counts {counted(promised, 'message')} and holds {self.found}"
-            said.append(Notice("MISSING_MESSAGES", text, lossy=True))
-        if self.torn:
-            taken, held, size = self.torn
-            lost = (  # counted by the share of bytes
-                f"about {counted(round(taken * (size - held) / held), 'is lost', 'are lost')}"
-                if taken
-                else "the rest is lost"
-            )
-            text = (
-                f"the last chunk breaks off: {counted(taken, 'message')} taken from its first "
-                f"{held} of {counted(size, 'byte')}, {lost}; "
-                "they could not be checked, since the chunk's checksum covers all of it"
-            )
-            said.append(Notice("TORN_CHUNK", text, lossy=True))
-        if self.unchecked:
-            said.append(Notice("NO_CHECKSUM", "the file has no checksums: damaged values would go unseen"))
-        return said

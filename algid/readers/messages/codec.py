@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 from algid.errors import LogError
-from algid.readers.mcap import cdr, protobuf
-from algid.readers.mcap import json as jsontext
-from algid.readers.mcap.columnar import ColumnDecoder, Decoder, Walk
-from algid.readers.mcap.definitions import DefinitionError, parse_idl, parse_msg
+from algid.readers.messages import cdr, protobuf
+from algid.readers.messages import json as jsontext
+from algid.readers.messages.columnar import ColumnDecoder, Decoder, Walk
+from algid.readers.messages.definitions import DefinitionError, parse_idl, parse_msg
+from algid.readers.messages.source import MessageChannel
 
 _DEFINITIONS = {"ros2msg": parse_msg, "ros2idl": parse_idl}
 
 
-def walk_for(path: str, channel: Any, schema: Any) -> Walk:
+def walk_for(path: str, channel: MessageChannel) -> Walk:
     """The walk over single messages of a channel.
 
     Raises
@@ -23,14 +23,14 @@ def walk_for(path: str, channel: Any, schema: Any) -> Walk:
         If the encoding of the messages or of the schema is not known, or the schema cannot be read.
     """
     place = f"{path}: topic {channel.topic!r}"
-    encoding = (channel.message_encoding, schema.encoding if schema else "")
+    encoding = (channel.encoding, channel.definition_encoding)
     try:
         if encoding[0] == "cdr" and encoding[1] in _DEFINITIONS:
-            types = _DEFINITIONS[encoding[1]](schema.name, schema.data.decode("utf-8", errors="replace"))
-            return lambda payload: cdr.walk(payload, schema.name, types)
+            types = _DEFINITIONS[encoding[1]](channel.type, channel.definition.decode("utf-8", errors="replace"))
+            return lambda payload: cdr.walk(payload, channel.type, types)
         if encoding == ("protobuf", "protobuf"):
-            messages = protobuf.parse(schema.name, schema.data)
-            return lambda payload: protobuf.walk(payload, schema.name, messages)
+            messages = protobuf.parse(channel.type, channel.definition)
+            return lambda payload: protobuf.walk(payload, channel.type, messages)
     except DefinitionError as error:
         raise LogError(f"{place}: the message definition cannot be read: {error}") from error
     if encoding[0] == "json":
@@ -41,9 +41,7 @@ def walk_for(path: str, channel: Any, schema: Any) -> Walk:
     )
 
 
-def decoder_for(
-    path: str, channel: Any, schema: Any, wanted: Mapping[str, str], works: Callable[[int], bool]
-) -> Decoder:
+def decoder_for(path: str, channel: MessageChannel, wanted: Mapping[str, str], works: Callable[[int], bool]) -> Decoder:
     """What reads the numbers `wanted`, by name a path each, out of a channel's messages; `works` as in `Decoder`.
 
     Raises
@@ -51,7 +49,7 @@ def decoder_for(
     LogError
         As `walk_for`.
     """
-    walk = walk_for(path, channel, schema)
-    if channel.message_encoding == "json":
+    walk = walk_for(path, channel)
+    if channel.encoding == "json":
         return jsontext.JsonDecoder(wanted, works)
     return ColumnDecoder(wanted, works, walk=walk)

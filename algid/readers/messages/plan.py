@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.log import Notice, Reading
 from algid.readers.joints import along_the_arm, order_notice
-from algid.readers.mcap.catalogue import Catalogue, channels_of, kinds, schema_name
-from algid.readers.mcap.codec import walk_for
-from algid.readers.mcap.columnar import MisfitError, Shape
-from algid.readers.mcap.framing import File
-from algid.readers.mcap.load import batches
-from algid.readers.mcap.topic import (
+from algid.readers.messages.codec import walk_for
+from algid.readers.messages.columnar import MisfitError, Shape
+from algid.readers.messages.source import Source, channels_of, kinds, listed
+from algid.readers.messages.topic import (
     DYNAMIC_JOINT_STATE,
     JOINT_STATE,
     Fields,
@@ -59,7 +57,7 @@ class Plan:
     others: dict[str, str] = field(default_factory=dict)
 
 
-def plan(file: File, found: Catalogue, profile: Profile | None) -> Plan:
+def plan(source: Source, profile: Profile | None) -> Plan:
     """What to read out of a file.
 
     Raises
@@ -69,7 +67,7 @@ def plan(file: File, found: Catalogue, profile: Profile | None) -> Plan:
     """
     places = {name: profile.place(name) for name in (*JOINT_CHANNELS, *VELOCITIES)} if profile else {}
     named = {name: (topic, source) for name, (topic, source) in places.items() if source}
-    usual = _usual_topic(file, found, profile) if len(named) < len(JOINT_CHANNELS) else None
+    usual = _usual_topic(source, profile) if len(named) < len(JOINT_CHANNELS) else None
     sources: dict[str, tuple[str, str]] = {}
     reading = Reading(joints_told="profile")
     notices: tuple[Notice, ...] = ()
@@ -85,14 +83,14 @@ def plan(file: File, found: Catalogue, profile: Profile | None) -> Plan:
         home = topic or (usual.topic if usual else None) or (profile.topic if profile else None)
         if home is None:
             raise LogError(
-                f"{file.path}: {channel} is taken from {path!r} without a topic: --topic NAME (profile: topic = …)"
+                f"{source.path}: {channel} is taken from {path!r} without a topic: --topic NAME (profile: topic = …)"
             )
         sources[channel] = (home, path)
     if (profile and not profile.velocity) or not all(name in sources for name in VELOCITIES):
         sources = {name: source for name, source in sources.items() if name not in VELOCITIES}
     mapping = {channel: f"{topic}: {path}" for channel, (topic, path) in sources.items()}
     homes = list(dict.fromkeys(sources[name][0] for name in sources))
-    topics = tuple(_topic(file, found, home, sources, profile) for home in homes)
+    topics = tuple(_topic(source, home, sources, profile) for home in homes)
     clock = topics[0].fields.stamp if topics[0].clock != "log" else None
     mapping["t"] = f"{homes[0]}: {clock[0].rpartition('.')[0]}" if clock else "log time"
     reading = replace(reading, topics=tuple(homes), clock="header" if clock else "log")
@@ -101,15 +99,13 @@ def plan(file: File, found: Catalogue, profile: Profile | None) -> Plan:
     return Plan(topics, mapping, reading, notices, units, others)
 
 
-def _topic(
-    file: File, found: Catalogue, name: str, sources: dict[str, tuple[str, str]], profile: Profile | None
-) -> Topic:
+def _topic(source: Source, name: str, sources: dict[str, tuple[str, str]], profile: Profile | None) -> Topic:
     """A topic by its name, with those of `sources` that are its own, of the type that misses the fewest of them."""
     paths = {channel: path for channel, (topic, path) in sources.items() if topic == name}
     best: tuple[str, list[str], list[str], tuple[str, str] | None] | None = None
-    for topic, kind in kinds(found):
+    for topic, kind in kinds(source):
         missing, known, stamp, messages = list(paths), list[str](), None, 0
-        for shape in _shapes(file, found, topic, kind) if topic == name else ():
+        for shape in _shapes(source, topic, kind) if topic == name else ():
             messages += 1
             missing = [channel for channel in missing if not shape.find(paths[channel])]
             known = known or [*shape.numbers][:12]
@@ -118,17 +114,17 @@ def _topic(
             best = (kind, missing, known, stamp)
     if best is None:
         mend = '--topic NAME, or --set CHANNEL.topic=NAME for one channel (profile: topic = "NAME")'
-        text = f"there is no message on topic {name!r}; found {listed(found)}; name another: {mend}"
-        raise NothingFoundError(f"{file.path}: {text}")
+        text = f"there is no message on topic {name!r}; found {listed(source)}; name another: {mend}"
+        raise NothingFoundError(f"{source.path}: {text}")
     kind, missing, known, stamp = best
     for channel in missing:
         raise LogError(
-            f"{file.path}: messages on {name!r} have no {paths[channel]!r} for {channel}; found "
+            f"{source.path}: messages on {name!r} have no {paths[channel]!r} for {channel}; found "
             f"{', '.join(known)}; name another: --set {channel}.source=FIELD (profile: source of [{channel}])"
         )
     clock = profile.clock if profile else None
     if clock == "header" and stamp is None:
-        raise LogError(f'{file.path}: messages on {name!r} carry no stamp: --clock log (profile: clock = "log")')
+        raise LogError(f'{source.path}: messages on {name!r} carry no stamp: --clock log (profile: clock = "log")')
     return Topic(name, kind, Fields(paths, stamp), clock)
 
 
@@ -144,15 +140,15 @@ class _Usual:
     others: dict[str, str] = field(default_factory=dict)
 
 
-def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> _Usual | None:
+def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
     """The one topic with joint states; None where there is none and a profile names the fields."""
     fitting: dict[str, _Usual] = {}
     many: dict[str, list[str]] = {}
     lacking: list[str] = []
     refused: list[LogError] = []
-    for name, kind in _candidates(file, found, profile):
+    for name, kind in _candidates(source, profile):
         try:
-            for shape in _shapes(file, found, name, kind):
+            for shape in _shapes(source, name, kind):
                 joints, names = joint_names(shape), names_in(shape)
                 if usual := _fitting(name, shape, joints, profile):
                     fitting.setdefault(name, usual)
@@ -160,7 +156,7 @@ def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> _Usua
                 if repeated := repeated_name(shape):
                     text = f"messages on {name!r} name the joint {repeated!r} twice; name the fields by their places, "
                     mend = '--set theta1.source="position[0]" … (profile: source = "position[0]" of [theta1] …)'
-                    refused.append(LogError(f"{file.path}: {text}{mend}"))
+                    refused.append(LogError(f"{source.path}: {text}{mend}"))
                 if len(joints) > 2 or (joints and profile and profile.joints):
                     many[name] = joints
                 elif not joints and names:
@@ -175,20 +171,20 @@ def _usual_topic(file: File, found: Catalogue, profile: Profile | None) -> _Usua
         return next(iter(fitting.values()))
     if fitting:
         raise LogError(
-            f'{file.path}: joint states on {", ".join(fitting)}; choose: --topic NAME (profile: topic = "NAME")'
+            f'{source.path}: joint states on {", ".join(fitting)}; choose: --topic NAME (profile: topic = "NAME")'
         )
     if many:
         name, joints = next(iter(many.items()))
         text = f"{name!r} has {counted(len(joints), 'joint')} ({', '.join(joints[:12])})"
-        raise LogError(f"{file.path}: {text}; choose: --joints A,B (profile: joints = […])")
+        raise LogError(f"{source.path}: {text}; choose: --joints A,B (profile: joints = […])")
     if refused:
         raise refused[0]
     if profile is not None and all(profile.channel(name).source for name in JOINT_CHANNELS):
         return None
     wanted = f"the joints {profile.joints}" if profile and profile.joints else "positions and efforts of two joints"
     mend = "--topic NAME --joints A,B, or --set tau1.topic=NAME --set tau1.source=FIELD … (profile: topic, joints, …)"
-    there = "; ".join([*dict.fromkeys(lacking)][:4]) or listed(found)
-    raise NothingFoundError(f"{file.path}: no topic holds {wanted}; found {there}; name topics and fields: {mend}")
+    there = "; ".join([*dict.fromkeys(lacking)][:4]) or listed(source)
+    raise NothingFoundError(f"{source.path}: no topic holds {wanted}; found {there}; name topics and fields: {mend}")
 
 
 def _fitting(topic: str, shape: Shape, joints: list[str], profile: Profile | None) -> _Usual | None:
@@ -218,30 +214,29 @@ def _fitting(topic: str, shape: Shape, joints: list[str], profile: Profile | Non
     return _Usual(topic, choice.joints or ("1", "2"), choice.joints is not None, found, {**choice.units, **currents})
 
 
-def _candidates(file: File, found: Catalogue, profile: Profile | None) -> list[tuple[str, str]]:
+def _candidates(source: Source, profile: Profile | None) -> list[tuple[str, str]]:
     """Topics, each with a type of its messages, that may hold joint states; a profile's alone, where it names one."""
-    places = kinds(found)
+    places = kinds(source)
     if profile and profile.topic:
         return [place for place in places if place[0] == profile.topic]
     some = []
     for place, numbers in places.items():
-        channel: Any = found.channels[min(numbers)]
-        schema = found.schemas.get(channel.schema_id)
-        known = schema is not None and (schema.name in JOINT_STATE + DYNAMIC_JOINT_STATE or b"effort" in schema.data)
-        if known or channel.message_encoding == "json":
+        channel = source.channels[min(numbers)]
+        known = channel.type in JOINT_STATE + DYNAMIC_JOINT_STATE or b"effort" in channel.definition
+        if known or channel.encoding == "json":
             some.append(place)
     if len(some) > LIMITS.topics:
         raise LogError(
-            f"{file.path}: {counted(len(some), 'topic')} may hold joint states: --topic NAME (profile: topic = …)"
+            f"{source.path}: {counted(len(some), 'topic')} may hold joint states: --topic NAME (profile: topic = …)"
         )
     return some
 
 
-def fields_shown(file: File, found: Catalogue, number: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def fields_shown(source: Source, number: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Joints that the first message of a channel names, and its numbers' paths as a profile's source takes them."""
-    channel = found.channels[number]
+    channel = source.channels[number]
     try:
-        shape = next(_shapes(file, found, channel.topic, schema_name(found, channel)), None)
+        shape = next(_shapes(source, channel.topic, channel.type), None)
     except LogError:
         return (), ()
     if shape is None:
@@ -257,7 +252,7 @@ def _paths_of(name: str, count: int, joints: tuple[str, ...]) -> list[str]:
     return [f"{name}[{place}]" for place in (joints if len(joints) == count else range(min(count, LIMITS.joint_cells)))]
 
 
-def _shapes(file: File, found: Catalogue, topic: str, type_name: str) -> Iterator[Shape]:
+def _shapes(source: Source, topic: str, type_name: str) -> Iterator[Shape]:
     """Shapes of the topic's first messages that fit their schema.
 
     Raises
@@ -265,45 +260,34 @@ def _shapes(file: File, found: Catalogue, topic: str, type_name: str) -> Iterato
     LogError
         If none of them does, or they ask for more work than those of any recorder.
     """
-    channels = channels_of(found, topic, type_name)
+    channels = channels_of(source, topic, type_name)
     if not channels:
         return
-    channel: Any = found.channels[min(channels)]
-    schema = found.schemas.get(channel.schema_id)
-    _work(file, topic, len(schema.data) // _LETTERS_A_STEP if schema else 0)
-    walk = walk_for(str(file.path), channel, schema)
-    for batch in batches(file, found, channels):
+    channel = source.channels[min(channels)]
+    _work(source, topic, len(channel.definition) // _LETTERS_A_STEP)
+    walk = walk_for(source.path, channel)
+    for batch in source.batches(channels):
         messages = batch.messages
         if messages is None:
-            found.damage.append(batch.reason)
+            source.damage.append(batch.reason)
         if messages is None or not len(messages):
             continue
         fitting, misfit = 0, None
         for start, size in zip(messages.starts[:_SAMPLES], messages.sizes[:_SAMPLES], strict=True):
-            _work(file, topic, size // _BYTES_A_STEP)
+            _work(source, topic, size // _BYTES_A_STEP)
             try:
                 shape = walk(messages.content[start : start + min(size, LIMITS.message_bytes)].tobytes())
             except MisfitError as error:
                 misfit = error
                 continue
             fitting += 1
-            _work(file, topic, shape.parts)
+            _work(source, topic, shape.parts)
             yield shape
         if misfit and not fitting:
-            raise LogError(f"{file.path}: topic {topic!r}: {misfit}; it cannot be read") from misfit
+            raise LogError(f"{source.path}: topic {topic!r}: {misfit}; it cannot be read") from misfit
         return
 
 
-def _work(file: File, topic: str, steps: int) -> None:
-    if not file.works(steps):
-        raise LogError(f"{file.path}: topic {topic!r}: messages or definitions of more parts than any recorder's")
-
-
-def listed(found: Catalogue) -> str:
-    """The topics of a file, with their types, for a message."""
-    topics = [
-        f"{channel.topic!r} ({schema_name(found, channel) or 'no schema'}, {channel.message_encoding!r})"
-        for channel in found.channels.values()
-    ]
-    more = f" and {len(topics) - 12} more" if len(topics) > 12 else ""
-    return (", ".join(topics[:12]) or "no topic") + more
+def _work(source: Source, topic: str, steps: int) -> None:
+    if not source.works(steps):
+        raise LogError(f"{source.path}: topic {topic!r}: messages or definitions of more parts than any recorder's")

@@ -8,8 +8,8 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
-from algid.readers.mcap.columnar import MisfitError, Numbers, Shape
-from algid.readers.mcap.definitions import PRIMITIVES, TEXTS, Field, Types
+from algid.readers.messages.columnar import MisfitError, Numbers, Shape
+from algid.readers.messages.definitions import PRIMITIVES, TEXTS, Field, Types
 from algid.words import counted
 
 _ENDINGS = {0: ">", 1: "<"}

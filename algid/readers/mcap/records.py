@@ -18,6 +18,7 @@ from algid.limits import LIMITS
 from algid.log import IntArray
 from algid.readers.mcap import framing
 from algid.readers.mcap.framing import BrokenOffError, DamagedError
+from algid.readers.messages.batch import Messages, gather
 
 HEAD = 31
 """Bytes of a message record before its payload: code, length, channel, sequence, log and publish time."""
@@ -27,19 +28,6 @@ _SMALL = 1 << 13
 _FEW = 256
 _SOME = (1 << 16) - 1
 """Messages between two looks at how much work they are."""
-
-
-@dataclass(frozen=True, eq=False)
-class Messages:
-    """Messages in unpacked bytes (M,): where each payload (N,) starts, its size, and its log time in ns."""
-
-    content: NDArray[np.uint8]
-    starts: IntArray
-    sizes: IntArray
-    log_ns: IntArray
-
-    def __len__(self) -> int:
-        return int(self.starts.size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,13 +135,6 @@ def alike(octets: NDArray[np.uint8]) -> IntArray | None:
     records = np.arange(0, octets.size, length, dtype=np.int64)
     same = gather(octets, records + 1, "<u8") == length - 9
     return records if bool(np.all(same) and np.all(octets[records] == framing.MESSAGE)) else None
-
-
-def gather(octets: NDArray[np.uint8], places: IntArray, kind: str) -> NDArray[np.generic]:
-    """The numbers of type `kind` at byte `places` (N,), aligned or not."""
-    width = np.dtype(kind).itemsize
-    window: NDArray[np.generic] = np.ndarray(max(0, octets.size - width + 1), np.dtype(kind), octets.data, strides=(1,))
-    return window[places]
 
 
 def _indexed(octets: NDArray[np.uint8], content: bytes, index: bytes) -> Records | None:

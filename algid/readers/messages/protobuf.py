@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from algid.limits import LIMITS
-from algid.readers.mcap.columnar import MisfitError, Numbers, Shape
-from algid.readers.mcap.definitions import DefinitionError
+from algid.readers.messages.columnar import MisfitError, Numbers, Shape
+from algid.readers.messages.definitions import DefinitionError
 from algid.words import counted
 
 _FIXED = {1: "<f8", 2: "<f4", 6: "<u8", 7: "<u4", 15: "<i4", 16: "<i8"}

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.limits import LIMITS
-from algid.readers.mcap.columnar import Decoder, Fields, MisfitError, Numbers, Shape
-from algid.readers.mcap.messages import Messages
+from algid.readers.messages.batch import Messages
+from algid.readers.messages.columnar import Decoder, Fields, MisfitError, Numbers, Shape
 from algid.words import counted
 
 _BYTES_A_STEP, _COMMAS_A_STEP, _STEPS_A_COLON = 64, 8, 2

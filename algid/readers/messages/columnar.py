@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.limits import LIMITS
-from algid.readers.mcap.messages import Messages
+from algid.readers.messages.batch import Messages
 from algid.words import counted
 
 _WORK_A_WALK, _WORK_A_SIZE = 200, 20

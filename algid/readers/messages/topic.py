@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.log import IntArray, Notice
-from algid.readers.mcap.catalogue import Catalogue, channels_of, schema_name
-from algid.readers.mcap.codec import decoder_for
-from algid.readers.mcap.columnar import Decoder, ExcessError, Shape
-from algid.readers.mcap.framing import File
-from algid.readers.mcap.load import Account, batches, look_beside
+from algid.readers.messages.batch import Account
+from algid.readers.messages.codec import decoder_for
+from algid.readers.messages.columnar import Decoder, ExcessError, Shape
+from algid.readers.messages.source import Source, channels_of
 from algid.readers.table import VELOCITIES, SampleTable, stack
 from algid.words import counted
 
@@ -115,7 +114,7 @@ class Topic:
     clock: str | None
     _chosen: str | None = field(default=None)
 
-    def tables(self, path: str, file: File, found: Catalogue, rows: int) -> Iterator[SampleTable]:
+    def tables(self, source: Source, rows: int) -> Iterator[SampleTable]:
         """The topic's samples in tables of about `rows` rows.
 
         Raises
@@ -123,21 +122,21 @@ class Topic:
         LogError
             If half of the messages do not fit their schema, or their stamps are none.
         """
-        channels = channels_of(found, self.name, self.type)
+        path = source.path
+        channels = channels_of(source, self.name, self.type)
         if not channels:
             text = f"{path}: topic {self.name!r} is not in this file"
             yield SampleTable(np.empty(0, np.int64), {}, (Notice("NO_TOPIC", text, lossy=True),))
             return
-        channel: Any = found.channels[min(channels)]
         wanted = dict(self.fields.paths)
         if self.fields.stamp is not None and self.clock != "log":
             wanted |= dict(zip(_STAMP, self.fields.stamp, strict=True))
-        decoder = decoder_for(path, channel, found.schemas.get(channel.schema_id), wanted, file.works)
-        look_beside(file, found, channels)
+        decoder = decoder_for(path, source.channels[min(channels)], wanted, source.works)
+        source.check(channels)
         account = Account()
         parts: list[SampleTable] = []
         size = 0
-        for batch in batches(file, found, channels):
+        for batch in source.batches(channels):
             account.add(batch)
             if batch.messages is None or not len(batch.messages):
                 continue
@@ -154,12 +153,12 @@ class Topic:
                 yield self._clocked(path, parts)
                 parts, size = [], 0
         last = self._clocked(path, parts) if parts else SampleTable(np.empty(0, np.int64), {})
-        promised = sum(found.counts.get(channel, 0) for channel in channels) if found.counts else None
-        yield last.noting(*found.notices, *account.notices(promised), *self._left_out(decoder, found, channels))
+        promised = sum(source.counts.get(channel, 0) for channel in channels) if source.counts else None
+        yield last.noting(*source.notices, *account.notices(promised), *self._left_out(decoder, source, channels))
 
-    def count(self, found: Catalogue) -> int:
-        """Messages that the file's statistics promise, 0 without them."""
-        return sum((found.counts or {}).get(channel, 0) for channel in channels_of(found, self.name, self.type))
+    def count(self, source: Source) -> int:
+        """Messages that the file counts, 0 where it does not."""
+        return sum((source.counts or {}).get(channel, 0) for channel in channels_of(source, self.name, self.type))
 
     def _clocked(self, path: str, parts: list[SampleTable]) -> SampleTable:
         """The tables as one, with the stamps of the chosen clock and float64 columns."""
@@ -199,7 +198,7 @@ class Topic:
         rest = nanoseconds + np.rint((seconds - whole) * 1e9) if seconds.dtype.kind == "f" else nanoseconds
         return whole.astype(np.int64) * 1_000_000_000 + rest.astype(np.int64)
 
-    def _left_out(self, decoder: Decoder, found: Catalogue, channels: frozenset[int]) -> list[Notice]:
+    def _left_out(self, decoder: Decoder, source: Source, channels: frozenset[int]) -> list[Notice]:
         """What to say of messages that lack a field, do not fit, or are of another type, encoding or definition."""
         said = []
         if decoder.lacking:
@@ -215,13 +214,9 @@ class Topic:
                 f"schema says; the first: {decoder.misfit}"
             )
             said.append(Notice("MISFIT_MESSAGES", text, lossy=True))
-        others = {number for number, channel in found.channels.items() if channel.topic == self.name} - channels
-        if found.counts is not None:
-            others = {one for one in others if found.counts.get(one)}
-        elif all(span.channels is not None for span in found.spans):
-            others &= frozenset[int]().union(*(span.channels or () for span in found.spans))
+        others = {one for one in source.used() - channels if source.channels[one].topic == self.name}
         if others:
-            types = ", ".join(sorted({schema_name(found, found.channels[one]) or "no schema" for one in others})[:4])
+            types = ", ".join(sorted({source.channels[one].type or "no schema" for one in others})[:4])
             text = f"topic {self.name!r} also carries messages of another type or definition ({types})"
             said.append(Notice("OTHER_TYPE", f"{text}; they were not read", lossy=True))
         return said

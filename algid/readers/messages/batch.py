@@ -1,0 +1,100 @@
+"""Messages as bytes, many at a time, and the account of those that are lost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from algid.log import IntArray, Notice
+from algid.words import counted
+
+
+@dataclass(frozen=True, eq=False)
+class Messages:
+    """Messages in unpacked bytes (M,): where each payload (N,) starts, its size, and its log time in ns."""
+
+    content: NDArray[np.uint8]
+    starts: IntArray
+    sizes: IntArray
+    log_ns: IntArray
+
+    def __len__(self) -> int:
+        return int(self.starts.size)
+
+
+def gather(octets: NDArray[np.uint8], places: IntArray, kind: str) -> NDArray[np.generic]:
+    """The numbers of type `kind` at byte `places` (N,), aligned or not."""
+    width = np.dtype(kind).itemsize
+    window: NDArray[np.generic] = np.ndarray(max(0, octets.size - width + 1), np.dtype(kind), octets.data, strides=(1,))
+    return window[places]
+
+
+@dataclass(frozen=True)
+class MessageBatch:
+    """Messages of one span or of many small ones, or None and why those of one are lost.
+
+    Of a torn chunk also how much is there.
+    """
+
+    messages: Messages | None
+    checked: bool
+    reason: str = ""
+    torn: tuple[int, int] | None = None
+    """Bytes of a torn chunk's records, unpacked: what is there, and what there should be."""
+    lost: int = 0
+    """Messages that the index of a damaged chunk lists, where it has one."""
+
+
+@dataclass
+class Account:
+    """What was lost on the way, for the notices at the end."""
+
+    spans: int = 0
+    reason: str = ""
+    unchecked: bool = False
+    found: int = 0
+    lost: int = 0
+    torn: tuple[int, int, int] | None = None
+    """Of a torn chunk the messages taken, and the bytes of its records that are there and that should be."""
+
+    def add(self, batch: MessageBatch) -> None:
+        """Count one batch."""
+        if batch.messages is None:
+            self.spans += 1
+            self.lost += batch.lost
+            self.reason = self.reason or batch.reason
+        else:
+            self.found += len(batch.messages)
+            self.unchecked |= not batch.checked and len(batch.messages) > 0
+            if batch.torn:
+                self.torn = (len(batch.messages), *batch.torn)
+
+    def notices(self, promised: int | None) -> list[Notice]:
+        """What to say; `promised` is how many messages the statistics promise."""
+        said = []
+        if self.spans:
+            missing = self.lost if promised is None else promised - self.found
+            text = f"{counted(self.spans, 'damaged chunk')} left out; the first: {self.reason}"
+            counting = f"; {counted(missing, 'message is missing', 'messages are missing')}" if missing else ""
+            said.append(Notice("DAMAGED_CHUNK", text + counting, lossy=True))
+        elif promised is not None and promised != self.found:
+            text = f"the file counts {counted(promised, 'message')} and holds {self.found}"
+            said.append(Notice("MISSING_MESSAGES", text, lossy=True))
+        if self.torn:
+            taken, held, size = self.torn
+            lost = (  # counted by the share of bytes
+                f"about {counted(round(taken * (size - held) / held), 'is lost', 'are lost')}"
+                if taken
+                else "the rest is lost"
+            )
+            text = (
+                f"the last chunk breaks off: {counted(taken, 'message')} taken from its first "
+                f"{held} of {counted(size, 'byte')}, {lost}; "
+                "they could not be checked, since the chunk's checksum covers all of it"
+            )
+            said.append(Notice("TORN_CHUNK", text, lossy=True))
+        if self.unchecked:
+            said.append(Notice("NO_CHECKSUM", "the file has no checksums: damaged values would go unseen"))
+        return said

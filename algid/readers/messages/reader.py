@@ -1,0 +1,85 @@
+"""From files of messages to a log: what is read out of them is planned on the first, then they are read as one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING
+
+from algid.errors import LogError
+from algid.log import Notice, Origin
+from algid.readers.assemble import TableReader, reader_of
+from algid.readers.joints import moving_joints
+from algid.readers.messages.source import Source
+from algid.readers.messages.topic import Fields, Topic
+from algid.readers.table import BLOCK_ROWS, SampleTable
+from algid.readers.timebase import aligned, whole_topic
+
+if TYPE_CHECKING:
+    from algid.profile import Profile
+
+Opener = Callable[[], AbstractContextManager[Source]]
+"""Opens a file of messages: several passes go over a log."""
+
+_LOOKED = 1 << 14
+"""Messages whose other joints are looked at."""
+
+
+def open_messages(
+    name: str, form: str, parts: Sequence[Opener], profile: Profile | None, said: tuple[Notice, ...] = ()
+) -> TableReader:
+    """Open a log of messages, or the parts of one in their order.
+
+    Parameters
+    ----------
+    name : str
+        Of the log, as its origin tells it.
+    form : str
+        Its format, likewise.
+    parts : sequence of Opener
+    profile : Profile, optional
+    said : tuple of Notice
+        What is to be said of the log as a whole.
+
+    Raises
+    ------
+    LogError
+        If a message is encoded in an unknown way, or the file cannot be read or is damaged and holds no joints.
+    NothingFoundError
+        If no topic of a sound file holds the joints.
+    """
+    from algid.readers.messages.plan import NothingFoundError, plan
+
+    with parts[0]() as source:
+        try:
+            wanted = plan(source, profile)
+        except NothingFoundError as error:
+            if not source.damage:
+                raise
+            places = list(dict.fromkeys(source.damage))
+            where = "; ".join(places[:3]) + (f"; {len(places) - 3} more" if len(places) > 3 else "")
+            left = str(error).removeprefix(f"{source.path}: ")
+            text = f"the file is damaged ({where}); copy it again; in what is left: {left}"
+            raise LogError(f"{source.path}: {text}") from error
+        truth = source.truth()
+        main = wanted.topics[0]
+        rows = main.count(source)
+        beside = moving_joints(
+            wanted.others,
+            lambda paths: Topic(main.name, main.type, Fields(paths, None), "log").tables(source, _LOOKED),
+        )
+    origin = Origin(name, form, wanted.mapping, truth, wanted.reading)
+
+    def read(topic: Topic, rows: int) -> Iterator[SampleTable]:
+        for part in parts:
+            with part() as source:
+                yield from topic.tables(source, rows)
+
+    def tables(rows: int) -> Iterator[SampleTable]:
+        samples, others = read(main, rows), wanted.topics[1:]
+        if not others:
+            return samples
+        series = [whole_topic(name, one.name, one.fields.paths, read(one, BLOCK_ROWS)) for one in others]
+        return aligned(samples, series)
+
+    return reader_of(origin, tables, profile, wanted.units, (*said, *wanted.notices, *beside), rows)
