@@ -48,6 +48,14 @@ class FileLimits:
     """Of one such line."""
     unit_letters: int = 40
     """Of a unit that a schema states."""
+    unit_statements: int = 512
+    """Statements of units in the lines above a table that are looked at."""
+    metadata_keys: int = 8192
+    """Of a schema that are looked at for units: each column may have one."""
+    name_letters: int = 512
+    """Of a column's, a topic's or a joint's name that is taken apart; a longer one is none of a joint's."""
+    number_letters: int = 400
+    """Of a cell that holds a number: the largest float64 has 309 digits before its point."""
     free_text_bytes: int = 256 << 20
     text_a_byte: int = 250
     """What a compressed table may unpack to: rows of numbers pack 3 to 20 times, a log at rest a hundred times."""

@@ -111,7 +111,7 @@ def _parsed(
     skip = dialect.skip
     for text in whole_lines(path, kind):
         if not dialect.separator:  # runs of blanks become one tab
-            text = re.sub(rb"[ \t]+", b"\t", re.sub(rb"(?m)^[ \t]+|[ \t]+$|[ \t]+(?=\r$)", b"", text))
+            text = re.sub(rb"(?m)^\t|\t(?=\r?$)", b"", re.sub(rb"[ \t]+", b"\t", text))
         yield scan(io.BytesIO(text), skip).collect()
         skip = 0
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -75,7 +76,7 @@ def detect(path: Path, head: bytes) -> Dialect:
     above = [line.removeprefix(comment or "").strip() for line in lines[:number]]
     separator = _separator(path, header, [line for _, line in data[1:20]])
     first_row = 1
-    if all(_NUMBER.match(cell) for cell in split(header, separator) if cell):
+    if all(_is_number(cell) for cell in split(header, separator) if cell):
         header, first_row = (
             _commented_header(path, lines[:number], comment, split(header, separator), separator),
             0,
@@ -105,8 +106,13 @@ def _below_titles(data: list[tuple[int, str]]) -> list[tuple[int, str]]:
 
 def _numeric(cells: Sequence[str]) -> bool:
     """Whether half of the cells hold numbers, dates or nothing, and one a number."""
-    numbers = sum(bool(_NUMBER.match(cell)) for cell in cells)
+    numbers = sum(map(_is_number, cells))
     return numbers > 0 and 2 * (numbers + sum(not cell or bool(_DATE.match(cell)) for cell in cells)) >= len(cells)
+
+
+def _is_number(cell: str) -> bool:
+    """Whether a cell holds a number: of one too long for that the pattern would take time with its square."""
+    return len(cell) <= LIMITS.number_letters and _NUMBER.match(cell) is not None
 
 
 def _units(columns: Sequence[str], cells: Sequence[str]) -> dict[str, str]:
@@ -125,7 +131,7 @@ def kinds(path: Path, head: bytes, found: Dialect) -> dict[str, str]:
     lines = _lines(path, head)[found.skip :]
     rows = [split(line, found.separator) for line in lines if line.strip() and not _comment(line, found.comment)]
     table = zip(*(cells for cells in rows if len(cells) == len(found.columns)), strict=True)
-    numbers = [all(not cell or _NUMBER.match(cell) for cell in cells) for cells in table]
+    numbers = [all(not cell or _is_number(cell) for cell in cells) for cells in table]
     return {
         column: "Int64" if column in found.whole else "Float64" if number else "String"
         for column, number in zip(found.columns, numbers, strict=True)
@@ -174,7 +180,7 @@ def _commented_header(path: Path, before: list[str], comment: str | None, cells:
     for line in reversed(before):
         text = line.removeprefix(comment or "").strip()
         names = split(text, separator)
-        if len(names) == len(cells) and not any(_NUMBER.match(name) for name in names):
+        if len(names) == len(cells) and not any(map(_is_number, names)):
             return text
     raise LogError(
         f"{path}: the table has no header, its first line is {', '.join(cells)[:60]!r}; "
@@ -199,12 +205,10 @@ def _checked(
             f"{path}: line {skip + 1} has {counted(len(cells), 'cell')} under a header "
             f"of {len(columns)}; mend the header"
         )
-    repeated = sorted({name for name in columns if name and columns.count(name) > 1})
+    repeated = sorted(name for name, count in Counter(columns).items() if name and count > 1)
     if repeated:
         raise LogError(f"{path}: the column {repeated[0]!r} stands in the header twice; rename one")
-    comma = separator != "," and any(
-        "," in cell and _NUMBER.match(cell) for row in rows for cell in split(row, separator)
-    )
+    comma = separator != "," and any("," in cell and _is_number(cell) for row in rows for cell in split(row, separator))
     padded = bool(separator) and any(re.search(rf"[ \t]{re.escape(separator)}|[ ]$", row.rstrip("\r")) for row in rows)
     table = [cells for cells in (split(row, separator) for row in rows) if len(cells) == len(columns)]
     whole = frozenset(column for column, *cells in zip(columns, *table, strict=True) if all(map(_WHOLE.match, cells)))

@@ -10,7 +10,9 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
+from algid.limits import LIMITS
 from algid.readers.joints import along_the_arm
 from algid.units import is_foreign, unit_of
 from algid.words import counted
@@ -100,8 +102,16 @@ class ChannelChoice:
 
 
 def take_apart(column: str) -> Name:
-    """Stem, joint and unit of a column's name; case and blanks do not matter."""
+    """Stem, joint and unit of a column's name; case and blanks do not matter.
+
+    A name longer than any of a joint's is its own stem: the patterns' time grows with its square.
+    """
     text = column.strip().strip('"').strip().lower()
+    return Name(text, None, None) if len(text) > LIMITS.name_letters else _taken_apart(text)
+
+
+@lru_cache(maxsize=1 << 13)
+def _taken_apart(text: str) -> Name:
     unit = foreign = None
     for pattern in (_BRACKET_UNIT, _SUFFIX_UNIT):
         found = pattern.match(text)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import zlib
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -115,8 +117,9 @@ def counted_rows(path: Path) -> int:
 def units_of_schema(schema: pa.Schema, roots: Mapping[str, str]) -> dict[str, str]:
     """By name the unit that an Arrow schema's metadata state; `roots` are the fields that the names belong to."""
     found = in_metadata(_decoded(schema.metadata), list(roots))
+    times = Counter(schema.names)
     for name, root in roots.items():
-        own = _decoded(schema.field(root).metadata) if schema.names.count(root) == 1 else {}
+        own = _decoded(schema.field(root).metadata) if times[root] == 1 else {}
         unit = next((value for key, value in own.items() if key.lower() in ("unit", "units")), "").strip()
         if unit.lower() not in _NO_UNIT:
             found[name] = unit[: LIMITS.unit_letters]
@@ -160,9 +163,13 @@ def _footer(path: Path) -> Footer:
             f"{path}: the Parquet footer claims {counted(length, 'byte')} of a file of {size}; copy the file again"
         )
     try:
-        return parsed(footer)
+        return _parsed(footer)
     except FooterError as error:
         raise LogError(f"{path}: the Parquet footer is damaged ({error}); copy the file again") from error
+
+
+_parsed = lru_cache(maxsize=2)(parsed)
+"""A footer is asked for some three times on the way, and one of many row groups takes seconds."""
 
 
 @dataclass

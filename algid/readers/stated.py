@@ -35,87 +35,114 @@ _UNITS: dict[str, Mapping[str, float]] = {"theta": ANGLE, "tau": {**TORQUE, **CU
 
 def in_text(lines: Iterable[str], columns: Sequence[str]) -> dict[str, str]:
     """By column the unit that one of the `lines` states; the first statement that names it holds."""
+    return _in_text(lines, _Named(columns))
+
+
+def _in_text(lines: Iterable[str], columns: _Named) -> dict[str, str]:
     found: dict[str, str] = {}
+    statements = 0
     for line in islice(lines, LIMITS.stated_lines):
         text = " ".join(line[: LIMITS.stated_letters].split())
         listed = _UNITS_LINE.match(text)
-        for column, unit in _listed(listed["list"], columns) if listed else _statements(text, columns):
-            found.setdefault(column, unit)
+        for stated, unit in _listed(listed["list"], columns) if listed else _statements(text, columns):
+            statements += 1
+            if statements > LIMITS.unit_statements:
+                return found
+            for column in stated:
+                found.setdefault(column, unit)
     return found
 
 
 def in_metadata(metadata: Mapping[str, str], columns: Sequence[str]) -> dict[str, str]:
     """By column the unit that a schema's metadata state: ``units`` as JSON or text, ``tau1.unit``, ``unit:tau1``."""
+    named = _Named(columns)
     found: dict[str, str] = {}
-    for key, value in metadata.items():
+    for key, value in islice(metadata.items(), LIMITS.metadata_keys):
         if key.lower() in ("unit", "units"):
-            try:
-                content = json.loads(value)  # an object of units by name, or text
-            except (ValueError, RecursionError):
-                content = None
-            units = (
-                {name: unit for name, unit in content.items() if _is_unit(unit)} if isinstance(content, dict) else {}
-            )
-            mapped = {column: unit for name, unit in units.items() for column in _columns_of(name, columns)}
-            found |= mapped or in_text([f"units: {value}", value], columns)
+            found |= _of_units_key(value, named)
             continue
-        named = re.fullmatch(r"(?:units?[.:_ /](.+)|(.+)[.:_ /]units?)", key, re.IGNORECASE)
-        if named and _is_unit(value):
-            found |= dict.fromkeys(_columns_of(named[1] or named[2], columns), value.strip())
+        one = re.fullmatch(r"(?:units?[.:_ /](.+)|(.+)[.:_ /]units?)", key, re.IGNORECASE)
+        if one and _is_unit(value):
+            found |= dict.fromkeys(named.of(one[1] or one[2]), value.strip())
     return found
 
 
-def _statements(line: str, columns: Sequence[str]) -> Iterator[tuple[str, str]]:
+def _of_units_key(value: str, columns: _Named) -> dict[str, str]:
+    """By column the unit that the value of the key ``units`` states: an object of units by name, or text."""
+    try:
+        content = json.loads(value)
+    except (ValueError, RecursionError):
+        content = None
+    mapped: dict[str, str] = {}
+    if isinstance(content, dict):
+        for name, unit in islice(content.items(), LIMITS.metadata_keys):
+            if _is_unit(unit):
+                mapped |= dict.fromkeys(columns.of(name), unit)
+    return mapped or _in_text([f"units: {value}", value], columns)
+
+
+Stated = Iterator[tuple[Sequence[str], str]]
+"""Columns, and the unit that is stated for them."""
+
+
+def _statements(line: str, columns: _Named) -> Stated:
     """Columns and units; of several names before one unit those that can have it: ``t, q1, tau1 in mNm``."""
     for found in _STATEMENT.finditer(line):
         unit = found["unit"].rstrip(".")
         if _is_unit(unit):
             *others, last = re.split(r" ?(?:,|&|\band\b) ?", found["names"])
-            yield from ((column, unit) for column in _columns_of(last, columns))
+            yield columns.of(last), unit
             for name in others:
-                for column in _columns_of(name, columns):
-                    if unit_of(unit) in _UNITS.get(_quantity(column) or "", {}):
-                        yield column, unit
+                yield [one for one in columns.of(name) if unit_of(unit) in _UNITS.get(_quantity(one) or "", {})], unit
 
 
-def _listed(text: str, columns: Sequence[str]) -> Iterator[tuple[str, str]]:
+def _listed(text: str, columns: _Named) -> Stated:
     """Units alone: one a column in their order, or one a quantity."""
     units = [part.strip() for part in re.split(r"[,;]", text)]
     if not all(map(_is_unit, units)):
         yield from _statements(text, columns)
-    elif len(units) == len(columns):
-        yield from zip(columns, units, strict=True)
+    elif len(units) == len(columns.names):
+        yield from (([column], unit) for column, unit in zip(columns.names, units, strict=True))
     else:
         for quantity, known in _UNITS.items():
             own = {unit for unit in units if unit_of(unit) in known and "/" not in unit}
             if len(own) == 1:
-                unit = own.pop()
-                yield from ((column, unit) for column in columns if _quantity(column) == quantity)
+                yield columns.of_quantity(quantity), own.pop()
 
 
 def _is_unit(text: object) -> TypeGuard[str]:
     return isinstance(text, str) and (unit_of(text) is not None or is_foreign(text))
 
 
-def _columns_of(name: str, columns: Sequence[str]) -> list[str]:
-    """The columns that a name stands for: one of that name, those of its stem, or those of its quantity."""
-    plain = name.strip().lower()
-    if same := [column for column in columns if column.lower() == plain]:
-        return same
-    part = take_apart(plain)
-    if part.joint is not None:
-        wanted = (part.stem, part.joint)
-        return [column for column in columns if ((own := take_apart(column)).stem, own.joint) == wanted]
-    if stem := [column for column in columns if take_apart(column).stem == part.stem]:
-        return stem
-    quantity = next((one for one, words in _WORDS.items() if part.stem in words or f"{part.stem}s" in words), None)
-    return [
-        column
-        for column in columns
-        if quantity is not None
-        and _quantity(column) == quantity
-        and (take_apart(column).stem in CURRENTS) == (part.stem in CURRENTS)
-    ]
+class _Named:
+    """The columns of a log, found by what a statement may call them; each is taken apart once."""
+
+    def __init__(self, columns: Sequence[str]) -> None:
+        self.names = columns
+        self._columns: dict[object, list[str]] = {}
+        for column in columns:
+            part, quantity = take_apart(column), _quantity(column)
+            current = part.stem in CURRENTS
+            for key in {column.lower(), (part.stem, part.joint), (part.stem,), (quantity, current, "")}:
+                self._columns.setdefault(key, []).append(column)
+
+    def of(self, name: str) -> Sequence[str]:
+        """The columns that a name stands for: one of that name, those of its stem, or those of its quantity."""
+        plain = name.strip().lower()
+        if plain in self._columns:
+            return self._columns[plain]
+        part = take_apart(plain)
+        if part.joint is not None:
+            return self._columns.get((part.stem, part.joint), [])
+        if (part.stem,) in self._columns:
+            return self._columns[(part.stem,)]
+        meant = (one for one, words in _WORDS.items() if part.stem in words or f"{part.stem}s" in words)
+        quantity = next(meant, None)
+        return [] if quantity is None else self._columns.get((quantity, part.stem in CURRENTS, ""), [])
+
+    def of_quantity(self, quantity: str) -> Sequence[str]:
+        """The columns of a quantity, measured or as a current."""
+        return [one for current in (False, True) for one in self._columns.get((quantity, current, ""), [])]
 
 
 def _quantity(column: str) -> str | None:

@@ -1,0 +1,99 @@
+"""Every loop over what a file claims has a bound, `algid.limits.LIMITS`; and patterns take time with a text's length.
+
+A text here is so long that a pattern which takes time with its square would not end.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from algid.errors import LogError
+from algid.limits import LIMITS
+from algid.readers import read_log
+from algid.readers.footer import FooterError, parsed
+from algid.readers.names import Name, take_apart
+from algid.readers.stated import in_metadata, in_text
+from tests.conftest import Limited
+
+COLUMNS = ("t", "theta1", "theta2", "tau1", "tau2")
+ROWS = [f"{row / 100},{row % 7},{row % 5},{row % 3},{row % 2}" for row in range(300)]
+
+
+def csv(folder: Path, *lines: str) -> Path:
+    path = folder / "log.csv"
+    path.write_text("\n".join(lines))
+    return path
+
+
+def parquet(folder: Path, **beside: object) -> Path:
+    table = pa.table({name: [row * 0.01 for row in range(300)] for name in COLUMNS} | beside)
+    pq.write_table(table, folder / "log.parquet")
+    return folder / "log.parquet"
+
+
+@pytest.mark.parametrize("piece", ["_", "a_", "[", " ", "1", "/"])
+def test_a_long_name_of_a_column_is_passed_over(piece: str, tmp_path: Path) -> None:
+    name = "q" + piece * 500_000
+    assert len(read_log(parquet(tmp_path, **{name: [0.0] * 300, f"{name}x": [0.0] * 300}))) == 300
+    name = name[:60_000]
+    assert len(read_log(csv(tmp_path, f"{','.join(COLUMNS)},{name}", *(f"{row},0" for row in ROWS)))) == 300
+
+
+def test_a_name_beyond_the_bound_is_its_own_stem(limited: Limited) -> None:
+    assert take_apart("theta_1") == Name("theta", "1", None)
+    limited(name_letters=6)
+    assert take_apart("theta_1") == Name("theta_1", None, None)
+
+
+def test_a_cell_of_very_many_digits_is_no_number(tmp_path: Path) -> None:
+    name = "9" * 60_000 + "x"
+    assert len(read_log(csv(tmp_path, f"{','.join(COLUMNS)},{name}", *(f"{row},0" for row in ROWS)))) == 300
+
+
+def test_a_table_of_blanks_is_refused_at_its_row(tmp_path: Path) -> None:
+    words = [line.replace(",", " ") for line in (",".join(COLUMNS), *ROWS)]
+    rows = [" ".join([*row.split()[:1], " " * 60_000, *row.split()[1:]]) for row in words]
+    assert len(read_log(csv(tmp_path, *words[:10], *rows[10:]))) == 300
+    with pytest.raises(LogError, match="expected a number, found 'x'; mend the file"):
+        read_log(csv(tmp_path, *words[:10], *("1" + " " * 60_000 + "x" for _ in range(100))))
+
+
+def test_blanks_and_tabs_around_rows_of_blanks(tmp_path: Path) -> None:
+    rows = [" \t " + row.replace(",", " \t  ") + " \t\r" for row in ROWS]
+    assert len(read_log(csv(tmp_path, " ".join(COLUMNS) + "\r", *rows))) == 300
+
+
+def test_statements_of_units_are_looked_at_up_to_a_bound(limited: Limited) -> None:
+    columns = [f"q{number}" for number in range(1000)]
+    assert len(in_text(["angles: deg " * 150] * 60, columns)) == 1000
+    assert in_text(["a: deg", "q1: deg"], columns) == {"q1": "deg"}
+    limited(unit_statements=1)
+    assert in_text(["a: deg", "q1: deg"], columns) == {}
+
+
+def test_keys_of_metadata_are_looked_at_up_to_a_bound(limited: Limited) -> None:
+    assert in_metadata({"units:a": "deg", "units:q1": "deg"}, ["q1"]) == {"q1": "deg"}
+    limited(metadata_keys=1)
+    assert in_metadata({"units:a": "deg", "units:q1": "deg"}, ["q1"]) == {}
+    assert in_metadata({"units": '{"a": "deg", "q1": "deg"}'}, ["q1"]) == {}
+
+
+def test_a_footer_of_very_many_values_is_refused(tmp_path: Path, limited: Limited) -> None:
+    path = parquet(tmp_path)
+    assert len(read_log(path)) == 300
+    limited(parquet_footer_values=10)
+    content = path.read_bytes()
+    with pytest.raises(FooterError, match="more values than any real one"):
+        parsed(content[-8 - int.from_bytes(content[-8:-4], "little") : -8])
+
+
+def test_a_table_of_very_many_columns_is_refused(tmp_path: Path, limited: Limited) -> None:
+    limited(columns=5)
+    assert len(read_log(parquet(tmp_path))) == 300
+    for path in (parquet(tmp_path, x=[0.0] * 300), csv(tmp_path, f"{','.join(COLUMNS)},x", *(f"{r},0" for r in ROWS))):
+        with pytest.raises(LogError, match=f"6 columns; expected {LIMITS.columns} at most"):
+            read_log(path)
