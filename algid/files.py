@@ -8,6 +8,7 @@ from __future__ import annotations
 import errno
 import io
 import os
+import re
 import reprlib
 import shutil
 import stat
@@ -16,7 +17,7 @@ import tomllib
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from algid.construction import beside, put_in_place, remove_left, under_construction
 from algid.errors import OutputError, SettingError
@@ -123,16 +124,63 @@ def read_toml(path: Path, model: type[ModelT]) -> ModelT:
     """
     from pydantic import ValidationError
 
-    try:
-        content = tomllib.loads(read_text(path))
-    except OSError as error:
-        raise SettingError(f"{path}: cannot read it ({error.strerror}); check the name") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise SettingError(f"{path}: not TOML ({error}); mend that line") from error
+    content = toml_content(path)
     try:
         return model.model_validate(content)
     except ValidationError as error:
         raise SettingError(f"{path}: {first_misfit(error)}") from error
+
+
+def toml_content(path: Path) -> dict[str, Any]:
+    """What stands in a TOML file, not held against any model yet.
+
+    Raises
+    ------
+    SettingError
+        If the file is missing or is not TOML.
+    """
+    try:
+        return parsed_toml(read_text(path))
+    except OSError as error:
+        raise SettingError(f"{path}: cannot read it ({error.strerror}); check the name") from error
+    except (ValueError, RecursionError) as error:
+        raise SettingError(f"{path}: not TOML ({error}); mend that line") from error
+
+
+def parsed_toml(text: str) -> dict[str, Any]:
+    """The content of a TOML document that does not ask for more work than any honest one.
+
+    Raises
+    ------
+    ValueError
+        If it is not TOML (`tomllib.TOMLDecodeError`), or larger or of longer dotted keys than `LIMITS` allow.
+    RecursionError
+        If lists or tables lie too deep within one another.
+    """
+    if len(text) > LIMITS.toml_bytes:
+        raise ValueError(f"more than {LIMITS.toml_bytes >> 20} MiB")
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line.count(".") >= LIMITS.toml_key_parts and _longest_key(line) > LIMITS.toml_key_parts:
+            raise ValueError(f"line {number} has a key of more than {LIMITS.toml_key_parts} parts")
+    try:
+        return tomllib.loads(text)
+    except ValueError as error:
+        if isinstance(error, tomllib.TOMLDecodeError):
+            raise
+        # Python reads no whole number of more than 4,300 digits, and says so to programmers
+        raise ValueError("a whole number of too many digits") from error
+
+
+_QUOTED = re.compile(r"""\"[^\"]*\"|'[^']*'""")
+_BETWEEN_KEYS = re.compile(r"[=,#\[\]{}]")
+
+
+def _longest_key(line: str) -> int:
+    """Parts of the longest dotted key that may stand in a line, however blanks stand around its dots."""
+    if line.lstrip().startswith("#"):
+        return 0
+    plain = "".join(_QUOTED.sub("q", line).split())
+    return max(sum(map(bool, run.split("."))) for run in _BETWEEN_KEYS.split(plain))
 
 
 def first_misfit(error: ValidationError) -> str:

@@ -20,6 +20,11 @@ class FileLimits:
     text_bytes: int = 1 << 26
     """Of a file that is read whole: profiles, limits, manifests, results have some thousand."""
 
+    toml_bytes: int = 1 << 22
+    """Of a TOML file: a manifest of 60,000 jobs; tomllib takes up to three seconds a MiB."""
+    toml_key_parts: int = 32
+    """Of a dotted key: tomllib takes time and memory with their square."""
+
     # tables of every format
     columns: int = 4096
     list_cells: int = 64

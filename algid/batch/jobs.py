@@ -17,14 +17,13 @@ import io
 import math
 import os
 import re
-import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 
 from algid.errors import SettingError
-from algid.files import read_text
+from algid.files import parsed_toml, read_text
 from algid.stores import is_url, list_urls
 
 Label = str | float | int | bool
@@ -107,7 +106,7 @@ def read_manifest(path: Path) -> list[Job]:
     """
     try:
         if path.suffix.lower() == ".toml":
-            kind, content = "job", tomllib.loads(read_text(path))
+            kind, content = "job", parsed_toml(read_text(path))
             rows = content.get("job")
             if set(content) != {"job"} or not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
                 raise SettingError(f"{path}: expected tables [[job]] alone, found {', '.join(content) or 'nothing'}")
@@ -116,7 +115,7 @@ def read_manifest(path: Path) -> list[Job]:
             if any(None in row for row in cells):
                 raise SettingError(f"{path}: a row has more cells than the header; quote commas within a cell")
             rows = [{name: cell for name, cell in row.items() if cell} for row in cells]
-    except (OSError, UnicodeDecodeError, csv.Error, tomllib.TOMLDecodeError, RecursionError) as error:
+    except (OSError, ValueError, csv.Error, RecursionError) as error:
         raise SettingError(f"{path}: the manifest cannot be read ({error}); mend it") from error
     return [_job(row, f"{path}: {kind} {number}", path.parent) for number, row in enumerate(rows, 1)]
 

@@ -6,7 +6,6 @@ A command declares its own options; `takes_settings` and `takes_profile` add the
 from __future__ import annotations
 
 import inspect
-import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import wraps
@@ -24,6 +23,8 @@ from algid.cli.completion import (
     terms,
 )
 from algid.errors import SettingError
+from algid.files import parsed_toml
+from algid.limits import LIMITS
 from algid.settings import Settings, flag
 
 if TYPE_CHECKING:
@@ -175,8 +176,10 @@ def _meaning(name: str, text: str) -> dict[str, Any]:
     if "=" not in text or not key.strip():
         raise SettingError(f"--set {text}: expected KEY=VALUE like tau1.sign=-1")
     try:
-        return tomllib.loads(f"{key} = {value}")
-    except tomllib.TOMLDecodeError:  # a bare word
+        return parsed_toml(f"{key} = {value}")
+    except (ValueError, RecursionError) as error:  # a bare word
+        if key.count(".") > LIMITS.toml_key_parts:
+            raise SettingError(f"--set {key[:40]}…: {error}; expected KEY=VALUE like tau1.sign=-1") from error
         setting: Any = value.strip()
         for part in reversed(key.split(".")):
             setting = {part.strip(): setting}
