@@ -88,17 +88,31 @@ def read_whole(path: Path) -> bytes:
     Raises
     ------
     OSError
-        If it cannot be read, has more bytes than `FileLimits.text_bytes`, or is no regular file: a pipe would be waited
-        for, and a device has no end.
+        As `read_start`, and if it has more bytes than `FileLimits.text_bytes`.
+    """
+    content = read_start(path, LIMITS.text_bytes + 1)
+    if len(content) > LIMITS.text_bytes:
+        raise OSError(errno.EFBIG, f"it has more than {LIMITS.text_bytes >> 20} MiB", str(path))
+    return content
+
+
+def read_start(path: Path, most: int) -> bytes:
+    """The first `most` bytes of a file.
+
+    A file of no size is empty, whatever reading it would bring: those that the kernel makes up, such as /proc/kmsg,
+    say that they have none, and some of them wait for ever.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read or is no regular file: a pipe would be waited for, and a device has no end.
     """
     handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)  # else opening a pipe waits already
     with os.fdopen(handle, "rb") as stream:
         found = os.fstat(handle)
         if not stat.S_ISREG(found.st_mode):
             raise OSError(errno.EINVAL, "it is no regular file", str(path))
-        if found.st_size > LIMITS.text_bytes:
-            raise OSError(errno.EFBIG, f"it has more than {LIMITS.text_bytes >> 20} MiB", str(path))
-        return stream.read()
+        return stream.read(most) if found.st_size else b""
 
 
 def read_text(path: Path, encoding: str = "utf-8") -> str:

@@ -23,7 +23,8 @@ from datetime import datetime
 from pathlib import Path
 
 from algid.errors import SettingError
-from algid.files import parsed_toml, read_text
+from algid.files import parsed_toml, read_start, read_text
+from algid.limits import LIMITS
 from algid.stores import is_url, list_urls
 
 Label = str | float | int | bool
@@ -91,8 +92,8 @@ def is_manifest(path: Path) -> bool:
         return True
     if path.suffix.lower() != ".csv" or not path.is_file():
         return False
-    with path.open(encoding="utf-8-sig", errors="replace") as stream:  # logs too come by here, whatever is in them
-        columns = next(csv.reader([stream.readline(1 << 16).strip()]), [])
+    head = read_start(path, LIMITS.line_bytes).decode("utf-8-sig", errors="replace")  # logs too come by here
+    columns = next(csv.reader(head.splitlines()[:1]), [])
     return "name" in columns and ("logs" in columns or "loaded" in columns)
 
 

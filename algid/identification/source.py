@@ -169,7 +169,7 @@ def sha256_of(path: Path) -> str:
     """SHA-256 of a file, or of a folder's files in the order of their names."""
     digest = hashlib.sha256()
     for file in sorted(path.iterdir()) if path.is_dir() else [path]:
-        if file.is_file():
+        if file.is_file() and file.stat().st_size:  # one of none is empty, or waits for ever, as /proc/kmsg does
             with file.open("rb") as opened:
                 while chunk := opened.read(1 << 20):
                     digest.update(chunk)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from algid.errors import LogError
+from algid.files import read_start
 from algid.limits import LIMITS
 from algid.log import Notice, Origin, Reading
 from algid.readers.assemble import TableReader, reader_of
@@ -76,8 +77,7 @@ def bag_files(folder: Path) -> Bag:
 
 def _listed(metadata: Path) -> list[str]:
     """The names of files that a bag's metadata.yaml lists."""
-    with metadata.open("rb") as stream:
-        text = stream.read(LIMITS.bag_metadata_bytes).decode("utf-8", errors="replace")
+    text = read_start(metadata, LIMITS.bag_metadata_bytes).decode("utf-8", errors="replace")
     mode = re.search(r"^\s*compression_mode:[ \t]*[\"']?(\w+)", text, re.MULTILINE)
     if mode and mode[1].upper() != "NONE":
         raise LogError(

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from algid.errors import LogError
+from algid.files import read_whole
 from algid.log import loads
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign
@@ -42,7 +43,7 @@ def open_csv(path: Path, profile: Profile, kind: str = "csv") -> TableReader:
     dialect = detect(path, head)
     beside = sidecar(path)
     try:
-        companion = loads(beside.read_bytes()) if beside.is_file() else NO_COMPANION
+        companion = loads(read_whole(beside)) if beside.is_file() else NO_COMPANION
     except (OSError, ValueError) as error:
         raise LogError(f"{beside}: the truth beside the log cannot be read ({error}); remove it") from error
     columns = assign(str(path), dialect.columns, profile, dialect.units, companion.sums)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from algid.errors import LogError
+from algid.files import read_start
 from algid.limits import LIMITS
 from algid.words import counted
 
@@ -50,8 +51,7 @@ def sniff(path: Path) -> str:
         if not path.is_file():
             found = "it is no regular file" if path.exists() else "there is no such file"
             raise LogError(f"{path}: {found}; expected a log in MCAP, Parquet or CSV; check the name")
-        with path.open("rb") as stream:
-            head = stream.read(LIMITS.head_bytes)
+        head = read_start(path, LIMITS.head_bytes)
     except (OSError, ValueError) as error:
         raise LogError(f"{str(path)!r}: the log cannot be read ({error}); check the name and rights") from error
     return _by_content(path, head)
