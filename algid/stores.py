@@ -33,6 +33,11 @@ def is_url(path: str) -> bool:
     return path.startswith(SCHEMES)
 
 
+def absolute(place: str) -> str:
+    """A path as it reads in every folder; a URL does already."""
+    return place if is_url(place) else str(Path(place).absolute())
+
+
 def public(path: str) -> str:
     """A path or URL as it is printed and kept: without credentials."""
     return without_credentials(path) if is_url(path) else path

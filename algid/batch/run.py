@@ -28,7 +28,7 @@ from algid.batch.records import (
     write_jobs,
     write_record,
 )
-from algid.batch.workers import CallFailedError, WorkerDiedError
+from algid.batch.workers import CallFailedError, WorkerDiedError, WorkersGoneError
 from algid.construction import remove_left
 from algid.errors import AlgidError, OutputError, SettingError, text_of
 from algid.profile import Profile
@@ -217,6 +217,9 @@ class Batch:
             return failed_record(task, f"it took its worker with it: {died.how}", End.KILLED)
         except CallFailedError as failed:
             return failed_record(task, str(failed))
+        except WorkersGoneError as gone:
+            self._stop_because(f"{gone}; {RUN_AGAIN}")
+            return None
         except Exception as error:  # of the executor's own: the other jobs go on
             return failed_record(task, text_of(error))
         if isinstance(ended, DiskFull):

@@ -1,4 +1,4 @@
-"""Workers that may die, hang or fail in any way without harm to each other: processes here, or a Dask cluster's.
+"""Workers that may die, hang or fail in any way without harm to each other: processes of this machine.
 
 Each worker is a `concurrent.futures.ProcessPoolExecutor` of one process, tended by a thread here that knows which call
 it runs: such a pool gives up as a whole when a process of it dies, without telling whose call killed it. Calls and
@@ -7,37 +7,27 @@ answers travel as bytes that are packed and unpacked here, so that what cannot b
 
 from __future__ import annotations
 
-import ctypes
-import hashlib
 import multiprocessing
 import os
 import pickle
 import signal
-import socket
 import tempfile
 import threading
-import time
-import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from multiprocessing import connection
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
-from algid.errors import SettingError, text_of
+from algid.errors import text_of
 from algid.files import temporary_folder
-from algid.stores import public
 
 # One thread a worker: more would fight for the same cores.
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "POLARS_MAX_THREADS", "ARROW_NUM_THREADS")
 TOO_LONG = "it took longer than {:g} s; raise --timeout, and run it again with --retry-failed"
-CONNECT_SECONDS = 10
-LOOK_EVERY = 0.1  # s
-MOST_DEATHS = 2  # the scheduler gives a task up at the next one
-LAST_SECONDS = 5.0  # s that a job on a cluster has to end once it is interrupted
 
 
 class WorkerDiedError(Exception):
@@ -50,6 +40,10 @@ class WorkerDiedError(Exception):
 
 class CallFailedError(Exception):
     """A call raised an exception, took too long, or cannot travel: what is known of it, in words."""
+
+
+class WorkersGoneError(Exception):
+    """No worker can run calls any more: why, and what to do, in words."""
 
 
 class Workers(Executor):
@@ -87,7 +81,7 @@ class Workers(Executor):
         """Run ``fn(*args, **kwargs)`` in a worker."""
         future: Future[Any] = Future()
         try:
-            self._calls.put((future, _packed((fn, args, kwargs))))
+            self._calls.put((future, packed((fn, args, kwargs))))
         except CallFailedError as error:
             future.set_exception(error)
         return future
@@ -154,12 +148,12 @@ class _Worker:
             If the worker dies.
         """
         try:
-            coming = self._pool.submit(_answered, packed)
+            coming = self._pool.submit(answered, packed)
             if coming not in wait([coming], timeout).done:
                 self.process.kill()
                 self.end()
                 raise CallFailedError(TOO_LONG.format(timeout))
-            return _unpacked(coming.result())
+            return unpacked(coming.result())
         except BrokenProcessPool as error:
             self.end()
             code = self.process.exitcode or 0
@@ -194,16 +188,16 @@ def _prepare(memory_limit: int | None, temporary: Path) -> None:
     resource.setrlimit(resource.RLIMIT_DATA, (limit, hard))
 
 
-def _answered(packed: bytes) -> bytes:
+def answered(call: bytes) -> bytes:
     """Run a call; whatever it raises becomes words, and the worker lives on."""
     try:
-        fn, args, kwargs = pickle.loads(packed)
-        return _packed((True, fn(*args, **kwargs)))
+        fn, args, kwargs = pickle.loads(call)
+        return packed((True, fn(*args, **kwargs)))
     except BaseException as error:
         return pickle.dumps((False, text_of(error)))
 
 
-def _packed(value: Any) -> bytes:
+def packed(value: Any) -> bytes:
     """A value as bytes. Raises `CallFailedError`, in words that are the same with every Python."""
     try:
         return pickle.dumps(value)
@@ -211,15 +205,15 @@ def _packed(value: Any) -> bytes:
         raise CallFailedError(f"cannot be pickled for a worker ({text_of(error)})") from error
 
 
-def _unpacked(packed: bytes) -> Any:
-    """What `_answered` gave. Raises `CallFailedError`."""
+def unpacked(answer: bytes) -> Any:
+    """What `answered` gave. Raises `CallFailedError`."""
     try:
-        good, answer = pickle.loads(packed)
+        good, content = pickle.loads(answer)
     except Exception as error:  # unpickling runs the answer's own code
         raise CallFailedError(text_of(error)) from error
     if not good:
-        raise CallFailedError(answer)
-    return answer
+        raise CallFailedError(content)
+    return content
 
 
 def _die_with_parent() -> None:
@@ -228,85 +222,3 @@ def _die_with_parent() -> None:
     if parent is not None:
         connection.wait([parent.sentinel])
         os._exit(1)
-
-
-@contextmanager
-def cluster(address: str, out: str, timeout: float | None = None) -> Iterator[tuple[Executor, int]]:
-    """The workers of a Dask cluster behind the interface of the local ones, and how many jobs to hand out at once.
-
-    Waits for jobs of an earlier batch on `out` that was killed: their threads cannot be stopped from outside.
-
-    Raises
-    ------
-    SettingError
-        If ``algid[dask]`` is not installed, nothing answers at `address`, or it has no workers.
-    """
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise SettingError("--scheduler: Dask is not installed; pip install 'algid[dask]'") from error
-    try:
-        client: Any = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)  # type: ignore[no-untyped-call]
-    except (OSError, ValueError) as error:
-        raise SettingError(f"--scheduler {address}: no scheduler answers ({error}); start dask scheduler") from error
-    with client:
-        threads = sum(client.nthreads().values())
-        if not threads:
-            raise SettingError(f"--scheduler {address}: it has no workers; start dask worker {address}")
-        prefix = f"algid-{hashlib.sha256(public(out).encode()).hexdigest()[:16]}-"
-
-        def at_work(dask_worker: Any) -> bool:
-            """Whether a worker, this runs on it, has a call of that batch in hand."""
-            return any(str(task.key).startswith(prefix) for task in dask_worker.state.all_running_tasks)
-
-        while any(client.run(at_work).values()):
-            time.sleep(LOOK_EVERY)
-        yield _Cluster(client, prefix, timeout), 2 * threads
-
-
-class _Cluster(Executor):
-    """Calls run on the cluster; they fail as those of `Workers` do."""
-
-    def __init__(self, client: Any, prefix: str, timeout: float | None) -> None:
-        self._client, self._prefix, self._timeout = client, prefix, timeout
-
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Run ``fn(*args, **kwargs)`` on a worker; one that dies has the call run elsewhere."""
-        from distributed.client import FutureCancelledError
-        from distributed.scheduler import KilledWorker
-
-        answer: Future[Any] = Future()
-        answer.set_running_or_notify_cancel()
-        packed = pickle.dumps((fn, args, kwargs))
-        remote = self._client.submit(answered_within, packed, self._timeout, key=self._prefix + uuid.uuid4().hex)
-
-        def settle(done: Any) -> None:
-            try:
-                answer.set_result(_unpacked(done.result()))
-            except KilledWorker as error:
-                answer.set_exception(WorkerDiedError(str(error).split("\n", maxsplit=1)[0], kills=MOST_DEATHS + 1))
-            except (FutureCancelledError, Exception) as error:
-                answer.set_exception(error)
-
-        remote.add_done_callback(settle)
-        return answer
-
-
-def answered_within(packed: bytes, timeout: float | None) -> bytes:
-    """`_answered` in a thread of its own, which is interrupted after `timeout` and, if it goes on, given up.
-
-    A thread of Python cannot be ended from outside; an exception reaches it between two of its own instructions.
-    """
-    answers: SimpleQueue[bytes] = SimpleQueue()
-    thread = threading.Thread(target=lambda: answers.put(_answered(packed)), daemon=True)
-    thread.start()
-    thread.join(timeout)
-    if thread.is_alive():
-        assert timeout is not None
-        reason = TOO_LONG.format(timeout)
-        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident or 0), ctypes.py_object(SystemExit))
-        thread.join(LAST_SECONDS)
-        if thread.is_alive():
-            reason += f"; it still runs on {socket.gethostname()}, process {os.getpid()}: restart that worker"
-        return pickle.dumps((False, reason))
-    return answers.get()

@@ -64,13 +64,15 @@ def batch(
     from algid.batch.run import Batch, Recipe, stopped_by_signals, sweep
     from algid.errors import SettingError
     from algid.results import read_result
-    from algid.stores import open_store
+    from algid.stores import absolute, open_store
 
     bytes_each = None if memory_limit is None else _bytes(memory_limit)
     if scheduler is not None and (workers is not None or memory_limit is not None):
         raise SettingError("--scheduler: workers and their memory are the cluster's; set them where it is started")
     known = None if parameters is None else read_result(parameters)
     profile = cache(lambda file: choice.profile(None if file is None else Path(file)))  # each file is read once
+    if scheduler is not None:  # a worker's own folder is another
+        sources, out = [absolute(source) for source in sources], absolute(out)
     recipe = Recipe(out, choice.settings(), profile, known, report)
     recipe.profile(None)
     alone = "logs" if known is None else "loaded"
@@ -100,10 +102,12 @@ def _workers(
     out: str, scheduler: str | None, workers: int | None, memory_limit: int | None, timeout: float
 ) -> Iterator[tuple[Executor, int]]:
     """The workers, and how many jobs to hand out at once; they end with the block."""
-    from algid.batch.workers import Workers, cluster
+    from algid.batch.workers import Workers
     from algid.runtime import cores
 
     if scheduler is not None:
+        from algid.batch.cluster import cluster
+
         with cluster(scheduler, out, timeout) as found:
             yield found
         return

@@ -6,14 +6,12 @@ import hashlib
 import os
 import random
 import signal
-import socket
 import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import polars as pl
@@ -21,6 +19,9 @@ import pytest
 
 import algid
 from algid.synth.sensors import Sensors
+from tests.batch.clusters import Dask, dask
+
+__all__ = ["dask"]
 
 JOBS = 6
 
@@ -187,50 +188,6 @@ def test_a_full_disk_stops_a_batch_that_ends_as_undisturbed_once_there_is_room(
     assert (second.returncode, errors) == (0, "")
     assert f"{JOBS} ok" in told
     assert _digest(out) == undisturbed.digest
-
-
-class Dask:
-    """A scheduler and its workers, processes of this machine that end with the test."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.running: list[subprocess.Popen[bytes]] = []
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            self.port = free.getsockname()[1]
-        self.address = f"tcp://127.0.0.1:{self.port}"
-
-    def start(self, kind: str, *flags: str, until: str) -> subprocess.Popen[bytes]:
-        """A scheduler or a worker, once it says that it is ready."""
-        said = self.folder / f"{kind}{len(self.running)}.txt"
-        code = f"from distributed.cli import dask_{kind}; dask_{kind}.main()"
-        env: dict[str, Any] = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
-        with said.open("wb") as stream:
-            command = [sys.executable, "-c", code, *flags, "--no-dashboard"]
-            self.running.append(subprocess.Popen(command, env=env, stdout=stream, stderr=stream))
-        end = time.monotonic() + 60
-        while until not in said.read_text():
-            assert time.monotonic() < end, said.read_text()
-            assert self.running[-1].poll() is None, said.read_text()
-            time.sleep(0.05)
-        return self.running[-1]
-
-    def worker(self) -> subprocess.Popen[bytes]:
-        """A worker with one thread that nobody starts again when it dies."""
-        return self.start("worker", self.address, "--nthreads", "1", "--no-nanny", until="Registered to")
-
-
-@pytest.fixture
-def dask(tmp_path: Path) -> Iterator[Dask]:
-    pytest.importorskip("distributed", reason="distributed is absent")
-    cluster = Dask(tmp_path)
-    try:
-        cluster.start("scheduler", "--host", "127.0.0.1", "--port", str(cluster.port), until="Scheduler at")
-        yield cluster
-    finally:
-        for process in cluster.running:
-            process.kill()
-            process.wait()
 
 
 def test_on_dask_the_death_of_a_worker_changes_no_result(

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from algid.batch.workers import TOO_LONG, CallFailedError, WorkerDiedError, Workers, answered_within
+from algid.batch.cluster import answered_within
+from algid.batch.workers import TOO_LONG, CallFailedError, WorkerDiedError, Workers
 from tests.batch import calls
 
 
@@ -78,7 +79,7 @@ def test_a_call_that_goes_on_on_a_cluster_is_interrupted_or_given_up(monkeypatch
     assert pickle.loads(answered_within(pickle.dumps((calls.add, (1, 1), {})), 60.0)) == (True, 2)
     spinning = pickle.dumps((calls.spin, (), {}))
     assert pickle.loads(answered_within(spinning, 0.2)) == (False, TOO_LONG.format(0.2))
-    monkeypatch.setattr("algid.batch.workers.LAST_SECONDS", 0.1)
+    monkeypatch.setattr("algid.batch.cluster.LAST_SECONDS", 0.1)
     sleeping = pickle.dumps((time.sleep, (60.0,), {}))  # however late a busy machine begins it
     good, reason = pickle.loads(answered_within(sleeping, 1.0))
     assert not good
