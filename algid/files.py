@@ -35,7 +35,8 @@ def writing(place: Path | str, trouble: str = "cannot write") -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise OutputError(f"{place}: {trouble} ({reason_of(error)}); choose another folder with -o") from error
+        remedy = "give a shorter name" if error.errno == errno.ENAMETOOLONG else "choose another folder with -o"
+        raise OutputError(f"{place}: {trouble} ({reason_of(error)}); {remedy}") from error
 
 
 def reason_of(error: OSError) -> str:
@@ -218,6 +219,15 @@ TEMPORARY = "algid"
 def result_folder(first_log: str, parent: Path, name: str | None = None) -> Path:
     """Where the result of a log goes: `parent/NAME.algid`, NAME the log's stem by default."""
     return parent / f"{Path(first_log).stem or 'log' if name is None else name}.algid"
+
+
+def refuse_misleading(name: str | None) -> None:
+    """Raises `SettingError` where the name of a result's folder is none, or would lead elsewhere."""
+    if name == "":
+        raise SettingError("--name: expected a name for the result folder, found ''; leave it out for the log's own")
+    if name is not None and (name in (".", "..") or "/" in name or not name.isprintable()):
+        found = f"found {name!r:.60}; -o names the folder around it"
+        raise SettingError(f"--name: expected a name without slashes, {found}")
 
 
 def refuse_existing(folder: Path, force: bool) -> None:

@@ -128,3 +128,34 @@ class FileLimits:
 
 
 LIMITS = FileLimits()
+
+
+Range = tuple[float, float]
+"""The least and the largest value."""
+
+
+@dataclass(frozen=True)
+class Physical:
+    """What may stand for a quantity, in SI units: far beyond any arm, and so that its powers are still numbers."""
+
+    length: Range = (1e-4, 1e3)
+    mass: Range = (1e-9, 1e6)
+    inertia: Range = (0.0, 1e9)
+    friction: Range = (0.0, 1e9)
+    gravity: Range = (0.0, 1e3)
+    """0 is an arm that moves in a horizontal plane."""
+    torque: Range = (-1e9, 1e9)
+    angle: Range = (-1e6, 1e6)
+    speed: Range = (-1e4, 1e4)
+    rate: Range = (1e-3, 1e6)
+    duration: Range = (1e-3, 1e6)
+    samples: Range = (2, 1e8)
+    """More than a day at 1 kHz."""
+    delay: Range = (-10.0, 10.0)
+    window: Range = (1e-3, 3600.0)
+    bandwidth: Range = (1e-2, 1e5)
+    pole: Range = (1e-6, 1e6)
+    noise: Range = (0.0, 1e3)
+
+
+PHYSICAL = Physical()

@@ -27,6 +27,17 @@ TorqueUnit = Annotated[
     Literal["N m", "mN m", "N cm", "kN m", "kgf m", "kgf cm", "lbf ft", "lbf in", "ozf in", "A", "mA"],
     BeforeValidator(_usual),
 ]
+Check = Literal[
+    "EFFORT_ZERO",
+    "EFFORT_DENORMAL",
+    "EFFORT_CONSTANT",
+    "WRAPPED_ANGLE",
+    "DEGREES",
+    "LOST_SAMPLES",
+    "WRONG_CONVENTION",
+    "NOT_FINITE",
+]
+"""Checks of a log that refuse it, or its result, unless they are accepted."""
 TimeUnit = Annotated[Literal["s", "ms", "us", "ns"], BeforeValidator(_usual)]
 
 
@@ -108,7 +119,7 @@ class Profile(_Strict):
     offsets: tuple[float, float] = (0.0, 0.0)
     start: float | None = Field(default=None, ge=0)
     end: float | None = Field(default=None, gt=0)
-    accept: Annotated[tuple[str, ...], BeforeValidator(_parts)] = ()
+    accept: Annotated[tuple[Check, ...], BeforeValidator(_parts)] = ()
     theta1: Angle = Angle()
     theta2: Angle = Angle()
     tau1: Torque = Torque()

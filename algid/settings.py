@@ -5,12 +5,14 @@ The command line derives its options from the fields: what one is called, what i
 
 from __future__ import annotations
 
-import math
+import reprlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
-from typing import Any, Literal
+from functools import cache
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from algid.errors import SettingError
+from algid.limits import PHYSICAL, Range
 
 Estimator = Literal["refined", "weak", "instruments", "paper"]
 
@@ -29,11 +31,35 @@ def _poles(text: str) -> tuple[complex, ...]:
         poles = tuple(complex(part.strip()) for part in text.split(","))
     except ValueError:
         raise SettingError(f"--poles {text}: expected numbers between commas; {like}") from None
+    low, high = PHYSICAL.pole
     try:
+        if not all(low <= abs(pole) <= high for pole in poles):
+            raise ValueError(f"each must be from {low:g} to {high:g} rad/s in size")
         observer_gain(poles)
     except ValueError as error:
-        raise SettingError(f"--poles {text}: {error}; {like}") from None
+        raise SettingError(f"--poles {text:.200}: {error}; {like}") from None
     return tuple(pole.real if pole.imag == 0 else pole for pole in poles)
+
+
+@cache
+def _kinds() -> dict[str, Any]:
+    """The types of the fields, by name."""
+    return get_type_hints(Settings)
+
+
+def _expected(bounds: Range | None, kind: Any, value: object) -> str | None:
+    """What a setting has to be, where its value is not that."""
+    if bounds is not None:
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        fits = number and bounds[0] <= value <= bounds[1]  # type: ignore[operator]
+        return None if fits else f"a number from {bounds[0]:g} to {bounds[1]:g}"
+    for part in (kind, *get_args(kind)):
+        if get_origin(part) is Literal:
+            words = get_args(part)
+            return None if value in words else f"one of {', '.join(words)}"
+    if kind in (bool, str):
+        return None if isinstance(value, kind) else "true or false" if kind is bool else "text"
+    return None
 
 
 @dataclass(frozen=True)
@@ -83,12 +109,21 @@ class Settings:
     )
     window: float | None = field(
         default=None,
-        metadata={"help": "Window, s: the paper's integrals restart after it (2), or the weak form's (0.4)."},
+        metadata={
+            "range": PHYSICAL.window,
+            "help": "Window, s: the paper's integrals restart after it (2), or the weak form's (0.4).",
+        },
     )
-    bandwidth: float = field(default=60.0, metadata={"help": "Of the zero-phase differentiator, Hz."})
+    bandwidth: float = field(
+        default=60.0, metadata={"range": PHYSICAL.bandwidth, "help": "Of the zero-phase differentiator, Hz."}
+    )
     gravity: float = field(
         default=9.81,
-        metadata={"help": "m/s², 9.81 by default; 0 for an arm that moves in a horizontal plane.", "profile": True},
+        metadata={
+            "range": PHYSICAL.gravity,
+            "help": "m/s², 9.81 by default; 0 for an arm that moves in a horizontal plane.",
+            "profile": True,
+        },
     )
     model: str = field(
         default="auto",
@@ -101,12 +136,21 @@ class Settings:
         default="foh", metadata={"help": "Torque between samples: ramped or held."}
     )
     delay: float = field(
-        default=0.0, metadata={"help": "From torque to angle, s, where known; --model delay estimates it."}
+        default=0.0,
+        metadata={"range": PHYSICAL.delay, "help": "From torque to angle, s, where known; --model delay estimates it."},
     )
-    l1: float | None = field(default=None, metadata={"help": "Length of link 1, m, where known."})
-    l2: float | None = field(default=None, metadata={"help": "Length of link 2, m, where known."})
+    l1: float | None = field(
+        default=None, metadata={"range": PHYSICAL.length, "help": "Length of link 1, m, where known."}
+    )
+    l2: float | None = field(
+        default=None, metadata={"range": PHYSICAL.length, "help": "Length of link 2, m, where known."}
+    )
     payload_mass: float | None = field(
-        default=None, metadata={"help": "Mass of the payload, kg, where known: tells the gain of the torques."}
+        default=None,
+        metadata={
+            "range": PHYSICAL.mass,
+            "help": "Mass of the payload, kg, where known: tells the gain of the torques.",
+        },
     )
     constrain: bool = field(default=False, metadata={"help": "Solve within the physical bounds."})
     cross_validate: bool = field(
@@ -114,14 +158,13 @@ class Settings:
     )
 
     def __post_init__(self) -> None:
-        for name, low in (("window", 0.0), ("bandwidth", 0.0), ("l1", 0.0), ("l2", 0.0), ("payload_mass", 0.0)):
-            value = getattr(self, name)
-            if value is not None and not low < value < math.inf:
-                raise SettingError(f"{flag(name)}: expected a number above {low:g}, found {value:g}")
-        if not 0.0 <= self.gravity < math.inf:
-            raise SettingError(f"--gravity: expected a number of 0 or more, found {self.gravity:g}")
-        if not math.isfinite(self.delay):
-            raise SettingError(f"--delay: expected seconds, found {self.delay:g}")
+        for one in fields(self):
+            value = getattr(self, one.name)
+            if value is None and one.default is None:
+                continue
+            expected = _expected(one.metadata.get("range"), _kinds()[one.name], value)
+            if expected:
+                raise SettingError(f"{flag(one.name)}: expected {expected}, found {reprlib.repr(value)}")
         if self.model not in ("auto", "plain"):
             self._check_terms()
         if self.estimator == "paper":
@@ -138,8 +181,11 @@ class Settings:
         """
         content = _without_short_forms(content)
         known = {f.name: content[f.name] for f in fields(cls) if f.name in content}
-        if known.get("poles") is not None:
-            known["poles"] = tuple(complex(pole) if isinstance(pole, str) else float(pole) for pole in known["poles"])
+        poles = known.get("poles")
+        if poles is not None:
+            if not isinstance(poles, list | tuple):
+                raise SettingError(f"--poles: expected six numbers, found {reprlib.repr(poles)}")
+            known["poles"] = _poles(",".join(map(str, poles[:7])))
         return cls(**known)
 
     @property

@@ -32,9 +32,9 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "files": room("construction errors limits", "pydantic"),
     "stores": room("errors files", "pyarrow"),
     "profile": room("errors files units", "pydantic"),
-    "settings": room("errors model signals"),
+    "settings": room("errors limits model signals"),
     "results": room("errors files log words", "pydantic"),
-    "synth": room("arm errors files log progress", "numpy pydantic scipy"),
+    "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
     "table4": room("arm log results synth", "numpy"),
     "writers": room("errors files log ros2", "mcap numpy polars pyarrow"),
     "readers": room(

@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import time
+from collections.abc import Sequence
 from types import FrameType
 
 EXIT_FAILED = 1
@@ -27,14 +28,24 @@ def main() -> None:
         signal.signal(number, stopping)
     harden_streams()
     bound_by_environment()  # before anything loads numpy
-    code = _run()
+    code = run(sys.argv[1:])
     if code:
         sys.exit(code)
 
 
-def _run() -> int:
-    """Run the command; the outermost place, where every exception that is not meant to end it becomes a line."""
-    from algid.cli.output import complain
+def run(arguments: Sequence[str]) -> int:
+    """Run a command and give its exit code: the outermost place, where what is raised becomes a line.
+
+    Raises
+    ------
+    SystemExit
+        As the command ends by itself with an exit code of its own.
+    _StoppedError
+        If a signal stops it.
+    KeyboardInterrupt
+        If a signal stops a caller that hears signals by itself.
+    """
+    from algid.cli.output import complain, remark
     from algid.errors import AlgidError
     from algid.faults import TRACEBACK, fault
 
@@ -43,7 +54,7 @@ def _run() -> int:
         try:
             from algid.cli.app import called
 
-            called(sys.argv[1:])()
+            called(arguments)(list(arguments))
         finally:
             sys.stdout.flush()  # else a full disk is told by the interpreter, in its words
         return 0
@@ -57,7 +68,9 @@ def _run() -> int:
     except BaseException as error:  # whatever a library raises, a panic too
         (line, code), found = fault(error), error
     if os.environ.get(TRACEBACK) == "1":
-        sys.excepthook(type(found), found, found.__traceback__)
+        import traceback
+
+        remark("".join(traceback.format_exception(found)))
     complain(line)
     return code
 

@@ -33,13 +33,15 @@ def batch(
     parameters: Annotated[
         Path | None, typer.Option(help="Result of the arm identified before: then logs are of the loaded arm.")
     ] = None,
-    workers: Annotated[int | None, typer.Option(help="Worker processes; one a core by default.", min=1)] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Worker processes; one a core by default.", min=1, max=4096)
+    ] = None,
     scheduler: Annotated[str | None, typer.Option(help="tcp://HOST:PORT of a Dask scheduler to run on.")] = None,
     memory_limit: Annotated[
         str | None, typer.Option(help="Memory of each worker, like 2GB; a job that needs more fails alone.")
     ] = None,
     timeout: Annotated[
-        float, typer.Option(help="Seconds that a job may take; one that takes longer fails alone.", min=1e-3)
+        float, typer.Option(help="Seconds that a job may take; one that takes longer fails alone.", min=1e-3, max=1e7)
     ] = 3600.0,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Run jobs again that have failed.")] = False,
     watch: Annotated[bool, typer.Option("--watch", help="Go on, and take logs as they arrive.")] = False,

@@ -24,7 +24,7 @@ def check(
     against: Annotated[
         Against, typer.Option(help="paper: each error at most Table 4's; truth: each at most --max-error.")
     ] = Against.TRUTH,
-    max_error: Annotated[float | None, typer.Option(help="Largest error allowed, percent.", min=0)] = None,
+    max_error: Annotated[float | None, typer.Option(help="Largest error allowed, percent.", min=0, max=1e9)] = None,
     tolerance_file: Annotated[
         Path | None, typer.Option(help="TOML with a table [max_error_percent]: parameter = percent.")
     ] = None,

@@ -26,10 +26,10 @@ def listed(known: Callable[[], list[str]]) -> Completion:
 
 
 def refusing_checks() -> list[str]:
-    """Codes of the checks that refuse a log."""
-    from algid.inspection.findings import REFUSED
+    """Codes of the checks that may be accepted."""
+    from algid.profile import Check
 
-    return list(REFUSED)
+    return list(get_args(Check))
 
 
 def terms() -> list[str]:

@@ -32,19 +32,19 @@ def convert(
     Raises
     ------
     OutputError
-        If no format has the suffix of OUT, or OUT exists and may not be overwritten.
+        If no format has the suffix of OUT.
     typer.Exit
         At the end: with 3 where samples are missing, else with 0.
     """
     from algid.errors import OutputError
+    from algid.files import refuse_existing
     from algid.readers import open_log
     from algid.report.progress import progress
     from algid.writers import FORMATS, write_log
 
     if target.suffix.lstrip(".").lower() not in FORMATS:
         raise OutputError(f"{target}: expected a name that ends in .mcap, .parquet or .csv")
-    if target.exists() and not force:
-        raise OutputError(f"{target}: exists already; overwrite it with --force")
+    refuse_existing(target, force)
     reader = open_log(source, choice.profile())
     notices: list[Notice] = []
 

@@ -55,10 +55,12 @@ def design(
     speed: Annotated[str | None, typer.Option(help="Largest speed, rad/s: 3, or 3,4 by joint.")] = None,
     acceleration: Annotated[str | None, typer.Option(help="Largest acceleration, rad/s²; none by default.")] = None,
     torque: Annotated[str | None, typer.Option(help="Largest torque, N m: 5, or 5,2 by joint.")] = None,
-    tip_height: Annotated[float | None, typer.Option(help="Lowest height of the tip over joint 1, m.")] = None,
+    tip_height: Annotated[
+        float | None, typer.Option(help="Lowest height of the tip over joint 1, m.", min=-1e6, max=1e3)
+    ] = None,
     duration: Annotated[float | None, typer.Option(help="Length of a run, s; 10 by default.", min=0.5, max=120)] = None,
     rate: Annotated[
-        float | None, typer.Option(help="Samples a second of its log, Hz; 1000 by default.", min=20)
+        float | None, typer.Option(help="Samples a second of its log, Hz; 1000 by default.", min=20, max=1e5)
     ] = None,
     runs: Annotated[str | None, typer.Option(help="Runs without and with the payload, like 2,1.")] = None,
     drive: Annotated[Drive, typer.Option(help="Position control, or open loop torque.")] = Drive.POSITION,
@@ -66,22 +68,28 @@ def design(
         str | None, typer.Option("--for", help="Parameters that matter, like k1,m_p; all by default.")
     ] = None,
     position_noise: Annotated[
-        float | None, typer.Option(help="Noise of the angles, rad (standard deviation).", min=1e-12)
+        float | None, typer.Option(help="Noise of the angles, rad (standard deviation).", min=1e-12, max=1e3)
     ] = None,
     torque_noise: Annotated[
-        float | None, typer.Option(help="Noise of the torques, N m (standard deviation).", min=1e-12)
+        float | None, typer.Option(help="Noise of the torques, N m (standard deviation).", min=1e-12, max=1e3)
     ] = None,
     noise_from: Annotated[Path | None, typer.Option(help="A log of the arm whose noise is taken.")] = None,
     prior_error: Annotated[
         float | None,
-        typer.Option(help="Share by which masses and friction may be wrong where no error bar tells; 0.2.", min=0),
+        typer.Option(
+            help="Share by which masses and friction may be wrong where no error bar tells; 0.2.", min=0, max=100
+        ),
     ] = None,
-    payload: Annotated[float | None, typer.Option(help="Payload of the loaded runs, kg.", min=1e-6)] = None,
-    l1: Annotated[float | None, typer.Option("--l1", help="Length of link 1, m, where known.", min=1e-3)] = None,
-    l2: Annotated[float | None, typer.Option("--l2", help="Length of link 2, m, where known.", min=1e-3)] = None,
+    payload: Annotated[float | None, typer.Option(help="Payload of the loaded runs, kg.", min=1e-6, max=1e6)] = None,
+    l1: Annotated[
+        float | None, typer.Option("--l1", help="Length of link 1, m, where known.", min=1e-3, max=1e3)
+    ] = None,
+    l2: Annotated[
+        float | None, typer.Option("--l2", help="Length of link 2, m, where known.", min=1e-3, max=1e3)
+    ] = None,
     margin: Annotated[float, typer.Option(help="Share of every limit left unused.", min=0, max=0.5)] = 0.05,
     joints: Annotated[str, typer.Option(help="Names of the robot's joints.")] = "joint1,joint2",
-    seed: Annotated[int, typer.Option(help="Seed of the search.", min=0)] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the search.", min=0, max=2**63)] = 0,
     force: Annotated[bool, typer.Option("--force", help="Replace a design that is there.")] = False,
     form: Annotated[Shown, typer.Option("--format", help="What to print.")] = Shown.TABLE,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,

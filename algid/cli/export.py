@@ -31,11 +31,15 @@ def export(
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="File; the result's name with the format's ending by default.")
     ] = None,
-    l1: Annotated[float | None, typer.Option(help="Length of link 1, m; g k1 / k2 by default.")] = None,
-    l2: Annotated[float | None, typer.Option(help="Length of link 2, m.")] = None,
-    m1: Annotated[float | None, typer.Option(help="Mass of link 1, kg.")] = None,
-    m2: Annotated[float | None, typer.Option(help="Mass of link 2, kg.")] = None,
-    rotor1: Annotated[float | None, typer.Option(help="Joint 1's rotor at the joint, kg m²: a part of k5.")] = None,
+    l1: Annotated[
+        float | None, typer.Option(help="Length of link 1, m; g k1 / k2 by default.", min=1e-3, max=1e3)
+    ] = None,
+    l2: Annotated[float | None, typer.Option(help="Length of link 2, m.", min=1e-3, max=1e3)] = None,
+    m1: Annotated[float | None, typer.Option(help="Mass of link 1, kg.", min=1e-6, max=1e6)] = None,
+    m2: Annotated[float | None, typer.Option(help="Mass of link 2, kg.", min=1e-6, max=1e6)] = None,
+    rotor1: Annotated[
+        float | None, typer.Option(help="Joint 1's rotor at the joint, kg m²: a part of k5.", min=0, max=1e6)
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
 ) -> None:
     """Write the arm of RESULT as a model; what is not known is chosen nearest to uniform links, and the file says so.

@@ -64,7 +64,7 @@ def identify(
     Raises
     ------
     SettingError
-        If a log of estimates is asked for without a report, or the result's name is empty.
+        If a log of estimates is asked for without a report.
     typer.Exit
         With `EXIT_INCOMPLETE` where a parameter is not identified, samples are lost, or the verdict is Failed.
     """
@@ -80,8 +80,6 @@ def identify(
 
     if export is not None and not report:
         raise SettingError("--export: the log is made from the time series; leave --no-report out")
-    if name == "":
-        raise SettingError("--name: expected a name for the result folder, found ''; leave it out for the log's own")
     keep_freed()
     settings = choice.settings()
     unloaded, loaded = (logs, loaded or []) if parameters is None else ([], [*logs, *(loaded or [])])

@@ -18,18 +18,11 @@ def new(
     """Write a profile with everything that can be set, filled in with what a log tells.
 
     Example: algid profile new arm.mcap -o algid.toml
-
-    Raises
-    ------
-    OutputError
-        If the profile exists and may not be overwritten.
     """
-    from algid.errors import OutputError
-    from algid.files import whole_file
+    from algid.files import refuse_existing, whole_file
     from algid.inspection.draft import draft_profile
 
-    if out.exists() and not force:
-        raise OutputError(f"{out}: exists already; overwrite it with --force")
+    refuse_existing(out, force)
     text = draft_profile(log)
     with whole_file(out) as temporary:
         temporary.write_text(text, encoding="utf-8")

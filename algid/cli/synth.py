@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from algid.synth.excitation import Torque
 
 
+FIRST_YEAR, LAST_YEAR = 1970, 2037
+"""Of a log's start: the stamps in messages of ROS 2 end in January 2038."""
+
+
 class LogFormat(StrEnum):
     """Formats that logs are written in."""
 
@@ -46,9 +50,9 @@ def synth(
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write into.")] = Path(),
     kind: Annotated[LogFormat, typer.Option("--format", help="Format of the logs.")] = LogFormat.MCAP,
-    rate: Annotated[float, typer.Option(help="Samples a second, Hz.", min=1e-3)] = 1000.0,
+    rate: Annotated[float, typer.Option(help="Samples a second, Hz.", min=1e-3, max=1e6)] = 1000.0,
     duration: Annotated[
-        float | None, typer.Option(help="Length of each log, s; 1, or as long as the motion.", min=1e-3)
+        float | None, typer.Option(help="Length of each log, s; 1, or as long as the motion.", min=1e-3, max=1e6)
     ] = None,
     torque: Annotated[
         str | None,
@@ -66,14 +70,18 @@ def synth(
     initial: Annotated[
         str | None, typer.Option(help="Initial state θ1,θ2,ω1,ω2 in rad and rad/s; hanging at rest by default.")
     ] = None,
-    position_noise: Annotated[float, typer.Option(help="Noise of the angles, rad (standard deviation).", min=0)] = 0.0,
-    torque_noise: Annotated[float, typer.Option(help="Noise of the torques, N m (standard deviation).", min=0)] = 0.0,
+    position_noise: Annotated[
+        float, typer.Option(help="Noise of the angles, rad (standard deviation).", min=0, max=1e3)
+    ] = 0.0,
+    torque_noise: Annotated[
+        float, typer.Option(help="Noise of the torques, N m (standard deviation).", min=0, max=1e3)
+    ] = 0.0,
     encoder_bits: Annotated[
         int | None, typer.Option(help="Round angles to 2π / 2^bits, as an encoder does.", min=4, max=32)
     ] = None,
-    jitter: Annotated[float, typer.Option(help="Jitter of the stamps, s (standard deviation).", min=0)] = 0.0,
+    jitter: Annotated[float, typer.Option(help="Jitter of the stamps, s (standard deviation).", min=0, max=1e3)] = 0.0,
     drop: Annotated[float, typer.Option(help="Share of samples lost at random.", min=0, max=0.9)] = 0.0,
-    seed: Annotated[int, typer.Option(help="Seed of noise, jitter and losses.", min=0)] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of noise, jitter and losses.", min=0, max=2**63)] = 0,
     force: Annotated[bool, typer.Option("--force", help="Overwrite logs that are there.")] = False,
     start_time: Annotated[
         datetime | None, typer.Option(help="When the log starts, in UTC; its stamps count from zero by default.")
@@ -103,7 +111,7 @@ def synth(
     from algid.writers import write_log
 
     described = load_case(case)
-    start_ns = 0 if start_time is None else int(start_time.replace(tzinfo=UTC).timestamp()) * 10**9
+    start_ns = 0 if start_time is None else _start_ns(start_time)
     sensors = Sensors(position_noise, torque_noise, encoder_bits, jitter, drop, seed, start_ns)
     roles = ("unloaded", "loaded") if described.payload else ("unloaded",)
 
@@ -118,6 +126,7 @@ def synth(
                     f"{flag} {value}: a motion starts where it was planned and carries one payload; leave it out"
                 )
         plan = read_plan(motion)
+        _check_samples(rate, duration or plan.duration)
         refuse_existing_logs(roles)
         with progress("samples") as shown:
             logs = rehearse(described, plan, Recording(rate, duration or plan.duration, sensors=sensors), shown)
@@ -125,6 +134,7 @@ def synth(
         recording = Recording(rate=rate, duration=1.0 if duration is None else duration, sensors=sensors)
         if initial is not None:
             recording = replace(recording, initial=_state(initial))
+        _check_samples(rate, recording.duration)
         if round(rate * recording.duration) < 1:
             raise SettingError(
                 f"--duration: expected at least {1 / rate:g} s, two samples at --rate {rate:g}, "
@@ -147,9 +157,33 @@ def synth(
         say(str(path))
 
 
+def _start_ns(start: datetime) -> int:
+    """A date in ns since 1970, in UTC where it names no zone."""
+    from algid.errors import SettingError
+
+    found = start if start.tzinfo is not None else start.replace(tzinfo=UTC)
+    if not FIRST_YEAR <= found.year <= LAST_YEAR:
+        span = f"from {FIRST_YEAR} to {LAST_YEAR}"
+        raise SettingError(f"--start-time: expected a date {span}, found {start.isoformat()}")
+    return int(found.timestamp()) * 10**9
+
+
+def _check_samples(rate: float, duration: float) -> None:
+    from algid.errors import SettingError
+    from algid.limits import PHYSICAL
+
+    most = PHYSICAL.samples[1]
+    if rate * duration > most:
+        raise SettingError(
+            f"--duration: {duration:g} s at --rate {rate:g} Hz are {rate * duration:.3g} samples; expected at most "
+            f"{most:g}, more than a day at 1 kHz"
+        )
+
+
 def _schedule(text: str) -> list[tuple[float, float]]:
     """Times in s, increasing, and payloads in kg out of S=KG,…."""
     from algid.errors import SettingError
+    from algid.limits import PHYSICAL
 
     try:
         schedule = [(float(time), float(mass)) for time, mass in (part.split("=") for part in text.split(","))]
@@ -157,7 +191,8 @@ def _schedule(text: str) -> list[tuple[float, float]]:
         schedule = []
     times = [time for time, _ in schedule]
     increasing = all(earlier < later for earlier, later in pairwise(times))
-    if not (schedule and increasing and all(0 <= number < math.inf for pair in schedule for number in pair)):
+    longest, heaviest = PHYSICAL.duration[1], PHYSICAL.mass[1]
+    if not (schedule and increasing and all(0 <= time <= longest and 0 <= m <= heaviest for time, m in schedule)):
         raise SettingError(
             f"--payload-schedule: expected increasing times and payloads of 0 or more like 2=0.05,4=0, found {text!r}"
         )
@@ -167,6 +202,7 @@ def _schedule(text: str) -> list[tuple[float, float]]:
 def _state(text: str) -> tuple[float, float, float, float]:
     """Two angles in rad and two velocities in rad/s out of θ1,θ2,ω1,ω2."""
     from algid.errors import SettingError
+    from algid.limits import PHYSICAL
 
     try:
         first, second, third, fourth = (float(part) for part in text.split(","))
@@ -174,6 +210,9 @@ def _state(text: str) -> tuple[float, float, float, float]:
         first = second = third = fourth = math.nan
     if not math.isfinite(first + second + third + fourth):
         raise SettingError(f"--initial: expected four numbers like -1.57,0,0,0, found {text!r}")
+    turned, fast = PHYSICAL.angle[1], PHYSICAL.speed[1]
+    if max(abs(first), abs(second)) > turned or max(abs(third), abs(fourth)) > fast:
+        raise SettingError(f"--initial: expected angles within {turned:g} rad and {fast:g} rad/s, found {text!r}")
     return first, second, third, fourth
 
 

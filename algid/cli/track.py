@@ -21,10 +21,10 @@ def track(
     parameters: Annotated[Path, typer.Option(help="Result of the arm, with error bars.")],
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the folder LOG.track.")] = Path(),
     l1: Annotated[
-        float | None, typer.Option("--l1", help="Length of link 1, m; the result's by default.", min=1e-3)
+        float | None, typer.Option("--l1", help="Length of link 1, m; the result's by default.", min=1e-3, max=1e3)
     ] = None,
     l2: Annotated[
-        float | None, typer.Option("--l2", help="Length of link 2, m; the result's by default.", min=1e-3)
+        float | None, typer.Option("--l2", help="Length of link 2, m; the result's by default.", min=1e-3, max=1e3)
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a track that is there.")] = False,
     export: Annotated[Export | None, typer.Option(help="Also write track.mcap, for Foxglove and PlotJuggler.")] = None,

@@ -31,7 +31,7 @@ def validate(
     logs: Annotated[list[Path], typer.Argument(help="Logs of the arm without payload.")],
     loaded: Annotated[list[Path] | None, typer.Option(help="A log of the loaded arm; may be repeated.")] = None,
     max_nrmse: Annotated[
-        float | None, typer.Option(help="Largest RMSE over the torque's RMS allowed, for either joint.", min=0)
+        float | None, typer.Option(help="Largest RMSE over the torque's RMS allowed, for either joint.", min=0, max=1e9)
     ] = None,
     simulate: Annotated[
         bool, typer.Option("--simulate", help="Also simulate the arm over 0.1, 0.5 and 2 s, and tell its angles' RMSE.")

@@ -20,6 +20,10 @@ Positive = Annotated[float, Field(gt=0)]  # inf is no limit
 NonNegative = Annotated[float, Field(ge=0)]  # nothing is a joint without a drive
 Pair = Positive | tuple[Positive, Positive]
 Span = tuple[float, float]
+MOST_RUNS = 1000
+Runs = Annotated[int, Field(ge=0, le=MOST_RUNS)]
+SMALLEST, LARGEST = 1e-6, 1e6
+"""What a limit in rad, rad/s, rad/s² or N m may be, but for 0 and inf."""
 
 
 class LimitsFile(BaseModel):
@@ -32,9 +36,9 @@ class LimitsFile(BaseModel):
     acceleration: Pair | None = None
     torque: NonNegative | tuple[NonNegative, NonNegative] | None = None
     tip_height: float | None = None
-    duration: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
-    rate: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
-    runs: tuple[Annotated[int, Field(ge=0)], Annotated[int, Field(ge=0)]] | None = None
+    duration: Annotated[float, Field(ge=0.5, le=120, allow_inf_nan=False)] | None = None
+    rate: Annotated[float, Field(ge=20, le=1e5, allow_inf_nan=False)] | None = None
+    runs: tuple[Runs, Runs] | None = None
 
 
 @dataclass(frozen=True)
@@ -81,6 +85,8 @@ def limits_of(asked: Request, lengths: FloatArray) -> Limits:
             raise SettingError(
                 f"--{name}: it must be given, or `{name} = …` in the file of --limits; inf is no limit at all"
             )
+    for name in ("range", "speed", "acceleration", "torque"):
+        _check(name, asked.content.get(name))
     low, high = _range(asked.content["range"])
     height = float(asked.get("tip_height", -np.inf))
     if np.isfinite(height) and not np.all(np.isfinite(lengths)):
@@ -92,6 +98,14 @@ def limits_of(asked: Request, lengths: FloatArray) -> Limits:
     if not np.any(np.isfinite([high - low, *others.values()])):
         raise SettingError("--range: without any limit no motion is the best, found inf for all; give one")
     return Limits(low=low, high=high, height=height, lengths=lengths, **others)
+
+
+def _check(name: str, value: Any) -> None:
+    """Raises `SettingError` where a limit is neither inf nor such as an arm may have."""
+    numbers = np.abs(np.array(0.0 if value is None else value, dtype=np.float64)).ravel()
+    wrong = ~(np.isinf(numbers) | (numbers == 0) | ((numbers >= SMALLEST) & (numbers <= LARGEST)))
+    if np.any(wrong):
+        raise SettingError(f"--{name}: expected from {SMALLEST:g} to {LARGEST:g}, or inf, found {numbers[wrong][0]:g}")
 
 
 def _both(value: Any) -> FloatArray:
@@ -138,7 +152,7 @@ def _parsed(name: str, text: str) -> Any:
     if len(parts) > 2 or any(len(part) != 1 for part in parts) or any(math.isnan(number) for number in numbers):
         return None
     if name == "runs":
-        whole = len(numbers) == 2 and all(number >= 0 and number.is_integer() for number in numbers)
+        whole = len(numbers) == 2 and all(0 <= number <= MOST_RUNS and number.is_integer() for number in numbers)
         return (int(numbers[0]), int(numbers[1])) if whole and any(numbers) else None
     if not all(number > 0 or (number == 0 and name == "torque") for number in numbers):
         return None

@@ -12,7 +12,7 @@ import numpy as np
 from algid.arm import CONSTANT_NAMES
 from algid.errors import LogError, ResultError, SettingError
 from algid.estimators.paper import SHORTEST
-from algid.files import result_folder, whole_folder
+from algid.files import refuse_misleading, result_folder, whole_folder
 from algid.identification.by_paper import run_paper
 from algid.identification.outcome import Identified
 from algid.identification.series import write_fit_series
@@ -103,6 +103,7 @@ def identify(
     ValueError
         If there is neither an unloaded log nor `parameters`.
     """
+    refuse_misleading(name)
     settings, out = settings or Settings(), None if out is None else Path(out)
     earlier = Earlier.of(parameters)
     profile = profile if earlier is None else reused(profile, earlier.result)

@@ -22,7 +22,7 @@ _HEAD = """\
 # offsets = [0.0, 0.0]       # rad, added to the angles
 # start = 0.0                # s since the first sample: leave out what comes before
 # end = 60.0                 # s since the first sample: leave out what comes after
-# accept = ["GAPS"]          # codes of checks that may warn, but not refuse
+# accept = ["DEGREES"]       # codes of checks that may warn, but not refuse
 """
 _ENCODER = (
     "# gear_ratio = 1.0  # turns of the encoder in one of the joint\n# counts = 4096.0  # encoder counts in one turn\n"

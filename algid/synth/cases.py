@@ -15,12 +15,26 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from algid.arm import Arm
 from algid.errors import SettingError
 from algid.files import read_toml
+from algid.limits import PHYSICAL, Range
 from algid.synth.excitation import MultiSine
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Harmonics = Annotated[list[Finite], Field(min_length=1)]
+
+def _within(bounds: Range) -> Any:
+    return Field(ge=bounds[0], le=bounds[1], allow_inf_nan=False)
+
+
+Mass = Annotated[float, _within(PHYSICAL.mass)]
+Length = Annotated[float, _within(PHYSICAL.length)]
+Inertia = Annotated[float, _within(PHYSICAL.inertia)]
+Friction = Annotated[float, _within(PHYSICAL.friction)]
+Gravity = Annotated[float, _within(PHYSICAL.gravity)]
+Payload = Annotated[float, _within((0.0, PHYSICAL.mass[1]))]
+Centre = Annotated[float, _within((-PHYSICAL.length[1], PHYSICAL.length[1]))]
+Percent = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+_SOME = Field(min_length=1, max_length=1000)
+Amplitudes = Annotated[list[Annotated[float, _within(PHYSICAL.torque)]], _SOME]
+Frequencies = Annotated[list[Annotated[float, _within((0.0, PHYSICAL.bandwidth[1]))]], _SOME]
+Phases = Annotated[list[Annotated[float, _within(PHYSICAL.angle)]], _SOME]
 
 
 @dataclass(frozen=True)
@@ -39,17 +53,17 @@ class _Table(BaseModel):
 
 
 class _ArmTable(_Table):
-    m1: Positive
-    m2: Positive
-    l1: Positive
-    l2: Positive
-    lc1: Finite | None = None
-    lc2: Finite | None = None
-    I1: NonNegative | None = None
-    I2: NonNegative | None = None
-    b1: NonNegative = 0.0
-    b2: NonNegative = 0.0
-    g: NonNegative = 9.81
+    m1: Mass
+    m2: Mass
+    l1: Length
+    l2: Length
+    lc1: Centre | None = None
+    lc2: Centre | None = None
+    I1: Inertia | None = None
+    I2: Inertia | None = None
+    b1: Friction = 0.0
+    b2: Friction = 0.0
+    g: Gravity = 9.81
 
     def arm(self) -> Arm:
         """The arm; a link of which only length and mass are given is uniform: l / 2, m l² / 12."""
@@ -63,13 +77,13 @@ class _ArmTable(_Table):
 
 
 class _PayloadTable(_Table):
-    m_p: NonNegative
+    m_p: Payload
 
 
 class _JointTorque(_Table):
-    amplitude: Harmonics
-    frequency: Harmonics
-    phase: Harmonics
+    amplitude: Amplitudes
+    frequency: Frequencies
+    phase: Phases
 
     @model_validator(mode="after")
     def _same_lengths(self) -> _JointTorque:
@@ -96,7 +110,7 @@ class _CaseFile(_Table):
     arm: _ArmTable
     payload: _PayloadTable = _PayloadTable(m_p=0.0)
     torque: _TorqueTable | None = None
-    paper_error_percent: dict[str, Positive] = {}
+    paper_error_percent: dict[str, Percent] = {}
 
 
 def case_names() -> list[str]:

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 import algid.cli
-from algid.cli import _run, _StoppedError
+from algid.cli import _StoppedError
 from algid.cli.output import console
 from algid.faults import EXIT_INTERNAL
 from algid.report.text import printable
@@ -45,7 +45,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
     def running(*arguments: str) -> tuple[object, str]:
         monkeypatch.setattr(sys, "argv", ["algid", *arguments])
         try:
-            code: object = _run()
+            code: object = algid.cli.run(arguments)
         except SystemExit as end:
             code = end.code
         return code, capsys.readouterr().err

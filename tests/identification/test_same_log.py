@@ -67,7 +67,7 @@ def test_gravity_flag_over_profile_over_default(flags: tuple[str, ...], expected
     write_log(tmp_path / "one.csv", moving_log(4000))
     (tmp_path / "algid.toml").write_text("gravity = 0\n")
     command = ["identify", str(tmp_path / "one.csv"), "-o", str(tmp_path), "--profile", str(tmp_path / "algid.toml")]
-    more = ["--estimator", "weak", "--model", "plain", "--no-report", "-q", "--accept", "NO_GRAVITY", *flags]
+    more = ["--estimator", "weak", "--model", "plain", "--no-report", "-q", *flags]
     CliRunner().invoke(app, [*command, *more])
     assert read_result(tmp_path / "one.algid").settings["gravity"] == expected
 

@@ -1,0 +1,310 @@
+"""Hostile calls of algid: flags that nobody means, TOML files and results that nobody wrote.
+
+Each is drawn from a seed. A call is made in a folder that holds what `places.furnish` puts there.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from datetime import datetime
+from enum import Enum
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal, get_args, get_origin
+
+import polars as pl
+import typer
+
+from algid.cli.app import COMMANDS, gathered
+from pipelines.hostile import places, values
+from pipelines.mutations import damage
+
+UNLOADED, LOADED = "case1-unloaded.csv", "case1-loaded.csv"
+RESULTS = ("full.algid", "weak.algid", "paper.algid")
+NOISE = ("--position-noise", "1e-3", "--torque-noise", "1e-2")
+DESIGN = ("--range", "1.2", "--speed", "3", "--torque", "1.5", "--duration", "1", "--rate", "50", *NOISE)
+QUICK = ("--estimator", "weak", "--model", "plain", "--no-report")
+CALLS: dict[str, tuple[str, ...]] = {
+    "inspect": (UNLOADED,),
+    "design": ("case1", "-o", "out", *DESIGN),
+    "identify": (UNLOADED, "-o", "out", *QUICK),
+    "validate": ("full.algid", UNLOADED),
+    "export": ("full.algid", "--to", "urdf", "-o", "out/arm.urdf"),
+    "fleet": ("results", "-o", "out"),
+    "track": (LOADED, "--parameters", "full.algid", "--l1", "0.1626", "--l2", "0.1232", "-o", "out"),
+    "check": ("full.algid", "--max-error", "50"),
+    "report": ("weak.algid",),
+    "compare": ("full.algid", "weak.algid", "-o", "out"),
+    "synth": ("case1", "-o", "out", "--duration", "0.2", "--rate", "50"),
+    "convert": (UNLOADED, "out/copy.mcap"),
+    "guide": (),
+}
+NEVER = {"--help", "--watch", "--scheduler", "--version", "--install-completion", "--show-completion", "--save-plots"}
+"""Options that wait for ever by intent, talk to a cluster, or need another package."""
+SLOW = {("identify", "--estimator"), ("identify", "--model"), ("identify", "--cross-validate")}
+"""Flags that choose honest work of more than a second."""
+
+
+@dataclass(frozen=True)
+class Call:
+    """A kind, the arguments, and what was changed, for the report."""
+
+    kind: str
+    arguments: tuple[str, ...]
+    note: str = ""
+
+
+def draw_call(seed: int, place: Path) -> Call:
+    """The call of that seed; the files that it needs are put into `place`."""
+    draw = random.Random(seed)
+    makers: tuple[Callable[[random.Random, Path], Call], ...] = (flags, flags, flags, toml, result, result, series)
+    return draw.choice(makers)(draw, place)
+
+
+# flags
+
+
+@cache
+def options(command: str) -> tuple[Any, ...]:
+    """A command's options, as typer reads them."""
+    group = typer.main.get_command(gathered([command, "guide" if command != "guide" else "check"]))
+    every = group.commands[command].params  # type: ignore[attr-defined]
+    return tuple(one for one in every if one.param_type_name == "option" and one.opts[-1] not in NEVER)
+
+
+def flags(draw: random.Random, _place: Path) -> Call:
+    """A sound call with one to three flags of any value."""
+    command = draw.choice([name for name in COMMANDS if name in CALLS])
+    given = [*CALLS[command]]  # no argument of a process holds a NUL, nor half a character
+    chosen = [draw.choice(options(command)) for _ in range(draw.choice((1, 1, 2, 3)))] if options(command) else []
+    for option in chosen:
+        if (command, option.opts[-1]) in SLOW and draw.random() < 0.8:
+            continue
+        given += _given(option, draw)
+    if draw.random() < 0.1 and CALLS[command]:
+        given[draw.randrange(len(CALLS[command]))] = values.text(draw)
+    words = [word.replace("\0", "").replace("\ud800", "\udcff") for word in given]
+    return Call("flags", (command, *words))
+
+
+def _given(option: Any, draw: random.Random) -> list[str]:
+    """An option and its value."""
+    flag, kind = option.opts[0], option.type_descriptor.annotation
+    if kind is bool:
+        return [draw.choice((*option.opts, *option.secondary_opts))]
+    if get_origin(kind) is Literal:
+        known = [str(one) for one in get_args(kind)]
+    elif isinstance(kind, type) and issubclass(kind, Enum):
+        known = [one.value for one in kind]
+    elif kind is float:
+        known = [repr(values.number(draw)) for _ in range(4)]
+    elif kind is int:
+        known = [str(draw.choice(values.WHOLE[:-1])) for _ in range(4)]
+    elif kind in (Path, list[Path]):
+        known = [*RESULTS, UNLOADED, LOADED, "results", "out", "absent", "/dev/zero", "/dev/full", "."]
+    elif kind is datetime:
+        known = [f"{draw.choice((1, 1600, 1677, 1969, 1970, 2026, 2262, 2300, 9999)):04d}-01-01T00:00:00"]
+    else:
+        known = _words(draw)
+    value = draw.choice(known) if draw.random() < 0.85 else values.text(draw)
+    return [f"{flag}={value}" if flag.startswith("--") else flag + value]
+
+
+def _words(draw: random.Random) -> list[str]:
+    """What an option of text may hold: numbers in every arrangement that some option has."""
+    one, two, three, four = (repr(values.number(draw)) for _ in range(4))
+    key = draw.choice(("tau1.sign", "theta1.unit", "theta1.offset", "gravity", "start", "accept", "a.b.c", "signs"))
+    arranged = (f"{one}", f"{one},{two}", f"{one}:{two},{three}:{four}", f"{one},{two},{three},{four}")
+    return [*arranged, f"{one}={two},{three}={four}", f"{key}={values.text(draw)}", f"{key}={one}", values.text(draw)]
+
+
+# TOML
+
+
+def toml(draw: random.Random, place: Path) -> Call:
+    """A file of settings, some of it changed."""
+    file = "hostile.toml"
+    known: tuple[tuple[Any, tuple[str, ...]], ...] = (
+        (places.PROFILE, ("identify", UNLOADED, "-o", "out", *QUICK, "--profile", file)),
+        (places.PROFILE, ("inspect", UNLOADED, "--profile", file)),
+        (places.PROFILE, ("convert", UNLOADED, "out/copy.csv", "--profile", file)),
+        (places.ARM, ("synth", file, "-o", "out", "--duration", "0.2", "--rate", "50")),
+        (places.ARM, ("design", file, "-o", "out", *DESIGN)),
+        (places.LIMITS, ("design", "case1", "-o", "out", "--limits", file, *NOISE)),
+        (places.TOLERANCES, ("check", "full.algid", "--tolerance-file", file)),
+        (places.MANIFEST, ("batch", file, "-o", "out", "--workers", "1", *QUICK, "-q")),
+    )
+    content, arguments = draw.choice(known[:-1] if draw.random() < 0.95 else known)
+    written = as_toml(values.changed(content, draw)).encode("utf-8", "surrogatepass")
+    if draw.random() < 0.2:
+        written = damage(written or b" ", draw)
+    (place / file).write_bytes(written)
+    return Call("toml", arguments, written.decode(errors="replace")[:600])
+
+
+def as_toml(content: dict[str, Any]) -> str:
+    """A document in TOML; what TOML cannot say is said as it would be in JSON."""
+    lines = [f"{_key(key)} = {_inline(value)}" for key, value in content.items() if not isinstance(value, dict)]
+    for key, value in content.items():
+        if isinstance(value, dict):
+            lines += [f"[{_key(key)}]", *(f"{_key(inner)} = {_inline(one)}" for inner, one in value.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _key(key: str) -> str:
+    return json.dumps(key, ensure_ascii=False)
+
+
+def _inline(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_key(key)} = {_inline(one)}" for key, one in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(map(_inline, value)) + "]"
+    if isinstance(value, float):
+        return repr(value)  # nan and inf are TOML's own words
+    return "" if value is None else json.dumps(value, ensure_ascii=False)
+
+
+# results
+
+
+def result(draw: random.Random, place: Path) -> Call:
+    """A command on a result whose result.json, or a track whose track.json, is changed."""
+    source = draw.choice((*RESULTS, RESULTS[0], "case1-loaded.track"))
+    folder, name = ("hostile.track", "track.json") if source.endswith(".track") else ("hostile.algid", "result.json")
+    _copied(place / source, place / folder)
+    content = json.loads((place / source / name).read_text())
+    written = json.dumps(values.changed(content, draw)).encode()
+    if draw.random() < 0.15:
+        written = damage(written, draw)
+    (place / folder / name).write_bytes(written)
+    return Call("result", _reading(folder, draw), f"{source}, {_differing(content, written)}")
+
+
+def _differing(content: Any, written: bytes) -> str:
+    """The first values that differ, for the report."""
+    try:
+        found = json.loads(written)
+    except (ValueError, RecursionError):
+        return "damaged"
+
+    def walk(one: Any, other: Any, at: str) -> Iterator[str]:
+        if isinstance(one, dict) and isinstance(other, dict):
+            for key in {**one, **other}:
+                yield from walk(one.get(key), other.get(key), f"{at}.{key}"[:200])
+        elif isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
+            for place, pair in enumerate(zip(one, other, strict=True)):
+                yield from walk(*pair, f"{at}.{place}"[:200])
+        elif one != other:
+            yield f"{at}: {str(one)[:60]} -> {str(other)[:80]}"
+
+    return "; ".join(list(walk(content, found, ""))[:4])[:600]
+
+
+def _reading(folder: str, draw: random.Random) -> tuple[str, ...]:
+    """A command that reads that result or track."""
+    if folder.endswith(".track"):
+        shown = draw.choice(("table", "json", "markdown"))
+        return ("report", folder, "--format", shown, *draw.choice(((), ("--export", "mcap"))))
+    form = ("--format", draw.choice(("table", "json", "markdown")))
+    track = ("track", LOADED, "--parameters", folder, "-o", "out")
+    known: tuple[tuple[str, ...], ...] = (
+        ("report", folder, *form),
+        ("report", folder, "--export", "mcap"),
+        ("compare", folder, "weak.algid", "-o", "out", *form),
+        ("compare", "full.algid", folder, *form),
+        ("check", folder, "--max-error", "50"),
+        ("check", folder, "--against", "paper"),
+        ("validate", folder, UNLOADED, *form),
+        ("validate", folder, UNLOADED, "--loaded", LOADED, "--simulate"),
+        *(("export", folder, "--to", to, "-o", "out/arm.x") for to in ("urdf", "mjcf", "sdf", "python", "c", "yaml")),
+        ("identify", LOADED, "--parameters", folder, "-o", "out", *QUICK),
+        (*track, "--l1", "0.1626", "--l2", "0.1232"),
+        track,
+        ("design", folder, "-o", "out", *DESIGN),
+    )
+    return draw.choice(known)
+
+
+def _copied(source: Path, target: Path) -> None:
+    shutil.rmtree(target, ignore_errors=True)
+    shutil.copytree(source, target)
+
+
+# tables
+
+
+def series(draw: random.Random, place: Path) -> Call:
+    """A command on a folder one of whose Parquet tables, or a design's trajectory, is changed."""
+    kind = draw.choice(("jobs", "jobs", "result", "track", "design"))
+    if kind == "jobs":
+        _copied(place / "results", place / "hostile")
+        file = place / "hostile" / "jobs.parquet"
+        arguments: tuple[str, ...] = ("fleet", "hostile", "-o", "out", "--format", draw.choice(("table", "json")))
+    elif kind == "design":
+        _copied(place / "case1.design", place / "hostile.design")
+        file = place / "hostile.design" / draw.choice(("trajectory.csv", "design.json"))
+        arguments = ("synth", "case1", "--motion", "hostile.design", "-o", "out", "--duration", "0.5", "--rate", "50")
+    else:
+        base = "full.algid" if kind == "result" else "case1-loaded.track"
+        folder = f"hostile{Path(base).suffix}"
+        _copied(place / base, place / folder)
+        file = draw.choice(sorted((place / folder).glob("*.parquet")))
+        arguments = ("report", folder, *draw.choice(((), ("--export", "mcap"))))
+    note = _spoil(file, draw)
+    return Call(f"series {kind}", arguments, f"{file.name}: {note}")
+
+
+TYPES: tuple[Any, ...] = (
+    *(pl.String, pl.Int64, pl.UInt8, pl.Float32, pl.Float64, pl.Boolean, pl.Date, pl.Datetime("ns"), pl.Datetime("ms")),
+    *(pl.Duration, pl.Time, pl.Binary, pl.Categorical, pl.Null, pl.List(pl.Float64), pl.Struct({"a": pl.Int64})),
+    *(pl.Datetime("us", "Europe/Rome"), pl.Int128, pl.Decimal(38, 4)),
+)
+
+
+def _spoil(file: Path, draw: random.Random) -> str:
+    if file.suffix != ".parquet" or draw.random() < 0.3:
+        if draw.random() < 0.1:
+            file.unlink()
+            return "removed"
+        file.write_bytes(damage(file.read_bytes(), draw))
+        return "damaged"
+    frame = pl.read_parquet(file)
+    notes = []
+    for _ in range(draw.choice((1, 1, 2))):
+        if not frame.width:
+            break
+        column = draw.choice(frame.columns)
+        frame, note = _spoilt_column(frame, column, draw)
+        notes.append(f"{column}: {note}")
+    frame.write_parquet(file)
+    return "; ".join(notes)
+
+
+def _spoilt_column(frame: pl.DataFrame, column: str, draw: random.Random) -> tuple[pl.DataFrame, str]:
+    kind = draw.randrange(8)
+    if kind == 0:
+        return frame.drop(column), "dropped"
+    if kind == 1:
+        return frame.with_columns(pl.lit(None).alias(column)), "null"
+    if kind == 2:
+        return frame.rename({column: column + values.text(draw)[:50].replace("\ud800", "x")}), "renamed"
+    if kind == 3:
+        return frame.head(draw.choice((0, 1, 2))), "cut"
+    if kind == 4:
+        return pl.concat([frame] * draw.choice((2, 9))), "repeated"
+    if kind == 5:
+        value = values.number(draw)
+        return frame.with_columns(pl.lit(value).alias(column)), f"{value}"
+    if kind == 6:
+        word = values.text(draw).replace("\ud800", "x")
+        return frame.with_columns(pl.lit(word).alias(column)), "text"
+    to = draw.choice(TYPES)
+    try:
+        return frame.with_columns(pl.col(column).cast(to, strict=False)), f"as {to}"
+    except pl.exceptions.PolarsError:
+        return frame.with_columns(pl.lit(None, dtype=to).alias(column)), f"null as {to}"
