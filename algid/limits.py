@@ -35,8 +35,8 @@ class FileLimits:
     """Of a file that is read as a whole: NumPy, MATLAB, Feather."""
     reserved_rows: int = 1 << 26
     """Rows to reserve memory for on a file's word alone."""
-    largest_value: float = 1e100
-    """Beyond this a value is no angle and no torque, and its square would overflow."""
+    largest_value: float = 1e30
+    """Beyond this a value is no angle and no torque; covariances hold its eighth power, which is a double still."""
     largest_time_ns: float = 9.2e18
     """int64 nanoseconds end at 292 years."""
 

@@ -123,9 +123,12 @@ class Judgement:
 def judge(theta: FloatArray, tau: FloatArray, dt: float, *, gravity: bool = True) -> Judgement | None:
     """Try every convention on angles (2, N) in rad and torques (2, N) in N m, `dt` s apart.
 
-    None where the log is too short (six windows) or too slow (ten samples a window) to tell, or a torque is zero.
+    None where the log is too short (six windows) or too slow (ten samples a window) to tell, a torque is zero, or an
+    angle spans more than any scale makes a joint's: such values are no angles, as a spike of 1e6 rad is none.
     """
     if theta.shape[1] * dt < 6 * WINDOW or 10 * dt > WINDOW or not np.all(np.any(tau != 0, axis=1)):
+        return None
+    if np.ptp(theta, axis=1).max() > _SCALES[1] * _WIDEST:
         return None
     log = _Trials(theta, tau, dt, gravity)
     found = list(log.discrete())

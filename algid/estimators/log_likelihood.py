@@ -35,7 +35,7 @@ from algid.signals.segments import Segment, pieces, spread_pieces
 
 PIECE_SAMPLES = 16384
 _TRAINED = 4  # pieces of a log in the training set, up to twice as many
-_SHORTEST = 8 * POINTS  # samples: shorter pieces tell nothing
+SHORTEST = 8 * POINTS  # samples: shorter pieces tell nothing
 _STRETCH = 64  # samples over which scores are summed
 _SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
 _FINEST = 1e-10  # relative noise that no sensor undercuts, and floating point can still weigh
@@ -101,7 +101,7 @@ class LogEvidence:
         self._least = _NEGLIGIBLE * np.where(rms > 0, rms, rms.max())
 
     def _pieces(self) -> Iterator[Segment]:
-        return (piece for piece in pieces(self._source(), PIECE_SAMPLES) if len(piece) >= _SHORTEST)
+        return (piece for piece in pieces(self._source(), PIECE_SAMPLES) if len(piece) >= SHORTEST)
 
     @property
     def trained(self) -> int:

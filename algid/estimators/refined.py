@@ -20,8 +20,9 @@ from algid.arm import FloatArray
 from algid.estimators.combine import Prior, combine
 from algid.estimators.fit import Fit, conclude
 from algid.estimators.identifiability import judge, open_directions
-from algid.estimators.log_likelihood import LogEvidence, Outcome
+from algid.estimators.log_likelihood import SHORTEST, LogEvidence, Outcome
 from algid.estimators.parametrisation import Shared
+from algid.estimators.too_short import TooShortError
 from algid.estimators.weak import Source, WeakSettings
 from algid.estimators.weak import fit as weak_fit
 from algid.estimators.whitening import NoiseLevels
@@ -104,8 +105,10 @@ def fit(
 
     Raises
     ------
+    TooShortError
+        If there is no log, or no log long enough.
     ValueError
-        If there is no log, or no log long enough, or a known noise level is not positive.
+        If a known noise level is not positive.
     """
     settings = settings or RefinedSettings()
     noise = settings.noise
@@ -116,6 +119,12 @@ def fit(
     shared = start.shared
     settings, prior = replace(settings, prior=_anchored(start)), settings.prior
     logs = [*_opened(unloaded, False, shared, settings), *_opened(loaded, True, shared, settings)]
+    for loaded_ones, given in ((False, unloaded), (True, loaded)):
+        if given and not any(log.loaded is loaded_ones for log in logs):
+            which = "loaded" if loaded_ones else "unloaded"
+            raise TooShortError(
+                f"no {which} log is long enough for the likelihood: expected at least {SHORTEST} samples without a gap"
+            )
     try:
         beta, outcomes, iterations, end = _train(shared, logs, start.values, settings, progress)
         if end == "refuted":

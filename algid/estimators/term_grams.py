@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from algid.arm import FloatArray
 from algid.estimators.combine import long_run_variance, scaled_pinv
 from algid.estimators.modulating_functions import OVERLAP, row_weights
+from algid.estimators.too_short import TooShortError
 from algid.estimators.weak import Normal, Source, WeakSettings, normal_equations
 from algid.model import RIGID, TERMS
 from algid.signals.segments import Segment, pieces, spread_pieces
@@ -77,7 +78,7 @@ class Grams:
 
     Raises
     ------
-    ValueError
+    TooShortError
         If no log is long enough for a window.
     """
 
@@ -91,7 +92,7 @@ class Grams:
             if (normal := normal_equations(log.segments, settings, here)) is not None:
                 normals.append((log.loaded, normal))
         if not normals:
-            raise ValueError("no log is long enough: expected at least a second of samples without a gap")
+            raise TooShortError("no log is long enough: expected at least a second of samples without a gap")
         self.kinds = {loaded for loaded, _ in normals}
         self._both = len(self.kinds) == 2
         self.size = len(self.names) + self._both * len(self._rigid)

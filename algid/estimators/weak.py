@@ -27,6 +27,7 @@ from algid.estimators.fit import Fit, conclude
 from algid.estimators.innovations import LAGS, ResidualSums, pooled, residual_sums
 from algid.estimators.modulating_functions import OVERLAP, Windows, row_weights
 from algid.estimators.parametrisation import Shared
+from algid.estimators.too_short import TooShortError
 from algid.model import Model
 from algid.signals.differences import held_torque
 from algid.signals.segments import Segment, pieces
@@ -158,7 +159,7 @@ def _start(
     """Shared parameters from which `conclude` starts, and each log's likelihood."""
     too_short = "log is long enough: expected at least a second of samples without a gap"
     if not unloaded and (prior is None or not loaded):
-        raise ValueError(f"no unloaded {too_short}")
+        raise TooShortError(f"no unloaded {too_short}")
     logs: list[LogInformation] = []
     arm: FloatArray = np.zeros(len(shared.log_names))
     if unloaded:
@@ -168,7 +169,7 @@ def _start(
     if not shared.payload:
         return arm, logs
     if not loaded:
-        raise ValueError(f"no loaded {too_short}")
+        raise TooShortError(f"no loaded {too_short}")
     c, under_load = solve(loaded, loaded=True)
     together = LogInformation(
         True, c, np.concatenate([log.S for log in under_load]), np.concatenate([log.g for log in under_load])

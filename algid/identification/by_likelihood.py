@@ -17,6 +17,7 @@ from algid.estimators.hedged import hedged
 from algid.estimators.innovations import ResidualSums, pooled
 from algid.estimators.prediction import PredictionSums, cross_validate
 from algid.estimators.selection import CHOICE, Selection, needs_shape, select
+from algid.estimators.too_short import TooShortError
 from algid.identification.known import model_of
 from algid.identification.series import torque_coefficients
 from algid.identification.source import LogSource
@@ -53,7 +54,7 @@ def choose_model(survey: Survey, settings: Settings, earlier: Result | None = No
     unloaded, loaded = _passes(survey, settings)
     try:
         return select(unloaded, loaded, _weak_settings(settings, _given(plain, ())), candidates, settings.terms)
-    except ValueError as error:
+    except TooShortError as error:
         raise LogError(f"{', '.join(log.name for log in survey.logs)}: {error}; record longer") from error
 
 
@@ -106,7 +107,7 @@ def run_fit(survey: Survey, settings: Settings, chosen: Selection, prior: Prior 
             fit = refined.fit(unloaded, loaded, refining, survey.progress)
             if fit.note:
                 fit = _foretelling(fit, unloaded, loaded, ours, settings, prior)
-    except ValueError as error:
+    except TooShortError as error:
         raise LogError(f"{', '.join(log.name for log in survey.logs)}: {error}; record longer") from error
     return constrained(fit) if settings.constrain else fit, sums
 

@@ -18,6 +18,7 @@ from operator import itemgetter
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.estimators.too_short import TooShortError
 from algid.signals.differences import Stencil
 from algid.signals.segments import Segment
 from algid.track.bins import CELL, Cells, IdentifiedArm, cells_of, joined
@@ -85,12 +86,12 @@ def track(source: Pass, arm: IdentifiedArm, covariance: FloatArray) -> Track:
 
     Raises
     ------
-    ValueError
+    TooShortError
         If the log is too short.
     """
     parts = cells_of(source(), arm, mass=0.0, settle=0)
     if not parts or sum(map(len, parts)) < 2 * SHORTEST:
-        raise ValueError(f"the log is too short: expected {2 * SHORTEST * CELL:g} s at least")
+        raise TooShortError(f"the log is too short: expected {2 * SHORTEST * CELL:g} s at least")
     cells = joined(parts)
     found = edges(cells, arm)
     for _ in range(ROUNDS):

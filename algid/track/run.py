@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from algid import __version__
 from algid.errors import LogError
+from algid.estimators.too_short import TooShortError
 from algid.files import read_whole
 from algid.identification.identify import reused
 from algid.identification.source import LogLike, open_source, read_otherwise
@@ -65,7 +66,7 @@ def track_log(
     try:
         with one_blas_thread():
             found = track(partial(survey.segments, source), arm, covariance)
-    except ValueError as error:
+    except TooShortError as error:
         raise LogError(f"{source.name}: {error}; record longer") from error
     otherwise = read_otherwise([survey.summary(source)], result, str(parameters))
     truth, notices = source.origin.truth, survey.seen(source).notices

@@ -81,7 +81,7 @@ def test_a_log_is_cut_where_the_user_says(sizes: tuple[int, ...]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("wrong", "found"), [(np.nan, "nan"), (-np.inf, "-inf"), (1e100, "1e\\+100"), (-3e200, "-3e\\+200")]
+    ("wrong", "found"), [(np.nan, "nan"), (-np.inf, "-inf"), (1e30, "1e\\+30"), (-3e200, "-3e\\+200")]
 )
 def test_numbers_that_are_none_are_refused_or_left_out(wrong: float, found: str) -> None:
     values = np.zeros(10)
@@ -99,9 +99,9 @@ def test_numbers_that_are_none_are_refused_or_left_out(wrong: float, found: str)
 
 
 def test_large_numbers_are_no_error() -> None:
-    """The sum of squares overflows before any of them is too large."""
-    values = np.full(10, 9e99)
-    assert np.all(reader(10, theta1=values).whole().theta[0] == 9e99)
+    """The sum of squares is large before any of them is too large."""
+    values = np.full(10, 9e29)
+    assert np.all(reader(10, theta1=values).whole().theta[0] == 9e29)
 
 
 def test_tables_are_cut_with_their_notices_first() -> None:

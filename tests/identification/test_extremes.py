@@ -1,0 +1,62 @@
+"""Logs that are too short or too slow for an estimator, and values that no arm has: one line that says so."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from algid.arm import FloatArray
+from algid.errors import LogError
+from algid.estimators.convention_search import judge
+from algid.identification.identify import identify
+from algid.log import Log, Origin
+from algid.profile import Profile
+from algid.settings import Settings
+from algid.writers import write_log
+
+
+def moving(rate: float, seconds: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Times (N,), angles and torques (2, N) of two sines."""
+    t = np.arange(0.0, seconds, 1 / rate)
+    return t, np.stack([np.sin(2 * t), np.cos(3 * t)]), np.stack([3 * np.cos(t), np.sin(2 * t)])
+
+
+def log_of(t: FloatArray, theta: FloatArray, tau: FloatArray) -> Log:
+    return Log(np.rint(t * 1e9).astype(np.int64), theta, tau, Origin("log", "", {}))
+
+
+@pytest.mark.parametrize(("rate", "seconds"), [(5, 5), (5, 10), (10, 2), (10, 5), (20, 1), (3, 10), (1, 30)])
+def test_a_log_too_short_for_the_likelihood_is_refused_with_what_it_takes(rate: float, seconds: float) -> None:
+    log = log_of(*moving(rate, seconds))
+    said = "no unloaded log is long enough for the likelihood: expected at least 72 samples without a gap"
+    with pytest.raises(LogError, match=f"{said}; record longer"):
+        identify(log, report=False)
+    assert identify(log, settings=Settings(estimator="paper"), report=False).parameters
+
+
+def test_a_loaded_log_too_short_for_the_likelihood_is_refused() -> None:
+    with pytest.raises(LogError, match="no loaded log is long enough for the likelihood"):
+        identify(log_of(*moving(100, 10)), log_of(*moving(10, 5)), report=False)
+
+
+@pytest.mark.parametrize("spike", [1e6, 1e12, 1e29])
+def test_a_spike_in_an_angle_is_no_convention(spike: float, tmp_path: Path) -> None:
+    t, theta, tau = moving(100, 10)
+    assert judge(theta, tau, 0.01) is not None
+    theta[0, 500] += spike
+    assert judge(theta, tau, 0.01) is None
+    path = tmp_path / "log.parquet"
+    write_log(path, log_of(t, theta, tau))
+    with pytest.raises(LogError, match="DEGREES: angles reach"):
+        identify(path, report=False)
+    profile = Profile(accept=("DEGREES",))
+    assert identify(path, settings=Settings(estimator="weak"), profile=profile, report=False).parameters
+
+
+@pytest.mark.parametrize("spike", [1e6, 1e29])
+def test_a_spike_in_a_torque_overflows_nothing(spike: float) -> None:
+    t, theta, tau = moving(100, 10)
+    tau[1, 333] += spike
+    assert identify(log_of(t, theta, tau), report=False).parameters
