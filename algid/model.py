@@ -1,4 +1,4 @@
-"""The torque of an arm with real drives: eq. (1) and the terms that real joints add.
+"""The torque of an arm with real drives, put together from the terms of `algid.physics.terms`.
 
 ======  ==========================================================  =========  =========
 symbol  name                                                        shape      unit
@@ -7,72 +7,42 @@ c       coefficients of the columns switched on                     (q,)       `
 Y       regressor, τ = Y c                                          (2, q, N)
 J       sensitivity, ∂τ/∂c                                          (2, q, N)
 P       partials, ∂τ/∂θ, ∂τ/∂θ̇ and ∂τ/∂θ̈                           (3, 2, 2, N)
-L       load of a joint: inertia, Coriolis and gravity of eq. (1)   (2, N)     N m
-ω_s     `coulomb_speed`, the width of Coulomb friction              scalar     rad/s
-ω_S     `stribeck_speed`, the speed at which Stribeck's has gone    scalar     rad/s
+L       load of a joint: inertia, Coriolis and gravity              (2, N)     N m
 ======  ==========================================================  =========  =========
 
-Every term is listed in `TERMS` with its equation. All its coefficients are zero on an arm without it. The rotor
-of joint 1 adds to k5 alone, which is why it has no column. Friction follows tanh(ω / ω_s) instead of sign(ω), so
-that a velocity error near standstill does not flip a whole sample.
+Which columns there are, their derivatives and what acts on the torque's channel are the terms' own business; here they
+are put in order once a model (`Compiled`) and evaluated along motions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
-from algid.arm import CONSTANT_NAMES, CONSTANT_UNITS, FloatArray, mass_matrix, passive_torque
+from algid.arm import FloatArray
+from algid.physics.expressions import Expression, Product, Values
+from algid.physics.motion import Motion, Widths, sine_cosine
+from algid.physics.parameters import PAYLOAD, Parameter
+from algid.physics.signals import ACCELERATIONS, rate
+from algid.physics.terms import ALWAYS, OPTIONAL, Term
 
+__all__ = ["Model", "Motion", "Term", "sine_cosine"]
 
-@dataclass(frozen=True)
-class Term:
-    """A term of the torque beside eq. (1).
-
-    Parameters
-    ----------
-    names : names of its coefficients
-    unit : str, of each
-    equation : str, what it adds to the torque of joint i
-    title : str, in words
-    needs : str or None
-        A term without which it has no meaning.
-    """
-
-    names: tuple[str, ...]
-    unit: str
-    equation: str
-    title: str
-    needs: str | None = None
-
-
-TERMS = {
-    "coulomb": Term(("f1", "f2"), "N m", "f_i tanh(ω_i / ω_s)", "Coulomb friction"),
-    "offset": Term(("o1", "o2"), "N m", "o_i", "torque offsets"),
-    "rotor": Term(("j2",), "kg m^2", "j2 θ̈_2 (joint 2)", "rotor inertia of joint 2"),
-    "stribeck": Term(
-        ("s1", "s2"), "N m", "s_i tanh(ω_i / ω_s) exp(-(ω_i / ω_S)²)", "Stribeck friction", needs="coulomb"
-    ),
-    "asymmetry": Term(("a1", "a2"), "N m", "a_i tanh²(ω_i / ω_s)", "asymmetric Coulomb friction", needs="coulomb"),
-    "load": Term(("e1", "e2"), "1", "e_i |L_i| tanh(ω_i / ω_s)", "friction in proportion to the joint's load"),
-    "gain": Term(("gain2",), "1", "τ_2 times 1 + gain2", "torque gain of joint 2 over that of joint 1, less 1"),
-    "zero": Term(("zero1", "zero2"), "rad", "θ_i + zero_i in place of θ_i", "zero offsets of the angles"),
-    "lag": Term(("lag",), "s", "-lag dτ_log/dt: the logged torque lags behind", "first-order low-pass of the torque"),
+EVERY_TERM = {term.name: term for term in (*ALWAYS, *OPTIONAL)}
+TERMS = {term.name: term for term in OPTIONAL if term.timing != "delay"}
+"""Terms that a model may have; a delay acts before a model does, on the log's times."""
+DELAYS = tuple(name for term in OPTIONAL if term.timing == "delay" for name in term.names)
+CHOICES = tuple(term.name for term in OPTIONAL)
+"""Names that ``--model`` takes."""
+PARAMETERS: dict[str, Parameter] = {
+    one.name: one for one in (*(one for term in EVERY_TERM.values() for one in term.parameters), *PAYLOAD)
 }
-COLUMN_NAMES = CONSTANT_NAMES + tuple(name for term in TERMS.values() for name in term.names)
-UNITS = {
-    **CONSTANT_UNITS,
-    **{name: term.unit for term in TERMS.values() for name in term.names},
-    "delay": "s",
-    "m_p": "kg",
-    "l1": "m",
-    "l2": "m",
-}
-_WITH_GRAVITY = ("k2", "k4", "zero1")
-RIGID = ("k1", "k2", "k3", "k4", "k5")
+COLUMN_NAMES = tuple(name for term in (*ALWAYS, *TERMS.values()) for name in term.names)
+UNITS = {name: parameter.unit for name, parameter in PARAMETERS.items()}
+RIGID = tuple(name for term in ALWAYS if term.inertial for name in term.names)
 _SIGN_TRIALS = 4  # as many patterns as the signs of two loads have
 
 
@@ -84,11 +54,9 @@ class Model:
     ----------
     terms : names in `TERMS`, in any order
     gravity : float, m/s^2
-        0 for an arm that moves in a horizontal plane: k2, k4 and zero1 have no column then.
-    coulomb_speed : float, rad/s
-        ω_s: speed at which Coulomb friction has reached three quarters of its value.
-    stribeck_speed : float, rad/s
-        ω_S: speed at which a third of Stribeck's additional friction is left.
+        0 for an arm that moves in a horizontal plane: parameters that weigh have no column then.
+    coulomb_speed, stribeck_speed : float, rad/s
+        Widths of friction: see `algid.physics.motion.Widths`.
 
     Raises
     ------
@@ -107,11 +75,20 @@ class Model:
             raise ValueError(f"terms: expected some of {', '.join(TERMS)}, got {unknown[0]!r}")
         object.__setattr__(self, "terms", tuple(term for term in TERMS if term in self.terms))
 
-    @cached_property
+    @property
+    def shape(self) -> Widths:
+        """The widths of friction."""
+        return Widths(self.coulomb_speed, self.stribeck_speed)
+
+    @property
+    def compiled(self) -> Compiled:
+        """Its columns and their derivatives."""
+        return _compiled(self.terms, self.gravity != 0)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the columns in their order."""
-        names = [*CONSTANT_NAMES, *(name for term in self.terms for name in TERMS[term].names)]
-        return tuple(name for name in names if self.gravity != 0 or name not in _WITH_GRAVITY)
+        return self.compiled.names
 
     @cached_property
     def columns(self) -> list[int]:
@@ -121,7 +98,21 @@ class Model:
     @property
     def linear(self) -> bool:
         """Whether the torque is linear in the coefficients, so that the regressor needs none."""
-        return not {"load", "gain", "zero"} & set(self.terms)
+        return all(TERMS[term].linear for term in self.terms)
+
+    @property
+    def iterated(self) -> tuple[str, ...]:
+        """Names of the coefficients in which the torque is not linear."""
+        return tuple(name for term in self.terms if not TERMS[term].linear for name in TERMS[term].names)
+
+    @cached_property
+    def lag_name(self) -> str | None:
+        """The coefficient that is the time constant of a low-pass of the torque; None where there is no such term."""
+        return next((name for term in self.terms if TERMS[term].timing == "lag" for name in TERMS[term].names), None)
+
+    def lag(self, c: FloatArray) -> float:
+        """The time constant in s of the torque's low-pass; 0 without."""
+        return 0.0 if self.lag_name is None else float(c[self.names.index(self.lag_name)])
 
     def expand(self, c: FloatArray) -> FloatArray:
         """Coefficients of all `COLUMN_NAMES`: zero where a column is switched off."""
@@ -134,35 +125,113 @@ class Model:
         return dict(zip(COLUMN_NAMES, self.expand(c).tolist(), strict=True))
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """Angles, velocities, accelerations (2, N) and what eq. (1) needs of them."""
+def without_delay(terms: Iterable[str]) -> tuple[str, ...]:
+    """Those of the names in `CHOICES` that a model may have."""
+    return tuple(term for term in terms if term in TERMS)
 
-    theta: FloatArray
-    omega: FloatArray
-    alpha: FloatArray
+
+Weighted = Mapping[Product, tuple[tuple[int, float], ...]]
+"""An expression that is linear in the coefficients: for each product their places and factors."""
+
+
+@dataclass(frozen=True, eq=False)
+class Compiled:
+    """The columns of a model in order, and what derives from them.
+
+    Parameters
+    ----------
+    names : of the columns
+    s, p, f : entries (joint, place, expression) of τ = d²s/dt² + dp/dt + f
+    regressor : entries of Y
+    loads : places of the columns that are the joints' load
+    partials : by order of θ's derivative, torque's joint and angle's joint
+    inertia : by torque's joint and angle's joint: what multiplies the accelerations
+    rest : by joint: the torque without accelerations
+    """
+
+    names: tuple[str, ...]
+    s: tuple[tuple[int, int, Expression], ...]
+    p: tuple[tuple[int, int, Expression], ...]
+    f: tuple[tuple[int, int, Expression], ...]
+    regressor: tuple[tuple[int, int, Expression], ...]
+    loads: tuple[int, ...]
+    partials: Mapping[tuple[int, int, int], Weighted]
+    inertia: Mapping[tuple[int, int], Weighted]
+    rest: tuple[Weighted, Weighted]
 
     @cached_property
-    def trigonometry(self) -> tuple[FloatArray, ...]:
-        """Sine and cosine of θ1, of θ2 and of θ1 + θ2, each (N,)."""
-        (s1, s2), (c1, c2) = sine_cosine(self.theta)
-        return s1, c1, s2, c2, s1 * c2 + c1 * s2, c1 * c2 - s1 * s2
+    def place(self) -> dict[str, int]:
+        """Where each column stands."""
+        return {name: number for number, name in enumerate(self.names)}
 
-    def turned(self, by: FloatArray) -> Motion:
-        """The motion with `by` (2,) rad added to its angles."""
-        return Motion(self.theta + by[:, None], self.omega, self.alpha) if np.any(by) else self
+    def only(self, weighted: Weighted, places: Iterable[int]) -> Weighted:
+        """What the columns at `places` give of it."""
+        wanted = set(places)
+        kept = {p: tuple(pair for pair in pairs if pair[0] in wanted) for p, pairs in weighted.items()}
+        return {product: pairs for product, pairs in kept.items() if pairs}
 
 
-def sine_cosine(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sine and cosine of angles, each in the shape of `theta`, through one tangent of the half angle.
+@lru_cache(maxsize=256)
+def _compiled(terms: tuple[str, ...], gravity: bool) -> Compiled:
+    own = [*ALWAYS, *(TERMS[term] for term in terms)]
+    parameters = [one for term in own for one in term.parameters if gravity or not one.weighs]
+    names = tuple(one.name for one in parameters)
+    place = {name: number for number, name in enumerate(names)}
+    columns = [column for term in own for column in term.columns if column.parameter in place]
+    parts = {
+        part: tuple(
+            (joint, place[column.parameter], getattr(column, part)[joint])
+            for column in columns
+            for joint in range(2)
+            if getattr(column, part)[joint]
+        )
+        for part in ("s", "p", "f")
+    }
+    Y: list[tuple[int, int, Expression]] = []
+    for column in columns:
+        for joint in range(2):
+            entry = rate(rate(column.s[joint])) + rate(column.p[joint]) + column.f[joint]
+            if entry:
+                Y.append((joint, place[column.parameter], entry))
 
-    Exact to a unit in the last place of 1, also where the tangent has its poles. NumPy has vector instructions
-    for the tangent on more processors than for sine and cosine: this is several times faster there.
-    """
-    half = np.tan(0.5 * theta)
-    square = half * half
-    scale = 1 / (1 + square)
-    return 2 * half * scale, (1 - square) * scale
+    def weighted(joint: int, of: Callable[[Expression], Expression]) -> Weighted:
+        found: dict[Product, list[tuple[int, float]]] = {}
+        for row, column, entry in Y:
+            for product, factor in of(entry).products.items() if row == joint else ():
+                found.setdefault(product, []).append((column, factor))
+        return {product: tuple(pairs) for product, pairs in found.items()}
+
+    signals = ("theta", "omega", "alpha")
+    partials = {
+        (order, row, angle): weighted(row, lambda e, s=f"{signal}{angle + 1}": e.by(s))  # type: ignore[misc]
+        for order, signal in enumerate(signals)
+        for row in range(2)
+        for angle in range(2)
+    }
+    return Compiled(
+        names,
+        parts["s"],
+        parts["p"],
+        parts["f"],
+        tuple(Y),
+        tuple(place[name] for term in own if term.inertial for name in term.names if name in place),
+        partials,
+        {(row, angle): partials[2, row, angle] for row in range(2) for angle in range(2)},
+        (
+            weighted(0, lambda e: e.without(ACCELERATIONS)),
+            weighted(1, lambda e: e.without(ACCELERATIONS)),
+        ),
+    )
+
+
+def summed(weighted: Weighted, c: FloatArray, values: Values) -> FloatArray | float:
+    """The value of an expression that is linear in the coefficients `c` (q,) or (q, N)."""
+    total: FloatArray | float = 0.0
+    for product, pairs in weighted.items():
+        coefficient = sum(factor * c[place] for place, factor in pairs)
+        if isinstance(coefficient, np.ndarray) or coefficient:
+            total = total + coefficient * values.of(product)
+    return total
 
 
 def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> FloatArray:
@@ -181,9 +250,9 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
 
     Notes
     -----
-    Friction by load, the gain and the zero offsets make the torque bilinear in c: Y is taken at `c` then, with
-    the load and the angles that c gives, joint 2's rows times its gain, and nothing in the columns of gain2, zero1
-    and zero2. The column of the lag, which is no function of the motion at one instant, is nothing too.
+    Friction by load, gains and turned angles make the torque bilinear in c: Y is taken at `c` then, with the load and
+    the angles that c gives, a joint's rows times its gain, and nothing in the columns of gains and angles. The column
+    of a low-pass, which is no function of the motion at one instant, is nothing too.
 
     Raises
     ------
@@ -192,57 +261,50 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
     """
     if c is None and not model.linear:
         raise ValueError(f"the regressor of {', '.join(model.terms)} depends on the coefficients, got none")
-    value = model.values(np.zeros(len(model.names)) if c is None else c)
-    motion = motion.turned(_zeros(value))
-    Y = np.zeros((2, len(model.names), motion.theta.shape[1]))
-    column = {name: Y[:, place] for place, name in enumerate(model.names)}
-    _fill_eq1(column, motion)
-    if "rotor" in model.terms:
-        column["j2"][1] = motion.alpha[1]
-    if "offset" in model.terms:
-        column["o1"][0] = column["o2"][1] = 1.0
-    for name, friction in friction_columns(model, motion.omega).items():
-        for joint in range(2):
-            column[f"{name}{joint + 1}"][joint] = friction[joint]
-    if "load" in model.terms:
-        dissipated = np.abs(_load(model, Y, value)) * _sign(model, motion.omega)
-        column["e1"][0], column["e2"][1] = dissipated
-    Y[1] *= 1 + value["gain2"]
-    return Y
+    c = np.zeros(len(model.names)) if c is None else c
+    compiled = model.compiled
+    motion = motion.turned(turns(model, c))
+    values = Values(motion, model.shape)
+    Y = np.zeros((2, len(compiled.names), motion.theta.shape[1]))
+    for joint, place, entry in compiled.regressor:
+        values.into(Y[joint, place], entry)
+    for name, joint in attributes(model, "by_load"):
+        load = Y[joint, list(compiled.loads)].T @ c[list(compiled.loads)]
+        Y[joint, compiled.place[name]] = np.abs(load) * _sign(model, motion.omega[joint])
+    return _amplified(model, c, Y)
 
 
-def _fill_eq1(column: Mapping[str, FloatArray], motion: Motion) -> None:
-    _, c1, s2, c2, _, c12 = motion.trigonometry
-    omega1, omega2 = motion.omega
-    alpha1, alpha2 = motion.alpha
-    column["k1"][0] = c2 * (2 * alpha1 + alpha2) - s2 * (2 * omega1 + omega2) * omega2
-    column["k1"][1] = c2 * alpha1 + s2 * omega1**2
-    column["k3"][:] = alpha1 + alpha2
-    column["k5"][0] = alpha1
-    column["k6"][0] = omega1
-    column["k7"][1] = omega2
-    if "k2" in column:
-        column["k2"][:] = c12
-        column["k4"][0] = c1
+def attributes(model: Model, kind: str) -> list[tuple[str, int]]:
+    """Pairs of a parameter and the joint on which it acts in the way `kind`, of the columns that the model has."""
+    return [pair for term in model.terms for pair in getattr(TERMS[term], kind) if pair[0] in model.compiled.place]
 
 
-def friction_columns(model: Model, omega: FloatArray) -> dict[str, FloatArray]:
-    """Columns (2, N) of the friction that a joint's own velocity (2, N) decides, by the coefficients' letter."""
-    if not {"coulomb", "stribeck", "asymmetry"} & set(model.terms):
-        return {}
-    sign = _sign(model, omega)
-    found = {}
-    if "coulomb" in model.terms:
-        found["f"] = sign
-    if "stribeck" in model.terms:
-        found["s"] = sign * np.exp(-((omega / model.stribeck_speed) ** 2))
-    if "asymmetry" in model.terms:
-        found["a"] = sign**2
-    return found
+def gains(model: Model, c: FloatArray) -> FloatArray:
+    """By what (2,) each joint's torque is multiplied at the coefficients `c` (q,)."""
+    factor = np.ones(2)
+    for name, joint in attributes(model, "gains"):
+        factor[joint] *= 1 + c[model.compiled.place[name]]
+    return factor
+
+
+def turns(model: Model, c: FloatArray) -> FloatArray:
+    """What (2,) in rad is added to each joint's angle at the coefficients `c` (q,)."""
+    turned = np.zeros(2)
+    for name, joint in attributes(model, "turns"):
+        turned[joint] += c[model.compiled.place[name]]
+    return turned
+
+
+def _amplified(model: Model, c: FloatArray, rows: FloatArray) -> FloatArray:
+    """`rows` (2, ...), in place, times each joint's gain."""
+    for joint, factor in enumerate(gains(model, c)):
+        if factor != 1:
+            rows[joint] *= factor
+    return rows
 
 
 def torque(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
-    """Torque τ (2, N) in N m; without the lag, which needs the torque at other instants too."""
+    """Torque τ (2, N) in N m; without a low-pass, which needs the torque at other instants too."""
     return np.einsum("aqn,q->an", regressor(model, motion, c), c)
 
 
@@ -257,35 +319,32 @@ def sensitivity(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
 
     Returns
     -------
-    (2, q, N), N m over the column's unit; nothing in the column of the lag
+    (2, q, N), N m over the column's unit; nothing in the column of a low-pass
 
     Notes
     -----
-    The regressor where the torque is linear in c. Else, with sgn L and t = tanh(ω / ω_s),
+    The regressor where the torque is linear in c. Else, with sgn L, t = tanh(ω / ω_s), load shares e, gains g and
+    turned angles z,
 
-        ∂τ_i/∂k_j = Y_ij (1 + e_i t_i sgn L_i)        j = 1 … 5
-        ∂τ_2/∂gain2 = τ_2 / (1 + gain2)
-        ∂τ_i/∂zero_j = ∂τ_i/∂θ_j
+        ∂τ_i/∂k_j = Y_ij (1 + e_i t_i sgn L_i)        for the columns j of the load
+        ∂τ_i/∂g_i = τ_i / (1 + g_i)
+        ∂τ_i/∂z_j = ∂τ_i/∂θ_j
     """
     J = regressor(model, motion, c)
     if model.linear:
         return J
-    value = model.values(c)
-    place = {name: number for number, name in enumerate(model.names)}
-    if "gain" in model.terms:
-        J[1, place["gain2"]] = J[1].T @ c / (1 + value["gain2"])
-    if "zero" in model.terms:
+    place, loads = model.compiled.place, list(model.compiled.loads)
+    factor = gains(model, c)
+    for name, joint in attributes(model, "gains"):
+        J[joint, place[name]] = J[joint].T @ c / factor[joint]
+    if turning := attributes(model, "turns"):
         slope = partials(model, c, motion)[0]
-        for joint in range(2):
-            if f"zero{joint + 1}" in place:
-                J[:, place[f"zero{joint + 1}"]] = slope[:, joint]
-    if "load" in model.terms:
-        turned = motion.turned(_zeros(value))
-        rigid = [place[name] for name in RIGID if name in place]
-        e = np.array([value["e1"], value["e2"]])
-        # The gain scales joint 2's load, which leaves its sign.
-        share = e[:, None] * _sign(model, turned.omega) * np.sign(_load(model, J, value))
-        J[:, rigid] *= 1 + share[:, None]
+        for name, joint in turning:
+            J[:, place[name]] = slope[:, joint]
+    turned = motion.turned(turns(model, c))
+    for name, joint in attributes(model, "by_load"):
+        load = J[joint, loads].T @ c[loads]  # a gain scales it, which leaves its sign
+        J[joint, loads] *= 1 + c[place[name]] * _sign(model, turned.omega[joint]) * np.sign(load)
     return J
 
 
@@ -303,65 +362,27 @@ def partials(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
     (3, 2, 2, N), N m/rad, N m s/rad and N m s²/rad
         By order of θ's derivative, torque's joint and angle's joint. Where a load is nothing its sign is too.
     """
-    value = model.values(c)
-    motion = motion.turned(_zeros(value))
-    P = _rigid_partials(value, motion)
-    if "load" in model.terms:
-        _, velocity, _ = P
-        Y = np.zeros((2, len(model.names), motion.theta.shape[1]))
-        _fill_eq1({name: Y[:, place] for place, name in enumerate(model.names)}, motion)
-        load, sign = _load(model, Y, value), _sign(model, motion.omega)
-        e = np.array([[value["e1"]], [value["e2"]]])
-        P *= 1 + (e * sign * np.sign(load))[:, None]
-        for joint in range(2):
-            velocity[joint, joint] += (e * np.abs(load) * (1 - sign**2) / model.coulomb_speed)[joint]
-    P[2, 1, 1] += value["j2"]
-    slope = friction_slope(model, value, motion.omega)
-    P[1, 0, 0] += slope[0]
-    P[1, 1, 1] += slope[1]
-    P[:, 1] *= 1 + value["gain2"]
+    compiled, motion = model.compiled, motion.turned(turns(model, c))
+    values = Values(motion, model.shape)
+    P = np.empty((3, 2, 2, motion.theta.shape[1]))
+    for where, weighted in compiled.partials.items():
+        P[where] = summed(weighted, c, values)
+    for name, joint in attributes(model, "by_load"):
+        share, sign = c[compiled.place[name]], _sign(model, motion.omega[joint])
+        load, loads = np.zeros(P.shape[-1]), compiled.loads
+        for row, place, entry in compiled.regressor:
+            if row == joint and place in loads:
+                load += c[place] * values.sum(entry)
+        for order in range(3):
+            for angle in range(2):
+                by_load = summed(compiled.only(compiled.partials[order, joint, angle], loads), c, values)
+                P[order, joint, angle] += share * sign * np.sign(load) * by_load
+        P[1, joint, joint] += share * np.abs(load) * (1 - sign**2) / model.coulomb_speed
+    factor = gains(model, c)
+    for joint in range(2):
+        if factor[joint] != 1:
+            P[:, joint] *= factor[joint]
     return P
-
-
-def _rigid_partials(value: dict[str, float], motion: Motion) -> FloatArray:
-    """`partials` of inertia, Coriolis and gravity."""
-    k1, k2, k3, k4, k5 = (value[name] for name in RIGID)
-    s1, _, s2, c2, s12, _ = motion.trigonometry
-    omega1, omega2 = motion.omega
-    alpha1, alpha2 = motion.alpha
-    k1_s2, k1_c2, k2_s12 = k1 * s2, k1 * c2, k2 * s12
-    P = np.empty((3, 2, 2, s1.size))
-    position, velocity, acceleration = P
-    position[0, 0] = -k4 * s1 - k2_s12
-    position[0, 1] = -k1_s2 * (2 * alpha1 + alpha2) - k1_c2 * (2 * omega1 + omega2) * omega2 - k2_s12
-    position[1, 0] = -k2_s12
-    position[1, 1] = k1_c2 * omega1**2 - k1_s2 * alpha1 - k2_s12
-    velocity[0, 0] = -2 * k1_s2 * omega2
-    velocity[0, 1] = -2 * k1_s2 * (omega1 + omega2)
-    velocity[1, 0] = 2 * k1_s2 * omega1
-    velocity[1, 1] = 0.0
-    acceleration[0, 0] = k5 + k3 + 2 * k1_c2
-    acceleration[0, 1] = acceleration[1, 0] = k3 + k1_c2
-    acceleration[1, 1] = k3
-    return P
-
-
-def friction_slope(model: Model, value: dict[str, float], omega: FloatArray) -> FloatArray:
-    """Derivative (2, N) by its velocity of the friction that a joint's own velocity (2, N) decides."""
-
-    def both(letter: str) -> FloatArray:
-        return np.array([[value[f"{letter}1"]], [value[f"{letter}2"]]])
-
-    viscous = np.array([[value["k6"]], [value["k7"]]])
-    if not {"coulomb", "stribeck", "asymmetry"} & set(model.terms):
-        return np.broadcast_to(viscous, omega.shape)
-    sign = _sign(model, omega)
-    steep = (1 - sign**2) / model.coulomb_speed
-    slope = viscous + (both("f") + 2 * both("a") * sign) * steep
-    if "stribeck" in model.terms:
-        fading = np.exp(-((omega / model.stribeck_speed) ** 2))
-        slope = slope + both("s") * fading * (steep - 2 * omega / model.stribeck_speed**2 * sign)
-    return slope
 
 
 def _sign(model: Model, omega: FloatArray) -> FloatArray:
@@ -369,24 +390,37 @@ def _sign(model: Model, omega: FloatArray) -> FloatArray:
     return np.tanh(omega / model.coulomb_speed)
 
 
-def _load(model: Model, Y: FloatArray, value: dict[str, float]) -> FloatArray:
-    """L (2, N), from the columns of eq. (1) in Y."""
-    rigid = [place for place, name in enumerate(model.names) if name in RIGID]
-    k = np.array([value[model.names[place]] for place in rigid])
-    return np.einsum("aqn,q->an", Y[:, rigid], k)
+def damping(model: Model, c: FloatArray) -> FloatArray:
+    """Derivative (2,) of each joint's torque by its velocity at rest, in N m s/rad; without friction by load."""
+    rest = Motion(np.zeros((2, 1)), np.zeros((2, 1)), np.zeros((2, 1)))
+    values = Values(rest, model.shape)
+    found = [summed(model.compiled.partials[1, joint, joint], c, values) for joint in range(2)]
+    return np.array([float(np.squeeze(one)) for one in found])
 
 
-def _zeros(value: dict[str, float]) -> FloatArray:
-    return np.array([value["zero1"], value["zero2"]])
+def inertia(model: Model, c: FloatArray, theta: FloatArray) -> FloatArray:
+    """What multiplies the accelerations (2, 2, ...) at angles (2, ...), rotors included, in kg m².
+
+    `c` is (q,), or (q, ...) for arms of their own at each sample.
+    """
+    values = Values(Motion(_turned(theta, turns(model, c)), theta, theta), model.shape)
+    M = np.empty((2, 2, *theta.shape[1:]))
+    for entry, weighted in model.compiled.inertia.items():
+        M[entry] = summed(weighted, c, values)
+    return M
+
+
+def _turned(theta: FloatArray, by: FloatArray) -> FloatArray:
+    return theta + by.reshape(2, *[1] * (theta.ndim - 1)) if np.any(by) else theta
 
 
 def acceleration(model: Model, c: FloatArray, theta: FloatArray, omega: FloatArray, tau: FloatArray) -> FloatArray:
-    """Accelerations that torques give: `torque` solved for θ̈, without the lag.
+    """Accelerations that torques give: `torque` solved for θ̈, without a low-pass.
 
     Parameters
     ----------
     model : Model
-    c : (q,), in `UNITS`
+    c : (q,), in `UNITS`; or (q, N), for an arm of its own at each sample, of a model that is linear
     theta, omega, tau : (2, N), rad, rad/s and N m
 
     Returns
@@ -395,37 +429,52 @@ def acceleration(model: Model, c: FloatArray, theta: FloatArray, omega: FloatArr
 
     Notes
     -----
-    With L = M θ̈ + n the load, D = 1 + e tanh(ω / ω_s) sgn L and R = diag(0, j2), friction and offsets in r,
+    With L = M θ̈ + n the load, D = 1 + e tanh(ω / ω_s) sgn L, R the inertia that is no load, friction and offsets in r
+    and gains g,
 
-        (D M + R) θ̈ = τ / (1, 1 + gain2) - r - D n
+        (D M + R) θ̈ = τ / (1 + g) - r - D n
 
     The signs of L are those of the torque left for it, and found again until they are their own.
     """
-    value = model.values(c)
-    k = np.array([value[name] for name in RIGID] + [0.0, 0.0])
-    turned = theta + _zeros(value)[:, None]
+    compiled = model.compiled
+    by_load = attributes(model, "by_load")
+    motion = Motion(_turned(theta, turns(model, c)), omega, omega)
+    values = Values(motion, model.shape)
     left = np.array(tau, dtype=np.float64)
-    left[1] /= 1 + value["gain2"]
+    for joint, factor in enumerate(gains(model, c)):
+        if factor != 1:
+            left[joint] /= factor
+    if not by_load:
+        for joint in range(2):
+            left[joint] -= summed(compiled.rest[joint], c, values)
+        a, b, d, e = (summed(weighted, c, values) for weighted in compiled.inertia.values())
+        return _solved(a, b, d, e, left)
+    others = [place for place in range(len(compiled.names)) if place not in compiled.loads]
+    M, R = (
+        [summed(compiled.only(weighted, places), c, values) for weighted in compiled.inertia.values()]
+        for places in (compiled.loads, others)
+    )
+    n = np.zeros_like(left)
     for joint in range(2):
-        left[joint] -= value[f"k{joint + 6}"] * omega[joint] + value[f"o{joint + 1}"]
-    for name, friction in friction_columns(model, omega).items():
-        left -= np.array([[value[f"{name}1"]], [value[f"{name}2"]]]) * friction
-    n = passive_torque(k, turned, omega)
-    m11, m12, m22 = mass_matrix(k, turned)
-    if "load" not in model.terms:
-        return _solved(m11, m12, m12, m22 + value["j2"], left - n)
-    e = np.array([[value["e1"]], [value["e2"]]]) * _sign(model, omega)
+        left[joint] -= summed(compiled.only(compiled.rest[joint], others), c, values)
+        n[joint] = summed(compiled.only(compiled.rest[joint], compiled.loads), c, values)
+    share = np.zeros_like(left)
+    for name, joint in by_load:
+        share[joint] = c[compiled.place[name]] * _sign(model, omega[joint])
     signs = np.sign(left)
     for _ in range(_SIGN_TRIALS):
-        D = 1 + e * signs
-        alpha = _solved(D[0] * m11, D[0] * m12, D[1] * m12, D[1] * m22 + value["j2"], left - D * n)
-        found = np.sign(np.stack([m11 * alpha[0] + m12 * alpha[1], m12 * alpha[0] + m22 * alpha[1]]) + n)
+        D = 1 + share * signs
+        first, second = (D[0] * M[0] + R[0], D[0] * M[1] + R[1]), (D[1] * M[2] + R[2], D[1] * M[3] + R[3])
+        alpha = _solved(*first, *second, left - D * n)
+        found = np.sign(np.stack([M[0] * alpha[0] + M[1] * alpha[1], M[2] * alpha[0] + M[3] * alpha[1]]) + n)
         if np.array_equal(found, signs):
             break
         signs = found
     return alpha
 
 
-def _solved(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, right: FloatArray) -> FloatArray:
+def _solved(
+    a: FloatArray | float, b: FloatArray | float, c: FloatArray | float, d: FloatArray | float, right: FloatArray
+) -> FloatArray:
     """X (2, N) with [[a, b], [c, d]] x = right."""
     return np.stack([d * right[0] - b * right[1], a * right[1] - c * right[0]]) / (a * d - b * c)

@@ -225,17 +225,15 @@ class Settings:
         return asdict(self) | {"poles": [pole.real if pole.imag == 0 else str(pole) for pole in poles]}
 
     def _check_terms(self) -> None:
-        from algid.model import TERMS
+        from algid.model import CHOICES, EVERY_TERM
 
         for term in self.terms:
-            if term not in (*TERMS, "delay"):
-                raise SettingError(
-                    f"--model: expected auto, plain or some of {', '.join(TERMS)}, delay; found {term!r}"
-                )
-            needed = TERMS[term].needs if term in TERMS else None
+            if term not in CHOICES:
+                raise SettingError(f"--model: expected auto, plain or some of {', '.join(CHOICES)}; found {term!r}")
+            needed = EVERY_TERM[term].needs
             if needed is not None and needed not in self.terms:
                 raise SettingError(f"--model: {term} has no meaning without {needed}; add {needed} to the list")
-        if {"delay", "lag"} <= set(self.terms):
+        if sum(EVERY_TERM[term].timing is not None for term in self.terms) > 1:
             raise SettingError("--model: no log tells a delay from a lag beside it; leave one of them out")
 
     def _refuse_what_the_paper_lacks(self) -> None:

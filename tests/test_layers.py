@@ -25,10 +25,11 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "units": room(),
     "words": room(),
     "arm": room(packages="numpy", library=PURE),
-    "model": room("arm", "numpy", PURE),
+    "physics": room("arm", "numpy", PURE),
+    "model": room("arm physics", "numpy", PURE),
     "log": room("arm", "numpy"),
     "signals": room("arm log", "numpy scipy", PURE),
-    "estimators": room("arm model progress signals", "numpy scipy", PURE),
+    "estimators": room("arm model physics progress signals", "numpy scipy", PURE),
     "files": room("construction errors limits", "pydantic"),
     "stores": room("errors files", "pyarrow"),
     "profile": room("errors files units", "pydantic"),
@@ -64,7 +65,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "arm errors estimators files identification log model progress report results signals synth writers",
         "numpy polars pydantic scipy",
     ),
-    "export": room("arm errors files identification model report results words", "numpy scipy"),
+    "export": room("arm errors files identification model physics report results words", "numpy scipy"),
     "fleet": room("errors files model progress report words", "numpy polars scipy"),
     "cli": room(
         "batch check design errors estimators export faults files "

@@ -34,9 +34,9 @@ def refusing_checks() -> list[str]:
 
 def terms() -> list[str]:
     """What ``--model`` may hold."""
-    from algid.model import TERMS
+    from algid.model import CHOICES
 
-    return ["auto", "plain", *TERMS, "delay"]
+    return ["auto", "plain", *CHOICES]
 
 
 def of_profile(setting: str, channel: str | None = None) -> Completion:

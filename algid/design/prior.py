@@ -20,7 +20,8 @@ from algid.results import Result, read_result
 from algid.synth.cases import Case, load_case
 
 WRONG = 0.2  # share by which masses and friction of a drawing may be wrong
-_UNPLANNED = ("load", "gain", "zero", "lag")  # the torque is not linear in them, or they are not of one instant
+# the torque is not linear in them, or they are not of one instant
+_UNPLANNED = tuple(name for name, term in TERMS.items() if not term.linear or term.timing)
 NOISE = ("theta1", "theta2", "tau1", "tau2")
 
 

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from algid.arm import CONSTANT_NAMES, FloatArray, mass_matrix, passive_torque
-from algid.model import COLUMN_NAMES, Model, Motion, friction_columns, friction_slope, partials
+from algid.arm import FloatArray
+from algid.model import Model, Motion, acceleration, damping, inertia
 
 _STABLE = 2.0  # largest product of step and fastest rate; the method's own limit is 2.8
 _COARSEST = 0.01  # s
@@ -46,9 +46,8 @@ def step_for(model: Model, coefficients: FloatArray, duration: float) -> float:
     """A step in s, of which `duration` holds a whole number, that is stable for arms (q, B)."""
     fastest, still = 1.0, np.zeros((2, 1))
     for c in coefficients.T:
-        slope = friction_slope(model, model.values(c), still)[:, 0]
-        M = partials(model, c, Motion(still, still, still))[2, :, :, 0]
-        fastest = max(fastest, float(np.abs(np.linalg.eigvals(np.linalg.inv(M) * slope)).max()))
+        M = inertia(model, c, still)[..., 0]
+        fastest = max(fastest, float(np.abs(np.linalg.eigvals(np.linalg.inv(M) * damping(model, c))).max()))
     step = max(min(_COARSEST, _STABLE / fastest), FINEST)
     return duration / int(np.ceil(duration / step))
 
@@ -73,20 +72,10 @@ def swing(
     lost : callable
         Asked now and then whether states (4, B) are such that the rest does not matter: the motions end there.
     """
-    value = dict(zip(COLUMN_NAMES, np.zeros((len(COLUMN_NAMES), C.shape[1])), strict=True))
-    value |= dict(zip(model.names, C, strict=True))
-    k = np.array([value[name] for name in CONSTANT_NAMES])
-    offset = np.array([value["o1"], value["o2"]])
 
     def rate(state: FloatArray, torque: FloatArray) -> FloatArray:
-        theta, omega = state[:2], np.clip(state[2:], -FAST, FAST)
-        free = torque - passive_torque(k, theta, omega) - offset
-        for letter, column in friction_columns(model, omega).items():
-            free -= np.array([value[f"{letter}1"], value[f"{letter}2"]]) * column
-        m11, m12, m22 = mass_matrix(k, theta)
-        m22 = m22 + value["j2"]
-        alpha = np.array([m22 * free[0] - m12 * free[1], m11 * free[1] - m12 * free[0]]) / (m11 * m22 - m12 * m12)
-        return np.concatenate([omega, alpha])
+        omega = np.clip(state[2:], -FAST, FAST)
+        return np.concatenate([omega, acceleration(model, C, state[:2], omega, torque)])
 
     steps = torque.shape[0] // 2
     state = np.zeros((4, C.shape[1]))

@@ -24,9 +24,9 @@ from algid.estimators.fit import Fit, Status
 from algid.estimators.identifiability import sizes
 from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Normal
-from algid.model import TERMS, Model
+from algid.model import CHOICES, EVERY_TERM, PARAMETERS, Model
 
-_NOT_NEGATIVE = ("k5", "k6", "k7", "f1", "f2", "j2", "m_p", "l1", "l2")
+_NOT_NEGATIVE = tuple(name for name, parameter in PARAMETERS.items() if parameter.sign == "+")
 _NUDGE = 1e-6  # of a parameter's size: step of the differences
 FAR_BEYOND = 3.0
 """Standard deviations past a bound of physics that chance does not explain."""
@@ -221,7 +221,7 @@ def joints_apart(normals: Sequence[Normal], model: Model) -> JointsApart | None:
     return JointsApart(model.names[both[worst]], float(first[worst]), float(second[worst]))
 
 
-_OPTIONAL = {**{term: content.names for term, content in TERMS.items()}, "delay": ("delay",)}
+_OPTIONAL = {term: EVERY_TERM[term].names for term in CHOICES}
 
 
 @dataclass(frozen=True)

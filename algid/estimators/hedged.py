@@ -21,7 +21,7 @@ from algid.estimators.fit import Fit, widened
 from algid.estimators.identifiability import STILL
 from algid.estimators.selection import FIRST_TERMS
 from algid.estimators.weak import Source, WeakSettings
-from algid.model import RIGID, UNITS
+from algid.model import DELAYS, RIGID, UNITS
 
 
 def hedged(
@@ -50,8 +50,9 @@ def hedged(
     if len(fit.logs) >= FEWEST_LOGS:
         return fit
     terms = tuple(dict.fromkeys((*settings.model.terms, *FIRST_TERMS)))
-    delayed = settings.estimate_delay or (settings.delay == 0 and "lag" not in terms)
-    larger = replace(settings, model=replace(settings.model, terms=terms), estimate_delay=delayed)
+    model = replace(settings.model, terms=terms)
+    delayed = settings.estimate_delay or (bool(DELAYS) and settings.delay == 0 and model.lag_name is None)
+    larger = replace(settings, model=model, estimate_delay=delayed)
     general = weak.fit(unloaded, loaded, larger, dict(lengths or {}), prior)
     stds = zip(general.names, general.std, general.status, strict=True)
     spreads = {name: std for name, std, status in stds if status == "OK"}
@@ -61,7 +62,7 @@ def hedged(
     if note and not np.array_equal(covariance, fit.covariance):
         added = [term for term in terms if term not in settings.model.terms]
         if delayed and not settings.estimate_delay:
-            added.append("delay")
+            added += DELAYS
         note = f"{note}, with error bars as if it had {', '.join(added)} too"
     doubt = _doubt(fit, unloaded, loaded, settings)
     fit = replace(fit, covariance=covariance, note=note)

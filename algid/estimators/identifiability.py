@@ -30,29 +30,13 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from algid.arm import FloatArray, keep_arrays
+from algid.model import PARAMETERS, RIGID
+from algid.physics.parameters import INERTIA, LENGTH, MASS, MOMENT, VISCOUS
 
-_CLASSES = (
-    ("k1", "k3", "k5", "j2"),
-    ("k2", "k4", "f1", "f2", "o1", "o2", "s1", "s2", "a1", "a2"),
-    ("k6", "k7"),
-    ("e1", "e2"),
-    ("gain2",),
-    ("zero1", "zero2"),
-    ("delay", "lag"),
-    ("m_p",),
-    ("l1", "l2"),
+_SCALES = tuple(
+    (scale, tuple(name for name, one in PARAMETERS.items() if one.scale is scale))
+    for scale in dict.fromkeys(one.scale for one in PARAMETERS.values())
 )
-_LEAST = {
-    "k6": 1e-6,
-    "e1": 1e-2,
-    "gain2": 1e-2,
-    "zero1": 1e-2,
-    "delay": 1e-3,
-    "m_p": 1e-3,
-    "l1": 1e-2,
-    "k2": 1e-4,
-    "k1": 1e-6,
-}
 _UNDETERMINED = 0.5  # standard deviation of a direction, in sizes of its parameters
 _DAMPING = 0.1  # of √(inertia × gravity), half the critical damping: an arm may be free of friction, and that be known
 _NOTHING = 1e-14  # of the largest eigenvalue: rounding
@@ -124,17 +108,14 @@ def sizes(names: Sequence[str], values: FloatArray) -> FloatArray:
     def largest_of(members: Sequence[str]) -> float:
         return max((by_name[name] for name in members if name in by_name), default=0.0)
 
+    sized = {scale: largest_of(members) for scale, members in _SCALES}
+    inertia, moment = (largest_of([n for n in RIGID if PARAMETERS[n].scale is scale]) for scale in (INERTIA, MOMENT))
     # With both lengths known the torque is linear in the payload, which may be none, and that be known: its size is
     # that of a mass which at 1 m loads the arm as much as it loads itself.
-    mass = max(largest_of(("k2", "k4")) / 9.81, largest_of(("k1", "k3", "k5")))
-    known = "m_p" in by_name and not {"l1", "l2"} & set(by_name)
-    damping = _DAMPING * np.sqrt(largest_of(("k1", "k3", "k5")) * largest_of(("k2", "k4")))
-    size = {}
-    for members in _CLASSES:
-        largest = max(largest_of(members), damping if "k6" in members else mass if known and "m_p" in members else 0.0)
-        for name in members:
-            size[name] = max(largest, _LEAST.get(members[0], 1e-6))
-    return np.array([size[name] for name in names])
+    if any(PARAMETERS[name].scale is MASS for name in names) and not any(PARAMETERS[n].scale is LENGTH for n in names):
+        sized[MASS] = max(sized[MASS], moment / 9.81, inertia)
+    sized[VISCOUS] = max(sized[VISCOUS], _DAMPING * float(np.sqrt(inertia * moment)))
+    return np.array([max(sized[scale], scale.least) for scale in (PARAMETERS[name].scale for name in names)])
 
 
 def _sentences(names: Sequence[str], null: FloatArray, size: FloatArray, moved: FloatArray) -> list[str]:

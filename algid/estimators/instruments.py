@@ -32,13 +32,13 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.arm import CONSTANT_NAMES, FloatArray, mass_matrix
+from algid.arm import FloatArray
 from algid.estimators import weak
 from algid.estimators.combine import BlockSums, LogInformation, Prior, long_run_variance, scaled_pinv
 from algid.estimators.fit import Fit, conclude
 from algid.estimators.modulating_functions import OVERLAP, Windows, row_weights
 from algid.estimators.weak import Source, WeakSettings
-from algid.model import Model, acceleration
+from algid.model import Model, acceleration, inertia
 from algid.signals.filters import correlate, differentiator, half_length, smoother
 from algid.signals.segments import Segment
 
@@ -273,10 +273,8 @@ def _started(piece: Segment, windows: Windows, starts: NDArray[np.int64]) -> tup
 
 def _has_inertia(model: Model, c: FloatArray, theta: FloatArray) -> bool:
     """Whether the mass matrix is positive definite at the angles (2, ...)."""
-    value = model.values(c)
-    k = np.array([value[name] for name in CONSTANT_NAMES])
-    m11, m12, m22 = mass_matrix(k, np.stack([theta[0] + value["zero1"], theta[1] + value["zero2"]]))
-    return bool(np.all((m11 > 0) & (m11 * (m22 + value["j2"]) > m12**2)))
+    (m11, m12), (_, m22) = inertia(model, c, theta)
+    return bool(np.all((m11 > 0) & (m11 * m22 > m12**2)))
 
 
 def endogeneity(unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings, fit: Fit) -> float | None:

@@ -20,6 +20,7 @@ window's moment is the sum over its blocks. The cost is O(N), whatever the lengt
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -27,7 +28,8 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from algid.arm import FloatArray
-from algid.model import Model, Motion, friction_columns, sine_cosine, torque
+from algid.model import Model, Motion, attributes, gains, sine_cosine, torque, turns
+from algid.physics.expressions import Values
 from algid.signals.filters import correlate, differentiator, half_length
 from algid.signals.segments import Segment
 
@@ -148,67 +150,60 @@ class Windows:
         margin = self.margin
         if (len(piece) - 2 * margin) // self.step < OVERLAP:
             return np.zeros((2, size, 0))
-        value = model.values(np.zeros(len(model.names)) if at is None else at)
+        here = np.zeros(len(model.names)) if at is None else at
         tau = piece.tau[:, margin - self.whole : len(piece) - margin - self.whole]
-        theta = piece.theta[:, margin : len(piece) - margin] + np.array([[value["zero1"]], [value["zero2"]]])
-        omega = self._velocity(piece)
-        columns = self._columns(model, theta, omega)
-        if "load" in model.terms and at is not None:
-            e1, e2 = self.moments(self._dissipated(model, at, theta, omega), self._plain[0])
-            columns |= {"e1": (e1, np.zeros_like(e1)), "e2": (np.zeros_like(e2), e2)}
-        if "zero" in model.terms and at is not None:
-            columns |= self._turned(value, theta, omega)
+        turned = turns(model, here)[:, None]
+        theta, omega = piece.theta[:, margin : len(piece) - margin] + turned, self._velocity(piece)
         X = np.zeros((2, size, (len(piece) - 2 * margin) // self.step - OVERLAP + 1))
-        for place, name in enumerate(model.names):
-            X[0, place], X[1, place] = columns.get(name, (0.0, 0.0))
-        X[1] *= 1 + value["gain2"]
+        self._fill(X, model, theta, omega)
+        if at is not None:
+            place = model.compiled.place
+            for name, joint, dissipated in self._dissipated(model, at, theta, omega):
+                X[joint, place[name]] = self.moments(dissipated[None], self._plain[0])[0]
+            if "zero" in model.terms:
+                for name, both in self._turned(model.values(at), theta, omega).items():
+                    if name in place:
+                        X[0, place[name]], X[1, place[name]] = both
+        X *= gains(model, here)[:, None, None]
         X[:, -1] = self.moments(tau, self._shifted[0])
         if at is not None:
-            _linearise_bilinear(X, model, at, value["gain2"])
-        tau_slope = self.moments(tau, self._shifted[1]) if delay or "lag" in model.terms else 0.0
-        if "lag" in model.terms:
-            X[:, model.names.index("lag")] = tau_slope
+            _linearise_bilinear(X, model, at)
+        tau_slope = self.moments(tau, self._shifted[1]) if delay or model.lag_name is not None else 0.0
+        if model.lag_name is not None:
+            X[:, model.names.index(model.lag_name)] = tau_slope
         if delay:
             X[:, -2] = -tau_slope
         return X
 
-    def _columns(self, model: Model, theta: FloatArray, omega: FloatArray) -> dict[str, tuple[FloatArray, FloatArray]]:
-        """Moments of both joints by coefficient: of eq. (1) and of all terms that are linear."""
-        weight, slope, bend = self._plain
-        (s1, s2), (c1, c2) = sine_cosine(theta)
-        momentum = c2 * omega[0]
-        centripetal = omega[0] * (omega[0] + omega[1]) * s2
-        theta_slope1, theta_slope2, momentum_slope = self.moments(np.stack([*theta, momentum]), slope)
-        theta_bend1, theta_bend2, s2_bend = self.moments(np.stack([*theta, s2]), bend)
-        friction = friction_columns(model, omega)
-        weighed = np.concatenate([np.stack([centripetal, c1, c1 * c2 - s1 * s2]), *friction.values()])
-        centripetal_, c1_, c12_, *rubbed = self.moments(weighed, weight)
-        zeros, one = np.zeros_like(c1_), np.ones_like(c1_)
-        found = {
-            "k1": (s2_bend - 2 * momentum_slope, centripetal_ - momentum_slope),
-            "k2": (c12_, c12_),
-            "k3": (theta_bend1 + theta_bend2,) * 2,
-            "k4": (c1_, zeros),
-            "k5": (theta_bend1, zeros),
-            "k6": (-theta_slope1, zeros),
-            "k7": (zeros, -theta_slope2),
-            "o1": (one, zeros),
-            "o2": (zeros, one),
-            "j2": (zeros, theta_bend2),
-        }
-        for place, letter in enumerate(friction):
-            found[f"{letter}1"] = (rubbed[2 * place], zeros)
-            found[f"{letter}2"] = (zeros, rubbed[2 * place + 1])
-        return found
+    def _fill(self, X: FloatArray, model: Model, theta: FloatArray, omega: FloatArray) -> None:
+        """Write the moments of every column of τ = d²s/dt² + dp/dt + f into X: ∫φ″ s - ∫φ′ p + ∫φ f."""
+        values = Values(Motion(theta, omega, omega), model.shape)
+        compiled = model.compiled
+        for order, entries in enumerate((compiled.f, compiled.p, compiled.s)):
+            products = list(dict.fromkeys(p for _, _, entry in entries for p in entry.products if p))
+            if products:
+                signals = np.stack([np.broadcast_to(values.of(product), theta.shape[1:]) for product in products])
+                moments = dict(zip(products, self.moments(signals, self._plain[order]), strict=True))
+            for joint, place, entry in entries:
+                for product, factor in entry.products.items():
+                    # a window's integral is one, its derivatives' are nothing
+                    moment = moments[product] if product else float(order == 0)
+                    X[joint, place] += (-1) ** order * factor * moment
 
-    def _dissipated(self, model: Model, c: FloatArray, theta: FloatArray, omega: FloatArray) -> FloatArray:
-        """|L| tanh(ω / ω_s) (2, N) of the load that the coefficients `c` give."""
+    def _dissipated(
+        self, model: Model, c: FloatArray, theta: FloatArray, omega: FloatArray
+    ) -> Iterator[tuple[str, int, FloatArray]]:
+        """Of each parameter by load its joint, and |L| tanh(ω / ω_s) (N,) of the load that `c` gives."""
+        shared = attributes(model, "by_load")
+        if not shared:
+            return
         rigid = Model(gravity=model.gravity)
-        k = c[: len(rigid.names)].copy()
-        k[-2:] = 0.0  # k6, k7: friction is no load
+        value = model.values(c)
+        loads = set(rigid.compiled.loads)
+        k = np.array([value[name] if place in loads else 0.0 for place, name in enumerate(rigid.names)])
         load = torque(rigid, k, Motion(theta, omega, np.gradient(omega, self.dt, axis=1)))
-        dissipated: FloatArray = np.abs(load) * np.tanh(omega / model.coulomb_speed)
-        return dissipated
+        for name, joint in shared:
+            yield name, joint, np.abs(load[joint]) * np.tanh(omega[joint] / model.coulomb_speed)
 
     def _turned(
         self, value: dict[str, float], theta: FloatArray, omega: FloatArray
@@ -258,16 +253,18 @@ def row_weights(gram: FloatArray, v: FloatArray, rows: int) -> FloatArray:
     return np.asarray(rows / np.maximum(squares, 1e-24 * float(gram[:, -1, -1].max()) + 1e-300))
 
 
-def _linearise_bilinear(X: FloatArray, model: Model, at: FloatArray, gain2: float) -> None:
-    """Complete X, made at `at`, by the column of the gain, and the torque by what the linearisation at `at` adds.
+def _linearise_bilinear(X: FloatArray, model: Model, at: FloatArray) -> None:
+    """Complete X, made at `at`, by the columns of the gains, and the torque by what the linearisation at `at` adds.
 
     With Y the regressor at c0 and J the derivative there, τ = Y c0 + J (c - c0) is J c = τ + (J - Y) c0; J and Y
-    differ in the columns of gain2, zero1 and zero2 alone.
+    differ in the columns of gains and turned angles alone.
     """
-    place = {name: number for number, name in enumerate(model.names)}
-    angles = [place[name] for name in ("zero1", "zero2") if name in place]
-    if "gain" in model.terms:
-        linear = np.array([0.0 if number in angles else value for number, value in enumerate(at)])
-        X[1, place["gain2"]] = X[1, : len(at)].T @ linear / (1 + gain2)
-        angles.append(place["gain2"])
-    X[:, -1] += np.einsum("j,ajr->ar", at[angles], X[:, angles])
+    place = model.compiled.place
+    moved = [place[name] for name, _ in attributes(model, "turns")]
+    linear = at.copy()
+    linear[moved] = 0.0
+    factor = gains(model, at)
+    for name, joint in attributes(model, "gains"):
+        X[joint, place[name]] = X[joint, : len(at)].T @ linear / factor[joint]
+        moved.append(place[name])
+    X[:, -1] += np.einsum("j,ajr->ar", at[moved], X[:, moved])

@@ -20,9 +20,10 @@ from functools import cached_property
 import numpy as np
 
 from algid.arm import FloatArray, payload_constants
-from algid.model import Model
+from algid.model import DELAYS, Model
+from algid.physics.parameters import PAYLOAD
 
-PAYLOAD_PARAMETERS = ("m_p", "l1", "l2")
+PAYLOAD_PARAMETERS = tuple(one.name for one in PAYLOAD)
 _LOADED = {"k1": 2, "k2": 4, "k3": 1, "k4": 3, "k5": 0}  # which z adds to which k: eq. (5) against eq. (3)
 
 
@@ -49,7 +50,7 @@ class Shared:
     @cached_property
     def log_names(self) -> tuple[str, ...]:
         """Names of the coefficients of one log."""
-        return self.model.names + (("delay",) if self.delay else ())
+        return self.model.names + (DELAYS if self.delay else ())
 
     @cached_property
     def names(self) -> tuple[str, ...]:

@@ -138,7 +138,7 @@ class PredictionSums:
     def _add(self, piece: Segment) -> None:
         shift = seconds(self._shift, piece.dt)
         if self._at is not None:  # a logged torque that lags shows at its stamp what acted before
-            shift -= self._model.values(self._at)["lag"]
+            shift -= self._model.lag(self._at)
         X = _filtered(self._model, piece, shift, self._by, self._at)
         self._count += X.shape[2]
         self._torque = self._torque + X[:, -1].sum(axis=1)

@@ -178,7 +178,7 @@ def _opened(
 ) -> Iterator[LogEvidence]:
     def stencil(dt: float, c: FloatArray) -> Stencil:
         delay = float(c[-1]) if shared.delay else settings.delay
-        shift = settings.shift(dt) + delay - shared.model.values(c[: len(shared.model.names)])["lag"]
+        shift = settings.shift(dt) + delay - shared.model.lag(c)
         return Stencil(dt, shift, held=settings.hold == "zoh")
 
     for source in sources:

@@ -21,7 +21,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.estimators.prediction import PredictionFilter, Shift, motion_of, seconds
-from algid.model import Model, acceleration, friction_slope
+from algid.model import Model, acceleration, damping, inertia
 from algid.signals.filters import butterworth
 from algid.signals.segments import Cutter, Segment
 
@@ -30,6 +30,7 @@ HORIZONS = (0.1, 0.5, 2.0)
 _STARTS = 400  # of a log, at most
 _CLOSEST = 0.05  # s between starts
 _PIECE_SECONDS = 60.0
+_POSES = 8  # of joint 2, at which the arm's stiffness is looked at
 _LONGEST, _SHORTEST = 2e-3, 1.25e-4  # s of a step
 
 
@@ -86,12 +87,11 @@ def rollouts(
 
 def time_step(model: Model, c: FloatArray) -> float:
     """Time step in s that the stiffest friction of either joint, at rest, leaves stable; it divides the horizons."""
-    value = model.values(c)
-    k1, k3, k5 = abs(value["k1"]), value["k3"], value["k5"]
-    slope = np.abs(friction_slope(model, value, np.zeros((2, 1))))[:, 0]
-    outer, coupling, inner = k5 + k3 + 2 * k1, k3 + k1, k3 + value["j2"]
-    least = max(outer * inner - coupling**2, 1e-3 * outer * inner)
-    rate = float(max(slope[0] * inner, slope[1] * outer)) / least
+    around = np.linspace(0, 2 * np.pi, _POSES, endpoint=False)
+    (outer, coupling), (_, inner) = inertia(model, c, np.stack([np.zeros_like(around), around]))
+    slope = np.abs(damping(model, c))
+    least = np.maximum(outer * inner - coupling**2, 1e-3 * outer * inner)
+    rate = float(np.max(np.maximum(slope[0] * inner, slope[1] * outer) / least))
     step = _LONGEST
     while step * rate > 1 and step > _SHORTEST:
         step /= 2
@@ -109,7 +109,7 @@ def _starts(
     if n <= 6 * (by.order + 1) or not at.size:
         return np.zeros((4, 0)), np.zeros((halves, 2, 0)), np.zeros((len(HORIZONS), 2, 0))
     motion = motion_of(butterworth(piece.theta, dt, min(by.motion, 0.45 / dt), by.order), dt)
-    late = seconds(shift, dt) - model.values(c)["lag"]
+    late = seconds(shift, dt) - model.lag(c)
     when = at * dt + 0.5 * step * np.arange(halves)[:, None] - late
     t = np.arange(n) * dt
     width = max(1, round(step / dt))

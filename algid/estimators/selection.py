@@ -17,41 +17,33 @@ linear is linearised, is improved between the rounds.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import combinations
 from typing import Literal
 
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.estimators.term_grams import Coefficients, Grams, Training, term_names
+from algid.estimators.term_grams import CHANGE, Coefficients, Grams, Training, term_names
 from algid.estimators.weak import Source, WeakSettings
-from algid.model import TERMS, Model
+from algid.model import CHOICES, EVERY_TERM, PARAMETERS, TERMS, Model, without_delay
+from algid.physics.motion import Widths
 
-TIMING = ("delay", "lag")  # the same to first order: one column tells both
-CHOICE = (*(term for term in TERMS if term != "lag"), "delay")
-_OF_BOTH_TORQUES = ("gain",)  # where a joint has no motor, its gain is nothing and makes its equation vanish
-FIRST_TERMS = ("coulomb", "offset", "rotor")  # the most common ones
+CHOICE = tuple(name for name, term in EVERY_TERM.items() if name in CHOICES and term.timing != "lag")
+"""Terms that the logs choose from: a lag and a delay are the same to first order, and one column tells both."""
+_DELAY, _LAG = (
+    tuple(name for name, term in EVERY_TERM.items() if term.timing == timing) for timing in ("delay", "lag")
+)
+# Where a joint has no motor, its gain is nothing and makes its equation vanish.
+_OF_BOTH_TORQUES = tuple(name for name in CHOICE if EVERY_TERM[name].gains)
+FIRST_TERMS = tuple(name for name, term in TERMS.items() if term.usual)
 _WIDTHS = np.array([0.01, 0.02, 0.04, 0.08, 0.16, 0.32])  # rad/s
 _FADES = np.array([0.1, 0.3, 0.9])  # rad/s
 _NEAR = np.array([0.7, 0.84, 1.0, 1.2, 1.44])  # of a shape found before
-_SHAPED = {"coulomb_speed": {"coulomb", "load", "asymmetry", "stribeck"}, "stribeck_speed": {"stribeck"}}
-_RELINEARISED = {"load", "gain", "zero", "delay"}
-_PLAUSIBLE = {  # coefficients beyond are another convention, or what a log that tells little makes of its noise
-    "f1": (0.0, np.inf),
-    "f2": (0.0, np.inf),
-    "j2": (0.0, np.inf),
-    "e1": (0.0, 0.5),
-    "e2": (0.0, 0.5),
-    "gain2": (-0.5, 0.5),
-    "zero1": (-0.35, 0.35),
-    "zero2": (-0.35, 0.35),
-    "delay": (-0.05, 0.05),
-}
+_SHAPED = {shape.name: {name for name, term in TERMS.items() if shape.name in term.shapes} for shape in fields(Widths)}
+_RELINEARISED = {name for name in CHOICE if not EVERY_TERM[name].linear or EVERY_TERM[name].timing}
 _ROUNDS = 4
 _TOGETHER = 2  # terms that are tried at once
-
-Shape = Literal["coulomb_speed", "stribeck_speed"]
 
 
 @dataclass(frozen=True)
@@ -102,10 +94,10 @@ class _Look:
 
     def grams(self, terms: Sequence[str], **shape: float) -> Grams:
         """Normal equations with the columns of `terms`."""
-        model = replace(self.settings.model, terms=tuple(term for term in terms if term != "delay"), **shape)
+        model = replace(self.settings.model, terms=without_delay(terms), **shape)
         return Grams(self.logs, replace(self.settings, model=model), self.at)
 
-    def shaped(self, shape: Shape, values: FloatArray, terms: Sequence[str]) -> _Look:
+    def shaped(self, shape: str, values: FloatArray, terms: Sequence[str]) -> _Look:
         """With the value of a shape at which the model with `terms` fits best."""
         costs = [self.grams(terms, **{shape: float(value)}).cost for value in values]
         best = float(np.exp(_lowest(np.log(values), costs)))
@@ -115,12 +107,12 @@ class _Look:
     def moved(self, grams: Grams, terms: Sequence[str]) -> _Look:
         """At what the sub-model with `terms` gives."""
         at = grams.coefficients(terms)
-        delay = self.settings.delay + at[False]["delay"]
+        delay = self.settings.delay + at[False][CHANGE]
         moved = replace(self, settings=replace(self.settings, delay=delay), at=at)
         for shape, shaped in _SHAPED.items():
             if shaped & set(terms):
                 now = getattr(self.settings.model, shape)
-                moved = moved.shaped(shape, now * _NEAR, terms)  # type: ignore[arg-type]
+                moved = moved.shaped(shape, now * _NEAR, terms)
         return moved
 
 
@@ -146,7 +138,7 @@ def select(
         Its model's gravity, its window, bandwidth, hold and delay.
     candidates : names in `CHOICE`
         A delay that turns out negative is a lag where that explains more.
-    kept : names in `TERMS`, or "delay"
+    kept : names in `CHOICES`
         Terms that stay whatever the data say; only their shapes are found.
 
     Raises
@@ -159,9 +151,11 @@ def select(
         candidates = [term for term in candidates if term not in _OF_BOTH_TORQUES]
     # At the constants, and at the shapes of friction, that a model of the most common terms gives.
     look = _Look(tuple(logs), settings, {False: {}, True: {}}).shaped("coulomb_speed", _WIDTHS, FIRST_TERMS)
-    at = look.grams(FIRST_TERMS).coefficients((*FIRST_TERMS, "delay"))
-    linear = {kind: {name: c for name, c in values.items() if name != "delay"} for kind, values in at.items()}
-    start = replace(look, at=linear).shaped("stribeck_speed", _FADES, (*FIRST_TERMS, "stribeck"))
+    at = look.grams(FIRST_TERMS).coefficients((*FIRST_TERMS, *_DELAY))
+    linear = {kind: {name: c for name, c in values.items() if name != CHANGE} for kind, values in at.items()}
+    start = replace(look, at=linear)
+    if _SHAPED["stribeck_speed"]:
+        start = start.shaped("stribeck_speed", _FADES, (*FIRST_TERMS, *_SHAPED["stribeck_speed"]))
     look, fixed, before = start, tuple(kept), None
     everything = tuple(dict.fromkeys((*candidates, *kept)))
     searches: list[_Search] = []
@@ -172,13 +166,13 @@ def select(
         if terms == before or not (_RELINEARISED | _SHAPED["coulomb_speed"]) & set(terms):
             break
         look, before = look.moved(grams, terms), terms
-        if "delay" in terms:
-            fixed = tuple(dict.fromkeys((*fixed, "delay")))
-    model = replace(look.settings.model, terms=tuple(term for term in terms if term != "delay"))
+        fixed = tuple(dict.fromkeys((*fixed, *(term for term in terms if term in _DELAY))))
+    model = replace(look.settings.model, terms=without_delay(terms))
+    delayed = len(model.terms) < len(terms)
     if not candidates:
-        return Selection(model, "delay" in terms)
-    trials = tuple(searches[0 if term == "delay" else -1].trial(term, terms, kept) for term in everything)
-    return _as_lag(start, look, terms, Selection(model, "delay" in terms, "logs", trials, grams.held_out))
+        return Selection(model, delayed)
+    trials = tuple(searches[0 if term in _DELAY else -1].trial(term, terms, kept) for term in everything)
+    return _as_lag(start, look, terms, Selection(model, delayed, "logs", trials, grams.held_out))
 
 
 def _lowest(x: FloatArray, y: Sequence[float]) -> float:
@@ -192,14 +186,14 @@ def _lowest(x: FloatArray, y: Sequence[float]) -> float:
 
 def _as_lag(start: _Look, look: _Look, terms: Sequence[str], chosen: Selection) -> Selection:
     """The selection with a lag in place of a negative delay where that fits better."""
-    if not chosen.delay or look.settings.delay >= start.settings.delay:
+    if not (chosen.delay and _LAG) or look.settings.delay >= start.settings.delay:
         return chosen
     timely = replace(look, settings=replace(look.settings, delay=start.settings.delay))
-    others = [term for term in terms if term != "delay"]
+    others = without_delay(terms)
     if timely.grams(others).cost >= look.grams(others).cost:  # both with the torque's slope, the one shifted before
         return chosen
-    trials = tuple(replace(trial, term="lag") if trial.term == "delay" else trial for trial in chosen.trials)
-    model = replace(chosen.model, terms=(*chosen.model.terms, "lag"))
+    trials = tuple(replace(trial, term=_LAG[0]) if trial.term in _DELAY else trial for trial in chosen.trials)
+    model = replace(chosen.model, terms=(*chosen.model.terms, *_LAG))
     return replace(chosen, model=model, delay=False, trials=trials)
 
 
@@ -228,10 +222,11 @@ class _Search:
         return self.gain(terms, beside) > 0 and self.plausible(terms, beside)
 
     def plausible(self, terms: Sequence[str], among: Sequence[str]) -> bool:
-        """Whether the coefficients of `terms` beside `among` are within `_PLAUSIBLE`."""
+        """Whether the coefficients of `terms` beside `among` are plausible."""
         value = self.grams.coefficients([*among, *terms])[False]
-        names = [name for term in terms for name in term_names(term) if name in _PLAUSIBLE]
-        return all(_PLAUSIBLE[name][0] <= value[name] <= _PLAUSIBLE[name][1] for name in names)
+        names = [name for term in terms for name in term_names(term) if name in value]
+        ranges = ((value[name], PARAMETERS[name].plausible) for name in names)
+        return all(low <= found <= high for found, (low, high) in ranges)
 
     def run(self) -> list[str]:
         """The terms that stay."""
@@ -284,4 +279,4 @@ class _Search:
 
 
 def _need(term: str) -> str | None:
-    return None if term == "delay" else TERMS[term].needs
+    return EVERY_TERM[term].needs

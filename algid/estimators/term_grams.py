@@ -26,7 +26,8 @@ from algid.estimators.combine import long_run_variance, scaled_pinv
 from algid.estimators.modulating_functions import OVERLAP, row_weights
 from algid.estimators.too_short import TooShortError
 from algid.estimators.weak import Normal, Source, WeakSettings, normal_equations
-from algid.model import RIGID, TERMS
+from algid.model import DELAYS, EVERY_TERM, RIGID
+from algid.physics.terms import ALWAYS
 from algid.signals.segments import Segment, pieces, spread_pieces
 
 IntArray = NDArray[np.int64]
@@ -37,11 +38,13 @@ _PIECE_SAMPLES = 16384
 _FOLDS = 5  # blocks of a log, where there are too few logs to leave whole ones out
 _FEWEST_LOGS = 3
 _REWEIGHTINGS = 4
+CHANGE = next(iter(DELAYS), "change of the delay")
+"""The column of a change of the delay."""
 
 
 def term_names(term: str) -> tuple[str, ...]:
     """Names of the coefficients of a term, or of the delay."""
-    return ("delay",) if term == "delay" else TERMS[term].names
+    return EVERY_TERM[term].names
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +87,7 @@ class Grams:
 
     def __init__(self, logs: Sequence[Training], settings: WeakSettings, at: Mapping[bool, Coefficients]) -> None:
         self.settings = settings = replace(settings, estimate_delay=True)
-        self.names = (*settings.model.names, "delay")
+        self.names = (*settings.model.names, CHANGE)
         self._rigid = [place for place, name in enumerate(self.names) if name in RIGID]
         normals = []
         for log in logs:
@@ -147,7 +150,8 @@ class Grams:
     def _columns(self, terms: Iterable[str]) -> IntArray:
         """Places in p of eq. (1) and of `terms`."""
         names = {name for term in terms for name in term_names(term)}
-        basic = [place for place, name in enumerate(self.names) if name[0] == "k" or name in names]
+        names |= {name for term in ALWAYS for name in term.names}
+        basic = [place for place, name in enumerate(self.names) if name in names]
         return np.array([*basic, *range(len(self.names), self.size)])
 
     def coefficients(self, terms: Iterable[str]) -> dict[bool, dict[str, float]]:

@@ -39,8 +39,7 @@ _SHORTEST = 64  # samples: shorter pieces hold no window
 _REWEIGHTINGS = 4
 _PASSES = 8
 _DELAY_SETTLED = 0.02  # samples
-_SETTLED = 1e-4  # of e1, e2, gain2, zero1, zero2: 1 or rad
-_ITERATED = ("e1", "e2", "gain2", "zero1", "zero2")
+_SETTLED = 1e-4  # of coefficients in which the torque is not linear: 1 or rad
 _FIRST_MASSES = (0.02, 0.1, 0.5, 2.0, 10.0)  # kg
 _FIRST_LENGTH = 0.3  # m
 
@@ -99,7 +98,7 @@ def fit(
     settings = settings or WeakSettings()
     model = settings.model
     shared = Shared(model, settings.estimate_delay, bool(loaded), dict(lengths or {}))
-    iterated = [model.names.index(name) for name in _ITERATED if name in model.names]
+    iterated = [model.names.index(name) for name in model.iterated if name in model.names]
     at: list[FloatArray | None] = [None, None]
     for _ in range(_PASSES):
         normals, loaded_normals = _normals(unloaded, settings, at[0]), _normals(loaded, settings, at[1])

@@ -125,10 +125,9 @@ def linearise(
     motion = Motion(*stencil.differences(theta0))
     J = sensitivity(model, c, motion)
     modelled = torque(model, c, motion)
-    if "lag" in model.terms:
-        place = model.names.index("lag")
-        J, modelled = (low_passed(signal, stencil.dt, float(c[place])) for signal in (J, modelled))
-        J[:, place] = -np.gradient(modelled, stencil.dt, axis=1)
+    if model.lag_name is not None:
+        J, modelled = (low_passed(signal, stencil.dt, model.lag(c)) for signal in (J, modelled))
+        J[:, model.names.index(model.lag_name)] = -np.gradient(modelled, stencil.dt, axis=1)
     G = along_stencil(partials(model, c, motion), stencil.weights)
     measured = held_torque(piece.tau) if stencil.held else piece.tau
     error = measured[:, torques] - modelled - forward(G, piece.theta - theta0, first)

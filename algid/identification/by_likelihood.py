@@ -23,7 +23,7 @@ from algid.identification.series import torque_coefficients
 from algid.identification.source import LogSource
 from algid.identification.survey import Survey
 from algid.identification.velocities import with_velocities
-from algid.model import TERMS, Model
+from algid.model import TERMS, Model, without_delay
 from algid.results import Result
 from algid.runtime import beside
 from algid.settings import Settings
@@ -50,7 +50,7 @@ def choose_model(survey: Survey, settings: Settings, earlier: Result | None = No
     plain = Model(gravity=settings.gravity)
     if not settings.chooses and not needs_shape(settings.terms):
         return _given(plain, settings.terms)
-    candidates = [term for term in CHOICE if term != "delay" or settings.delay == 0] if settings.chooses else []
+    candidates = (CHOICE if settings.delay == 0 else without_delay(CHOICE)) if settings.chooses else ()
     unloaded, loaded = _passes(survey, settings)
     try:
         return select(unloaded, loaded, _weak_settings(settings, _given(plain, ())), candidates, settings.terms)
@@ -59,8 +59,8 @@ def choose_model(survey: Survey, settings: Settings, earlier: Result | None = No
 
 
 def _given(model: Model, terms: Sequence[str]) -> Selection:
-    wanted = tuple(term for term in (*model.terms, *terms) if term != "delay")
-    return Selection(replace(model, terms=wanted), "delay" in terms)
+    wanted = without_delay((*model.terms, *terms))
+    return Selection(replace(model, terms=wanted), len(without_delay(terms)) < len(terms))
 
 
 def run_fit(survey: Survey, settings: Settings, chosen: Selection, prior: Prior | None) -> tuple[Fit, Predictions]:
@@ -87,7 +87,7 @@ def run_fit(survey: Survey, settings: Settings, chosen: Selection, prior: Prior 
     """
     sums: dict[LogSource, PredictionSums] = {}
     ours = _weak_settings(settings, chosen)
-    scored = chosen.model.linear and not chosen.delay and "lag" not in chosen.model.terms  # depends on no estimate
+    scored = chosen.model.linear and not chosen.delay and chosen.model.lag_name is None  # depends on no estimate
     unloaded, loaded = _passes(survey, settings, partial(_scored, chosen.model, settings, sums) if scored else None)
     try:
         if settings.estimator == "weak":

@@ -11,7 +11,7 @@ from algid.arm import FloatArray, payload_constants, with_payload
 from algid.errors import ResultError
 from algid.estimators.combine import Prior
 from algid.identification.source import Role
-from algid.model import Model
+from algid.model import Model, without_delay
 from algid.results import Result, Status
 from algid.settings import Settings
 
@@ -23,7 +23,7 @@ def model_of(result: Result) -> Model:
     settings = Settings.of(result.settings)
     found = None if result.fit is None else result.fit.model
     if found is None:
-        return Model(tuple(term for term in settings.terms if term != "delay"), settings.gravity)
+        return Model(without_delay(settings.terms), settings.gravity)
     return Model(tuple(found.terms), settings.gravity, found.coulomb_speed, found.stribeck_speed)
 
 

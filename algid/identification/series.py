@@ -20,7 +20,7 @@ from algid.estimators.paper import PaperSeries
 from algid.estimators.prediction import PredictionFilter
 from algid.estimators.running import has_running, running
 from algid.identification.survey import Survey
-from algid.model import Model, Motion, torque
+from algid.model import Model, Motion, inertia, torque
 from algid.settings import Settings
 from algid.signals.filters import half_length, smoothed
 from algid.signals.segments import Segment, pieces
@@ -56,7 +56,7 @@ def _torques(piece: Segment, model: Model, c: FloatArray, shift: float) -> dict[
     omega = np.gradient(theta, piece.dt, axis=1)
     motion = Motion(theta, omega, np.gradient(omega, piece.dt, axis=1))
     predicted = smoothed(torque(model, c, motion), piece.dt, bandwidth)
-    shift -= model.values(c)["lag"]  # a torque that lags shows at its stamp what acted before
+    shift -= model.lag(c)  # a torque that lags shows at its stamp what acted before
     predicted = np.stack([np.interp(piece.t + shift, piece.t, row) for row in predicted])
     reach = min(half_length(piece.dt, bandwidth), len(piece) // 2)
     predicted[:, :reach] = predicted[:, len(piece) - reach :] = np.nan
@@ -74,10 +74,9 @@ def _bandwidth(piece: Segment, model: Model, c: FloatArray) -> float:
 
     White noise σ_θ sampled at dt has σ_θ √(2 dt B/5) (2π B)² of acceleration below B; inertia makes it torque.
     """
-    full = dict(zip(model.names, c, strict=True))
-    inertia = np.abs([full["k5"] + full["k3"] + 2 * full["k1"], full["k3"]])
+    outstretched = np.abs(np.diag(inertia(model, c, np.zeros((2, 1)))[..., 0]))
     allowed = NOISE_SHARE * np.sqrt(np.mean(piece.tau**2, axis=1))
-    noise = inertia * first_guess(piece.theta, piece.tau).theta * np.sqrt(0.4 * piece.dt) * (2 * np.pi) ** 2
+    noise = outstretched * first_guess(piece.theta, piece.tau).theta * np.sqrt(0.4 * piece.dt) * (2 * np.pi) ** 2
     sharpest = (allowed / np.maximum(noise, 1e-300)) ** 0.4
     return float(np.clip(sharpest.min(), LOWEST, min(HIGHEST, 0.1 / piece.dt)))
 

@@ -12,8 +12,7 @@ from algid.model import (
     Model,
     Motion,
     acceleration,
-    friction_columns,
-    friction_slope,
+    damping,
     torque,
 )
 from tests.estimators.test_model import VALUES
@@ -64,20 +63,12 @@ def test_a_load_whose_sign_turns_is_found_from_either_side() -> None:
     np.testing.assert_allclose(again, tau, rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("terms", [(), ("coulomb",), ("coulomb", "asymmetry"), ("coulomb", "stribeck"), WITHOUT_LAG])
-def test_frictions_slope_is_its_difference(terms: tuple[str, ...]) -> None:
+@pytest.mark.parametrize("terms", [(), ("coulomb",), ("coulomb", "asymmetry"), ("coulomb", "stribeck"), ("offset",)])
+def test_damping_at_rest_is_the_torques_difference(terms: tuple[str, ...]) -> None:
     model = Model(terms, coulomb_speed=0.3, stribeck_speed=0.4)
-    value = model.values(_constants(model))
-    omega = np.random.default_rng(4).normal(0, 0.5, (2, 300))
-
-    def friction(omega: FloatArray) -> FloatArray:
-        drag = np.array([[value["k6"]], [value["k7"]]]) * omega
-        columns = friction_columns(model, omega).items()
-        return drag + sum(np.array([[value[f"{name}1"]], [value[f"{name}2"]]]) * found for name, found in columns)
-
-    step = 1e-6
-    expected = (friction(omega + step) - friction(omega - step)) / (2 * step)
-    np.testing.assert_allclose(friction_slope(model, value, omega), expected, atol=1e-8)
+    c, still, step = _constants(model), np.zeros((2, 1)), 1e-6
+    both = [torque(model, c, Motion(still, still + sign * step, still)) for sign in (1, -1)]
+    np.testing.assert_allclose(damping(model, c), (both[0] - both[1])[:, 0] / (2 * step), atol=1e-8)
 
 
 def test_what_a_model_lacks_is_nothing_in_the_order_of_all_columns() -> None:

@@ -1,0 +1,66 @@
+"""What a parameter is: its name, unit, meaning, scale, sign and plausible range, each once.
+
+A parameter's standard deviation is compared with its scale: the largest value among the parameters of that scale, and
+no less than the scale's `least`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Parameters that compare in size: what they have in common, and the least size that counts, in their unit."""
+
+    name: str
+    least: float
+
+
+INERTIA = Scale("inertia", 1e-6)
+MOMENT = Scale("torque", 1e-4)
+VISCOUS = Scale("viscous friction", 1e-6)
+LOAD_SHARE = Scale("share of the load", 1e-2)
+GAIN = Scale("gain", 1e-2)
+ANGLE = Scale("angle", 1e-2)
+TIME = Scale("time", 1e-3)
+MASS = Scale("mass", 1e-3)
+LENGTH = Scale("length", 1e-2)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of the arm, of its drives or of its payload.
+
+    Parameters
+    ----------
+    name : str, as results, exports and flags have it
+    symbol : str, as formulas have it
+    unit : str
+    meaning : str, in words
+    scale : Scale
+    sign : "+" where physics allows no negative value, else "±"
+    plausible : (low, high), in the unit
+        Beyond, a value is another convention, or what a log that tells little makes of its noise.
+    weighs : bool
+        Whether it acts by gravity alone: an arm in a horizontal plane does not have it.
+    """
+
+    name: str
+    symbol: str
+    unit: str
+    meaning: str
+    scale: Scale
+    sign: Literal["+", "±"] = "±"
+    plausible: tuple[float, float] = (-inf, inf)
+    weighs: bool = False
+
+
+PAYLOAD = (
+    Parameter("m_p", "m_p", "kg", "mass of the payload", MASS, "+"),
+    Parameter("l1", "l₁", "m", "length of link 1", LENGTH, "+"),
+    Parameter("l2", "l₂", "m", "distance of the payload from joint 2, along link 2", LENGTH, "+"),
+)
+"""What loaded logs tell beside the arm."""

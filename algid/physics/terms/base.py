@@ -1,0 +1,85 @@
+"""What a term of the torque says of itself.
+
+A term of motion writes each of its columns as three vectors, by the least derivative they need,
+
+    τ = d²s/dt² + dp/dt + f,   s(θ), p(θ, ω), f(θ, ω)
+
+and the regressor, the moments over windows, M(θ), the dynamics, the partials and the exports all derive from them. A
+term that acts on the torque's channel instead says which parameters do so, and has no columns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from algid.physics.expressions import NOTHING, Expression
+from algid.physics.parameters import Parameter
+
+Vector = tuple[Expression, Expression]
+NONE: Vector = (NOTHING, NOTHING)
+
+
+@dataclass(frozen=True)
+class TorqueColumn:
+    """The torque of both joints per unit of a parameter: d²s/dt² + dp/dt + f."""
+
+    parameter: str
+    s: Vector = NONE
+    p: Vector = NONE
+    f: Vector = NONE
+
+
+@dataclass(frozen=True)
+class Term:
+    """A term of the torque. Where it needs nothing special, it leaves the rest out.
+
+    Parameters
+    ----------
+    name : str, as ``--model`` has it
+    title : str, in words
+    equation : str, what it adds to the torque of joint i
+    parameters : tuple of Parameter
+    columns : tuple of TorqueColumn, of a term of motion
+    needs : str or None
+        A term without which it has no meaning.
+    inertial : bool
+        Whether its columns are the joints' load, on which friction may depend: inertia, Coriolis and gravity.
+    usual : bool
+        Whether most real joints have it: other terms are weighed beside it first.
+    shapes : names of the widths that its columns have, fields of `algid.physics.motion.Widths`
+    by_load : pairs of a parameter and the joint whose load times the smooth sign of its velocity it multiplies
+    gains : pairs of a parameter g and the joint whose torque it multiplies by 1 + g
+    turns : pairs of a parameter and the joint to whose angle it is added
+    timing : "delay" or "lag"
+        Whether its one parameter is a time by which the torque is late, as a whole or after a low-pass.
+    """
+
+    name: str
+    title: str
+    equation: str
+    parameters: tuple[Parameter, ...]
+    columns: tuple[TorqueColumn, ...] = ()
+    needs: str | None = None
+    inertial: bool = False
+    usual: bool = False
+    shapes: tuple[str, ...] = ()
+    by_load: tuple[tuple[str, int], ...] = ()
+    gains: tuple[tuple[str, int], ...] = ()
+    turns: tuple[tuple[str, int], ...] = ()
+    timing: Literal["delay", "lag"] | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its parameters."""
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @property
+    def unit(self) -> str:
+        """Unit of its parameters, which are alike."""
+        return self.parameters[0].unit
+
+    @property
+    def linear(self) -> bool:
+        """Whether the torque is linear in its parameters beside those of other terms."""
+        return not (self.by_load or self.gains or self.turns)
