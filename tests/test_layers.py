@@ -69,7 +69,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "fleet": room("errors files model progress report words", "numpy polars scipy"),
     "cli": room(
         "batch check design errors estimators export faults files "
-        "fleet identification inspection limits log model profile progress readers report results runtime "
+        "fleet identification inspection limits log model physics profile progress readers report results runtime "
         "settings stores synth track writers words",
         "numpy rich typer",
     ),

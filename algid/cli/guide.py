@@ -47,6 +47,9 @@ SUMMARIES = {
 }
 
 
+TERMS_MARK = "<!-- terms -->"
+
+
 def guide(
     topic: Annotated[GuideTopic | None, typer.Argument(help="One of the topics; the list of them without.")] = None,
 ) -> None:
@@ -68,5 +71,19 @@ def guide(
 
 
 def text_of(topic: str) -> str:
-    """A topic's Markdown."""
-    return (resources.files("algid") / "guide" / f"{topic}.md").read_text(encoding="utf-8")
+    """A topic's Markdown; what the registry of terms holds stands in place of its mark."""
+    text = (resources.files("algid") / "guide" / f"{topic}.md").read_text(encoding="utf-8")
+    return text.replace(TERMS_MARK, _table_of_terms()) if TERMS_MARK in text else text
+
+
+def _table_of_terms() -> str:
+    """The torque's terms as a table of Markdown."""
+    from algid.physics.terms import OPTIONAL
+
+    rows = ["| term | what it is | what it adds to the torque | its parameters |", "|---|---|---|---|"]
+    for term in OPTIONAL:
+        meanings = "; ".join(f"{one.name}, {one.unit}: {one.meaning}" for one in term.parameters)
+        needs = f", beside `{term.needs}`" if term.needs else ""
+        equation = term.equation.replace("|", "\\|")
+        rows.append(f"| `{term.name}` | {term.title}{needs} | {equation} | {meanings} |")
+    return "\n".join(rows)

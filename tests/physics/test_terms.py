@@ -1,0 +1,134 @@
+"""Every term, in one loop: its partials, its moments over windows, its C source and its form, against its columns."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from algid.arm import FloatArray
+from algid.estimators.modulating_functions import Windows
+from algid.model import EVERY_TERM, TERMS, Model, Motion, partials, regressor, torque
+from algid.physics.expressions import Expression
+from algid.physics.terms import ALWAYS, OPTIONAL
+from algid.signals.segments import Segment
+from tests.estimators.test_model import VALUES
+from tests.export.test_peers import compiled, each, text_of
+
+DT = 1e-3
+IN_MODELS = [*(term.name for term in ALWAYS), *TERMS]
+
+
+def model_with(term: str) -> Model:
+    """The model with a term, and with what that needs."""
+    needed = EVERY_TERM[term].needs
+    wanted = [name for name in (needed, term) if name in TERMS]
+    return Model(tuple(wanted), coulomb_speed=0.5, stribeck_speed=0.8)
+
+
+def constants(model: Model) -> FloatArray:
+    return np.array([VALUES[name] for name in model.names])
+
+
+def moving(seconds: float = 2.0) -> Motion:
+    """A closed-form motion at 1 kHz."""
+    t = np.arange(round(seconds / DT)) * DT
+    theta, omega, alpha = np.zeros((3, 2, t.size))
+    for joint, waves in enumerate((((0.9, 2.1), (0.4, 5.3)), ((1.1, 1.3), (0.5, 6.1)))):
+        for size, rate in waves:
+            theta[joint] += size * np.sin(rate * t)
+            omega[joint] += size * rate * np.cos(rate * t)
+            alpha[joint] -= size * rate**2 * np.sin(rate * t)
+    return Motion(theta, omega, alpha)
+
+
+@pytest.mark.parametrize("term", IN_MODELS)
+def test_partials_are_the_differences_of_the_torque(term: str) -> None:
+    model, motion, step = model_with(term), moving(), 1e-6
+    c = constants(model)
+    P = partials(model, c, motion)
+    signals = [motion.theta, motion.omega, motion.alpha]
+    for order in range(3):
+        for joint in range(2):
+            both = []
+            for sign in (1, -1):
+                moved = [signal.copy() for signal in signals]
+                moved[order][joint] += sign * step
+                both.append(torque(model, c, Motion(moved[0], moved[1], moved[2])))
+            slope = (both[0] - both[1]) / (2 * step)
+            np.testing.assert_allclose(P[order, :, joint], slope, atol=1e-7)  # rounding over the step
+
+
+@pytest.mark.parametrize("term", IN_MODELS)
+def test_moments_over_windows_are_those_of_the_columns(term: str) -> None:
+    """∫φ″ s - ∫φ′ p + ∫φ f against ∫φ times the column itself, which has accelerations."""
+    model, motion = model_with(term), moving()
+    at = None if model.linear else constants(model)
+    windows = Windows(DT, 0.4, bandwidth=None)
+    X = windows.equations(model, Segment(0.0, DT, motion.theta, motion.theta, motion.omega), False, at)
+    Y = regressor(model, motion, at)
+    for place, name in enumerate(model.names):
+        if any(name == own for kind in ("gains", "turns") for own, _ in getattr(EVERY_TERM[term], kind)):
+            continue  # a derivative, not a column: the estimators' own tests have it
+        if name == model.lag_name:
+            continue
+        expected = windows.moments(Y[:, place], windows.kernels()[0])
+        np.testing.assert_allclose(X[:, place], expected, rtol=1e-3, atol=1e-4)  # the quadrature at 1 kHz
+
+
+@pytest.mark.parametrize("term", [name for name in IN_MODELS if EVERY_TERM[name].timing is None])
+def test_the_c_source_is_the_torque(term: str, tmp_path: Path) -> None:
+    model, motion = model_with(term), moving(0.3)
+    value = {name: VALUES[name] for name in model.names}
+    arm = compiled(text_of("c", value, model), tmp_path)
+    found = each(arm.inverse_dynamics, motion.theta, motion.omega, motion.alpha)
+    np.testing.assert_allclose(found, torque(model, constants(model), motion), rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("term", [term.name for term in (*ALWAYS, *OPTIONAL) if term.columns])
+def test_the_form_is_the_column(term: str) -> None:
+    """SymPy derives s twice and p once along a motion, and finds the regressor."""
+    model = Model((term,) if term in TERMS else (), coulomb_speed=0.5, stribeck_speed=0.8)
+    motion, t = moving(0.05), sp.Symbol("t")
+    angles = [sp.Function(f"angle{joint}")(t) for joint in (1, 2)]
+    Y = regressor(model, motion)
+    for column in EVERY_TERM[term].columns:
+        for joint in range(2):
+            s, p, f = (_by_sympy(getattr(column, part)[joint], angles, model) for part in ("s", "p", "f"))
+            expected = _along(sp.diff(s, t, 2) + sp.diff(p, t) + f, angles, motion)
+            np.testing.assert_allclose(Y[joint, model.names.index(column.parameter)], expected, atol=1e-11)
+
+
+def _by_sympy(expression: Expression, angles: list[sp.Expr], model: Model) -> sp.Expr:
+    """The expression in SymPy's symbols, read from its atoms' source text."""
+    t = sp.Symbol("t")
+    names = {"q1": angles[0], "q2": angles[1], "w1": angles[0].diff(t), "w2": angles[1].diff(t)}
+    names |= {"COULOMB_SPEED": model.coulomb_speed, "STRIBECK_SPEED": model.stribeck_speed}
+    total = sp.Integer(0)
+    for product, factor in expression.products.items():
+        parts = [sp.sympify(atom.source or atom.name, locals=names) for atom in product]
+        total += factor * sp.Mul(*parts)
+    return total
+
+
+def _along(expression: sp.Expr, angles: list[sp.Expr], motion: Motion) -> FloatArray:
+    """The expression's values (N,) along a motion."""
+    t, known = sp.Symbol("t"), {}
+    for order, signal in ((2, motion.alpha), (1, motion.omega), (0, motion.theta)):
+        for joint, angle in enumerate(angles):
+            symbol = sp.Symbol(f"x{order}{joint}")
+            expression = expression.subs(angle.diff(t, order) if order else angle, symbol)
+            known[symbol] = signal[joint]
+    found = sp.lambdify(list(known), expression, "numpy")(*known.values())
+    return np.broadcast_to(np.asarray(found, dtype=np.float64), motion.theta.shape[1:])
+
+
+def test_every_parameter_says_what_it_is() -> None:
+    parameters = [one for term in (*ALWAYS, *OPTIONAL) for one in term.parameters]
+    assert len({one.name for one in parameters}) == len(parameters)
+    for one in parameters:
+        assert one.meaning
+        assert one.plausible[0] < one.plausible[1]
+        assert one.sign == "±" or one.plausible[0] in (0.0, -np.inf)
