@@ -125,6 +125,16 @@ class FileLimits:
 
     # bags
     bag_metadata_bytes: int = 1 << 24
+    bag_topics: int = 1000
+    bag_header_bytes: int = 1 << 16
+    """Of a record's header in a ROS 1 bag; that of a message has some forty."""
+    bag_record_bytes: int = 1 << 28
+    """Of a record of a ROS 1 bag, a chunk packed and unpacked."""
+    bag_records: int = 10_000_000
+    """Records of a ROS 1 bag outside its chunks."""
+    free_sqlite_steps: int = 20_000_000
+    sqlite_steps_a_byte: int = 4
+    """Of SQLite's machine, for all that is asked of a database; a row takes some ten."""
 
 
 LIMITS = FileLimits()

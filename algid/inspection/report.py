@@ -78,10 +78,10 @@ def contents(path: Path) -> tuple[str, tuple[Entry, ...]]:
     if kind == "mcap":
         return kind, _mcap(path)
     if kind == "rosbag2":
-        from algid.readers.bag import bag_files
+        from algid.readers.bags.folder import bag_files
 
         bag = bag_files(path)
-        return kind, _mcap(bag.paths[0]) if bag.kind == "mcap" else ()
+        return kind, _mcap(bag.paths[0]) if bag.kind == "mcap" else _bag(path, kind)
     if kind == "parquet":
         return kind, tuple(_parquet(path))
     if kind.startswith("csv"):
@@ -91,7 +91,15 @@ def contents(path: Path) -> tuple[str, tuple[Entry, ...]]:
 
         frame = frame_of(path, kind)
         return kind, tuple(Entry(name, str(dtype), frame.height) for name, dtype in frame.schema.items())
-    return kind, ()
+    return kind, _bag(path, kind)
+
+
+def _bag(path: Path, kind: str) -> tuple[Entry, ...]:
+    from algid.readers.bags import parts_of
+
+    parts, _ = parts_of(path, kind)
+    with parts[0]() as source:
+        return tuple(_topics(source))
 
 
 def _mcap(path: Path) -> tuple[Entry, ...]:

@@ -45,7 +45,7 @@ def _opened(path: Path, profile: Profile) -> TableReader:
 
         return open_mcap([path], profile)
     if kind == "rosbag2":
-        from algid.readers.bag import bag_files
+        from algid.readers.bags.folder import bag_files
         from algid.readers.mcap import open_mcap
 
         bag = bag_files(path)
@@ -64,9 +64,9 @@ def _opened(path: Path, profile: Profile) -> TableReader:
         from algid.readers.arrays import open_arrays
 
         return open_arrays(path, kind, profile)
-    from algid.readers.bag import open_bag
+    from algid.readers.bags import open_bag
 
-    return open_bag(path, profile)
+    return open_bag(path, kind, profile)
 
 
 def read_log(path: str | Path, profile: Profile | None = None) -> Log:

@@ -45,6 +45,8 @@ class MessageBatch:
     """Bytes of a torn chunk's records, unpacked: what is there, and what there should be."""
     lost: int = 0
     """Messages that the index of a damaged chunk lists, where it has one."""
+    what: str = "chunk"
+    """What is damaged: a chunk of messages, or rows of one each."""
 
 
 @dataclass
@@ -52,6 +54,7 @@ class Account:
     """What was lost on the way, for the notices at the end."""
 
     spans: int = 0
+    what: str = "chunk"
     reason: str = ""
     unchecked: bool = False
     found: int = 0
@@ -62,7 +65,8 @@ class Account:
     def add(self, batch: MessageBatch) -> None:
         """Count one batch."""
         if batch.messages is None:
-            self.spans += 1
+            self.what = batch.what
+            self.spans += batch.lost if batch.what == "row" else 1
             self.lost += batch.lost
             self.reason = self.reason or batch.reason
         else:
@@ -76,7 +80,7 @@ class Account:
         said = []
         if self.spans:
             missing = self.lost if promised is None else promised - self.found
-            text = f"{counted(self.spans, 'damaged chunk')} left out; the first: {self.reason}"
+            text = f"{counted(self.spans, f'damaged {self.what}')} left out; the first: {self.reason}"
             counting = f"; {counted(missing, 'message is missing', 'messages are missing')}" if missing else ""
             said.append(Notice("DAMAGED_CHUNK", text + counting, lossy=True))
         elif promised is not None and promised != self.found:

@@ -1,6 +1,7 @@
 """CDR, the encoding of ROS 2 messages (XCDR version 1, either byte order): the shape of one message.
 
-Numbers are aligned to their own size, counted from behind the four bytes of the encapsulation.
+Numbers are aligned to their own size, counted from behind the four bytes of the encapsulation. Messages of ROS 1 have
+neither: their numbers, little endian, stand one behind the other.
 """
 
 from __future__ import annotations
@@ -24,7 +25,11 @@ class _Walk:
     types: Types
     shape: Shape
     order: str = "<"
-    place: int = _HEAD
+    head: int = _HEAD
+    aligned: bool = True
+
+    def __post_init__(self) -> None:
+        self.place = self.head
 
     def structure(self, name: str, prefix: str) -> None:
         self.shape.count(1 + len(self.types[name]))
@@ -79,7 +84,8 @@ class _Walk:
         self.advance(self.length() * (4 if kind == "wstring" else 1))
 
     def align(self, width: int) -> None:
-        self.place += -(self.place - _HEAD) % width
+        if self.aligned:
+            self.place += -(self.place - self.head) % width
 
     def advance(self, size: int) -> None:
         self.place += size
@@ -117,3 +123,18 @@ def walk(payload: bytes, root: str, types: Types) -> Shape:
     if len(payload) - walk.place > _PADDING:
         raise MisfitError(f"a message of {counted(len(payload), 'byte')} where its schema ends at {walk.place}")
     return shape
+
+
+def walk_ros1(payload: bytes, root: str, types: Types) -> Shape:
+    """The shape of one message of ROS 1.
+
+    Raises
+    ------
+    MisfitError
+        If its bytes do not fit the schema.
+    """
+    walk = _Walk(payload, types, Shape(), head=0, aligned=False)
+    walk.structure(root, "")
+    if len(payload) != walk.place:
+        raise MisfitError(f"a message of {counted(len(payload), 'byte')} where its schema ends at {walk.place}")
+    return walk.shape

@@ -8,10 +8,14 @@ from algid.errors import LogError
 from algid.readers.messages import cdr, protobuf
 from algid.readers.messages import json as jsontext
 from algid.readers.messages.columnar import ColumnDecoder, Decoder, Walk
-from algid.readers.messages.definitions import DefinitionError, parse_idl, parse_msg
+from algid.readers.messages.definitions import DefinitionError, parse_idl, parse_msg, parse_ros1
 from algid.readers.messages.source import MessageChannel
 
-_DEFINITIONS = {"ros2msg": parse_msg, "ros2idl": parse_idl}
+_PARSERS = {
+    ("cdr", "ros2msg"): (parse_msg, cdr.walk),
+    ("cdr", "ros2idl"): (parse_idl, cdr.walk),
+    ("ros1", "ros1msg"): (parse_ros1, cdr.walk_ros1),
+}
 
 
 def walk_for(path: str, channel: MessageChannel) -> Walk:
@@ -25,9 +29,10 @@ def walk_for(path: str, channel: MessageChannel) -> Walk:
     place = f"{path}: topic {channel.topic!r}"
     encoding = (channel.encoding, channel.definition_encoding)
     try:
-        if encoding[0] == "cdr" and encoding[1] in _DEFINITIONS:
-            types = _DEFINITIONS[encoding[1]](channel.type, channel.definition.decode("utf-8", errors="replace"))
-            return lambda payload: cdr.walk(payload, channel.type, types)
+        if encoding in _PARSERS:
+            parse, walk = _PARSERS[encoding]
+            types = parse(channel.type, channel.definition.decode("utf-8", errors="replace"))
+            return lambda payload: walk(payload, channel.type, types)
         if encoding == ("protobuf", "protobuf"):
             messages = protobuf.parse(channel.type, channel.definition)
             return lambda payload: protobuf.walk(payload, channel.type, messages)
@@ -35,9 +40,14 @@ def walk_for(path: str, channel: MessageChannel) -> Walk:
         raise LogError(f"{place}: the message definition cannot be read: {error}") from error
     if encoding[0] == "json":
         return jsontext.walk
+    if encoding == ("cdr", ""):
+        raise LogError(
+            f"{place}: the file holds no definition of {channel.type}, and none is known; "
+            "install what knows the usual ones, pip install 'algid[bags]', or record with MCAP"
+        )
     raise LogError(
         f"{place}: message encoding {encoding[0]!r} with schema encoding {encoding[1]!r}; "
-        "expected cdr with ros2msg or ros2idl, protobuf, or json"
+        "expected cdr with ros2msg or ros2idl, ros1 with ros1msg, protobuf, or json"
     )
 
 

@@ -114,7 +114,7 @@ class Shape:
         lists = [texts for texts in self.texts.values() if texts]
         if not joints or any(joints.intersection(texts) for texts in lists):
             return False
-        listed = {path.partition("[")[0] for path in paths}
+        listed = {path.partition("[")[0] for path in paths if "[" in path}
         return bool(lists) or not any(
             one.count and path.partition("[")[0] in listed for path, one in self.numbers.items()
         )

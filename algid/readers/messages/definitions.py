@@ -43,10 +43,29 @@ class Field:
 
 
 Types = dict[str, tuple[Field, ...]]
+_NOTHING = Field("structure_needs_at_least_one_member", "uint8", None)
 
 
-def parse_msg(root: str, text: str) -> Types:
-    """Fields by type name, `root` under its full name.
+_TIMES_OF_ROS1: Types = {
+    "builtin_interfaces/Time": (Field("secs", "uint32", None), Field("nsecs", "uint32", None)),
+    "builtin_interfaces/Duration": (Field("secs", "int32", None), Field("nsecs", "int32", None)),
+}
+
+
+def parse_ros1(root: str, text: str) -> Types:
+    """Fields by type name out of a ROS 1 definition, in which times are no messages, and a structure may be empty.
+
+    Raises
+    ------
+    DefinitionError
+        As `parse_msg`.
+    """
+    types = parse_msg(root, text, _TIMES_OF_ROS1)
+    return {name: tuple(one for one in fields if one != _NOTHING) for name, fields in types.items()}
+
+
+def parse_msg(root: str, text: str, known: Types | None = None) -> Types:
+    """Fields by type name, `root` under its full name; `known` types need no section of the text.
 
     Raises
     ------
@@ -55,7 +74,7 @@ def parse_msg(root: str, text: str) -> Types:
     """
     _check_length(root, text)
     sections = re.split(r"^=+[ \t]*\r?$", text, flags=re.MULTILINE)
-    types = {root: _fields(root, sections[0])}
+    types = {**(known or {}), root: _fields(root, sections[0])}
     for section in sections[1:]:
         head, _, body = section.strip().partition("\n")
         found = re.match(r"^MSG:\s*(\S+)$", head.strip())
@@ -92,7 +111,7 @@ def _fields(name: str, text: str) -> tuple[Field, ...]:
     if len(fields) > LIMITS.definition_fields:
         raise DefinitionError(f"{name}: {counted(len(fields), 'field')}")
     # an empty structure takes one byte, since IDL has none
-    return tuple(fields) or (Field("structure_needs_at_least_one_member", "uint8", None),)
+    return tuple(fields) or (_NOTHING,)
 
 
 def _resolved(field: Field, owner: str, types: Types) -> Field:

@@ -143,7 +143,7 @@ class _Usual:
 def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
     """The one topic with joint states; None where there is none and a profile names the fields."""
     fitting: dict[str, _Usual] = {}
-    many: dict[str, list[str]] = {}
+    many: dict[str, dict[str, None]] = {}
     lacking: list[str] = []
     refused: list[LogError] = []
     for name, kind in _candidates(source, profile):
@@ -158,11 +158,12 @@ def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
                     mend = '--set theta1.source="position[0]" … (profile: source = "position[0]" of [theta1] …)'
                     refused.append(LogError(f"{source.path}: {text}{mend}"))
                 if len(joints) > 2 or (joints and profile and profile.joints):
-                    many[name] = joints
-                elif not joints and names:
-                    empty = [what for what in ("position", "effort") if shape.find(f"{what}[0]") is None]
-                    stays = " and ".join(empty) or "fields"
-                    lacking.append(f"{name!r} with the joints {', '.join(names[:8])}, whose {stays} stay empty")
+                    many.setdefault(name, {}).update(dict.fromkeys(joints))
+                elif len(joints) < 2 and names:
+                    last = len(names) - 1
+                    short = [what for what in ("position", "effort") if shape.find(f"{what}[{last}]") is None]
+                    stays = f", whose {' and '.join(short)} stay empty" if short else ""
+                    lacking.append(f"{name!r} with the joints {', '.join(names[:8])}{stays}")
         except LogError as error:  # another topic may still hold the joints
             refused.append(error)
     if _USUAL in fitting:
@@ -174,8 +175,8 @@ def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
             f'{source.path}: joint states on {", ".join(fitting)}; choose: --topic NAME (profile: topic = "NAME")'
         )
     if many:
-        name, joints = next(iter(many.items()))
-        text = f"{name!r} has {counted(len(joints), 'joint')} ({', '.join(joints[:12])})"
+        name, own = next(iter(many.items()))
+        text = f"{name!r} has {counted(len(own), 'joint')} ({', '.join([*own][:12])})"
         raise LogError(f"{source.path}: {text}; choose: --joints A,B (profile: joints = […])")
     if refused:
         raise refused[0]
