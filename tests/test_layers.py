@@ -39,7 +39,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "table4": room("arm log results synth", "numpy"),
     "writers": room("errors files log ros2", "mcap numpy polars pyarrow"),
     "readers": room(
-        "arm errors files faults limits log profile runtime units words",
+        "arm errors files faults limits log profile ros2 runtime units words",
         "google lz4 mcap numpy polars pyarrow rosbags scipy zstandard",
     ),
     "inspection": room("arm errors estimators faults log profile readers signals words", "numpy"),

@@ -17,6 +17,7 @@ from algid.limits import LIMITS
 from algid.log import IntArray
 from algid.readers.messages.batch import Messages, gather
 from algid.readers.messages.source import MessageChannel
+from algid.words import counted
 
 MESSAGE, BAG, INDEX, CHUNK, CHUNK_INFO, CONNECTION = range(2, 8)
 SIZE = struct.Struct("<I")
@@ -258,5 +259,5 @@ def unpacked(packed: bytes, packing: str, size: int, *, torn: bool) -> bytes:
     except (OSError, EOFError, RuntimeError, ValueError) as error:
         raise BagError(f"a chunk cannot be unpacked ({error})") from error
     if len(found) != size and not torn:
-        raise BagError(f"a chunk of {size} bytes unpacks to {len(found)}{' or more' if len(found) > size else ''}")
+        raise BagError(f"a chunk of {counted(size, 'byte')} unpacks to {'more' if len(found) > size else len(found)}")
     return found

@@ -258,7 +258,8 @@ class _Outline:
     def broken(self, place: int, why: str) -> None:
         """Note that nothing is read from byte `place` on."""
         rest = counted(self._file.size - place, "byte")
-        self._found.notices.append(Notice("CUT_OFF", f"the bag breaks off {rest} before its end ({why})", lossy=True))
+        text = f"the bag breaks off at byte {place} ({why}); of what follows nothing is read: {rest}"
+        self._found.notices.append(Notice("CUT_OFF", text, lossy=True))
         self._found.damage.append(f"{why} at byte {place}")
 
     def layout(self) -> BagLayout:
