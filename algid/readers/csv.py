@@ -6,17 +6,19 @@ import io
 import re
 from collections.abc import Iterator
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from algid.errors import LogError
 from algid.files import read_whole
+from algid.limits import LIMITS
 from algid.log import loads
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign
 from algid.readers.dialect import Dialect, detect
-from algid.readers.frames import NO_COMPANION, flat_reader
-from algid.readers.sniff import head_of, whole_lines
+from algid.readers.frames import NO_COMPANION, beyond, flat_reader
+from algid.readers.sniff import head_of, pieces, whole_lines
 
 if TYPE_CHECKING:
     import polars as pl
@@ -78,6 +80,9 @@ def _frames(
     import polars as pl
 
     done = 0
+    told = most is not None  # of rows without a value, and of quotes that are left open, the whole pass tells
+    if not told and len(dialect.columns) > len(columns.sources):
+        _check_quotes(path, kind, dialect)
     try:
         for frame in _parsed(path, kind, dialect, columns, rows, most):
             if frame[_EXCESS].any():
@@ -87,8 +92,12 @@ def _frames(
                 )
             done += frame.height
             frame.drop_in_place(_EXCESS)  # in place: `drop` would queue behind the parsing of the next rows
-            empty_lines = any(frame.null_count().row(0))  # which are no rows
-            yield frame.filter(~pl.all_horizontal(pl.all().is_null())) if empty_lines else frame
+            if any(frame.null_count().row(0)):  # empty lines, which are no rows, or rows without a value
+                if not told and (lost := _without_values(path, kind, dialect, columns)):
+                    yield frame.clear(lost)
+                told = True
+                frame = frame.filter(~pl.all_horizontal(pl.all().is_null()))
+            yield frame
             if most is not None and done >= most:
                 return
     except pl.exceptions.PolarsError as error:
@@ -100,6 +109,62 @@ def _frames(
             f"{path}: column {dialect.columns[int(found[2])]!r}, past row {done}: expected a number, found "
             f"{found[1][:40]!r}; mend the file or name another column"
         ) from error
+
+
+def _lines(path: Path, kind: str, dialect: Dialect) -> Iterator[tuple[int, bytes]]:
+    """The lines under the header that are no comments, with their numbers; those between quotes are lines too.
+
+    Raises
+    ------
+    LogError
+        If a line is no table's.
+    """
+    comment = dialect.comment.encode() if dialect.comment else b"\n"
+    rest, number = b"", 0
+    for piece in chain(pieces(path, kind), [b"\n"]):
+        *lines, rest = (rest + piece).split(b"\n")
+        if len(rest) > LIMITS.line_bytes:
+            raise LogError(f"{path}: a line of more than 65,000 characters; expected rows of numbers")
+        for line in lines:
+            number += 1
+            if number > dialect.skip and not line.startswith(comment):
+                yield number, line
+
+
+def _without_values(path: Path, kind: str, dialect: Dialect, columns: Columns) -> int:
+    """Rows that have cells, and in the columns that are needed only empty ones."""
+    separator = dialect.separator.encode()
+    if not separator:
+        return 0
+    needed = [dialect.columns.index(column) for column in columns.sources.values()]
+    lost = 0
+    for _, line in _lines(path, kind, dialect):
+        if separator in line:
+            cells = line.split(separator)
+            lost += not any(cells[place].strip(b' \t\r"') for place in needed if place < len(cells))
+    return lost
+
+
+def _check_quotes(path: Path, kind: str, dialect: Dialect) -> None:
+    """Refuse rows that lie between quotes, where polars would take them for the text of a cell.
+
+    Raises
+    ------
+    LogError
+        If a line that begins between quotes has the cells of a row.
+    """
+    if not dialect.separator or not any(b'"' in piece for piece in pieces(path, kind)):
+        return
+    inside = 0
+    separators = len(dialect.columns) - 1
+    for number, line in _lines(path, kind, dialect):
+        if inside and line.count(dialect.separator.encode()) >= separators:
+            raise LogError(
+                f"{path}: line {number} lies between quotes, of which the first stands in line {inside}; close the "
+                "quotes of that line, or save the table without quotes"
+            )
+        if line.count(b'"') % 2:
+            inside = 0 if inside else number
 
 
 def _parsed(
@@ -154,7 +219,9 @@ def _number(dialect: Dialect, columns: Columns, name: str) -> pl.Expr:
     if column in dialect.dates:
         text = cell.str.strip_chars().str.replace(" ", "T", literal=True).str.replace(r"Z$", "+00:00")
         zoned = pl.when(text.str.contains(r"[+-]\d{2}:?\d{2}$")).then(text).otherwise(text + "+00:00")
-        return zoned.str.to_datetime("%Y-%m-%dT%H:%M:%S%.f%z", time_unit="ns", strict=True).dt.timestamp("ns")
+        ns = zoned.str.to_datetime("%Y-%m-%dT%H:%M:%S%.f%z", time_unit="ns", strict=True).dt.timestamp("ns")
+        within = text.str.slice(0, 4).is_between(pl.lit("1678"), pl.lit("2261"))  # others wrap round
+        return pl.when(within).then(ns).otherwise(beyond(text))
     if not dialect.padded:
         return cell
     text = cell.str.strip_chars()

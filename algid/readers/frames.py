@@ -121,11 +121,21 @@ def number(name: str, cell: pl.Expr, kind: pl.DataType) -> pl.Expr:
 
     if name != "t":
         return cell.cast(pl.Float64).alias(name)
-    if isinstance(kind, pl.Datetime):
-        return cell.dt.timestamp("ns").alias(name)
-    if isinstance(kind, pl.Duration):
-        return cell.dt.total_nanoseconds().alias(name)
+    if isinstance(kind, (pl.Datetime, pl.Duration)):
+        factor = NANOSECONDS[kind.time_unit or "us"]
+        units = cell.to_physical()
+        most = int(LIMITS.largest_time_ns) // factor
+        return pl.when(units.is_between(-most, most)).then(units * factor).otherwise(beyond(units)).alias(name)
+    if kind == pl.UInt64:
+        return pl.when(cell < 1 << 63).then(cell).otherwise(beyond(cell)).cast(pl.Int64).alias(name)
     return cell.cast(pl.Int64 if kind.is_integer() or kind.is_temporal() else pl.Float64).alias(name)
+
+
+def beyond(cell: pl.Expr) -> pl.Expr:
+    """Where a cell has a value, the largest int64: a time that `to_nanoseconds` refuses, where int64 would wrap."""
+    import polars as pl
+
+    return pl.when(cell.is_not_null()).then(pl.lit((1 << 63) - 1, pl.Int64))
 
 
 _EPOCH = (("s", 1e8, 1e11), ("ms", 1e11, 1e14), ("us", 1e14, 1e17), ("ns", 1e17, 1e20))

@@ -21,6 +21,8 @@ HORIZON = 1024
 """Rows a sample may come late: a network reorders neighbours, it does not mix two recordings."""
 BACKWARD_SHARE = 0.25
 REPEATED_SHARE = 0.5
+_RUN = 8
+"""Samples in a row that come late: fewer are jitter."""
 _GAP = 3.0
 """Samples of the other topic this many of its periods apart are not interpolated between."""
 
@@ -73,10 +75,12 @@ def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, int, int]:
     back = np.flatnonzero(np.diff(stamps) < 0)
     order = np.argsort(stamps, kind="stable")
     moved = order - np.arange(rows)
-    if back.size > BACKWARD_SHARE * rows or np.abs(moved).max() > HORIZON:
-        last = stamps[back[0]]
+    set_back = _set_back(table) if back.size else None
+    if set_back is not None or back.size > BACKWARD_SHARE * rows or np.abs(moved).max() > HORIZON:
+        place = back[0] if set_back is None else set_back
+        last = stamps[place]
         raise LogError(
-            f"{path}: time goes backwards by {(last - stamps[back[0] + 1]) * 1e-9:.6g} s behind stamp {last} ns, "
+            f"{path}: time goes backwards by {(last - stamps[place + 1]) * 1e-9:.6g} s behind stamp {last} ns, "
             "and not for a few late samples only; split the file where its clock starts again"
         )
     fresh = np.diff(stamps[order], prepend=stamps[order[0]] - 1) > 0
@@ -88,6 +92,35 @@ def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, int, int]:
             '--clock log (profile: clock = "log")'
         )
     return table.take(order[fresh]), int(np.count_nonzero(moved > 0)), repeated
+
+
+def _set_back(table: SampleTable) -> int | None:
+    """The row behind which the clock was set back, if it was.
+
+    Samples that merely come late fill the hole that they left, or come twice. Where a clock is set back, a row of other
+    samples lies in time that was recorded already.
+    """
+    stamps = table.stamp_ns
+    highest = np.maximum.accumulate(stamps)
+    late = np.flatnonzero(stamps[1:] <= highest[:-1]) + 1
+    runs = np.split(late, np.flatnonzero(np.diff(late) > 1) + 1)
+    step = np.diff(stamps)
+    period = float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
+    for run in runs:
+        if run.size < _RUN:
+            continue
+        before = np.arange(max(0, run[0] - HORIZON - run.size), run[0])  # in time order but for late ones among them
+        before = before[np.argsort(stamps[before], kind="stable")]
+        after = np.clip(np.searchsorted(stamps[before], stamps[run]), 0, before.size - 1)
+        nearest = before[after]
+        left = before[np.maximum(after - 1, 0)]
+        nearer = np.abs(stamps[left] - stamps[run]) < np.abs(stamps[nearest] - stamps[run])
+        nearest = np.where(nearer, left, nearest)
+        crowded = np.abs(stamps[nearest] - stamps[run]) <= period / 2
+        again = np.all([values[nearest] == values[run] for values in table.columns.values()], axis=0)
+        if np.count_nonzero(crowded & ~again) > run.size / 2:
+            return int(run[0]) - 1
+    return None
 
 
 @dataclass(frozen=True, eq=False)

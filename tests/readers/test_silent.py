@@ -1,0 +1,162 @@
+"""What a table loses is counted or refused: rows of commas, rows between quotes, times that wrap, a clock set back."""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.feather as feather
+import pyarrow.parquet as pq
+import pytest
+
+from algid.arm import FloatArray
+from algid.errors import LogError
+from algid.log import Log
+from algid.readers import read_log
+
+HEAD = "t,theta1,theta2,tau1,tau2"
+N = 1000
+T = np.arange(N) / 100
+
+
+def signals(t: FloatArray) -> dict[str, FloatArray]:
+    return {"theta1": np.sin(2 * t), "theta2": np.cos(3 * t), "tau1": np.cos(t), "tau2": np.sin(2 * t)}
+
+
+def rows_of(stamps: list[Any], t: FloatArray) -> list[str]:
+    columns = zip(stamps, *(values.tolist() for values in signals(t).values()), strict=True)
+    return [",".join(map(str, row)) for row in columns]
+
+
+ROWS = rows_of(T.tolist(), T)
+
+
+def read(folder: Path, *lines: str) -> Log:
+    (folder / "log.csv").write_text("\n".join(lines) + "\n")
+    return read_log(folder / "log.csv")
+
+
+def lost(log: Log) -> list[str]:
+    return [notice.text for notice in log.notices if notice.lossy]
+
+
+@pytest.mark.parametrize("row", [",,,,,", " , ,,, ,", ",,,,,x", '"","",,,,'])
+@pytest.mark.parametrize("place", [500, 900])
+def test_rows_without_a_value_are_counted(row: str, place: int, tmp_path: Path) -> None:
+    noted = [f"{one},x" for one in ROWS]
+    log = read(tmp_path, f"{HEAD},note", *noted[:place], *[row, ""] * 50, *noted[place + 50 :])
+    assert len(log) == N - 50
+    assert lost(log) == ["50 of 1,000 rows dropped for want of a value"]
+
+
+def test_empty_lines_are_no_rows(tmp_path: Path) -> None:
+    log = read(tmp_path, HEAD, *ROWS[:500], *["", "\r"] * 20, *ROWS[500:], "", "")
+    assert len(log) == N
+    assert lost(log) == []
+
+
+def test_rows_without_a_value_are_counted_in_compressed_text(tmp_path: Path) -> None:
+    text = "\n".join([HEAD, *ROWS[:500], *[",,,,"] * 20, "", *ROWS[520:]])
+    (tmp_path / "log.csv.gz").write_bytes(gzip.compress(text.encode()))
+    assert lost(read_log(tmp_path / "log.csv.gz")) == ["20 of 1,000 rows dropped for want of a value"]
+
+
+@pytest.mark.parametrize("quoted", ['"x', 'a"b', '"'])
+@pytest.mark.parametrize("closed", [True, False])
+def test_rows_between_quotes_are_refused(quoted: str, closed: bool, tmp_path: Path) -> None:
+    noted = [f"{one},x" for one in ROWS]
+    noted[500] = f"{ROWS[500]},{quoted}"
+    noted[700] = f'{ROWS[700]},x"' if closed else noted[700]
+    with pytest.raises(LogError, match="line 503 lies between quotes, of which the first stands in line 502"):
+        read(tmp_path, f"{HEAD},note", *noted)
+
+
+@pytest.mark.parametrize("note", ['"x, y"', '"x\ny"', '"x ""y"" z"', "x"])
+def test_texts_in_quotes_are_texts(note: str, tmp_path: Path) -> None:
+    log = read(tmp_path, f"{HEAD},note", *(f"{one},{note}" for one in ROWS))
+    assert len(log) == N
+    assert lost(log) == []
+
+
+@pytest.mark.parametrize("day", ["0001-01-01", "1600-02-29", "1677-09-21", "2262-04-12", "2300-01-01", "9999-12-31"])
+def test_dates_beyond_int64_nanoseconds_are_refused(day: str, tmp_path: Path) -> None:
+    dates = [f"{day}T00:00:{second:05.2f}Z" for second in T]
+    with pytest.raises(LogError, match="a time beyond 292 years in column 't'"):
+        read(tmp_path, HEAD, *rows_of(dates, T))
+
+
+@pytest.mark.parametrize("year", [1679, 1969, 2261])
+def test_dates_within_are_read(year: int, tmp_path: Path) -> None:
+    dates = [f"{year}-01-02T00:00:{second:05.2f}" for second in T]
+    log = read(tmp_path, HEAD, *rows_of(dates, T))
+    assert log.stamp_ns[0] == np.datetime64(f"{year}-01-02", "ns").astype(np.int64)
+    assert np.ptp(log.stamp_ns) == 9_990_000_000
+
+
+WRITERS: Mapping[str, Callable[[pa.Table, Path], Any]] = {
+    "parquet": pq.write_table,
+    "feather": lambda table, path: feather.write_feather(table, path, compression="uncompressed"),
+}
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+@pytest.mark.parametrize(
+    "times",
+    [
+        pa.array(np.arange(N) + (1 << 50), pa.duration("s")),
+        pa.array(np.arange(N) - (1 << 60), pa.duration("us")),
+        pa.array(np.arange(N) + (1 << 40), pa.timestamp("s")),
+        pa.array(np.arange(N) * 10 + (1 << 60), pa.timestamp("ms", "UTC")),
+        pa.array(np.arange(N, dtype=np.uint64) * np.uint64(10**7) + np.uint64(1 << 63)),
+    ],
+    ids=str,
+)
+def test_times_beyond_int64_nanoseconds_are_refused(kind: str, times: pa.Array, tmp_path: Path) -> None:
+    WRITERS[kind](pa.table({"t": times, **signals(T)}), tmp_path / "log")
+    with pytest.raises(LogError, match="a time beyond 292 years in column 't'"):
+        read_log(tmp_path / "log")
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+@pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
+def test_durations_and_dates_within_are_exact(kind: str, unit: str, tmp_path: Path) -> None:
+    ns = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}[unit]
+    for make, first in ((pa.duration, -7), (pa.timestamp, 1_700_000_000 * 10**9 // ns)):
+        whole = np.arange(N) * max(1, 10**7 // ns) + first
+        WRITERS[kind](pa.table({"t": pa.array(whole, make(unit)), **signals(T)}), tmp_path / "log")
+        assert np.array_equal(read_log(tmp_path / "log").stamp_ns, whole * ns)
+
+
+def test_numpy_times_beyond_int64_are_refused(tmp_path: Path) -> None:
+    times = np.arange(N, dtype=np.uint64) * np.uint64(10**7) + np.uint64(1 << 63)
+    arrays: dict[str, Any] = {"t": times, **signals(T)}
+    np.savez(tmp_path / "log.npz", **arrays)
+    with pytest.raises(LogError, match="a time beyond 292 years in column 't'"):
+        read_log(tmp_path / "log.npz")
+
+
+@pytest.mark.parametrize("step", [1.0, 0.9995, 0.0105, 0.05, 0.3])
+@pytest.mark.parametrize("place", [100, 2500, 70_000])
+def test_a_clock_that_is_set_back_is_refused(step: float, place: int, tmp_path: Path) -> None:
+    rows = 80_000 if place > 4000 else 5000
+    t = np.arange(rows) / 1000
+    stamps = t.copy()
+    stamps[place:] -= min(step, 0.09 if place == 100 else step)
+    pq.write_table(pa.table({"t": stamps, **signals(t)}), tmp_path / "log.parquet")
+    with pytest.raises(LogError, match=r"time goes backwards by .* split the file where its clock starts again"):
+        read_log(tmp_path / "log.parquet")
+
+
+def test_late_blocks_and_repeated_blocks_are_put_in_order(tmp_path: Path) -> None:
+    t = np.arange(5000) / 1000
+    order = np.concatenate([np.arange(1000), np.arange(1400, 1800), np.arange(1000, 1400), np.arange(1800, 5000)])
+    twice = np.concatenate([np.arange(3000), np.arange(2500, 5000)])
+    for chosen in (order, twice, order[twice]):
+        table = pa.table({"t": t[chosen], **{name: values[chosen] for name, values in signals(t).items()}})
+        pq.write_table(table, tmp_path / "log.parquet")
+        log = read_log(tmp_path / "log.parquet")
+        assert np.array_equal(log.theta[0], np.sin(2 * t))
