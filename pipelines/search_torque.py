@@ -71,13 +71,19 @@ def observed(theta: FloatArray) -> FloatArray:
     return np.stack([LuenbergerObserver(DT).velocities(angles) for angles in candidates], axis=1)
 
 
-def estimates(theta: FloatArray, tau: FloatArray, known_k6: FloatArray | None) -> FloatArray:
-    """x_r (6, B), or x_m (5, B) where k6 (B,) is known: medians over the judged instants."""
-    terms = columns(theta, observed(theta), tau, DT)
+def estimates(
+    theta: FloatArray,
+    tau: FloatArray,
+    known_k6: FloatArray | None,
+    omega: FloatArray,
+    judged: slice = JUDGED,
+) -> FloatArray:
+    """x_r (6, B), or x_m (5, B) where k6 (B,) is known: medians over the `judged` instants."""
+    terms = columns(theta, omega, tau, DT)
     unknown, rhs = terms.first_joint(), terms.torque1
     if known_k6 is not None:
         unknown, rhs = np.delete(unknown, 3, axis=0), rhs - known_k6[:, None] * terms.viscous1
-    rows = stack_rows(np.concatenate([unknown, rhs[None]]), DT, len(unknown))[..., JUDGED]
+    rows = stack_rows(np.concatenate([unknown, rhs[None]]), DT, len(unknown))[..., judged]
     x = solve_scaled(rows[:, :-1], rows[:, -1]).x
     return np.where(np.isnan(x).any(axis=-1), np.inf, np.median(np.nan_to_num(x), axis=-1))
 
@@ -87,8 +93,16 @@ def errors(case: Case, genes: FloatArray) -> FloatArray:
     k = case.arm.constants()
     loaded = with_payload(k, case.arm.payload_constants(case.payload))
     tau = torques(genes, DT * np.arange(SAMPLES))
-    x_r = estimates(motions(k, genes), tau, None)
-    x_m = estimates(motions(loaded, genes), tau, x_r[3])
+    unloaded_motion, loaded_motion = motions(k, genes), motions(loaded, genes)
+    x_r = estimates(unloaded_motion, tau, None, observed(unloaded_motion))
+    x_m = estimates(loaded_motion, tau, x_r[3], observed(loaded_motion))
+    return table4_errors(case, x_r, x_m)
+
+
+def table4_errors(case: Case, x_r: FloatArray, x_m: FloatArray) -> FloatArray:
+    """Table 4's errors (12, B) in percent of the stages' estimates x_r (6, B) and x_m (5, B)."""
+    k = case.arm.constants()
+    loaded = with_payload(k, case.arm.payload_constants(case.payload))
     sum_, k1, k3, k6, k4, k2 = x_r
     _, m_p = payload(x_m, np.stack([k1, k2, k3, k4, sum_ - k3, k6]), case.arm.g)
     truth_r = np.array([k[4] + k[2], k[0], k[2], k[5], k[3], k[1]])

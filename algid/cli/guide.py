@@ -23,6 +23,7 @@ class GuideTopic(StrEnum):
     REPORT = "report"
     WARNINGS = "warnings"
     ESTIMATORS = "estimators"
+    PAPER = "paper"
     PAYLOAD = "payload"
     BATCH = "batch"
     PYTHON = "python"
@@ -39,6 +40,7 @@ SUMMARIES = {
     GuideTopic.REPORT: "the report, figure by figure",
     GuideTopic.WARNINGS: "every warning and status: meaning, cause, what to do",
     GuideTopic.ESTIMATORS: "the estimators, the torque's terms, and what they assume",
+    GuideTopic.PAPER: "the paper's method, its misprints, and how special its torque is",
     GuideTopic.PAYLOAD: "payloads, lengths, payload in time",
     GuideTopic.BATCH: "thousands of logs, fleets, clusters",
     GuideTopic.PYTHON: "the Python API",
