@@ -26,9 +26,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import lapack
 
 from algid.arm import FloatArray
+from algid.compiled import lapack
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels, along_stencil, covariance_factor
 from algid.model import Model, Motion, partials, regressor

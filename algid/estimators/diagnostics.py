@@ -16,9 +16,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from scipy.special import chdtrc, chdtri, ndtri
 
 from algid.arm import FloatArray
+from algid.compiled import chi2_exceeded, chi2_tail, normal_exceeded
 from algid.estimators.combine import LogInformation, Prior, combine, likelihood, sandwich, scaled_pinv
 from algid.estimators.fit import Fit, Status
 from algid.estimators.identifiability import sizes
@@ -274,7 +274,7 @@ def payload_distance(fit: Fit) -> float | None:
     arm = Prior.of(fit.shared.log_names, unloaded[0], unloaded[1])
     information = LogInformation(True, loaded[0], scaled_pinv(loaded[1])[None], np.zeros_like(loaded[0])[None])
     _, _, value = combine(fit.shared, [information], fit.values, arm)
-    return max(0.0, float(-ndtri(chdtrc(freedom, max(0.0, -2 * value)))))
+    return max(0.0, normal_exceeded(float(chi2_tail(freedom, max(0.0, -2 * value)))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,7 +307,7 @@ def repeatability(fit: Fit) -> MassScatter | None:
         masses.append(fit.values[place] + float(slope @ (g - S @ change)) / information)
     n = len(masses)
     std = float(np.std(masses, ddof=1))
-    low, high = (std * float(np.sqrt((n - 1) / chdtri(n - 1, tail))) for tail in (0.025, 0.975))
+    low, high = (std * float(np.sqrt((n - 1) / chi2_exceeded(n - 1, tail))) for tail in (0.025, 0.975))
     return MassScatter(np.array(masses), std, (low, high))
 
 

@@ -8,9 +8,9 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from scipy.special import stdtrit
 
 from algid.arm import FloatArray, keep_arrays, read_only
+from algid.compiled import student_quantile
 from algid.estimators.combine import (
     LogInformation,
     Prior,
@@ -210,7 +210,7 @@ def conclude(
         if repeated is not None:
             within, covariance, intervals = covariance, widened(covariance, repeated), "jackknife"
             squares = _satterthwaite(within, covariance, freedom, logs)
-        quantile = float(stdtrit(squares, 0.975))  # squares are two at least
+        quantile = student_quantile(squares)  # squares are two at least
     return Fit(
         estimator=estimator,
         shared=shared,

@@ -27,9 +27,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc
 
 from algid.arm import FloatArray, keep_arrays
+from algid.compiled import chi2_tail
 from algid.model import PARAMETERS, RIGID
 from algid.physics.parameters import INERTIA, LENGTH, MASS, MOMENT, VISCOUS
 
@@ -242,7 +242,7 @@ def judge(sums: Correlations) -> Whiteness:
     lags = np.arange(1, _LAGS + 1)
     tested = lags < n / 4
     statistic = np.sum(np.where(tested, n * (n + 2) * rho**2 / np.maximum(n - lags, 1), 0.0), axis=2)
-    p = chdtrc(np.maximum(tested.sum(axis=2), 1), statistic)
+    p = chi2_tail(np.maximum(tested.sum(axis=2), 1), statistic)
     # In a long log the least colour is significant; one this faint does not move an error bar.
     faint = np.sqrt(np.mean(rho**2, axis=2)) < _FAINT
     p_value = np.minimum(1.0, len(SCALES) * np.where(faint, 1.0, p).min(axis=0))

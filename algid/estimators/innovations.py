@@ -20,9 +20,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtri
 
 from algid.arm import FloatArray, keep_arrays
+from algid.compiled import chi2_exceeded
 
 LAGS = 40
 NORMAL = 1.959963984540054
@@ -124,7 +124,7 @@ def spectra(sums: ResidualSums) -> Spectra:
     lines, scatter = (np.add.reduceat(one[:last], starts) for one in (sums.lines, sums.scatter))
     density = np.add.reduceat(sums.power[:, :last], starts, axis=1) / lines
     freedom = 2 * lines**2 / scatter
-    low, high = (chdtri(freedom, tail) / freedom for tail in (0.975, 0.025))
+    low, high = (chi2_exceeded(freedom, tail) / freedom for tail in (0.975, 0.025))
     middle = np.sqrt(_EDGES[starts] * _EDGES[ends + 1])
     return Spectra(middle / sums.dt, 2 * sums.dt * density, low, high)
 

@@ -28,9 +28,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import lapack
 
 from algid.arm import FloatArray, keep_arrays
+from algid.compiled import lapack
 from algid.model import Model, Motion, partials, sensitivity, torque
 from algid.signals.differences import HELD, POINTS, Stencil, held_torque
 from algid.signals.filters import recursion

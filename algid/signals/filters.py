@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.compiled import lapack
 
 _KAISER_BETA = 7.0  # stop band at -70 dB
 _PERIODS = 2.5  # half length of a kernel in periods of its bandwidth
@@ -129,8 +130,6 @@ def _sections(cutoff: float, order: int) -> list[tuple[FloatArray, FloatArray]]:
 
 def _section(numerator: FloatArray, denominator: FloatArray, x: FloatArray) -> FloatArray:
     """Signals (m, N) after one section that was at rest before them: a triangular banded system."""
-    from scipy.linalg import lapack
-
     driven = numerator[0] * x
     driven[:, 1:] += numerator[1] * x[:, :-1]
     driven[:, 2:] += numerator[2] * x[:, :-2]
@@ -155,8 +154,6 @@ def recursion(
     before add to its right side; zeros are a filter at rest. (`scipy.signal.lfilter` does the same; its package takes
     a second to import, which a short log does not take to identify.)
     """
-    from scipy.linalg import lapack
-
     driven = np.convolve(numerator, x)
     driven[: state.size] += state
     band = np.tile(denominator, (x.size, 1)).T
