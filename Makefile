@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: help setup demo test test-slow test-processor check lint format types pytest pipelines clean
+.PHONY: help setup demo test test-slow test-processor test-pythons check lint format pipelines clean
 
 help:
 	@echo "make demo       synthesise, identify and print Table 4 beside the paper's"
@@ -39,11 +39,12 @@ test-processor: setup
 	      torque_scale.py validate.py velocities.py) || exit; \
 	done
 
-check: setup
+check: lint test
+
+lint: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest
 
 format: setup
 	$(BIN)/ruff format .
