@@ -17,8 +17,9 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
-from algid.errors import ResultError
+from algid.errors import ResultError, SettingError
 from algid.files import first_misfit, read_text, whole_file
+from algid.limits import LIMITS
 from algid.log import Reading
 from algid.words import counted
 
@@ -343,7 +344,72 @@ def read_result(path: str | Path) -> Result:
         raise ResultError(
             f"{file}: schema_version: expected {known}, found {found!r}; identify again with this version"
         )
+    wrong = misfit_of_numbers(content)
+    if wrong is not None:
+        raise ResultError(f"{file}: {wrong}; identify again with this version")
     try:
-        return Result.model_validate(content | {"schema_version": SCHEMA_VERSION})
+        result = Result.model_validate(content | {"schema_version": SCHEMA_VERSION})
+        _check(result)
     except ValidationError as error:
         raise ResultError(f"{file}: {first_misfit(error)}; identify again with this version") from error
+    except SettingError as error:
+        raise ResultError(f"{file}: {error}; identify again with this version") from error
+    return result
+
+
+def misfit_of_numbers(content: Any) -> str | None:
+    """Where a document of JSON's types holds a number that is none, or beyond all bounds; None nowhere."""
+    largest = LIMITS.largest_value**2  # of a covariance
+    left: list[tuple[str, Any]] = [("", content)]
+    while left:
+        place, value = left.pop()
+        if isinstance(value, dict):
+            left += [(f"{place}.{key}"[-200:], inner) for key, inner in value.items()]
+        elif isinstance(value, list):
+            left += [(f"{place}.{number}"[-200:], inner) for number, inner in enumerate(value)]
+        elif isinstance(value, int | float) and not -largest <= value <= largest:  # also where it is no number
+            return f"{place.lstrip('.')}: expected a number below {largest:g} in size"
+    return None
+
+
+def _check(result: Result) -> None:
+    """What no field tells by itself.
+
+    Raises
+    ------
+    SettingError
+        If settings, terms, error bars, the covariance or a log's figures are such as no identification gives.
+    """
+    from algid.model import TERMS
+    from algid.settings import Settings
+
+    Settings.of(result.settings)
+    for log in result.logs:
+        if min(log.rows, log.duration, log.rate) < 0 or abs(log.start_ns) >= 1 << 63:
+            raise SettingError(f"{log.path!r:.60}: rows, duration and rate may not be negative, nor the start 2^63 ns")
+    fit = result.fit
+    tables = [result.estimates, result.paper_payload, *(fit.by_log if fit is not None else ())]
+    for name, one in (pair for table in tables for pair in table.items()):
+        _check_size(f"{name!r:.60}: estimate", one.estimate)
+        if max(abs(one.estimate or 0.0), one.std or 0.0) > LIMITS.largest_value:
+            raise SettingError(f"{name!r:.60}: expected a number below {LIMITS.largest_value:g} in size")
+        _check_size(f"{name!r:.60}: std", one.std, positive=True)
+    if fit is None:
+        return
+    for name, level in fit.noise.items():
+        _check_size(f"fit.noise.{name:.60}", level, positive=True)
+    unknown = [term for term in (fit.model.terms if fit.model is not None else ()) if term not in TERMS]
+    if unknown:
+        raise SettingError(f"fit.model.terms: expected some of {', '.join(TERMS)}, found {unknown[0]!r:.60}")
+    if len(set(fit.covariance_names)) < len(fit.covariance_names):
+        raise SettingError("fit.covariance_names: expected each once")
+    for place, row in enumerate(fit.covariance):
+        _check_size(f"fit.covariance.{place}.{place}", row[place], positive=True)
+
+
+def _check_size(place: str, value: float | None, *, positive: bool = False) -> None:
+    """Raises `SettingError` where a number is not 0 and so small that it cannot be divided by, or is negative."""
+    if value is not None and (0 < abs(value) < 1 / LIMITS.largest_value or (positive and value < 0)):
+        least = f"{1 / LIMITS.largest_value:g}"
+        what = f"0, or {least} or more" if positive else f"0, or {least} or more in size"
+        raise SettingError(f"{place}: expected {what}, found {value:g}")

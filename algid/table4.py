@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from algid.arm import CONSTANT_NAMES, FloatArray, with_payload
+from algid.limits import LIMITS
 from algid.log import Truth
 from algid.results import Table4Row
 
@@ -94,5 +93,5 @@ def table4(
 
 
 def finite(value: float | None) -> float | None:
-    """The value as JSON can hold it: None where it is not a finite number."""
-    return None if value is None or not np.isfinite(value) else float(value)
+    """The value as a result holds it: None where it is not a finite number, or beyond all bounds."""
+    return None if value is None or not abs(value) <= LIMITS.largest_value else float(value)

@@ -35,9 +35,9 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "stores": room("errors files", "pyarrow"),
     "profile": room("errors files units", "pydantic"),
     "settings": room("errors limits model signals"),
-    "results": room("errors files log words", "pydantic"),
+    "results": room("errors files limits log model settings words", "pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
-    "table4": room("arm log results synth", "numpy"),
+    "table4": room("arm limits log results synth"),
     "writers": room("errors files log ros2", "mcap numpy polars pyarrow"),
     "readers": room(
         "arm errors files faults limits log profile ros2 runtime units words",
@@ -67,7 +67,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "numpy polars pydantic scipy",
     ),
     "export": room("arm errors files identification model physics report results words", "numpy scipy"),
-    "fleet": room("errors files model progress report words", "numpy polars scipy"),
+    "fleet": room("errors files limits model progress report words", "numpy polars scipy"),
     "cli": room(
         "batch check design errors estimators export faults files "
         "fleet identification inspection limits log model physics profile progress readers report results runtime "

@@ -11,6 +11,7 @@ from algid.errors import ResultError
 from algid.files import whole_file
 from algid.fleet.drift import FEWEST, SPAN, windows
 from algid.fleet.findings import mislabelled, outliers
+from algid.limits import LIMITS
 from algid.progress import Progress
 from algid.words import counted
 
@@ -46,9 +47,50 @@ def read_jobs(path: Path) -> pl.DataFrame:
     missing = {"job", "robot", "time", "status"} - set(names)
     if missing:
         raise ResultError(f"{path}: no column {', '.join(sorted(missing))}; expected jobs.parquet of algid batch")
+    jobs = _typed(jobs, path)
     months = (pl.col("time") - pl.col("time").min().over("robot")).dt.total_seconds() / (86400 * MONTH_DAYS)
     finished = jobs.filter(pl.col("status").is_in(["ok", "incomplete"]))
     return finished.with_columns(months.alias("t")).with_columns(pl.col("t").floor().cast(pl.Int32).alias("month"))
+
+
+def _typed(jobs: pl.DataFrame, path: Path) -> pl.DataFrame:
+    """The jobs with the types that algid batch writes; a number that is none, or beyond all bounds, is null.
+
+    Raises
+    ------
+    ResultError
+        If a column holds something else.
+    """
+    import polars as pl
+
+    columns = []
+    for name, kind in jobs.schema.items():
+        number = name not in ("job", "robot", "time", "status")
+        if name == "time":
+            fits, wanted = kind == pl.Datetime or kind == pl.Date, "times"
+            column = pl.col(name).cast(pl.Datetime("us", getattr(kind, "time_zone", None)), strict=False)
+            zoned = getattr(kind, "time_zone", None) is not None
+            column = column.dt.convert_time_zone("UTC") if zoned else column.dt.replace_time_zone("UTC")
+        elif number:
+            labels = name == "label_payload"  # a manifest's, which may be words: then there is none
+            fits, wanted = kind.is_numeric() or labels, "numbers"
+            column = pl.col(name).cast(pl.Float64, strict=False) if kind.is_numeric() else pl.lit(None, pl.Float64)
+            size = column.abs()
+            low = 1 / LIMITS.largest_value if name.endswith("_std") else 0.0
+            column = pl.when((size <= LIMITS.largest_value) & (size >= low)).then(column).alias(name)
+        else:
+            fits, wanted = kind == pl.String or isinstance(kind, pl.Categorical | pl.Enum), "text"
+            column = pl.col(name).cast(pl.String)
+        if kind == pl.Null:
+            none = pl.Datetime("us", "UTC") if name == "time" else pl.Float64() if number else pl.String()
+            fits, column = True, pl.lit(None, none)
+        if not fits:
+            raise ResultError(f"{path}: column {name}: expected {wanted}, found {kind}; run algid batch again")
+        columns.append(column.alias(name))
+    typed = jobs.select(columns)
+    if typed["job"].null_count():
+        raise ResultError(f"{path}: column job: expected a name in every row, found none; run algid batch again")
+    return typed
 
 
 @dataclass(frozen=True, eq=False)

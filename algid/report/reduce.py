@@ -63,7 +63,7 @@ def blocks(path: Path, names: Sequence[str], rows: int = ROWS) -> Iterator[Block
     """
     import pyarrow.parquet
 
-    _check_columns(path, names)
+    _check_columns(path, names, numbers=True)
     # without pre_buffer=False the file is kept in memory as it is read
     with _reading(path), pyarrow.parquet.ParquetFile(path, pre_buffer=False) as file:
         for batch in file.iter_batches(batch_size=rows, columns=list(names)):
@@ -72,6 +72,8 @@ def blocks(path: Path, names: Sequence[str], rows: int = ROWS) -> Iterator[Block
                 values = np.asarray(batch.column(name).to_numpy(zero_copy_only=False), dtype=np.float64)
                 beyond = np.isfinite(values) & (np.abs(values) > LARGEST)
                 block[name] = np.where(beyond, np.nan, values) if beyond.any() else values
+            if "log" in block and not np.all(np.isfinite(block["log"])):
+                raise ResultError(f"{path}: column 'log': expected whole numbers; identify again with this version")
             yield block
 
 
@@ -91,11 +93,22 @@ def table_of(path: Path, names: Sequence[str]) -> dict[str, list[Any]]:
         return found
 
 
-def _check_columns(path: Path, names: Sequence[str]) -> None:
-    present = columns_of(path)
+def _check_columns(path: Path, names: Sequence[str], *, numbers: bool = False) -> None:
+    import pyarrow.parquet
+    from pyarrow import types
+
+    with _reading(path):
+        kinds = {field.name: field.type for field in pyarrow.parquet.read_schema(path)}
+    present = list(kinds)
     absent = [name for name in names if name not in present]
     if absent:
         raise ResultError(f"{path}: expected a column {absent[0]!r}, found none; identify again with this version")
+    of_numbers = (types.is_integer, types.is_floating, types.is_null, types.is_boolean)
+    for name in names if numbers else ():
+        if not any(fits(kinds[name]) for fits in of_numbers):
+            raise ResultError(
+                f"{path}: column {name!r}: expected numbers, found {kinds[name]}; identify again with this version"
+            )
 
 
 def row_count(path: Path) -> int:

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from algid.errors import ResultError
+from algid.files import first_misfit, read_text
 from algid.report.reduce import Block, blocks
-from algid.results import LogSummary
+from algid.results import LogSummary, misfit_of_numbers
 from algid.track.payload import QUANTILE, Stretch, Track
 from algid.track.result import TrackResult
 
-FILE = "track.json"
+FILE, CURVE = "track.json", "track.parquet"
 COLUMNS = ("t", "m_p", "high", "stretch", "left")
 
 
@@ -33,44 +34,86 @@ def read_track(folder: Path) -> TrackResult:
         If its files are missing, damaged, or of a version that did not keep all that its pages show.
     """
     path = folder / FILE
+    again = "run algid track again with this version"
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        curve = list(blocks(folder / "track.parquet", COLUMNS))
-        return _result(found, {name: np.concatenate([part[name] for part in curve]) for name in COLUMNS if curve})
+        content = json.loads(read_text(path))
+        wrong = misfit_of_numbers(content)
+        if wrong is not None:
+            raise ResultError(f"{path}: {wrong}; {again}")
+        found = _File.model_validate(content)
     except OSError as error:
         raise ResultError(f"{path}: cannot read it ({error.strerror})") from error
-    except KeyError as error:
-        raise ResultError(f"{path}: expected {error}, found none; run algid track again with this version") from error
-    except (ValueError, TypeError, ValidationError, AttributeError) as error:
+    except ValidationError as error:
+        raise ResultError(f"{path}: {first_misfit(error)}; {again}") from error
+    except (ValueError, RecursionError) as error:
         reason = str(error).partition("\n")[0]
-        raise ResultError(f"{path}: expected a track of algid track, found another thing ({reason})") from error
+        raise ResultError(f"{path}: not JSON ({reason}); expected a track of algid track") from error
+    curve = list(blocks(folder / CURVE, COLUMNS))
+    if not curve:
+        raise ResultError(f"{folder / CURVE}: it holds no rows; {again}")
+    return _result(found, {name: np.concatenate([part[name] for part in curve]) for name in COLUMNS})
 
 
-def _result(found: dict[str, Any], curve: Block) -> TrackResult:
-    stretches = [Stretch(*(float(one[name]) for name in ("start", "end", "m_p", "std"))) for one in found["stretches"]]
-    changes = [(one["t"], one["from"], one["to"]) for one in found["changes"]]
-    schedule = found["schedule"]
+class _Stretch(BaseModel):
+    start: float
+    end: float
+    m_p: float
+    std: Annotated[float, Field(ge=0)]
+
+
+class _Change(BaseModel):
+    t: float
+    before: float = Field(alias="from")
+    to: float
+
+
+class _Arm(BaseModel):
+    path: str
+    sha256: str
+    sentence: str | None
+
+
+class _File(BaseModel):
+    """What is read of ``track.json``; it holds more, which follows from this."""
+
+    version: str
+    stretches: list[_Stretch]
+    changes: list[_Change]
+    explained: float
+    excess: float
+    bare: float
+    holes: list[tuple[float, float]]
+    schedule: list[tuple[float, float]] | None
+    arm: _Arm
+    settings: dict[str, Any]
+    log: LogSummary
+    data_lost: bool
+    warnings: list[str]
+
+
+def _result(found: _File, curve: Block) -> TrackResult:
+    changes = [(one.t, one.before, one.to) for one in found.changes]
     return TrackResult(
         track=Track(
-            stretches=stretches,
+            stretches=[Stretch(one.start, one.end, one.m_p, one.std) for one in found.stretches],
             t=curve["t"],
             m_p=curve["m_p"],
             std=(curve["high"] - curve["m_p"]) / QUANTILE,
             stretch=curve["stretch"],
             left=curve["left"],
             changes=np.array(changes, dtype=np.float64).reshape(-1, 3),
-            colour=float(found["excess"]),
-            explained=float(found["explained"]),
-            holes=np.array(found["holes"], dtype=np.float64).reshape(-1, 2),
-            tip_equivalent=float(found["bare"]),
+            colour=found.excess,
+            explained=found.explained,
+            holes=np.array(found.holes, dtype=np.float64).reshape(-1, 2),
+            tip_equivalent=found.bare,
         ),
-        log=LogSummary.model_validate(found["log"]),
-        arm=found["arm"]["path"],
-        arm_sha256=found["arm"]["sha256"],
-        arm_sentence=found["arm"]["sentence"],
-        settings=found["settings"],
-        version=found["version"],
-        schedule=None if schedule is None else tuple((float(time), float(mass)) for time, mass in schedule),
-        warnings=tuple(found["warnings"]),
-        data_lost=bool(found["data_lost"]),
+        log=found.log,
+        arm=found.arm.path,
+        arm_sha256=found.arm.sha256,
+        arm_sentence=found.arm.sentence,
+        settings=found.settings,
+        version=found.version,
+        schedule=None if found.schedule is None else tuple(found.schedule),
+        warnings=tuple(found.warnings),
+        data_lost=found.data_lost,
     )

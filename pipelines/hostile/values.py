@@ -32,7 +32,7 @@ def text(draw: random.Random) -> str:
 def anything(draw: random.Random) -> Any:
     """A value of any of JSON's types."""
     deep: Any = 1
-    for _ in range(draw.choice((3, 60, 400))):
+    for _ in range(draw.choice((3, 60, 200))):
         deep = [deep] if draw.random() < 0.5 else {"a": deep}
     makers = (
         *(lambda: number(draw), lambda: number(draw), lambda: draw.choice(WHOLE), lambda: text(draw)),

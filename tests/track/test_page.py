@@ -237,7 +237,7 @@ def test_a_damaged_track_is_refused_in_one_line(result: TrackResult, tmp_path: P
     folder = tmp_path / "picking.track"
     write_track(result, folder)
     (folder / "track.json").write_text(damage)
-    with pytest.raises(ResultError, match=r"track\.json: expected") as refused:
+    with pytest.raises(ResultError, match=r"track\.json: (not JSON|.*(required|expected|valid))") as refused:
         read_track(folder)
     assert "\n" not in str(refused.value)
 
