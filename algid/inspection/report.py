@@ -86,7 +86,12 @@ def contents(path: Path) -> tuple[str, tuple[Entry, ...]]:
         return kind, tuple(_parquet(path))
     if kind.startswith("csv"):
         return kind, tuple(_csv(path, kind))
-    if kind in ("npz", "npy", "mat", "feather"):
+    if kind == "feather":
+        from algid.readers.feather import opened
+
+        feather = opened(path)
+        return kind, tuple(Entry(field.name, str(field.type)[:80], feather.rows) for field in feather.schema)
+    if kind in ("npz", "npy", "mat"):
         from algid.readers.arrays import frame_of
 
         frame = frame_of(path, kind)

@@ -60,7 +60,11 @@ def _opened(path: Path, profile: Profile) -> TableReader:
         from algid.readers.csv import open_csv
 
         return open_csv(path, profile, kind)
-    if kind in ("npz", "npy", "mat", "feather"):
+    if kind == "feather":
+        from algid.readers.feather import open_feather
+
+        return open_feather(path, profile)
+    if kind in ("npz", "npy", "mat"):
         from algid.readers.arrays import open_arrays
 
         return open_arrays(path, kind, profile)

@@ -1,4 +1,4 @@
-"""Logs that are read as a whole: NumPy archives, MATLAB files, Feather (Arrow IPC)."""
+"""Logs that are read as a whole: NumPy archives, MATLAB files."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign
-from algid.readers.frames import cells, flat_reader, number, of_numbers
+from algid.readers.frames import flat_reader, number, of_numbers
 from algid.readers.names import TIMES
-from algid.readers.parquet import units_of_schema
+from algid.readers.natives import natively
 from algid.words import counted
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def open_arrays(path: Path, kind: str, profile: Profile) -> TableReader:
-    """Open a log of the kind "npz", "npy", "mat" or "feather".
+    """Open a log of the kind "npz", "npy" or "mat".
 
     Raises
     ------
@@ -37,7 +37,7 @@ def open_arrays(path: Path, kind: str, profile: Profile) -> TableReader:
     import polars as pl
 
     frame = frame_of(path, kind)
-    columns = assign(str(path), frame.columns, profile, _feather_units(path, frame) if kind == "feather" else {})
+    columns = assign(str(path), frame.columns, profile, {})
     columns = of_numbers(str(path), columns, frame.schema)
 
     def frames(columns: Columns, rows: int, most: int | None) -> Iterator[pl.DataFrame]:
@@ -46,19 +46,6 @@ def open_arrays(path: Path, kind: str, profile: Profile) -> TableReader:
         yield from chosen.select(numbers).iter_slices(rows)
 
     return flat_reader(str(path), kind, columns, frames, profile, frame.height)
-
-
-def _feather_units(path: Path, frame: pl.DataFrame) -> dict[str, str]:
-    """Units that a Feather file's schema states; nothing for one of the first version, which has none."""
-    import pyarrow as pa
-
-    try:
-        with pa.ipc.open_file(path) as file:
-            schema = file.schema
-    except (pa.ArrowException, OSError, ValueError):
-        return {}
-    roots = {name: name if name in schema.names else name.partition("[")[0] for name in frame.columns}
-    return units_of_schema(schema, {name: root for name, root in roots.items() if root in schema.names})
 
 
 def frame_of(path: Path, kind: str) -> pl.DataFrame:
@@ -73,19 +60,8 @@ def frame_of(path: Path, kind: str) -> pl.DataFrame:
 
     if path.stat().st_size > LIMITS.whole_bytes:
         raise LogError(f"{path}: a {kind} file of more than 1 GiB is not read as a whole; save it as Parquet")
-    try:
-        if kind == "feather":
-            frame = pl.read_ipc(path)
-            widest = frame.select(pl.col(pl.List).list.len().max().fill_null(0)).to_dict(as_series=False)
-            found = cells(frame.schema, lambda column: int(widest[column][0]))
-            flat = frame.select([cell.alias(name) for name, (cell, _) in found.items()])
-        else:
-            flat = pl.DataFrame(_columns(path, {"npy": _npy, "npz": _npz, "mat": _matlab}[kind](path)))
-    except LogError:
-        raise
-    except Exception as error:  # whatever a damaged file makes of NumPy, SciPy or polars
-        reason = str(error).split("\n", maxsplit=1)[0][:200]
-        raise LogError(f"{path}: the {kind} file cannot be read ({type(error).__name__}: {reason})") from error
+    with natively(path, kind):
+        flat = pl.DataFrame(_columns(path, {"npy": _npy, "npz": _npz, "mat": _matlab}[kind](path)))
     if flat.width > LIMITS.columns:
         raise LogError(f"{path}: {counted(flat.width, 'column')}; expected {LIMITS.columns} at most")
     return flat

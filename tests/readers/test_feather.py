@@ -1,0 +1,132 @@
+"""Feather files of every type and make: read, or refused in one line, and nothing unpacked that no log has."""
+
+from __future__ import annotations
+
+import random
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from algid.errors import LogError
+from algid.log import Log
+from algid.readers import read_log
+from pipelines.mutations import damage
+from tests.conftest import Limited
+
+N = 300
+T = np.arange(N) / 100
+LOG: dict[str, Any] = {
+    "t": T,
+    "theta1": np.sin(T),
+    "theta2": np.cos(2 * T),
+    "tau1": 3 * np.cos(T),
+    "tau2": np.sin(3 * T),
+}
+DECIMALS = [Decimal(int(1000 * value)) / 1000 for value in np.sin(T)]
+REFUSED = {
+    "union": pa.UnionArray.from_sparse(pa.array([0] * N, pa.int8()), [pa.array(T)]),
+    "dense union": pa.UnionArray.from_dense(
+        pa.array([0] * N, pa.int8()), pa.array(range(N), pa.int32()), [pa.array(T)]
+    ),
+    "run-end encoded": pa.RunEndEncodedArray.from_arrays(pa.array([N], pa.int32()), pa.array([1.0])),
+    "interval": pa.array([(1, 2, 3)] * N, pa.month_day_nano_interval()),
+    "list view": pa.array([[1.0]] * N, pa.list_view(pa.float64())),
+    "map": pa.array([[("a", 1)]] * N, pa.map_(pa.string(), pa.int64())),
+    "struct": pa.array([{"a": 1.0}] * N),
+    "binary": pa.array([b"x"] * N),
+    "nothing": pa.nulls(N),
+}
+
+
+def write(path: Path, columns: dict[str, Any], names: list[str] | None = None, **options: Any) -> Path:
+    arrays = [pa.array(one) if isinstance(one, np.ndarray) else one for one in columns.values()]
+    table = pa.Table.from_arrays(arrays, names or list(columns))
+    written = pa.ipc.IpcWriteOptions(**options)
+    with pa.OSFile(str(path), "wb") as sink, pa.ipc.new_file(sink, table.schema, options=written) as file:
+        file.write_table(table, max_chunksize=100)
+    return path
+
+
+def right(log: Log) -> bool:
+    return len(log) == N and np.allclose(log.theta, [np.sin(T), np.cos(2 * T)], atol=1e-3)
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_a_type_that_holds_no_numbers_is_refused_where_it_is_needed_alone(kind: str, tmp_path: Path) -> None:
+    assert right(read_log(write(tmp_path / "log.feather", {**LOG, "extra": REFUSED[kind]})))
+    with pytest.raises(LogError, match=r"column 'theta1' for theta1 holds .*; expected numbers"):
+        read_log(write(tmp_path / "log.feather", {**LOG, "theta1": REFUSED[kind]}))
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        pa.array(DECIMALS, pa.decimal256(60, 3)),
+        pa.array(DECIMALS, pa.decimal128(20, 3)),
+        pa.array(np.sin(T).astype(np.float32)),
+        pa.array(np.sin(T).astype(np.float16)),
+        pa.array(np.sin(T)).dictionary_encode(),
+    ],
+    ids=lambda values: str(values.type),
+)
+def test_numbers_of_every_make_are_read(values: pa.Array, tmp_path: Path) -> None:
+    assert right(read_log(write(tmp_path / "log.feather", {**LOG, "theta1": values})))
+
+
+@pytest.mark.parametrize("name", ["tau2", "x"])
+def test_two_columns_of_one_name_are_refused(name: str, tmp_path: Path) -> None:
+    columns = {**LOG, "a": T, "b": T}
+    with pytest.raises(LogError, match=f"the column '{name}' stands in the file twice; rename one"):
+        read_log(write(tmp_path / "log.feather", columns, [*list(LOG)[:4], "tau2", name, name]))
+
+
+@pytest.mark.parametrize("packing", [None, "lz4", "zstd"])
+@pytest.mark.parametrize(
+    ("bounds", "said"),
+    [
+        ({"whole_bytes": 500}, "it claims"),
+        ({"free_text_bytes": 0, "text_a_byte": 0}, "it claims"),
+        ({"message_indexes": 5}, "it claims"),
+        ({"spans": 2}, "more than 2 messages"),
+        ({"record_bytes": 100}, "it claims a footer of"),
+        ({"columns": 4}, "5 columns; expected 4 at most"),
+    ],
+)
+def test_claims_beyond_a_bound_are_refused(
+    packing: str | None, bounds: dict[str, int], said: str, tmp_path: Path, limited: Limited
+) -> None:
+    path = write(tmp_path / "log.feather", LOG, compression=packing)
+    assert right(read_log(path))
+    limited(**bounds)
+    with pytest.raises(LogError, match=said):
+        read_log(path)
+
+
+def test_zeros_that_unpack_to_more_than_any_log_are_not_unpacked(tmp_path: Path) -> None:
+    zeros = pa.array(np.zeros(50_000_000))
+    table = pa.table(dict.fromkeys(LOG, zeros))
+    with pa.OSFile(str(tmp_path / "log.feather"), "wb") as sink:
+        options = pa.ipc.IpcWriteOptions(compression="zstd")
+        with pa.ipc.new_file(sink, table.schema, options=options) as file:
+            file.write_table(table)
+    assert (tmp_path / "log.feather").stat().st_size < 1 << 20
+    with pytest.raises(LogError, match=r"it claims 2,000,000,000 bytes"):
+        read_log(tmp_path / "log.feather")
+
+
+@pytest.mark.parametrize("packing", [None, "lz4"])
+def test_damaged_bytes_are_refused_or_read(packing: str | None, tmp_path: Path) -> None:
+    content = write(tmp_path / "log.feather", LOG, compression=packing).read_bytes()
+    refused = []
+    for seed in range(150):
+        (tmp_path / "log.feather").write_bytes(damage(content, random.Random(seed)))
+        try:
+            read_log(tmp_path / "log.feather")
+        except LogError as error:
+            refused.append(str(error))
+    assert len(refused) > 30
+    assert not any("\n" in line for line in refused)
