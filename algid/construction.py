@@ -114,6 +114,23 @@ def _remove(place: Path) -> None:
             place.unlink()
 
 
+def folders_below(root: Path) -> Iterator[tuple[str, list[str]]]:
+    """A folder and those within it, each with the names of what is no folder in it, or was left by algid.
+
+    Links are not followed, and what cannot be looked at is passed over. ``os.walk`` of Python 3.11 ends at a thousand.
+    """
+    pending = [str(root)]
+    while pending:
+        folder = pending.pop()
+        try:
+            with os.scandir(folder) as entries:
+                found = [(e.name, e.is_dir(follow_symlinks=False) and not _LEFT.fullmatch(e.name)) for e in entries]
+        except OSError:
+            continue
+        yield folder, [name for name, is_folder in found if not is_folder]
+        pending += [f"{folder}/{name}" for name, is_folder in found if is_folder]
+
+
 def remove_left(folder: Path, name: str | None = None) -> None:
     """Remove what killed processes of this user have left in `folder`, of `name` or of anything.
 

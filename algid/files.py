@@ -50,6 +50,17 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """What befalls a disk while it is written to."""
 
 
+def refuse_links(folder: Path, name: str) -> None:
+    """Raises `OutputError` where a folder on the way from `folder` to what is to be `name` is a link out of it."""
+    place = folder
+    for part in name.split("/")[:-1]:
+        place /= part
+        if place.is_symlink():
+            raise OutputError(
+                f"{place}: a link, which is not followed; make it a folder, or choose another one with -o"
+            )
+
+
 @contextmanager
 def whole_file(path: Path, *, sweep: bool = True) -> Iterator[Path]:
     """Give a temporary name beside `path` to write to; it becomes `path` when the block ends well.

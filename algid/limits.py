@@ -136,6 +136,12 @@ class FileLimits:
     sqlite_steps_a_byte: int = 4
     """Of SQLite's machine, for all that is asked of a database; a row takes some ten."""
 
+    # batches
+    name_bytes: int = 1000
+    """Of a job's name with its folders: a path may have 4096."""
+    estimate_letters: int = 200
+    """Of the name of a parameter, or of a sum of several."""
+
 
 LIMITS = FileLimits()
 

@@ -17,8 +17,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
+from algid.construction import folders_below
 from algid.errors import AlgidError, LogError, OutputError, without_credentials
-from algid.files import remove_whole, whole_file
+from algid.files import read_whole, refuse_links, remove_whole, whole_file
 
 if TYPE_CHECKING:
     from pyarrow.fs import FileInfo, FileSystem
@@ -69,6 +70,8 @@ class Store:
         """The content, or None where there is no such file. Raises `LogError` where it cannot be read."""
         with _translated(f"{self.place}/{name}", LogError, "it cannot be read"):
             try:
+                if self.folder is not None:
+                    return read_whole(self.folder / name)
                 with self.filesystem.open_input_file(f"{self.root}/{name}") as stream:
                     return bytes(stream.readall())
             except FileNotFoundError:
@@ -77,6 +80,7 @@ class Store:
     def write(self, name: str, content: bytes) -> None:
         """Write the whole file. Raises `OutputError`."""
         if self.folder is not None:
+            refuse_links(self.folder, name)
             with whole_file(self.folder / name, sweep=False) as temporary:
                 temporary.write_bytes(content)
             return
@@ -93,6 +97,7 @@ class Store:
         path = f"{self.root}/{name}"
         with _translated(f"{self.place}/{name}", OutputError, "it cannot be removed"):
             if self.folder is not None:
+                refuse_links(self.folder, name)
                 remove_whole(self.folder / name)
                 return
             kind = self.filesystem.get_file_info(path).type
@@ -111,11 +116,13 @@ class Store:
         """
         from pyarrow.fs import FileSelector, FileType
 
+        if self.folder is not None:
+            return _names_below(self.folder, under)
         path = f"{self.root}/{under}".rstrip("/")
         with _translated(self.place, OutputError, "its objects cannot be listed"):
             found = self.filesystem.get_file_info(FileSelector(path, recursive=True, allow_not_found=True))
             bucket = self.root.partition("/")[0]
-            if not found and self.folder is None and not _is_there(self.filesystem.get_file_info(bucket)):
+            if not found and not _is_there(self.filesystem.get_file_info(bucket)):
                 raise OutputError(f"{self.place}: there is no bucket {bucket}; check its name, or make it")
         files = (info for info in found if info.type == FileType.File and not info.base_name.startswith("."))
         return sorted(info.path.removeprefix(f"{self.root}/") for info in files)
@@ -124,6 +131,13 @@ class Store:
         """Whether there is such a file. Raises `LogError` where that cannot be known."""
         with _translated(f"{self.place}/{name}", LogError, "it cannot be looked at"):
             return bool(self.filesystem.get_file_info(f"{self.root}/{name}").is_file)
+
+
+def _names_below(root: Path, under: str) -> list[str]:
+    """Of a folder of this machine: links to folders are not followed, what cannot be looked at is passed over."""
+    start = len(str(root)) + 1
+    paths = (f"{folder}/{name}" for folder, names in folders_below(root / under) for name in names if name[0] != ".")
+    return sorted(path[start:] for path in paths if Path(path).is_file())
 
 
 def open_store(place: str) -> Store:

@@ -32,7 +32,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "signals": room("arm compiled log", "numpy scipy", PURE),
     "estimators": room("arm compiled model physics progress signals", "numpy scipy", PURE),
     "files": room("construction errors limits", "pydantic"),
-    "stores": room("errors files", "pyarrow"),
+    "stores": room("construction errors files", "pyarrow"),
     "profile": room("errors files units", "pydantic"),
     "settings": room("errors limits model signals"),
     "results": room("errors files limits log model settings words", "pydantic"),
@@ -56,7 +56,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "api": room("log synth"),
     "batch": room(
         "construction errors files identification limits profile readers report results runtime settings stores",
-        "distributed mcap polars pyarrow",
+        "distributed mcap polars pyarrow pydantic",
     ),
     "track": room(
         "arm errors estimators files identification model profile report results runtime signals words",

@@ -9,7 +9,7 @@ import polars as pl
 import pytest
 
 import algid
-from algid.batch.jobs import jobs_of
+from algid.batch.discover import jobs_of
 from algid.batch.records import End
 from algid.batch.run import Batch, Recipe
 from algid.errors import LogError, OutputError

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from algid.batch.jobs import read_manifest
+from algid.batch.manifest import read_manifest
 from algid.design.request import request
 from algid.errors import SettingError
 from algid.files import parsed_toml

@@ -10,11 +10,13 @@ of algid but its version.
 
 from __future__ import annotations
 
+import asyncio
 import ctypes
 import hashlib
 import logging
 import os
 import pickle
+import re
 import socket
 import threading
 import time
@@ -70,6 +72,7 @@ def cluster(address: str, out: str, timeout: float | None = None) -> Iterator[tu
         from distributed import Client
     except ImportError as error:
         raise SettingError("--scheduler: Dask is not installed; pip install 'algid[dask]'") from error
+    _reach(address)
     try:
         client: Any = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
@@ -95,6 +98,34 @@ def cluster(address: str, out: str, timeout: float | None = None) -> Iterator[tu
             client.close(timeout=CLOSE_SECONDS)
         for name, level in loggers.items():
             logging.getLogger(name).setLevel(level)
+
+
+_ADDRESS = re.compile(r"((?:tcp|tls)://)?(?P<host>\[[0-9A-Fa-f:.]+\]|[\w.-]+):(?P<port>[0-9]{1,5})", re.ASCII)
+
+
+def _reach(address: str) -> None:
+    """Find out whether a scheduler answers: a client that fails to connect cannot be got rid of cleanly.
+
+    Raises
+    ------
+    SettingError
+        If the address is none, or no scheduler answers there in time.
+    """
+    found = _ADDRESS.fullmatch(address)
+    if found is None or not 0 < int(found["port"]) < 1 << 16:
+        raise SettingError(f"--scheduler: expected an address like tcp://HOST:8786, found {address!r:.60}")
+    try:
+        asyncio.run(asyncio.wait_for(_greet(address), CONNECT_SECONDS))
+    except Exception as error:  # whatever there is that answers something else
+        reason = " ".join(str(error).split())[:200] or f"no word within {CONNECT_SECONDS} s"
+        raise SettingError(f"--scheduler {address}: no scheduler answers ({reason}); start dask scheduler") from error
+
+
+async def _greet(address: str) -> None:
+    from distributed.core import rpc
+
+    async with rpc(address, timeout=CONNECT_SECONDS) as scheduler:  # type: ignore[no-untyped-call]
+        await scheduler.identity()
 
 
 def misfit_of(version: str, mark: str | None, out: str) -> Callable[[], str | None]:

@@ -14,17 +14,17 @@ from typing import TYPE_CHECKING, Any
 
 from algid import __version__
 from algid.batch.fetch import naming, staged
-from algid.batch.jobs import Job
+from algid.batch.jobs import Job, kept_path
 from algid.batch.records import End, Input, JobRecord, estimates_of, hash_of, stat_of
 from algid.errors import AlgidError, chain_of, text_of
-from algid.files import temporary_folder
+from algid.files import refuse_links, temporary_folder
 from algid.identification.identify import identify
 from algid.identification.source import Staged
 from algid.report.verdict import verdict
 from algid.results import Result, Status
 from algid.runtime import keep_freed, keep_to_one_core
 from algid.settings import Settings
-from algid.stores import is_url, open_store, public, put_folder
+from algid.stores import is_url, open_store, put_folder
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -103,8 +103,8 @@ def failed_record(task: Task, reason: str, status: End = End.FAILED, **known: An
 
 def kept(job: Job) -> Job:
     """A job as records hold it: its URLs without credentials."""
-    logs, loaded = (tuple(map(public, paths)) for paths in (job.logs, job.loaded))
-    return replace(job, logs=logs, loaded=loaded, profile=None if job.profile is None else public(job.profile))
+    logs, loaded = (tuple(map(kept_path, paths)) for paths in (job.logs, job.loaded))
+    return replace(job, logs=logs, loaded=loaded, profile=None if job.profile is None else kept_path(job.profile))
 
 
 def _record(task: Task, **known: Any) -> JobRecord:
@@ -123,12 +123,14 @@ def _looked_at(path: str) -> Input:
     try:
         return stat_of(path)
     except AlgidError:
-        return Input(public(path), 0, 0)
+        return Input(kept_path(path), 0, 0)
 
 
 def _identified(task: Task) -> Result:
     """Identify; what lies in an object store is fetched before and put there after."""
     paths = (*task.job.logs, *task.job.loaded, task.out)
+    if not is_url(task.out):
+        refuse_links(Path(task.out), task.job.name)
     with temporary_folder() if any(map(is_url, paths)) else nullcontext(Path()) as stage:
         place = (stage if is_url(task.out) else Path(task.out)) / task.job.name
         logs = _here(task.job.logs, stage / "logs", task.profile)

@@ -1,25 +1,23 @@
-"""What is known of a job that has come to an end: one small file each, written whole, below ``OUT/.jobs``.
-
-`jobs.parquet`: a row a job, in flat columns that SQL can ask.
-"""
+"""What is known of a job that has come to an end: one small file each, written whole, below ``OUT/.jobs``."""
 
 from __future__ import annotations
 
-import io
 import json
+import math
+import os
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
-from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from algid.batch.jobs import Job
-from algid.errors import LogError
+from algid.batch.jobs import COLUMNS, TABLE, Job, kept_path, name_fault, utc_of
+from algid.errors import LogError, OutputError
+from algid.files import refuse_links, writing
 from algid.identification.source import sha256_of
+from algid.limits import LIMITS
 from algid.results import Result
-from algid.stores import Store, is_url, object_stat, public
+from algid.stores import Store, is_url, object_stat
 
 FOLDER = ".jobs"
 
@@ -83,16 +81,16 @@ def stat_of(path: str) -> Input:
         If it may be there and cannot be looked at.
     """
     if is_url(path):
-        return Input(public(path), *object_stat(path))
+        return Input(kept_path(path), *object_stat(path))
     try:
         files = filter(Path.is_file, Path(path).iterdir()) if Path(path).is_dir() else [Path(path)]
         found = [file.stat() for file in files]
     except (FileNotFoundError, NotADirectoryError):
-        return Input(path, 0, 0)
+        return Input(kept_path(path), 0, 0)
     except OSError as error:
         raise LogError(f"{path}: it cannot be looked at ({error.strerror}); check name and rights") from error
     mtime, ctime = (max((getattr(s, name) for s in found), default=0) for name in ("st_mtime_ns", "st_ctime_ns"))
-    return Input(path, sum(s.st_size for s in found), mtime, ctime)
+    return Input(kept_path(path), sum(s.st_size for s in found), mtime, ctime)
 
 
 def hash_of(path: str) -> str | None:
@@ -103,18 +101,21 @@ def hash_of(path: str) -> str | None:
         return None
 
 
-def unchanged(before: Input, path: str) -> bool:
-    """Whether the log at `path` holds what it held: by size and times of change, or by its hash where these moved.
+def unchanged(before: Input, path: str) -> Input | None:
+    """The log at `path` as it is now, if it holds what it held, else None.
+
+    It does by its size and times of change, or by its hash where these moved.
 
     Raises
     ------
     LogError
         If it may be there and cannot be looked at.
     """
-    now = stat_of(path)
-    if replace(now, sha256=before.sha256) == before:
-        return True
-    return now.size == before.size and before.sha256 is not None and hash_of(path) == before.sha256
+    now = replace(stat_of(path), sha256=before.sha256)
+    if now == before:
+        return before
+    same = now.size == before.size and before.sha256 is not None and hash_of(path) == before.sha256
+    return now if same else None
 
 
 def same_logs(before: Sequence[Input], now: Sequence[Input]) -> bool:
@@ -133,95 +134,107 @@ def estimates_of(result: Result) -> dict[str, tuple[float | None, float | None, 
     return {name: (e.estimate, e.std, e.status.value) for name, e in result.estimates.items()}
 
 
+def record_name(job: str) -> str:
+    """Where the record of a job lies in OUT; no folder of one job's is the file of another's."""
+    *folders, last = job.split("/")
+    # x.json is the file of a job x: as a folder it gets a mark, which marks marked ones once more
+    apart = (f"{one}~" if one.rstrip("~").endswith(".json") else one for one in folders)
+    return "/".join((FOLDER, *apart, f"{last}.json"))
+
+
+def prepare(store: Store) -> None:
+    """Make room for records, before any job has run. Raises `OutputError` where none can be written."""
+    if store.folder is None:
+        return
+    for name, wanted in ((FOLDER, True), (TABLE, False)):
+        path = store.folder / name
+        refuse_links(store.folder, f"{name}/x" if wanted else name)
+        if os.path.lexists(path) and path.is_dir() != wanted:
+            kind = "folder" if wanted else "file"
+            raise OutputError(f"{path}: expected a {kind} of algid's own; move it, or choose another folder with -o")
+    with writing(store.folder / FOLDER):
+        (store.folder / FOLDER).mkdir(parents=True, exist_ok=True)
+
+
 def write_record(store: Store, record: JobRecord) -> None:
     """Write a record, whole or not at all. Raises `OutputError`."""
     text = json.dumps(asdict(record), ensure_ascii=False, indent=1)
-    store.write(f"{FOLDER}/{record.job.name}.json", text.encode())
+    store.write(record_name(record.job.name), text.encode())
 
 
-def read_records(store: Store) -> dict[str, JobRecord]:
+@dataclass(frozen=True)
+class Known:
+    """What is known of earlier jobs: their records, and why some of them cannot be read, by their places."""
+
+    records: dict[str, JobRecord]
+    unreadable: dict[str, str]
+
+
+def read_records(store: Store) -> Known:
     """All records by job; one that cannot be read counts as none, so that its job runs again."""
-    found = {}
+    known = Known({}, {})
+    columns: set[str] = set()
     for name in store.names(FOLDER):
-        with suppress(ValueError, KeyError, TypeError, AttributeError, RecursionError, LogError):
-            fields = json.loads(store.read(name) or b"")
-            job = fields.pop("job")
-            record = JobRecord(
-                job=Job(**{**job, "logs": tuple(job["logs"]), "loaded": tuple(job["loaded"])}),
-                status=End(fields.pop("status")),
-                inputs=tuple(Input(**one) for one in fields.pop("inputs")),
-                estimates={name: tuple(three) for name, three in fields.pop("estimates").items()},
-                **fields,
-            )
-            found[record.job.name] = record
-    return found
+        if not name.endswith(".json"):
+            continue
+        try:
+            record = _record_in(store.read(name) or b"", name)
+            named = columns | record.estimates.keys() | record.job.labels.keys()
+            if len(named) > LIMITS.columns:
+                raise ValueError(f"all records together name more than {LIMITS.columns} labels and estimates")
+            columns = named
+            known.records[record.job.name] = record
+        except (ValueError, LogError) as error:
+            known.unreadable[name] = str(error)
+    return known
 
 
-if TYPE_CHECKING:
-    import polars as pl
+def _record_in(content: bytes, place: str) -> JobRecord:
+    """The record that a file holds; fields that this version does not know are left out.
 
-TABLE = "jobs.parquet"
-FIRST_EPOCH_NS = 10**17  # stamps before 1973 count from some start, not from 1970
-
-
-def write_jobs(store: Store, records: Sequence[JobRecord]) -> None:
-    """Write ``jobs.parquet``, whole or not at all. Raises `OutputError`."""
-    content = io.BytesIO()
-    jobs_frame(records).write_parquet(content)
-    store.write(TABLE, content.getvalue())
-
-
-def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
-    """A row a record.
-
-    Columns: job, robot, time, status, reason, seconds, log_seconds, estimator (whose numbers these are; the one
-    asked for stands in the settings), version, settings (JSON); logs, sha256, size in bytes and time of change
-    (lists; a log that was fetched in part has no sha256); ``label_X`` for each label, numbers where every one is,
-    text otherwise; ``k``, ``k_std`` and
-    ``k_status`` for each estimate, null where there is none.
+    Raises
+    ------
+    ValueError
+        If it holds none, or one that no row of the table can hold.
     """
-    import polars as pl
+    from pydantic import TypeAdapter, ValidationError
 
-    columns: dict[str, pl.Series] = {
-        "job": pl.Series([r.job.name for r in records], dtype=pl.String),
-        "robot": pl.Series([r.job.robot for r in records], dtype=pl.String),
-        "time": pl.Series([time_of(r) for r in records], dtype=pl.Datetime("us", "UTC")),
-        "status": pl.Series([r.status.value for r in records], dtype=pl.String),
-        "reason": pl.Series([r.reason for r in records], dtype=pl.String),
-        "seconds": pl.Series([r.seconds for r in records], dtype=pl.Float64),
-        "log_seconds": pl.Series([r.log_seconds for r in records], dtype=pl.Float64),
-        "estimator": pl.Series([r.estimator for r in records], dtype=pl.String),
-        "version": pl.Series([r.version for r in records], dtype=pl.String),
-        "settings": pl.Series([json.dumps(r.settings, sort_keys=True) for r in records], dtype=pl.String),
-        "logs": pl.Series([[i.path for i in r.inputs] for r in records], dtype=pl.List(pl.String)),
-        "sha256": pl.Series([[i.sha256 for i in r.inputs] for r in records], dtype=pl.List(pl.String)),
-        "size": pl.Series([[i.size for i in r.inputs] for r in records], dtype=pl.List(pl.Int64)),
-        "changed": pl.Series([[i.mtime_ns for i in r.inputs] for r in records], dtype=pl.List(pl.Int64)).cast(
-            pl.List(pl.Datetime("ns", "UTC"))
-        ),
-    }
-    for name in _names([r.job.labels for r in records]):
-        labels = [r.job.labels.get(name) for r in records]
-        numbers = all(label is None or type(label) in (int, float) for label in labels)
-        kind, dtype = (float, pl.Float64) if numbers else (str, pl.String)
-        columns[f"label_{name}"] = pl.Series([None if x is None else kind(x) for x in labels], dtype=dtype)
-    for name in _names([r.estimates for r in records]):
-        found = [r.estimates.get(name, (None, None, None)) for r in records]
-        columns[name] = pl.Series([one[0] for one in found], dtype=pl.Float64)
-        columns[f"{name}_std"] = pl.Series([one[1] for one in found], dtype=pl.Float64)
-        columns[f"{name}_status"] = pl.Series([one[2] for one in found], dtype=pl.String)
-    return pl.DataFrame(columns)
+    from algid.files import first_misfit
+
+    try:
+        record = TypeAdapter(JobRecord).validate_json(content)
+    except ValidationError as error:
+        raise ValueError(first_misfit(error)) from error
+    fault = _fault(record, place)
+    if fault is not None:
+        raise ValueError(fault)
+    return record
 
 
-def time_of(record: JobRecord) -> datetime | None:
-    """When the job's logs were taken, in UTC: as its manifest says, or as its first stamp does."""
-    if record.job.time is not None:
-        taken = datetime.fromisoformat(record.job.time)
-        return taken.replace(tzinfo=UTC) if taken.tzinfo is None else taken.astimezone(UTC)
-    if record.start_ns is None or record.start_ns < FIRST_EPOCH_NS:
-        return None
-    return datetime.fromtimestamp(record.start_ns * 1e-9, UTC)
+def _fault(record: JobRecord, place: str) -> str | None:
+    """What keeps a record from being one: no row of the table could hold it, or it is another job's."""
+    job = record.job
+    whole = [record.start_ns or 0, *(number for one in record.inputs for number in (one.size,))]
+    whole += [label for label in job.labels.values() if type(label) is int]
+    real = [record.seconds, record.log_seconds, *(x for one in record.estimates.values() for x in one[:2])]
+    real += [label for label in job.labels.values() if isinstance(label, float)]
+    if name_fault(job.name) is not None or record_name(job.name) != place:
+        return f"job.name: expected the job whose record lies here, found {job.name!r:.60}"
+    if [one.path for one in record.inputs] != [*job.logs, *job.loaded]:
+        return "inputs: expected the job's own logs"
+    if not all(math.isfinite(x) for x in real if x is not None) or not all(-(2**63) <= n < 2**63 for n in whole):
+        return "expected finite numbers, whole ones of 64 bits"
+    if not all(map(_is_estimates, record.estimates)):
+        return "estimates: expected the names of parameters"
+    if job.time is not None:
+        try:
+            utc_of(job.time)
+        except ValueError:
+            return f"job.time: expected ISO 8601 from 1970 to 2261, found {job.time!r:.60}"
+    return None
 
 
-def _names(several: Sequence[Mapping[str, Any]]) -> list[str]:
-    return sorted({name for one in several for name in one})
+def _is_estimates(name: str) -> bool:
+    """Whether a parameter may be called so: its column, and those of its error and its status, are no other's."""
+    others = name in COLUMNS or name.startswith("label_") or name.endswith(("_std", "_status"))
+    return 0 < len(name) <= LIMITS.estimate_letters and name.isprintable() and not others

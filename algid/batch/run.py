@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import threading
 from collections import Counter, deque
@@ -15,21 +14,23 @@ from types import FrameType
 from typing import Any
 
 from algid.batch.job import DiskFull, Task, basis_of, failed_record, is_full, kept, run_task
-from algid.batch.jobs import Job
+from algid.batch.jobs import TABLE, Job
 from algid.batch.records import (
     FAILURES,
     End,
     Input,
     JobRecord,
+    prepare,
     read_records,
+    record_name,
     same_logs,
     stat_of,
     unchanged,
-    write_jobs,
     write_record,
 )
+from algid.batch.table import write_jobs
 from algid.batch.workers import CallFailedError, WorkerDiedError, WorkersGoneError
-from algid.construction import remove_left
+from algid.construction import MARK, folders_below, remove_left
 from algid.errors import AlgidError, OutputError, SettingError, text_of
 from algid.profile import Profile
 from algid.results import Result
@@ -56,6 +57,8 @@ class Recipe:
 
     def task(self, job: Job) -> Task:
         """The job with all that decides its outcome. Raises `SettingError` where it cannot be run so."""
+        if job.trouble is not None:
+            raise SettingError(job.trouble)
         if not job.logs and self.parameters is None:
             raise SettingError(
                 f"{', '.join(job.loaded)}: a loaded log alone; add the arm's log without payload, named "
@@ -99,23 +102,34 @@ def plan(
             continue
         record = records.get(job.name)
         try:
-            if record is None or (retry_failed and record.status in FAILURES) or not _stands(record, task, store):
+            again = record is None or (retry_failed and record.status in FAILURES)
+            standing = None if again else _standing(record, task, store)
+            if standing is None:
                 made.tasks.append(task)
             else:
-                made.standing.append(record)
+                made.standing.append(standing)
         except AlgidError as error:
             made.unseen.append(failed_record(task, str(error)))
     return made
 
 
-def _stands(record: JobRecord, task: Task, store: Store) -> bool:
+def _standing(record: JobRecord | None, task: Task, store: Store) -> JobRecord | None:
+    """The record with its job and logs as they are now, if it still tells what would come of the task.
+
+    Times of change that moved while the content did not are taken over, so that it is hashed once for them.
+    """
     job = kept(task.job)
-    if record.basis != task.basis or (record.job.logs, record.job.loaded) != (job.logs, job.loaded):
-        return False
+    if record is None or record.basis != task.basis:
+        return None
+    if (record.job.logs, record.job.loaded) != (job.logs, job.loaded):
+        return None
     if record.status not in FAILURES and not store.exists(f"{task.job.name}.algid/result.json"):
-        return False
+        return None
     paths = (*task.job.logs, *task.job.loaded)
-    return len(record.inputs) == len(paths) and all(map(unchanged, record.inputs, paths))
+    inputs = [unchanged(before, path) for before, path in zip(record.inputs, paths, strict=True)]
+    if not inputs or None in inputs:
+        return None
+    return replace(record, job=job, inputs=tuple(one for one in inputs if one is not None))
 
 
 @dataclass(frozen=True)
@@ -160,9 +174,14 @@ class Batch:
         self._kills: Counter[str] = Counter()
         self._stopped: str | None = None
         self._ran = 0
+        self._written = False
         self.stop = threading.Event()
         """Set it, and `run` returns at once; what was running is left to whoever ends the executor."""
-        self.records = read_records(store)
+        prepare(store)
+        known = read_records(store)
+        self.records = known.records
+        self.unreadable = known.unreadable
+        """Why records that are there cannot be read, by their places."""
 
     def run(self, jobs: Sequence[Job], retry_failed: bool = False) -> Ended:
         """Bring `jobs` to an end, and write ``jobs.parquet``.
@@ -171,20 +190,24 @@ class Batch:
         earlier runs that are not among `jobs` keep their rows.
         """
         made = plan(jobs, self.records, self._recipe, self._store, retry_failed)
-        named = {job.name: kept(job) for job in jobs}
         unseen = {record.job.name: record for record in made.unseen}
-        for record in made.standing:
-            if record.job != named[record.job.name]:
-                self._keep(replace(record, job=named[record.job.name]))
-        for record in made.refused:
-            self._keep(record)
+        for record in (*made.standing, *made.refused):
+            if record != self.records.get(record.job.name):
+                self._keep(record)
         left = self._work(deque(made.tasks))
-        try:
-            write_jobs(self._store, [self.records[name] for name in sorted(self.records)])
-        except OutputError as error:
-            self._cannot_go_on(error)
+        self._write_table()
         now = {**self.records, **unseen}
         return Ended([now[job.name] for job in jobs if job.name in now], self._ran, left, self._stopped)
+
+    def _write_table(self) -> None:
+        """Write ``jobs.parquet`` where it is not that of the records."""
+        if self._written and self._store.exists(TABLE):
+            return
+        try:
+            write_jobs(self._store, [self.records[name] for name in sorted(self.records)])
+            self._written = True
+        except OutputError as error:
+            self._cannot_go_on(error)
 
     def _work(self, waiting: deque[Task]) -> int:
         """Run tasks; how many are left where the batch was stopped."""
@@ -235,6 +258,8 @@ class Batch:
             self._cannot_go_on(error)
             return False
         self.records[record.job.name] = record
+        self.unreadable.pop(record_name(record.job.name), None)
+        self._written = False
         return True
 
     def _without_old_result(self, record: JobRecord) -> JobRecord:
@@ -299,6 +324,6 @@ def sweep(store: Store) -> None:
     """Remove what a killed run has left half-written; links are not followed."""
     if store.folder is None:
         return
-    for place, folders, _ in os.walk(store.folder):
-        remove_left(Path(place))
-        folders[:] = [name for name in folders if not name.endswith(".algid")]
+    for folder, names in folders_below(store.folder):
+        if any(MARK in name for name in names):
+            remove_left(Path(folder))

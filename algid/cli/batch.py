@@ -59,15 +59,17 @@ def batch(
     Raises
     ------
     SettingError
-        If workers or their memory are given beside a scheduler, or the sources hold no log.
+        If workers or their memory are given beside a scheduler, there is no OUT, or the sources hold no log.
     """
-    from algid.batch.jobs import jobs_of
+    from algid.batch.discover import jobs_of
     from algid.batch.lock import locked
     from algid.batch.run import Batch, Recipe, stopped_by_signals, sweep
     from algid.errors import SettingError
     from algid.results import read_result
-    from algid.stores import absolute, open_store
+    from algid.stores import absolute, open_store, shown
 
+    if not out.strip():
+        raise SettingError("-o: expected a folder or a URL, found none; name where results go")
     bytes_each = None if memory_limit is None else _bytes(memory_limit)
     if scheduler is not None and (workers is not None or memory_limit is not None):
         raise SettingError("--scheduler: workers and their memory are the cluster's; set them where it is started")
@@ -96,6 +98,8 @@ def batch(
                     )
         finally:
             sweep(store)
+    for name, why in running.unreadable.items():
+        complain(f"{shown(out)}/{name}: no record of a job ({why}); it counts as none: remove it")
     _conclude(ended, running.stop.is_set() and not watch, out, quiet)
 
 
@@ -157,7 +161,7 @@ def _progress(quiet: bool) -> Iterator[Callable[[Progress], None]]:
 
 def _watch(running: Batch, sources: list[str], out: str, alone: str, retry_failed: bool) -> Ended:
     """Look for logs until stopped; nothing but settled ones are taken."""
-    from algid.batch.jobs import jobs_of
+    from algid.batch.discover import jobs_of
     from algid.batch.run import LOOK_EVERY, Settling
     from algid.errors import SettingError
 

@@ -5,14 +5,24 @@ from __future__ import annotations
 import errno
 import math
 import os
+import subprocess
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from algid.batch.jobs import Job, checked_name, is_manifest, jobs_of, label_of, read_manifest
+from algid.batch.discover import jobs_of
+from algid.batch.job import kept
+from algid.batch.jobs import Job, checked_name, name_fault
+from algid.batch.manifest import is_manifest, label_of, read_manifest
+from algid.batch.run import sweep
 from algid.errors import SettingError
+from algid.stores import open_store
+
+JOB = "[[job]]\nname = 'x'\nlogs = 'a.csv'\n"
 
 
 def _touch(folder: Path, *names: str) -> None:
@@ -45,10 +55,102 @@ def test_a_glob_and_a_file_name_jobs_by_their_stems(tmp_path: Path) -> None:
     assert job == Job("a", loaded=(str(tmp_path / "x/a.mcap"),))
 
 
-def test_two_logs_of_one_name_are_refused(tmp_path: Path) -> None:
-    _touch(tmp_path, "a.mcap", "a.csv")
-    with pytest.raises(SettingError, match=r"a: two jobs of one name .*a\.csv.*a\.mcap"):
-        jobs_of([str(tmp_path)], "out")
+def test_two_logs_of_one_name_fail_alone(tmp_path: Path) -> None:
+    _touch(tmp_path, "a.mcap", "a.csv", "a.parquet", "b.csv", "c-loaded.csv", "c_loaded.mcap")
+    first, second, third = jobs_of([str(tmp_path)], "out")
+    names = ", ".join(str(tmp_path / name) for name in ("a.csv", "a.mcap", "a.parquet"))
+    assert first.trouble == f"a: two jobs of one name ({names}); rename a log, or name the jobs in a manifest"
+    assert (second.name, second.trouble) == ("b", None)
+    assert third.trouble is not None
+    assert third.trouble.startswith("c: two jobs of one name")
+
+
+@pytest.mark.parametrize("name", ["bad\nname", "a\\b", "\x1b[2J", "caf\udce9", "a\u202eb", "x" * 201, "\x7f"])
+def test_a_log_of_an_odd_name_fails_alone_and_is_told_in_visible_letters(tmp_path: Path, name: str) -> None:
+    _touch(tmp_path, "good.csv", f"{name}.csv")
+    odd, good = sorted(jobs_of([str(tmp_path)], "out"), key=lambda job: job.trouble is None)
+    assert (good.name, good.trouble) == ("good", None)
+    assert name_fault(odd.name) is None
+    assert odd.trouble is not None
+    assert "a log's name becomes a folder's: expected parts of 1 to 200 printable characters" in odd.trouble
+    assert odd.logs == (f"{tmp_path}/{name}.csv",)
+    assert all(path.encode() for path in kept(odd).logs)
+    assert jobs_of([str(tmp_path)], "out") == jobs_of([str(tmp_path)], "out")
+
+
+def test_each_folder_is_looked_through_once_whatever_links_lead_there(tmp_path: Path) -> None:
+    _touch(tmp_path, "logs/a.csv", "logs/z/b.csv", "elsewhere/c.csv")
+    for number in range(3):
+        (tmp_path / f"logs/{number}").symlink_to(tmp_path / "logs")
+        (tmp_path / f"logs/z/{number}").symlink_to("..")
+        (tmp_path / f"elsewhere/{number}").symlink_to(tmp_path)
+        (tmp_path / f"logs/far{number}").symlink_to(tmp_path / "elsewhere")
+    (tmp_path / "logs/itself.csv").symlink_to(tmp_path / "logs/itself.csv")
+    names = ["a", "far0/c", "itself", "z/b"]
+    assert [job.name for job in jobs_of([str(tmp_path / "logs")], "out")] == names
+    assert [job.name for job in jobs_of([f"{tmp_path}/logs/**/*.csv"], "out")] == ["a", "b", "c", "itself"]
+
+
+def test_a_pattern_of_two_stars_goes_through_folders_and_not_through_results(tmp_path: Path) -> None:
+    _touch(
+        tmp_path, "x/a.mcap", "x/y/b.mcap", "x/y/c.csv", "b.algid/d.mcap", "x/bag/metadata.yaml", ".h/e.mcap", "f.txt"
+    )
+    for pattern, names in (
+        ("**/*.mcap", ["a", "b"]),
+        ("**/y/*", ["b", "c"]),
+        ("x/**", ["a", "b", "bag", "c"]),
+        ("**/x/**/*.csv", ["c"]),
+        ("**/**/[ab].*", ["a", "b"]),
+        ("*.txt", ["f.txt"]),
+        ("**/f.*", ["f.txt"]),
+    ):
+        assert [job.name for job in jobs_of([str(tmp_path / pattern)], "out")] == names, pattern
+    with pytest.raises(SettingError, match="no such file, folder or match"):
+        jobs_of([f"{tmp_path}/**/*.bag"], "out")
+
+
+def _nested(folder: Path, names: Sequence[str]) -> None:
+    """Make folders within each other, further than a path reaches, with an empty log in the last one."""
+    place = os.open(folder, os.O_RDONLY)
+    for name in names:
+        os.mkdir(name, dir_fd=place)
+        inner = os.open(name, os.O_RDONLY, dir_fd=place)
+        os.close(place)
+        place = inner
+    os.close(os.open("log.csv", os.O_CREAT, dir_fd=place))
+    os.close(place)
+
+
+@pytest.mark.parametrize(
+    ("names", "trouble"),
+    [
+        (["d"] * 100, None),
+        pytest.param(
+            ["d"] * 1500,
+            "a log's name becomes a folder's: expected at most 1000 bytes; rename it",
+            marks=pytest.mark.slow,
+        ),
+        (["d" * 200] * 25, "cannot look there (File name too long); check its rights"),
+    ],
+)
+def test_folders_may_be_nested_as_deep_as_the_system_takes_them(
+    tmp_path: Path, names: Sequence[str], trouble: str | None
+) -> None:
+    _touch(tmp_path, "good.csv")
+    _nested(tmp_path, names)
+    try:
+        found = {job.name: job.trouble for job in jobs_of([str(tmp_path)], str(tmp_path))}
+        sweep(open_store(str(tmp_path)))
+        assert open_store(str(tmp_path)).names("")[-1] == "good.csv"
+    finally:
+        subprocess.run(["rm", "-rf", tmp_path / names[0]], check=True)  # shutil.rmtree ends at a thousand
+    assert found.pop("good") is None
+    ((name, told),) = found.items()
+    if trouble is None:
+        assert (name, told) == ("/".join([*names, "log"]), None)
+    else:
+        assert told is not None
+        assert told.endswith(trouble)
 
 
 def test_a_source_that_is_not_there_is_refused(tmp_path: Path) -> None:
@@ -82,6 +184,14 @@ def test_manifests_in_csv_and_toml_say_the_same(tmp_path: Path) -> None:
         ("name,logs\n../x,a.csv\n", "row 1: a job's name becomes a folder's"),
         ("name,logs\nx,\n", "row 1: expected a name and logs"),
         ("name,logs,time\nx,a.csv,yesterday\n", "row 1: time: expected ISO 8601"),
+        ("name,logs,time\nx,a.csv,0001-01-01T00:00+23:59\n", "row 1: time: expected ISO 8601.* from 1970 to 2261"),
+        ("name,logs,time\nx,a.csv,9999-12-31T23:59-23:59\n", "row 1: time: expected ISO 8601.* from 1970 to 2261"),
+        ("name,logs,time\nx,a.csv,1969-12-31T23:59:59Z\n", "row 1: time: expected ISO 8601"),
+        ("name,logs\na.algid/b,a.csv\n", "row 1: a job's name .* no folder that ends in .algid"),
+        ("name,logs\njobs.parquet/b,a.csv\n", "row 1: a job's name .* none that is jobs.parquet"),
+        (f"name,logs\n{'abc/' * 250}d,a.csv\n", "row 1: a job's name .* at most 1000 bytes"),
+        ("name,logs,logs\nx,a.csv,b.csv\n", "two columns are named 'logs'; rename one"),
+        ("name,logs," + ",".join(map(str, range(5000))) + "\nx,a" + ",1" * 5000, "5002 different names of labels"),
         ("name,logs\nx,a,b,c\n", "a row has more cells"),
         ("name,logs\nx,a.csv;;b.csv\n", "row 1: logs: expected paths, found 'a.csv;;b.csv'"),
         ("name,logs\ny,a.csv\nx,a\0.csv\n", "row 2: logs: expected paths, found"),
@@ -109,6 +219,16 @@ def test_a_bad_manifest_is_refused_by_its_place(tmp_path: Path, text: str, told:
         ("[[job]]\nname = 'x'\nlogs = 'a.csv'\ntime = 07:32:00", "job 1: time: expected ISO 8601"),
         ("a = " + "[" * 5000 + "]" * 5000, r"the manifest cannot be read \(maximum recursion depth"),
         ("[[job", "the manifest cannot be read"),
+        (f"{JOB}payload = 1{'0' * 400}", "job 1: payload: expected text, a date, true, .* 64 bits, found another int"),
+        (f"{JOB}payload = 1{'0' * 5000}", "the manifest cannot be read"),
+        (
+            f"{JOB}payload = 0x1{'0' * 5000}",
+            "job 1: payload: expected text, a date, true, .* 64 bits, found another int",
+        ),
+        (f"{JOB}payload = nan", "job 1: payload: .* finite number"),
+        (f"{JOB}payload = {{a = 1}}", "job 1: payload: .* found another dict"),
+        (f"{JOB}robot = [1]", "job 1: robot: .* found another list"),
+        (f"{JOB}time = 9999-12-31T23:59:59-23:59", "job 1: time: expected ISO 8601"),
     ],
 )
 def test_a_bad_manifest_in_toml_is_refused_by_its_place(tmp_path: Path, text: str, told: str) -> None:
@@ -177,20 +297,24 @@ def test_a_name_may_hold_slashes_and_any_printable_character() -> None:
         assert checked_name(name, "here") == name
 
 
-def test_where_the_system_lets_nobody_look_is_told_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_where_nobody_may_look_fails_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _touch(tmp_path, "a.csv", "locked/b.csv")
-    listed = Path.iterdir
+    scan = os.scandir
 
-    def refused(path: Path) -> object:
-        if path.name == "locked":
-            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
-        return listed(path)
+    def refused(path: str) -> Any:
+        if path.endswith("locked"):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), path)
+        return scan(path)
 
-    monkeypatch.setattr(Path, "iterdir", refused)
-    with pytest.raises(SettingError, match=rf"^{tmp_path}: cannot look there \(.*denied: '{tmp_path}/locked'\); check"):
-        jobs_of([str(tmp_path)], "out")
-    with pytest.raises(SettingError, match=r": cannot look there \(.*name too long.*\); check its name"):
-        jobs_of(["x" * 5000], "out")
+    monkeypatch.setattr(os, "scandir", refused)
+    locked, good = jobs_of([str(tmp_path)], "out")
+    assert locked.trouble == f"{tmp_path}/locked: cannot look there (Permission denied); check its rights"
+    assert (good.name, good.trouble) == ("a", None)
+    with pytest.raises(SettingError, match=rf"^{tmp_path}/locked: cannot look there \(.*denied: .*\); check its name"):
+        jobs_of([str(tmp_path / "locked")], "out")
+    for source in ("x" * 5000, "a\0b"):
+        with pytest.raises(SettingError, match=r": cannot look there \(.*\); check its name|no such file"):
+            jobs_of([source], "out")
 
 
 def test_a_bag_is_one_log_and_its_folder_no_place_to_look_in(tmp_path: Path) -> None:
@@ -216,8 +340,10 @@ def test_a_source_that_is_given_twice_counts_once(tmp_path: Path) -> None:
     _touch(tmp_path, "a.csv", "b.csv")
     assert [job.name for job in jobs_of([str(tmp_path), str(tmp_path / "a.csv")], "out")] == ["a", "b"]
     _touch(tmp_path, "other/a.csv")
-    with pytest.raises(SettingError, match=rf"^a: two jobs of one name \({tmp_path}/a.csv, {tmp_path}/other/a.csv\)"):
-        jobs_of([str(tmp_path), str(tmp_path / "other/a.csv")], "out")
+    both, other = jobs_of([str(tmp_path / "*.csv"), str(tmp_path / "other/a.csv")], "out")
+    assert both.trouble is not None
+    assert both.trouble.startswith(f"a: two jobs of one name ({tmp_path}/a.csv, {tmp_path}/other/a.csv)")
+    assert (other.name, other.trouble) == ("b", None)
 
 
 @pytest.mark.parametrize(

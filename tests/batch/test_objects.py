@@ -14,8 +14,8 @@ import polars as pl
 import pytest
 
 import algid
+from algid.batch.discover import jobs_of
 from algid.batch.fetch import staged
-from algid.batch.jobs import jobs_of
 from algid.batch.records import End
 from algid.batch.run import Batch, Ended, Recipe
 from algid.errors import AlgidError, LogError, OutputError, without_credentials

@@ -16,7 +16,7 @@ import polars as pl
 import pytest
 
 import algid
-from algid.batch.jobs import jobs_of
+from algid.batch.discover import jobs_of
 from algid.batch.lock import locked
 from algid.batch.records import End
 from algid.batch.run import Batch, Ended, Recipe, Settling, sweep

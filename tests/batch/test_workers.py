@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import os
 import pickle
+import re
+import socket
 import subprocess
 import sys
+import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
-from algid.batch.cluster import answered_within
+from algid.batch.cluster import answered_within, cluster
 from algid.batch.workers import TOO_LONG, CallFailedError, WorkerDiedError, Workers
+from algid.errors import SettingError
 from tests.batch import calls
 
 
@@ -153,3 +158,49 @@ def _wait_until(condition: object) -> None:
     while not condition():  # type: ignore[operator]
         assert time.monotonic() < end
         time.sleep(0.02)
+
+
+@pytest.mark.parametrize("address", [".", "", "x", "inproc://a", "tcp://127.0.0.1:99999", "tcp://a:0", "tcp://a b:1"])
+def test_what_is_no_address_of_a_scheduler_is_refused_at_once(address: str) -> None:
+    pytest.importorskip("distributed", reason="distributed is absent")
+    with (
+        pytest.raises(SettingError, match=r"^--scheduler: expected an address like tcp://HOST:8786, found '"),
+        cluster(address, "out"),
+    ):
+        pass
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["refused", "silent", "other", "tls"])
+def test_a_scheduler_that_does_not_answer_as_one_gets_one_line(kind: str) -> None:
+    pytest.importorskip("distributed", reason="distributed is absent")
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        if kind == "refused":
+            server.close()
+        if kind == "other":
+            threading.Thread(target=_greet_as_another, args=(server,), daemon=True).start()
+        scheme = "tls" if kind == "tls" else "tcp"
+        command = [sys.executable, "-m", "algid", "batch", __file__, "-o", "out", "--scheduler"]
+        with tempfile.TemporaryDirectory() as place:
+            done = subprocess.run(
+                [*command, f"{scheme}://127.0.0.1:{port}"],
+                cwd=place,
+                env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+                capture_output=True,
+                text=True,
+                timeout=60,
+                check=False,
+            )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert re.fullmatch(r"algid: --scheduler t\w\w://127.0.0.1:\d+: no scheduler answers \(.+\); .*\n", done.stderr)
+
+
+def _greet_as_another(server: socket.socket) -> None:
+    while True:
+        try:
+            connection, _ = server.accept()
+        except OSError:
+            return
+        with connection:
+            connection.sendall(b"HTTP/1.0 400 Bad Request\r\n\r\n" * 100)

@@ -114,7 +114,7 @@ def test_a_watch_complains_once_and_retries_what_failed_once(
             raise found
         return found
 
-    monkeypatch.setattr("algid.batch.jobs.jobs_of", jobs_of)
+    monkeypatch.setattr("algid.batch.discover.jobs_of", jobs_of)
     monkeypatch.setattr("algid.batch.run.Settling", lambda: SimpleNamespace(settled=lambda jobs: jobs))
     running: Any = Watched(6)
     ended = command._watch(running, ["logs"], "out", "logs", True)
