@@ -51,7 +51,7 @@ def read_manifest(path: Path) -> list[Job]:
         raise SettingError(f"{path}: the manifest cannot be read ({error!s:.200}); mend it") from error
     labels = {name for row in rows for name in row}
     if len(labels) > LIMITS.columns:
-        raise SettingError(f"{path}: {len(labels)} different names of labels; expected at most {LIMITS.columns}")
+        raise SettingError(f"{path}: expected labels of at most {LIMITS.columns} names, found {len(labels)}")
     return [_job(row, f"{path}: {kind} {number}", path.parent) for number, row in enumerate(rows, 1)]
 
 
