@@ -17,9 +17,9 @@ from pathlib import Path
 from algid.batch.jobs import TABLE, Job, kept_path, name_fault, safe_name
 from algid.batch.manifest import is_manifest, read_manifest
 from algid.errors import SettingError
+from algid.readers.formats import SUFFIXES
 from algid.stores import is_url, list_urls
 
-SUFFIXES = (".mcap", ".parquet", ".csv", ".csv.gz", ".csv.zst")
 BAG = "metadata.yaml"
 """What makes a folder a bag."""
 MOST_NAMED = 8

@@ -58,16 +58,22 @@ def _print_content(found: Inspection, console: Console) -> None:
 
     console.print(f"{escape(plain(found.path))}: {found.format}{', synthetic' if found.synthetic else ''}")
     shown = found.entries[:MOST_SHOWN]
-    rows = [(one.name[:80], one.type[:60], "" if one.count is None else str(one.count)) for one in shown]
+    rows = [(one.name[:80], one.type[:60], _known(one.count, "d"), _known(one.rate, ".4g")) for one in shown]
     if len(found.entries) > len(shown):
-        rows.append((f"and {len(found.entries) - len(shown)} more", "", ""))
-    _table(console, "channels", ("name", "type", "samples"), rows)
+        rows.append((f"and {len(found.entries) - len(shown)} more", "", "", ""))
+    rated = any(one.rate for one in shown)
+    header = ("name", "type", "samples", "Hz")
+    _table(console, "channels", header if rated else header[:3], rows if rated else [row[:3] for row in rows])
     for entry in shown:
         if entry.joints or entry.fields:
             joints = f"joints {', '.join(entry.joints)}; " if entry.joints else ""
             fields = ", ".join(entry.fields[:12]) + (" …" if len(entry.fields) > 12 else "")
             console.print(escape(plain(f"{entry.name}: {joints}fields {fields or 'without a number'}")))
     _table(console, "taken as", ("algid", "log"), sorted((found.mapping or {}).items()))
+
+
+def _known(value: float | None, form: str) -> str:
+    return "" if value is None else format(value, form)
 
 
 def _print_worth(found: Inspection, console: Console) -> None:

@@ -6,7 +6,7 @@ The whole look at a log that `algid inspect` prints.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
@@ -19,24 +19,8 @@ from algid.inspection.figures import ClockFigures, SignalFigures, clock_figures,
 from algid.inspection.findings import Finding
 from algid.log import Log, Notice
 from algid.readers import read_log
-from algid.readers.sniff import sniff
+from algid.readers.formats import Entry, format_of
 
-
-@dataclass(frozen=True)
-class Entry:
-    """A column or a topic: its name, its type, and how many samples it has where that is known.
-
-    A topic's `joints` are those that its messages name, its `fields` paths of their numbers.
-    """
-
-    name: str
-    type: str
-    count: int | None = None
-    joints: tuple[str, ...] = ()
-    fields: tuple[str, ...] = ()
-
-
-_MOST_SHOWN = 64
 T = TypeVar("T")
 
 
@@ -74,87 +58,12 @@ def contents(path: Path) -> tuple[str, tuple[Entry, ...]]:
     LogError
         If there is no such log, or not even its list of entries can be read.
     """
-    kind = sniff(path)
-    if kind == "mcap":
-        return kind, _mcap(path)
-    if kind == "rosbag2":
-        from algid.readers.bags.folder import bag_files
-
-        bag = bag_files(path)
-        return kind, _mcap(bag.paths[0]) if bag.kind == "mcap" else _bag(path, kind)
-    if kind == "parquet":
-        return kind, tuple(_parquet(path))
-    if kind.startswith("csv"):
-        return kind, tuple(_csv(path, kind))
-    if kind == "feather":
-        from algid.readers.feather import opened
-
-        feather = opened(path)
-        return kind, tuple(Entry(field.name, str(field.type)[:80], feather.rows) for field in feather.schema)
-    if kind in ("npz", "npy", "mat"):
-        from algid.readers.arrays import frame_of
-
-        frame = frame_of(path, kind)
-        return kind, tuple(Entry(name, str(dtype), frame.height) for name, dtype in frame.schema.items())
-    return kind, _bag(path, kind)
-
-
-def _bag(path: Path, kind: str) -> tuple[Entry, ...]:
-    from algid.readers.bags import parts_of
-
-    parts, _ = parts_of(path, kind)
-    with parts[0]() as source:
-        return tuple(_topics(source))
-
-
-def _mcap(path: Path) -> tuple[Entry, ...]:
-    from algid.readers.mcap import messages_in
-
-    with messages_in(path) as source:
-        return tuple(_topics(source))
-
-
-def _topics(source: Source) -> Iterator[Entry]:
-    from algid.readers.messages.plan import fields_shown
-
-    for place, (number, channel) in enumerate(sorted(source.channels.items())):
-        form = f"{channel.type or 'no schema'}, {channel.encoding}"
-        count = None if source.counts is None else source.counts.get(number, 0)
-        joints, fields = fields_shown(source, number) if place < _MOST_SHOWN else ((), ())
-        yield Entry(channel.topic, form, count, joints[:_MOST_SHOWN], fields[:_MOST_SHOWN])
-
-
-def _parquet(path: Path) -> Iterator[Entry]:
-    from algid.readers.parquet import counted_rows, schema_of
-
-    rows = _known(lambda: counted_rows(path))
-    for name, kind in schema_of(path).items():
-        yield Entry(name, str(kind), rows)
-
-
-def _csv(path: Path, kind: str) -> Iterator[Entry]:
-    from algid.readers.csv import counted_rows
-    from algid.readers.dialect import detect, kinds
-    from algid.readers.sniff import head_of
-
-    head = head_of(path, kind)
-    dialect = detect(path, head)
-    rows = _known(lambda: counted_rows(path, kind, dialect))
-    for name, dtype in kinds(path, head, dialect).items():
-        yield Entry(name, dtype, rows)
-
-
-def _known(count: Callable[[], int]) -> int | None:
-    """What can be counted; None in a damaged file, of which reading will tell more."""
-    try:
-        return count()
-    except LogError:
-        return None
+    form = format_of(path)
+    return form.name, form.entries(path)
 
 
 if TYPE_CHECKING:
     from algid.profile import Profile
-    from algid.readers.messages.source import Source
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign
 from algid.readers.dialect import Dialect, detect
 from algid.readers.frames import NO_COMPANION, beyond, flat_reader
-from algid.readers.sniff import head_of, pieces, whole_lines
+from algid.readers.text import head_of, pieces, whole_lines
 
 if TYPE_CHECKING:
     import polars as pl

@@ -20,6 +20,7 @@ from algid.batch.jobs import Job, checked_name, name_fault
 from algid.batch.manifest import is_manifest, label_of, read_manifest
 from algid.batch.run import sweep
 from algid.errors import SettingError
+from algid.readers.formats import SUFFIXES
 from algid.stores import open_store
 
 JOB = "[[job]]\nname = 'x'\nlogs = 'a.csv'\n"
@@ -53,6 +54,12 @@ def test_a_glob_and_a_file_name_jobs_by_their_stems(tmp_path: Path) -> None:
     assert job == Job("a", logs=(str(tmp_path / "x/a.mcap"),))
     (job,) = jobs_of([str(tmp_path / "x/a.mcap")], "out", alone="loaded")
     assert job == Job("a", loaded=(str(tmp_path / "x/a.mcap"),))
+
+
+def test_a_folder_is_searched_for_every_format_that_is_read(tmp_path: Path) -> None:
+    _touch(tmp_path, *(f"log{number}{suffix.upper()}" for number, suffix in enumerate(SUFFIXES)), "readme.md")
+    assert [job.name for job in jobs_of([str(tmp_path)], "out")] == sorted(f"log{one}" for one in range(len(SUFFIXES)))
+    assert {".npz", ".mat", ".feather", ".bag", ".db3"} < set(SUFFIXES)
 
 
 def test_two_logs_of_one_name_fail_alone(tmp_path: Path) -> None:

@@ -16,10 +16,12 @@ from typer.testing import CliRunner
 
 from algid.cli import convert, inspect, profile
 from algid.errors import OutputError, SettingError
+from algid.inspection.report import inspect_log
 from algid.profile import Angle, Profile, Torque, Velocity, load_profile
 from algid.readers import read_log
 from algid.writers import FORMATS, write_log
 from tests.inspection.test_checks import moving_log
+from tests.readers.large import WRITERS
 from tests.readers.logs import EPOCH_NS, TRUTH, noise_log, same
 from tests.readers.mcaps import joint_state, write_mcap
 
@@ -198,3 +200,20 @@ def test_a_new_profile_writes_all_that_can_be_set(kind: str, tmp_path: Path) -> 
     (tmp_path / "all.toml").write_text("\n".join(lines))
     load_profile(tmp_path / "all.toml")  # every line is valid once it is no comment
     load_profile(tmp_path / "algid.toml")
+
+
+def test_topics_of_bags_are_listed_as_of_mcap(tmp_path: Path) -> None:
+    """Names, types, counts, rates, joints and fields, whatever holds the messages."""
+    for form, write in WRITERS.items():
+        write(tmp_path / f"log.{form}", 2001)
+    seen = {form: inspect_log(tmp_path / f"log.{form}") for form in WRITERS}
+    for form, found in seen.items():
+        (entry,) = found.entries
+        assert found.format == form
+        assert (entry.name, entry.count, entry.joints) == ("/joint_states", 2001, ("joint1", "joint2"))
+        assert entry.rate == pytest.approx(1000)
+        assert {"position[joint1]", "velocity[joint2]", "effort[joint2]"} <= set(entry.fields)
+    assert {found.entries[0].type for found in seen.values()} == {
+        "sensor_msgs/msg/JointState, cdr",
+        "sensor_msgs/JointState, ros1",
+    }

@@ -14,11 +14,13 @@ import zstandard
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import algid
 from algid.errors import LogError
 from algid.readers import read_log
 from algid.readers.csv import counted_rows
 from algid.readers.dialect import Dialect, detect, kinds, split
-from algid.readers.sniff import head_of, looks_like_text, pieces, sniff, whole_lines
+from algid.readers.formats import FORMATS, SUFFIXES, sniff
+from algid.readers.text import head_of, looks_like_text, pieces, whole_lines
 
 CONTENT = {
     "mcap": b"\x89MCAP0\r\n...", "parquet": b"PAR1...", "bag": b"#ROSBAG V2.0\n", "db3": b"SQLite format 3\x00...",
@@ -194,3 +196,17 @@ def test_a_cell_that_is_no_number_is_told_by_its_column(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("\n".join(["t,q1,q2,tau1,tau2", *rows]) + "\n")
     with pytest.raises(LogError, match="column 'tau1', past row 0: expected a number, found 'off'; mend the file"):
         read_log(tmp_path / "log.csv")
+
+
+def test_each_format_is_one_entry() -> None:
+    names = [form.name for form in FORMATS]
+    assert len(set(names)) == len(names)
+    assert len(set(SUFFIXES)) == len(SUFFIXES)
+    assert set(names) >= {*CONTENT, "npz", "rosbag2"}
+
+
+def test_the_guide_lists_every_format() -> None:
+    guide = (Path(algid.__file__).parent / "guide" / "logs.md").read_text(encoding="utf-8")
+    for form in FORMATS:
+        ends = ", ".join(f"`{suffix}`" for suffix in form.suffixes) or "a folder"
+        assert f"| {form.title} | {ends} |" in guide

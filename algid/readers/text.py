@@ -1,7 +1,4 @@
-"""Which format a file has, known from its content: names lie, first bytes do not.
-
-Compressed text, piece by piece, in bounded memory.
-"""
+"""Tables of text, also compressed: told from other bytes, and read piece by piece in bounded memory."""
 
 from __future__ import annotations
 
@@ -14,7 +11,6 @@ from pathlib import Path
 from typing import BinaryIO
 
 from algid.errors import LogError
-from algid.files import read_start
 from algid.limits import LIMITS
 from algid.words import counted
 
@@ -22,63 +18,7 @@ MCAP = b"\x89MCAP0\r\n"
 PARQUET = b"PAR1"
 ZSTD = b"\x28\xb5\x2f\xfd"
 GZIP = b"\x1f\x8b"
-BAG = b"#ROSBAG V"
-SQLITE = b"SQLite format 3\x00"
-_KINDS = (
-    *((MCAP, "mcap"), (PARQUET, "parquet"), (BAG, "bag"), (SQLITE, "db3"), (b"ARROW1", "feather")),
-    *((b"\x93NUMPY", "npy"), (b"MATLAB ", "mat")),
-)
 _EMPTY_LINES = re.compile(rb"\n[\r\n]*\n")
-
-
-def sniff(path: Path) -> str:
-    """The format of a log, by its content.
-
-    One of "mcap", "parquet", "csv", "csv.zst", "csv.gz", "feather", "npz", "npy", "mat", "bag", "db3" and "rosbag2".
-
-    Raises
-    ------
-    LogError
-        If there is no such file, it cannot be read, or its content is none of these.
-    """
-    if any(0xD800 <= ord(letter) <= 0xDFFF for letter in str(path)):  # bytes that polars and results cannot name
-        raise LogError(f"{str(path)!r}: the name is not valid UTF-8; rename the log")
-    try:
-        if path.is_dir():
-            if (path / "metadata.yaml").is_file() or any(path.glob("*.mcap")) or any(path.glob("*.db3")):
-                return "rosbag2"
-            raise LogError(f"{path}: a folder without metadata.yaml or *.mcap; expected a log file or a rosbag2 folder")
-        if not path.is_file():
-            found = "it is no regular file" if path.exists() else "there is no such file"
-            raise LogError(f"{path}: {found}; expected a log in MCAP, Parquet or CSV; check the name")
-        head = read_start(path, LIMITS.head_bytes)
-    except (OSError, ValueError) as error:
-        raise LogError(f"{str(path)!r}: the log cannot be read ({error}); check the name and rights") from error
-    return _by_content(path, head)
-
-
-def _by_content(path: Path, head: bytes) -> str:
-    kind = next((name for magic, name in _KINDS if head.startswith(magic)), None)
-    if kind is not None:
-        return kind
-    if head.startswith(b"PK\x03\x04") and path.suffix.lower() == ".npz":  # any zip begins so
-        return "npz"
-    if head.startswith((ZSTD, GZIP)):
-        name = "csv.zst" if head.startswith(ZSTD) else "csv.gz"
-        inside = head_of(path, name)
-        if inside.startswith(MCAP):
-            raise LogError(
-                f"{path}: an MCAP file compressed as a whole, which cannot be read by parts; "
-                f"unpack it first: {'zstd -d' if name == 'csv.zst' else 'gunzip'} {path.name}"
-            )
-        if inside and looks_like_text(inside):
-            return name
-        raise LogError(f"{path}: compressed, but not a table of text; unpack it and name what is inside")
-    if not head:
-        raise LogError(f"{path}: the file is empty; expected a log in MCAP, Parquet or CSV")
-    if looks_like_text(head):
-        return "csv"
-    raise LogError(f"{path}: unknown format, it begins with {head[:8]!r}; expected a log in MCAP, Parquet or CSV")
 
 
 def looks_like_text(head: bytes) -> bool:

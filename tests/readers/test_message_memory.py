@@ -1,0 +1,47 @@
+"""How much memory long logs of messages take, read in blocks as identification reads them."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from algid.readers import read_log
+from tests.readers.large import WRITERS
+
+_MOST = 600e6
+_PEAK = """
+import resource, sys
+from algid.readers import open_log
+print(sum(map(len, open_log(sys.argv[1]).blocks())), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+"""
+
+
+@pytest.mark.parametrize("form", WRITERS)
+def test_what_long_logs_are_made_of_is_read(form: str, tmp_path: Path) -> None:
+    path = tmp_path / f"log.{form}"
+    WRITERS[form](path, 12_000)
+    log = read_log(path)
+    ticks = np.arange(12_000)
+    assert np.array_equal(log.stamp_ns, ticks * 1_000_000)
+    assert np.array_equal(log.theta[1], 2 * np.sin(ticks * (0.001 + 0.0003)))
+    assert np.array_equal(log.tau[1], 6 * np.sin(ticks * (0.001 + 0.0003 * 5)))
+    assert log.notices == () or [notice.code for notice in log.notices] == ["NO_CHECKSUM"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", WRITERS)
+def test_ten_million_samples_are_read_in_bounded_memory(form: str, tmp_path: Path) -> None:
+    path = tmp_path / f"log.{form}"
+    try:
+        WRITERS[form](path, 10_000_000)
+        done = subprocess.run([sys.executable, "-c", _PEAK, str(path)], capture_output=True, text=True, check=True)
+    finally:
+        path.unlink(missing_ok=True)
+    rows, peak = map(int, done.stdout.split())
+    assert rows == 10_000_000
+    print(f"{form}: {peak / 1e6:.0f} MB")
+    assert peak < _MOST, f"{peak / 1e6:.0f} MB"
