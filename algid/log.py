@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import Arm, FloatArray
+from algid.notices import Notice
 
 IntArray = NDArray[np.int64]
 
@@ -48,21 +49,6 @@ class Truth:
     payload: float
     case: str | None = None
     schedule: tuple[tuple[float, float], ...] = ()
-
-
-@dataclass(frozen=True)
-class Notice:
-    """Something a reader saw that its user should know.
-
-    `code` is a fixed word such as ``DUPLICATE_STAMPS``; `lossy` tells that samples are missing from the log; `flags`
-    are those that mend it; `note` tells that it says how the log was read and is no reason to doubt a result.
-    """
-
-    code: str
-    text: str
-    lossy: bool = False
-    flags: tuple[str, ...] = ()
-    note: bool = False
 
 
 SAME_OFFSET = 1e-9

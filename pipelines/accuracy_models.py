@@ -53,7 +53,7 @@ def draw(job: tuple[str, int, int, str]) -> Row:
     weak = replace(weak, model=chosen.model, estimate_delay=chosen.delay)
     settings = refined.RefinedSettings(model=chosen.model, estimate_delay=chosen.delay, weak=weak)
     fit = refined.fit(*logs, settings)
-    if fit.note and mode == MODES[0]:
+    if fit.refuted and mode == MODES[0]:
         fit = hedged(fit, *logs, weak)
     truth = _scenes[row, arm, False].truth
     names = [*CONSTANT_NAMES, "m_p"]

@@ -94,7 +94,7 @@ def _fitted(sources: Sequence[Source], kind: Kind) -> tuple[Fit, Selection]:
     if fewer != chosen:
         fit, chosen = _refined(sources, fewer, weak)
     own = replace(weak, model=chosen.model, estimate_delay=chosen.delay)
-    return hedged(fit, sources, (), own) if fit.note else fit, chosen
+    return hedged(fit, sources, (), own) if fit.refuted else fit, chosen
 
 
 def _refined(sources: Sequence[Source], chosen: Selection, weak: WeakSettings) -> tuple[Fit, Selection]:

@@ -24,10 +24,10 @@ from algid.estimators.conventions import AS_READ
 from algid.identification.identify import identify
 from algid.inspection.conventions import judged, mend
 from algid.log import Log, Origin, Reading
-from algid.report.verdict import LEVEL_WORDS, verdict
 from algid.results import Result
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
+from algid.verdict import GRADE_WORDS
 from pipelines.accuracy_scenes import case_of
 
 ARMS = ("case1", "case2", "arm21", "arm22", "arm23")
@@ -137,26 +137,26 @@ def row(
     """A line of the table, and whether it passes."""
     log = log_of(motion, spoil, friction=friction)
     named = mend(log, judged(log))
-    words = "" if named is None else f"{named.words}: `{' '.join(named.flags)}`"
+    words = "" if named is None else f"{named.words}: `{' '.join(named.remedy.flags)}`"
     try:
         result = identify(log, report=False)
     except LogError as refusal:  # exit 2: a scale that no joint has
         right = name == "nothing" or name in INVISIBLE
         return _line(name, arm, friction, "", "Refused", str(refusal).partition(": ")[2], not right)
-    found = verdict(result)
+    found = result.verdict
     if name == "nothing" or name in INVISIBLE:
-        passed = named is None and found.level != "failed"
+        passed = named is None and found.grade != "failed"
     elif name in SPOILED:
         passed, words = _noticed(result, SPOILED[name][1], k), SPOILED[name][1]
     else:
-        passed = found.level == "failed" and named is not None and mended(log, k)
-    return _line(name, arm, friction, f"{furthest(result, k):.3g}", LEVEL_WORDS[found.level], words, passed)
+        passed = found.grade == "failed" and named is not None and mended(log, k)
+    return _line(name, arm, friction, f"{furthest(result, k):.3g}", GRADE_WORDS[found.grade], words, passed)
 
 
 def _noticed(result: Result, code: str, k: FloatArray) -> bool:
     """Whether a result names `code`, is not Good, and has no error beyond `FAR` without having failed."""
-    level = verdict(result).level
-    named = any(code in warning for warning in result.warnings)
+    level = result.verdict.grade
+    named = any(notice.code == code for notice in result.notices)
     return named and level != "good" and (level == "failed" or furthest(result, k) <= FAR)
 
 
@@ -174,7 +174,7 @@ def exchanged(arm: str, k: FloatArray, *, friction: bool) -> tuple[str, bool]:
     )
     result = identify(loaded, unloaded, report=False)
     passed = _noticed(result, "EXCHANGED_LOGS", k)
-    far, level = f"{furthest(result, k):.3g}", LEVEL_WORDS[verdict(result).level]
+    far, level = f"{furthest(result, k):.3g}", GRADE_WORDS[result.verdict.grade]
     return _line(EXCHANGED, arm, friction, far, level, "EXCHANGED_LOGS", passed)
 
 

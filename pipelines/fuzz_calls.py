@@ -25,7 +25,7 @@ from typing import NoReturn
 
 import algid.cli.app
 from algid.faults import EXIT_INTERNAL
-from algid.report.text import printable
+from algid.text import printable
 from pipelines.hostile.calls import Call, draw_call
 from pipelines.hostile.places import called, called_once, furnish
 

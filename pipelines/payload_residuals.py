@@ -33,8 +33,9 @@ from algid.estimators.weak import Source, WeakSettings
 from algid.identification.by_likelihood import choose_model, run_fit
 from algid.identification.source import LogSource, open_sources
 from algid.identification.survey import Survey
-from algid.log import Log, Notice, Origin
+from algid.log import Log, Origin
 from algid.model import torque
+from algid.notices import Notice
 from algid.readers import open_log
 from algid.runtime import one_blas_thread
 from algid.settings import Settings

@@ -39,7 +39,7 @@ def test_what_notebooks_call_says_all_that_it_takes_and_gives(name: str) -> None
 
 
 def test_a_result_says_what_each_of_its_fields_is() -> None:
-    assert _sections(Result)["Attributes"] == set(Result.model_fields)
+    assert _sections(Result)["Attributes"] == set(Result.model_fields) | set(Result.model_computed_fields)
 
 
 def _sections(thing: object) -> dict[str, set[str]]:
@@ -76,19 +76,25 @@ def test_a_result_is_read_by_a_string_and_shows_itself_as_a_short_table(tmp_path
 
 
 def test_a_result_of_the_first_schema_is_still_read(tmp_path: Path) -> None:
-    """The file as version 1 wrote it: without what version 2 added."""
+    """The file as version 1 wrote it: without what later versions added, its warnings sentences."""
     build(tmp_path / "a.algid", duration=1.0)
     file = tmp_path / "a.algid" / "result.json"
     content = json.loads(file.read_text(encoding="utf-8"))
     content["schema_version"] = 1
-    for name in ("profile", "causes"):
+    for name in ("profile", "notices", "verdict"):
         del content[name]
+    content |= {"warnings": ["arm.csv: JITTER: stamps jitter"], "notes": ["cut"]}
     del content["log"]["reading"]
     del content["fit"]["endogeneity"]
     file.write_text(json.dumps(content), encoding="utf-8")
     old: Result = algid.read_result(file)
-    assert old.schema_version == 2
+    assert old.schema_version == 3
     assert old.log.reading is None
+    assert [(one.code, one.text, one.note) for one in old.notices] == [
+        ("EARLIER", "arm.csv: JITTER: stamps jitter", False),
+        ("EARLIER", "cut", True),
+    ]
+    assert old.verdict.grade == "reservations"
     assert old.parameters["k1"].status is Status.OK
 
 

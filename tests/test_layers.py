@@ -24,54 +24,60 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "runtime": room(packages="threadpoolctl"),
     "units": room(),
     "words": room(),
+    "text": room(),
+    "notices": room("text words"),
+    "verdict": room("notices"),
     "arm": room(packages="numpy", library=PURE),
     "compiled": room("arm", "numpy scipy"),
     "physics": room("arm", "numpy", PURE),
     "model": room("arm physics", "numpy", PURE),
-    "log": room("arm", "numpy"),
+    "log": room("arm notices", "numpy"),
     "signals": room("arm compiled log", "numpy scipy", PURE),
-    "estimators": room("arm compiled model physics progress signals", "numpy scipy", PURE),
+    "estimators": room("arm compiled model notices physics progress signals", "numpy scipy", PURE),
     "files": room("construction errors limits", "pydantic"),
     "stores": room("construction errors files", "pyarrow"),
     "profile": room("errors files units", "pydantic"),
     "settings": room("errors limits model signals"),
-    "results": room("errors files limits log model settings words", "pydantic"),
+    "results": room("errors files limits log model notices settings text verdict words", "pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
     "table4": room("arm limits log results synth"),
     "writers": room("errors files log ros2", "mcap numpy polars pyarrow"),
     "readers": room(
-        "arm errors files faults limits log profile ros2 runtime units words",
+        "arm errors faults files limits log notices profile ros2 runtime units words",
         "google lz4 mcap numpy polars pyarrow rosbags scipy zstandard",
     ),
-    "inspection": room("arm errors estimators faults log profile readers signals words", "numpy"),
+    "inspection": room("arm errors estimators faults log notices profile readers signals words", "numpy"),
     "report": room(
-        "arm errors files progress results ros2 words", "matplotlib mcap numpy plotly polars pyarrow rich"
+        "arm errors files notices progress results ros2 text verdict words",
+        "matplotlib mcap numpy plotly polars pyarrow rich"
     ),
     "check": room("errors files results", "pydantic"),
     "identification": room(
-        "arm errors estimators files inspection log model profile progress readers report results runtime settings "
-        "signals table4",
+        "arm errors estimators files inspection log model notices profile progress readers report results runtime "
+        "settings signals table4",
         "numpy pyarrow",
     ),
     "api": room("log synth"),
     "batch": room(
-        "construction errors files identification limits profile readers report results runtime settings stores",
+        "construction errors files identification limits profile readers results runtime settings stores",
         "distributed mcap polars pyarrow pydantic",
     ),
     "track": room(
-        "arm errors estimators files identification model profile report results runtime signals words",
+        "arm errors estimators files identification model notices profile report results runtime signals text verdict "
+        "words",
         "mcap numpy polars pyarrow pydantic",
     ),
     "design": room(
-        "arm compiled errors estimators files identification log model progress report results signals synth writers",
+        "arm compiled errors estimators files identification log model notices progress report results "
+        "signals synth text verdict writers",
         "numpy polars pydantic scipy",
     ),
-    "export": room("arm errors files identification model physics report results words", "numpy scipy"),
-    "fleet": room("errors files limits model progress report words", "numpy polars scipy"),
+    "export": room("arm errors files identification model notices physics results text words", "numpy scipy"),
+    "fleet": room("errors files limits model notices progress report text verdict words", "numpy polars scipy"),
     "cli": room(
-        "batch check design errors estimators export faults files "
-        "fleet identification inspection limits log model physics profile progress readers report results runtime "
-        "settings stores synth track writers words",
+        "batch check design errors estimators export faults files fleet identification inspection limits "
+        "log model notices physics profile progress readers report results runtime settings stores synth "
+        "text track words writers",
         "numpy rich typer",
     ),
 }  # fmt: skip

@@ -20,7 +20,6 @@ from algid.errors import AlgidError, chain_of, text_of
 from algid.files import refuse_links, temporary_folder
 from algid.identification.identify import identify
 from algid.identification.source import Staged
-from algid.report.verdict import verdict
 from algid.results import Result, Status
 from algid.runtime import keep_freed, keep_to_one_core
 from algid.settings import Settings
@@ -71,10 +70,10 @@ def run_task(task: Task) -> JobRecord | DiskFull:
         reason = TOO_LARGE if isinstance(error, MemoryError) else text_of(error)
         inputs = tuple(replace(one, sha256=hash_of(one.path)) for one in inputs)
         return failed_record(task, reason, inputs=inputs, seconds=time.perf_counter() - start)
-    judged = verdict(result)
+    judged = result.verdict
     lacking = ["samples were lost"] if result.data_lost else []
     lacking += [f"{name} {one.status.value}" for name, one in result.estimates.items() if one.status is not Status.OK]
-    failed = judged.level == "failed"
+    failed = judged.failed
     hashes = {log.path: log.sha256 for log in result.logs}
     return _record(
         task,

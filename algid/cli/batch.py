@@ -185,8 +185,8 @@ def _watch(running: Batch, sources: list[str], out: str, alone: str, retry_faile
 def _conclude(ended: Ended, stopped: bool, out: str, quiet: bool) -> None:
     """Print what came of the jobs, and leave with the exit code that tells it."""
     from algid.batch.records import FAILURES, End
-    from algid.report.text import visible
     from algid.stores import shown
+    from algid.text import visible
 
     failed = [record for record in ended.records if record.status in FAILURES]
     if not quiet:

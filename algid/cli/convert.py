@@ -12,7 +12,8 @@ from algid.cli.output import remark
 from algid.cli.settings import Choice, takes_profile
 
 if TYPE_CHECKING:
-    from algid.log import Log, Notice
+    from algid.log import Log
+    from algid.notices import Notice
     from algid.progress import Progress
 
 

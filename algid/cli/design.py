@@ -108,13 +108,13 @@ def design(
     import shlex
 
     from algid.design.campaign import plan
+    from algid.design.page import design_document
     from algid.design.prior import KnownBefore, prior_of
     from algid.design.request import request
-    from algid.design.tables import bound_table, limit_table, sentence
     from algid.design.write import Provenance, design_json, write_design
     from algid.files import refuse_existing, whole_folder
     from algid.report.progress import progress
-    from algid.report.terminal import print_table
+    from algid.report.terminal import print_document
     from algid.runtime import one_blas_thread
 
     asked = request(
@@ -139,28 +139,14 @@ def design(
     campaign = _campaign(known, asked, noise, wanted, drive, margin, seed)
     with one_blas_thread(), progress("steps", quiet) as shown:
         planned = plan(campaign, shown)
-    warnings = [*known.warnings]
-    if planned.interrupted:
-        warnings.append("the search was broken off: this is the best motion until then")
-    if planned.open_parameters:
-        open_ones = ", ".join(planned.open_parameters)
-        warnings.append(
-            f"no motion within the limits tells {open_ones}: widen --range, --speed or --torque, or add runs"
-        )
-    origin = Provenance(prior, shlex.join(["algid", *sys.argv[1:]]), names, warnings)
+    origin = Provenance(prior, shlex.join(["algid", *sys.argv[1:]]), names, known.doubts)
     with whole_folder(folder, force) as temporary:
         write_design(planned, temporary, origin)
     if not quiet:
         if form is Shown.JSON:
             say(design_json(planned, origin), end="")
         else:
-            say(sentence(planned))
-            terminal = console()
-            for table in (bound_table(planned), limit_table(planned)):
-                terminal.print()
-                print_table(table, terminal)
-        for warning in warnings:
-            remark(f"warning: {warning}")
+            print_document(design_document(planned, prior, known.doubts), console())
         remark(f"wrote {folder}")
     if planned.open_parameters:
         raise typer.Exit(EXIT_INCOMPLETE)

@@ -60,5 +60,5 @@ def export(
     with whole_file(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
     for warning in warnings:
-        complain(warning)
+        complain(warning.text)
     remark(f"wrote {out}")

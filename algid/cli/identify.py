@@ -74,9 +74,8 @@ def identify(
     from algid.files import result_folder
     from algid.identification.identify import identify as run
     from algid.report.progress import progress
-    from algid.report.text import visible
-    from algid.report.verdict import verdict
     from algid.runtime import keep_freed
+    from algid.text import visible
 
     if export is not None and not report:
         raise SettingError("--export: the log is made from the time series; leave --no-report out")
@@ -105,13 +104,13 @@ def identify(
         for note in result.notes:
             remark(f"note: {visible(note)}")
         remark(f"wrote {result_folder(result.log.path, out, name)}")
-    if not result.complete or result.data_lost or verdict(result).level == "failed":
+    if not result.complete or result.data_lost or result.verdict.failed:
         raise typer.Exit(EXIT_INCOMPLETE)
 
 
 def _print_reading(result: Result) -> None:
     """What was read, and how, on standard error."""
-    from algid.report.text import visible
+    from algid.text import visible
 
     for log in result.logs:
         size = f"{counted(log.rows, 'sample')}, {log.duration:.6g} s at {log.rate:.6g} Hz"

@@ -100,9 +100,9 @@ def _print_worth(found: Inspection, console: Console) -> None:
             f"k2 {rough.weight2:.3g} N m, turned by {round(rough.turn)}°"
         )
     for notice in found.notices:
-        console.print(f"{notice.code}: {escape(plain(notice.text))}")
+        console.print(f"{notice.code}: {escape(plain(notice.clause))}")
     for finding in found.findings:
-        console.print(f"{finding.code}: {escape(plain(finding.text))}")
+        console.print(f"{finding.code}: {escape(plain(finding.clause))}")
     if found.refused:
         console.print(f"refused: {escape(plain(found.refused))}")
 

@@ -62,5 +62,5 @@ def track(
     if not quiet:
         print_track(result, form)
         remark(f"wrote {folder}")
-    if not result.complete or result.data_lost or verdict(result).level == "failed":
+    if not result.complete or result.data_lost or verdict(result).failed:
         raise typer.Exit(EXIT_INCOMPLETE)

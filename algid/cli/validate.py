@@ -73,7 +73,8 @@ def validate(
         found = judge(model, survey)
         rolled = roll(model, survey) if simulate else None
     summaries = [survey.summary(log) for log in survey.logs]
-    for warning in (*warnings, *(() if known is None else read_otherwise(summaries, known, str(result)))):
+    otherwise = [] if known is None else [one.sentence for one in read_otherwise(summaries, known, str(result))]
+    for warning in (*warnings, *otherwise):
         complain(warning)
     total = found.total
     over = max_nrmse is not None and (total is None or max(total.nrmse) > max_nrmse)
@@ -114,7 +115,7 @@ def _rows(one: RolloutScore) -> list[dict[str, Any]]:
 
 def _lines(every: Mapping[str, TorquePrediction | None], simulated: Simulated) -> Iterator[str]:
     """The predictions in words, then the simulations."""
-    from algid.report.text import visible
+    from algid.text import visible
 
     for name, one in every.items():
         if one is None:
@@ -141,7 +142,7 @@ def _lines(every: Mapping[str, TorquePrediction | None], simulated: Simulated) -
 def _tables(every: Mapping[str, TorquePrediction | None], simulated: Simulated) -> Iterator[Table]:
     """The predictions, and the simulations if there are any."""
     from algid.report.document import Column, Table
-    from algid.report.text import ABSENT, significant, visible
+    from algid.text import ABSENT, significant, visible
 
     def table(title: str, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> Table:
         columns = (Column(headings[0], "name"), *(Column(heading, "number") for heading in headings[1:]))

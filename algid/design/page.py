@@ -9,32 +9,28 @@ import numpy as np
 from algid import __version__
 from algid.design.campaign import Design
 from algid.design.figures import figures
-from algid.design.tables import bound_table, limit_table, sentence
+from algid.design.tables import bound_table, limit_table, verdict
+from algid.notices import Notice
 from algid.report.arm import ArmDrawing
-from algid.report.document import Bullets, Document, Section
+from algid.report.document import Document, Section
 from algid.report.frame import page
-from algid.report.text import file_name, significant
-from algid.report.verdict import Verdict
+from algid.text import file_name, significant
 
 _READING = "Play the motion: is the space around the arm free? The grey line is the tip's path, the red one its limit."
 
 
-def page_html(design: Design, source: str, warnings: Sequence[str]) -> str:
+def page_html(design: Design, source: str, doubts: Sequence[Notice] = ()) -> str:
     """The page's text."""
-    return page(design_document(design, source, warnings))
+    return page(design_document(design, source, doubts))
 
 
-def design_document(design: Design, source: str, warnings: Sequence[str]) -> Document:
+def design_document(design: Design, source: str, doubts: Sequence[Notice] = ()) -> Document:
     """The report of a design for the arm that `source` tells of."""
     campaign, name = design.campaign, file_name(source)
-    text = sentence(design)
     return Document(
         title=f"Design for {name}",
-        verdict=Verdict("reservations" if design.open_parameters else "good", text[0].lower() + text[1:].rstrip(".")),
-        sections=(
-            Section((bound_table(design), limit_table(design), *_arm(design), *figures(design))),
-            Section((Bullets(tuple(warnings)),) if warnings else (), "warnings", "Warnings"),
-        ),
+        verdict=verdict(design, doubts),
+        sections=(Section((bound_table(design), limit_table(design), *_arm(design), *figures(design))),),
         kicker="a planned identification",
         name=name,
         facts=f"{significant(campaign.duration, 4)} s under {campaign.drive} control · logged at "

@@ -15,7 +15,7 @@ from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
 from algid.identification.known import contradictions, has_error_bar, model_of
 from algid.model import TERMS, Model
-from algid.report.text import joined
+from algid.notices import Notice
 from algid.results import Result, read_result
 from algid.synth.cases import Case, load_case
 
@@ -38,14 +38,14 @@ class BelievedArm:
         Of the links; NaN where they are not known.
     noise : NoiseLevels or None
         Of the logs behind a result.
-    warnings : sentences about what does not fit
+    doubts : what does not fit
     """
 
     source: str
     belief: Belief
     lengths: FloatArray
     noise: NoiseLevels | None
-    warnings: tuple[str, ...] = ()
+    doubts: tuple[Notice, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -151,19 +151,17 @@ def _of_result(result: Result, source: str, loaded: bool | None, knowns: KnownBe
     reach = np.array([np.nan if value.get(name) is None else value[name] for name in ("l1", "l2")], dtype=np.float64)
     levels = [0.0 if result.fit is None else result.fit.noise.get(name) or 0.0 for name in NOISE]
     noise = NoiseLevels(np.array(levels[:2]), np.array(levels[2:])) if min(levels) > 0 else None
-    warnings = (*left_out, *contradictions(result, knowns.lengths))
-    return BelievedArm(source, Belief(shared, mean, spread, box=False), reach, noise, warnings)
+    doubts = (*left_out, *contradictions(result, knowns.lengths))
+    return BelievedArm(source, Belief(shared, mean, spread, box=False), reach, noise, doubts)
 
 
-def _planned(model: Model) -> tuple[Model, tuple[str, ...]]:
-    """The model less the terms that no regressor holds, and a sentence about them."""
+def _planned(model: Model) -> tuple[Model, tuple[Notice, ...]]:
+    """The model less the terms that no regressor holds, and a notice of them."""
     spare = [term for term in model.terms if term in _UNPLANNED]
     if not spare:
         return model, ()
-    words = joined([TERMS[term].title for term in spare])
-    return replace(model, terms=tuple(term for term in model.terms if term not in spare)), (
-        f"the plan leaves out {words}: where they are estimated too, error bars are somewhat larger than predicted",
-    )
+    left = Notice("TERMS_LEFT_OUT", numbers={"terms": [TERMS[term].title for term in spare]})
+    return replace(model, terms=tuple(term for term in model.terms if term not in spare)), (left,)
 
 
 def _spread(

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from algid.design.campaign import Design
 from algid.design.limits import Row
 from algid.design.torque import END
 from algid.model import UNITS
+from algid.notices import Notice, Remedy
 from algid.report.document import Column, Table
-from algid.report.text import ABSENT, percent, resolved, significant, unit_text
+from algid.text import ABSENT, percent, resolved, significant, unit_text
+from algid.verdict import Verdict, graded
 
 BINDS = 0.98  # of what the margin leaves: a limit that is used as far is what keeps the error bars from being less
 SIGNS = {
@@ -122,13 +126,23 @@ def amounts(design: Design, row: Row, used: float) -> tuple[float, float]:
     return sign * limit, sign * used * limit
 
 
-def sentence(design: Design) -> str:
-    """The design in one sentence."""
+def verdict(design: Design, doubts: Sequence[Notice] = ()) -> Verdict:
+    """The design in one clause, and what is against it: `doubts` about its prior, what no motion reaches."""
+    reasons = [*doubts]
+    if design.open_parameters:
+        wider = tuple(Remedy({name: None}, "widen") for name in ("range", "speed", "torque", "runs"))
+        reasons.insert(0, Notice("NOT_REACHED", numbers={"names": list(design.open_parameters)}, remedies=wider))
+    if design.interrupted:
+        reasons.append(Notice("BROKEN_OFF"))
+    return graded(_headline(design), reasons)
+
+
+def _headline(design: Design) -> str:
     asked = design.campaign.asked
     relative = np.where(asked.wanted, design.relative, -np.inf)
     name = design.names[int(np.argmax(relative))]
     row, used = design.binding[0]
     return (
-        f"Every parameter asked for to within {percent(design.largest, 1.0)} % (one σ; {name} is the least certain); "
-        f"{limit_name(row)} is used to {percent(used, 1.0, 3)} %."
+        f"every parameter asked for to within {percent(design.largest, 1.0)} % (one σ; {name} is the least certain); "
+        f"{limit_name(row)} is used to {percent(used, 1.0, 3)} %"
     )

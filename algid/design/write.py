@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,23 +17,24 @@ from algid import __version__
 from algid.arm import FloatArray
 from algid.design.campaign import Design
 from algid.design.page import page_html
-from algid.design.tables import amounts, sentence
+from algid.design.tables import amounts, verdict
 from algid.files import whole_file
 from algid.log import Log, Origin
 from algid.model import UNITS, Motion
+from algid.notices import Notice
 
 POINTS = 50.0  # a second, of the joint trajectory: its controller joins them by polynomials of fifth degree
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a design comes from: its prior's file, its command line, the names of the robot's joints, warnings."""
+    """Where a design comes from: its prior's file and doubts about it, command line, names of the robot's joints."""
 
     source: str
     command: str
     joints: tuple[str, str] = ("joint1", "joint2")
-    warnings: Sequence[str] = ()
+    doubts: Sequence[Notice] = ()
 
 
 def write_design(design: Design, folder: Path, origin: Provenance) -> None:
@@ -52,7 +53,7 @@ def write_design(design: Design, folder: Path, origin: Provenance) -> None:
     write_log(folder / "trajectory.mcap", log, kind="mcap")
     texts = {
         "design.json": design_json(design, origin),
-        "report.html": page_html(design, origin.source, origin.warnings),
+        "report.html": page_html(design, origin.source, origin.doubts),
     }
     if design.campaign.drive == "position":
         texts["joint_trajectory.yaml"] = joint_trajectory(design, origin.joints)
@@ -119,7 +120,7 @@ def content(design: Design, origin: Provenance) -> dict[str, Any]:
         "version": __version__,
         "prior": origin.source,
         "command": origin.command,
-        "sentence": sentence(design),
+        "verdict": asdict(verdict(design, origin.doubts)),
         "drive": campaign.drive,
         "duration": campaign.duration,
         "rate": experiment.rate,
@@ -156,7 +157,6 @@ def content(design: Design, origin: Provenance) -> dict[str, Any]:
         ],
         "start": design.motion.theta[:, 0].tolist(),
         "joints": list(origin.joints),
-        "warnings": list(origin.warnings),
     }
 
 

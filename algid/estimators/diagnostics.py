@@ -25,6 +25,7 @@ from algid.estimators.identifiability import sizes
 from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Normal
 from algid.model import CHOICES, EVERY_TERM, PARAMETERS, Model
+from algid.notices import Notice
 
 _NOT_NEGATIVE = tuple(name for name, parameter in PARAMETERS.items() if parameter.sign == "+")
 _NUDGE = 1e-6  # of a parameter's size: step of the differences
@@ -155,18 +156,16 @@ def constrained(fit: Fit) -> Fit:
         moved = replace(fit, values=fit.values + scale * x)
         disobeyed = broken_bounds(moved)
         if not disobeyed:
-            note = f"--constrain enforces {_named(enforced)}, which the logs contradict"
-            return moved.noted(note)
-    note = f"--constrain cannot obey {_named(disobeyed)}: no estimates within the bounds were found"
+            return moved.noted(Notice("CONSTRAINED", numbers={"bounds": _named(enforced)}))
+    note = Notice("NOT_FEASIBLE", numbers={"bounds": _named(disobeyed)})
     status: tuple[Status, ...] = tuple("NOT_CONVERGED" if word == "OK" else "NOT_IDENTIFIABLE" for word in fit.status)
     return replace(fit, converged=False, status=status).noted(note)
 
 
-def _named(bounds: Sequence[BrokenBound]) -> str:
-    sentences = (
+def _named(bounds: Sequence[BrokenBound]) -> list[str]:
+    return [
         b.bound if b.distance is None else f"{b.bound} ({b.distance:.2g} standard deviations beyond)" for b in bounds
-    )
-    return ", ".join(sentences)
+    ]
 
 
 _UNLIKE = 0.5  # of the larger of two values: more than any error of a model that is of use

@@ -24,6 +24,7 @@ from algid.estimators.identifiability import Whiteness, examine, open_directions
 from algid.estimators.innovations import NORMAL, ResidualSums
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
+from algid.notices import Notice
 
 Status = Literal["OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED", "WEAK_EXCITATION"]
 Estimator = Literal["weak", "instruments", "refined"]
@@ -58,7 +59,7 @@ class Fit:
     without : (n, Q) or None
         The estimates without each of the logs, where error bars needed them.
     endogeneity : how far instruments are from least squares, in standard deviations; None where not asked
-    note : why the refined estimator handed back the weak estimate although nothing failed
+    notes : what is to be said of the fit, such as why the refined estimator handed back the weak estimate
     moved : (2,), rad, how far each joint travelled
     """
 
@@ -80,7 +81,7 @@ class Fit:
     prior: Prior | None = None
     without: FloatArray | None = None
     endogeneity: float | None = None
-    note: str | None = None
+    notes: tuple[Notice, ...] = ()
     moved: FloatArray = field(default_factory=lambda: np.full(2, np.inf))
 
     def __post_init__(self) -> None:
@@ -109,9 +110,14 @@ class Fit:
         marked = (status if word == "OK" and (names is None or name in names) else word for name, word in own)
         return replace(self, status=tuple(marked))
 
-    def noted(self, note: str) -> Fit:
+    @property
+    def refuted(self) -> bool:
+        """Whether the refined estimator found its likelihood refuted, and another estimate stands in its place."""
+        return any(note.code == "REFUTED" for note in self.notes)
+
+    def noted(self, note: Notice) -> Fit:
         """The fit with one more thing to say of it."""
-        return replace(self, note=note if self.note is None else f"{self.note}; {note}")
+        return replace(self, notes=(*self.notes, note))
 
     def spread(self, share: FloatArray) -> float:
         """Standard deviation of the sum `share` (Q,) @ values; infinite where the logs leave that sum open.

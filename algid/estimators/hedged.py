@@ -22,6 +22,7 @@ from algid.estimators.identifiability import STILL
 from algid.estimators.selection import FIRST_TERMS
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import DELAYS, RIGID, UNITS
+from algid.notices import Notice
 
 
 def hedged(
@@ -58,22 +59,23 @@ def hedged(
     spreads = {name: std for name, std, status in stds if status == "OK"}
     least = np.array([spreads.get(name, 0.0) for name in fit.names])
     covariance = widened(fit.covariance, np.diag(least**2))
-    note = fit.note
-    if note and not np.array_equal(covariance, fit.covariance):
+    wider = None
+    if fit.refuted and not np.array_equal(covariance, fit.covariance):
         added = [term for term in terms if term not in settings.model.terms]
         if delayed and not settings.estimate_delay:
             added += DELAYS
-        note = f"{note}, with error bars as if it had {', '.join(added)} too"
+        wider = Notice("WIDER_MODEL", numbers={"terms": added}, note=True)
     doubt = _doubt(fit, unloaded, loaded, settings)
-    fit = replace(fit, covariance=covariance, note=note)
+    fit = replace(fit, covariance=covariance)
+    fit = fit if wider is None else fit.noted(wider)
     return fit if doubt is None else fit.marked("WEAK_EXCITATION", RIGID).noted(doubt)
 
 
-def _doubt(fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings) -> str | None:
+def _doubt(fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings) -> Notice | None:
     """Why no error bar stands for k1 … k5: a joint that stood still, or whose torque contradicts the other's."""
     still = [f"joint {joint + 1}" for joint in range(2) if fit.moved[joint] < STILL]
     if still:
-        return f"{' and '.join(still)} never moved: give a log in which both joints do"
+        return Notice("JOINT_STILL", numbers={"joints": still})
     names, value = settings.model.names, dict(zip(fit.names, fit.values.tolist(), strict=True))
     settings = replace(settings, estimate_delay=False, delay=value.get("delay", settings.delay))
     for sources, kind in ((unloaded, False), (loaded, True)):
@@ -84,7 +86,7 @@ def _doubt(fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], setti
         normals = [normal for normal in every if normal is not None]
         apart = joints_apart(normals, settings.model) if normals else None
         if apart is not None:
-            first, second = f"{apart.first:.2g} {UNITS[apart.name]}", f"{apart.second:.2g}"
-            sentence = f"joint 1 by itself tells {apart.name} as {first} and joint 2 as {second}: one of them"
-            return f"{sentence} is hardly driven, or a term is missing; give a log that drives both"
+            unit = UNITS[apart.name]
+            numbers = {"name": apart.name, "first": apart.first, "second": apart.second, "unit": unit}
+            return Notice("JOINTS_CONTRADICT", numbers=numbers)
     return None

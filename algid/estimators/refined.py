@@ -27,15 +27,12 @@ from algid.estimators.weak import Source, WeakSettings
 from algid.estimators.weak import fit as weak_fit
 from algid.estimators.whitening import NoiseLevels
 from algid.model import Model
+from algid.notices import Notice
 from algid.progress import Progress
 from algid.signals.differences import Stencil
 
 _STEPS = 20
 _NOISE_STEPS = 12  # then the noise levels stay, so that the rest can settle
-_REFUTED = (
-    "the torque's error is far larger and slower than its sensor's noise (unmodelled dynamics): the likelihood of "
-    "white noise does not hold, and the weak estimate with robust intervals stands in its place"
-)
 _SETTLED = 0.02  # change of every parameter in its standard deviations
 _NOISE_SETTLED = 0.2  # change of every log variance in its standard deviations
 _FAR = 3.0  # standard deviations of the training set beyond which the last step is repeated
@@ -128,7 +125,8 @@ def fit(
     try:
         beta, outcomes, iterations, end = _train(shared, logs, start.values, settings, progress)
         if end == "refuted":
-            return replace(start, note=_REFUTED, iterations=iterations)
+            refuted = Notice("REFUTED", numbers={"kept": start.estimator})
+            return replace(start.noted(refuted), iterations=iterations)
         settled = end == "settled" and bool(np.all(np.isfinite(beta)))
         if settled and not all(log.whole for log in logs):
             beta, outcomes = _finish(shared, logs, beta, settings)

@@ -20,8 +20,9 @@ from algid.errors import ResultError, SettingError
 from algid.export.links import Knowns, Link, links_of
 from algid.identification.known import contradictions, first_length, has_error_bar, model_of, torque_constants
 from algid.model import TERMS, UNITS, Model
-from algid.report.text import joined
+from algid.notices import Notice
 from algid.results import Estimate, Result, Status
+from algid.text import joined
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,7 @@ class Description:
     links : two of Link, or None where the format needs none
     rotor1 : float, kg m^2
     numbers : where each number comes from
-    warnings : sentences about what does not fit
+    warnings : what does not fit
     """
 
     name: str
@@ -116,7 +117,7 @@ class Description:
     links: tuple[Link, Link] | None
     rotor1: float
     numbers: tuple[Number, ...]
-    warnings: tuple[str, ...]
+    warnings: tuple[Notice, ...]
 
 
 def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Description:
@@ -226,5 +227,5 @@ def header(arm: Description, remarks: list[str]) -> list[str]:
         *(str(number).rstrip() for number in arm.numbers),
         *([""] if remarks or arm.warnings else []),
         *(f"This file {remark}." for remark in remarks),
-        *(f"Warning: {warning}." for warning in arm.warnings),
+        *(f"Warning: {warning.text}." for warning in arm.warnings),
     ]

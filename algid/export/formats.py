@@ -12,6 +12,7 @@ from algid.export.links import Knowns
 from algid.export.programs import c99, python_module
 from algid.export.robots import mjcf, sdf, urdf
 from algid.identification.known import contradictions
+from algid.notices import Notice
 from algid.results import Result, Status
 
 
@@ -36,7 +37,7 @@ FORMATS = {
 PAYLOAD = "yaml"
 
 
-def exported(result: Result, file: str, to: str, knowns: Knowns) -> tuple[str, tuple[str, ...]]:
+def exported(result: Result, file: str, to: str, knowns: Knowns) -> tuple[str, tuple[Notice, ...]]:
     """The text of an export, and warnings about what does not fit.
 
     Parameters

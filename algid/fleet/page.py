@@ -15,12 +15,13 @@ from algid import __version__
 from algid.fleet.drift import ALPHA, SPAN
 from algid.fleet.history import History
 from algid.model import UNITS
+from algid.notices import Notice
 from algid.report.document import Column, Depth, Document, Drawn, ReadingAid, References, Section, Table, filled
 from algid.report.drawings import Course, sparklines
 from algid.report.figures.base import Figure, Panel, axis, label
 from algid.report.frame import page
-from algid.report.text import ABSENT, joined, significant, unit_text, visible
-from algid.report.verdict import Level, Verdict
+from algid.text import ABSENT, joined, significant, unit_text, visible
+from algid.verdict import Verdict, graded
 from algid.words import counted
 
 if TYPE_CHECKING:
@@ -117,7 +118,6 @@ def verdict(history: History) -> Verdict:
     import polars as pl
 
     drifts, findings = history.drifts.height, history.findings.height
-    level: Level = "reservations" if drifts or findings or history.untested else "good"
     statement = f"{counted(history.robots, 'robot')}, {counted(history.logs, 'log')}: "
     statement += f"{counted(drifts, 'drift')} and {counted(findings, 'finding')}"
     tested = history.windows.filter(pl.col("p").is_not_nan() & (pl.col("mean") != 0.0))
@@ -126,7 +126,9 @@ def verdict(history: History) -> Verdict:
         slope, p = 100 * row["slope"] / abs(row["mean"]), significant(row["p"], 2)
         statement += f"; the clearest trend is {row['parameter']} of {visible(row['robot'])}, {slope:+.2g} % a month"
         statement += f" (p = {p})" + ("" if row["drift"] else f", which does not pass p < {ALPHA:g}")
-    return Verdict(level, statement, tuple(history.untested))
+    found = [Notice("DRIFTS", counted(drifts, "drift"))] * bool(drifts)
+    found += [Notice("STAND_OUT", counted(findings, "log stands out", "logs stand out"))] * bool(findings)
+    return graded(statement, [*found, *(Notice("NOT_TESTED", why) for why in history.untested)])
 
 
 def robot_table(history: History) -> Table:

@@ -24,6 +24,7 @@ from algid.identification.source import LogSource
 from algid.identification.survey import Survey
 from algid.identification.velocities import with_velocities
 from algid.model import TERMS, Model, without_delay
+from algid.notices import Notice
 from algid.results import Result
 from algid.runtime import beside
 from algid.settings import Settings
@@ -105,7 +106,7 @@ def run_fit(survey: Survey, settings: Settings, chosen: Selection, prior: Prior 
                 weak=ours,
             )
             fit = refined.fit(unloaded, loaded, refining, survey.progress)
-            if fit.note:
+            if fit.refuted:
                 fit = _foretelling(fit, unloaded, loaded, ours, settings, prior)
     except TooShortError as error:
         raise LogError(f"{', '.join(log.name for log in survey.logs)}: {error}; record longer") from error
@@ -137,7 +138,7 @@ def with_hedge(fit: Fit, survey: Survey, settings: Settings, chosen: Selection, 
 
     One that physics contradicts stays as sure as it is, so that the contradiction is reported.
     """
-    if not (fit.note and settings.chooses):
+    if not (fit.refuted and settings.chooses):
         return fit
     if any(bound.distance is not None and bound.distance > FAR_BEYOND for bound in broken_bounds(fit)):
         return fit
@@ -191,7 +192,8 @@ def _foretelling(
     found = cross_validate(other, unloaded, loaded, settings.torque_shift) if other.converged else None
     if found is None or np.sum(found.nrmse**2) >= np.sum(least.nrmse**2):
         return fit
-    return replace(other, note=fit.note and fit.note.replace("weak estimate", "estimate by instruments"))
+    notes = tuple(note for note in fit.notes if note.code != "REFUTED")
+    return replace(other, notes=(*notes, Notice("REFUTED", numbers={"kept": "instruments"})))
 
 
 def _weak_settings(settings: Settings, chosen: Selection) -> weak.WeakSettings:

@@ -164,7 +164,7 @@ def _identified(
             outcome = _by_likelihood(survey, settings, earlier, folder if series else None)
         result = result_of(outcome, settings, survey)
     otherwise = [] if earlier is None else read_otherwise(result.logs, earlier.result, earlier.file)
-    return result.model_copy(update={"profile": said, "warnings": [*otherwise, *result.warnings]})
+    return result.model_copy(update={"profile": said, "notices": [*otherwise, *result.notices]})
 
 
 def _by_the_paper(survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None) -> Identified:

@@ -12,6 +12,7 @@ from algid.errors import ResultError
 from algid.estimators.combine import Prior
 from algid.identification.source import Role
 from algid.model import Model, without_delay
+from algid.notices import Notice
 from algid.results import Result, Status
 from algid.settings import Settings
 
@@ -103,20 +104,19 @@ def first_length(result: Result) -> tuple[float, float] | None:
     return gravity * k1.estimate / k2.estimate, float(np.sqrt(slope @ covariance @ slope))
 
 
-def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[str, ...]:
-    """Sentences about given lengths far from what the result says of them: by itself, and by l1 = g k1 / k2."""
+def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice, ...]:
+    """Notices of given lengths far from what the result says of them: by itself, and by l1 = g k1 / k2."""
     identified = {name: (found.estimate, found.std) for name, found in result.payload.items() if name in ("l1", "l2")}
     by_constants = first_length(result)
     if by_constants is not None:
         identified["l1"] = by_constants
-    sentences = []
+    found = []
     for name, given in lengths.items():
         estimate, std = identified.get(name, (None, None))
         if estimate is None or not std:
             continue
         distance = abs(given - estimate) / std
         if distance > FAR:
-            sentences.append(
-                f"--{name} {given:g} lies {distance:.0f} σ from the result's {estimate:.5g} ± {std:.2g} m; one is wrong"
-            )
-    return tuple(sentences)
+            numbers = {"name": name, "given": given, "distance": distance, "estimate": estimate, "std": std}
+            found.append(Notice("LENGTH_CONTRADICTED", numbers=numbers))
+    return tuple(found)

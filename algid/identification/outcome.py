@@ -18,11 +18,12 @@ from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
 from algid.estimators.prediction import PredictionFilter, PredictionScore, cross_validate, score
 from algid.estimators.selection import Selection
 from algid.identification.by_likelihood import Predictions
-from algid.identification.sentences import EXCHANGED, exchanged, fit_notes, fit_warnings
+from algid.identification.remarks import fit_notes, fit_warnings
 from algid.identification.series import torque_coefficients, torque_shift
 from algid.identification.survey import Survey
 from algid.model import UNITS
-from algid.results import Cause, Estimate, Status
+from algid.notices import Notice
+from algid.results import Estimate, Status
 from algid.settings import Settings
 from algid.table4 import LOADED_ROWS, UNLOADED_ROWS, finite
 from algid.table4 import UNITS as TABLE_UNITS
@@ -43,10 +44,7 @@ class Identified:
     stds: Mapping[str, float] = field(default_factory=dict)
     paper_payload: dict[str, Estimate] = field(default_factory=dict)
     fit: results.FitSummary | None = None
-    warnings: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    causes: list[Cause] = field(default_factory=list)
-    """What probably lies behind a poor result, the most likely first."""
+    notices: list[Notice] = field(default_factory=list)
 
 
 def outcome_of(fit: Fit, predictions: Predictions, survey: Survey, settings: Settings, chosen: Selection) -> Identified:
@@ -63,9 +61,9 @@ def outcome_of(fit: Fit, predictions: Predictions, survey: Survey, settings: Set
     summary = fit_summary(fit, predictions, survey, settings, chosen)
     if is_implausible(summary):
         found, combined, payload = (distrusted(group) for group in (found, combined, payload))
-    warnings = [*fit_warnings(fit)]
+    notices = [*fit_warnings(fit)]
     if settings.cross_validate and summary.cross_validation is None:
-        warnings.append("no cross-validation: a log is too short to be fitted, or to be judged")
+        notices.append(Notice("NO_CROSS_VALIDATION"))
     return Identified(
         parameters=found,
         loaded=combined,
@@ -74,9 +72,7 @@ def outcome_of(fit: Fit, predictions: Predictions, survey: Survey, settings: Set
         estimator=fit.estimator,
         stds=stds,
         fit=summary,
-        warnings=warnings,
-        notes=[*fit_notes(summary, warnings)],
-        causes=[Cause(cause=EXCHANGED)] if exchanged(fit) else [],
+        notices=[*notices, *fit_notes(summary)],
     )
 
 
@@ -259,6 +255,7 @@ def prediction(found: PredictionScore) -> results.TorquePrediction | None:
     if found.count == 0:
         return None
     rmse, nrmse, r2 = ([float(value) for value in pair] for pair in (found.rmse, found.nrmse, found.r2))
+    by = PredictionFilter()
     return results.TorquePrediction(
-        rmse=(rmse[0], rmse[1]), nrmse=(nrmse[0], nrmse[1]), r2=(r2[0], r2[1]), filter=str(PredictionFilter())
+        rmse=(rmse[0], rmse[1]), nrmse=(nrmse[0], nrmse[1]), r2=(r2[0], r2[1]), filter=str(by), bandwidth=by.cutoff
     )

@@ -11,7 +11,8 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Literal
 
 from algid.errors import LogError
-from algid.log import Log, Notice, Origin
+from algid.log import Log, Origin
+from algid.notices import Notice
 from algid.results import LogSummary, Result
 from algid.runtime import ahead
 
@@ -125,7 +126,7 @@ def open_sources(
         content = source.digest() if source.digest and hashed else None
         if content in places:
             twin = places[content]
-            said = Notice("SAME_LOG", f"SAME_LOG: {source.name} is the same log, byte for byte, and counts once")
+            said = Notice("SAME_LOG", numbers={"name": source.name})
             kept[twin] = replace(kept[twin], notices=(*kept[twin].notices, said))
             continue
         if content is not None:
@@ -143,8 +144,8 @@ def with_twins_marked(unloaded: list[LogSource], loaded: list[LogSource]) -> lis
     marked = []
     for source in loaded:
         twin = names.get(source.digest()) if source.digest else None
-        text = f"SAME_LOG: {source.name} is {twin}, byte for byte: one log is given as unloaded and as loaded"
-        said = () if twin is None else (Notice("SAME_LOG", f"{text}, which makes the payload nought"),)
+        numbers = {"name": source.name, "twin": twin}
+        said = () if twin is None else (Notice("SAME_LOG_LOADED", numbers=numbers),)
         marked.append(replace(source, notices=(*source.notices, *said)))
     return [*unloaded, *marked]
 
@@ -176,13 +177,17 @@ def sha256_of(path: Path) -> str:
     return digest.hexdigest()
 
 
-def read_otherwise(logs: Sequence[LogSummary], earlier: Result, file: str) -> list[str]:
+def read_otherwise(logs: Sequence[LogSummary], earlier: Result, file: str) -> list[Notice]:
     """Warnings of logs that were read otherwise than those of an earlier result, which `file` holds."""
     before = earlier.log.reading
     if before is None:
         return []
     return [
-        f"{PurePath(log.path).name}: read otherwise than the log of {file}: {', '.join(differences)}"
+        Notice(
+            "READ_OTHERWISE",
+            numbers={"file": file, "differences": ", ".join(differences)},
+            logs=(PurePath(log.path).name,),
+        )
         for log in logs
         if log.reading and (differences := sorted(log.reading.differences(before)))
     ]

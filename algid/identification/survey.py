@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from itertools import chain, islice
 
 from algid.identification.source import LogSource
-from algid.log import Log, Notice
+from algid.log import Log
+from algid.notices import Notice
 from algid.progress import Progress
 from algid.results import LogSummary
 from algid.runtime import Beside

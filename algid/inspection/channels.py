@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from algid.inspection.figures import robust_deviation, saturated_share
-from algid.inspection.findings import Finding
 from algid.log import Log
+from algid.notices import Notice, Remedy
 from algid.words import counted
 
 _DENORMAL = 1e-6
@@ -18,32 +18,29 @@ _DEAD, _DEAD_RUNS = 0.1, 20  # s, and in usual runs: a torque that keeps one val
 _TURN = 2 * math.pi
 
 
-def efforts(log: Log) -> Iterator[Finding]:
+def efforts(log: Log) -> Iterator[Notice]:
     """Torques that are zero, constant or clipped; that of a joint without a motor may be anything."""
     for joint, tau in enumerate(log.tau, start=1):
         if joint == log.origin.reading.passive:
             continue
         name = f"tau{joint}"
-        other = f'--set {name}.source=NAME (profile: source = "NAME" of [{name}])'
+        other = Remedy({f"{name}.source": None}, "name the measured torque")
         largest, what = float(np.abs(tau).max()), _source(log, name)
         if largest == 0:
-            text = (
-                f"{what} is zero in every sample; name the measured torque: {other}; for a joint without a "
-                f"motor: --passive {joint} (profile: passive = {joint})"
-            )
-            yield Finding("EFFORT_ZERO", text, True)
+            motorless = Remedy({"passive": joint}, "for a joint without a motor")
+            yield Notice("EFFORT_ZERO", f"{what} is zero in every sample", refuse=True, remedies=(other, motorless))
         elif largest < _DENORMAL:
-            text = f"{what} never exceeds {largest:.3g} N m: no torque; name the measured one: {other}"
-            yield Finding("EFFORT_DENORMAL", text, True)
+            text = f"{what} never exceeds {largest:.3g} N m: no torque"
+            yield Notice("EFFORT_DENORMAL", text, refuse=True, remedies=(other,))
         elif tau.min() == tau.max():
-            text = f"{what} is {tau[0]:.6g} N m in every sample; name the measured torque: {other}"
-            yield Finding("EFFORT_CONSTANT", text, True)
+            text = f"{what} is {tau[0]:.6g} N m in every sample"
+            yield Notice("EFFORT_CONSTANT", text, refuse=True, remedies=(other,))
         elif (share := saturated_share(tau)) > 0.01:
             text = f"{what} stands at its limit in {100 * share:.3g} % of the samples"
-            yield Finding("SATURATED_EFFORT", text)
+            yield Notice("SATURATED_EFFORT", text)
 
 
-def dead_efforts(log: Log) -> Iterator[Finding]:
+def dead_efforts(log: Log) -> Iterator[Notice]:
     """Torques whose longest run of one value is far longer than their runs elsewhere.
 
     A run at the largest or the smallest value is a limit's, and slow publishers repeat every value as often.
@@ -59,34 +56,31 @@ def dead_efforts(log: Log) -> Iterator[Finding]:
         at_limit = tau[first] in (tau.max(), tau.min())
         if not at_limit and length * log.period >= _DEAD and length >= _DEAD_RUNS * usual:
             span = f"for {length * log.period:.3g} s from t = {first * log.period:.6g} s"
-            yield Finding("DEAD_EFFORT", f"{_source(log, name)} stands still {span}; leave that out")
+            yield Notice("DEAD_EFFORT", f"{_source(log, name)} stands still {span}; leave that out")
 
 
-def angles(log: Log) -> Iterator[Finding]:
+def angles(log: Log) -> Iterator[Notice]:
     """Angles that never change, jump by a turn, or freeze until they jump."""
     for name, theta in zip(("theta1", "theta2"), log.theta, strict=True):
         steps, what = np.diff(theta), _source(log, name)
         moving = np.flatnonzero(steps)
         if not moving.size:
-            yield Finding("ANGLE_CONSTANT", f"{what} is {theta[0]:.6g} rad in every sample")
+            yield Notice("ANGLE_CONSTANT", f"{what} is {theta[0]:.6g} rad in every sample")
             continue
         sizes = np.abs(steps)
         wraps = int(np.count_nonzero(np.abs(sizes - _TURN) < 0.1 * _TURN))
         if wraps and np.median(sizes) < 0.5:  # at this rate the arm moves by far less than a turn between two samples
-            text = (
-                f"{what} jumps by a turn {counted(wraps, 'time')}: --set {name}.unwrap=true "
-                f"(profile: unwrap = true of [{name}])"
-            )
-            yield Finding("WRAPPED_ANGLE", text, True)
+            text = f"{what} jumps by a turn {counted(wraps, 'time')}"
+            yield Notice("WRAPPED_ANGLE", text, refuse=True, remedies=(Remedy({f"{name}.unwrap": True}),))
         runs, usual = np.diff(moving), float(np.quantile(sizes[moving], 0.99))
         long_enough = max(10, round(0.02 / log.period))
         frozen = np.flatnonzero((runs > long_enough) & (sizes[moving[1:]] > 5 * usual))
         if frozen.size:
             start, length = (int(moving[frozen[0]]) + 1) * log.period, int(runs[frozen[0]]) * log.period
-            yield Finding("STUCK_SENSOR", f"{what} freezes for {length:.3g} s from t = {start:.6g} s, then jumps")
+            yield Notice("STUCK_SENSOR", f"{what} freezes for {length:.3g} s from t = {start:.6g} s, then jumps")
 
 
-def degrees(log: Log, is_right: Callable[[], bool]) -> Iterator[Finding]:
+def degrees(log: Log, is_right: Callable[[], bool]) -> Iterator[Notice]:
     """Angles or velocities in degrees, by each other or by how far the angles turn.
 
     A joint may turn as often as it will: `is_right` tells whether physics holds for the log as it was read.
@@ -116,19 +110,19 @@ def _travelled_over_summed(log: Log, row: int) -> float:
     return float(np.sum(travelled[moving])) / total if total > 0 else 0.0
 
 
-def _in_degrees(log: Log, name: str, text: str) -> Finding:
+def _in_degrees(log: Log, name: str, text: str) -> Notice:
     """Refused, unless the user has said the unit of the channel `name`."""
     if log.origin.reading.told(name):
         unit = log.origin.reading.channels[name].unit
-        return Finding("DEGREES", f"{text}; they are taken for {unit} as told")
-    of_angle = name.startswith("theta")
-    flag = "--angle-unit " if of_angle else f"--set {name}.unit="
-    motor = f", --set {name}.gear_ratio=N for the angle of a motor behind its gear" if of_angle else ""
-    mend = f"{flag}deg{motor}, or {flag}rad where it is right (profile: unit or gear_ratio of [{name}])"
-    return Finding("DEGREES", f"{text}: {mend}", True)
+        return Notice("DEGREES", f"{text}; they are taken for {unit} as told")
+    remedies = [Remedy({"angle_unit": "deg"} if name.startswith("theta") else {f"{name}.unit": "deg"})]
+    if name.startswith("theta"):
+        remedies.append(Remedy({f"{name}.gear_ratio": None}, "for the angle of a motor behind its gear"))
+    remedies.append(Remedy({f"{name}.unit": "rad"}, "where it is right"))
+    return Notice("DEGREES", text, refuse=True, remedies=tuple(remedies))
 
 
-def spikes(log: Log) -> Iterator[Finding]:
+def spikes(log: Log) -> Iterator[Notice]:
     """Single samples thirty times further off the middle of their neighbours than noise and bends of the signal are."""
     if len(log) < 20:
         return
@@ -140,7 +134,7 @@ def spikes(log: Log) -> Iterator[Finding]:
         if found.size:
             first = float(log.t[1:-1][found][0])
             text = f"{_source(log, name)} has {counted(len(found), 'spike')}, the first at t = {first:.6g} s"
-            yield Finding("SPIKES", text)
+            yield Notice("SPIKES", text)
 
 
 def _source(log: Log, name: str) -> str:

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import shlex
+from dataclasses import replace
 from functools import cache, partial
 
 from algid.errors import LogError
 from algid.inspection.channels import angles, dead_efforts, degrees, efforts, spikes
 from algid.inspection.conventions import is_right, judged, mend
 from algid.inspection.dynamics import dynamic_figures, gravity_findings
-from algid.inspection.findings import Finding
+from algid.inspection.findings import yielding
 from algid.inspection.sampling import rests, sampling
-from algid.log import Log, Notice
+from algid.log import Log
+from algid.notices import Notice
 
 
-def examine(log: Log, *, gravity: float = 9.81, whole: bool = True) -> tuple[Finding, ...]:
+def examine(log: Log, *, gravity: float = 9.81, whole: bool = True) -> tuple[Notice, ...]:
     """Everything that the checks find in a log; conventions are not sought in one that a check refuses.
 
     Parameters
@@ -27,7 +28,7 @@ def examine(log: Log, *, gravity: float = 9.81, whole: bool = True) -> tuple[Fin
 
     Returns
     -------
-    tuple of Finding
+    tuple of Notice
         None for a log of fewer than four samples.
     """
     if len(log) < 4:
@@ -42,17 +43,14 @@ def examine(log: Log, *, gravity: float = 9.81, whole: bool = True) -> tuple[Fin
         *sampling(log),
         *rests(log, whole),
     )
-    found = [finding.yielding(log.origin.reading.accepted) for finding in every]
+    found = [yielding(notice, log.origin.reading.accepted) for notice in every]
     if any(finding.refuse for finding in found):
         return tuple(found)
     mended = mend(log, tried())
     if mended is not None:
-        advice = f"use {' '.join(map(shlex.quote, mended.flags))} (profile: {mended.lines})"
-        if mended.another:
-            text = f"{mended.words}, by all that physics says ({mended.contradiction}); {advice}"
-            found.append(Finding("WRONG_CONVENTION", text, flags=mended.flags))
-        else:
-            found.append(Finding("ZERO_OFFSET", f"{mended.words}; {advice}", flags=mended.flags))
+        code = "WRONG_CONVENTION" if mended.another else "ZERO_OFFSET"
+        numbers = {"wrong": mended.words, "contradiction": mended.contradiction}
+        found.append(Notice(code, numbers=numbers, remedies=(mended.remedy,)))
     elif gravity > 0 and (figures := dynamic_figures(log)) is not None:
         found += gravity_findings(figures)
     return tuple(found)
@@ -69,6 +67,6 @@ def noticed(log: Log, *, gravity: float = 9.81, whole: bool = True) -> tuple[Not
     findings = examine(log, gravity=gravity, whole=whole)
     refused = next((finding for finding in findings if finding.refuse), None)
     if refused is not None and whole:
-        raise LogError(f"{log.origin.path}: {refused.code}: {refused.text}")
+        raise LogError(f"{log.origin.path}: {refused.code}: {refused.clause}")
     place = "" if whole else f" (in its first {log.duration:.0f} s)"
-    return tuple(Notice(one.code, f"{one.code}: {one.text}{place}", flags=one.flags, note=one.note) for one in findings)
+    return tuple(replace(one, text=f"{one.text}{place}", refuse=False) for one in findings)

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import degrees, isclose, pi, remainder
@@ -16,6 +15,7 @@ import numpy as np
 from algid.estimators.convention_search import Judgement, judge
 from algid.estimators.conventions import AS_READ, Convention
 from algid.log import Log, Reading
+from algid.notices import Remedy
 from algid.signals.segments import Segment, append, segments
 from algid.words import counted
 
@@ -42,31 +42,15 @@ class Mend:
     another: bool
 
     @property
-    def flags(self) -> tuple[str, ...]:
-        """Flags that say the same."""
-        flags: list[str] = []
-        for name, value in self.settings.items():
-            if name in ("zero", "second_angle", "drive"):
-                flags += ["--" + name.replace("_", "-"), str(value)]
-            elif name == "joints":
-                flags += ["--joints", ",".join(value)]
-            elif isinstance(value, Mapping):
-                for key, inner in value.items():
-                    flags += ["--set", f"{name}.{key}={_toml(inner)}"]
-            else:
-                flags += ["--set", f"{name}={json.dumps(value)}"]
-        return tuple(flags)
-
-    @property
-    def lines(self) -> str:
-        """The profile's lines."""
-        own, channels = [], []
+    def remedy(self) -> Remedy:
+        """The same settings by dotted names."""
+        flat: dict[str, Any] = {}
         for name, value in self.settings.items():
             if isinstance(value, Mapping):
-                channels += [f"{key} = {_toml(inner)} of [{name}]" for key, inner in value.items()]
+                flat |= {f"{name}.{key}": inner for key, inner in value.items()}
             else:
-                own.append(f"{name} = {_toml(value)}")
-        return ", ".join(own + channels)
+                flat[name] = value
+        return Remedy(flat)
 
 
 def judged(log: Log, *, gravity: bool = True) -> Judgement | None:
@@ -223,7 +207,3 @@ def _zeros(convention: Convention, reading: Reading, place: tuple[int, int]) -> 
     offsets = [0.0 if abs(angle) < _SAME else float(f"{angle:.6g}") for angle in added]
     found: dict[str, Any] = {"zero": zero} if zero != reading.zero else {}
     return found | ({"offsets": offsets} if offsets != list(reading.offsets) else {})
-
-
-def _toml(value: Any) -> str:
-    return json.dumps(value, ensure_ascii=False)

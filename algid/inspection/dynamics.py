@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from algid.arm import FloatArray, regressor
-from algid.inspection.findings import Finding
 from algid.log import Log
+from algid.notices import Notice, Remedy
 
 _RATE = 100.0
 _MOST_ROWS = 20_000
@@ -93,32 +93,24 @@ def dynamic_figures(log: Log) -> DynamicFigures | None:
     )
 
 
-def gravity_findings(figures: DynamicFigures) -> Iterator[Finding]:
+def gravity_findings(figures: DynamicFigures) -> Iterator[Notice]:
     """What a rough fit that explains the torques says of gravity: none, upwards, or sideways."""
     if figures.condition > 1e6 or figures.explained < 0.3:
         return
     weightless = math.hypot(figures.weight1, figures.weight2) < _LEAST_PULL * abs(figures.inertia)
     if figures.seen > 0.15 and figures.gravity_share < 0.01 and weightless:
-        text = (
-            f"torques carry no weight (gravity explains {100 * figures.gravity_share:.2g} % of them): "
-            "they are gravity-compensated, or the arm moves in a horizontal plane (--gravity 0; profile: gravity = 0)"
-        )
-        yield Finding("GRAVITY_COMPENSATED", text)
+        level = Remedy({"gravity": 0}, "for a horizontal plane")
+        yield Notice("GRAVITY_COMPENSATED", numbers={"percent": 100 * figures.gravity_share}, remedies=(level,))
     elif figures.seen < 0.015 or figures.gravity_share < 0.02:
         return  # the motion does not tell where gravity pulls
     elif abs(figures.turn) > 135:
-        text = (
-            f"gravity pulls upwards (k4 = {figures.weight1:.3g} N m): the sign of torques or angles is wrong; turn the "
-            "torques round: --set tau1.sign=-1 --set tau2.sign=-1 (profile: sign = -1 of [tau1] and [tau2]), or angles "
-            "and velocities likewise"
+        torques = Remedy(
+            {"tau1.sign": -1, "tau2.sign": -1}, "turn the torques round, or angles and velocities likewise"
         )
-        yield Finding("FLIPPED_SIGN", text)
+        yield Notice("FLIPPED_SIGN", numbers={"weight": figures.weight1}, remedies=(torques,))
     elif abs(figures.turn) > 45:
-        text = (
-            f"gravity is turned by {figures.turn:.0f}°: θ1 is not from the horizontal: --zero hanging "
-            '(profile: zero = "hanging"), or --set theta1.offset=RAD'
-        )
-        yield Finding("WRONG_ZERO", text)
+        hanging, other = Remedy({"zero": "hanging"}), Remedy({"theta1.offset": None}, "another zero")
+        yield Notice("WRONG_ZERO", numbers={"turn": figures.turn}, remedies=(hanging, other))
 
 
 def _smoothed(log: Log) -> tuple[FloatArray, FloatArray, float] | None:

@@ -31,30 +31,19 @@ WRONG_ZERO            no       gravity pulls sideways: θ1 is not from the horiz
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import replace
+
+from algid.notices import Notice, Remedy
 
 REFUSED = ("EFFORT_ZERO", "EFFORT_DENORMAL", "EFFORT_CONSTANT", "WRAPPED_ANGLE", "DEGREES")
 """The checks that refuse a log unless they are accepted."""
 
 
-@dataclass(frozen=True)
-class Finding:
-    """One thing seen: its code, what it means, whether the log is refused for it, and the flags that mend it.
-
-    `note` tells that it may be right as it is, and is no reason to doubt a result.
-    """
-
-    code: str
-    text: str
-    refuse: bool = False
-    flags: tuple[str, ...] = ()
-    note: bool = False
-
-    def yielding(self, accepted: Collection[str]) -> Finding:
-        """A refusal with what overrides it named, or as a warning where its code is in `accepted`; else the same."""
-        if not self.refuse:
-            return self
-        if self.code in accepted:
-            return replace(self, refuse=False, text=f"{self.text}; used nevertheless, as accept says")
-        override = f'--accept {self.code} (profile: accept = ["{self.code}"])'
-        return replace(self, text=f"{self.text}; to use it nevertheless: {override}")
+def yielding(notice: Notice, accepted: Collection[str]) -> Notice:
+    """A refusal with what overrides it, or as a warning where its code is in `accepted`; else the same."""
+    if not notice.refuse:
+        return notice
+    if notice.code in accepted:
+        return replace(notice, refuse=False, remedies=(), text=f"{notice.text}; used nevertheless, as accept says")
+    override = Remedy({"accept": notice.code}, "to use it nevertheless")
+    return replace(notice, remedies=(*notice.remedies, override))

@@ -16,8 +16,8 @@ from algid.faults import during
 from algid.inspection.checks import examine
 from algid.inspection.dynamics import DynamicFigures, dynamic_figures
 from algid.inspection.figures import ClockFigures, SignalFigures, clock_figures, signal_figures
-from algid.inspection.findings import Finding
-from algid.log import Log, Notice
+from algid.log import Log
+from algid.notices import Notice
 from algid.readers import read_log
 from algid.readers.formats import Entry, format_of
 
@@ -80,7 +80,7 @@ class Inspection:
     signals: dict[str, SignalFigures] | None = None
     dynamics: DynamicFigures | None = None
     notices: tuple[Notice, ...] = ()
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[Notice, ...] = ()
 
     @property
     def lossy(self) -> bool:
@@ -107,7 +107,7 @@ def inspect_log(path: Path, profile: Profile | None = None) -> Inspection:
     log = seen.found
     gravity = profile.gravity if profile is not None else 9.81
     findings = examine(log, gravity=gravity)
-    reasons = [f"{one.code}: {one.text}" for one in findings if one.refuse]
+    reasons = [f"{one.code}: {one.clause}" for one in findings if one.refuse]
     return Inspection(
         path=str(path),
         format=seen.format,

@@ -9,8 +9,8 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.inspection.figures import clock_figures, signal_figures
-from algid.inspection.findings import Finding
 from algid.log import Log
+from algid.notices import Notice, Remedy
 from algid.signals.spacing import NEAR, near_stamps
 from algid.words import counted
 
@@ -22,43 +22,38 @@ _REST, _STILL = 0.5, 1e-3
 """Seconds at rest that are worth a word; and of an angle's range, how far it may creep meanwhile."""
 
 
-def sampling(log: Log) -> Iterator[Finding]:
+def sampling(log: Log) -> Iterator[Notice]:
     """Logs too short or too slow for their motion; stamps that cluster, miss samples or jitter."""
     clock = clock_figures(log)
     period = f"a period of {1e3 / clock.rate:.4g} ms"
     if clock.duration < _SHORTEST:
         text = f"the log lasts {clock.duration:.3g} s; an estimate needs a second of motion at least, ten are better"
-        yield Finding("SHORT_LOG", text)
+        yield Notice("SHORT_LOG", text)
     samples = samples_a_period(log)
     if samples < _FEWEST:
         text = (
             f"{samples:.2g} samples in a period of the motion at {clock.rate:.4g} Hz: too slow to tell its "
             "acceleration; record faster, or move more slowly"
         )
-        yield Finding("SLOW_SAMPLING", text)
+        yield Notice("SLOW_SAMPLING", text)
     near = near_stamps(log.stamp_ns, log.period)
     if near:
         text = (
             f"{counted(near, 'sample follows', 'samples follow')} the one before by less than {NEAR:g} of {period}, as "
             "receipt times do: late ones go back to the period they are missing from, the mean stands for the others"
         )
-        yield Finding("NEAR_STAMPS", text)
+        yield Notice("NEAR_STAMPS", text)
     lost = lost_steps(log)
     if lost:
-        text = (
-            f"{counted(lost, 'step of the angles is', 'steps of the angles are')} twice as long as usual, though "
-            "the stamps are even: samples were lost and the others renumbered, so that no estimate can be right; take "
-            "the stamps of the messages, or record without losses; to use it nevertheless: --accept LOST_SAMPLES "
-            '(profile: accept = ["LOST_SAMPLES"])'
-        )
-        yield Finding("LOST_SAMPLES", text)
+        override = Remedy({"accept": "LOST_SAMPLES"}, "to use it nevertheless")
+        yield Notice("LOST_SAMPLES", numbers={"count": lost}, remedies=(override,))
     if clock.gaps:
         text = f"{counted(clock.gaps, 'gap')}, the longest {clock.longest_gap:.4g} s; no window spans one"
-        yield Finding("GAPS", text)
+        yield Notice("GAPS", text)
     if clock.jitter * clock.rate > 0.01:
         bend = max(float(np.sqrt(np.mean(np.diff(row, 2) ** 2))) for row in log.theta) / 8
         text = f"stamps jitter by {clock.jitter * 1e3:.3g} ms about {period}"
-        yield Finding("JITTER", f"{text}; resampling moves angles by {bend:.2g} rad at most, linearly")
+        yield Notice("JITTER", f"{text}; resampling moves angles by {bend:.2g} rad at most, linearly")
 
 
 def samples_a_period(log: Log) -> float:
@@ -94,7 +89,7 @@ def lost_steps(log: Log) -> int:
     return lost if lost > max(_LOST_SHARE * len(log), _FEWEST, _AGAINST * chance) else 0
 
 
-def rests(log: Log, whole: bool) -> Iterator[Finding]:
+def rests(log: Log, whole: bool) -> Iterator[Notice]:
     """Rest before the motion and, where the log is `whole`, after it.
 
     A joint that stiction holds bears a torque of which the motion tells nothing: gravity's constants take it. A posture
@@ -109,15 +104,13 @@ def rests(log: Log, whole: bool) -> Iterator[Finding]:
     if before == log.duration:
         return
     end = log.duration - after
-    parts = [(before, f"for its first {before:.3g} s", f"--start {before:.4g}", f"start = {before:.4g}")]
-    parts += [(after, f"for its last {after:.3g} s", f"--end {end:.4g}", f"end = {end:.4g}")]
-    if long := [part for part in parts if part[0] >= _REST]:
-        _, words, flags, lines = zip(*long, strict=True)
-        text = (
-            f"the arm rests {' and '.join(words)}; where friction holds it there, the torque is not that of the "
-            f"weight: leave the rest out with {' '.join(flags)} (profile: {', '.join(lines)})"
-        )
-        yield Finding("RESTS", text, flags=flags, note=True)
+    parts = [(before, f"for its first {before:.3g} s", "start", float(f"{before:.4g}"))]
+    parts += [(after, f"for its last {after:.3g} s", "end", float(f"{end:.4g}"))]
+    long = [part for part in parts if part[0] >= _REST]
+    if long:
+        rests = [words for _, words, _, _ in long]
+        cut = Remedy({setting: value for _, _, setting, value in long})
+        yield Notice("RESTS", numbers={"rests": rests}, remedies=(cut,), note=True)
 
 
 def _still(t: FloatArray, theta: FloatArray, room: FloatArray, few: int) -> float:

@@ -14,7 +14,8 @@ from algid.arm import FloatArray
 from algid.errors import LogError
 from algid.faults import during
 from algid.limits import LIMITS
-from algid.log import Log, Notice, Origin
+from algid.log import Log, Origin
+from algid.notices import Notice
 from algid.readers.convert import ROWS, Conversion, Gatherer, channel_readings
 from algid.readers.table import BLOCK_ROWS, SampleTable, cut
 from algid.readers.timebase import in_order

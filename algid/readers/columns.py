@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from algid.errors import LogError
-from algid.log import Notice, Reading
+from algid.log import Reading
+from algid.notices import Notice
 from algid.readers.joints import reading_of
 from algid.readers.names import COMMANDED, CURRENTS, ChannelChoice, choose, on_motor_side, other_joints, take_apart
 from algid.readers.table import CHANNELS, JOINT_CHANNELS, VELOCITIES

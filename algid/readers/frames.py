@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from algid.errors import LogError
 from algid.limits import LIMITS
-from algid.log import Companion, IntArray, Notice, Origin, add, word_sum
+from algid.log import Companion, IntArray, Origin, add, word_sum
+from algid.notices import Notice
 from algid.readers.assemble import TableReader, reader_of
 from algid.readers.columns import Columns
 from algid.readers.joints import moving_joints

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from algid.errors import LogError
-from algid.log import Notice, Reading
+from algid.log import Reading
+from algid.notices import Notice
 from algid.readers.table import SampleTable
 from algid.words import counted
 

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from algid.errors import LogError
 from algid.limits import LIMITS
-from algid.log import CANONICAL_COLUMNS, KEY, Notice, loads
+from algid.log import CANONICAL_COLUMNS, KEY, loads
+from algid.notices import Notice
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign
 from algid.readers.footer import Footer, FooterError, Pages, page_header, parsed

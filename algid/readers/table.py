@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.log import IntArray, Notice
+from algid.log import IntArray
+from algid.notices import Notice
 
 JOINT_CHANNELS = ("theta1", "theta2", "tau1", "tau2")
 VELOCITIES = ("omega1", "omega2")

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.errors import LogError
-from algid.log import IntArray, Notice
+from algid.log import IntArray
+from algid.notices import Notice
 from algid.readers.table import SampleTable, stack
 from algid.words import counted
 

@@ -12,8 +12,9 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.report.series import TorqueLog
-from algid.report.text import escaped, script_json, significant
+from algid.report.text import escaped, script_json
 from algid.results import Result
+from algid.text import significant
 
 FRAMES = 30.0  # a second
 MOST_FRAMES = 6_000

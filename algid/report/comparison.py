@@ -9,8 +9,8 @@ from dataclasses import asdict, dataclass
 
 from algid.report.document import Column, Table
 from algid.report.tables import flat_settings
-from algid.report.text import ABSENT, file_name, resolved, significant, unit_text, visible
 from algid.results import Estimate, Result
+from algid.text import ABSENT, file_name, resolved, significant, unit_text, visible
 from algid.words import counted
 
 

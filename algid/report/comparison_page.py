@@ -14,9 +14,9 @@ from algid.report.comparison import Comparison
 from algid.report.document import Document, Section
 from algid.report.figures.base import Figure, Layout, Legend, Panel, Trace, axis, label, packed, stretch
 from algid.report.frame import page
-from algid.report.text import joined, significant, visible
-from algid.report.verdict import Verdict
 from algid.results import Estimate, Result
+from algid.text import joined, significant, visible
+from algid.verdict import Verdict
 from algid.words import counted
 
 COLOURS = ("@blue", "@orange", "@green", "@amber", "@red", "@muted")

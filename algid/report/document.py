@@ -13,8 +13,8 @@ from typing import Literal
 
 from algid.report.arm import ArmDrawing
 from algid.report.figures.base import Figure, Missing
-from algid.report.text import ABSENT
-from algid.report.verdict import Verdict
+from algid.text import ABSENT
+from algid.verdict import Verdict
 
 Kind = Literal["name", "number", "text", "status", "doubtful status"]
 Fold = Literal["", "open", "closed"]

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.report.text import escaped, significant
+from algid.report.text import escaped
 from algid.results import Estimate
+from algid.text import significant
 
 
 def _svg(kind: str, width: float, height: float, says: str, drawing: str) -> str:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
+from algid.notices import Notice
 from algid.report.arm import ArmDrawing, arm_html
 from algid.report.document import Bullets, Column, Content, Document, Drawn, ReadingAid, References, Section, Table
 from algid.report.figures.base import Figure, Missing, Panel
 from algid.report.text import escaped
-from algid.report.verdict import Verdict
 from algid.results import Status
+from algid.verdict import MOST_REASONS, Verdict
+from algid.words import counted
 
 CARDED = 3  # columns; a row of a wider table stands as a card on a phone, so that no column is out of sight
 ANSWERS = ("yes", "no", "none")
@@ -19,15 +21,29 @@ SIGNS = {"good": "✓", "reservations": "!", "failed": "✕"}
 
 
 def banner(judged: Verdict) -> str:
-    """The verdict's sentence, what to run first, and the reasons that it does not say itself, in its colour."""
-    cause = f'<p class="cause">Likely cause: {escaped(judged.cause)}</p>' if judged.cause else ""
+    """The verdict in its colour: headline, the first reasons, what to run first; the rest is folded away."""
+    first, rest = judged.reasons[:MOST_REASONS], judged.reasons[MOST_REASONS:]
+    shown = f"<ul>{_listed(_sentences(first))}</ul>" if first else ""
     if judged.command:
-        cause += f'<p class="cause">Run first: <code>{escaped(judged.command)}</code></p>'
-    reasons = f"<ul>{_listed(judged.further_reasons)}</ul>" if judged.further_reasons else ""
-    return (
-        f'<div class="verdict {judged.level}"><span class="sign" aria-hidden="true">{SIGNS[judged.level]}</span>'
-        f"<div><p><strong>{judged.word}</strong>{escaped(judged.rest)}</p>{cause}{reasons}</div></div>"
+        shown += f'<p class="cause">Run first: <code>{escaped(judged.command)}</code></p>'
+    shown += _folded(counted(len(rest), "more reason"), rest) + _folded(
+        f"data notes ({len(judged.notes)})", judged.notes
     )
+    return (
+        f'<div class="verdict {judged.grade}"><span class="sign" aria-hidden="true">{SIGNS[judged.grade]}</span>'
+        f"<div><p><strong>{judged.word}</strong>: {escaped(judged.headline)}.</p>{shown}</div></div>"
+    )
+
+
+def _sentences(notices: Iterable[Notice]) -> tuple[str, ...]:
+    return tuple(one.sentence for one in notices)
+
+
+def _folded(title: str, notices: Sequence[Notice]) -> str:
+    """Notices behind their title; nothing where there is none."""
+    if not notices:
+        return ""
+    return f"<details><summary>{escaped(title)}</summary><ul>{_listed(_sentences(notices))}</ul></details>"
 
 
 def _listed(sentences: tuple[str, ...]) -> str:

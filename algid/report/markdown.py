@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 
 from algid.report.document import Depth, Document, Table
-from algid.report.verdict import Level
+from algid.text import visible
+from algid.verdict import Grade
 
-LEVEL_SIGNS: dict[Level, str] = {"good": "✅", "reservations": "⚠️", "failed": "❌"}
+GRADE_SIGNS: dict[Grade, str] = {"good": "✅", "reservations": "⚠️", "failed": "❌"}
 _SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|~@&])")
 
 
@@ -17,12 +18,11 @@ def markdown(document: Document) -> str:
     lines = [
         f"### {escaped(document.title)}",
         "",
-        f"{LEVEL_SIGNS[judged.level]} **{judged.word}**{escaped(judged.rest)}",
+        f"{GRADE_SIGNS[judged.grade]} **{judged.word}**: {escaped(visible(judged.headline))}.",
         "",
-        *([f"Likely cause: {escaped(judged.cause)}", ""] if judged.cause else []),
+        *(f"- {escaped(visible(reason.sentence))}" for reason in judged.reasons),
+        "",
         *(["Run first:", "", *_code(judged.command), ""] if judged.command else []),
-        *(f"- {escaped(reason)}" for reason in judged.further_reasons),
-        "",
         *map(markdown_table, document.tables(Depth.TERMINAL, Depth.MARKDOWN)),
     ]
     folded = document.tables(Depth.FOLDED)

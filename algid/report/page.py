@@ -23,9 +23,8 @@ from algid.report.tables import (
     settings_table,
     terms_tables,
 )
-from algid.report.text import file_name, significant
-from algid.report.verdict import verdict
 from algid.results import Result, read_result
+from algid.text import file_name, significant
 from algid.words import counted
 
 FIRST = ("Parameters", "Payload")
@@ -90,7 +89,8 @@ def result_document(result: Result, shown: Gallery | None = None) -> Document:
     torque = None if shown is None else shown.torque
     figures, convergence = ([], []) if shown is None else (shown.figures, shown.paper)
     data = (*quality_tables(torque, result), *log_tables(result.logs))
-    notes = Bullets(tuple(result.notes), "What the readers and the estimator warn of stands at the top of the page.")
+    noted = tuple(one.sentence for one in result.verdict.notes)
+    notes = Bullets(noted, "What the readers and the estimator warn of stands at the top of the page.")
     opened: Fold = "open" if result.estimator == "paper" or _truth(result) else "closed"
     sections = (
         Section(
@@ -113,7 +113,7 @@ def result_document(result: Result, shown: Gallery | None = None) -> Document:
     seconds, samples = sum(log.duration for log in result.logs), sum(log.rows for log in result.logs)
     return Document(
         title=f"Identification of {name}",
-        verdict=verdict(result),
+        verdict=result.verdict,
         sections=sections,
         kicker="identification of a two-link arm",
         name=f"{name} and {len(result.more_logs)} more" if result.more_logs else name,

@@ -10,9 +10,9 @@ from typing import Any
 
 from algid.report.document import Column, Depth, Table, filled
 from algid.report.series import TorqueLog
-from algid.report.text import ABSENT, digits_of, file_name, interval, percent, resolved, significant, unit_text, visible
-from algid.report.verdict import replaced_estimator, verdict
 from algid.results import Estimate, FitSummary, LogSummary, Result, Table4Row
+from algid.results.verdict import replaced_estimator
+from algid.text import ABSENT, digits_of, file_name, interval, percent, resolved, significant, unit_text, visible
 from algid.words import counted
 
 LONGEST_VALUE = 4_000  # characters: a command that names many logs is there to be copied
@@ -237,7 +237,7 @@ def estimate_tables(result: Result) -> tuple[Table, ...]:
         note = "Names and order of the paper's Table 4; Paper % is the error it reports."
         tables.append(Table("Table 4", TABLE4_COLUMNS, rows, note))
     shown = filled(*(table.without_empty() for table in tables))
-    if verdict(result).level == "failed":
+    if result.verdict.failed:
         shown = tuple(table.doubted() for table in shown)
     return shown + filled(_prediction(result.fit))
 

@@ -6,15 +6,17 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from algid.report.document import Column, Depth, Document, Table
-from algid.report.verdict import Level, Verdict
 from algid.results import Status
+from algid.text import visible
+from algid.verdict import Grade, Verdict
+from algid.words import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table as RichTable
 
 LONGEST_WORD = 24  # columns; what is longer, like a path, breaks where it must
-LEVEL_STYLES: dict[Level, str] = {"good": "bold green", "reservations": "bold yellow", "failed": "bold red"}
+GRADE_STYLES: dict[Grade, str] = {"good": "bold green", "reservations": "bold yellow", "failed": "bold red"}
 
 
 def print_document(document: Document, console: Console) -> None:
@@ -25,23 +27,24 @@ def print_document(document: Document, console: Console) -> None:
         print_table(table, console)
 
 
-def print_verdict(judged: Verdict, console: Console) -> None:
-    """Print the sentence and the reasons behind it, as a list whose longer points stay clear of the bullets."""
+def print_verdict(judged: Verdict, console: Console, most: int | None = None) -> None:
+    """Print grade and headline, what to run first, and as many of the reasons as are asked for, all by default."""
     from rich.table import Table as RichTable
     from rich.text import Text
 
-    console.print(Text.assemble((judged.word, LEVEL_STYLES[judged.level]), judged.rest))
-    if judged.cause:
-        console.print(Text.assemble(("Likely cause: ", "bold"), judged.cause))
-    if judged.command:
-        console.print(Text.assemble(("Run first:    ", "bold"), judged.command), soft_wrap=True)
-    if judged.further_reasons:
-        points = RichTable.grid(padding=(0, 1))
-        points.add_column()
-        points.add_column(overflow="fold")
-        for reason in judged.further_reasons:
-            points.add_row(" •", Text(reason))
+    console.print(Text.assemble((judged.word, GRADE_STYLES[judged.grade]), f": {visible(judged.headline)}."))
+    points = RichTable.grid(padding=(0, 1))
+    points.add_column()
+    points.add_column(overflow="fold")
+    for reason in judged.reasons[:most]:
+        points.add_row(" •", Text.assemble(visible(reason.sentence), (f" [{reason.code}]", "dim")))
+    left = len(judged.reasons[most:]) if most is not None else 0
+    if left:
+        points.add_row("", f"and {counted(left, 'more reason')}, with -v and in the report")
+    if points.row_count:
         console.print(points)
+    if judged.command:
+        console.print(Text.assemble(("Run first: ", "bold"), judged.command), soft_wrap=True)
 
 
 def print_table(table: Table, console: Console) -> None:

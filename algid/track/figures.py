@@ -9,7 +9,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.report.figures.base import Figure, Layout, Legend, Panel, Trace, axis, level, line, packed, stretch, times
 from algid.report.reduce import MinMax, broken_at_gaps, bucket_size
-from algid.report.text import joined
+from algid.text import joined
 from algid.track.bins import CELL
 from algid.track.payload import HALF_BAND, HOLE, QUANTILE, Track
 from algid.track.result import TrackResult

@@ -15,7 +15,7 @@ from algid.report.export import START_KEY, write_series
 from algid.report.frame import page
 from algid.report.markdown import markdown
 from algid.report.tables import settings_table
-from algid.report.text import file_name, significant
+from algid.text import file_name, significant
 from algid.track.figures import figures
 from algid.track.payload import QUANTILE
 from algid.track.result import TrackResult, track_json
@@ -27,7 +27,7 @@ def track_document(result: TrackResult) -> Document:
     """The report of a track."""
     name = file_name(result.log.path)
     seconds, rate = significant(result.log.duration, 4), significant(result.log.rate, 4)
-    warnings = Bullets(tuple(result.warnings), "The readers gave no warning.")
+    warnings = Bullets(tuple(one.sentence for one in result.notices), "The readers gave no warning.")
     sections = (
         Section((stretch_table(result), *figures(result), *filled(change_table(result)))),
         Section((warnings, *quality_tables(result)), "data", "Data quality"),

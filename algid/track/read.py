@@ -11,6 +11,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from algid.errors import ResultError
 from algid.files import first_misfit, read_text
+from algid.notices import Notice
 from algid.report.reduce import Block, blocks
 from algid.results import LogSummary, misfit_of_numbers
 from algid.track.payload import QUANTILE, Stretch, Track
@@ -70,7 +71,7 @@ class _Change(BaseModel):
 class _Arm(BaseModel):
     path: str
     sha256: str
-    sentence: str | None
+    sentence: str | None = None
 
 
 class _File(BaseModel):
@@ -88,7 +89,8 @@ class _File(BaseModel):
     settings: dict[str, Any]
     log: LogSummary
     data_lost: bool
-    warnings: list[str]
+    warnings: list[str] = []
+    notices: list[Notice] | None = None
 
 
 def _result(found: _File, curve: Block) -> TrackResult:
@@ -110,10 +112,17 @@ def _result(found: _File, curve: Block) -> TrackResult:
         log=found.log,
         arm=found.arm.path,
         arm_sha256=found.arm.sha256,
-        arm_sentence=found.arm.sentence,
         settings=found.settings,
         version=found.version,
         schedule=None if found.schedule is None else tuple(found.schedule),
-        warnings=tuple(found.warnings),
+        notices=_notices(found),
         data_lost=found.data_lost,
     )
+
+
+def _notices(found: _File) -> tuple[Notice, ...]:
+    """What was noticed; of a track of schema version 1 its sentences."""
+    if found.notices is not None:
+        return tuple(found.notices)
+    arm = [] if found.arm.sentence is None else [f"the arm's own result: {found.arm.sentence}"]
+    return tuple(Notice("EARLIER", text) for text in [*arm, *found.warnings])

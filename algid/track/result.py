@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
+from algid.notices import Notice
 from algid.results import LogSummary
 from algid.track.payload import Stretch, Track
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 UNDETERMINED = 0.5  # standard deviation over the payload or link 2, whichever is heavier
 FAR = 4.0  # standard deviations below nothing; by chance one stretch in 30,000
 
@@ -28,19 +29,18 @@ class StretchStatus(StrEnum):
 class TrackResult:
     """A track, and what it came from.
 
-    `arm` names the result of the arm and `arm_sha256` its file; `arm_sentence` is that result's verdict where it is
-    not good. `start_ns` is the log's first stamp. `schedule` is the truth of a synthetic log: times in s and kg.
+    `arm` names the result of the arm and `arm_sha256` its file. `start_ns` is the log's first stamp. `schedule` is the
+    truth of a synthetic log: times in s and kg.
     """
 
     track: Track
     log: LogSummary
     arm: str
     arm_sha256: str
-    arm_sentence: str | None
     settings: Mapping[str, Any]
     version: str
     schedule: tuple[tuple[float, float], ...] | None = None
-    warnings: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
     data_lost: bool = False
 
     @property
@@ -94,10 +94,10 @@ def track_json(result: TrackResult) -> str:
         "bare": result.track.tip_equivalent,
         "holes": result.track.holes.tolist(),
         "schedule": result.schedule,
-        "arm": {"path": result.arm, "sha256": result.arm_sha256, "sentence": result.arm_sentence},
+        "arm": {"path": result.arm, "sha256": result.arm_sha256},
         "settings": dict(result.settings),
         "log": result.log.model_dump(mode="json"),
         "data_lost": result.data_lost,
-        "warnings": list(result.warnings),
+        "notices": [asdict(notice) for notice in result.notices],
     }
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"

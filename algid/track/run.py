@@ -15,7 +15,7 @@ from algid.files import read_whole
 from algid.identification.identify import reused
 from algid.identification.source import LogLike, open_source, read_otherwise
 from algid.identification.survey import Survey
-from algid.report.verdict import verdict
+from algid.notices import Notice, merged
 from algid.results import read_result
 from algid.runtime import one_blas_thread
 from algid.track.bins import arm_of
@@ -70,17 +70,17 @@ def track_log(
         raise LogError(f"{source.name}: {error}; record longer") from error
     otherwise = read_otherwise([survey.summary(source)], result, str(parameters))
     truth, notices = source.origin.truth, survey.seen(source).notices
-    judged = verdict(result)
+    judged = result.verdict
+    doubt = Notice("ARM_DOUBTFUL", numbers={"grade": judged.word.lower(), "headline": judged.headline})
     file = parameters / "result.json" if parameters.is_dir() else parameters
     return TrackResult(
         track=found,
         log=survey.summary(source),
         arm=str(parameters),
         arm_sha256=hashlib.sha256(read_whole(file)).hexdigest(),
-        arm_sentence=None if judged.level == "good" else judged.sentence,
         settings={"l1": arm.l1, "l2": arm.l2, "gravity": arm.model.gravity, **(settings or {})},
         version=__version__,
         schedule=None if truth is None else truth.schedule or ((0.0, truth.payload),),
-        warnings=(*otherwise, *(notice.text for notice in notices)),
+        notices=(*(() if judged.grade == "good" else (doubt,)), *otherwise, *merged(notices)),
         data_lost=any(notice.lossy for notice in notices),
     )

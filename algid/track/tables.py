@@ -8,12 +8,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from algid.notices import Notice
 from algid.report.document import Column, Depth, Table, filled
 from algid.report.tables import log_tables, provenance_table
-from algid.report.text import ABSENT, file_name, joined, significant, visible
-from algid.report.verdict import LEAST_R2, WORST_R2, Verdict, judged, share_text
+from algid.results.verdict import LEAST_R2, WORST_R2, share_text
+from algid.text import ABSENT, file_name, joined, significant
 from algid.track.payload import Stretch
 from algid.track.result import StretchStatus, TrackResult
+from algid.verdict import Verdict, graded
 from algid.words import counted
 
 COLUMNS = (
@@ -51,7 +53,7 @@ def stretch_table(result: TrackResult) -> Table:
             )
         )
     table = Table("Payload by stretch", COLUMNS, tuple(rows)).without_empty()
-    return table.doubted() if verdict(result).level == "failed" else table
+    return table.doubted() if verdict(result).failed else table
 
 
 def change_table(result: TrackResult) -> Table:
@@ -136,17 +138,16 @@ STRANGE = 1e4  # of the rows' variance: a real arm with friction reaches 6e3, an
 ALL_BUT = 0.99  # explained of the torque, beyond which such errors are those of very quiet sensors
 MOST_NAMED = 4
 
-STATUS_WORDS = {
-    StretchStatus.WEAK_EXCITATION: "moves too little to be weighed",
-    StretchStatus.NEGATIVE_MASS: "weighs less than nothing, which no payload does",
+STATUS_CODES = {
+    StretchStatus.WEAK_EXCITATION: "STRETCHES_WEAK",
+    StretchStatus.NEGATIVE_MASS: "STRETCHES_NEGATIVE",
 }
 
 
 def verdict(result: TrackResult) -> Verdict:
     """Judge a track by its stretches, what it explains of the torque, and the arm's own result."""
-    reasons = tuple(_reasons(result))
-    first = reasons[0].partition(": ")[0] if reasons else ""
-    return judged(_weighed(result), reasons, _failure(result), things="masses", first=first)
+    notes = [one for one in result.notices if one.note]
+    return graded(_weighed(result), list(_reasons(result)), notes, failure=_failure(result), things="masses")
 
 
 def _weighed(result: TrackResult) -> str:
@@ -184,22 +185,15 @@ def _failure(result: TrackResult) -> str | None:
     return None
 
 
-def _reasons(result: TrackResult) -> Iterator[str]:
-    for status, words in STATUS_WORDS.items():
+def _reasons(result: TrackResult) -> Iterator[Notice]:
+    for status, code in STATUS_CODES.items():
         numbers = [str(place) for place, found in enumerate(result.statuses, start=1) if found is status]
         if numbers:
-            many = len(numbers) > 1
-            subject = f"stretch{'es' * many} {joined(numbers)}"
-            yield f"{subject} {words.replace('moves', 'move').replace('weighs', 'weigh') if many else words}"
+            yield Notice(code, numbers={"numbers": numbers})
     if result.track.explained < LEAST_R2:
-        yield f"arm and payload explain only {max(100 * result.track.explained, 0):.0f} % of the torque"
+        yield Notice("TORQUE_UNEXPLAINED", numbers={"percent": max(100 * result.track.explained, 0.0)})
     if result.track.colour > COLOURED:
-        wider = significant(float(result.track.colour) ** 0.5, 2)
-        yield (
-            f"the torque holds errors {wider} times its sensors' noise that the arm's model does not explain: "
-            "intervals are wider by as much, and small changes go unseen"
-        )
-    if result.data_lost:
-        yield "samples of the log are lost"
-    if result.arm_sentence is not None:
-        yield f"the arm's own result says: {visible(result.arm_sentence)}"
+        yield Notice("TORQUE_ERRORS", numbers={"times": significant(float(result.track.colour) ** 0.5, 2)})
+    if result.data_lost and not any(one.lossy for one in result.notices):
+        yield Notice("DATA_LOST")
+    yield from (one for one in result.notices if not one.note)

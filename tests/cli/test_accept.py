@@ -29,7 +29,7 @@ def test_a_refused_log_is_identified_where_its_code_is_accepted(code: str, tmp_p
     )
     assert taken.code in (0, 3), taken.err
     result = json.loads((tmp_path / "arm.algid" / "result.json").read_text())
-    assert any(warning.startswith(f"arm.parquet: {code}: ") for warning in result["warnings"]), result["warnings"]
+    assert [one["logs"] for one in result["notices"] if one["code"] == code] == [["arm.parquet"]], result["notices"]
     assert "Traceback" not in taken.err
     assert code in taken.out
     assert result["parameters"]

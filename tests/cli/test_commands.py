@@ -197,8 +197,8 @@ def test_a_failed_result_ends_with_three_and_says_what_to_run(logs: Path, tmp_pa
     assert found.code == 3
     lines = found.out.splitlines()
     assert lines[0].startswith("Failed: ")
-    assert any(line.startswith("Likely cause: ") for line in lines[1:4])
-    assert f"Run first:    algid inspect {tmp_path / 'wrong.csv'}" in lines
+    assert "[UNKNOWN_CAUSE]" in found.out
+    assert f"Run first: algid inspect {tmp_path / 'wrong.csv'}" in lines
     assert " OK " not in found.out
 
 
@@ -245,7 +245,7 @@ def test_how_a_log_was_read_is_reused_and_compared(logs: Path, tmp_path: Path) -
     assert json.loads(alike.out)["log"]["reading"]["zero"] == "hanging"
     assert json.loads(alike.out)["payload"]["m_p"]["estimate"] == pytest.approx(0.3515, rel=0.02)
     other = Outcome("identify", *known, tmp_path / "loaded.csv", *quick, "--zero", "horizontal", "--name", "other")
-    (warning,) = [w for w in json.loads(other.out)["warnings"] if "read otherwise" in w]
+    (warning,) = [one["text"] for one in json.loads(other.out)["notices"] if one["code"] == "READ_OTHERWISE"]
     assert "zero horizontal instead of hanging" in warning
     good = Outcome("validate", tmp_path / "unloaded.algid", tmp_path / "unloaded.csv")
     assert min(map(float, re.findall(r"R² (\S+?)[;\s]", good.out))) > 0.999

@@ -17,7 +17,7 @@ import algid.cli
 from algid.cli import _StoppedError
 from algid.cli.output import console
 from algid.faults import EXIT_INTERNAL
-from algid.report.text import printable
+from algid.text import printable
 from tests.cli.commands import call
 from tests.processes import Outcome, begin
 

@@ -44,7 +44,7 @@ def test_the_spread_of_a_case_is_what_each_mass_and_friction_moves() -> None:
     np.testing.assert_allclose(belief.spread, expected, atol=1e-14)
     assert belief.box
     np.testing.assert_array_equal(prior.lengths, [0.4, 0.3])
-    assert (prior.noise, prior.warnings, prior.source) == (None, (), "mine")
+    assert (prior.noise, prior.doubts, prior.source) == (None, (), "mine")
     usual = of_case(CASE, "mine", None, KnownBefore()).belief.spread
     np.testing.assert_allclose(usual, 2 * belief.spread, atol=1e-14)  # a fifth where nothing is told
 
@@ -118,8 +118,8 @@ def test_terms_that_no_plan_holds_are_left_out_and_said(tmp_path: Path) -> None:
     value = values_of(ODD, f1=0.4, f2=0.3, gain2=0.05, zero1=0.01, zero2=0.02)
     prior = believed(result_of(value, Model(("coulomb", "gain", "zero"))), tmp_path)
     assert prior.belief.shared.model.terms == ("coulomb",)
-    (warning,) = prior.warnings
-    assert warning == (
+    (doubt,) = prior.doubts
+    assert doubt.text == (
         "the plan leaves out torque gain of joint 2 over that of joint 1, less 1 and zero offsets of the angles: where "
         "they are estimated too, error bars are somewhat larger than predicted"
     )

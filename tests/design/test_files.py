@@ -20,6 +20,7 @@ from algid.design.write import Provenance, design_json, joint_trajectory, trajec
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
 from algid.model import Model, Motion
+from algid.notices import Notice
 
 RATE, COUNT = 120.0, 61
 T = np.arange(COUNT) / RATE
@@ -127,7 +128,7 @@ def test_a_zero_of_a_joint_trajectory_has_no_sign_and_few_samples_are_all_taken(
 
 def test_the_json_holds_what_decides_and_what_is_predicted() -> None:
     one = made_up()
-    origin = Provenance("arm.algid", "algid design arm.algid", ("a", "b"), ("something",))
+    origin = Provenance("arm.algid", "algid design arm.algid", ("a", "b"), (Notice("DOUBT", "something"),))
     text = design_json(one, origin)
     assert text.endswith("}\n")
     content = json.loads(text)
@@ -155,7 +156,9 @@ def test_the_json_holds_what_decides_and_what_is_predicted() -> None:
     expected = [(2.0, 1.8), (-5.0, -3.5), (-1.0, 0.0)]
     np.testing.assert_allclose([(row["allowed"], row["most"]) for row in content["used"]], expected)
     assert content["start"] == one.motion.theta[:, 0].tolist()
-    assert (content["joints"], content["warnings"]) == (["a", "b"], ["something"])
+    assert content["joints"] == ["a", "b"]
+    assert content["verdict"]["grade"] == "reservations"
+    assert "something" in [reason["text"] for reason in content["verdict"]["reasons"]]
     k4, k7 = content["parameters"]["k4"], content["parameters"]["k7"]
     assert (k4["believed"], k4["unit"], k4["asked"]) == (4.0, "N m", True)
     np.testing.assert_allclose([k4["believed_std"], k4["std"], k4["relative"], k4["worst_std"]], [0.4, 3.2, 0.8, 0.1])

@@ -60,9 +60,10 @@ def test_what_a_result_leaves_open_is_named(result: Result, tmp_path: Path) -> N
 
 def test_a_length_far_from_the_results_is_a_warning(result: Result, tmp_path: Path) -> None:
     file = saved(result, tmp_path)
-    (warning,) = prior_of(file, None, KnownBefore(l2=0.2)).warnings
-    assert warning.startswith("--l2 0.2 lies ")
-    assert prior_of(file, None, KnownBefore(l2=result.payload["l2"].estimate)).warnings == ()
+    (doubt,) = prior_of(file, None, KnownBefore(l2=0.2)).doubts
+    assert doubt.code == "LENGTH_CONTRADICTED"
+    assert (doubt.numbers["name"], doubt.numbers["given"]) == ("l2", 0.2)
+    assert prior_of(file, None, KnownBefore(l2=result.payload["l2"].estimate)).doubts == ()
 
 
 def test_an_impossible_arm_is_refused(result: Result, tmp_path: Path) -> None:

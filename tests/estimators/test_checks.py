@@ -23,7 +23,7 @@ from algid.estimators.identifiability import examine, sizes
 from algid.estimators.parametrisation import Shared
 from algid.estimators.prediction import cross_validate, motion_of, score
 from algid.estimators.weak import Source, WeakSettings
-from algid.identification.sentences import fit_warnings
+from algid.identification.remarks import fit_warnings
 from algid.model import Model
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case
@@ -273,9 +273,9 @@ def test_constants_of_no_length_and_exchanged_logs_break_bounds(bench: Bench) ->
     (broken,) = [bound for bound in broken_bounds(inside_out) if bound.bound == "k5 >= 0"]
     assert broken.distance == pytest.approx(fit.values[4] / fit.std[4])
     both = weak.fit([lambda: [bench.log(loaded=True, sigma=1e-3)]], [lambda: [bench.log(sigma=1e-3)]])
-    assert any(warning.startswith("EXCHANGED_LOGS") for warning in fit_warnings(both))
+    assert any(warning.code == "EXCHANGED_LOGS" for warning in fit_warnings(both))
     right = weak.fit([lambda: [bench.log(sigma=1e-3)]], [lambda: [bench.log(loaded=True, sigma=1e-3)]])
-    assert not any(warning.startswith("EXCHANGED_LOGS") for warning in fit_warnings(right))
+    assert not any(warning.code == "EXCHANGED_LOGS" for warning in fit_warnings(right))
 
 
 @pytest.mark.parametrize("rotor", [0.0, 0.02])
@@ -320,7 +320,7 @@ def test_gravity_compensated_by_half_is_told_where_the_length_is_known(bench: Be
         found = length_by_constants(fit)
         assert found is not None
         assert found[0] == pytest.approx(bench.arm.l1 / (1 - share), rel=0.05)
-        assert any(warning.startswith("LENGTH_MISMATCH") for warning in fit_warnings(fit)) is told
+        assert any(warning.code == "LENGTH_MISMATCH" for warning in fit_warnings(fit)) is told
 
 
 def test_motion_by_five_points_is_exact_for_a_cubic_and_repeats_itself_at_the_ends() -> None:

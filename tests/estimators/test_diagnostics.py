@@ -26,6 +26,7 @@ from algid.estimators.fit import Fit, conclude
 from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import Model
+from algid.notices import Notice
 
 from .conftest import Bench
 
@@ -54,10 +55,13 @@ def test_a_friction_held_at_nothing_moves_the_others_as_conditional_normals(brok
     assert found.converged
     name = fit.names[broken]
     distance = 0.05 / fit.std[broken]
-    assert found.note == (
-        f"--constrain enforces {name} >= 0 ({distance:.2g} standard deviations beyond), which the logs contradict"
+    (note,) = found.notes
+    assert (note.code, note.text) == (
+        "CONSTRAINED",
+        f"--constrain enforces {name} >= 0 ({distance:.2g} standard deviations beyond), which the logs contradict",
     )
-    assert constrained(replace(fit, note="before")).note == f"before; {found.note}"
+    before = Notice("BEFORE", "before")
+    assert constrained(replace(fit, notes=(before,))).notes == (before, note)
 
 
 def test_bounds_that_no_point_keeps_leave_the_free_estimates(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -71,9 +75,9 @@ def test_bounds_that_no_point_keeps_leave_the_free_estimates(monkeypatch: pytest
         assert not found.converged
         assert found.status == ("NOT_CONVERGED", "NOT_IDENTIFIABLE", *("NOT_CONVERGED",) * 5)
         np.testing.assert_array_equal(found.values, fit.values)
-        assert found.note is not None
-        assert found.note.startswith("--constrain cannot obey k6 >= 0 (")
-        assert found.note.endswith("standard deviations beyond): no estimates within the bounds were found")
+        (note,) = found.notes
+        assert note.code == "NOT_FEASIBLE"
+        assert note.text.startswith("--constrain cannot obey k6 >= 0 (")
 
 
 def test_a_bound_is_broken_by_what_is_known_alone() -> None:

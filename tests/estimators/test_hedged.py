@@ -16,12 +16,14 @@ from algid.estimators.hedged import hedged
 from algid.estimators.weak import WeakSettings
 from algid.log import Log
 from algid.model import Model
+from algid.notices import Notice
 from algid.results import Status
 from algid.settings import Settings
 from algid.synth.sensors import Sensors
 
 from .conftest import Bench
 
+REFUTED = Notice("REFUTED", numbers={"kept": "weak"})
 EVERY = WeakSettings(model=Model(("coulomb", "offset", "rotor")), estimate_delay=True)
 
 
@@ -31,7 +33,7 @@ def _general(fit: Fit, larger: Fit) -> np.ndarray:
 
 def test_no_error_bar_is_narrower_than_with_every_common_term(bench: Bench) -> None:
     log = bench.log(sigma=1e-3)
-    fit = replace(weak.fit([lambda: [log]]), note="refuted")
+    fit = replace(weak.fit([lambda: [log]]), notes=(REFUTED,))
     found = hedged(fit, [lambda: [log]], [], WeakSettings())
     larger = weak.fit([lambda: [log]], settings=EVERY)
     np.testing.assert_allclose(found.std, np.maximum(fit.std, _general(fit, larger)), rtol=1e-9)
@@ -40,10 +42,11 @@ def test_no_error_bar_is_narrower_than_with_every_common_term(bench: Bench) -> N
     assert found.quantile == fit.quantile
     size, wide = np.outer(fit.std, fit.std), np.outer(found.std, found.std)
     np.testing.assert_allclose(found.covariance / wide, fit.covariance / size, atol=1e-12)  # correlations stay
-    assert found.note == "refuted, with error bars as if it had coulomb, offset, rotor, delay too"
+    assert [note.code for note in found.notes] == ["REFUTED", "WIDER_MODEL"]
+    assert found.notes[1].numbers["terms"] == ["coulomb", "offset", "rotor", "delay"]
     rubbing = WeakSettings(model=Model(("coulomb",)))
-    known = hedged(replace(weak.fit([lambda: [log]], settings=rubbing), note="refuted"), [lambda: [log]], [], rubbing)
-    assert known.note == "refuted, with error bars as if it had offset, rotor, delay too"
+    known = hedged(replace(weak.fit([lambda: [log]], settings=rubbing), notes=(REFUTED,)), [lambda: [log]], [], rubbing)
+    assert known.notes[1].numbers["terms"] == ["offset", "rotor", "delay"]
 
 
 def test_a_fit_with_every_term_and_one_of_four_logs_stay_as_they_are(bench: Bench) -> None:
@@ -58,7 +61,7 @@ def test_a_fit_with_every_term_and_one_of_four_logs_stay_as_they_are(bench: Benc
 def test_what_the_larger_model_leaves_open_keeps_its_error_bar(bench: Bench) -> None:
     rest = bench.log(sigma=1e-3)
     still = replace(rest, theta=np.stack([rest.theta[0], np.full(len(rest), 0.3)]))
-    fit = replace(weak.fit([lambda: [still]]), note="refuted")
+    fit = replace(weak.fit([lambda: [still]]), notes=(REFUTED,))
     larger = weak.fit([lambda: [still]], settings=EVERY)
     found = hedged(fit, [lambda: [still]], [], WeakSettings())
     assert "NOT_IDENTIFIABLE" in larger.status
@@ -85,8 +88,8 @@ def test_a_refuted_log_is_hedged_where_it_chose_its_terms_itself() -> None:
     stds = np.array([[one.parameters[name].std for name in own] for one in (chosen, told)], dtype=np.float64)
     assert np.all(stds[0] >= stds[1] * (1 - 1e-9))
     assert np.any(stds[0] > 1.05 * stds[1])
-    assert any("with error bars as if it had" in text for text in chosen.warnings)
-    assert not any("with error bars as if it had" in text for text in told.warnings)
+    assert "WIDER_MODEL" in [notice.code for notice in chosen.notices]
+    assert "WIDER_MODEL" not in [notice.code for notice in told.notices]
 
 
 def _statuses(fit: Fit) -> dict[str, str]:
@@ -114,14 +117,12 @@ def test_a_joint_that_is_hardly_driven_is_told_by_the_other(bench: Bench, idle: 
 def test_constants_that_the_joints_contradict_are_not_ok(bench: Bench) -> None:
     log = bench.log(sigma=1e-4)
     idle = replace(log, tau=log.tau * np.array([[1.0], [0.02]]))
-    fit = replace(weak.fit([lambda: [idle]]), note="refuted")
+    fit = replace(weak.fit([lambda: [idle]]), notes=(REFUTED,))
     found = hedged(fit, [lambda: [idle]], [], WeakSettings())
     assert _statuses(fit) == dict.fromkeys(fit.names, "OK")
     assert _statuses(found) == {name: "OK" if name in ("k6", "k7") else "WEAK_EXCITATION" for name in fit.names}
-    assert found.note is not None
-    assert re.search(
-        r"; joint 1 by itself tells k\d as [\d.]+ \S.* and joint 2 as .*: one of them is hardly", found.note
-    )
+    (doubt,) = (note for note in found.notes if note.code == "JOINTS_CONTRADICT")
+    assert re.match(r"joint 1 by itself tells k\d as [\d.]+ \S.* and joint 2 as .*: one of them is hardly", doubt.text)
     np.testing.assert_array_equal(found.values, fit.values)
 
 
@@ -141,9 +142,9 @@ def test_a_refuted_log_in_which_a_joint_stood_still_is_not_ok(bench: Bench) -> N
     still = replace(log, theta=np.stack([log.theta[0], 0.3 + tremble]))
     fit = weak.fit([lambda: [still]])
     found = hedged(fit, [lambda: [still]], [], WeakSettings())
-    assert "joint 2 never moved: give a log in which both joints do" in (found.note or "")
+    assert "joint 2 never moved: give a log in which both joints do" in [note.text for note in found.notes]
     assert not [
         name for name, word in _statuses(found).items() if name in ("k1", "k2", "k3", "k4", "k5") and word == "OK"
     ]
     with_motion = hedged(weak.fit([lambda: [log]]), [lambda: [log]], [], WeakSettings())
-    assert with_motion.note is None
+    assert with_motion.notes == ()

@@ -131,7 +131,7 @@ def test_unmodelled_dynamics_hand_back_the_weak_estimate(bench: Bench) -> None:
     slow = 0.3 * np.sign(np.sin(2 * np.pi * 1.3 * bench.bare.t))
     fit = refined.fit([lambda: [replace(log, tau=log.tau + slow)]])
     assert fit.estimator == "weak"
-    assert fit.note is not None
+    assert fit.refuted
     assert fit.intervals == "sandwich"
 
 

@@ -18,7 +18,6 @@ from algid.identification.identify import identify
 from algid.identification.source import open_source
 from algid.inspection.checks import noticed
 from algid.log import Log
-from algid.report.verdict import verdict
 from algid.results import Status, read_result, result_schema
 from algid.settings import Settings
 from algid.synth.cases import load_case
@@ -75,7 +74,7 @@ def test_folder_holds_schema_valid_result_and_flat_series(tmp_path: Path, wide: 
     folder = tmp_path / "case1-unloaded.algid"
     content = json.loads((folder / "result.json").read_text())
     jsonschema.validate(content, result_schema())
-    assert content["schema_version"] == 2
+    assert content["schema_version"] == 3
     assert read_result(folder) == result
     series = pl.read_parquet(folder / "estimates.parquet")
     assert series.columns[0] == "t"
@@ -152,8 +151,8 @@ def test_settings_that_the_paper_lacks_are_refused() -> None:
 def test_other_schema_versions_are_refused(tmp_path: Path, wide: tuple[Log, Log]) -> None:
     identify(wide[0], None, PAPER, out=tmp_path, report=False)
     file = tmp_path / "case1-unloaded.algid" / "result.json"
-    file.write_text(file.read_text().replace('"schema_version": 2', '"schema_version": 7'))
-    with pytest.raises(ResultError, match="expected 1 or 2, found 7"):
+    file.write_text(file.read_text().replace('"schema_version": 3', '"schema_version": 7'))
+    with pytest.raises(ResultError, match="expected 1 or 2 or 3, found 7"):
         read_result(file)
 
 
@@ -201,8 +200,8 @@ def test_numbers_without_a_meaning_are_refused(name: str, value: float) -> None:
 
 
 def test_a_result_names_the_estimator_whose_numbers_it_holds(shared_data: Path) -> None:
+
     from algid.profile import Profile, with_settings
-    from algid.report.verdict import verdict
 
     logs = sorted((shared_data / "dfki" / "C1_sysid").glob("*.csv"))
     profile = with_settings(Profile(), {"zero": "hanging"})
@@ -216,10 +215,9 @@ def test_a_result_names_the_estimator_whose_numbers_it_holds(shared_data: Path) 
         assert shown.estimate is not None
         assert found.std is not None
         assert abs(shown.estimate - found.estimate) < 0.1 * found.std  # iterations from another start
-    assert f"by the {result.estimator} estimator in place of the refined one" in verdict(result).sentence
-    jitter = [warning for warning in result.warnings if "JITTER" in warning]
-    assert len(jitter) == 1
-    assert f"likewise in 1 other log ({logs[1].name})" in jitter[0]
+    assert f"by the {result.estimator} estimator in place of the refined one" in result.verdict.sentence
+    (jitter,) = (notice for notice in result.notices if notice.code == "JITTER")
+    assert jitter.logs == (logs[0].name, logs[1].name)
 
 
 def flipped(log: Log) -> Log:
@@ -229,7 +227,6 @@ def flipped(log: Log) -> Log:
 
 @pytest.mark.parametrize("estimator", ["weak", "paper"])
 def test_an_impossible_arm_has_no_status_ok(estimator: str, noisy: tuple[Log, Log], wide: tuple[Log, Log]) -> None:
-    from algid.report.verdict import verdict
 
     log = (noisy if estimator == "weak" else wide)[0]
     result = identify(flipped(log), None, Settings(estimator=estimator))  # type: ignore[arg-type]
@@ -239,7 +236,7 @@ def test_an_impossible_arm_has_no_status_ok(estimator: str, noisy: tuple[Log, Lo
     assert Status.IMPLAUSIBLE in statuses
     assert Status.OK not in statuses
     assert not result.complete
-    assert verdict(result).level == "failed"
+    assert result.verdict.grade == "failed"
 
 
 @pytest.mark.parametrize("change", ["joint 2 flipped", "torque flipped"])
@@ -280,7 +277,7 @@ def test_a_log_whose_lost_samples_were_renumbered_has_failed_unless_it_is_accept
     some = int(kept.sum())
     lost = replace(log, stamp_ns=log.stamp_ns[:some], theta=log.theta[:, kept], tau=log.tau[:, kept], omega=None)
     found = algid.identify(lost, report=False, settings=WEAK)
-    assert verdict(found).level == "failed"
+    assert found.verdict.grade == "failed"
     assert not any(one.status is Status.OK for one in found.parameters.values())
     reading = replace(lost.origin.reading, accepted=("LOST_SAMPLES",))
     accepted = algid.identify(replace(lost, origin=replace(lost.origin, reading=reading)), report=False, settings=WEAK)

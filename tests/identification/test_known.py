@@ -165,8 +165,8 @@ def test_lengths_five_deviations_off_contradict_the_result(weighed: Result) -> N
     (l1, s1), (l2, s2) = by_constants, (own.estimate, own.std)
     assert contradictions(weighed, {"l1": l1 + 4.9 * s1, "l2": l2 - 4.9 * s2}) == ()
     first, second = contradictions(weighed, {"l1": l1 + 5.6 * s1, "l2": l2 - 7.2 * s2})
-    assert first == f"--l1 {l1 + 5.6 * s1:g} lies 6 σ from the result's {l1:.5g} ± {s1:.2g} m; one is wrong"
-    assert second.startswith(f"--l2 {l2 - 7.2 * s2:g} lies 7 σ from the result's {l2:.5g}")
+    assert first.text == f"l1 of {l1 + 5.6 * s1:g} m lies 6 σ from the result's {l1:.5g} ± {s1:.2g} m; one is wrong"
+    assert (second.numbers["name"], second.numbers["distance"]) == ("l2", pytest.approx(7.2))
     bare = weighed.model_copy(update={"payload": {}})
     assert contradictions(bare, {"l2": 9.0}) == ()  # the constants tell l1 alone
     assert len(contradictions(bare, {"l1": 9.0})) == 1

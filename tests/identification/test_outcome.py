@@ -17,11 +17,12 @@ from algid.estimators.prediction import PredictionScore
 from algid.estimators.selection import Selection
 from algid.estimators.whitening import NoiseLevels
 from algid.identification.outcome import distrusted, estimate, outcome_of, prediction, table_rows, unknown
-from algid.identification.sentences import ONE_RUN, fit_notes, fit_warnings
+from algid.identification.remarks import fit_notes, fit_warnings
 from algid.identification.source import open_source
 from algid.identification.survey import Survey
 from algid.log import Log, Origin
 from algid.model import Model
+from algid.notices import Notice
 from algid.results import Estimate, FitSummary, Repeatability, Status
 from algid.settings import Settings
 from algid.table4 import LOADED_ROWS, UNLOADED_ROWS
@@ -116,7 +117,8 @@ def test_a_bound_broken_by_far_spoils_every_estimate_and_one_broken_by_chance_no
         fit = with_stds(with_values(fit_of(), k6=k6), k6=1.0)
         found = outcome_of(fit, {}, survey(), Settings(), Selection(Model(), False))
         assert {one.status for one in (found.parameters | found.payload).values()} == {status}
-        assert any(text.startswith("the estimates break k6 >= 0: ") for text in found.warnings)
+        assert found.fit is not None
+        assert [one.bound for one in found.fit.broken_bounds] == ["k6 >= 0"]
 
 
 def test_noise_is_the_root_mean_square_over_logs() -> None:
@@ -200,8 +202,8 @@ def test_a_prediction_without_samples_is_none_and_others_hold_their_sums() -> No
     assert found.r2 == pytest.approx((0.99, 0.91))  # 125 − 50²/100 = 100 is the variance left to explain
 
 
-def sentences(fit: Fit, word: str) -> list[str]:
-    return [text for text in fit_warnings(fit) if word in text]
+def found(fit: Fit, code: str) -> list[Notice]:
+    return [one for one in fit_warnings(fit) if one.code == code]
 
 
 def test_a_good_fit_is_passed_over_in_silence() -> None:
@@ -210,13 +212,13 @@ def test_a_good_fit_is_passed_over_in_silence() -> None:
 
 def test_a_payload_near_zero_has_its_one_sided_bound() -> None:
     fit = with_stds(with_values(fit_of(), m_p=0.1), m_p=0.1)
-    assert sentences(fit, "not told from zero") == ["the payload is not told from zero: at most 0.265 kg at 95 %"]
+    assert [one.numbers["most"] for one in found(fit, "NO_PAYLOAD")] == [pytest.approx(0.2645)]
     negative = with_stds(with_values(fit_of(), m_p=-0.2), m_p=0.1)
-    assert sentences(negative, "not told from zero") == ["the payload is not told from zero: at most 0 kg at 95 %"]
-    assert not sentences(with_stds(with_values(fit_of(), m_p=0.26), m_p=0.1), "not told")
+    assert [one.numbers["most"] for one in found(negative, "NO_PAYLOAD")] == [0.0]
+    assert not found(with_stds(with_values(fit_of(), m_p=0.26), m_p=0.1), "NO_PAYLOAD")
     lost = with_stds(fit_of(), m_p=np.inf)
-    assert sentences(lost, "give --l1 and --l2")
-    assert not sentences(with_stds(fit_of(lengths={"l1": ARM.l1}), m_p=np.inf), "give --l1 and --l2")
+    assert found(lost, "LENGTHS_NEEDED")
+    assert not found(with_stds(fit_of(lengths={"l1": ARM.l1}), m_p=np.inf), "LENGTHS_NEEDED")
 
 
 def test_a_length_that_the_constants_contradict_is_named() -> None:
@@ -224,60 +226,62 @@ def test_a_length_that_the_constants_contradict_is_named() -> None:
     std = 0.01 * math.sqrt(2) * ARM.l1
     for times, told in ((4.9, False), (5.1, True)):
         fit = fit_of(lengths={"l1": ARM.l1 + times * std})
-        assert bool(sentences(fit, "LENGTH_MISMATCH")) is told
-    (text,) = sentences(fit, "LENGTH_MISMATCH")
-    assert f"makes l1 {ARM.l1:.4g} ± {QUANTILE * std:.2g} m, given are {ARM.l1 + 5.1 * std:g} m" in text
+        assert bool(found(fit, "LENGTH_MISMATCH")) is told
+    (one,) = found(fit, "LENGTH_MISMATCH")
+    assert one.numbers == pytest.approx({"length": ARM.l1, "half": QUANTILE * std, "given": ARM.l1 + 5.1 * std})
 
 
-def test_a_negative_mass_by_five_deviations_says_exchanged_and_is_the_cause() -> None:
+def test_a_negative_mass_by_five_deviations_says_exchanged() -> None:
     for mass, told in ((-0.49, False), (-0.51, True)):
         fit = with_stds(with_values(fit_of(), m_p=mass), m_p=0.1)
-        assert bool(sentences(fit, "EXCHANGED_LOGS")) is told
-        causes = outcome_of(fit, {}, survey(), Settings(), Selection(Model(), False)).causes
-        assert ["exchanged" in cause.cause for cause in causes] == [True] * told
+        assert bool(found(fit, "EXCHANGED_LOGS")) is told
 
 
 def test_notes_of_a_fit_are_repeated_with_what_the_intervals_lack() -> None:
-    assert list(fit_warnings(replace(fit_of(), note="a reason"))) == ["a reason"]
-    assert next(fit_warnings(replace(fit_of(), note="a reason", intervals="sandwich"))) == f"a reason; {ONE_RUN}"
+    note = Notice("REFUTED", numbers={"kept": "weak"})
+    assert list(fit_warnings(replace(fit_of(), notes=(note,)))) == [note]
     failed = replace(fit_of(), converged=False)
-    assert sentences(failed, "did not converge")
-    assert not sentences(replace(failed, note="--constrain found no point"), "did not converge")
+    assert found(failed, "REFINED_FAILED")
+    infeasible = Notice("NOT_FEASIBLE", numbers={"bounds": ["k6 >= 0"]})
+    assert not found(replace(failed, notes=(infeasible,)), "REFINED_FAILED")
 
 
 def test_endogeneity_is_told_unless_instruments_already_stand_in() -> None:
     fit = replace(fit_of(), endogeneity=8.25)
-    (text,) = sentences(fit, "instruments and least squares")
-    assert "8.2 standard deviations apart" in text
-    assert not sentences(replace(fit, estimator="instruments"), "least squares")
-    assert not sentences(replace(fit, endogeneity=0.3), "least squares")
+    (one,) = found(fit, "ENDOGENEITY")
+    assert one.numbers["distance"] == 8.25
+    assert one.remedy is not None
+    assert one.remedy.flags == ("--estimator", "instruments")
+    assert not found(replace(fit, estimator="instruments"), "ENDOGENEITY")
+    assert not found(replace(fit, endogeneity=0.3), "ENDOGENEITY")
 
 
-def notes(warnings: list[str] | None = None, **changes: Any) -> list[str]:
+def notes(**changes: Any) -> list[Notice]:
     summary = FitSummary(
         noise={}, covariance_names=[], covariance=[], iterations=0, converged=True,
         **({"intervals": "likelihood"} | changes),
     )  # fmt: skip
-    return list(fit_notes(summary, warnings or []))
+    return list(fit_notes(summary))
 
 
 def test_what_one_run_leaves_out_is_noted_once() -> None:
-    assert notes(intervals="sandwich") == [ONE_RUN]
-    assert notes([f"a reason; {ONE_RUN}"], intervals="sandwich") == []
+    assert [(one.code, one.note) for one in notes(intervals="sandwich")] == [("ONE_RUN", True)]
     assert notes() == notes(intervals="jackknife") == []
 
 
 def test_repeatability_and_gain_are_told_in_numbers() -> None:
     repeated = Repeatability(masses=[0.5, 0.51234], std=0.0087, ci95=(0.0039, 0.28))
-    (text,) = notes(repeatability=repeated)
-    assert text == "the loaded runs by themselves weigh 0.5, 0.5123 kg: repeatability 0.0087 kg (95 %: 0.0039 to 0.28)"
+    (one,) = notes(repeatability=repeated)
+    assert (
+        one.text == "the loaded runs by themselves weigh 0.5, 0.5123 kg: repeatability 0.0087 kg (95 %: 0.0039 to 0.28)"
+    )
     gain = Estimate(estimate=1.25, std=0.01, ci95=(1.23, 1.27), unit="1")
-    (text,) = notes(torque_gain=gain)
-    assert "the torques have to be multiplied by 1.25 (95 %: 1.23 to 1.27), and" in text
-    (text,) = notes(torque_gain=unknown("1"))
-    assert text.endswith("its mass is not told from zero")
+    (one,) = notes(torque_gain=gain)
+    assert "the torques have to be multiplied by 1.25 (95 %: 1.23 to 1.27), and" in one.text
+    (one,) = notes(torque_gain=unknown("1"))
+    assert one.code == "NO_TORQUE_GAIN"
 
 
 def test_cross_validation_that_could_not_be_done_is_told() -> None:
-    found = outcome_of(fit_of(), {}, survey(), Settings(cross_validate=True), Selection(Model(), False))
-    assert found.warnings == ["no cross-validation: a log is too short to be fitted, or to be judged"]
+    outcome = outcome_of(fit_of(), {}, survey(), Settings(cross_validate=True), Selection(Model(), False))
+    assert [one.code for one in outcome.notices] == ["NO_CROSS_VALIDATION"]

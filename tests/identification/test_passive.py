@@ -17,7 +17,6 @@ from algid.identification.identify import identify
 from algid.log import Log, Origin, Reading
 from algid.profile import Profile
 from algid.readers import open_log
-from algid.report.verdict import verdict
 from algid.results import Result
 from algid.settings import Settings
 from algid.signals.segments import Segment
@@ -63,7 +62,7 @@ def test_a_joint_without_motor_leaves_all_constants_told(case: str, passive: int
     """With the terms chosen by the log: none of them, and every constant within its interval's reach."""
     motion, k = moved(case, passive), load_case(case).arm.constants()
     result = identified(logged(motion, 0))
-    assert verdict(result).level != "failed"
+    assert result.verdict.grade != "failed"
     assert result.estimator == "refined"
     for name, true in zip(CONSTANT_NAMES, k, strict=True):
         found = result.parameters[name]

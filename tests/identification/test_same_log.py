@@ -29,7 +29,7 @@ def test_a_log_given_twice_counts_once_and_is_told(tmp_path: Path) -> None:
     assert {name: one.std for name, one in twice.parameters.items()} == {
         name: one.std for name, one in once.parameters.items()
     }
-    assert any("SAME_LOG" in warning and "copy.csv" in warning for warning in twice.warnings)
+    assert [str(one.numbers["name"]) for one in twice.notices if one.code == "SAME_LOG"] == [str(tmp_path / "copy.csv")]
 
 
 def test_logs_of_one_length_and_other_content_stay() -> None:
@@ -53,10 +53,8 @@ def test_one_log_as_unloaded_and_as_loaded_is_told_in_one_line(tmp_path: Path) -
     shutil.copy(tmp_path / "one.csv", tmp_path / "copy.csv")
     settings = Settings(estimator="weak", model="plain")
     result = identify(tmp_path / "one.csv", tmp_path / "copy.csv", settings, report=False)
-    said = [warning for warning in result.warnings if "SAME_LOG" in warning]
-    assert len(said) == 1
-    assert "copy.csv is " in said[0]
-    assert "one log is given as unloaded and as loaded" in said[0]
+    (said,) = (one for one in result.notices if one.code == "SAME_LOG_LOADED")
+    assert said.numbers == {"name": str(tmp_path / "copy.csv"), "twin": str(tmp_path / "one.csv")}
 
 
 @pytest.mark.parametrize(

@@ -13,9 +13,9 @@ from algid.arm import FloatArray
 from algid.errors import LogError
 from algid.inspection import channels
 from algid.inspection.checks import examine, noticed
-from algid.inspection.findings import Finding
 from algid.inspection.sampling import lost_steps, rests, samples_a_period, sampling
 from algid.log import ChannelReading, Log, Origin, Reading
+from algid.notices import Notice
 
 ROWS = 2000
 T = np.arange(ROWS) * 1e-3
@@ -39,7 +39,7 @@ def logged(
     return Log(stamp_ns, angles, torques, origin, omega)
 
 
-def only(found: Sequence[Finding]) -> Finding:
+def only(found: Sequence[Notice]) -> Notice:
     (one,) = found
     return one
 
@@ -49,16 +49,18 @@ def test_each_torque_that_is_none_is_told_with_its_source_and_what_names_another
     other = '--set tau2.source=NAME (profile: source = "NAME" of [tau2])'
     zero = only([*channels.efforts(logged(tau=np.stack([tau[0], 0 * tau[1]]), mapping={"tau2": "effort"}))])
     assert (zero.code, zero.refuse) == ("EFFORT_ZERO", True)
-    assert zero.text == (
-        f"tau2 (effort) is zero in every sample; name the measured torque: {other}; for a joint without a motor: "
+    assert zero.clause == (
+        f"tau2 (effort) is zero in every sample: name the measured torque: {other}; for a joint without a motor: "
         "--passive 2 (profile: passive = 2)"
     )
     tiny = only([*channels.efforts(logged(tau=np.stack([tau[0], 3.14159e-7 * np.sin(T)])))])
     assert tiny.code == "EFFORT_DENORMAL"
-    assert tiny.text.startswith("tau2 never exceeds 3.14e-07 N m: no torque; name the measured one: --set tau2.source=")
+    assert tiny.clause.startswith(
+        "tau2 never exceeds 3.14e-07 N m: no torque: name the measured torque: --set tau2.source="
+    )
     held = only([*channels.efforts(logged(tau=np.stack([tau[0], np.full(ROWS, -2.5)])))])
     assert held.code == "EFFORT_CONSTANT"
-    assert held.text == f"tau2 is -2.5 N m in every sample; name the measured torque: {other}"
+    assert held.clause == f"tau2 is -2.5 N m in every sample: name the measured torque: {other}"
 
 
 def test_a_millionth_of_a_newton_metre_is_a_torque_and_a_passive_joint_needs_none() -> None:
@@ -118,7 +120,7 @@ def test_wraps_are_counted(turns: int) -> None:
     times = "1 time" if turns == 1 else "3 times"
     assert found.refuse
     assert (
-        found.text == f"theta2 jumps by a turn {times}: --set theta2.unwrap=true (profile: unwrap = true of [theta2])"
+        found.clause == f"theta2 jumps by a turn {times}: --set theta2.unwrap=true (profile: unwrap = true of [theta2])"
     )
     assert [*channels.angles(logged(np.stack([np.sin(T), angle])))] == []
 
@@ -192,14 +194,13 @@ def test_degrees_are_told_by_angles_and_velocities(factor: float, told: str | No
 
 def test_what_is_in_degrees_is_told_with_the_flags_of_its_channel() -> None:
     angle = only([*channels.degrees(turning((180 / math.pi, 1.0)), never)])
-    assert angle.text.partition(": ")[2] == (
-        "--angle-unit deg, --set theta1.gear_ratio=N for the angle of a motor behind its gear, or --angle-unit rad "
-        "where it is right (profile: unit or gear_ratio of [theta1])"
-    )
+    assert [one.settings for one in angle.remedies] == [
+        {"angle_unit": "deg"},
+        {"theta1.gear_ratio": None},
+        {"theta1.unit": "rad"},
+    ]
     velocity = only([*channels.degrees(turning((math.pi / 180, 1.0)), never)])
-    assert velocity.text.partition(": ")[2] == (
-        "--set omega1.unit=deg, or --set omega1.unit=rad where it is right (profile: unit or gear_ratio of [omega1])"
-    )
+    assert [one.settings for one in velocity.remedies] == [{"omega1.unit": "deg"}, {"omega1.unit": "rad"}]
     assert angle.refuse
     assert velocity.refuse
 
@@ -330,9 +331,9 @@ def held(before: float, after: float, creep: float = 0.0) -> Log:
 def test_rest_lasts_until_a_thousandth_of_the_way(before: float, after: float, flags: tuple[str, ...]) -> None:
     """Two samples of 1e-3 rad are within 2.5e-3 rad."""
     found = [*rests(held(before, after), True)]
-    assert [one.flags for one in found] == ([flags] if flags else [])
+    assert [" ".join(one.remedies[0].flags) for one in found] == ([" ".join(flags)] if flags else [])
     for one in found:
-        assert f"leave the rest out with {' '.join(flags)} (profile: " in one.text
+        assert f"leave the rest out: {' '.join(flags)} (profile: " in one.clause
         assert one.note
 
 
@@ -355,7 +356,7 @@ def test_of_the_beginning_of_a_log_nothing_is_refused_and_the_place_is_told() ->
         noticed(log)
     told = noticed(log, whole=False)
     assert [one.code for one in told] == ["EFFORT_ZERO", "EFFORT_ZERO"]
-    assert all(one.text.startswith("EFFORT_ZERO: ") and one.text.endswith(" (in its first 2 s)") for one in told)
+    assert all(one.code == "EFFORT_ZERO" and one.text.endswith(" (in its first 2 s)") for one in told)
 
 
 def test_a_log_that_is_refused_is_not_asked_for_its_physics(monkeypatch: pytest.MonkeyPatch) -> None:

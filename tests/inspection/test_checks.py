@@ -14,8 +14,9 @@ from algid.errors import LogError
 from algid.inspection.checks import examine, noticed
 from algid.inspection.dynamics import dynamic_figures
 from algid.inspection.figures import signal_figures
-from algid.inspection.findings import Finding
+from algid.inspection.findings import yielding
 from algid.log import Log, Origin
+from algid.notices import Notice
 from algid.profile import Profile
 from algid.readers import read_log
 from algid.synth.cases import load_case
@@ -255,7 +256,7 @@ def test_encoders_and_rest_make_no_lost_samples() -> None:
 def test_angles_of_motors_may_be_what_looks_like_degrees() -> None:
     log = moving()
     (told,) = [finding for finding in examine(replace(log, theta=30 * log.theta)) if finding.code == "DEGREES"]
-    assert "--set theta1.gear_ratio=N" in told.text or "--set theta2.gear_ratio=N" in told.text
+    assert "--set theta1.gear_ratio=N" in told.clause or "--set theta2.gear_ratio=N" in told.clause
 
 
 def resting(before: float, after: float) -> Log:
@@ -276,9 +277,9 @@ def resting(before: float, after: float) -> Log:
 @pytest.mark.parametrize(("before", "after"), [(0.8, 0), (0, 1.2), (0.8, 1.2)])
 def test_rest_is_told_with_the_flags_that_leave_it_out(before: float, after: float) -> None:
     (found,) = (one for one in examine(resting(before, after)) if one.code == "RESTS")
-    told = {flag.split()[0]: float(flag.split()[1]) for flag in found.flags}
-    expected = {"--start": before} if before else {}
-    expected |= {"--end": before + 6.0} if after else {}
+    told = dict(found.remedies[0].settings)
+    expected = {"start": before} if before else {}
+    expected |= {"end": before + 6.0} if after else {}
     assert told == pytest.approx(expected, abs=0.03)  # it moves by no more than noise meanwhile
     assert found.note
     assert not found.refuse
@@ -291,13 +292,13 @@ def test_a_short_rest_and_the_end_of_a_part_are_no_rest() -> None:
 
 
 def test_a_refusal_alone_names_what_overrides_it_and_yields_to_that() -> None:
-    refusal, warning = Finding("STILL", "joint 2 is still", refuse=True), Finding("RESTS", "the arm rests")
-    assert warning.yielding(()) == warning
-    assert warning.yielding(("RESTS",)) == warning
-    named = refusal.yielding(("RESTS",))
+    refusal, warning = Notice("STILL", "joint 2 is still", refuse=True), Notice("RESTS", "the arm rests")
+    assert yielding(warning, ()) == warning
+    assert yielding(warning, ("RESTS",)) == warning
+    named = yielding(refusal, ("RESTS",))
     assert named.refuse
-    assert named.text == 'joint 2 is still; to use it nevertheless: --accept STILL (profile: accept = ["STILL"])'
-    accepted = refusal.yielding(("RESTS", "STILL"))
+    assert named.clause == 'joint 2 is still: to use it nevertheless: --accept STILL (profile: accept = ["STILL"])'
+    accepted = yielding(refusal, ("RESTS", "STILL"))
     assert not accepted.refuse
     assert accepted.text == "joint 2 is still; used nevertheless, as accept says"
 

@@ -98,9 +98,9 @@ def test_settings_change_what_a_profile_said(tmp_path: Path) -> None:
 def test_a_finding_names_flags_that_the_command_line_takes(tmp_path: Path) -> None:
     path = written(tmp_path / "arm.csv", *recorded("base, tau2 reversed"))
     (finding,) = [one for one in examine(read_log(path)) if one.code == "WRONG_CONVENTION"]
-    assert "--drive base" in finding.text
-    assert 'drive = "base"' in finding.text
-    assert finding.flags == ("--set", "tau2.sign=-1", "--drive", "base")
+    assert "--drive base" in finding.clause
+    assert 'drive = "base"' in finding.clause
+    assert finding.remedies[0].flags == ("--set", "tau2.sign=-1", "--drive", "base")
     profile = profile_from({"set": ["tau2.sign=-1"], "drive": "base"})
     assert profile is not None
     log = read_log(path, profile)

@@ -232,9 +232,9 @@ def test_what_is_wrong_is_said_in_words_and_in_flags_that_are_taken(
 ) -> None:
     found = mended(convention)
     assert found.words == words
-    assert " ".join(found.flags) == flags
+    assert " ".join(found.remedy.flags) == flags
     assert found.another
-    pairs = zip(found.flags[::2], found.flags[1::2], strict=True)
+    pairs = zip(found.remedy.flags[::2], found.remedy.flags[1::2], strict=True)
     given: dict[str, Any] = {"set": []}
     for flag, text in pairs:
         if flag == "--set":
@@ -249,7 +249,7 @@ def test_what_is_wrong_is_said_in_words_and_in_flags_that_are_taken(
 
 def test_the_lines_of_a_profile_stand_before_those_of_its_channels() -> None:
     found = mended(Convention(signs=(-1, 1), base=True, zero=(-HALF, 0.0)))
-    assert found.lines == 'drive = "base", zero = "hanging", sign = -1 of [theta1]'
+    assert found.remedy.lines == 'drive = "base", zero = "hanging", sign = -1 of [theta1]'
     turned = mended(Convention(signs=(-1, -1), torque_signs=(-1, -1)))
     assert turned.words.startswith("all signs are turned round, or θ1 counts from the other horizontal")
 
@@ -262,7 +262,7 @@ def test_zeros_that_are_a_little_off_are_no_other_convention(off: float, another
 
 def test_settings_are_over_those_that_the_log_was_read_by() -> None:
     joints = mended(Convention(swapped=True, torques_swapped=True), Reading(joints=("shoulder", "elbow")))
-    assert joints.flags == ("--joints", "elbow,shoulder")
+    assert joints.remedy.flags == ("--joints", "elbow,shoulder")
     signs = mended(Convention(signs=(-1, 1), torque_signs=(-1, 1)), Reading(signs=(-1, 1)))
     assert signs.settings == {"signs": [1, 1]}
     hanging = mended(Convention(zero=(HALF, 0.0)), Reading(zero="hanging"))

@@ -10,7 +10,8 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.errors import LogError
-from algid.log import Log, Notice, Origin, join
+from algid.log import Log, Origin, join
+from algid.notices import Notice
 from algid.profile import Profile
 from algid.readers.assemble import TableReader, reader_of
 from algid.readers.table import CHANNELS, SampleTable, cut

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from algid.errors import LogError
-from algid.log import Notice
+from algid.notices import Notice
 from algid.profile import Profile, with_settings
 from algid.readers.columns import Columns, assign
 from algid.readers.names import Name, choose, on_motor_side, other_joints, take_apart

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from algid.log import Log, Notice, Origin
+from algid.log import Log, Origin
+from algid.notices import Notice
 from pipelines import fuzz
 from pipelines.hostile import corpus, hostile
 from pipelines.mutations import clean_log
@@ -35,7 +36,7 @@ def test_the_judge_sees_what_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(fuzz, "read_log", lambda _: found)
         return fuzz.outcome(Path("log.mcap"), log)[0]
 
-    lossy, other = Notice("CUT_OFF", "", lossy=True), Notice("GAPS", "")
+    lossy, other = Notice("CUT_OFF", "cut", lossy=True), Notice("GAPS", "gaps")
     assert judged(log) == "same"
     assert judged(log.part(0, 19)) == "silent"
     assert judged(_noting(log.part(0, 19), other)) == "silent"

@@ -9,7 +9,7 @@ import polars as pl
 import pytest
 
 from algid.errors import LogError
-from algid.log import Notice
+from algid.notices import Notice
 from algid.readers import read_log
 from algid.readers.frames import time_unit, to_nanoseconds
 from algid.readers.names import choose, take_apart

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from algid.arm import FloatArray
 from algid.errors import LogError
-from algid.log import IntArray, Notice
+from algid.log import IntArray
+from algid.notices import Notice
 from algid.readers.table import SampleTable, stack
 from algid.readers.timebase import Series, aligned, in_order, whole_topic
 from tests.readers.logs import EPOCH_NS

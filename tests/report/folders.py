@@ -16,6 +16,7 @@ from algid.arm import CONSTANT_NAMES, CONSTANT_UNITS, FloatArray, forward_dynami
 from algid.estimators.innovations import residual_sums
 from algid.estimators.paper import STAGE2_NAMES, stage1, stage2
 from algid.identification.series import innovation_rows, write_columns
+from algid.notices import Notice
 from algid.results import (
     Estimate,
     FitSummary,
@@ -253,7 +254,7 @@ def build_recorded(folder: Path, csv: Path) -> Result:
             "payload": {},
             "paper_payload": {},
             "table4": [],
-            "warnings": ["stamps jitter by up to 0.9 ms; resampled at 2 ms"],
+            "notices": [Notice("JITTER", "stamps jitter by up to 0.9 ms; resampled at 2 ms")],
         }
     )
     write_result(result, folder / "result.json")
@@ -272,7 +273,7 @@ def hostile(result: Result) -> Result:
             "log": log,
             "more_logs": [replace_log(log, "x/</script><svg onload=alert(1)>\x1b[31m\u202egnp.csv")],
             "settings": {HOSTILE: HOSTILE, "a|b": "`c` | [red]d[/red] [x](javascript:alert(1))"},
-            "warnings": [HOSTILE, "]]><!-- \x1b]0;owned\x07", "@everyone ```"],
+            "notices": [Notice("H", text) for text in (HOSTILE, "]]><!-- \x1b]0;owned\x07", "@everyone ```")],
             "estimator": "<b>bold</b>",
         }
     )

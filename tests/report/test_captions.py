@@ -15,7 +15,6 @@ from algid.report.figures.base import Figure
 from algid.report.figures.innovations import CORRELATION, WHITENED, innovations, read_curves
 from algid.report.figures.running import running
 from algid.report.gallery import gallery
-from algid.report.verdict import verdict
 from algid.results import Result, WhitenessTest
 
 
@@ -30,7 +29,7 @@ def _figure(made: object) -> Figure:
 
 
 def test_a_good_reports_innovations_lie_in_their_band(case_folder: Path, result: Result) -> None:
-    assert verdict(result).level == "good"
+    assert result.verdict.grade == "good"
     curves = read_curves(case_folder / "innovations.parquet")
     assert set(curves) == {(kind, joint) for kind in (WHITENED, CORRELATION) for joint in (1, 2)}
     count = sum(curve.x.size for curve in curves.values())

@@ -41,9 +41,9 @@ def test_distances_and_their_count_agree(result: Result) -> None:
     inside = sum(abs(x) <= 1.96 for x in drawn[0] + drawn[1])
     assert figure.note.startswith(f"{inside} of {len(drawn[0]) + len(drawn[1])} differences")
     judged = verdict(found)
-    assert judged.level == "reservations"
+    assert judged.grade == "reservations"
     assert "of c (-5.0 σ)" in judged.sentence
-    assert verdict(compare(results[:2], ["a", "b"])).level == "good"
+    assert verdict(compare(results[:2], ["a", "b"])).grade == "good"
 
 
 def test_intervals_are_those_of_the_results(result: Result) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from algid.notices import Notice
 from algid.report.arm import ArmDrawing
 from algid.report.document import (
     Bullets,
@@ -33,7 +34,7 @@ from algid.report.frame import page
 from algid.report.html import banner, contents, section_html, table_html
 from algid.report.markdown import markdown, markdown_table
 from algid.report.terminal import print_document
-from algid.report.verdict import Verdict, judged
+from algid.verdict import Verdict, graded
 
 COLUMNS = (Column("Name", "name"), Column("Value", "number"))
 GOOD = Verdict("good", "all is well")
@@ -312,52 +313,29 @@ def test_a_narrow_table_loses_the_highest_rank_first_and_never_one_without() -> 
     assert Table("T", (), ()).narrower() is None
 
 
-REASONS = ("k2 is singular", "it jitters: by 2 ms", "it is cold")
-
-
-@pytest.mark.parametrize(
-    ("reasons", "sentence"),
-    [
-        ((), "Good: k is known."),
-        (REASONS[:1], "With reservations: k is known, but k2 is singular."),
-        (REASONS[:2], "With reservations: k is known, but k2 is singular, and there is one more reason below."),
-        (REASONS, "With reservations: k is known, but k2 is singular, and 2 more reasons below."),
-        (
-            REASONS[:1] * 2001,
-            "With reservations: k is known, but k2 is singular, and 2,000 more reasons below.",
-        ),
-    ],
-)
-def test_one_sentence_judges_every_report(reasons: tuple[str, ...], sentence: str) -> None:
-    found = judged("k is known", reasons, None)
-    assert found.sentence == found.word + found.rest == sentence
-    failed = judged("k is known", reasons, "it broke", things="masses", cause="c", command="run")
+def test_one_sentence_judges_every_report() -> None:
+    reasons = (Notice("A", "k2 is singular"), Notice("B", "it jitters"))
+    assert graded("k is known").sentence == "Good: k is known."
+    assert graded("k is known", reasons).sentence == "With reservations: k is known, but k2 is singular."
+    failed = graded("k is known", reasons, failure="it broke", things="masses", command="run")
     assert failed.sentence == "Failed: it broke; do not use these masses."
-    assert (failed.level, failed.reasons, failed.cause, failed.command) == ("failed", reasons, "c", "run")
-    assert judged("k", reasons, "it broke").sentence.endswith("these numbers.")
-
-
-def test_the_first_reason_may_be_told_shorter_and_stays_whole_below() -> None:
-    found = judged("k is known", REASONS[1:], None, first="it jitters", cause="the wind", command="run")
-    assert found.sentence == "With reservations: k is known, but it jitters, and there is one more reason below."
-    assert found.further_reasons == REASONS[1:]
-    assert (found.cause, found.command) == ("the wind", "run")
-    assert judged("k is known", (), None, cause="c", command="run") == Verdict("good", "k is known")
+    assert (failed.grade, failed.reasons, failed.command) == ("failed", reasons, "run")
+    assert graded("k", reasons, failure="it broke").sentence.endswith("these numbers.")
 
 
 def test_the_word_of_a_verdict_is_marked_in_every_format() -> None:
-    poor = Verdict("failed", "it is <broken>", ("a|b", "c"), "the cause", "algid x `y`")
+    reasons = (Notice("A", "a|b"), Notice("C", "c"))
+    poor = Verdict("failed", "it is <broken>", reasons, command="algid x `y`")
     shown = document(verdict=poor)
     coloured = terminal(shown, force_terminal=True, color_system="standard")
     assert "\x1b[1;31mFailed\x1b[0m: it is <broken>." in coloured
     plain = terminal(shown)
-    assert plain.splitlines() == [
+    assert [line.rstrip() for line in plain.splitlines()] == [
         "Failed: it is <broken>.",
-        "Likely cause: the cause",
-        "Run first:    algid x `y`",
-        *plain.splitlines()[3:],
+        " • a|b [A]",
+        " • c [C]",
+        "Run first: algid x `y`",
     ]
-    assert [line.split() for line in plain.splitlines()[3:]] == [["•", "a|b"], ["•", "c"]]
     text = markdown(shown)
     assert "❌ **Failed**: it is \\<broken\\>." in text
     assert "```sh\nalgid x `y`\n```" in text
@@ -366,11 +344,11 @@ def test_the_word_of_a_verdict_is_marked_in_every_format() -> None:
     assert '<div class="verdict failed"><span class="sign" aria-hidden="true">✕</span>' in marked
     assert "<p><strong>Failed</strong>: it is &lt;broken&gt;.</p>" in marked
     assert "Run first: <code>algid x `y`</code>" in marked
-    assert marked.endswith("<ul><li>a|b</li><li>c</li></ul></div></div>")
+    assert "<ul><li>a|b</li><li>c</li></ul>" in marked
     assert "<ul>" not in banner(GOOD)
     assert "cause" not in banner(GOOD)
 
 
 def test_no_row_of_backticks_ends_a_block_of_code() -> None:
-    text = markdown(document(verdict=Verdict("failed", "no", (), None, "echo ````x```` ``")))
+    text = markdown(document(verdict=Verdict("failed", "no", command="echo ````x```` ``")))
     assert "\n`````sh\necho ````x```` ``\n`````\n" in text

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from algid.report.text import file_name, interval, joined, percent, resolved, significant, visible
+from algid.text import file_name, interval, joined, percent, resolved, significant, visible
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False, min_value=-1e290, max_value=1e290)
 

@@ -19,6 +19,7 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.errors import ResultError
+from algid.notices import Notice
 from algid.report.figures.base import Figure, Missing
 from algid.report.figures.timeline import views
 from algid.report.frame import library
@@ -27,8 +28,8 @@ from algid.report.html import banner
 from algid.report.page import page_html, write_report
 from algid.report.series import LogRange, read_torque
 from algid.report.text import escaped, script_json
-from algid.report.verdict import Verdict
 from algid.results import Estimate, Result, Status, TermCriterion, read_result, write_result
+from algid.verdict import Verdict
 from tests.report.folders import HOSTILE, hostile
 
 BUNDLE = Path(str(resources.files("algid.report"))) / "assets/plotly.min.js.gz"
@@ -317,11 +318,11 @@ def test_what_was_tried_stands_second_with_what_it_gains(folder: Path, result: R
     assert page.count('class="less"') == 1
 
 
-def test_a_reason_that_the_verdict_tells_is_not_listed_again() -> None:
-    told = "k1 is known, but k2 is singular"
-    one = Verdict("reservations", told, ("k2 is singular", "it jitters"))
-    assert one.further_reasons == ("it jitters",)
-    assert banner(one).count("k2 is singular") == 1
-    cause = "θ1 is zero hanging; use --zero hanging"
-    other = Verdict("failed", "M is not positive", (f"algid warns: a.csv: {cause}", "it jitters"), cause)
-    assert other.further_reasons == ("it jitters",)
+def test_a_page_shows_three_reasons_and_folds_the_rest_and_the_notes() -> None:
+    reasons = tuple(Notice("A", f"reason {place}", logs=("a.csv",)) for place in range(5))
+    shown = banner(Verdict("reservations", "k1 is known", reasons, (Notice("B", "a note", note=True),)))
+    first, _, rest = shown.partition("<details>")
+    assert [place for place in range(5) if f"reason {place}" in first] == [0, 1, 2]
+    assert "2 more reasons" in rest
+    assert "data notes (1)" in rest
+    assert "a.csv: reason 4" in rest

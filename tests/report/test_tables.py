@@ -14,8 +14,8 @@ from algid.report.markdown import escaped, markdown
 from algid.report.page import FIRST, TOLD_ELSEWHERE, page_html, result_document, write_report
 from algid.report.tables import estimate_tables, flat_settings, log_tables, settings_table, terms_tables
 from algid.report.terminal import print_document
-from algid.report.text import digits_of, resolved, significant
 from algid.results import Estimate, Result, Status, TermCriterion, TorquePrediction, result_json
+from algid.text import digits_of, resolved, significant
 from tests.report.folders import estimate, hostile
 
 

@@ -3,15 +3,17 @@ from __future__ import annotations
 import pytest
 from rich.console import Console
 
+from algid.notices import Notice, Remedy
 from algid.report.document import Depth
 from algid.report.html import table_html
 from algid.report.markdown import markdown
 from algid.report.page import result_document
 from algid.report.tables import estimate_tables
 from algid.report.terminal import print_document
-from algid.report.verdict import verdict
-from algid.results import Bound, Cause, Estimate, Result, Status, TorquePrediction, WhitenessTest
+from algid.results import Bound, Estimate, Result, Status, TorquePrediction, WhitenessTest
 from tests.report.folders import estimate
+
+HANGING = Notice("WRONG_ZERO", numbers={"turn": -90.0}, remedies=(Remedy({"zero": "hanging"}),))
 
 
 def with_fit(result: Result, **changes: object) -> Result:
@@ -24,8 +26,8 @@ def with_parameter(result: Result, name: str, found: Estimate) -> Result:
 
 
 def test_a_result_without_a_flaw_is_good_and_says_how_good(result: Result) -> None:
-    found = verdict(result)
-    assert found.level == "good"
+    found = result.verdict
+    assert found.grade == "good"
     assert found.sentence.startswith("Good: all 9 parameters are identified, the least certain, ")
     assert "over 99.99 % of the torque of both joints" in found.sentence
     assert found.reasons == ()
@@ -36,28 +38,33 @@ def test_the_papers_estimator_is_good_without_error_bars(result: Result) -> None
     plain = result.model_copy(
         update={"parameters": bare, "payload": {}, "fit": None, "estimator": "paper", "table4": []}
     )
-    found = verdict(plain)
-    assert found.level == "good"
+    found = plain.verdict
+    assert found.grade == "good"
     assert "without error bars, which the paper estimator does not give" in found.sentence
 
 
 def test_one_reservation_is_told_in_the_sentence(result: Result) -> None:
     lost = Estimate(estimate=None, unit="kg m^2", status=Status.NOT_IDENTIFIABLE)
-    found = verdict(with_parameter(result, "k5", lost))
-    assert found.level == "reservations"
+    found = with_parameter(result, "k5", lost).verdict
+    assert found.grade == "reservations"
     assert found.sentence == "With reservations: 8 of 9 parameters are identified, but k5 is not identifiable."
+    assert [reason.code for reason in found.reasons] == ["NOT_IDENTIFIABLE"]
 
 
-def test_more_reservations_are_counted(result: Result) -> None:
-    found = verdict(result.model_copy(update={"warnings": ["3 samples are missing", "stamps jitter"]}))
-    assert found.sentence.endswith("but algid warns: 3 samples are missing, and there is one more reason below.")
-    assert len(found.reasons) == 2
+def test_warnings_are_reasons_and_notes_are_none(result: Result) -> None:
+    lost, cut = (
+        Notice("NOT_FINITE", "3 samples are missing", lossy=True, logs=("a.csv",)),
+        Notice("CUT", "cut", note=True),
+    )
+    found = result.model_copy(update={"notices": [cut, lost]}).verdict
+    assert found.sentence.endswith("but 3 samples are missing.")
+    assert (found.reasons, found.notes) == ((lost,), (cut,))
+    assert found.reasons[0].sentence == "a.csv: 3 samples are missing"
 
 
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
-        ({"unidentifiable": ["k3 and k5 only as a sum"]}, "k3 and k5 only as a sum"),
         ({"broken_bounds": [Bound(bound="k6 ≥ 0", value=-1.0, distance_sigma=4.0)]}, "k6 ≥ 0"),
         (
             {"whiteness": {"tau1": WhitenessTest(white=False, p_value=0.0, lag1_correlation=0.9)}},
@@ -72,33 +79,33 @@ def test_more_reservations_are_counted(result: Result) -> None:
 def test_what_the_fit_holds_against_itself_is_a_reservation(
     result: Result, changes: dict[str, object], reason: str
 ) -> None:
-    found = verdict(with_fit(result, **changes))
-    assert found.level == "reservations"
+    found = with_fit(result, **changes).verdict
+    assert found.grade == "reservations"
     assert reason in found.sentence
 
 
 def test_intervals_that_allow_for_colour_make_it_no_reservation(result: Result) -> None:
     coloured = {"tau1": WhitenessTest(white=False, p_value=0.0, lag1_correlation=0.9)}
-    assert verdict(with_fit(result, whiteness=coloured, intervals="sandwich")).level == "good"
+    assert with_fit(result, whiteness=coloured, intervals="sandwich").verdict.grade == "good"
 
 
 def test_wide_intervals_and_distance_from_the_truth_are_reservations(result: Result) -> None:
-    wide = verdict(with_parameter(result, "k2", estimate(0.05, 0.01, "N m")))
-    assert "k2 (±20 %)" in wide.sentence
+    wide = with_parameter(result, "k2", estimate(0.05, 0.01, "N m")).verdict
+    assert "k2 (±39 %)" in wide.sentence  # 1.96 times 20 %
     row = result.table4[0].model_copy(update={"estimate": 2.0, "truth": 1.0, "std": 0.1})
-    assert "k1 lies 10 σ from the truth" in verdict(result.model_copy(update={"table4": [row]})).sentence
+    assert "k1 (10 σ) lies far from the truth" in result.model_copy(update={"table4": [row]}).verdict.sentence
 
 
 def test_an_estimator_that_did_not_converge_failed(result: Result) -> None:
-    found = verdict(with_fit(result, converged=False))
+    found = with_fit(result, converged=False).verdict
     assert found.sentence == "Failed: the estimator did not converge in 4 iterations; do not use these numbers."
     one = result.parameters["k1"].model_copy(update={"status": Status.NOT_CONVERGED})
-    assert verdict(with_parameter(result, "k1", one)).level == "failed"
+    assert with_parameter(result, "k1", one).verdict.grade == "failed"
 
 
 def test_a_model_that_explains_little_of_the_torque_failed(result: Result) -> None:
     poor = TorquePrediction(rmse=(1, 1), nrmse=(1, 1), r2=(0.14, 0.48), filter="none")
-    found = verdict(with_fit(result, residual=poor))
+    found = with_fit(result, residual=poor).verdict
     assert found.sentence == (
         "Failed: the model explains only 14 % of the torque of joint 1; do not use these numbers."
     )
@@ -107,35 +114,29 @@ def test_a_model_that_explains_little_of_the_torque_failed(result: Result) -> No
 def test_fewer_than_half_of_the_parameters_is_a_failure(result: Result) -> None:
     lost = Estimate(estimate=None, unit="kg m^2", status=Status.NOT_IDENTIFIABLE)
     few = {name: found if name in ("k1", "k2") else lost for name, found in result.parameters.items()}
-    found = verdict(result.model_copy(update={"parameters": few, "payload": {}, "table4": []}))
+    found = result.model_copy(update={"parameters": few, "payload": {}, "table4": []}).verdict
     assert found.sentence.startswith("Failed: only 2 of 7 parameters could be identified")
-
-
-def test_what_a_warning_tells_is_not_told_twice(result: Result) -> None:
-    told = with_fit(result, unidentifiable=["k3 and k5 only as a sum"]).model_copy(
-        update={"warnings": ["k3 and k5 only as a sum"]}
-    )
-    assert verdict(told).reasons == ("algid warns: k3 and k5 only as a sum",)
 
 
 def test_nothing_identified_is_a_failure(result: Result) -> None:
     weak = {"k1": Estimate(estimate=None, unit="kg m^2", status=Status.WEAK_EXCITATION)}
-    found = verdict(result.model_copy(update={"parameters": weak, "payload": {}, "table4": []}))
+    found = result.model_copy(update={"parameters": weak, "payload": {}, "table4": []}).verdict
     assert found.sentence.startswith("Failed: no parameter could be identified (too weakly excited)")
 
 
 def test_an_undetermined_parameter_is_told_once(result: Result) -> None:
     lost = Estimate(estimate=None, unit="kg m^2", status=Status.NOT_IDENTIFIABLE)
-    told = with_parameter(result, "k5", lost).model_copy(update={"warnings": ["k5 is not determined"]})
-    assert verdict(told).reasons == ("k5 is not identifiable",)
+    told = with_parameter(result, "k5", lost)
+    assert [reason.text for reason in told.verdict.reasons] == ["k5 is not identifiable"]
 
 
 def test_many_estimates_far_from_the_truth_are_one_reason(result: Result) -> None:
     wrong = [row.model_copy(update={"truth": row.truth * 2}) for row in result.table4 if row.truth is not None]
-    reasons = verdict(result.model_copy(update={"table4": wrong})).reasons
+    reasons = result.model_copy(update={"table4": wrong}).verdict.reasons
     assert len(reasons) == 1
-    assert reasons[0].startswith("k1 (")
-    assert reasons[0].endswith(" σ) lie far from the truth")
+    assert reasons[0].code == "FAR_FROM_TRUTH"
+    assert reasons[0].text.startswith("k1 (")
+    assert reasons[0].text.endswith(" σ) lie far from the truth")
 
 
 def implausible(result: Result, **changes: object) -> Result:
@@ -149,20 +150,18 @@ def implausible(result: Result, **changes: object) -> Result:
 
 def test_broken_physics_failed_and_the_likely_cause_leads(result: Result) -> None:
     broken = [Bound(bound="k7 >= 0", value=-0.3, distance_sigma=43.0)]
-    found = verdict(implausible(result, broken_bounds=broken))
-    assert found.level == "failed"
+    found = implausible(result, broken_bounds=broken).verdict
+    assert found.grade == "failed"
     assert found.sentence.startswith("Failed: the estimates break k7 >= 0 by 43 standard deviations")
-    assert found.cause is not None
-    assert "signs" in found.cause
+    assert found.reasons[0].code == "UNKNOWN_CAUSE"
     assert found.command == f"algid inspect {result.log.path}"
-    assert not any("implausible" in reason or "k7" in reason for reason in found.reasons)
+    assert not any("k7" in reason.text for reason in found.reasons)
 
 
 def test_a_known_cause_comes_with_the_command_that_mends_it(result: Result) -> None:
-    cause = Cause(cause="θ1 is measured from hanging", flags=["--zero", "hanging"])
-    told = result.model_copy(update={"causes": [cause], "settings": {"command": "algid identify 'a b.csv' -o out"}})
-    found = verdict(implausible(told))
-    assert found.cause == "θ1 is measured from hanging"
+    told = result.model_copy(update={"notices": [HANGING], "settings": {"command": "algid identify 'a b.csv' -o out"}})
+    found = implausible(told).verdict
+    assert found.reasons[0] == HANGING
     assert found.command == "algid identify 'a b.csv' -o out --zero hanging --force"
 
 
@@ -210,8 +209,8 @@ def predicted(one: float, two: float) -> TorquePrediction:
     ],
 )
 def test_what_the_model_explains_decides(result: Result, r2: tuple[float, float], level: str, words: str) -> None:
-    found = verdict(with_fit(result, residual=predicted(*r2)))
-    assert (found.level, words in found.sentence) == (level, True), found.sentence
+    found = with_fit(result, residual=predicted(*r2)).verdict
+    assert (found.grade, words in found.sentence) == (level, True), found.sentence
 
 
 @pytest.mark.parametrize(
@@ -226,34 +225,34 @@ def test_half_of_the_parameters_must_be_identified(result: Result, lost: int, se
     names = list(result.parameters)
     parameters = {name: none if place < lost else result.parameters[name] for place, name in enumerate(names)}
     payload = {"m_p": result.payload["m_p"]}
-    found = verdict(result.model_copy(update={"parameters": parameters, "payload": payload, "table4": []}))
+    found = result.model_copy(update={"parameters": parameters, "payload": payload, "table4": []}).verdict
     assert found.sentence.startswith(sentence)
 
 
-@pytest.mark.parametrize(("sigmas", "reasons"), [(3.9, ()), (4.5, ("k1 lies 4.5 σ from the truth",))])
+@pytest.mark.parametrize(("sigmas", "reasons"), [(3.9, ()), (4.5, ("k1 (4.5 σ) lies far from the truth",))])
 def test_four_sigma_from_the_truth_are_too_far(result: Result, sigmas: float, reasons: tuple[str, ...]) -> None:
     (row,) = [row for row in result.table4 if row.parameter == "k1"]
     assert row.estimate is not None
     assert row.std is not None
     far = row.model_copy(update={"truth": row.estimate + sigmas * row.std, "error_percent": 0.1})
-    assert verdict(result.model_copy(update={"table4": [far]})).reasons == reasons
+    found = result.model_copy(update={"table4": [far]}).verdict
+    assert tuple(reason.text for reason in found.reasons) == reasons
 
 
 def test_praise_tells_the_widest_interval_in_percent(result: Result) -> None:
-    found = verdict(with_parameter(result, "k2", estimate(-2.0, 0.1, "N m")))
+    found = with_parameter(result, "k2", estimate(-2.0, 0.1, "N m")).verdict
     assert "the least certain, k2, to ±9.8 % (95 %)" in found.sentence  # 1.96 times 5 %
 
 
 def test_a_command_is_forced_once(result: Result) -> None:
-    cause = Cause(cause="θ1 is measured from hanging", flags=["--zero", "hanging"])
-    told = result.model_copy(update={"causes": [cause], "settings": {"command": "algid identify a.csv --force"}})
-    assert verdict(implausible(told)).command == "algid identify a.csv --force --zero hanging"
+    told = result.model_copy(update={"notices": [HANGING], "settings": {"command": "algid identify a.csv --force"}})
+    assert implausible(told).verdict.command == "algid identify a.csv --force --zero hanging"
 
 
 def test_a_bound_without_a_distance_does_not_hide_a_useless_model(result: Result) -> None:
     near = [Bound(bound="k7 >= 0", value=0.0, distance_sigma=None)]
-    found = verdict(implausible(result, broken_bounds=near, residual=predicted(-0.3, 0.9)))
+    found = implausible(result, broken_bounds=near, residual=predicted(-0.3, 0.9)).verdict
     assert found.sentence.startswith("Failed: the model predicts the torque of joint 1 worse than its mean does;")
-    fine = verdict(implausible(result, broken_bounds=near))
+    fine = implausible(result, broken_bounds=near).verdict
     assert fine.sentence.startswith("Failed: the estimates break k7 >= 0;")
-    assert verdict(implausible(result)).sentence.startswith("Failed: physics forbids these estimates;")
+    assert implausible(result).verdict.sentence.startswith("Failed: physics forbids these estimates;")

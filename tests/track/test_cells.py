@@ -15,6 +15,7 @@ from algid.estimators.whitening import NoiseLevels
 from algid.identification.identify import identify
 from algid.log import Log, Origin
 from algid.model import Model
+from algid.notices import Notice
 from algid.results import LogSummary
 from algid.settings import Settings
 from algid.signals.segments import segments
@@ -179,7 +180,7 @@ def judged(
     log = LogSummary(
         path="a", sha256=None, role="loaded", format="csv", rows=2, start_ns=0, duration=1.0, rate=1.0, mapping={}
     )
-    return TrackResult(found, log, "arm", "0" * 64, None, {"l1": 0.3}, "1", schedule, ("a warning",), True)
+    return TrackResult(found, log, "arm", "0" * 64, {"l1": 0.3}, "1", schedule, (Notice("A", "a warning"),), True)
 
 
 @pytest.mark.parametrize(
@@ -217,6 +218,6 @@ def test_track_json_holds_what_was_found() -> None:
     assert content["changes"] == [{"t": 2.0, "from": 1.9, "to": 2.1}]
     assert content["holes"] == [[5.0, 6.0]]
     assert (content["excess"], content["explained"], content["bare"]) == (1.5, 0.99, 0.1)
-    assert content["arm"] == {"path": "arm", "sha256": "0" * 64, "sentence": None}
+    assert content["arm"] == {"path": "arm", "sha256": "0" * 64}
     assert content["data_lost"] is True
-    assert content["warnings"] == ["a warning"]
+    assert [one["text"] for one in content["notices"]] == ["a warning"]

@@ -20,9 +20,9 @@ from typer.testing import CliRunner
 import algid
 from algid.errors import ResultError
 from algid.identification.identify import identify
+from algid.notices import Notice
 from algid.report.frame import page
 from algid.report.markdown import markdown
-from algid.report.verdict import Verdict
 from algid.synth.sensors import Sensors
 from algid.track.figures import figures
 from algid.track.page import track_document, write_track
@@ -31,6 +31,7 @@ from algid.track.read import read_track
 from algid.track.result import StretchStatus, TrackResult, track_json
 from algid.track.run import track_log
 from algid.track.tables import change_table, fixed, stretch_table, verdict
+from algid.verdict import Verdict
 from algid.writers import write_log
 from tests.cli.commands import app
 from tests.report.browser import DRIVER, Browser
@@ -59,7 +60,7 @@ def result(files: tuple[Path, Path]) -> TrackResult:
 
 def test_the_sentence_tells_changes_and_masses(result: TrackResult) -> None:
     judged = verdict(result)
-    assert judged.level == "good", judged
+    assert judged.grade == "good", judged
     assert "doubtful status" not in {column.kind for column in stretch_table(result).columns}
     first, second = result.track.changes[:, 0]
     assert f" at {first:.2f} and {second:.2f} s, " in judged.sentence
@@ -151,23 +152,25 @@ def test_masses_that_cannot_be_are_not_passed_on(result: TrackResult) -> None:
     found = replace(result, track=replace(result.track, stretches=[less, still, less]))
     assert found.statuses == [StretchStatus.NEGATIVE_MASS, StretchStatus.WEAK_EXCITATION, StretchStatus.NEGATIVE_MASS]
     judged = verdict(found)
-    assert judged.level == "failed"
+    assert judged.grade == "failed"
     assert "2 of 3 stretches weigh less than nothing" in judged.sentence
-    assert judged.reasons[:2] == (
+    assert [reason.text for reason in judged.reasons[:2]] == [
         "stretch 2 moves too little to be weighed",
         "stretches 1 and 3 weigh less than nothing, which no payload does",
-    )
+    ]
 
 
 def test_the_arm_of_another_log_is_told(files: tuple[Path, Path], tmp_path: Path) -> None:
     other, _ = algid.synthesise("case2", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
     write_log(tmp_path / "other.mcap", other)
     judged = verdict(track_log(tmp_path / "other.mcap", files[1], l1=CASE.arm.l1, l2=CASE.arm.l2))
-    assert judged.level == "failed"
+    assert judged.grade == "failed"
 
 
 def test_names_that_attack_stay_text(result: TrackResult) -> None:
-    hostile = replace(result, arm=HOSTILE, log=result.log.model_copy(update={"path": HOSTILE}), warnings=(HOSTILE,))
+    hostile = replace(
+        result, arm=HOSTILE, log=result.log.model_copy(update={"path": HOSTILE}), notices=(Notice("HOSTILE", HOSTILE),)
+    )
     own = re.sub(r"<(script|style)[^>]*>.*?</\1>", "", page(track_document(hostile)), flags=re.DOTALL)
     assert "<img" not in own
     assert "<script" not in own
@@ -178,7 +181,7 @@ def test_the_command_prints_json_alone_and_keeps_what_is_there(files: tuple[Path
     command = ["track", str(files[0]), "--parameters", str(files[1]), *lengths, "-o", str(tmp_path)]
     done = CliRunner().invoke(app, [*command, "--format", "json", "--export", "mcap"])
     assert done.exit_code == 0, done.output
-    assert json.loads(done.stdout)["schema_version"] == 1
+    assert json.loads(done.stdout)["schema_version"] == 2
     folder = tmp_path / "picking.track"
     names = {"track.json", "track.parquet", "stretches.parquet", "report.html", "report.md", "track.mcap"}
     assert {path.name for path in folder.iterdir()} == names
@@ -250,14 +253,14 @@ def test_what_a_track_cannot_explain_is_told_by_how_much(result: TrackResult) ->
     assert judged(explained=-0.3).sentence == f"Failed: {nothing}; do not use these masses."
     strange = judged(explained=0.95, colour=250_000.0).sentence
     assert strange.startswith("Failed: arm and payload miss the torque by 500 times its sensors' noise: is it this arm")
-    assert judged(explained=0.995, colour=250_000.0).level == "reservations"  # very quiet sensors
+    assert judged(explained=0.995, colour=250_000.0).grade == "reservations"  # very quiet sensors
     poor = judged(explained=0.8)
-    assert (poor.level, poor.reasons[0]) == ("reservations", "arm and payload explain only 80 % of the torque")
+    assert (poor.grade, poor.reasons[0].text) == ("reservations", "arm and payload explain only 80 % of the torque")
     wider = judged(colour=9.0)
-    assert wider.reasons[0].startswith("the torque holds errors 3.0 times its sensors' noise")
-    lost = verdict(replace(result, data_lost=True, arm_sentence="Failed: no."))
-    assert lost.reasons == ("samples of the log are lost", "the arm's own result says: Failed: no.")
-    assert lost.sentence.endswith(", but samples of the log are lost, and there is one more reason below.")
+    assert wider.reasons[0].text.startswith("the torque holds errors 3.0 times its sensors' noise")
+    lost = verdict(replace(result, data_lost=True))
+    assert [reason.code for reason in lost.reasons] == ["DATA_LOST"]
+    assert lost.sentence.endswith(", but samples of the log are lost.")
 
 
 def test_one_stretch_and_many_are_told_in_words(result: TrackResult) -> None:

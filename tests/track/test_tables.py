@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from algid.arm import FloatArray
+from algid.notices import Notice
 from algid.report.document import Depth
 from algid.report.frame import page
 from algid.report.markdown import markdown
@@ -58,9 +59,7 @@ def track(masses: list[float], std: float = 0.001, **changes: object) -> TrackRe
         colour=1.0,
         tip_equivalent=0.05,
     )
-    made = TrackResult(
-        track=found, log=LOG, arm="arm.algid", arm_sha256="1" * 64, arm_sentence=None, settings={"l1": 0.2}, version="1"
-    )
+    made = TrackResult(track=found, log=LOG, arm="arm.algid", arm_sha256="1" * 64, settings={"l1": 0.2}, version="1")
     return replace(made, **changes)  # type: ignore[arg-type]
 
 
@@ -107,8 +106,10 @@ def test_stretches_stand_against_the_schedule() -> None:
 
 
 def test_a_report_shows_changes_and_holes_where_there_are_any() -> None:
-    still = track([0.1], warnings=("it jitters",))
-    assert verdict(still).level == "good"
+    assert verdict(track([0.1])).grade == "good"
+    still = track([0.1], notices=(Notice("JITTER", "it jitters"), Notice("CUT", "cut", note=True)))
+    assert [one.code for one in verdict(still).reasons] == ["JITTER"]
+    assert [one.code for one in verdict(still).notes] == ["CUT"]
     titles = [table.title for table in track_document(still).tables(*Depth)]
     assert titles == ["Payload by stretch", "Fit", "Logs", "Channels", "Settings", "Provenance"]
     moving = track([0.1, 0.3])

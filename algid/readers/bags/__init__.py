@@ -11,7 +11,7 @@ from algid.readers.bags.folder import bag_files
 from algid.readers.messages.reader import Opener, open_messages
 
 if TYPE_CHECKING:
-    from algid.log import Notice
+    from algid.notices import Notice
     from algid.profile import Profile
 
 

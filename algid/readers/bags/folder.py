@@ -9,7 +9,7 @@ from pathlib import Path
 from algid.errors import LogError
 from algid.files import read_start
 from algid.limits import LIMITS
-from algid.log import Notice
+from algid.notices import Notice
 from algid.words import counted
 
 

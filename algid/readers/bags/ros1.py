@@ -20,7 +20,7 @@ import numpy as np
 
 from algid.errors import LogError
 from algid.limits import LIMITS
-from algid.log import Notice
+from algid.notices import Notice
 from algid.readers.bags.records import (
     BAG,
     CHUNK,

@@ -18,7 +18,7 @@ import numpy as np
 
 from algid.errors import LogError
 from algid.limits import LIMITS
-from algid.log import Notice
+from algid.notices import Notice
 from algid.readers.messages.batch import MessageBatch, Messages
 from algid.readers.messages.source import MessageChannel, Source
 from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION

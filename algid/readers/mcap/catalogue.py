@@ -15,7 +15,8 @@ from typing import Any
 
 from algid.errors import LogError
 from algid.limits import LIMITS
-from algid.log import KEY, Notice, Truth, loads
+from algid.log import KEY, Truth, loads
+from algid.notices import Notice
 from algid.readers.mcap import framing
 from algid.readers.mcap.framing import ChunkIndex, DamagedError, File, claimed, parse, unpack
 from algid.readers.mcap.records import Records, records_in

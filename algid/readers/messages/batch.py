@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.log import IntArray, Notice
+from algid.log import IntArray
+from algid.notices import Notice
 from algid.words import counted
 
 

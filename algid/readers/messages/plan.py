@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from algid.errors import LogError
 from algid.limits import LIMITS
-from algid.log import Notice, Reading
+from algid.log import Reading
+from algid.notices import Notice
 from algid.readers.joints import along_the_arm, order_notice
 from algid.readers.messages.codec import walk_for
 from algid.readers.messages.columnar import MisfitError, Shape

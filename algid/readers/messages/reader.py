@@ -7,7 +7,8 @@ from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING
 
 from algid.errors import LogError
-from algid.log import Notice, Origin
+from algid.log import Origin
+from algid.notices import Notice
 from algid.readers.assemble import TableReader, reader_of
 from algid.readers.joints import moving_joints
 from algid.readers.messages.source import Source

@@ -9,7 +9,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from algid.log import Notice, Truth
+from algid.log import Truth
+from algid.notices import Notice
 from algid.readers.messages.batch import MessageBatch
 
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from algid.errors import LogError
 from algid.limits import LIMITS
-from algid.log import IntArray, Notice
+from algid.log import IntArray
+from algid.notices import Notice
 from algid.readers.messages.batch import Account
 from algid.readers.messages.codec import decoder_for
 from algid.readers.messages.columnar import Decoder, ExcessError, Shape

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.report.text import visible
+from algid.text import visible
 
 Trace = dict[str, Any]
 Layout = dict[str, Any]

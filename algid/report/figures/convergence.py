@@ -26,8 +26,8 @@ from algid.report.figures.base import (
     upright,
 )
 from algid.report.series import EPSILON, LARGEST_CONDITION, Series, SeriesLog, read_series
-from algid.report.text import resolved, significant, unit_text
 from algid.results import Estimate, Result
+from algid.text import resolved, significant, unit_text
 
 HEIGHT = 230
 TITLE, LOADED = "Convergence of the estimates", "Convergence, loaded log"

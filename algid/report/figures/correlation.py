@@ -6,8 +6,8 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.report.figures.base import Figure, Missing, Panel, axis, label, packed
-from algid.report.text import joined
 from algid.results import Result
+from algid.text import joined
 
 TITLE = "Correlation of the estimates"
 STRONG = 0.95

@@ -7,7 +7,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.report.figures.base import Figure, Panel, axis, packed
 from algid.report.series import TorqueLog
-from algid.report.text import significant
+from algid.text import significant
 
 TURN = 540.0  # degrees: an angle that spans more has turned round, and is shown within ±180
 

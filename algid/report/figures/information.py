@@ -13,8 +13,8 @@ from algid.report.figures.base import Figure, Layout, Missing, Panel, axis, labe
 from algid.report.figures.timeline import offsets, separators
 from algid.report.reduce import Block, blocks, by_log, columns_of
 from algid.report.series import LogRange
-from algid.report.text import significant
 from algid.results import Result
+from algid.text import significant
 
 TITLE = "Information per second of log"
 MOST_CELLS = 600

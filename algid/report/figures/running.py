@@ -13,8 +13,8 @@ from algid.report.figures.base import Figure, Layout, Legend, Missing, Panel, ax
 from algid.report.figures.timeline import offsets, separators, views
 from algid.report.reduce import blocks, by_log, columns_of
 from algid.report.series import LogRange
-from algid.report.text import resolved, significant, unit_text
 from algid.results import Estimate, Result
+from algid.text import resolved, significant, unit_text
 
 TITLE = "Running estimate"
 HALF = "_half"

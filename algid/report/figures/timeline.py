@@ -9,8 +9,8 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.report.figures.base import Layout, label, upright
 from algid.report.series import LogRange
-from algid.report.text import file_name
 from algid.results import LogSummary
+from algid.text import file_name
 
 SPACE = 0.01  # of the whole time, between two logs
 MOST_NAMES = 6

@@ -10,8 +10,8 @@ from algid.errors import ResultError
 from algid.report.figures.base import Figure, Legend, Missing, Panel, Trace, axis, line
 from algid.report.figures.timeline import chained, offsets, separators, views
 from algid.report.series import TorqueLog
-from algid.report.text import significant
 from algid.results import LogSummary
+from algid.text import significant
 
 TITLE = "Measured and predicted torque"
 CLOSEUP = "The worst moment, at full rate"

@@ -1,7 +1,7 @@
 """What an identification found: the one source of every table, file and page that shows it.
 
-A `Result` is written as `result.json` (schema version 2; version 1 is still read) and read back; JSON Schema comes
-from the models.
+A `Result` is written as `result.json` (schema version 3; 1 and 2 are still read) and read back; JSON Schema comes
+from the models. Its verdict is made of the rest whenever it is asked for, and written for whoever reads the file.
 Numbers that do not exist (NaN) are null; an unbounded interval is ``[null, null]``. Nothing in a result depends
 on when it was made, so that the same log and settings give the same bytes.
 """
@@ -15,22 +15,25 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, ValidationError, computed_field, model_validator
 
 from algid.errors import ResultError, SettingError
 from algid.files import first_misfit, read_text, whole_file
 from algid.limits import LIMITS
 from algid.log import Reading
+from algid.notices import Notice, from_flags
+from algid.verdict import Verdict
 from algid.words import counted
 
-SCHEMA_VERSION: Literal[2] = 2
-READABLE = (1, 2)
+SCHEMA_VERSION: Literal[3] = 3
+READABLE = (1, 2, 3)
 """Versions that are read; what the first one did not hold has its default."""
 
 
 class Status(StrEnum):
     """How far an estimate can be trusted.
 
+    NOT_SIGNIFICANT: the interval holds zero, which the parameter may be.
     IMPLAUSIBLE: the estimates together break a bound of physics by more than three standard deviations, or predict
     the torque worse than a constant does.
     """
@@ -41,6 +44,7 @@ class Status(StrEnum):
     NOT_IDENTIFIABLE = "NOT_IDENTIFIABLE"
     NOT_CONVERGED = "NOT_CONVERGED"
     IMPLAUSIBLE = "IMPLAUSIBLE"
+    NOT_SIGNIFICANT = "NOT_SIGNIFICANT"
 
 
 class _Model(BaseModel):
@@ -144,12 +148,16 @@ class Bound(_Model):
 
 
 class TorquePrediction(_Model):
-    """How well the model predicts the torque of logs: RMSE in N m, RMSE over the torque's RMS, and R², a joint."""
+    """How well the model predicts the torque of logs: RMSE in N m, RMSE over the torque's RMS, and R², a joint.
+
+    Scored is what lies below `bandwidth`, in Hz; `filter` says how it is cut out.
+    """
 
     rmse: tuple[float, float]
     nrmse: tuple[float, float]
     r2: tuple[float, float]
     filter: str
+    bandwidth: float | None = None
 
 
 class Repeatability(_Model):
@@ -195,13 +203,6 @@ class FitSummary(_Model):
         return self
 
 
-class Cause(_Model):
-    """What probably lies behind a poor result, in a clause, and the flags to identify again with, if any mend it."""
-
-    cause: str
-    flags: list[str] = []
-
-
 class Result(_Model):
     """The outcome of one identification.
 
@@ -226,13 +227,13 @@ class Result(_Model):
         The first log that was used, and the others.
     data_lost : bool
         Whether a log lacks samples.
-    warnings, notes : list of str
-        What makes the result doubtful, and what could have been read otherwise.
-    causes : list of Cause
-        What probably lies behind a poor result, the most likely one first.
+    notices : list of Notice
+        What was noticed in the logs and in the fit.
+    verdict : Verdict
+        How far to trust it.
     """
 
-    schema_version: Literal[2] = SCHEMA_VERSION
+    schema_version: Literal[3] = SCHEMA_VERSION
     version: str
     estimator: str
     parameters: dict[str, Estimate]
@@ -247,9 +248,30 @@ class Result(_Model):
     log: LogSummary
     more_logs: list[LogSummary] = []
     data_lost: bool = False
-    notes: list[str] = []
-    warnings: list[str] = []
-    causes: list[Cause] = []
+    notices: list[Notice] = []
+
+    @model_validator(mode="before")
+    @classmethod
+    def _verdict_is_made_anew(cls, content: Any) -> Any:
+        return {k: v for k, v in content.items() if k != "verdict"} if isinstance(content, dict) else content
+
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def verdict(self) -> Verdict:
+        """How far to trust the result: made of all that it holds."""
+        from algid.results.verdict import judge
+
+        return judge(self)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What makes the result doubtful, of logs and fit: codes and words."""
+        return [f"{one.code}: {one.sentence}" for one in self.notices if not one.note]
+
+    @property
+    def notes(self) -> list[str]:
+        """How things were read and done: codes and words."""
+        return [f"{one.code}: {one.sentence}" for one in self.notices if one.note]
 
     @property
     def logs(self) -> list[LogSummary]:
@@ -298,7 +320,7 @@ class Result(_Model):
 
 def result_schema() -> dict[str, Any]:
     """JSON Schema of `result.json`."""
-    return Result.model_json_schema()
+    return Result.model_json_schema(mode="serialization")
 
 
 def result_json(result: Result) -> str:
@@ -323,7 +345,7 @@ def read_result(path: str | Path) -> Result:
     Returns
     -------
     Result
-        One of schema version 1 comes back as of version 2.
+        One of an earlier schema version comes back as of this one.
 
     Raises
     ------
@@ -348,7 +370,7 @@ def read_result(path: str | Path) -> Result:
     if wrong is not None:
         raise ResultError(f"{file}: {wrong}; identify again with this version")
     try:
-        result = Result.model_validate(content | {"schema_version": SCHEMA_VERSION})
+        result = Result.model_validate(_current(content))
         _check(result)
     except ValidationError as error:
         raise ResultError(f"{file}: {first_misfit(error)}; identify again with this version") from error
@@ -413,3 +435,18 @@ def _check_size(place: str, value: float | None, *, positive: bool = False) -> N
         least = f"{1 / LIMITS.largest_value:g}"
         what = f"0, or {least} or more" if positive else f"0, or {least} or more in size"
         raise SettingError(f"{place}: expected {what}, found {value:g}")
+
+
+def _current(content: dict[str, Any]) -> dict[str, Any]:
+    """The content of a result of an earlier schema as this one has it: sentences become notices without numbers."""
+    if content["schema_version"] == SCHEMA_VERSION:
+        return content
+    kept = {name: value for name, value in content.items() if name not in ("warnings", "notes", "causes")}
+    causes = [
+        Notice("EARLIER_CAUSE", one["cause"], remedies=(from_flags(one["flags"]),) if one.get("flags") else ())
+        for one in content.get("causes", [])
+    ]
+    said = [
+        Notice("EARLIER", text, note=key == "notes") for key in ("warnings", "notes") for text in content.get(key, [])
+    ]
+    return kept | {"schema_version": SCHEMA_VERSION, "notices": [*causes, *said]}

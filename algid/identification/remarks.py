@@ -1,0 +1,72 @@
+"""What there is to say of a fit: warnings that a reader has to know, and notes on what its intervals leave out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from algid import results
+from algid.estimators.diagnostics import broken_bounds, length_by_constants, payload_distance
+from algid.estimators.fit import Fit
+from algid.estimators.instruments import ENDOGENEOUS
+from algid.notices import Notice, Remedy
+
+ONE_SIDED = 1.645  # standard deviations of a one-sided bound at 95 %
+FAR_APART = 5.0  # standard deviations past which two logs are not of one arm
+
+
+def exchanged(fit: Fit) -> bool:
+    """Whether the unloaded arm bears more than the loaded one, and by far."""
+    return any(b.bound == "m_p >= 0" and b.distance is not None and b.distance > FAR_APART for b in broken_bounds(fit))
+
+
+def fit_warnings(fit: Fit) -> Iterator[Notice]:
+    """What a user should know about a fit."""
+    yield from fit.notes
+    if not fit.converged and not any(note.code == "NOT_FEASIBLE" for note in fit.notes):
+        yield Notice("REFINED_FAILED")
+    yield from (Notice("OPEN_DIRECTION", sentence) for sentence in fit.unidentifiable)
+    if fit.shared.model.gravity == 0:
+        yield Notice("NO_GRAVITY")
+    if fit.endogeneity is not None and fit.endogeneity > ENDOGENEOUS and fit.estimator != "instruments":
+        instruments = Remedy({"estimator": "instruments"}, "to compare")
+        yield Notice("ENDOGENEITY", numbers={"distance": fit.endogeneity}, remedies=(instruments,))
+    if "m_p" in fit.names:
+        yield from _of_payload(fit)
+    given, by_constants = fit.shared.lengths.get("l1"), length_by_constants(fit)
+    if given is not None and by_constants is not None and abs(by_constants[0] - given) > FAR_APART * by_constants[1]:
+        length, std = by_constants
+        yield Notice("LENGTH_MISMATCH", numbers={"length": length, "half": fit.quantile * std, "given": given})
+    if exchanged(fit):
+        yield Notice("EXCHANGED_LOGS")
+    apart = payload_distance(fit)
+    if apart is not None and apart > FAR_APART:
+        yield Notice("LOGS_APART", numbers={"distance": apart})
+
+
+def _of_payload(fit: Fit) -> Iterator[Notice]:
+    place = fit.names.index("m_p")
+    mass, std = float(fit.values[place]), float(fit.std[place])
+    if np.isfinite(std) and abs(mass) < fit.quantile * std:
+        yield Notice("NO_PAYLOAD", numbers={"most": max(mass + ONE_SIDED * std, 0.0)})
+    elif np.isinf(std) and not fit.shared.lengths:
+        yield Notice("LENGTHS_NEEDED")
+
+
+def fit_notes(fit: results.FitSummary) -> Iterator[Notice]:
+    """What blocks of logs leave out, how well the payload repeats, the gain of the torques."""
+    if fit.intervals == "sandwich":
+        yield Notice("ONE_RUN", note=True)
+    if fit.repeatability is not None:
+        masses = ", ".join(f"{mass:.4g}" for mass in fit.repeatability.masses)
+        low, high = fit.repeatability.ci95
+        numbers = {"masses": masses, "std": fit.repeatability.std, "low": low, "high": high}
+        yield Notice("REPEATABILITY", numbers=numbers, note=True)
+    gain = fit.torque_gain
+    if gain is not None and (gain.estimate is None or gain.ci95 is None):
+        yield Notice("NO_TORQUE_GAIN", note=True)
+    elif gain is not None and gain.ci95 is not None:
+        numbers = {"gain": gain.estimate, "low": gain.ci95[0], "high": gain.ci95[1]}
+        gears = Remedy({"tau1.torque_constant": None, "tau2.torque_constant": None}, "set them, or gear_ratio")
+        yield Notice("TORQUE_GAIN", numbers=numbers, remedies=(gears,), note=True)

@@ -1,0 +1,315 @@
+"""What algid has noticed: a code with its numbers and what mends it; whoever shows it writes the words.
+
+A `Notice` is data: nobody searches, cuts or compares its text. A `Remedy` holds settings by name and value, which are
+written as flags for the command that was typed, as lines of a profile, or as Python's keywords.
+"""
+
+from __future__ import annotations
+
+import json
+import shlex
+import string
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from algid.text import joined
+from algid.words import counted
+
+OWN_FLAGS = (
+    *("zero", "second_angle", "drive", "passive", "joints", "angle_unit", "torque_unit", "topic", "clock", "start"),
+    *("end", "accept", "gravity", "estimator", "model", "delay", "l1", "l2", "range", "speed", "torque", "runs"),
+)
+"""Settings with a flag of their own; any other is one of a profile, behind ``--set``."""
+NO_PROFILE = ("estimator", "model", "delay", "l1", "l2", "range", "speed", "torque", "runs")
+"""Settings that no profile has."""
+UNIT_OF = {"angle_unit": "[theta1] and [theta2]", "torque_unit": "[tau1] and [tau2]"}
+OPEN = {"source": "NAME", "gear_ratio": "N", "offset": "RAD", "torque_constant": "K"}
+"""What stands for a value that only the user knows, by the last part of a setting's name."""
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """Settings that mend what a notice is of, by name: ``zero``, ``tau1.sign``; None stands for the user's own value.
+
+    `when` is the case that it is meant for, in words.
+    """
+
+    settings: Mapping[str, Any] = field(hash=False)
+    when: str = ""
+
+    @property
+    def complete(self) -> bool:
+        """Whether every value is known, so that a command with it can be run."""
+        return all(value is not None for value in self.settings.values())
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """As words of a command line."""
+        words: list[str] = []
+        for name, value in self.settings.items():
+            if name in OWN_FLAGS:
+                plain = ",".join(map(str, value)) if isinstance(value, list | tuple) else str(_shown(name, value))
+                words += ["--" + name.replace("_", "-"), plain]
+            else:
+                words += ["--set", f"{name}={_toml(name, value) if value is not None else _shown(name, value)}"]
+        return tuple(words)
+
+    @property
+    def lines(self) -> str:
+        """As lines of a profile; empty where no profile has such a setting."""
+        own: list[str] = []
+        channels: list[str] = []
+        for name, value in self.settings.items():
+            if name in NO_PROFILE:
+                continue
+            if name in UNIT_OF:
+                channels.append(f"unit = {_toml(name, value)} of {UNIT_OF[name]}")
+                continue
+            channel, dot, key = name.partition(".")
+            value = [value] if name == "accept" and isinstance(value, str) else value
+            line = f"{key or name} = {_toml(name, value)}"
+            (channels if dot else own).append(f"{line} of [{channel}]" if dot else line)
+        return ", ".join(own + channels)
+
+    @property
+    def keywords(self) -> dict[str, Any]:
+        """As Python's keywords, a channel's settings in a dictionary of their own."""
+        found: dict[str, Any] = {}
+        for name, value in self.settings.items():
+            channel, dot, key = name.partition(".")
+            if dot:
+                found.setdefault(channel, {})[key] = value
+            else:
+                found[name] = value
+        return found
+
+    def __str__(self) -> str:
+        when = f"{self.when}: " if self.when else ""
+        flags, lines = " ".join(map(shlex.quote, self.flags)), self.lines
+        return f"{when}{flags} (profile: {lines})" if lines else f"{when}{flags}"
+
+
+def _shown(name: str, value: Any) -> Any:
+    """A value, or what stands for one that only the user knows."""
+    return OPEN.get(name.rpartition(".")[2], "VALUE") if value is None else value
+
+
+def _toml(name: str, value: Any) -> str:
+    if value is None and name.endswith("source"):
+        return f'"{_shown(name, value)}"'
+    if value is None:
+        return str(_shown(name, value))
+    return json.dumps(value, ensure_ascii=False)
+
+
+class _Words(string.Formatter):
+    """Format strings in which ``{count:# sample has|samples have}`` agrees with its number, and lists are joined."""
+
+    def format_field(self, value: Any, spec: str) -> str:
+        """One value as `spec` has it."""
+        if "|" in spec:
+            one, many = spec.removeprefix("# ").split("|")
+            count = len(value) if isinstance(value, list | tuple) else value
+            return counted(count, one, many) if spec.startswith("# ") else one if count == 1 else many
+        if isinstance(value, list | tuple):
+            return joined(list(map(str, value)))
+        return str(format(value, spec))
+
+
+MESSAGES: Mapping[str, str] = {
+    # of estimates
+    "NOT_IDENTIFIABLE": "{names} {names:is|are} not identifiable",
+    "NOT_SIGNIFICANT": "{names} {names:is|are} not significant: zero lies within the 95 % interval",
+    "WEAK_EXCITATION": "{names} {names:is|are} too weakly excited",
+    "SINGULAR": "{names} {names:is|are} singular",
+    "NOT_CONVERGED": "{names} {names:is|are} not converged",
+    "WIDE_INTERVAL": "the 95 % interval of {names} is wide",
+    "FAR_FROM_TRUTH": "{names} {names:lies|lie} far from the truth",
+    # of a fit
+    "LITTLE_EXPLAINED": "the model explains only {percent:.0f} % of the torque of joint {joint}{band}",
+    "WORSE_THAN_MEAN": "the model predicts the torque of joint {joint} worse than its mean does",
+    "BROKEN_BOUND": "the estimates break {bound} by {distance}",
+    "NOT_WHITE": "the residual of {names} is not white, though the intervals take it to be",
+    "UNKNOWN_CAUSE": (
+        "angles, signs, units or the order of the joints are not what algid took them for, or the logs are of another "
+        "arm"
+    ),
+    "REFUTED": (
+        "the torque's error is far larger and slower than its sensor's noise (unmodelled dynamics): the likelihood of "
+        "white noise does not hold, and the {kept} estimate with robust intervals stands in its place"
+    ),
+    "WIDER_MODEL": "error bars are as if the model had {terms} too",
+    "JOINT_STILL": "{joints} never moved: give a log in which both joints do",
+    "JOINTS_CONTRADICT": (
+        "joint 1 by itself tells {name} as {first:.2g} {unit} and joint 2 as {second:.2g}: one of them is hardly "
+        "driven, or a term is missing; give a log that drives both"
+    ),
+    "CONSTRAINED": "--constrain enforces {bounds}, which the logs contradict",
+    "NOT_FEASIBLE": "--constrain cannot obey {bounds}: no estimates within the bounds were found",
+    "REFINED_FAILED": "the refined estimator did not converge; the weak estimate is reported instead",
+    "NO_GRAVITY": "without gravity k2 and k4 have no effect, and the payload has no weight: give --l1 or --l2",
+    "ENDOGENEITY": (
+        "instruments and least squares are {distance:.1f} standard deviations apart: torque that the model lacks "
+        "drives the motion, and least squares takes the constants too small"
+    ),
+    "NO_PAYLOAD": "the payload is not significantly different from zero: at most {most:.3g} kg at 95 %",
+    "LENGTHS_NEEDED": "without link lengths a payload near zero is not determined: give --l1 and --l2",
+    "LENGTH_MISMATCH": (
+        "g k1 / k2 makes l1 {length:.4g} ± {half:.2g} m, given are {given:g} m: gravity is compensated in part, or a "
+        "zero, a sign or a term of the torque is wrong"
+    ),
+    "EXCHANGED_LOGS": "the payload's mass is negative by far: the loaded and the unloaded logs are exchanged",
+    "LOGS_APART": "the loaded and the unloaded logs are {distance:.1f} standard deviations from belonging to one arm",
+    "NO_CROSS_VALIDATION": "no cross-validation: a log is too short to be fitted, or to be judged",
+    "ONE_RUN": "what differs from run to run is not in the intervals: give four logs or more",
+    "REPEATABILITY": (
+        "the loaded runs by themselves weigh {masses} kg: repeatability {std:.2g} kg (95 %: {low:.2g} to {high:.2g})"
+    ),
+    "TORQUE_GAIN": (
+        "by the payload that is known the torques have to be multiplied by {gain:.5g} (95 %: {low:.5g} to {high:.5g}), "
+        "and with them k1 … k7, friction and masses"
+    ),
+    "NO_TORQUE_GAIN": (
+        "the payload that is known does not tell the gain of the torques: its mass is not significantly different from "
+        "zero"
+    ),
+    # of logs
+    "SAME_LOG": "{name} is the same log, byte for byte, and counts once",
+    "SAME_LOG_LOADED": (
+        "{name} is {twin}, byte for byte: one log is given as unloaded and as loaded, which makes the payload zero"
+    ),
+    "OTHER_ARM": "its metadata name another arm than {first}",
+    "READ_OTHERWISE": "read otherwise than the log of {file}: {differences}",
+    "DATA_LOST": "samples of the log are lost",
+    "FLIPPED_SIGN": "gravity pulls upwards (k4 = {weight:.3g} N m): the sign of torques or angles is wrong",
+    "WRONG_ZERO": "gravity is turned by {turn:.0f}°: θ1 is not from the horizontal",
+    "GRAVITY_COMPENSATED": (
+        "torques carry no weight (gravity explains {percent:.2g} % of them): they are gravity-compensated, or the arm "
+        "moves in a horizontal plane"
+    ),
+    "WRONG_CONVENTION": "{wrong}, by all that physics says ({contradiction})",
+    "ZERO_OFFSET": "{wrong}",
+    "RESTS": (
+        "the arm rests {rests}; where friction holds it there, the torque is not that of the weight: leave the rest out"
+    ),
+    "LOST_SAMPLES": (
+        "{count:# step of the angles is|steps of the angles are} twice as long as usual, though the stamps are even: "
+        "samples were lost and the others renumbered, so that no estimate can be right; take the stamps of the "
+        "messages, or record without losses"
+    ),
+    # of tracks
+    "STRETCHES_WEAK": "stretch{numbers:|es} {numbers} {numbers:moves|move} too little to be weighed",
+    "STRETCHES_NEGATIVE": (
+        "stretch{numbers:|es} {numbers} {numbers:weighs|weigh} less than nothing, which no payload does"
+    ),
+    "TORQUE_UNEXPLAINED": "arm and payload explain only {percent:.0f} % of the torque",
+    "TORQUE_ERRORS": (
+        "the torque holds errors {times} times its sensors' noise that the arm's model does not explain: intervals are "
+        "wider by as much, and small changes go unseen"
+    ),
+    "ARM_DOUBTFUL": "the arm's own result is {grade}: {headline}",
+    "LENGTH_CONTRADICTED": (
+        "{name} of {given:g} m lies {distance:.0f} σ from the result's {estimate:.5g} ± {std:.2g} m; one is wrong"
+    ),
+    # of designs and fleets
+    "TERMS_LEFT_OUT": (
+        "the plan leaves out {terms}: where they are estimated too, error bars are somewhat larger than predicted"
+    ),
+    "NOT_REACHED": "no motion within the limits tells {names}",
+    "BROKEN_OFF": "the search was broken off: this is the best motion until then",
+}
+"""Text by code; what is not here brings its own."""
+
+
+@dataclass(frozen=True)
+class Notice:
+    """Something that a user should know of a log or of a result.
+
+    Parameters
+    ----------
+    code : a fixed word such as ``DUPLICATE_STAMPS``
+    text : what was seen, in a clause; made of the numbers where `MESSAGES` has the code
+    lossy : whether samples are missing from the log
+    note : whether it says how things were done, and is no reason to doubt a result
+    refuse : whether the log is not used for it
+    numbers : what the text is made of
+    remedies : what mends it, the likeliest first
+    logs : names of the logs that it is of
+    """
+
+    code: str
+    text: str = ""
+    lossy: bool = False
+    note: bool = False
+    refuse: bool = False
+    numbers: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    remedies: tuple[Remedy, ...] = ()
+    logs: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.text:
+            return
+        try:
+            object.__setattr__(self, "text", _Words().vformat(MESSAGES[self.code], (), self.numbers))
+        except (LookupError, TypeError, ValueError) as error:
+            raise ValueError(
+                f"code {self.code!r:.60}: it has no text for the numbers {sorted(self.numbers)}"
+            ) from error
+
+    @property
+    def remedy(self) -> Remedy | None:
+        """The first remedy that can be applied as it stands."""
+        return next((one for one in self.remedies if one.complete), None)
+
+    @property
+    def advice(self) -> str:
+        """What mends it, in words: flags, and the profile's lines beside them; empty where nothing is known."""
+        return "; ".join(map(str, self.remedies))
+
+    @property
+    def sentence(self) -> str:
+        """Logs, text and advice in one clause."""
+        return f"{_place(self.logs)}{self.clause}"
+
+    @property
+    def clause(self) -> str:
+        """Text and advice."""
+        return f"{self.text}: {self.advice}" if self.remedies else self.text
+
+    def of(self, *logs: str) -> Notice:
+        """The same of those logs."""
+        return replace(self, logs=logs)
+
+
+NAMED = 3  # logs that are named
+
+
+def _place(logs: Sequence[str]) -> str:
+    if not logs:
+        return ""
+    if len(logs) <= NAMED:
+        return f"{', '.join(logs)}: "
+    return f"{', '.join(logs[:1])} and {len(logs) - 1} more: "
+
+
+def merged(notices: Iterable[Notice]) -> list[Notice]:
+    """Of each code the first notice, with the logs of all of them; what tells of lost samples stands by itself."""
+    found: dict[object, Notice] = {}
+    for place, one in enumerate(notices):
+        key = place if one.lossy else (one.code, one.note)
+        known = found.get(key)
+        found[key] = one if known is None else replace(known, logs=tuple(dict.fromkeys((*known.logs, *one.logs))))
+    return list(found.values())
+
+
+def from_flags(flags: Sequence[str]) -> Remedy:
+    """The remedy that flags stand for, as results of an earlier schema hold them."""
+    settings: dict[str, Any] = {}
+    for flag, value in zip(flags[::2], flags[1::2], strict=False):
+        name, text = (value.partition("=")[::2]) if flag == "--set" else (flag.removeprefix("--"), value)
+        try:
+            settings[name.replace("-", "_")] = json.loads(text)
+        except json.JSONDecodeError:
+            settings[name.replace("-", "_")] = text
+    return Remedy(settings)

@@ -1,0 +1,102 @@
+"""How names and numbers are written: the one place, so that every format shows the same.
+
+Names out of logs are foreign text, which may not reach a terminal or a page as it is.
+"""
+
+from __future__ import annotations
+
+import math
+import unicodedata
+
+LONGEST = 300
+# Controls drive a terminal, format characters reorder what is read, separators break lines.
+_HIDDEN = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}
+
+
+def visible(text: str, longest: int = LONGEST) -> str:
+    """`text` with every character that cannot be seen written as an escape, and cut to a sane length."""
+    shown = "".join(map(_shown, text[:longest]))
+    return shown if len(text) <= longest else shown + "…"
+
+
+def printable(text: str) -> str:
+    """`text` with every character that cannot be seen, but for line feeds and tabs, as an escape that JSON knows."""
+    if text.isascii() and text.replace("\n", "").replace("\t", "").isprintable():
+        return text
+    return "".join(c if c in "\n\t" or unicodedata.category(c) not in _HIDDEN else _as_json(c) for c in text)
+
+
+def _as_json(character: str) -> str:
+    """A character as JSON's strings may hold it: UTF-16 in hexadecimal."""
+    units = character.encode("utf-16-be", "surrogatepass")
+    return "".join(f"\\u{units[i : i + 2].hex()}" for i in range(0, len(units), 2))
+
+
+def _shown(character: str) -> str:
+    if unicodedata.category(character) not in _HIDDEN:
+        return character
+    code = ord(character)
+    return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
+
+
+def file_name(path: str) -> str:
+    """Last part of a path of any system, made visible."""
+    return visible(path.replace("\\", "/").rstrip("/").rpartition("/")[2] or path)
+
+
+def joined(words: list[str]) -> str:
+    """The words as a list in a sentence: a, b and c."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}" if words else ""
+
+
+def unit_text(unit: str) -> str:
+    """A unit with its power as it is printed: kg m²."""
+    return visible(unit).replace("^2", "²")
+
+
+ABSENT = "–"
+SMALLEST_FIXED = 1e-3
+LARGEST_FIXED = 1e6
+MOST_DIGITS = 8
+
+
+def significant(value: float | None, digits: int = 5) -> str:
+    """`value` with that many significant digits; a dash where there is none, ∞ where it is unbounded."""
+    if value is None or math.isnan(value):
+        return ABSENT
+    if math.isinf(value):
+        return "∞" if value > 0 else "−∞"
+    if value == 0:
+        return "0"
+    exponent = int(f"{value:.{digits - 1}e}".partition("e")[2])  # once rounded
+    if SMALLEST_FIXED <= abs(value) < LARGEST_FIXED:
+        return f"{value:.{max(digits - 1 - exponent, 0)}f}"
+    mantissa = f"{value / 10.0**exponent:.{digits - 1}f}" if abs(exponent) < 300 else f"{value:.{digits - 1}e}"
+    return f"{mantissa}e{exponent}" if "e" not in mantissa else mantissa
+
+
+def resolved(value: float | None, std: float | None) -> str:
+    """`value` down to the second significant digit of its standard deviation; five digits where there is none."""
+    return significant(value, digits_of(value, std))
+
+
+def digits_of(value: float | None, std: float | None) -> int:
+    """Significant digits of `value` that its standard deviation leaves worth writing: two to eight."""
+    if value is None or std is None or not (math.isfinite(value) and math.isfinite(std)) or value == 0 or std <= 0:
+        return 5
+    leading = math.floor(math.log10(abs(value))) - math.floor(math.log10(std))
+    return min(max(leading + 2, 2), MOST_DIGITS)
+
+
+def percent(part: float | None, whole: float | None, digits: int = 2) -> str:
+    """`part` in percent of the size of `whole`."""
+    if part is None or not whole:
+        return ABSENT
+    return significant(100 * part / abs(whole), digits)
+
+
+def interval(low: float | None, high: float | None, std: float | None) -> str:
+    """An interval, as fine as the standard deviation; a missing end is unbounded."""
+    left = "−∞" if low is None else resolved(low, std)
+    right = "∞" if high is None else resolved(high, std)
+    return f"[{left}, {right}]"

@@ -1,0 +1,65 @@
+"""How far to trust what a report is about: a grade, a headline, the reasons behind it, and what to run first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from algid.notices import Notice
+
+Grade = Literal["good", "reservations", "failed"]
+GRADE_WORDS: dict[Grade, str] = {"good": "Good", "reservations": "With reservations", "failed": "Failed"}
+MOST_REASONS = 3
+"""Reasons that a terminal or a page shows at first."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A judgement.
+
+    Parameters
+    ----------
+    grade : 'good', 'reservations' or 'failed'
+    headline : what there is to say in one clause
+    reasons : what makes it doubtful, the weightiest first
+    notes : what was seen of the data and is no reason to doubt it
+    command : what to run first, to mend it or to find out
+    """
+
+    grade: Grade
+    headline: str
+    reasons: tuple[Notice, ...] = ()
+    notes: tuple[Notice, ...] = ()
+    command: str | None = None
+
+    @property
+    def word(self) -> str:
+        """The word of its grade."""
+        return GRADE_WORDS[self.grade]
+
+    @property
+    def sentence(self) -> str:
+        """Grade and headline, and where it is usable with reservations the first of them."""
+        but = f", but {self.reasons[0].text}" if self.grade == "reservations" and self.reasons else ""
+        return f"{self.word}: {self.headline}{but}."
+
+    @property
+    def failed(self) -> bool:
+        """Whether what it is about must not be used."""
+        return self.grade == "failed"
+
+
+def graded(
+    headline: str,
+    reasons: Sequence[Notice] = (),
+    notes: Sequence[Notice] = (),
+    *,
+    failure: str | None = None,
+    things: str = "numbers",
+    command: str | None = None,
+) -> Verdict:
+    """The verdict on `headline`: failed where there is a `failure`, after which `things` must not be used."""
+    if failure is not None:
+        return Verdict("failed", f"{failure}; do not use these {things}", tuple(reasons), tuple(notes), command)
+    return Verdict("reservations" if reasons else "good", headline, tuple(reasons), tuple(notes), command)
