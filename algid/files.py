@@ -43,7 +43,7 @@ def reason_of(error: OSError) -> str:
     """What the system says, in its own words: libraries put them into a text of their own."""
     own = str(error).partition("\n")[0][:200]
     known = next((words for words in map(os.strerror, _FULL) if words in own), None)
-    return error.strerror or known or own or type(error).__name__
+    return known or error.strerror or own or type(error).__name__
 
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import resource
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
@@ -24,6 +25,8 @@ from functools import cache
 from itertools import islice
 from typing import Any, Generic, TypeVar
 
+from algid.errors import SettingError
+
 _VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
@@ -31,6 +34,37 @@ def bound_by_environment() -> None:
     """One thread for any BLAS that is loaded from now on, unless the user's environment says otherwise."""
     for variable in _VARIABLES:
         os.environ.setdefault(variable, "1")
+
+
+OPEN_FILES = 32
+"""Files that a command has open at once, at most."""
+OPEN_FILES_A_WORKER = 8
+MOST_THREADS = 1024
+
+
+def check_environment() -> None:
+    """Refuse what libraries would end in a panic for, before they are loaded.
+
+    Raises
+    ------
+    SettingError
+        If POLARS_MAX_THREADS is no number of threads, or too few files may be open at once.
+    """
+    threads = os.environ.get("POLARS_MAX_THREADS")
+    if threads is not None and not (threads.isascii() and threads.isdigit() and 0 < int(threads[:5]) <= MOST_THREADS):
+        expected = f"expected a whole number from 1 to {MOST_THREADS}"
+        raise SettingError(f"POLARS_MAX_THREADS: {expected}, found {threads!r:.60}; mend or unset it")
+    may_open(OPEN_FILES)
+
+
+def may_open(files: int) -> None:
+    """Let this process have so many files open at once. Raises `SettingError` where the system does not allow it."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    most = float("inf") if hard == resource.RLIM_INFINITY else hard
+    if soft != resource.RLIM_INFINITY and soft < files <= most:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (files, hard))
+    elif most < files:
+        raise SettingError(f"{hard} files may be open at once, {files} are needed; raise the limit with ulimit -n")
 
 
 @contextmanager

@@ -21,7 +21,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "faults": room("errors"),
     "progress": room(),
     "ros2": room(),
-    "runtime": room(packages="threadpoolctl"),
+    "runtime": room("errors", "threadpoolctl"),
     "units": room(),
     "words": room(),
     "text": room(),

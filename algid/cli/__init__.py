@@ -48,10 +48,12 @@ def run(arguments: Sequence[str]) -> int:
     from algid.cli.output import complain, remark
     from algid.errors import AlgidError
     from algid.faults import TRACEBACK, fault
+    from algid.runtime import check_environment
 
     found: BaseException
     try:
         try:
+            check_environment()
             from algid.cli.app import called
 
             called(arguments)(list(arguments))

@@ -109,7 +109,7 @@ def _workers(
 ) -> Iterator[tuple[Executor, int]]:
     """The workers, and how many jobs to hand out at once; they end with the block."""
     from algid.batch.workers import Workers
-    from algid.runtime import cores
+    from algid.runtime import OPEN_FILES, OPEN_FILES_A_WORKER, cores, may_open
 
     if scheduler is not None:
         from algid.batch.cluster import cluster
@@ -118,6 +118,7 @@ def _workers(
             yield found
         return
     count = workers or cores()
+    may_open(OPEN_FILES + OPEN_FILES_A_WORKER * count)
     executor = Workers(count, memory_limit, timeout)
     try:
         yield executor, 2 * count
