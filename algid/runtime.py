@@ -64,7 +64,7 @@ def may_open(files: int) -> None:
     if soft != resource.RLIM_INFINITY and soft < files <= most:
         resource.setrlimit(resource.RLIMIT_NOFILE, (files, hard))
     elif most < files:
-        raise SettingError(f"{hard} files may be open at once, {files} are needed; raise the limit with ulimit -n")
+        raise SettingError(f"the limit on open files: expected {files} or more, found {hard}; raise it with ulimit -n")
 
 
 @contextmanager
