@@ -39,6 +39,8 @@ class FileLimits:
     """Beyond this a value is no angle and no torque; covariances hold its eighth power, which is a double still."""
     largest_time_ns: float = 9.2e18
     """int64 nanoseconds end at 292 years."""
+    shortest_step_ns: float = 1000.0
+    """Between samples, in the median: filters have as many taps as samples in their time."""
 
     # text
     head_bytes: int = 1 << 16

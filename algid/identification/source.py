@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Literal
 from algid.errors import LogError
 from algid.log import Log, Origin
 from algid.notices import Notice
+from algid.readers.timebase import check_step
 from algid.results import LogSummary, Result
 from algid.runtime import ahead
 
@@ -86,6 +87,7 @@ def open_source(
     """
     if isinstance(log, Log):
         log = _in_radians(log)
+        check_step(log.origin.path, log.stamp_ns)
         source = LogSource(
             log.origin.path, role, log.origin, lambda: iter([log]), len(log), gravity, partial(_hash_of_arrays, log)
         )
@@ -96,7 +98,9 @@ def open_source(
         reader = open_log(path, profile)
         name, whole = (log.url, log.whole) if isinstance(log, Staged) else (str(log), True)
         digest = cache(partial(sha256_of, path)) if whole else None
-        source = LogSource(name, role, reader.origin, lambda: ahead(reader.blocks()), reader.rows, gravity, digest)
+        source = LogSource(
+            name, role, reader.origin, lambda: ahead(_of_an_arm(reader.blocks())), reader.rows, gravity, digest
+        )
     truth = source.origin.truth
     if truth is None or changing:
         return source
@@ -106,6 +110,14 @@ def open_source(
         found = f"a payload of {truth.payload:g} kg" if truth.payload > 0 else "no payload"
         raise LogError(f"{source.name}: expected a log of the {role} arm, its metadata say {found}; swap the logs")
     return source
+
+
+def _of_an_arm(blocks: Iterator[Log]) -> Iterator[Log]:
+    """The blocks of a log, once the first is known to be sampled as an arm is."""
+    for number, block in enumerate(blocks):
+        if number == 0:
+            check_step(block.origin.path, block.stamp_ns)
+        yield block
 
 
 def open_sources(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.errors import LogError
+from algid.limits import LIMITS
 from algid.log import IntArray
 from algid.notices import Notice
 from algid.readers.table import SampleTable, stack
@@ -65,6 +66,23 @@ def in_order(path: str, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
         said.append(Notice("DUPLICATE_STAMPS", text))
     if pending is not None:
         yield pending.noting(*said)
+
+
+def check_step(path: str, stamps: IntArray) -> None:
+    """Refuse a clock that no arm is sampled by: its unit is another.
+
+    Raises
+    ------
+    LogError
+        If the median step between the stamps (N,) is shorter than `FileLimits.shortest_step_ns`.
+    """
+    step = float(np.median(np.diff(stamps))) if stamps.size > 2 else np.inf
+    if step < LIMITS.shortest_step_ns:
+        raise LogError(
+            f"{path}: its stamps are {step:g} ns apart in the median, {1e9 / max(step, 1.0):.3g} Hz, as no arm's log "
+            'is; say their unit: --set time_unit=s (profile: time_unit = "s"; ms, us or ns), of messages take another '
+            'clock: --clock log (profile: clock = "log")'
+        )
 
 
 def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, int, int]:

@@ -5,18 +5,23 @@ A text here is so long that a pattern which takes time with its square would not
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
 from algid.errors import LogError
+from algid.identification.identify import identify
 from algid.limits import LIMITS
 from algid.readers import read_log
 from algid.readers.footer import FooterError, parsed
 from algid.readers.names import Name, take_apart
 from algid.readers.stated import in_metadata, in_text
+from algid.writers import write_log
+from pipelines.mutations import clean_log
 from tests.conftest import Limited
 
 COLUMNS = ("t", "theta1", "theta2", "tau1", "tau2")
@@ -97,3 +102,15 @@ def test_a_table_of_very_many_columns_is_refused(tmp_path: Path, limited: Limite
     for path in (parquet(tmp_path, x=[0.0] * 300), csv(tmp_path, f"{','.join(COLUMNS)},x", *(f"{r},0" for r in ROWS))):
         with pytest.raises(LogError, match=f"6 columns; expected {LIMITS.columns} at most"):
             read_log(path)
+
+
+@pytest.mark.parametrize("step", [1, 10, 999])
+@pytest.mark.parametrize("kind", ["csv", "parquet", "mcap"])
+def test_steps_that_no_arm_is_sampled_with_are_refused(step: int, kind: str, tmp_path: Path) -> None:
+    log = clean_log(300)
+    quick = replace(log, stamp_ns=10**18 + np.arange(300) * step)
+    write_log(tmp_path / f"log.{kind}", quick)
+    with pytest.raises(LogError, match=f"its stamps are {step} ns apart in the median, .* say their unit"):
+        identify(tmp_path / f"log.{kind}", report=False)
+    with pytest.raises(LogError, match="as no arm's log is"):
+        identify(quick, report=False)
