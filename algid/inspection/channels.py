@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from algid.inspection.candidates import torques_beside
 from algid.inspection.figures import robust_deviation, saturated_share
 from algid.log import Log
 from algid.notices import Notice, Remedy
@@ -28,7 +29,12 @@ def efforts(log: Log) -> Iterator[Notice]:
         largest, what = float(np.abs(tau).max()), _source(log, name)
         if largest == 0:
             motorless = Remedy({"passive": joint}, "for a joint without a motor")
-            yield Notice("EFFORT_ZERO", f"{what} is zero in every sample", refuse=True, remedies=(other, motorless))
+            yield Notice(
+                "EFFORT_ZERO",
+                f"{what} is zero in every sample",
+                refuse=True,
+                remedies=(other, *torques_beside(log, name), motorless),
+            )
         elif largest < _DENORMAL:
             text = f"{what} never exceeds {largest:.3g} N m: no torque"
             yield Notice("EFFORT_DENORMAL", text, refuse=True, remedies=(other,))

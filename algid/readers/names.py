@@ -31,7 +31,7 @@ STEMS: dict[str, tuple[str, ...]] = {
         "observation_velocity",
     ),
     "tau": (
-        *("tau", "tau_meas", "tau_j", "torque_measured", "measured_torque", "actual_tau", "actual_torque"),
+        *("tau", "tau_meas", "tau_j", "tau_est", "torque_measured", "measured_torque", "actual_tau", "actual_torque"),
         *("torque", "trq", "effort", "joint_torque", "joint_effort", "torques", "efforts", "tau_filt"),
         *("torque_filtered", "tau_con", "tau_cmd", "tau_des", "tau_d", "tau_j_d", "torque_cmd", "target_torque"),
         *("motor_torque", "observation_effort", "observation_torque"),
@@ -61,6 +61,8 @@ _SUFFIX_UNIT = re.compile(
 )
 _JOINT_NAMED = re.compile(r"^(.*/[^/]+)/(position|velocity|effort)$")
 _JOINT_PLACED = re.compile(r"^.*/(position|velocity|effort)[.\[/](\d+)\]?$")
+_STATE_OF_JOINT = re.compile(r"^(?:\w+[./])*\w*state[./]?\[(\d{1,3})\][./](\w+)$")
+_STATE_OF_ALL = re.compile(r"^(?:\w+[./])*\w*state[./](\w+)\[(\d{1,3})\]$")
 _JOINT_FIRST = re.compile(r"^(?:joint|axis|motor|link|j)[_ ]?(\d{1,3})[_./ ]+(.+)$")
 _JOINT_LAST = re.compile(r"^(.*?[^\W\d])[_./ ]*\[?(\d{1,3})\]?$")
 
@@ -165,6 +167,11 @@ def choose(
     parts = {column: take_apart(column) for column in columns}
     chosen = _pairs(parts, joints)
     if "theta1" not in chosen or "tau1" not in chosen:
+        states = {**parts, **_of_states(parts)}
+        found = _pairs(states, joints)
+        if "theta1" in found and "tau1" in found:
+            chosen, parts = found, states
+    if "theta1" not in chosen or "tau1" not in chosen:
         worded = _worded(parts)
         found = _pairs({**parts, **worded}, joints)
         own = _named_joints(found, {**parts, **worded})
@@ -250,6 +257,20 @@ def _worded(parts: dict[str, Name]) -> dict[str, Name]:
                 if words and _NO_JOINTS.isdisjoint(words):
                     found[column] = replace(name, stem=stem, joint="_".join(words))
                 break
+    return found
+
+
+def _of_states(parts: dict[str, Name]) -> dict[str, Name]:
+    """Columns named by a structure of states, ``state.q[0]`` (libfranka) or ``motor_state[0].q`` (Unitree)."""
+    found = {}
+    for column, name in parts.items():
+        text = column.strip().lower()
+        if len(text) > LIMITS.name_letters:
+            continue
+        if one := _STATE_OF_JOINT.match(text):
+            found[column] = replace(name, stem=one[2], joint=one[1])
+        elif one := _STATE_OF_ALL.match(text):
+            found[column] = replace(name, stem=one[1], joint=one[2])
     return found
 
 

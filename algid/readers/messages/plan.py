@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.log import Reading
-from algid.notices import Notice
+from algid.notices import Notice, Remedy
 from algid.readers.joints import along_the_arm, order_notice
 from algid.readers.messages.codec import walk_for
 from algid.readers.messages.columnar import MisfitError, Shape
@@ -37,6 +37,8 @@ _SAMPLES = 64
 _LETTERS_A_STEP, _BYTES_A_STEP = 4, 4
 """Letters of a definition, and bytes of a message, that are read in a step of work."""
 _USUAL = "/joint_states"
+_TELLING = (b"effort", b"tau_est", b"tau_J")
+"""Names of torques in definitions: of ROS, Unitree, libfranka."""
 
 
 class NothingFoundError(LogError):
@@ -80,6 +82,7 @@ def plan(source: Source, profile: Profile | None) -> Plan:
             joints, told = along_the_arm(usual.joints)
             reading = Reading(joints=joints, joints_told=told)
             notices = order_notice(usual.joints, joints, told) if usual.named else ()
+        notices += _choice_notice(usual)
     for channel, (topic, path) in named.items():
         home = topic or (usual.topic if usual else None) or (profile.topic if profile else None)
         if home is None:
@@ -98,6 +101,16 @@ def plan(source: Source, profile: Profile | None) -> Plan:
     units = {} if usual is None else {name: one for name, one in usual.units.items() if name not in named}
     others = usual.others if usual is not None and usual.topic == topics[0].name else {}
     return Plan(topics, mapping, reading, notices, units, others)
+
+
+def _choice_notice(usual: _Usual) -> tuple[Notice, ...]:
+    """What to say where other topics hold two joints too."""
+    if not usual.beside:
+        return ()
+    names = ", ".join(usual.beside[:4])
+    text = f"the joints are taken from {usual.topic!r}; there are two also on {names}"
+    other = Remedy({"topic": usual.beside[0]}, "for the other")
+    return (Notice("TOPIC_CHOICE", text, note=True, remedies=(other,)),)
 
 
 def _topic(source: Source, name: str, sources: dict[str, tuple[str, str]], profile: Profile | None) -> Topic:
@@ -139,6 +152,8 @@ class _Usual:
     paths: dict[str, str]
     units: dict[str, str] = field(default_factory=dict)
     others: dict[str, str] = field(default_factory=dict)
+    beside: tuple[str, ...] = ()
+    """Other topics that hold two joints too."""
 
 
 def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
@@ -168,7 +183,7 @@ def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
         except LogError as error:  # another topic may still hold the joints
             refused.append(error)
     if _USUAL in fitting:
-        return fitting[_USUAL]
+        return replace(fitting[_USUAL], beside=tuple(name for name in fitting if name != _USUAL))
     if len(fitting) == 1:
         return next(iter(fitting.values()))
     if fitting:
@@ -224,7 +239,8 @@ def _candidates(source: Source, profile: Profile | None) -> list[tuple[str, str]
     some = []
     for place, numbers in places.items():
         channel = source.channels[min(numbers)]
-        known = channel.type in JOINT_STATE + DYNAMIC_JOINT_STATE or b"effort" in channel.definition
+        known = channel.type in JOINT_STATE + DYNAMIC_JOINT_STATE
+        known = known or any(word in channel.definition for word in _TELLING)
         if known or channel.encoding == "json":
             some.append(place)
     if len(some) > LIMITS.topics:

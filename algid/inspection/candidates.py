@@ -1,0 +1,40 @@
+"""Channels of a log that may hold a torque, where the one that was read holds none: with the settings that take them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from algid.errors import LogError
+from algid.log import Log
+from algid.notices import Remedy
+from algid.readers.formats import Entry, format_of
+
+_TORQUE = re.compile(r"(?<![a-z])(torques?|efforts?|tau(?![a-z])|moment)", re.IGNORECASE)
+_CURRENT = re.compile(r"(?<![a-z])(currents?|i_?q)(?![a-z])", re.IGNORECASE)
+_COMMANDED = re.compile(r"cmd|command|desired|target|limit|(?<![a-z])des(?![a-z])", re.IGNORECASE)
+_MOST = 4
+
+
+def torques_beside(log: Log, channel: str) -> list[Remedy]:
+    """What else in the log's file may be the torque `channel`, and the settings that take it."""
+    try:
+        entries = format_of(Path(log.origin.path)).entries(Path(log.origin.path))
+    except LogError:  # a log in memory, or a file that is gone
+        return []
+    used = set(log.origin.mapping.values())
+    return [remedy for source, remedy in _candidates(entries, channel) if source not in used][:_MOST]
+
+
+def _candidates(entries: tuple[Entry, ...], channel: str) -> Iterator[tuple[str, Remedy]]:
+    """What a mapping calls each channel that may be a torque, and what takes it: torques first, then currents."""
+    places = [(entry.name, field) for entry in entries for field in entry.fields]
+    places += [("", entry.name) for entry in entries if not entry.fields]
+    amperes = {f"{channel}.unit": "A", f"{channel}.torque_constant": None}
+    for pattern, unit in ((_TORQUE, {}), (_CURRENT, amperes)):
+        for topic, field in places:
+            if pattern.search(field) and not _COMMANDED.search(field) and not field.endswith("(empty)"):
+                home = {f"{channel}.topic": topic} if topic else {}
+                source = f"{topic}: {field}" if topic else field
+                yield source, Remedy({**home, f"{channel}.source": field, **unit}, "the log also holds")

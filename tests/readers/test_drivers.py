@@ -1,0 +1,147 @@
+"""Logs as drivers of robots name them, and what is said where there is a choice."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from algid.inspection.checks import examine
+from algid.log import Log
+from algid.profile import Profile
+from algid.readers import read_log
+from tests.readers.logs import EPOCH_NS, noise_log
+from tests.readers.mcaps import TOPIC, joint_state, messages_of, write_mcap
+
+LOG = noise_log(80, start_ns=EPOCH_NS)
+DRIVERS = {
+    "libfranka": ("state.q[{}]", "state.tau_J[{}]", "state.dq[{}]", ("state.q_d[{}]", "state.tau_J_d[{}]")),
+    "franka_ros": ("franka_state.q[{}]", "franka_state.tau_J[{}]", "franka_state.dq[{}]", ("franka_state.dtheta[{}]",)),
+    "unitree": ("motor_state[{}].q", "motor_state[{}].tau_est", "motor_state[{}].dq", ("motor_state[{}].temperature",)),
+    "low_state": (
+        "low_state.motor_state[{}].q",
+        "low_state.motor_state[{}].tau_est",
+        "low_state.motor_state[{}].dq",
+        (),
+    ),
+}
+
+
+def columns(driver: str, joints: int) -> dict[str, object]:
+    """The log as a table of a driver's names, with more joints of other values."""
+    theta, tau, omega, others = DRIVERS[driver]
+    assert LOG.omega is not None
+    table: dict[str, object] = {"t": LOG.t}
+    for joint in range(joints):
+        own = joint - (joints - 2)
+        for name, pair in ((theta, LOG.theta), (tau, LOG.tau), (omega, LOG.omega)):
+            table[name.format(joint)] = pair[own] if own >= 0 else np.full(len(LOG), 0.5 + joint)
+        table |= {name.format(joint): np.full(len(LOG), 7.0) for name in others}
+    return table
+
+
+@pytest.mark.parametrize("driver", DRIVERS)
+@pytest.mark.parametrize("joints", [2, 7])
+def test_names_of_drivers_are_known(driver: str, joints: int, tmp_path: Path) -> None:
+    pl.DataFrame(columns(driver, joints)).write_parquet(tmp_path / "a.parquet")
+    chosen = None if joints == 2 else Profile(joints=("5", "6"))
+    log = read_log(tmp_path / "a.parquet", chosen)
+    assert np.array_equal(log.theta, LOG.theta)
+    assert np.array_equal(log.tau, LOG.tau)
+    assert log.omega is not None
+    assert LOG.omega is not None
+    assert np.array_equal(log.omega, LOG.omega)
+
+
+def test_plain_columns_stand_before_those_of_a_state(tmp_path: Path) -> None:
+    table = {
+        **columns("libfranka", 2),
+        "q1": LOG.theta[0] + 1,
+        "q2": LOG.theta[1],
+        "tau1": LOG.tau[0],
+        "tau2": LOG.tau[1],
+    }
+    pl.DataFrame(table).write_parquet(tmp_path / "a.parquet")
+    assert np.array_equal(read_log(tmp_path / "a.parquet").theta[0], LOG.theta[0] + 1)
+
+
+def test_messages_of_unitree_are_read(tmp_path: Path) -> None:
+    messages = []
+    for row, stamp in enumerate(LOG.stamp_ns.tolist()):
+        motors = [{"q": LOG.theta[one, row], "tau_est": LOG.tau[one, row], "mode": 1} for one in (0, 1)]
+        messages.append(("/lowstate", stamp, json.dumps({"motor_state": motors}).encode()))
+    write_mcap(tmp_path / "a.mcap", messages, {"/lowstate": ("L", "jsonschema", b"{}")}, encoding="json")
+    log = read_log(tmp_path / "a.mcap")
+    assert np.array_equal(log.theta, LOG.theta)
+    assert np.array_equal(log.tau, LOG.tau)
+
+
+def test_of_two_topics_with_both_joints_it_is_said_which_was_taken(tmp_path: Path) -> None:
+    messages = [*messages_of(LOG), *(("/arm/state", stamp, data) for _, stamp, data in messages_of(LOG))]
+    write_mcap(tmp_path / "a.mcap", messages)
+    log = read_log(tmp_path / "a.mcap")
+    (notice,) = (notice for notice in log.notices if notice.code == "TOPIC_CHOICE")
+    assert notice.note
+    assert notice.text == "the joints are taken from '/joint_states'; there are two also on /arm/state"
+    assert [remedy.settings for remedy in notice.remedies] == [{"topic": "/arm/state"}]
+    chosen = read_log(tmp_path / "a.mcap", Profile(topic="/arm/state"))
+    assert not [notice for notice in chosen.notices if notice.code == "TOPIC_CHOICE"]
+
+
+def held_beside(log: Log, joint: int) -> list[dict[str, object]]:
+    """The settings that are told to take other channels for the torque of a joint that is zero."""
+    zero = [one for one in examine(log) if one.code == "EFFORT_ZERO"]
+    remedies = [remedy for one in zero for remedy in one.remedies if remedy.when == "the log also holds"]
+    return [dict(remedy.settings) for remedy in remedies if f"tau{joint}.source" in remedy.settings]
+
+
+def test_a_torque_of_zeros_names_what_else_the_log_holds(tmp_path: Path) -> None:
+    """A topic of wrenches and one of currents, and how they are taken."""
+    messages = []
+    for row, stamp in enumerate(LOG.stamp_ns.tolist()):
+        state = joint_state(stamp, position=LOG.theta[:, row].tolist(), effort=[0.0, 0.0]).done()
+        wrench = {"wrench": {"force": {"z": 1.0}, "torque": {"z": float(LOG.tau[0, row])}}}
+        drive = {"motor_current": float(row), "target_current": 1.0}
+        messages.append((TOPIC, stamp, state))
+        messages.append(("/ft", stamp, json.dumps(wrench).encode()))
+        messages.append(("/drive", stamp, json.dumps(drive).encode()))
+    write_both(tmp_path / "a.mcap", messages)
+    log = read_log(tmp_path / "a.mcap")
+    current = {"tau1.unit": "A", "tau1.torque_constant": None}
+    assert held_beside(log, 1) == [
+        {"tau1.topic": "/ft", "tau1.source": "wrench.torque.z"},
+        {"tau1.topic": "/drive", "tau1.source": "motor_current", **current},
+    ]
+    assert {"tau2.topic": "/ft", "tau2.source": "wrench.torque.z"} in held_beside(log, 2)
+    profile = {"tau1": {"topic": "/ft", "source": "wrench.torque.z"}}
+    named = read_log(tmp_path / "a.mcap", Profile.model_validate(profile))
+    assert np.array_equal(named.tau[0], LOG.tau[0])
+
+
+def write_both(path: Path, messages: list[tuple[str, int, bytes]]) -> None:
+    """An MCAP file of joint states in CDR, and the others in JSON."""
+    from mcap.writer import Writer
+
+    from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
+
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        state = writer.register_schema(JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode())
+        plain = writer.register_schema("any", "jsonschema", b"{}")
+        channels: dict[str, int] = {}
+        for topic, stamp, data in messages:
+            if topic not in channels:
+                encoding, schema = ("cdr", state) if topic == TOPIC else ("json", plain)
+                channels[topic] = writer.register_channel(topic, encoding, schema)
+            writer.add_message(channels[topic], stamp, data, stamp)
+        writer.finish()  # type: ignore[no-untyped-call]
+
+
+def test_columns_that_may_be_the_torque_are_named(tmp_path: Path) -> None:
+    table = {"t": LOG.t, "q1": LOG.theta[0], "q2": LOG.theta[1], "tau1": 0 * LOG.t, "tau2": LOG.tau[1]}
+    pl.DataFrame({**table, "torque_sensor": LOG.tau[0], "torque_limit": LOG.t}).write_csv(tmp_path / "a.csv")
+    assert held_beside(read_log(tmp_path / "a.csv"), 1) == [{"tau1.source": "torque_sensor"}]
