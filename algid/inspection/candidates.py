@@ -1,4 +1,4 @@
-"""Channels of a log that may hold a torque, where the one that was read holds none: with the settings that take them."""
+"""Channels of a log that may hold a torque, where the one that was read holds none, and what takes them."""
 
 from __future__ import annotations
 
