@@ -42,6 +42,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
     "table4": room("arm limits log results synth"),
     "writers": room("errors files log ros2", "mcap numpy polars pyarrow"),
+    "example": room("arm files log synth writers", "numpy"),
     "readers": room(
         "arm errors faults files limits log notices profile ros2 runtime units words",
         "google lz4 mcap numpy polars pyarrow rosbags scipy zstandard",
@@ -75,7 +76,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "export": room("arm errors files identification model notices physics results text words", "numpy scipy"),
     "fleet": room("errors files limits model notices progress report text verdict words", "numpy polars scipy"),
     "cli": room(
-        "batch check design errors estimators export faults files fleet identification inspection limits "
+        "batch check design errors estimators example export faults files fleet identification inspection limits "
         "log model notices physics profile progress readers report results runtime settings stores synth "
         "text track words writers",
         "numpy rich typer",

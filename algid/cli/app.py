@@ -17,6 +17,7 @@ from algid.cli.output import say
 from algid.errors import SettingError
 
 COMMANDS: dict[str, Callable[[], Callable[..., Any]]] = {
+    "example": lambda: import_module("algid.cli.example").example,
     "inspect": lambda: import_module("algid.cli.inspect").inspect,
     "design": lambda: import_module("algid.cli.design").design,
     "identify": lambda: import_module("algid.cli.identify").identify,

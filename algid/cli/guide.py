@@ -26,6 +26,7 @@ class GuideTopic(StrEnum):
     PAPER = "paper"
     PAYLOAD = "payload"
     BATCH = "batch"
+    CI = "ci"
     PYTHON = "python"
     MEASURED = "measured"
     CONTRIBUTING = "contributing"
@@ -43,6 +44,7 @@ SUMMARIES = {
     GuideTopic.PAPER: "the paper's method, its misprints, and how special its torque is",
     GuideTopic.PAYLOAD: "payloads, lengths, payload in time",
     GuideTopic.BATCH: "thousands of logs, fleets, clusters",
+    GuideTopic.CI: "an arm and its logs checked by a forge at every change",
     GuideTopic.PYTHON: "the Python API",
     GuideTopic.MEASURED: "what was measured, with the command that measures it",
     GuideTopic.CONTRIBUTING: "the house and its rules",

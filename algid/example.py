@@ -1,0 +1,81 @@
+"""Logs to try algid on: four runs of an arm that is simulated with all that a first real log has, and a payload.
+
+Its angles are zero where it hangs straight down, and its log does not say so; its joints have dry friction, and its
+sensors noise and steps. What it truly is stands in `ARM`, `FRICTION` and `PAYLOAD`, and in none of the files.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from algid.arm import Arm, with_payload
+from algid.files import refuse_existing, whole_file
+from algid.log import Log, Truth
+from algid.synth.excitation import wide_multi_sine
+from algid.synth.sensors import Sensors, record, sample_times
+from algid.synth.simulator import HANGING, simulate
+from algid.writers import write_log
+
+ARM = Arm(
+    m1=1.2, m2=0.8, lc1=0.15, lc2=0.12, l1=0.30, l2=0.25, I1=0.010, I2=0.006, b1=0.50, b2=0.40, g=9.81
+)  # fmt: skip
+PAYLOAD = 0.5
+"""kg, at the tip in ``loaded.csv``."""
+FRICTION = (0.4, 0.2)
+"""N m of dry friction, which the motors overcome beside what moves the arm."""
+SENSORS = Sensors(torque_noise=0.02, encoder_bits=14)
+STRENGTH = 0.3
+"""Of the torque that swings an arm round and round."""
+RATE, DURATION = 500.0, 10.0
+LOGS = {"run1": 0.0, "run2": 0.0, "run3": 0.0, "run4": 0.0, "loaded": PAYLOAD}
+PROFILE = "arm.toml"
+PROFILE_TEXT = """\
+# What the logs of this arm do not say. `algid profile new run1.csv` writes all that can be set.
+zero = "hanging"  # θ1 is zero hanging straight down, not along the horizontal
+"""
+
+
+def write_example(folder: str | Path, force: bool = False) -> list[Path]:
+    """Write the logs ``run1.csv`` to ``run4.csv`` and ``loaded.csv``, and the arm's profile ``arm.toml``.
+
+    Parameters
+    ----------
+    folder : str or Path
+        It is made where it is missing.
+    force : bool
+        Replace files that are there.
+
+    Returns
+    -------
+    list of Path
+        The files, logs first.
+
+    Raises
+    ------
+    OutputError
+        If a file is there already and `force` is not set, or cannot be written.
+    """
+    folder = Path(folder)
+    paths = [folder / f"{name}.csv" for name in LOGS] + [folder / PROFILE]
+    for path in paths:
+        refuse_existing(path, force)
+    for number, (path, payload) in enumerate(zip(paths, LOGS.values(), strict=False)):
+        write_log(path, run(number, payload))
+    with whole_file(paths[-1]) as temporary:
+        temporary.write_text(PROFILE_TEXT, encoding="utf-8")
+    return paths
+
+
+def run(number: int, payload: float) -> Log:
+    """One run of the arm: a motion of its own, with `payload` in kg at the tip, angles from hanging."""
+    sensors = replace(SENSORS, seed=number)
+    k = with_payload(ARM.constants(), ARM.payload_constants(payload))
+    t = sample_times(RATE, DURATION, sensors)
+    strong = wide_multi_sine(ARM, seed=number)
+    motion = simulate(k, lambda at: STRENGTH * strong(at), t, HANGING, np.zeros(2))
+    tau = motion.tau + np.array(FRICTION)[:, None] * np.sign(motion.omega)
+    log = record(replace(motion, tau=tau), sensors, Truth(ARM, payload, "example"), f"run{number + 1}")
+    return replace(log, theta=log.theta - HANGING[:, None], origin=replace(log.origin, truth=None))

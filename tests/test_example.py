@@ -1,0 +1,54 @@
+"""The logs to try algid on: what its guide promises of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import algid
+from algid.errors import OutputError
+from algid.example import ARM, FRICTION, LOGS, PAYLOAD, PROFILE, write_example
+from algid.inspection.report import inspect_log
+from algid.profile import load_profile
+from tests.processes import Outcome
+
+
+@pytest.fixture(scope="module")
+def example(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("example")
+    done = Outcome("example", "-o", folder)
+    assert (done.code, done.err) == (0, "")
+    assert done.out.split() == [str(folder / f"{name}.csv") for name in LOGS] + [str(folder / PROFILE)]
+    return folder
+
+
+def test_nothing_is_overwritten_unless_forced(example: Path, tmp_path: Path) -> None:
+    (tmp_path / "run4.csv").write_text("mine")
+    with pytest.raises(OutputError, match=r"run4\.csv: exists already"):
+        write_example(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["run4.csv"]
+    write_example(tmp_path, force=True)
+    for path in sorted(example.iterdir()):
+        assert (tmp_path / path.name).read_bytes() == path.read_bytes()
+
+
+def test_a_log_does_not_say_how_its_zero_lies_and_physics_does(example: Path) -> None:
+    found = {one.code for one in inspect_log(example / "run1.csv").findings}
+    assert "WRONG_CONVENTION" in found
+    profile = load_profile(example / PROFILE)
+    assert "WRONG_CONVENTION" not in {one.code for one in inspect_log(example / "run1.csv", profile).findings}
+
+
+def test_with_its_profile_the_arm_is_found(example: Path) -> None:
+    """Within four standard deviations, and these a thousandth of the value."""
+    profile = load_profile(example / PROFILE)
+    result = algid.identify(example / "run1.csv", example / "loaded.csv", profile=profile)
+    truth = dict(zip(("k1", "k2", "k3", "k4", "k5", "k6", "k7"), ARM.constants(), strict=True))
+    truth |= {"f1": FRICTION[0], "f2": FRICTION[1], "m_p": PAYLOAD, "l1": ARM.l1}
+    for name, value in truth.items():
+        found = result.estimates[name]
+        assert found.estimate is not None
+        assert found.std is not None
+        assert abs(found.estimate - value) < 4 * found.std
+        assert found.std < 4e-3 * value
