@@ -13,7 +13,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[1]
-USED = ("bags", "dask", "plots")
+USED = ("bags", "dask", "hdf5", "plots")
 """Extras that algid itself imports."""
 
 

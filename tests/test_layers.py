@@ -45,7 +45,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "example": room("arm files log synth writers", "numpy"),
     "readers": room(
         "arm errors faults files limits log notices profile ros2 runtime units words",
-        "google lz4 mcap numpy polars pyarrow rosbags scipy zstandard",
+        "google h5py lz4 mcap numpy polars pyarrow rosbags scipy zstandard",
     ),
     "inspection": room("arm errors estimators faults log notices profile readers signals words", "numpy"),
     "report": room(

@@ -16,9 +16,13 @@ from algid.limits import LIMITS
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign
 from algid.readers.frames import flat_reader, number, of_numbers
+from algid.readers.jsonlines import frame_of_lines
 from algid.readers.names import TIMES
 from algid.readers.natives import natively
 from algid.words import counted
+
+_MOST_TOLD = 12
+"""Arrays that fit nothing and are listed."""
 
 if TYPE_CHECKING:
     import polars as pl
@@ -27,7 +31,7 @@ if TYPE_CHECKING:
 
 
 def open_arrays(path: Path, kind: str, profile: Profile) -> TableReader:
-    """Open a log of the kind "npz", "npy" or "mat".
+    """Open a log of the kind "npz", "npy", "mat", "hdf5" or "jsonl".
 
     Raises
     ------
@@ -36,8 +40,13 @@ def open_arrays(path: Path, kind: str, profile: Profile) -> TableReader:
     """
     import polars as pl
 
-    frame = frame_of(path, kind)
-    columns = assign(str(path), frame.columns, profile, {})
+    frame, others = contents_of(path, kind)
+    try:
+        columns = assign(str(path), frame.columns, profile, {})
+    except LogError as error:
+        if not others:
+            raise
+        raise LogError(f"{error}; the file also holds, of another length: {', '.join(others[:_MOST_TOLD])}") from error
     columns = of_numbers(str(path), columns, frame.schema)
 
     def frames(columns: Columns, rows: int, most: int | None) -> Iterator[pl.DataFrame]:
@@ -48,8 +57,10 @@ def open_arrays(path: Path, kind: str, profile: Profile) -> TableReader:
     return flat_reader(str(path), kind, columns, frames, profile, frame.height)
 
 
-def frame_of(path: Path, kind: str) -> pl.DataFrame:
-    """The file as one frame of flat columns: a matrix or a list gives one a joint, ``q[0]``, ``q[1]``.
+def contents_of(path: Path, kind: str) -> tuple[pl.DataFrame, tuple[str, ...]]:
+    """The file as one frame of flat columns, and its arrays that fit in none, each with its shape.
+
+    A matrix or a list gives a column a joint, ``q[0]``, ``q[1]``.
 
     Raises
     ------
@@ -60,11 +71,16 @@ def frame_of(path: Path, kind: str) -> pl.DataFrame:
 
     if path.stat().st_size > LIMITS.whole_bytes:
         raise LogError(f"{path}: a {kind} file of more than 1 GiB is not read as a whole; save it as Parquet")
+    others: tuple[str, ...] = ()
     with natively(path, kind):
-        flat = pl.DataFrame(_columns(path, {"npy": _npy, "npz": _npz, "mat": _matlab}[kind](path)))
+        if kind == "jsonl":
+            flat = frame_of_lines(path)
+        else:
+            columns, others = _columns(path, _LOADERS[kind](path))
+            flat = pl.DataFrame(columns)
     if flat.width > LIMITS.columns:
         raise LogError(f"{path}: {counted(flat.width, 'column')}; expected {LIMITS.columns} at most")
-    return flat
+    return flat, others
 
 
 def _npy(path: Path) -> dict[str, NDArray[Any]]:
@@ -88,9 +104,45 @@ def _matlab(path: Path) -> dict[str, NDArray[Any]]:
 
     try:
         content = loadmat(path, simplify_cells=True)
-    except NotImplementedError as error:
-        raise LogError(f"{path}: a MATLAB 7.3 file (HDF5); save it with save(FILE, '-v7')") from error
+    except NotImplementedError:  # version 7.3 is HDF5
+        return _hdf5(path)
     return dict(_leaves(content, ""))
+
+
+def _hdf5(path: Path) -> dict[str, NDArray[Any]]:
+    """The datasets of numbers in an HDF5 file, by their paths with dots; nothing that lies in another file."""
+    try:
+        import h5py
+    except ImportError as error:
+        mend = "pip install 'algid[hdf5]', or in MATLAB save(FILE, '-v7')"
+        raise LogError(f"{path}: an HDF5 file, for which h5py is needed: {mend}") from error
+    found: dict[str, Any] = {}
+
+    def keep(name: str, one: Any) -> None:
+        if isinstance(one, h5py.Dataset) and not (one.is_virtual or one.external) and not name.startswith("#"):
+            kinds = one.dtype.names or ()
+            fields = {f"{name}/{field}": one.dtype[field] for field in kinds} or {name: one.dtype}
+            if one.ndim <= 2 and all(kind.kind in "iuf" for kind in fields.values()):
+                found[name] = one
+
+    with h5py.File(path, "r") as file:
+        file.visititems(keep)
+        claimed = sum(one.nbytes for one in found.values())
+        if claimed > LIMITS.whole_bytes or len(found) > LIMITS.columns:
+            raise LogError(f"{path}: {counted(len(found), 'array')} of {counted(claimed, 'byte')}; save it as Parquet")
+        arrays: dict[str, NDArray[Any]] = {}
+        for name, one in found.items():
+            values = one[()]
+            plain = name.replace("/", ".")
+            arrays |= (
+                {f"{plain}.{field}": values[field] for field in values.dtype.names}
+                if values.dtype.names
+                else {plain: np.atleast_1d(values)}
+            )
+    return arrays
+
+
+_LOADERS = {"npy": _npy, "npz": _npz, "mat": _matlab, "hdf5": _hdf5}
 
 
 def _leaves(content: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, NDArray[Any]]]:
@@ -103,8 +155,16 @@ def _leaves(content: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, NDAr
             yield f"{prefix}{name}", value
 
 
-def _columns(path: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Columns as long as the time, or as the longest array; the last part of a nested name where that is unique."""
+def _columns(path: Path, arrays: Mapping[str, NDArray[Any]]) -> tuple[dict[str, NDArray[Any]], tuple[str, ...]]:
+    """Columns as long as the time, or as the longest array, and the arrays that are not, with their shapes.
+
+    A nested name's last part stands for it where that is unique.
+
+    Raises
+    ------
+    LogError
+        If no array has two samples.
+    """
     numbers = {name: np.squeeze(array) for name, array in arrays.items() if array.dtype.kind in "iuf"}
     last = {name: name.rpartition(".")[2] for name in numbers}
     short = Counter(last.values())
@@ -114,13 +174,16 @@ def _columns(path: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArra
     if rows < 2:
         raise LogError(f"{path}: no arrays of two samples or more; found {', '.join(arrays) or 'nothing'}")
     columns: dict[str, NDArray[Any]] = {}
+    others: list[str] = []
     for name, array in numbers.items():
         if array.shape == (rows,):
             columns[name] = _native(array)
         elif array.ndim == 2 and rows in array.shape and min(array.shape) <= LIMITS.list_cells:
             upright = array if array.shape[0] == rows else array.T
             columns |= {f"{name}[{place}]": _native(upright[:, place]) for place in range(upright.shape[1])}
-    return columns
+        else:
+            others.append(f"{name} ({' × '.join(map(str, array.shape)) or 'one number'})")
+    return columns, tuple(others)
 
 
 def _native(array: NDArray[Any]) -> NDArray[Any]:

@@ -103,6 +103,12 @@ def _is_packed_text(magic: bytes, name: str) -> Callable[[Path, bytes], bool]:
     return fits
 
 
+def _is_json_lines(_: Path, head: bytes) -> bool:
+    from algid.readers.jsonlines import is_lines
+
+    return is_lines(head)
+
+
 def _is_text(_: Path, head: bytes) -> bool:
     return bool(head) and looks_like_text(head)
 
@@ -209,10 +215,11 @@ def _open_arrays(kind: str, path: Path, profile: Profile) -> TableReader:
 
 
 def _array_entries(kind: str, path: Path) -> Entries:
-    from algid.readers.arrays import frame_of
+    from algid.readers.arrays import contents_of
 
-    frame = frame_of(path, kind)
-    return tuple(Entry(name, str(dtype), frame.height) for name, dtype in frame.schema.items())
+    frame, others = contents_of(path, kind)
+    columns = [Entry(name, str(dtype), frame.height) for name, dtype in frame.schema.items()]
+    return (*columns, *(Entry(name, "of another length") for name in others))
 
 
 def _open_feather(path: Path, profile: Profile) -> TableReader:
@@ -253,8 +260,10 @@ FORMATS: tuple[FileFormat, ...] = (
     _table("npz", "NumPy archive", (".npz",), _is_npz),
     _table("npy", "NumPy structured array", (".npy",), begins(b"\x93NUMPY")),
     _table("mat", "MATLAB", (".mat",), begins(b"MATLAB ")),
+    _table("hdf5", "HDF5 (`algid[hdf5]`)", (".h5", ".hdf5"), begins(b"\x89HDF\r\n\x1a\n")),
     _csv("csv.zst", "CSV packed with zstd", ".csv.zst", _is_packed_text(ZSTD, "csv.zst")),
     _csv("csv.gz", "CSV packed with gzip", ".csv.gz", _is_packed_text(GZIP, "csv.gz")),
+    _table("jsonl", "JSON lines", (".jsonl", ".ndjson"), _is_json_lines),
     _csv("csv", "CSV", ".csv", _is_text),
 )
 """In the order in which a file is held against them."""

@@ -1,0 +1,180 @@
+"""Formats that are read as a whole: JSON lines, HDF5, and MATLAB files that fit nothing."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.io
+
+from algid.errors import LogError
+from algid.inspection.report import contents, inspect_log
+from algid.profile import Profile
+from algid.readers import read_log
+from algid.readers.formats import sniff
+from tests.readers.logs import EPOCH_NS, noise_log
+
+LOG = noise_log(60, start_ns=EPOCH_NS)
+assert LOG.omega is not None
+OMEGA = LOG.omega
+
+
+def lines(path: Path, rows: list[dict[str, Any]]) -> Path:
+    path.write_text("".join(json.dumps(row) + "\n" for row in rows))
+    return path
+
+
+def nested() -> list[dict[str, Any]]:
+    """A line a sample, as a driver of motors writes them."""
+    return [
+        {
+            "t": LOG.t[row],
+            "mode": "run",
+            "motor_state": [
+                {"q": LOG.theta[one, row], "dq": OMEGA[one, row], "tau_est": LOG.tau[one, row]} for one in (0, 1)
+            ],
+        }
+        for row in range(len(LOG))
+    ]
+
+
+@pytest.mark.parametrize("name", ["a.jsonl", "a.txt"])
+def test_nested_json_lines_are_read(name: str, tmp_path: Path) -> None:
+    path = lines(tmp_path / name, nested())
+    assert sniff(path) == "jsonl"
+    log = read_log(path)
+    assert np.array_equal(log.theta, LOG.theta)
+    assert np.array_equal(log.tau, LOG.tau)
+    assert log.omega is not None
+    assert np.array_equal(log.omega, OMEGA)
+    assert log.origin.mapping["tau2"] == "motor_state[1].tau_est"
+    assert [entry.name for entry in contents(path)[1]][:3] == ["t", "mode", "motor_state[0].q"]
+
+
+def test_lists_and_plain_numbers_of_json_lines_are_read(tmp_path: Path) -> None:
+    rows = [{"time": LOG.t[row], "q": LOG.theta[:, row].tolist(), "tau": LOG.tau[:, row].tolist()} for row in range(60)]
+    log = read_log(lines(tmp_path / "a.jsonl", rows))
+    assert np.array_equal(log.theta, LOG.theta)
+    assert np.array_equal(log.tau, LOG.tau)
+
+
+def test_a_line_that_lacks_a_number_is_counted(tmp_path: Path) -> None:
+    rows = nested()
+    del rows[7]["motor_state"][1]["tau_est"]
+    rows[9]["motor_state"] = rows[9]["motor_state"][:1]
+    rows[11]["t"] = None
+    log = read_log(lines(tmp_path / "a.jsonl", rows))
+    assert len(log) == 57
+    (notice,) = (notice for notice in log.notices if notice.lossy)
+    assert notice.code == "EMPTY_CELLS"
+
+
+@pytest.mark.parametrize("wrong", ['{"t": 1, "motor_state": [', "[1, 2]", "nan", '{"t": 1,}'])
+def test_a_line_that_is_no_object_is_refused_with_its_number(wrong: str, tmp_path: Path) -> None:
+    path = lines(tmp_path / "a.jsonl", nested())
+    kept = path.read_text().splitlines()
+    kept[30] = wrong
+    path.write_text("\n".join(kept))
+    with pytest.raises(LogError, match=r"a\.jsonl: line 31: expected a JSON object in every line"):
+        read_log(path)
+
+
+def test_numbers_that_are_none_are_refused(tmp_path: Path) -> None:
+    rows = nested()
+    rows[5]["motor_state"][0]["q"] = "far"
+    with pytest.raises(LogError):
+        read_log(lines(tmp_path / "a.jsonl", rows))
+
+
+@pytest.mark.parametrize("text", ["{\n}\n", "{1}\n{2}\n", '{"a": 1}'])
+def test_other_text_is_no_json_lines(text: str, tmp_path: Path) -> None:
+    (tmp_path / "a.jsonl").write_text(text)
+    assert sniff(tmp_path / "a.jsonl") == "csv"
+
+
+def written_hdf5(path: Path, userblock: int = 0) -> Path:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w", userblock_size=userblock) as file:
+        group = file.create_group("arm/state")
+        group["q"], group["tau"] = LOG.theta.T, LOG.tau.T
+        file["time"] = LOG.t
+        file["note"] = "a text"
+        file["picture"] = np.zeros((4, 5, 6))
+        file["gains"] = np.eye(3)
+        file["same"] = h5py.SoftLink("/time")
+        file["elsewhere"] = h5py.ExternalLink("other.h5", "/time")
+    return path
+
+
+def test_hdf5_is_read_and_its_arrays_are_listed(tmp_path: Path) -> None:
+    path = written_hdf5(tmp_path / "a.dat")
+    log = read_log(path)
+    assert np.array_equal(log.theta, LOG.theta)
+    assert np.array_equal(log.tau, LOG.tau)
+    kind, entries = contents(path)
+    assert kind == "hdf5"
+    assert {entry.name for entry in entries} == {"q[0]", "q[1]", "tau[0]", "tau[1]", "time", "gains (3 × 3)"}
+
+
+def test_matlab_7_3_is_hdf5_behind_a_head(tmp_path: Path) -> None:
+    """MATLAB writes matrices by columns: two joints are two rows there."""
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "a.mat"
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file["q"], file["tau"], file["t"] = LOG.theta, LOG.tau, LOG.t[None, :]
+        file.create_group("#refs#")["a"] = np.arange(1000.0)
+    head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(116) + bytes(8) + struct_of_version()
+    content = path.read_bytes()
+    path.write_bytes(head + content[len(head) :])
+    log = read_log(path)
+    assert np.array_equal(log.theta, LOG.theta)
+    assert np.array_equal(log.tau, LOG.tau)
+
+
+def struct_of_version() -> bytes:
+    return b"\x00\x02IM"
+
+
+def test_hdf5_without_its_package_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = written_hdf5(tmp_path / "a.h5")
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(LogError, match=r"an HDF5 file, for which h5py is needed: pip install 'algid\[hdf5\]'"):
+        read_log(path)
+
+
+def test_hdf5_that_is_damaged_or_leads_elsewhere_is_refused(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    path = written_hdf5(tmp_path / "a.h5")
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    with pytest.raises(LogError):
+        read_log(path)
+    layout = h5py.VirtualLayout(shape=(60,), dtype="f8")
+    layout[:] = h5py.VirtualSource(str(tmp_path / "b.h5"), "t", shape=(60,))
+    with h5py.File(path, "w") as file:
+        file.create_virtual_dataset("t", layout)
+    with pytest.raises(LogError, match="no arrays of two samples or more; found nothing"):
+        read_log(path)
+
+
+def test_a_matlab_file_whose_matrices_fit_nothing_says_what_it_holds(tmp_path: Path) -> None:
+    path = tmp_path / "a.mat"
+    scipy.io.savemat(path, {"A": np.eye(80), "q": np.ones((50, 2)), "t": np.arange(200.0)})
+    words = r"no column for theta1, .* the file also holds, of another length: A \(80 × 80\), q \(50 × 2\)"
+    with pytest.raises(LogError, match=words):
+        read_log(path)
+    found = inspect_log(path)
+    assert [entry.name for entry in found.entries] == ["t", "A (80 × 80)", "q (50 × 2)"]
+    scipy.io.savemat(path, {"data": np.ones((100, 5))})
+    with pytest.raises(LogError, match=r"found 'data\[0\]', 'data\[1\]', .*--set theta1.source=NAME"):
+        read_log(path)
+    named = {"time": "data[0]", **{name: {"source": f"data[{place}]"} for place, name in enumerate(ARM, start=1)}}
+    scipy.io.savemat(path, {"data": np.column_stack([LOG.t, *LOG.theta, *LOG.tau])})
+    assert np.array_equal(read_log(path, Profile.model_validate(named)).tau, LOG.tau)
+
+
+ARM = ("theta1", "theta2", "tau1", "tau2")
