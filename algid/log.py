@@ -24,6 +24,7 @@ import math
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -203,7 +204,7 @@ class Log:
         """Time from the first to the last sample in s."""
         return float(self.stamp_ns[-1] - self.stamp_ns[0]) * 1e-9
 
-    @property
+    @cached_property
     def period(self) -> float:
         """Usual time between samples in s: see `usual_period`."""
         return usual_period(self.stamp_ns)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from algid.inspection.candidates import torques_beside
-from algid.inspection.figures import robust_deviation, saturated_share
+from algid.inspection.figures import robust_deviation, saturated_share, thinned
 from algid.log import Log
 from algid.notices import Notice, Remedy
 from algid.words import counted
@@ -53,12 +53,12 @@ def dead_efforts(log: Log) -> Iterator[Notice]:
     """
     for name, tau in zip(("tau1", "tau2"), log.tau, strict=True):
         changes = np.flatnonzero(np.diff(tau))
-        if changes.size < _DEAD_RUNS:
+        if changes.size < _DEAD_RUNS or changes.size == tau.size - 1:  # all runs are of one sample
             continue
         runs = np.diff(changes)
         longest = int(np.argmax(runs))
         first, length = int(changes[longest]) + 1, int(runs[longest])
-        usual = float(np.quantile(runs, 0.95))
+        usual = float(np.quantile(thinned(runs), 0.95))
         at_limit = tau[first] in (tau.max(), tau.min())
         if not at_limit and length * log.period >= _DEAD and length >= _DEAD_RUNS * usual:
             span = f"for {length * log.period:.3g} s from t = {first * log.period:.6g} s"
@@ -75,10 +75,13 @@ def angles(log: Log) -> Iterator[Notice]:
             continue
         sizes = np.abs(steps)
         wraps = int(np.count_nonzero(np.abs(sizes - _TURN) < 0.1 * _TURN))
-        if wraps and np.median(sizes) < 0.5:  # at this rate the arm moves by far less than a turn between two samples
+        # at this rate the arm moves by far less than a turn between two samples
+        if wraps and np.median(thinned(sizes)) < 0.5:
             text = f"{what} jumps by a turn {counted(wraps, 'time')}"
             yield Notice("WRAPPED_ANGLE", text, refuse=True, remedies=(Remedy({f"{name}.unwrap": True}),))
-        runs, usual = np.diff(moving), float(np.quantile(sizes[moving], 0.99))
+        if moving.size == steps.size:  # it never stands still
+            continue
+        runs, usual = np.diff(moving), float(np.quantile(thinned(sizes[moving]), 0.99))
         long_enough = max(10, round(0.02 / log.period))
         frozen = np.flatnonzero((runs > long_enough) & (sizes[moving[1:]] > 5 * usual))
         if frozen.size:
@@ -134,9 +137,10 @@ def spikes(log: Log) -> Iterator[Notice]:
         return
     for name, values in zip(("theta1", "theta2", "tau1", "tau2"), (*log.theta, *log.tau), strict=True):
         off = values[1:-1] - (values[:-2] + values[2:]) / 2
-        size, aside = np.abs(off), np.abs(values[2:] - values[:-2])
-        limit = _SPIKE * max(robust_deviation(off), float(np.quantile(size, 0.9)))
-        found = np.flatnonzero((size > limit) & (aside < 0.2 * size) & (limit > 0))
+        size = np.abs(off)
+        limit = _SPIKE * max(robust_deviation(off), float(np.quantile(thinned(size), 0.9)))
+        found = np.flatnonzero(size > limit) if limit > 0 else np.empty(0, dtype=np.int64)
+        found = found[np.abs(values[found + 2] - values[found]) < 0.2 * size[found]]
         if found.size:
             first = float(log.t[1:-1][found][0])
             text = f"{_source(log, name)} has {counted(len(found), 'spike')}, the first at t = {first:.6g} s"

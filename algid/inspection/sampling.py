@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.inspection.figures import clock_figures, signal_figures
+from algid.inspection.figures import ENOUGH, clock_figures, differences, signal_figures
 from algid.log import Log
 from algid.notices import Notice, Remedy
 from algid.signals.spacing import NEAR, near_stamps
@@ -66,7 +66,7 @@ def samples_a_period(log: Log) -> float:
     """
     fewest = math.inf
     for theta in log.theta:
-        step, bend = (float(np.median(np.abs(np.diff(theta, order)))) for order in (1, 2))
+        step, bend = (float(np.median(np.abs(differences(theta, order)))) for order in (1, 2))
         if step > 0.02 and bend > 0:
             fewest = min(fewest, math.pi / math.asin(min(1.0, bend / (2 * step))))
     return fewest
@@ -77,15 +77,20 @@ def lost_steps(log: Log) -> int:
 
     A velocity that is twice the mean of its neighbours' is a lost sample's. Noise makes one that is nought as often.
     """
-    velocity = np.diff(log.theta) / (np.diff(log.stamp_ns) * 1e-9)
-    around = 0.5 * (velocity[:, 2:] + velocity[:, :-2])
-    own = velocity[:, 1:-1]
+    count = len(log) - 3
+    before, own, after = (
+        differences(log.theta[:, place : count + place + 1], 1)
+        / (differences(log.stamp_ns[place : count + place + 1], 1) * 1e-9)
+        for place in range(3)
+    )
+    around = 0.5 * (before + after)
     power = np.sum(around**2, axis=0)
     share = np.sum(own * around, axis=0) / np.maximum(power, 1e-300)
     off = np.sqrt(np.sum((own - share * around) ** 2, axis=0))
     clear = (power > np.quantile(power, 0.25)) & (off < _LOST * np.sqrt(power))
-    lost = int(np.count_nonzero(clear & (np.abs(share - 2) < _LOST)))
-    chance = int(np.count_nonzero(clear & (np.abs(share) < _LOST)))
+    each = count / max(1, power.size)  # of a long log some steps stand for all
+    lost = round(each * np.count_nonzero(clear & (np.abs(share - 2) < _LOST)))
+    chance = round(each * np.count_nonzero(clear & (np.abs(share) < _LOST)))
     return lost if lost > max(_LOST_SHARE * len(log), _FEWEST, _AGAINST * chance) else 0
 
 
@@ -119,6 +124,10 @@ def _still(t: FloatArray, theta: FloatArray, room: FloatArray, few: int) -> floa
     `room` (2,) is how far noise and encoder let it be from there.
     """
     places = np.median(theta[:, :few], axis=1, keepdims=True)
-    away = np.flatnonzero(np.any(np.abs(theta - places) > room[:, None], axis=0))
-    moved = int(away[0]) if away.size else t.size
+    moved = t.size
+    for first in range(0, t.size, ENOUGH):  # few arms rest for the whole of a long log
+        away = np.any(np.abs(theta[:, first : first + ENOUGH] - places) > room[:, None], axis=0)
+        if away.any():
+            moved = first + int(np.argmax(away))
+            break
     return float(t[moved - 1]) if moved else 0.0

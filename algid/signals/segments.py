@@ -83,7 +83,7 @@ def segments(blocks: Iterable[Log]) -> Iterator[Segment]:
     if not first:
         return
     head = join(first)  # so that the period does not depend on how the blocks were cut
-    stamps = join(spaced([head], usual_period(head.stamp_ns[:PERIOD_SAMPLES]))).stamp_ns[:PERIOD_SAMPLES]
+    stamps = _first_stamps(spaced([head], usual_period(head.stamp_ns[:PERIOD_SAMPLES])))
     steps, dt = np.diff(stamps).astype(np.float64), usual_period(stamps)
     near = steps[np.abs(steps - 1e9 * dt) <= 0.5e9 * dt]
     if 2 * near.size > steps.size:
@@ -92,6 +92,16 @@ def segments(blocks: Iterable[Log]) -> Iterator[Segment]:
     for block in spaced(chain([head], source), dt):
         yield from sampler.push(block)
     yield from sampler.finish()
+
+
+def _first_stamps(blocks: Iterable[Log]) -> IntArray:
+    """The first `PERIOD_SAMPLES` stamps; the other signals are not copied."""
+    found: list[IntArray] = []
+    for block in blocks:
+        found.append(block.stamp_ns)
+        if sum(map(len, found)) >= PERIOD_SAMPLES:
+            break
+    return np.concatenate(found)[:PERIOD_SAMPLES]
 
 
 class _Sampler:
@@ -106,7 +116,7 @@ class _Sampler:
 
     def push(self, block: Log) -> Iterator[Segment]:
         if self._pending is None:
-            self._anchor = float(self._time(block)[0])
+            self._anchor = float(self._time(block.stamp_ns[0]))
             yield from self._settle(block)
             return
         yield from self._settle(join([self._pending, block.part(0, _BRIDGE)]))
@@ -118,7 +128,7 @@ class _Sampler:
         edges = [0, *gaps.tolist(), len(held)]
         for first, last in pairwise(edges[:-1]):
             yield from self._stretch(held.part(first, last), ends=True)
-            self._anchor, self._emitted = self._time(held)[last], 0
+            self._anchor, self._emitted = float(self._time(held.stamp_ns[last])), 0
         self._pending = held.part(edges[-2], edges[-1])
         yield from self._stretch(self._pending, ends=False)
         self._pending = self._pending.part(max(0, len(self._pending) - 4), len(self._pending))
@@ -127,12 +137,12 @@ class _Sampler:
         if self._pending is not None:
             yield from self._stretch(self._pending, ends=True)
 
-    def _time(self, log: Log) -> FloatArray:
-        return (log.stamp_ns - self._origin_ns) * 1e-9
+    def _time(self, stamp_ns: IntArray) -> FloatArray:
+        return (stamp_ns - self._origin_ns) * 1e-9
 
     def _stretch(self, log: Log, *, ends: bool) -> Iterator[Segment]:
         """The grid points that `log` settles: up to its last sample but one, or all where the stretch ends."""
-        t = self._time(log)
+        t = self._time(log.stamp_ns)
         reach = t[-1] + EVEN * self._dt if ends else t[max(0, t.size - 2)] - EVEN * self._dt
         count = int(np.floor((reach - self._anchor) / self._dt)) + 1 - self._emitted
         if count <= 0 or t.size < 4:
