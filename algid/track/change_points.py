@@ -132,24 +132,33 @@ def cuts(A: FloatArray, B: FloatArray, penalty: float, shortest: int) -> list[in
     """
     count = A.size
     a, b = np.concatenate([[0.0], np.cumsum(A)]), np.concatenate([[0.0], np.cumsum(B)])
+    last = np.zeros(count + 1, dtype=np.int64)
     best = np.full(count + 1, np.inf)
     best[0] = -penalty
-    last = np.zeros(count + 1, dtype=np.int64)
-    # A start that a cut at `end` would serve as well is of no more use where that cut may stand: `shortest` later.
-    until = np.full(count + 1, count + 1)
-    open_: list[int] = []
+    # Of each start that may serve: the start, a, b and best there, and until which end it may. A start that a cut at
+    # `end` would serve as well is of no more use where that cut may stand: `shortest` later.
+    start, until = np.empty(count + 1, dtype=np.int64), np.empty(count + 1, dtype=np.int64)
+    sums = np.empty((3, count + 1))
+    size, soonest = 0, count + 1
     for end in range(shortest, count + 1):
         if end == shortest or end - shortest >= shortest:
-            open_.append(end - shortest)
-        starts = np.array(open_)
-        starts = starts[until[starts] > end]
-        information = np.maximum(a[end] - a[starts], 1e-300)
-        value = best[starts] - (b[end] - b[starts]) ** 2 / information
+            new = end - shortest
+            start[size], until[size], sums[:, size] = new, count + 1, (a[new], b[new], best[new])
+            size += 1
+        if soonest <= end:
+            kept = np.flatnonzero(until[:size] > end)
+            size = kept.size
+            start[:size], until[:size], sums[:, :size] = start[kept], until[kept], sums[:, kept]
+            soonest = int(until[:size].min())
+        information = np.maximum(a[end] - sums[0, :size], 1e-300)
+        score = b[end] - sums[1, :size]
+        value = sums[2, :size] - score * score / information
         place = int(np.argmin(value))
-        best[end], last[end] = value[place] + penalty, starts[place]
-        beaten = starts[value > best[end]]
-        until[beaten] = np.minimum(until[beaten], end + shortest)
-        open_ = starts.tolist()
+        best[end], last[end] = value[place] + penalty, start[place]
+        beaten = np.flatnonzero(value > best[end])
+        if beaten.size:
+            until[beaten] = np.minimum(until[beaten], end + shortest)
+            soonest = min(soonest, end + shortest)
     found = [int(last[-1])]
     while found[-1] > 0:
         found.append(int(last[found[-1]]))
