@@ -80,6 +80,8 @@ def chi2_exceeded(freedom: Any, tail: Any) -> Any:
 
 def normal_exceeded(tail: float) -> float:
     """What a standard normal variable exceeds with the probability `tail`; ∞ for 0."""
+    if tail >= 1:
+        return -math.inf
     return math.inf if tail <= 0 else -NormalDist().inv_cdf(tail)
 
 

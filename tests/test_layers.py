@@ -17,6 +17,7 @@ ROOT = Path(algid.__file__).parent
 TABLE: dict[str, Room] = {  # lower rooms first
     "construction": room(),
     "errors": room(),
+    "exits": room(),
     "limits": room(),
     "faults": room("errors"),
     "progress": room(),
@@ -76,9 +77,9 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "export": room("arm errors files identification model notices physics results text words", "numpy scipy"),
     "fleet": room("errors files limits model notices progress report text verdict words", "numpy polars scipy"),
     "cli": room(
-        "batch check design errors estimators example export faults files fleet identification inspection limits "
-        "log model notices physics profile progress readers report results runtime settings stores synth "
-        "text track words writers",
+        "batch check design errors estimators example exits export faults files fleet identification "
+        "inspection limits log model notices physics profile progress readers report results runtime "
+        "settings stores synth text track words writers",
         "numpy rich typer",
     ),
 }  # fmt: skip

@@ -20,7 +20,7 @@ from algid.errors import AlgidError, chain_of, text_of
 from algid.files import refuse_links, temporary_folder
 from algid.identification.identify import identify
 from algid.identification.source import Staged
-from algid.results import Result, Status
+from algid.results import Result
 from algid.runtime import keep_freed, keep_to_one_core
 from algid.settings import Settings
 from algid.stores import is_url, open_store, put_folder
@@ -72,7 +72,7 @@ def run_task(task: Task) -> JobRecord | DiskFull:
         return failed_record(task, reason, inputs=inputs, seconds=time.perf_counter() - start)
     judged = result.verdict
     lacking = ["samples were lost"] if result.data_lost else []
-    lacking += [f"{name} {one.status.value}" for name, one in result.estimates.items() if one.status is not Status.OK]
+    lacking += [f"{name} {one.status.value}" for name, one in result.estimates.items() if not one.usable]
     failed = judged.failed
     hashes = {log.path: log.sha256 for log in result.logs}
     return _record(
@@ -84,6 +84,10 @@ def run_task(task: Task) -> JobRecord | DiskFull:
         start_ns=result.log.start_ns,
         log_seconds=sum(log.duration for log in result.logs),
         estimator=result.estimator,
+        verdict=judged.grade,
+        headline=judged.headline,
+        reasons=tuple(f"{one.code}: {one.sentence}" for one in judged.reasons),
+        command=judged.command,
         estimates=estimates_of(result),
     )
 

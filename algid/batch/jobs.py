@@ -17,7 +17,7 @@ TABLE = "jobs.parquet"
 COLUMNS = frozenset(
     {
         *("job", "robot", "time", "status", "reason", "seconds", "log_seconds", "estimator", "version", "settings"),
-        *("logs", "sha256", "size", "changed"),
+        *("logs", "sha256", "size", "changed", "verdict", "headline", "reasons", "command"),
     }
 )
 """Columns that every table has."""

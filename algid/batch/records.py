@@ -54,6 +54,7 @@ class Input:
 class JobRecord:
     """A job's end: `basis` stands for settings, profile, known parameters and version; `seconds` is its duration.
 
+    `verdict` is the grade of the result, `reasons` are codes and texts, `command` is what to run first.
     `estimates` holds estimate, standard deviation and status by name, `estimator` whose they are; `start_ns` and
     `log_seconds` are the first log's first stamp and the length of all logs.
     """
@@ -70,6 +71,10 @@ class JobRecord:
     log_seconds: float | None = None
     estimator: str | None = None
     estimates: Mapping[str, tuple[float | None, float | None, str]] = field(default_factory=dict)
+    verdict: str | None = None
+    headline: str | None = None
+    reasons: tuple[str, ...] = ()
+    command: str | None = None
 
 
 def stat_of(path: str) -> Input:

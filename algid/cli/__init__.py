@@ -9,9 +9,8 @@ import time
 from collections.abc import Sequence
 from types import FrameType
 
-EXIT_FAILED = 1
-EXIT_USAGE = 2
-EXIT_INCOMPLETE = 3
+from algid.exits import Exit
+
 PATIENCE = 5.0  # s to clear up in after a signal, before a second one is heard
 
 
@@ -19,7 +18,7 @@ def main() -> None:
     """Run algid; the entry point of the console script."""
     if sys.platform == "win32":
         print("algid: it runs on Linux and macOS; on Windows, run it in WSL", file=sys.stderr)
-        sys.exit(EXIT_USAGE)
+        sys.exit(Exit.USAGE)
     from algid.cli.streams import harden_streams
     from algid.runtime import bound_by_environment, ending_signals
 
@@ -61,7 +60,7 @@ def run(arguments: Sequence[str]) -> int:
             sys.stdout.flush()  # else a full disk is told by the interpreter, in its words
         return 0
     except AlgidError as error:
-        line, code, found = str(error), EXIT_USAGE, error
+        line, code, found = str(error), int(Exit.USAGE), error
     except _StoppedError:
         complain("stopped; nothing half-written is left")
         raise

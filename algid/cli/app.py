@@ -15,6 +15,7 @@ from typer.core import TyperCommand
 from algid import __version__
 from algid.cli.output import say
 from algid.errors import SettingError
+from algid.exits import epilog
 
 COMMANDS: dict[str, Callable[[], Callable[..., Any]]] = {
     "example": lambda: import_module("algid.cli.example").example,
@@ -88,7 +89,9 @@ def gathered(names: Iterable[str], *, listed: bool = False) -> typer.Typer:
     wanted = list(names)
     for name in wanted:
         command = COMMANDS[name]()
-        made.command(name, cls=FiniteCommand, help=_help(command))((lambda: None) if listed else command)
+        made.command(name, cls=FiniteCommand, help=_help(command), epilog=epilog(name))(
+            (lambda: None) if listed else command
+        )
     if len(wanted) != 1:
         profiles = typer.Typer(help="Profiles tell what a log's names, units and signs mean.", no_args_is_help=True)
         new = import_module("algid.cli.profile").new

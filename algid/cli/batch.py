@@ -11,16 +11,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from algid.cli import EXIT_FAILED, EXIT_INCOMPLETE
 from algid.cli.output import complain, say
 from algid.cli.settings import Choice, takes_settings
+from algid.exits import Exit
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from algid.batch.run import Batch, Ended, Progress
-
-EXIT_STOPPED = 130
 
 
 @takes_settings
@@ -50,9 +48,8 @@ def batch(
 ) -> None:
     """Identify many logs: a result folder a job and OUT/jobs.parquet; what is done already is not done again.
 
-    X-unloaded.* and X-loaded.* are one job X. Exit code 1 tells that jobs failed or the batch was cut short, 3
-    that a result lacks a parameter or samples, 130 that it was stopped: Ctrl-C ends it at once, and what was running
-    is done by the next run.
+    X-unloaded.* and X-loaded.* are one job X. Ctrl-C ends it at once, and what was running is done by the
+    next run.
 
     Example: algid batch logs/ -o results --workers 2
 
@@ -199,8 +196,8 @@ def _conclude(ended: Ended, stopped: bool, out: str, quiet: bool) -> None:
     if ended.stopped is not None:
         complain(ended.stopped)
     elif stopped:
-        raise typer.Exit(EXIT_STOPPED)
+        raise typer.Exit(Exit.STOPPED)
     if failed or ended.left or ended.stopped is not None:
-        raise typer.Exit(EXIT_FAILED)
+        raise typer.Exit(Exit.LIMIT)
     if any(record.status is End.INCOMPLETE for record in ended.records):
-        raise typer.Exit(EXIT_INCOMPLETE)
+        raise typer.Exit(Exit.FAILED)

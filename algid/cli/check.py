@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from algid.cli import EXIT_FAILED
 from algid.cli.output import say
+from algid.exits import Exit
 
 
 class Against(StrEnum):
@@ -36,7 +36,7 @@ def check(
     Raises
     ------
     typer.Exit
-        With `EXIT_FAILED` where an error is over its limit.
+        With `Exit.LIMIT` where an error is over its limit.
     """
     from algid.check import failed, judge
     from algid.results import read_result
@@ -45,4 +45,4 @@ def check(
     for row in rows:
         say(row.text)
     if failed(rows):
-        raise typer.Exit(EXIT_FAILED)
+        raise typer.Exit(Exit.LIMIT)

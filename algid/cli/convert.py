@@ -10,6 +10,7 @@ import typer
 
 from algid.cli.output import remark
 from algid.cli.settings import Choice, takes_profile
+from algid.exits import exit_of
 
 if TYPE_CHECKING:
     from algid.log import Log
@@ -26,8 +27,6 @@ def convert(
 ) -> None:
     """Write a log in another format, in SI units, with canonical names; a synthetic log keeps its truth.
 
-    Exit code 3 where samples of IN are missing.
-
     Example: algid convert rosbag2_2026/ arm.parquet --joints shoulder,elbow --zero hanging
 
     Raises
@@ -35,7 +34,7 @@ def convert(
     OutputError
         If no format has the suffix of OUT.
     typer.Exit
-        At the end: with 3 where samples are missing, else with 0.
+        At the end: with 4 where samples are missing, else with 0.
     """
     from algid.errors import OutputError
     from algid.files import refuse_existing
@@ -63,4 +62,4 @@ def convert(
         write_log(target, noted(shown), truth=reader.origin.truth)
     for notice in notices:
         remark(f"{notice.code}: {notice.text}")
-    raise typer.Exit(3 if any(notice.lossy for notice in notices) else 0)
+    raise typer.Exit(exit_of(failed=False, lost=any(notice.lossy for notice in notices)))

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from algid.cli import EXIT_INCOMPLETE
 from algid.cli.completion import cases
 from algid.cli.output import console, remark, say
 from algid.cli.settings import two_names
+from algid.exits import Exit
 
 if TYPE_CHECKING:
     from algid.design.campaign import Campaign
@@ -103,7 +103,7 @@ def design(
     Raises
     ------
     typer.Exit
-        With `EXIT_INCOMPLETE` where a parameter stays open.
+        With `Exit.FAILED` where a parameter stays open.
     """
     import shlex
 
@@ -149,7 +149,7 @@ def design(
             print_document(design_document(planned, prior, known.doubts), console())
         remark(f"wrote {folder}")
     if planned.open_parameters:
-        raise typer.Exit(EXIT_INCOMPLETE)
+        raise typer.Exit(Exit.FAILED)
 
 
 def _campaign(

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from algid.cli import EXIT_INCOMPLETE
 from algid.cli.output import remark
 from algid.cli.report import ExportTo, ResultFormat, print_result
 from algid.cli.settings import Choice, takes_settings
+from algid.exits import Exit, exit_of
 from algid.words import counted
 
 if TYPE_CHECKING:
@@ -57,8 +57,6 @@ def identify(
 ) -> None:
     """Identify an arm's constants k1 … k7 and, with loaded logs, its payload; write LOG.algid.
 
-    Exit code 3 tells that a parameter could not be identified, that samples were lost, or that the result failed.
-
     Example: algid identify run-unloaded.mcap --loaded run-loaded.mcap -o results
 
     Raises
@@ -66,7 +64,7 @@ def identify(
     SettingError
         If a log of estimates is asked for without a report.
     typer.Exit
-        With `EXIT_INCOMPLETE` where a parameter is not identified, samples are lost, or the verdict is Failed.
+        As `algid.exits.exit_of` has it, where that is not `Exit.OK`.
     """
     import shlex
 
@@ -104,8 +102,9 @@ def identify(
         for note in result.notes:
             remark(f"note: {visible(note)}")
         remark(f"wrote {result_folder(result.log.path, out, name)}")
-    if not result.complete or result.data_lost or result.verdict.failed:
-        raise typer.Exit(EXIT_INCOMPLETE)
+    ended = exit_of(failed=result.verdict.failed or not result.complete, lost=result.data_lost)
+    if ended is not Exit.OK:
+        raise typer.Exit(ended)
 
 
 def _print_reading(result: Result) -> None:

@@ -10,6 +10,7 @@ import typer
 
 from algid.cli.output import console, say
 from algid.cli.settings import Choice, takes_profile
+from algid.exits import Exit, exit_of
 from algid.words import counted
 
 if TYPE_CHECKING:
@@ -29,14 +30,13 @@ def inspect(
 ) -> None:
     """Show what a log holds, which channels would be used, and what is wrong with it.
 
-    Exit code 2 for a log that would be refused, 3 where samples are missing.
-
     Example: algid inspect arm.mcap --joints shoulder,elbow --zero hanging
 
     Raises
     ------
     typer.Exit
-        At the end: with 2 for a log that would be refused, 3 where samples are missing, else with 0.
+        At the end: with 2 for a log that would be refused, 3 where physics contradicts its convention, 4 where samples
+        are missing, else with 0.
     """
     import json
 
@@ -49,7 +49,7 @@ def inspect(
         terminal = console(highlight=False)
         _print_content(found, terminal)
         _print_worth(found, terminal)
-    raise typer.Exit(2 if found.refused else 3 if found.lossy else 0)
+    raise typer.Exit(Exit.USAGE if found.refused else exit_of(failed=found.contradicted, lost=found.lossy))
 
 
 def _print_content(found: Inspection, console: Console) -> None:

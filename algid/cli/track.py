@@ -8,10 +8,10 @@ from typing import Annotated
 
 import typer
 
-from algid.cli import EXIT_INCOMPLETE
 from algid.cli.output import remark
 from algid.cli.report import Export, ResultFormat, print_track
 from algid.cli.settings import Choice, takes_profile
+from algid.exits import Exit, exit_of
 
 
 @takes_profile
@@ -33,14 +33,12 @@ def track(
 ) -> None:
     """Find when the payload changed and what each stretch weighs; write LOG.track.
 
-    Exit code 3 tells that a stretch could not be weighed, that samples were lost, or that the track failed.
-
     Example: algid track picking.mcap --parameters case1-unloaded.algid -o tracks
 
     Raises
     ------
     typer.Exit
-        With `EXIT_INCOMPLETE` where a stretch is not weighed, samples are lost, or the verdict is Failed.
+        As `algid.exits.exit_of` has it, where that is not `Exit.OK`.
     """
     import shlex
 
@@ -62,5 +60,6 @@ def track(
     if not quiet:
         print_track(result, form)
         remark(f"wrote {folder}")
-    if not result.complete or result.data_lost or verdict(result).failed:
-        raise typer.Exit(EXIT_INCOMPLETE)
+    ended = exit_of(failed=verdict(result).failed or not result.complete, lost=result.data_lost)
+    if ended is not Exit.OK:
+        raise typer.Exit(ended)

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from algid.cli import EXIT_FAILED
 from algid.cli.output import complain, say
 from algid.cli.report import ResultFormat
 from algid.cli.settings import Choice, takes_profile
+from algid.exits import Exit
 from algid.words import counted
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def validate(
     Raises
     ------
     typer.Exit
-        With `EXIT_FAILED` where a limit is given and the normalised RMSE is past it or missing.
+        With `Exit.LIMIT` where a limit is given and the normalised RMSE is past it or missing.
     """
     from algid.identification.identify import reused
     from algid.identification.source import open_sources, read_otherwise
@@ -94,7 +94,7 @@ def validate(
             content["simulation"] = simulated
         say(json.dumps(content, indent=2, allow_nan=False))
     if over:
-        raise typer.Exit(EXIT_FAILED)
+        raise typer.Exit(Exit.LIMIT)
 
 
 def _rows(one: RolloutScore) -> list[dict[str, Any]]:

@@ -21,7 +21,7 @@ from algid.export.links import Knowns, Link, links_of
 from algid.identification.known import contradictions, first_length, has_error_bar, model_of, torque_constants
 from algid.model import TERMS, UNITS, Model
 from algid.notices import Notice
-from algid.results import Estimate, Result, Status
+from algid.results import Estimate, Result
 from algid.text import joined
 
 
@@ -155,7 +155,7 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
 
 
 def _length(found: Estimate | None) -> float | None:
-    return None if found is None or found.status is not Status.OK else found.estimate
+    return None if found is None or not found.usable else found.estimate
 
 
 def _first_length(coefficients: Coefficients, file: str) -> float:

@@ -13,7 +13,7 @@ from algid.export.programs import c99, python_module
 from algid.export.robots import mjcf, sdf, urdf
 from algid.identification.known import contradictions
 from algid.notices import Notice
-from algid.results import Result, Status
+from algid.results import Result
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def payload_yaml(result: Result, file: str, knowns: Knowns) -> str:
         If the result has no payload, or one that no load explains.
     """
     mass = result.payload.get("m_p")
-    if mass is None or mass.estimate is None or mass.status is not Status.OK:
+    if mass is None or mass.estimate is None or not mass.usable:
         raise ResultError(f"{file}: the result has no payload; identify with --loaded LOG")
     if mass.estimate <= 0:
         raise ResultError(

@@ -13,7 +13,7 @@ from algid.estimators.combine import Prior
 from algid.identification.source import Role
 from algid.model import Model, without_delay
 from algid.notices import Notice
-from algid.results import Result, Status
+from algid.results import Result
 from algid.settings import Settings
 
 FAR = 5.0  # standard deviations beyond which two statements contradict each other
@@ -86,7 +86,7 @@ def torque_constants(result: Result, model: Model, role: Role, file: str) -> Flo
 def has_error_bar(result: Result, name: str) -> bool:
     """Whether an estimate is sound and the result's covariance holds it."""
     found = result.estimates.get(name)
-    ok = found is not None and found.status is Status.OK and found.std is not None
+    ok = found is not None and found.usable and found.std is not None
     return ok and result.fit is not None and name in result.fit.covariance_names
 
 

@@ -28,6 +28,8 @@ from algid.settings import Settings
 from algid.table4 import LOADED_ROWS, UNLOADED_ROWS, finite
 from algid.table4 import UNITS as TABLE_UNITS
 
+NEVER_ZERO = ("k3", "k5", "l1", "l2")
+"""Inertias and lengths: any other parameter of an arm may be zero."""
 NEAR_CONSTANT = 0.1  # of the torque's RMS: a residual this small passes, however little there was to explain
 
 
@@ -52,6 +54,7 @@ def outcome_of(fit: Fit, predictions: Predictions, survey: Survey, settings: Set
     # a constant that the model has no column for is not identifiable
     found = {name: unknown(UNITS[name]) for name in CONSTANT_NAMES}
     found |= _estimates(fit.names, fit.values, fit.std, fit.quantile, fit.status)
+    found = with_significance(found)
     payload = {name: found.pop(name) for name in PAYLOAD_PARAMETERS if name in found}
     rows, stds = table_rows(fit)
     combined = {name: unknown(TABLE_UNITS[name]) for name in LOADED_ROWS if survey.loaded}
@@ -94,7 +97,7 @@ def is_implausible(summary: results.FitSummary) -> bool:
 def distrusted(group: Mapping[str, Estimate]) -> dict[str, Estimate]:
     """The estimates with no status OK left."""
     return {
-        name: found.model_copy(update={"status": Status.IMPLAUSIBLE}) if found.status is Status.OK else found
+        name: found.model_copy(update={"status": Status.IMPLAUSIBLE}) if found.usable else found
         for name, found in group.items()
     }
 
@@ -116,6 +119,21 @@ def estimate(value: float, std: float, half: float, unit: str, status: str) -> E
         return unknown(unit)
     interval = (finite(value - half), finite(value + half))
     return Estimate(estimate=finite(value), std=finite(std), ci95=interval, unit=unit, status=Status(status))
+
+
+def with_significance(group: Mapping[str, Estimate]) -> dict[str, Estimate]:
+    """The estimates, those not significant whose interval holds zero and that may be zero: no inertia, no length."""
+    return {
+        name: found.model_copy(update={"status": Status.NOT_SIGNIFICANT})
+        if found.status is Status.OK and name not in NEVER_ZERO and _holds_zero(found)
+        else found
+        for name, found in group.items()
+    }
+
+
+def _holds_zero(found: Estimate) -> bool:
+    low, high = found.ci95 or (None, None)
+    return low is not None and high is not None and low <= 0 <= high
 
 
 def unknown(unit: str) -> Estimate:
@@ -188,7 +206,9 @@ def fit_summary(
         ),
         terms=_terms(fit, chosen),
         broken_bounds=[
-            results.Bound(bound=b.bound, value=b.value, distance_sigma=b.distance) for b in broken_bounds(fit)
+            results.Bound(bound=b.bound, value=b.value, distance_sigma=b.distance)
+            for b in broken_bounds(fit)
+            if b.distance is None or b.distance > fit.quantile  # else its 95 % interval keeps it
         ],
         endogeneity=endogeneity,
         by_log=[_estimates(fit.shared.log_names, own.values, own.std, fit.quantile) for own in own_estimates(fit)],

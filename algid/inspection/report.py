@@ -66,6 +66,10 @@ if TYPE_CHECKING:
     from algid.profile import Profile
 
 
+CONTRADICTIONS = ("WRONG_CONVENTION", "FLIPPED_SIGN", "WRONG_ZERO")
+"""Findings that say that a log was read by a wrong convention."""
+
+
 @dataclass(frozen=True)
 class Inspection:
     """What a log is and is worth; everything below `refused` is empty for a log that cannot be read."""
@@ -86,6 +90,11 @@ class Inspection:
     def lossy(self) -> bool:
         """Whether samples are missing."""
         return any(notice.lossy for notice in self.notices)
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether physics contradicts how the log was read."""
+        return any(finding.code in CONTRADICTIONS for finding in self.findings)
 
     def as_dict(self) -> dict[str, Any]:
         """As plain data for JSON; what is not finite becomes None."""

@@ -60,6 +60,11 @@ class Estimate(_Model):
     unit: str
     status: Status = Status.OK
 
+    @property
+    def usable(self) -> bool:
+        """Whether number and interval can be used: also where zero lies within it."""
+        return self.status in (Status.OK, Status.NOT_SIGNIFICANT) and self.estimate is not None
+
 
 class Table4Row(_Model):
     """A row of the paper's Table 4, in its names and order; truth and errors where they are known."""
@@ -285,8 +290,8 @@ class Result(_Model):
 
     @property
     def complete(self) -> bool:
-        """Whether every estimate has status OK."""
-        return all(estimate.status is Status.OK for estimate in self.estimates.values())
+        """Whether every estimate can be used: see `Estimate.usable`."""
+        return all(estimate.usable for estimate in self.estimates.values())
 
     def __str__(self) -> str:
         rows = [("parameter", "estimate", "std", "unit", "status"), *self._rows()]

@@ -110,7 +110,7 @@ def _failure(result: Result) -> str | None:
         return "the estimator did not converge"
     if is_implausible(result):
         return _contradiction(result.fit)
-    usable, count = sum(map(_usable, result.estimates.values())), len(result.estimates)
+    usable, count = sum(found.usable for found in result.estimates.values()), len(result.estimates)
     if not usable:
         words = sorted({STATUS_WORDS.get(found.status, "absent") for found in result.estimates.values()})
         return f"no parameter could be identified ({joined(words)})"
@@ -118,11 +118,6 @@ def _failure(result: Result) -> str | None:
         return f"only {usable} of {counted(count, 'parameter')} could be identified"
     poor = next(_unexplained(result.fit, WORST_R2), None)
     return None if poor is None else poor.text
-
-
-def _usable(found: Estimate) -> bool:
-    """Whether there is a number to use; one that is not significant has an interval that is."""
-    return found.status in ("OK", "NOT_SIGNIFICANT") and found.estimate is not None
 
 
 def _identified(result: Result) -> str:

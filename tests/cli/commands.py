@@ -13,9 +13,9 @@ from unittest.mock import patch
 
 from typer.main import get_command
 
-from algid.cli import EXIT_USAGE
 from algid.cli.app import COMMANDS, called, gathered
 from algid.errors import AlgidError
+from algid.exits import Exit
 
 app = gathered(COMMANDS)
 
@@ -43,7 +43,7 @@ def call(*arguments: str | Path) -> Done:
             _command(words[0])(words)
         except AlgidError as error:
             print(f"algid: {error}", file=err)
-            code = EXIT_USAGE
+            code = Exit.USAGE
         except SystemExit as end:
             code = int(end.code or 0)
     return Done(code, out.getvalue(), err.getvalue())

@@ -285,3 +285,19 @@ def test_repeatability_and_gain_are_told_in_numbers() -> None:
 def test_cross_validation_that_could_not_be_done_is_told() -> None:
     outcome = outcome_of(fit_of(), {}, survey(), Settings(cross_validate=True), Selection(Model(), False))
     assert [one.code for one in outcome.notices] == ["NO_CROSS_VALIDATION"]
+
+
+def test_what_may_be_zero_and_is_not_told_from_it_is_not_significant() -> None:
+    fit = with_stds(with_values(fit_of(), k6=0.1, k3=0.1), k6=1.0, k3=1.0)
+    outcome = outcome_of(fit, {}, survey(), Settings(), Selection(Model(), False))
+    assert outcome.parameters["k6"].status is Status.NOT_SIGNIFICANT
+    assert outcome.parameters["k3"].status is Status.OK  # no inertia is zero
+    assert outcome.parameters["k4"].status is Status.OK
+
+
+def test_a_bound_is_mentioned_from_the_level_of_the_intervals_on() -> None:
+    for k6, mentioned in ((-0.7, False), (-1.9, False), (-2.9, True)):
+        fit = with_stds(with_values(fit_of(), k6=k6), k6=1.0)
+        outcome = outcome_of(fit, {}, survey(), Settings(), Selection(Model(), False))
+        assert outcome.fit is not None
+        assert bool(outcome.fit.broken_bounds) is mentioned
