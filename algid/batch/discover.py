@@ -9,16 +9,17 @@ import glob
 import os
 import re
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
+from urllib.parse import unquote
 
 from algid.batch.jobs import TABLE, Job, kept_path, name_fault, safe_name
 from algid.batch.manifest import is_manifest, read_manifest
 from algid.errors import SettingError
 from algid.readers.formats import SUFFIXES
-from algid.stores import is_url, list_urls
+from algid.stores import is_url, list_urls, shown
 
 BAG = "metadata.yaml"
 """What makes a folder a bag."""
@@ -62,7 +63,9 @@ Found = tuple[str, str, str | None]
 def _logs(source: str, out: str) -> list[Found]:
     """The logs of a source."""
     if is_url(source):
-        return [(url, _stem(name), None) for url, name in list_urls(source) if _is_log(name) and not _in_result(name)]
+        own = _written_by_batch(source, out)
+        found = [(url, name) for url, name in list_urls(source) if _is_log(name) and not own(name)]
+        return [(url, _stem(name), None) for url, name in found]
     path = Path(source)
     if path.is_dir() and not _is_bag(path):
         return [_below(path, one) for one in _walk(path, out) if one.trouble or one.bag or _is_log(one.name)]
@@ -72,10 +75,18 @@ def _logs(source: str, out: str) -> list[Found]:
     return [(one.path, _stem(one.name), one.trouble) for one in matches if one.bag or not Path(one.path).is_dir()]
 
 
-def _in_result(name: str) -> bool:
-    """Whether an object belongs to a result, or is hidden."""
-    *folders, _ = parts = name.split("/")
-    return any(part.startswith(".") for part in parts) or any(part.endswith(".algid") for part in folders)
+def _written_by_batch(source: str, out: str) -> Callable[[str], bool]:
+    """Whether an object of that name below `source` is hidden, part of a result, or lies in `out`."""
+    below, place = f"{shown(source)}/", f"{shown(out)}/"
+    inside = unquote(place.removeprefix(below)) if is_url(out) and place.startswith(below) else None
+
+    def own(name: str) -> bool:
+        *folders, _ = parts = name.split("/")
+        if any(part.startswith(".") for part in parts) or any(part.endswith(".algid") for part in folders):
+            return True
+        return inside is not None and (name.startswith(inside) if inside else name == TABLE)
+
+    return own
 
 
 @dataclass(frozen=True)

@@ -161,7 +161,7 @@ def _watch(running: Batch, sources: list[str], out: str, alone: str, retry_faile
     """Look for logs until stopped; nothing but settled ones are taken."""
     from algid.batch.discover import jobs_of
     from algid.batch.run import LOOK_EVERY, Settling
-    from algid.errors import SettingError
+    from algid.errors import AlgidError
 
     settling = Settling()
     complaint = ""
@@ -169,7 +169,7 @@ def _watch(running: Batch, sources: list[str], out: str, alone: str, retry_faile
     while not running.stop.is_set():
         try:
             jobs = settling.settled(jobs_of(sources, out, alone))
-        except SettingError as error:
+        except AlgidError as error:  # a store may be away for a while
             jobs = []
             if str(error) != complaint:
                 complaint = str(error)

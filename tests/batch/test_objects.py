@@ -18,6 +18,7 @@ from algid.batch.discover import jobs_of
 from algid.batch.fetch import staged
 from algid.batch.records import End
 from algid.batch.run import Batch, Ended, Recipe
+from algid.cli import batch as command
 from algid.errors import AlgidError, LogError, OutputError, without_credentials
 from algid.settings import Settings
 from algid.stores import connect, list_urls, open_store, put_folder
@@ -212,6 +213,39 @@ def test_a_result_that_may_not_be_written_says_so(served: Served, log: bytes) ->
     assert ended.left == 1
     assert "ACCESS_DENIED" in str(ended.stopped)
     assert "room" not in str(ended.stopped)
+
+
+@pytest.mark.parametrize("place", ["", "logs/r 1/out"])
+def test_what_a_batch_wrote_below_its_source_is_no_log(served: Served, log: bytes, place: str) -> None:
+    open_store(served.url("logs")).write("r 1/a.csv", log)
+    open_store(served.url("logs")).write("jobs.parquet", b"a log of that name")
+    out = served.url(place)
+    for _ in range(2):
+        jobs = jobs_of([served.url("")], out)
+        assert [job.name for job in jobs] == ["logs/jobs", "logs/r 1/a"]
+        Batch(open_store(out), replace(RECIPE, out=out, report=True), Here(), 1, lambda _progress: None).run(jobs)
+
+
+def test_a_store_that_is_away_for_a_while_does_not_end_a_watched_prefix(
+    served: Served, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("algid.batch.run.LOOK_EVERY", 0.0)
+    open_store(served.url("logs")).write("bad.csv", b"junk")
+    out, looks = str(tmp_path / "out"), 0
+    batch = Batch(open_store(out), replace(RECIPE, out=out), Here(), 1, lambda _progress: None)
+
+    def denied(_method: str, path: str) -> bool:
+        """Listings 1 and 2 are refused; the batch is stopped once the log is done."""
+        nonlocal looks
+        looks += path.rstrip("/") == f"/{served.bucket}"
+        if "bad" in batch.records or looks > 20:
+            batch.stop.set()
+        return looks in (1, 2) and path.rstrip("/") == f"/{served.bucket}"
+
+    served.denied = denied
+    ended = command._watch(batch, [served.url("logs")], out, "logs", False)
+    assert _ends(ended) == {"bad": End.FAILED}
+    assert capsys.readouterr().err.count("its objects cannot be listed") == 1
 
 
 def _folder(place: Path, *names: str) -> Path:
