@@ -7,6 +7,7 @@ choose before it runs: filters, windows, starts, bounds, widths, terms.
 
 from __future__ import annotations
 
+import io
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -208,7 +209,9 @@ def mujoco_sysid(logs: Sequence[Segment], l1: float) -> Answer:
     names = [f"stretch{place}" for place in range(len(states))]
     sequences = sysid.ModelSequences("arm", spec, names, states, controls, sensors)
     residual = sysid.build_residual_fn(models_sequences=[sequences])
-    best, outcome = sysid.optimize(initial_params=parameters, residual_fn=residual, optimizer="mujoco", verbose=False)
+    best, outcome = sysid.optimize(
+        initial_params=parameters, residual_fn=residual, optimizer="mujoco", verbose=False, output=io.StringIO()
+    )
     x = np.array([float(best[name].value[0]) for name in _CHANGES])
     misfit, _, _ = residual(outcome.x, best)
     covariance, _ = sysid.calculate_intervals(misfit, outcome.jac)
