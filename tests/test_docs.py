@@ -19,6 +19,7 @@ from pathlib import Path
 import pytest
 
 import algid
+from pipelines.docs import pages
 
 ROOT = Path(__file__).parents[1]
 PAGES = {"README": ROOT / "README.md"} | {
@@ -115,6 +116,15 @@ def test_the_readme_installs_from_a_clean_clone(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
     assert "Table 4" in done.stdout
     assert done.stdout.splitlines()[-2:] == [str(tmp_path / "algid/.venv/bin/algid"), f"algid {algid.__version__}"]
+
+
+def test_the_site_has_a_page_for_each_topic_and_every_public_name(tmp_path: Path) -> None:
+    pages(tmp_path / "pages")
+    guide = {path.stem for path in (Path(algid.__file__).parent / "guide").glob("*.md")}
+    assert {path.stem for path in (tmp_path / "pages").iterdir()} == guide | {"index", "reference"}
+    named = re.findall(r"^::: algid\.[\w.]+\.(\w+)$", (tmp_path / "pages/reference.md").read_text(), re.MULTILINE)
+    assert sorted(named) == sorted(set(algid.__all__) - {"__version__"})
+    assert "<!--" not in "".join(path.read_text() for path in (tmp_path / "pages").iterdir())
 
 
 @pytest.mark.parametrize(
