@@ -28,7 +28,7 @@ from functools import cached_property
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from algid.arm import Arm, FloatArray
 from algid.notices import Notice
@@ -191,6 +191,38 @@ class Log:
             if channel is not None and channel.shape != (2, rows):
                 raise ValueError(f"{name} must have shape (2, {rows}), got {channel.shape}")
 
+    @classmethod
+    def from_arrays(
+        cls, t: ArrayLike, theta: ArrayLike, tau: ArrayLike, omega: ArrayLike | None = None, *, name: str = "log"
+    ) -> Log:
+        """A log of samples in memory.
+
+        Parameters
+        ----------
+        t : (N,), s
+            Strictly increasing.
+        theta : (2, N) or (N, 2), rad
+            Joint angles: θ1 from the horizontal, θ2 from link 1.
+        tau : like `theta`, N m
+        omega : like `theta`, rad/s
+            Velocities, where they were recorded.
+        name : what the result calls it
+
+        Raises
+        ------
+        ValueError
+            If a shape does not fit, a value is not finite, or the times do not increase.
+        """
+        times = np.asarray(t, dtype=np.float64)
+        if times.ndim != 1 or times.size < 2:
+            raise ValueError(f"t must have shape (N,) with two samples or more, got {times.shape}")
+        if not np.all(np.diff(times) > 0):
+            raise ValueError("t must be finite and strictly increasing")
+        signals = {"theta": theta, "tau": tau} | ({} if omega is None else {"omega": omega})
+        rows = {key: _two_rows(key, value, times.size) for key, value in signals.items()}
+        stamps = np.round(times * 1e9).astype(np.int64)
+        return cls(stamps, rows["theta"], rows["tau"], Origin(name, "arrays", {}), rows.get("omega"))
+
     def __len__(self) -> int:
         return self.stamp_ns.size
 
@@ -218,6 +250,18 @@ class Log:
             tau=self.tau[:, first:last],
             omega=None if self.omega is None else self.omega[:, first:last],
         )
+
+
+def _two_rows(name: str, values: ArrayLike, count: int) -> FloatArray:
+    """A signal of both joints (2, N), given so or as (N, 2)."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape == (count, 2) and count != 2:
+        array = array.T
+    if array.shape != (2, count):
+        raise ValueError(f"{name} must have shape (2, {count}) or ({count}, 2), got {array.shape}")
+    if not np.all(np.isfinite(array)):
+        raise ValueError(f"{name} must be finite")
+    return np.ascontiguousarray(array)
 
 
 def usual_period(stamp_ns: IntArray) -> float:

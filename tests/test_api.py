@@ -63,11 +63,12 @@ def test_a_result_is_read_by_a_string_and_shows_itself_as_a_short_table(tmp_path
     assert found == made
     lines = str(found).splitlines()
     assert lines == repr(found).splitlines()
-    assert len(lines) == 2 + len(made.estimates)
-    assert lines[1].split() == ["parameter", "estimate", "std", "unit", "status"]
+    assert len(lines) == 3 + len(made.estimates)
+    assert lines[1] == made.verdict.sentence
+    assert lines[2].split() == ["parameter", "estimate", "std", "unit", "status"]
     k1 = made.parameters["k1"]
-    assert lines[2].split()[:2] == ["k1", f"{k1.estimate:.6g}"]
-    assert lines[2].endswith("OK")
+    assert lines[3].split()[:2] == ["k1", f"{k1.estimate:.6g}"]
+    assert lines[3].endswith("OK")
     hostile = found.model_copy(update={"log": found.log.model_copy(update={"path": "<b>\x1b[31m\n.csv"})})
     assert "<b>" not in hostile._repr_html_()
     assert hostile._repr_html_().count("<tr>") == 1 + len(made.estimates)
@@ -192,3 +193,23 @@ def test_readings_of_other_words_for_the_same_numbers_do_not_differ() -> None:
     assert other(offset=0.25 + 5e-10) == []
     assert other(offset=0.25 + 2e-9) == ["tau1 offset by 0.25 instead of 0.25"]
     assert list(READING.differences(Reading(zero="hanging", second_angle="absolute", drive="base"))) == []
+
+
+def test_a_log_is_made_of_arrays_either_way_round_and_gives_the_same_result() -> None:
+    log, _ = algid.synthesise("case1", duration=2.0, excitation="wide")
+    weak = algid.Settings(estimator="weak")
+    one = algid.identify(algid.Log.from_arrays(log.t, log.theta, log.tau), settings=weak)
+    other = algid.identify(algid.Log.from_arrays(log.t, log.theta.T, log.tau.T), settings=weak)
+    assert one.parameters == other.parameters
+    assert one.parameters["k1"].estimate == pytest.approx(one.parameters["k1"].estimate)
+    with pytest.raises(ValueError, match=r"theta must have shape"):
+        algid.Log.from_arrays(log.t, log.theta[:, 1:], log.tau)
+    with pytest.raises(ValueError, match="strictly increasing"):
+        algid.Log.from_arrays(log.t[::-1], log.theta, log.tau)
+    frame = one.to_frame()
+    assert frame["parameter"].to_list() == list(one.estimates)
+    assert frame["std"][0] == one.parameters["k1"].std
+    assert one.covariance.shape == (len(one.fit.covariance_names),) * 2 if one.fit else False
+    assert {"verdict", "to_frame", "parameters"} <= set(dir(one))
+    assert not any(name.startswith("model_") for name in dir(one))
+    assert one.verdict.word in one._repr_html_()

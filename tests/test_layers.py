@@ -39,7 +39,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "stores": room("construction errors files", "pyarrow"),
     "profile": room("errors files units", "pydantic"),
     "settings": room("errors limits model signals"),
-    "results": room("errors files limits log model notices settings text verdict words", "pydantic"),
+    "results": room("errors files limits log model notices settings text verdict words", "numpy polars pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
     "table4": room("arm limits log results synth"),
     "writers": room("errors files log ros2", "mcap numpy polars pyarrow"),
@@ -50,7 +50,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "inspection": room("arm errors estimators faults log notices profile readers signals words", "numpy"),
     "report": room(
-        "arm errors files notices progress results ros2 text verdict words",
+        "arm errors files model notices progress results ros2 text verdict words",
         "matplotlib mcap numpy plotly polars pyarrow rich"
     ),
     "check": room("errors files results", "pydantic"),

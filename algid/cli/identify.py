@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from algid.cli.output import remark
+from algid.cli.output import remark, say
 from algid.cli.report import ExportTo, ResultFormat, print_result
 from algid.cli.settings import Choice, takes_settings
 from algid.exits import Exit, exit_of
@@ -52,7 +52,10 @@ def identify(
         bool, typer.Option("-q", "--quiet", help="Print nothing but errors.", rich_help_panel=OUTPUT)
     ] = False,
     verbose: Annotated[
-        bool, typer.Option("-v", "--verbose", help="Tell logs, channels and settings too.", rich_help_panel=OUTPUT)
+        bool,
+        typer.Option(
+            "-v", "--verbose", help="All tables, reasons, logs, channels and settings.", rich_help_panel=OUTPUT
+        ),
     ] = False,
 ) -> None:
     """Identify an arm's constants k1 … k7 and, with loaded logs, its payload; write LOG.algid.
@@ -98,10 +101,17 @@ def identify(
     if verbose:
         _print_reading(result)
     if not quiet:
-        print_result(result, output)
-        for note in result.notes:
-            remark(f"note: {visible(note)}")
-        remark(f"wrote {result_folder(result.log.path, out, name)}")
+        folder = result_folder(result.log.path, out, name)
+        if output is ResultFormat.TABLE and not verbose:
+            from algid.report.brief import brief
+
+            for line in brief(result):
+                say(line)
+        else:
+            print_result(result, output)
+            for note in result.notes:
+                remark(f"note: {visible(note)}")
+        remark(f"wrote {folder}")
     ended = exit_of(failed=result.verdict.failed or not result.complete, lost=result.data_lost)
     if ended is not Exit.OK:
         raise typer.Exit(ended)

@@ -22,7 +22,8 @@ from algid.files import first_misfit, read_text, whole_file
 from algid.limits import LIMITS
 from algid.log import Reading
 from algid.notices import Notice, from_flags
-from algid.verdict import Verdict
+from algid.text import visible
+from algid.verdict import MOST_REASONS, Verdict
 from algid.words import counted
 
 SCHEMA_VERSION: Literal[3] = 3
@@ -293,10 +294,45 @@ class Result(_Model):
         """Whether every estimate can be used: see `Estimate.usable`."""
         return all(estimate.usable for estimate in self.estimates.values())
 
+    @property
+    def covariance(self) -> Any:
+        """Covariance of the parameters `fit.covariance_names` (Q, Q), numpy; None without error bars."""
+        if self.fit is None:
+            return None
+        import numpy as np
+
+        return np.array(self.fit.covariance, dtype=np.float64)
+
+    def to_frame(self) -> Any:
+        """The estimates as a polars frame: parameter, estimate, std, low, high, unit, status."""
+        import polars as pl
+
+        ends = [found.ci95 or (None, None) for found in self.estimates.values()]
+        columns = {
+            "parameter": list(self.estimates),
+            "estimate": [found.estimate for found in self.estimates.values()],
+            "std": [found.std for found in self.estimates.values()],
+            "low": [low for low, _ in ends],
+            "high": [high for _, high in ends],
+            "unit": [found.unit for found in self.estimates.values()],
+            "status": [found.status.value for found in self.estimates.values()],
+        }
+        numbers = dict.fromkeys(("estimate", "std", "low", "high"), pl.Float64)
+        return pl.DataFrame(columns, schema_overrides=numbers)
+
+    def __dir__(self) -> list[str]:
+        """What is algid's, and not what is pydantic's."""
+        own = {name for name in vars(type(self)) if not name.startswith(("_", "model_"))}
+        return sorted(own | set(type(self).model_fields))
+
     def __str__(self) -> str:
         rows = [("parameter", "estimate", "std", "unit", "status"), *self._rows()]
         widths = [max(len(row[column]) for row in rows) for column in range(5)]
-        lines = [f"{self.estimator} estimate from {ascii(self.log.path)[1:-1]}{self._others}"]
+        judged = self.verdict
+        lines = [
+            f"{self.estimator} estimate from {ascii(self.log.path)[1:-1]}{self._others}",
+            visible(judged.sentence, 1000),
+        ]
         for row in rows:
             name, value, std, unit, status = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
             numbers = (cell.strip().rjust(len(cell)) for cell in (value, std))
@@ -311,7 +347,12 @@ class Result(_Model):
         head = "".join(f"<th>{cell}</th>" for cell in heading)
         body = "".join(f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
         title = html.escape(f"{self.estimator} estimate from {ascii(self.log.path)[1:-1]}{self._others}")
-        return f"<table><caption>{title}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+        judged = self.verdict
+        reasons = "".join(f"<li>{html.escape(visible(one.text, 1000))}</li>" for one in judged.reasons[:MOST_REASONS])
+        said = (
+            f"<p><strong>{judged.word}</strong>: {html.escape(visible(judged.headline, 1000))}.</p><ul>{reasons}</ul>"
+        )
+        return f"{said}<table><caption>{title}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
     @property
     def _others(self) -> str:

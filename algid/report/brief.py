@@ -1,0 +1,115 @@
+"""A result in at most 25 lines of 80 columns: what a terminal shows unless more is asked for."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Iterator
+
+from algid.model import PARAMETERS
+from algid.notices import Notice
+from algid.results import Estimate, Result, Status
+from algid.results.verdict import share_text
+from algid.text import ABSENT, resolved, significant, unit_text, visible
+from algid.verdict import MOST_REASONS, Verdict
+from algid.words import counted
+
+WIDTH, HEIGHT = 80, 25
+ARM = ("k1", "k2", "k3", "k4", "k5", "k6", "k7")
+
+
+def brief(result: Result, place: str = "") -> list[str]:
+    """The lines.
+
+    Parameters
+    ----------
+    result : Result
+    place : str
+        Where its report is; nothing is said of it without one.
+    """
+    judged = result.verdict
+    head = _wrapped(f"{judged.word}: {visible(judged.headline)}.")
+    body = ["", *_estimates(result), *_terms(result), *_prediction(result)]
+    tail = [*_notes(judged.notes), *([f"Report: {place}"] if place else [])]
+    command = [f"Run first: {judged.command}"] if judged.command else []
+    room = HEIGHT - len(head) - len(body) - len(tail) - len(command)
+    return [*head, *_reasons(judged, room), *command, *body, *tail]
+
+
+def _wrapped(text: str, first: str = "", rest: str = "") -> list[str]:
+    return textwrap.wrap(text, WIDTH, initial_indent=first, subsequent_indent=rest, break_on_hyphens=False)
+
+
+def _reasons(judged: Verdict, room: int) -> Iterator[str]:
+    """As many of the first reasons as there is room for, each whole, and how many there are more."""
+    shown = 0
+    for reason in judged.reasons[:MOST_REASONS]:
+        lines = _wrapped(f"{visible(reason.text, 1000)} [{reason.code}]", " • ", "   ")
+        last = shown + 1 == len(judged.reasons)
+        if len(lines) > room - (0 if last else 1):
+            break
+        yield from lines
+        room -= len(lines)
+        shown += 1
+    left = judged.reasons[shown:]
+    if left:
+        codes = ", ".join(dict.fromkeys(one.code for one in left))
+        yield textwrap.shorten(f" • {counted(len(left), 'more reason')}, with -v: {codes}", WIDTH, placeholder=" …")
+
+
+def _estimates(result: Result) -> Iterator[str]:
+    """The arm's constants and the payload: estimate, half the 95 % interval, unit, error where it is known, meaning."""
+    errors = _errors(result)
+    for name, found in {**{k: v for k, v in result.parameters.items() if k in ARM}, **result.payload}.items():
+        number = f"{resolved(found.estimate, found.std)} ± {_half(found)}" if found.estimate is not None else ABSENT
+        error = f"{errors[name]:>8}" if errors else ""
+        words = PARAMETERS[name].meaning.partition(", ")[0] if name in PARAMETERS else ""
+        status = "" if found.status is Status.OK else found.status.value
+        line = f"{visible(name):<4}{number:>19} {unit_text(found.unit):<10}{error} "
+        fits = len(line) + len(words) <= WIDTH or not errors  # beside errors there is no room for a second line
+        yield from _wrapped(f"{line}{status or (words if fits else '')}", rest=" " * len(line))
+
+
+def _half(found: Estimate) -> str:
+    low, high = found.ci95 or (None, None)
+    return ABSENT if low is None or high is None else significant((high - low) / 2, 2)
+
+
+def _errors(result: Result) -> dict[str, str]:
+    """By parameter its error in percent of the truth; empty of a log that does not know it."""
+    if not result.truth:
+        return {}
+    errors = dict.fromkeys(result.estimates, "")
+    for name, true in result.truth.items():
+        estimate = result.estimates[name].estimate if name in errors else None
+        if estimate is not None and true:
+            errors[name] = f"{100 * (estimate - true) / abs(true):+.2g} %"
+    return errors
+
+
+def _terms(result: Result) -> list[str]:
+    """The terms of the torque beside eq. (1), and their coefficients."""
+    terms = [] if result.fit is None or result.fit.model is None else result.fit.model.terms
+    others = {name: found for name, found in result.parameters.items() if name not in ARM}
+    if not terms and not others:
+        return ["Terms kept: none"] if result.fit is not None else []
+    numbers = [f"{name} {resolved(found.estimate, found.std)} ± {_half(found)}" for name, found in others.items()]
+    return _at_most(2, f"Terms kept: {', '.join(terms) or 'delay'} ({', '.join(numbers)})")
+
+
+def _at_most(lines: int, text: str) -> list[str]:
+    """The text in so many lines; a longer one ends where a word does."""
+    return _wrapped(textwrap.shorten(text, lines * WIDTH - 12, placeholder=" …"))
+
+
+def _prediction(result: Result) -> list[str]:
+    fit = result.fit
+    found = None if fit is None else fit.cross_validation or fit.residual
+    if found is None:
+        return []
+    band = "" if found.bandwidth is None else f" below {found.bandwidth:g} Hz"
+    return [f"R² of the torque{band}: joint 1 {share_text(found.r2[0])}, joint 2 {share_text(found.r2[1])}"]
+
+
+def _notes(notes: Iterable[Notice]) -> list[str]:
+    codes = [one.code for one in notes]
+    return _at_most(1, f"Data notes ({len(codes)}): {', '.join(dict.fromkeys(codes))}") if codes else []

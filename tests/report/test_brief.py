@@ -1,0 +1,57 @@
+"""What a terminal shows of a result: 25 lines of 80 columns, whatever the log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import algid
+from algid.notices import Notice
+from algid.profile import Profile
+from algid.report.brief import HEIGHT, WIDTH, brief
+from algid.results import Result
+from algid.settings import Settings
+from algid.synth.sensors import Sensors
+
+
+def held(result: Result) -> str:
+    """The lines as one text, once they are within their bounds."""
+    lines = brief(result)
+    assert len(lines) <= HEIGHT, lines
+    commands = [line for line in lines if line.startswith("Run first: ")]  # there to be copied, whole
+    assert all(len(line) <= WIDTH for line in lines if line not in commands), lines
+    return "\n".join(lines)
+
+
+def test_verdict_reasons_estimates_terms_and_fit_stand_in_25_lines(result: Result) -> None:
+    text = held(result)
+    assert text.startswith("Good: ")
+    for words in ("gravity moment of link 2", "k7", "m_p", "R²", "Terms kept"):
+        assert words in text
+    noted = [Notice(code, "said " * 40, logs=(f"{code}.csv",)) for code in ("ONE", "TWO", "THREE", "FOUR")]
+    doubtful = held(result.model_copy(update={"notices": noted}))
+    assert "[ONE]" in doubtful
+    assert "with -v: " in doubtful
+
+
+@pytest.mark.parametrize("estimator", ["weak", "paper"])
+def test_a_simulated_log_shows_its_errors(estimator: str) -> None:
+    logs = algid.synthesise("case1", duration=3.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
+    text = held(algid.identify(*logs, settings=Settings(estimator=estimator)))  # type: ignore[arg-type]
+    assert " % " in text
+
+
+def test_a_failed_log_says_what_to_run_first() -> None:
+    log, _ = algid.synthesise("case1", duration=3.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
+    log.theta[1] *= -1
+    text = held(algid.identify(log, settings=Settings(estimator="weak")))
+    assert text.startswith("Failed: ")
+    assert "Run first: " in text
+
+
+@pytest.mark.slow
+def test_a_real_arm_fits_too(shared_data: Path) -> None:
+    logs = sorted((shared_data / "dfki" / "A0_sysid").glob("*.csv"))
+    found = algid.identify(logs[0], settings=Settings(estimator="weak"), profile=Profile(zero="hanging"))
+    assert "gravity moment of link 2" in held(found)
