@@ -27,7 +27,8 @@ from algid.errors import LogError
 from algid.log import Log
 from algid.readers import read_log
 from pipelines.hostile import corpus
-from pipelines.mutations import clean_files, damage
+from pipelines.hostile.others import other_files
+from pipelines.mutations import clean_files, clean_log, damage
 
 FILES = 20_000
 _BATCH = 500
@@ -121,11 +122,13 @@ def batch(source: str, seed: int, files: int) -> int:
 
 
 def _damaged(folder: Path, seed: int, files: int) -> Iterator[tuple[str, Path, Log | None]]:
-    clean = [(path, path.read_bytes(), read_log(path)) for path in clean_files(folder)]
+    clean: list[tuple[Path, bytes, Log | None]] = []
+    clean += [(path, path.read_bytes(), read_log(path)) for path in clean_files(folder)]
+    clean += [(path, path.read_bytes(), None) for path in other_files(folder, clean_log(150))]
     for number in range(files):
         path, content, log = clean[number % len(clean)]
         path.write_bytes(damage(content, random.Random(seed + number)))
-        yield f"{path.suffix} seed {seed + number} of batch {seed}", path, log
+        yield f"{path.name} seed {seed + number} of batch {seed}", path, log
 
 
 def _hostile(folder: Path, seed: int, files: int) -> Iterator[tuple[str, Path, Log | None]]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import zipfile
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,25 +41,49 @@ def open_arrays(path: Path, kind: str, profile: Profile) -> TableReader:
     """
     import polars as pl
 
-    frame, others = contents_of(path, kind)
+    content, others = contents_of(path, kind)
+    schema = content.schema
     try:
-        columns = assign(str(path), frame.columns, profile, {})
+        columns = assign(str(path), schema.names(), profile, {})
     except LogError as error:
         if not others:
             raise
         raise LogError(f"{error}; the file also holds, of another length: {', '.join(others[:_MOST_TOLD])}") from error
-    columns = of_numbers(str(path), columns, frame.schema)
+    columns = of_numbers(str(path), columns, schema)
 
     def frames(columns: Columns, rows: int, most: int | None) -> Iterator[pl.DataFrame]:
-        chosen = frame if most is None else frame.head(most)
-        numbers = [number(name, pl.col(source), frame.schema[source]) for name, source in columns.sources.items()]
-        yield from chosen.select(numbers).iter_slices(rows)
+        numbers = [number(name, pl.col(source), schema[source]) for name, source in columns.sources.items()]
+        end = content.rows if most is None else min(most, content.rows)
+        for first in range(0, end, rows):
+            yield content.part(first, min(first + rows, end), set(columns.sources.values())).select(numbers)
 
-    return flat_reader(str(path), kind, columns, frames, profile, frame.height)
+    return flat_reader(str(path), kind, columns, frames, profile, content.rows)
 
 
-def contents_of(path: Path, kind: str) -> tuple[pl.DataFrame, tuple[str, ...]]:
-    """The file as one frame of flat columns, and its arrays that fit in none, each with its shape.
+@dataclass(frozen=True, eq=False)
+class Content:
+    """The flat columns of a file, of so many rows: arrays or a frame."""
+
+    columns: Mapping[str, NDArray[Any]] | pl.DataFrame
+    rows: int
+
+    @property
+    def schema(self) -> pl.Schema:
+        """The types of the columns as frames have them."""
+        return self.part(0, 1).schema
+
+    def part(self, first: int, last: int, names: Collection[str] | None = None) -> pl.DataFrame:
+        """Some rows, of all columns or of those named: a frame of all would hold each array a second time."""
+        import polars as pl
+
+        if isinstance(self.columns, pl.DataFrame):
+            return self.columns[first:last]
+        wanted = [name for name in self.columns if names is None or name in names]
+        return pl.DataFrame({name: _native(self.columns[name][first:last]) for name in wanted})
+
+
+def contents_of(path: Path, kind: str) -> tuple[Content, tuple[str, ...]]:
+    """The file's flat columns, and its arrays that fit in none, each with its shape.
 
     A matrix or a list gives a column a joint, ``q[0]``, ``q[1]``.
 
@@ -67,20 +92,20 @@ def contents_of(path: Path, kind: str) -> tuple[pl.DataFrame, tuple[str, ...]]:
     LogError
         If the file is damaged, too large, or holds no arrays of one length.
     """
-    import polars as pl
-
     if path.stat().st_size > LIMITS.whole_bytes:
         raise LogError(f"{path}: a {kind} file of more than 1 GiB is not read as a whole; save it as Parquet")
     others: tuple[str, ...] = ()
     with natively(path, kind):
         if kind == "jsonl":
-            flat = frame_of_lines(path)
+            frame = frame_of_lines(path)
+            content = Content(frame, frame.height)
         else:
             columns, others = _columns(path, _LOADERS[kind](path))
-            flat = pl.DataFrame(columns)
-    if flat.width > LIMITS.columns:
-        raise LogError(f"{path}: {counted(flat.width, 'column')}; expected {LIMITS.columns} at most")
-    return flat, others
+            content = Content(columns, len(next(iter(columns.values()), ())))
+        width = len(content.schema)  # of types that polars does not take it tells here
+    if width > LIMITS.columns:
+        raise LogError(f"{path}: {counted(width, 'column')}; expected {LIMITS.columns} at most")
+    return content, others
 
 
 def _npy(path: Path) -> dict[str, NDArray[Any]]:
@@ -177,10 +202,10 @@ def _columns(path: Path, arrays: Mapping[str, NDArray[Any]]) -> tuple[dict[str, 
     others: list[str] = []
     for name, array in numbers.items():
         if array.shape == (rows,):
-            columns[name] = _native(array)
+            columns[name] = array
         elif array.ndim == 2 and rows in array.shape and min(array.shape) <= LIMITS.list_cells:
             upright = array if array.shape[0] == rows else array.T
-            columns |= {f"{name}[{place}]": _native(upright[:, place]) for place in range(upright.shape[1])}
+            columns |= {f"{name}[{place}]": upright[:, place] for place in range(upright.shape[1])}
         else:
             others.append(f"{name} ({' × '.join(map(str, array.shape)) or 'one number'})")
     return columns, tuple(others)

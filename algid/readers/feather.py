@@ -132,6 +132,8 @@ def opened(path: Path) -> Feather:
     rows = claims(path)
     with natively(path, "feather"), pa.memory_map(str(path)) as source:
         schema = pa.ipc.open_file(source).schema
+        for field in schema:
+            str(field.name), str(field.type)  # what is no UTF-8 tells here
     if len(schema) > LIMITS.columns:
         raise LogError(f"{path}: {counted(len(schema), 'column')}; expected {LIMITS.columns} at most")
     twice = [name for name, count in Counter(schema.names).items() if count > 1]

@@ -217,8 +217,8 @@ def _open_arrays(kind: str, path: Path, profile: Profile) -> TableReader:
 def _array_entries(kind: str, path: Path) -> Entries:
     from algid.readers.arrays import contents_of
 
-    frame, others = contents_of(path, kind)
-    columns = [Entry(name, str(dtype), frame.height) for name, dtype in frame.schema.items()]
+    content, others = contents_of(path, kind)
+    columns = [Entry(name, str(dtype), content.rows) for name, dtype in content.schema.items()]
     return (*columns, *(Entry(name, "of another length") for name in others))
 
 

@@ -8,8 +8,10 @@ import pytest
 
 from algid.log import Log, Origin
 from algid.notices import Notice
+from algid.readers import read_log
 from pipelines import fuzz
 from pipelines.hostile import corpus, hostile
+from pipelines.hostile.others import other_files
 from pipelines.mutations import clean_log
 
 SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (50, 100, 150))]
@@ -52,3 +54,17 @@ def test_the_judge_sees_what_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def _noting(log: Log, notice: Notice) -> Log:
     return Log(log.stamp_ns, log.theta, log.tau, log.origin, log.omega, (notice,))
+
+
+@pytest.mark.parametrize("seed", [1, pytest.param(1000, marks=pytest.mark.slow)])
+def test_damaged_bytes_of_every_format_are_read_told_or_refused(seed: int, capfd: pytest.CaptureFixture[str]) -> None:
+    assert fuzz.batch("damaged", seed, 120) == 0
+    counts = [line.split("\t")[0] for line in capfd.readouterr().out.splitlines()]
+    assert not set(counts) & set(fuzz.FAILURES)
+    assert {"count refused", "count read", "count same"} <= set(counts)
+
+
+def test_every_format_is_damaged(tmp_path: Path) -> None:
+    log = clean_log(60)
+    found = {read_log(path).origin.format for path in other_files(tmp_path, log)}
+    assert found >= {"feather", "npz", "npy", "mat", "bag"}

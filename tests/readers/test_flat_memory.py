@@ -1,0 +1,90 @@
+"""How much memory long tables take, read in blocks as identification reads them."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pyarrow as pa
+import pyarrow.feather as feather
+import pyarrow.parquet as pq
+import pytest
+from scipy.io import savemat
+
+from algid.arm import FloatArray
+from algid.readers import open_log
+
+_MOST = 600e6
+_PEAK = """
+import re, sys
+from pathlib import Path
+from algid.readers import open_log
+rows = sum(map(len, open_log(sys.argv[1]).blocks()))
+status = Path("/proc/self/status").read_text()  # of this program alone: ru_maxrss goes on from the one that starts it
+print(rows, 1024 * int(re.search(r"VmHWM:\\s*(\\d+)", status)[1]))
+"""
+Columns = dict[str, FloatArray]
+
+
+def _npy(path: Path, columns: Columns) -> None:
+    table = np.empty(columns["t"].size, [(name, float) for name in columns])
+    for name, values in columns.items():
+        table[name] = values
+    np.save(path, table)
+
+
+WRITERS: dict[str, Callable[[Path, Columns], object]] = {
+    "csv": lambda path, columns: pl.DataFrame(columns).write_csv(path, float_precision=6),
+    "csv.zst": lambda path, columns: path.write_bytes(_packed(columns)),
+    "parquet": lambda path, columns: pq.write_table(pa.table(columns), path),
+    "feather": lambda path, columns: feather.write_feather(pa.table(columns), str(path)),
+    "one.feather": lambda path, columns: pl.DataFrame(columns).write_ipc(path),
+    "npz": lambda path, columns: np.savez(path, **columns),  # type: ignore[arg-type]
+    "packed.npz": lambda path, columns: np.savez_compressed(path, **columns),  # type: ignore[arg-type]
+    "npy": _npy,
+    "mat": lambda path, columns: savemat(path, columns),
+    "packed.mat": lambda path, columns: savemat(path, columns, do_compression=True),
+}
+
+
+def _packed(columns: Columns) -> bytes:
+    import zstandard
+
+    return zstandard.compress(pl.DataFrame(columns).write_csv(float_precision=6).encode(), 1)
+
+
+def _write(path: Path, kind: str, rows: int) -> None:
+    t = np.arange(rows) / 1000
+    columns = {"t": t, "theta1": np.sin(2 * t), "theta2": np.cos(3 * t), "tau1": np.cos(t), "tau2": np.sin(t)}
+    WRITERS[kind](path, columns)
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_blocks_of_a_table_are_its_rows(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / f"log.{kind}"
+    _write(path, kind, 12_000)
+    blocks = list(open_log(path).blocks(5000))
+    assert [len(block) for block in blocks] == [5000, 5000, 2000]
+    stamps = np.concatenate([block.stamp_ns for block in blocks])
+    assert np.array_equal(stamps, np.arange(12_000) * 1_000_000)
+    assert np.allclose(np.concatenate([block.tau[1] for block in blocks]), np.sin(stamps * 1e-9), atol=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the system does not tell a program's peak")
+@pytest.mark.parametrize("kind", WRITERS)
+def test_ten_million_samples_are_read_in_bounded_memory(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / f"log.{kind}"
+    try:
+        _write(path, kind, 10_000_000)
+        done = subprocess.run([sys.executable, "-c", _PEAK, str(path)], capture_output=True, text=True, check=True)
+    finally:
+        path.unlink(missing_ok=True)
+    rows, peak = map(int, done.stdout.split())
+    assert rows == 10_000_000
+    print(f"{kind}: {peak / 1e6:.0f} MB")
+    assert peak < _MOST, f"{peak / 1e6:.0f} MB"
