@@ -267,9 +267,9 @@ class _Outline:
         found = self._found
         wrong, lost = self._wrong()
         if wrong and not found.notices:
-            code = "CUT_OFF" if lost else "DAMAGED_INDEX"
             text = f"the bag's index does not agree with what stands in it ({wrong}); every chunk was read"
-            found.notices.append(Notice(code, text, lossy=lost))
+            notice = Notice("CUT_OFF", text, lossy=True) if lost else Notice("DAMAGED_INDEX", text)
+            found.notices.append(notice)
         found.agreed = found.agreed and not wrong and not found.notices
         found.span_ns = (min(self._times), max(self._times)) if self._times else None
         return found
