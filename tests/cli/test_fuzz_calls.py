@@ -1,0 +1,56 @@
+"""The judge of `make fuzz` over calls, and what it draws."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from pipelines.fuzz_calls import FAILURES, judged
+from pipelines.hostile import places
+from pipelines.hostile.calls import Call, as_toml, flags
+from pipelines.hostile.values import anything, changed
+
+
+@pytest.mark.parametrize(
+    ("code", "out", "err", "kind"),
+    [
+        (0, "fine\n", "wrote x\n", "done"),
+        (2, "", "algid: x: no such file; check the name\n", "refused"),
+        (142, "", "", "hang"),
+        (70, "", "algid: internal error: KeyError: 'x'\n", "internal"),
+        (1, "", "Traceback (most recent call last):\nValueError: x\n", "traceback"),
+        (0, "", "x.py:3: RuntimeWarning: overflow\n", "warning"),
+        (5, "", "", "code"),
+        (0, "a\x1b[31m", "", "escape"),
+        (0, "", "\u202e", "escape"),
+        (2, "", "out of words\n", "lines"),
+        (2, "", "algid: while reading x: not enough memory (MemoryError: x)\n", "memory"),
+        (2, "", "algid: while reading x: a library cannot take it (PanicError: x); look at the file\n", "library"),
+    ],
+)
+def test_the_judge_sees_every_bad_end(code: int, out: str, err: str, kind: str) -> None:
+    assert judged(Call("flags", ("check", "x")), code, out, err)[0] == kind
+    assert (kind in FAILURES) == (kind not in ("done", "refused", "library"))
+
+
+@pytest.mark.parametrize("text", ["{", '{"a": NaN}'])
+def test_the_judge_reads_what_is_printed_as_json(text: str) -> None:
+    assert judged(Call("flags", ("compare", "--format", "json")), 0, text, "")[0] == "json"
+
+
+def test_calls_and_documents_are_the_same_for_the_same_seed() -> None:
+    import random
+
+    assert [flags(random.Random(seed), Path()) for seed in range(30)] == [
+        flags(random.Random(seed), Path()) for seed in range(30)
+    ]
+    assert len({flags(random.Random(seed), Path()).arguments[0] for seed in range(200)}) > 10
+    for content in (places.ARM, places.PROFILE, places.LIMITS, places.TOLERANCES, places.MANIFEST):
+        before = as_toml(content)
+        assert tomllib.loads(before)
+        others = {as_toml(changed(content, random.Random(seed))) for seed in range(20)}
+        assert len(others) > 10
+        assert as_toml(content) == before  # what is drawn leaves the sound one as it is
+    assert {type(anything(random.Random(seed))) for seed in range(200)} >= {dict, list, str, float, int, bool}
