@@ -1,0 +1,166 @@
+"""Give batches hostile records, manifests and folders; fail on a traceback, a hang, a lost job, or a touch elsewhere.
+
+Usage: python -m pipelines.fuzz_batches [CASES] [SEED]
+
+Jobs end at once here, as failed or with an empty result: it is what a batch makes of its folders that is tried. It ends
+with a row a job and a record a row, and the next run has nothing left to do; or it is refused in one line.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from dataclasses import replace
+from pathlib import Path
+from types import FrameType
+from typing import Any, NoReturn
+
+import polars as pl
+
+from algid.batch.discover import jobs_of
+from algid.batch.job import failed_record
+from algid.batch.records import End, stat_of
+from algid.batch.run import Batch, Recipe, sweep
+from algid.errors import AlgidError
+from algid.files import whole_folder
+from algid.settings import Settings
+from algid.stores import open_store
+from pipelines.hostile.batches import furnish_output, grow, manifest, record
+
+CASES = 5_000
+SECONDS = 20
+FAILURES = ("traceback", "hang", "lost", "elsewhere", "left", "again", "lines")
+
+
+class AtOnce(Executor):
+    """Ends every job at once: one of two with an empty result, the others as failed."""
+
+    def __init__(self) -> None:
+        self.ran = 0
+
+    def submit(self, _fn: Callable[..., Any], /, *args: Any, **_more: Any) -> Future[Any]:
+        """Run a task."""
+        self.ran += 1
+        (task,) = args
+        status = End.OK if len(task.job.name) % 2 else End.FAILED
+        future: Future[Any] = Future()
+        try:
+            if status is End.OK:
+                with whole_folder(Path(task.out, f"{task.job.name}.algid"), force=True) as folder:
+                    (folder / "result.json").touch()
+            inputs = tuple(replace(stat_of(path), sha256="c") for path in (*task.job.logs, *task.job.loaded))
+            future.set_result(failed_record(task, "as asked", status, inputs=inputs))
+        except AlgidError as error:
+            future.set_result(failed_record(task, str(error)))
+        return future
+
+
+def main() -> int:
+    """Run all cases."""
+    cases = int(sys.argv[1]) if len(sys.argv) > 1 else CASES
+    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 1
+    signal.signal(signal.SIGALRM, _hang)
+    total: Counter[str] = Counter()
+    start, slowest = time.monotonic(), 0.0
+    for number in range(seed, seed + cases):
+        began = time.monotonic()
+        place = Path(tempfile.mkdtemp(prefix="algid-fuzz-"))
+        signal.alarm(SECONDS)
+        try:
+            kind, text = outcome(place, random.Random(number))
+        except TimeoutError:
+            kind, text = "hang", ""
+        except BaseException:  # whatever a batch raises that is no message
+            kind, text = "traceback", traceback.format_exc()[-1500:]
+        finally:
+            signal.alarm(0)
+            shutil.rmtree(place)
+        slowest = max(slowest, time.monotonic() - began)
+        total[kind] += 1
+        if kind in FAILURES:
+            print(f"{kind}: seed {number}: {text}", flush=True)
+    print(f"{cases} batches: {dict(total)}; the slowest {slowest:.1f} s; {time.monotonic() - start:.0f} s in all")
+    return int(any(total[kind] for kind in FAILURES))
+
+
+def _hang(_number: int, _frame: FrameType | None) -> NoReturn:
+    raise TimeoutError
+
+
+def outcome(place: Path, draw: random.Random) -> tuple[str, str]:
+    """What came of a case, and more of it."""
+    logs, out, guarded = place / "logs", place / "out", place / "guarded"
+    guarded.mkdir()
+    (guarded / ".a.algid.algid-0123abcd").mkdir()
+    grow(draw, logs)
+    furnish_output(draw, out)
+    source = manifest(draw, logs) if draw.random() < 0.4 else logs
+    if draw.random() < 0.4:
+        (out / ".jobs/r1").mkdir(parents=True, exist_ok=True)
+        (out / ".jobs/r1/a.json").unlink(missing_ok=True)
+        (out / ".jobs/r1/a.json").write_bytes(record(draw))
+    if draw.random() < 0.1 and not (out / "r1").exists():
+        out.mkdir(exist_ok=True)
+        (out / "r1").symlink_to(guarded)
+    try:
+        jobs = jobs_of([str(source)], str(out))
+        first = _run(jobs, out, AtOnce())
+    except AlgidError as error:
+        return ("refused", "") if "\n" not in str(error) else ("lines", str(error))
+    if first[1] is not None:
+        return "stopped", first[1]
+    touched = [path.name for path in guarded.iterdir()]
+    if touched != [".a.algid.algid-0123abcd"]:
+        return "elsewhere", str(touched)
+    missing = {job.name for job in jobs} - first[0]
+    if missing or (
+        source is logs and not _logs_below(logs) <= {path for job in jobs for path in job.logs + job.loaded}
+    ):
+        return "lost", str(missing)
+    again = AtOnce()
+    if _run(jobs, out, again)[0] != first[0] or again.ran:
+        return "again", f"{again.ran} jobs"
+    left = [name for _, _, names in os.walk(out) for name in names if ".algid-" in name and name.startswith(".")]
+    return ("left", str(left)) if left else ("done", "")
+
+
+def _run(jobs: list[Any], out: Path, executor: AtOnce) -> tuple[set[str], str | None]:
+    """The jobs of the table that a batch leaves, and why it was stopped."""
+    store = open_store(str(out))
+    sweep(store)
+    recipe = Recipe(str(out), Settings(), lambda _file: None)
+    ended = Batch(store, recipe, executor, 1, lambda _progress: None).run(jobs)
+    if ended.stopped is not None:
+        return set(), ended.stopped
+    return set(pl.read_parquet(out / "jobs.parquet")["job"]), None
+
+
+def _logs_below(folder: Path) -> set[str]:
+    """Logs below a folder, as another program finds them."""
+    endings = ("*.csv", "*.mcap", "*.parquet", "*.csv.gz", "*.CSV")
+    tests = [word for name in endings for word in ("-o", "-name", name)][1:]
+    hidden = ["(", "-name", ".*", "-o", "-type", "d", "-name", "*.algid", ")", "-prune", "-o"]
+    command = ["find", f"{folder}/", "-mindepth", "1", *hidden, "-type", "f", "(", *tests, ")", "-print0"]
+    found = subprocess.run(command, capture_output=True, check=True).stdout.split(b"\0")
+    paths = (os.fsdecode(path).replace("//", "/", 1) for path in found if path)
+    return {path for path in paths if not _in_bag(Path(path), folder)}
+
+
+def _in_bag(path: Path, folder: Path) -> bool:
+    return any(
+        (one / "metadata.yaml").is_file() for one in path.parents if one != folder and one.is_relative_to(folder)
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())
