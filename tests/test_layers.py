@@ -61,7 +61,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "api": room("log synth"),
     "batch": room(
-        "construction errors files identification limits profile readers results runtime settings stores",
+        "construction errors files identification limits profile readers results runtime settings stores verdict",
         "distributed mcap polars pyarrow pydantic",
     ),
     "track": room(

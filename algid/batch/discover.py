@@ -110,7 +110,8 @@ def _below(folder: Path, one: _File) -> Found:
 def _walk(folder: Path, out: str) -> Iterator[_File]:
     """Files below a folder; hidden ones, results and what lies in `out` are passed over.
 
-    Each folder is looked through once, whatever links lead there; a name that goes through no link comes first.
+    Each folder is looked through once, whatever links lead there, and those above `folder` are not; a name that goes
+    through no link comes first.
 
     Raises
     ------
@@ -118,7 +119,8 @@ def _walk(folder: Path, out: str) -> Iterator[_File]:
         If nobody may look into `folder` itself.
     """
     results = _mark(out) if Path(out).is_dir() else None
-    seen = {results} if results != _mark(str(folder)) else set()
+    above = {_mark(str(one)) for one in folder.resolve().parents}  # a link there leads to all that there is
+    seen = above | ({results} if results != _mark(str(folder)) else set())
     pending, links = [str(folder)], deque[str]()
     while pending or links:
         place = pending.pop() if pending else links.popleft()

@@ -27,6 +27,7 @@ from algid.stores import is_url, open_store, put_folder
 
 if TYPE_CHECKING:
     from algid.profile import Profile
+    from algid.verdict import Verdict
 
 NO_SPACE = {errno.ENOSPC, errno.EDQUOT}
 NO_SPACE_LEFT = "No space left on device"  # what libraries say that raise exceptions of their own
@@ -73,13 +74,12 @@ def run_task(task: Task) -> JobRecord | DiskFull:
     judged = result.verdict
     lacking = ["samples were lost"] if result.data_lost else []
     lacking += [f"{name} {one.status.value}" for name, one in result.estimates.items() if not one.usable]
-    failed = judged.failed
     hashes = {log.path: log.sha256 for log in result.logs}
     return _record(
         task,
         inputs=tuple(replace(one, sha256=hashes.get(one.path)) for one in inputs),
-        status=End.INCOMPLETE if failed or lacking else End.OK,
-        reason=judged.sentence if failed else "; ".join(lacking),
+        status=End.FAILED if judged.failed else End.INCOMPLETE if lacking else End.OK,
+        reason=_first_reason(judged) if judged.failed else "; ".join(lacking),
         seconds=time.perf_counter() - start,
         start_ns=result.log.start_ns,
         log_seconds=sum(log.duration for log in result.logs),
@@ -90,6 +90,12 @@ def run_task(task: Task) -> JobRecord | DiskFull:
         command=judged.command,
         estimates=estimates_of(result),
     )
+
+
+def _first_reason(judged: Verdict) -> str:
+    """Why a result must not be used."""
+    first = judged.reasons[0].text if judged.reasons else ""
+    return judged.sentence if first in judged.sentence else f"{judged.sentence} {first}"
 
 
 def is_full(error: BaseException) -> bool:

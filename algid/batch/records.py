@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from algid.batch.jobs import COLUMNS, TABLE, Job, kept_path, name_fault, utc_of
 from algid.errors import LogError, OutputError
@@ -27,7 +27,7 @@ class End(StrEnum):
 
     OK = "ok"
     INCOMPLETE = "incomplete"  # a result is there, but data were lost or a parameter is not identifiable
-    FAILED = "failed"
+    FAILED = "failed"  # there is no result, or one that must not be used
     KILLED = "killed"  # it took its worker with it, three times
 
 
@@ -54,7 +54,8 @@ class Input:
 class JobRecord:
     """A job's end: `basis` stands for settings, profile, known parameters and version; `seconds` is its duration.
 
-    `verdict` is the grade of the result, `reasons` are codes and texts, `command` is what to run first.
+    `verdict` is the grade of the result, None where there is none; a job whose result must not be used failed.
+    `reasons` are codes and texts, `command` is what to run first.
     `estimates` holds estimate, standard deviation and status by name, `estimator` whose they are; `start_ns` and
     `log_seconds` are the first log's first stamp and the length of all logs.
     """
@@ -71,7 +72,7 @@ class JobRecord:
     log_seconds: float | None = None
     estimator: str | None = None
     estimates: Mapping[str, tuple[float | None, float | None, str]] = field(default_factory=dict)
-    verdict: str | None = None
+    verdict: Literal["good", "reservations", "failed"] | None = None
     headline: str | None = None
     reasons: tuple[str, ...] = ()
     command: str | None = None

@@ -123,13 +123,18 @@ def _standing(record: JobRecord | None, task: Task, store: Store) -> JobRecord |
         return None
     if (record.job.logs, record.job.loaded) != (job.logs, job.loaded):
         return None
-    if record.status not in FAILURES and not store.exists(f"{task.job.name}.algid/result.json"):
+    if _has_result(record) and not store.exists(f"{task.job.name}.algid/result.json"):
         return None
     paths = (*task.job.logs, *task.job.loaded)
     inputs = [unchanged(before, path) for before, path in zip(record.inputs, paths, strict=True)]
     if not inputs or None in inputs:
         return None
     return replace(record, job=job, inputs=tuple(one for one in inputs if one is not None))
+
+
+def _has_result(record: JobRecord) -> bool:
+    """Whether the job left a result, be it one that must not be used."""
+    return record.status not in FAILURES or record.verdict is not None
 
 
 @dataclass(frozen=True)
@@ -265,7 +270,7 @@ class Batch:
     def _without_old_result(self, record: JobRecord) -> JobRecord:
         """The record of a job; where it failed and its logs are others than before, their result is removed."""
         before = self.records.get(record.job.name)
-        if record.status not in FAILURES or before is None or same_logs(before.inputs, record.inputs):
+        if _has_result(record) or before is None or same_logs(before.inputs, record.inputs):
             return record
         try:
             self._store.remove(f"{record.job.name}.algid")

@@ -29,7 +29,8 @@ def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
     """A row a record.
 
     Columns: job, robot, time, status, reason, seconds, log_seconds, estimator (whose numbers these are; the one
-    asked for stands in the settings), version, settings (JSON); logs, sha256, size in bytes and time of change
+    asked for stands in the settings), verdict
+    (good, reservations or failed), version, settings (JSON); logs, sha256, size in bytes and time of change
     (lists; a log that was fetched in part has no sha256); ``label_X`` for each label, numbers where every one is,
     text otherwise; ``k``, ``k_std`` and
     ``k_status`` for each estimate, null where there is none.

@@ -132,7 +132,7 @@ def grow(draw: random.Random, folder: Path) -> None:
         makers: tuple[Callable[[Path], object], ...] = (
             *(Path.mkdir, Path.mkdir, os.mkfifo, lambda p: (p.mkdir(), (p / "metadata.yaml").touch())),
             lambda p: p.symlink_to(draw.choice(places)),
-            lambda p: p.symlink_to(draw.choice(("/dev/zero", "/proc/self", ".", "..", p.name, "absent"))),
+            lambda p: p.symlink_to(draw.choice(("/dev/zero", "/", "/etc", ".", "..", p.name, "absent"))),
             *([lambda p: p.write_text("t,theta1\n0,1\n")] * 6),
         )
         with suppress(OSError, ValueError):  # the system does not take every name

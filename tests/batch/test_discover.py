@@ -92,6 +92,7 @@ def test_each_folder_is_looked_through_once_whatever_links_lead_there(tmp_path: 
         (tmp_path / f"logs/z/{number}").symlink_to("..")
         (tmp_path / f"elsewhere/{number}").symlink_to(tmp_path)
         (tmp_path / f"logs/far{number}").symlink_to(tmp_path / "elsewhere")
+    (tmp_path / "logs/all").symlink_to("/")
     (tmp_path / "logs/itself.csv").symlink_to(tmp_path / "logs/itself.csv")
     names = ["a", "far0/c", "itself", "z/b"]
     assert [job.name for job in jobs_of([str(tmp_path / "logs")], "out")] == names

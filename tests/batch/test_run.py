@@ -23,9 +23,12 @@ from algid.batch.run import Batch, Ended, Recipe, Settling, sweep
 from algid.batch.workers import WorkerDiedError
 from algid.errors import OutputError
 from algid.identification.identify import identify
+from algid.notices import Notice
+from algid.results import Result
 from algid.settings import Settings
 from algid.stores import open_store
 from algid.synth.sensors import Sensors
+from algid.verdict import Verdict
 
 
 class Here(Executor):
@@ -221,3 +224,26 @@ def test_a_growing_log_is_left_alone(tmp_path: Path) -> None:
         log.write_text(text) if not log.exists() or log.read_text() != text else None
         found.append(len(settling.settled(jobs_of([str(tmp_path)], "out"))))
     assert found == [0, 0, 1]
+
+
+def test_a_result_that_must_not_be_used_is_a_failure_with_its_first_reason_and_stays_to_be_looked_at(
+    logs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    failed = Verdict("failed", "no sense; do not use these numbers", (Notice("X", "X: the torque is none"),))
+    with monkeypatch.context() as patch:
+        patch.setattr(Result, "verdict", property(lambda _result: failed))
+        ended = _run(logs)
+    good, bad = ended.records[1], ended.records[0]
+    assert (good.status, good.verdict) == (End.FAILED, "failed")
+    assert good.reason == "Failed: no sense; do not use these numbers. the torque is none"
+    assert bad.verdict is None
+    table = pl.read_parquet(logs.parent / "out/jobs.parquet")
+    assert table["status"].to_list() == ["failed"] * 3
+    assert table["verdict"].to_list() == [None, "failed", "failed"]
+    assert (logs.parent / "out/r1/a.algid/result.json").exists()
+    again = Here()
+    assert _run(logs, again).ran == 0
+    shutil.rmtree(logs.parent / "out/r1/a.algid")
+    _run(logs, again)
+    assert again.ran == ["r1/a"]
+    assert pl.read_parquet(logs.parent / "out/jobs.parquet")["verdict"].to_list()[1] in ("good", "reservations")
