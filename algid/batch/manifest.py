@@ -110,7 +110,7 @@ def _label(row: Mapping[str, object], name: str, place: str) -> Label:
     except ValueError as error:
         expected = "expected text, a date, true, false or a finite number, whole ones of 64 bits"
         kind = type(row[name]).__name__
-        raise SettingError(f"{place}: {name:.60}: {expected}, found another {kind}") from error
+        raise SettingError(f"{place}: {repr(name)[1:-1]:.60}: {expected}, found another {kind}") from error
 
 
 def label_of(value: object) -> Label:

@@ -235,7 +235,7 @@ def test_a_result_that_must_not_be_used_is_a_failure_with_its_first_reason_and_s
         ended = _run(logs)
     good, bad = ended.records[1], ended.records[0]
     assert (good.status, good.verdict) == (End.FAILED, "failed")
-    assert good.reason == "Failed: no sense; do not use these numbers. the torque is none"
+    assert good.reason == "Failed: no sense; do not use these numbers. X: the torque is none"
     assert bad.verdict is None
     table = pl.read_parquet(logs.parent / "out/jobs.parquet")
     assert table["status"].to_list() == ["failed"] * 3
