@@ -18,6 +18,7 @@ from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign
 from algid.readers.frames import flat_reader, number, of_numbers
 from algid.readers.jsonlines import frame_of_lines
+from algid.readers.matfile import check_elements
 from algid.readers.names import TIMES
 from algid.readers.natives import natively
 from algid.words import counted
@@ -127,6 +128,7 @@ def _npz(path: Path) -> dict[str, NDArray[Any]]:
 def _matlab(path: Path) -> dict[str, NDArray[Any]]:
     from scipy.io import loadmat
 
+    check_elements(path)
     try:
         content = loadmat(path, simplify_cells=True)
     except NotImplementedError:  # version 7.3 is HDF5

@@ -19,6 +19,7 @@ from algid.log import Log
 from algid.profile import Profile
 from algid.readers import read_log
 from tests.cli.commands import app
+from tests.conftest import Limited
 
 ROWS = 500
 T = np.arange(ROWS) * 1e-3
@@ -148,3 +149,31 @@ def test_a_frame_of_polars_is_read_too(tmp_path: Path) -> None:
         tmp_path / "log.ipc"
     )
     assert right(read_log(tmp_path / "log.ipc"))
+
+
+def test_an_element_of_no_type_is_refused_before_scipy_meets_it(tmp_path: Path) -> None:
+    savemat(tmp_path / "log.mat", {"t": T, "q": THETA.T, "tau": TAU.T})
+    content = (tmp_path / "log.mat").read_bytes()
+    place = content.index(b"tau") - 4  # the tag of a variable's name
+    (tmp_path / "log.mat").write_bytes(content[:place] + bytes(len(content) - place))
+    with pytest.raises(LogError, match="is no element"):
+        read_log(tmp_path / "log.mat")
+
+
+def test_elements_beyond_a_bound_are_refused(tmp_path: Path, limited: Limited) -> None:
+    path = mat_struct(tmp_path)
+    assert right(read_log(path))
+    for bounds, said in (
+        ({"whole_bytes": path.stat().st_size}, "unpack to more"),
+        ({"other_records": 5}, "more elements than any"),
+    ):
+        limited(**bounds)
+        with pytest.raises(LogError, match=said):
+            read_log(path)
+        limited(whole_bytes=1 << 30)
+
+
+def test_cells_texts_and_other_variables_are_passed_over(tmp_path: Path) -> None:
+    others = {"cells": np.array([1, "x", T], object), "text": "arm", "empty": np.empty(0), "flag": True, "z": 1j * T}
+    savemat(tmp_path / "log.mat", {"t": T, "q": THETA.T, "tau": TAU.T, **others})
+    assert right(read_log(tmp_path / "log.mat"))

@@ -1,0 +1,76 @@
+"""The structure of a MATLAB file of version 5 to 7, walked before SciPy reads it.
+
+SciPy takes an element's type for a place in a table without a look, and ends the process at one that is none.
+"""
+
+from __future__ import annotations
+
+import mmap
+import struct
+import zlib
+from pathlib import Path
+
+from algid.errors import LogError
+from algid.limits import LIMITS
+
+_HEAD = 128
+_MATRIX, _PACKED = 14, 15
+_TYPES = frozenset({1, 2, 3, 4, 5, 6, 7, 9, 12, 13, _MATRIX, _PACKED, 16, 17, 18})
+_HDF5 = 2
+"""The major version of 7.3."""
+
+
+def check_elements(path: Path) -> None:
+    """Refuse a file that holds an element of no type, one that reaches beyond what holds it, or more than any log.
+
+    Raises
+    ------
+    LogError
+        If it is so.
+    """
+    try:
+        with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as content:
+            order = "<" if content[126:128] == b"IM" else ">"
+            (version,) = struct.unpack_from(f"{order}H", content, 124)
+            if version >> 8 != _HDF5:
+                walk = _Walk(order)
+                walk.elements(content, _HEAD, len(content), 0)
+    except (struct.error, zlib.error, ValueError) as error:
+        raise LogError(f"{path}: the mat file is damaged ({error}); copy it again") from error
+
+
+class _Walk:
+    """Goes over elements and counts them."""
+
+    def __init__(self, order: str) -> None:
+        self._tag = struct.Struct(f"{order}II")
+        self._found = self._unpacked = 0
+
+    def elements(self, content: bytes | mmap.mmap, place: int, end: int, depth: int) -> None:
+        """The elements between two bytes, and those within them."""
+        while place + self._tag.size <= end:
+            self._found += 1
+            kind, size = self._tag.unpack_from(content, place)
+            start = place + self._tag.size
+            if kind >> 16:  # a small element: its size stands beside its type, and its four bytes in the tag
+                kind, size, start = kind & 0xFFFF, min(4, kind >> 16), place + 4
+            if kind not in _TYPES or start + size > end:
+                raise ValueError(f"what stands at byte {place} is no element")
+            if depth > LIMITS.definition_depth or self._found > LIMITS.other_records:
+                raise ValueError("more elements than any log's")
+            if kind == _MATRIX:
+                self.elements(content, start, start + size, depth + 1)
+            elif kind == _PACKED:
+                inside = self._inside(content[start : start + size])
+                self.elements(inside, 0, len(inside), depth + 1)
+            size += 0 if kind == _PACKED else -size % 8  # but for packed ones, elements are padded to 8 bytes
+            place = max(place + self._tag.size, start + size) if start > place + 4 else place + self._tag.size
+
+    def _inside(self, packed: bytes) -> bytes:
+        left = LIMITS.whole_bytes - self._unpacked
+        stream = zlib.decompressobj()
+        inside = stream.decompress(packed, left)
+        self._unpacked += len(inside)
+        if stream.unconsumed_tail:
+            raise ValueError("its elements unpack to more than 1 GiB")
+        return inside
