@@ -67,6 +67,8 @@ class Arm:
     I1, I2 : float, kg m^2, about each link's centre of gravity
     b1, b2 : float, N m s/rad
     g : float, m/s^2, 0 for an arm that moves in a horizontal plane
+    delta1, delta2 : float, rad
+        How far each link's centre of gravity is turned off the link's line, seen from its joint.
     """
 
     m1: float
@@ -80,20 +82,37 @@ class Arm:
     b1: float
     b2: float
     g: float = 9.81
+    delta1: float = 0.0
+    delta2: float = 0.0
 
     def constants(self) -> FloatArray:
-        """Constants k1 … k7 (Table 1): (7,), in `CONSTANT_UNITS`."""
+        """Constants k1 … k7 (Table 1): (7,), in `CONSTANT_UNITS`; of phasors the parts along the links."""
+        along1, along2 = self.lc1 * np.cos(self.delta1), self.lc2 * np.cos(self.delta2)
         return np.array(
             [
-                self.m2 * self.l1 * self.lc2,
-                self.m2 * self.g * self.lc2,
+                self.m2 * self.l1 * along2,
+                self.m2 * self.g * along2,
                 self.I2 + self.m2 * self.lc2**2,
-                self.m1 * self.g * self.lc1 + self.m2 * self.g * self.l1,
+                self.m1 * self.g * along1 + self.m2 * self.g * self.l1,
                 self.I1 + self.m1 * self.lc1**2 + self.m2 * self.l1**2,
                 self.b1,
                 self.b2,
             ]
         )
+
+    def sines(self) -> FloatArray:
+        """The sine parts of k1, k2 and k4: (3,), in their units; nothing where the links are straight."""
+        across1, across2 = self.lc1 * np.sin(self.delta1), self.lc2 * np.sin(self.delta2)
+        return np.array([self.m2 * self.l1 * across2, self.m2 * self.g * across2, self.m1 * self.g * across1])
+
+    def phasors(self, m_p: float = 0.0, x: float | None = None, y: float = 0.0, J: float = 0.0) -> FloatArray:
+        """Constants k1 … k7 and their sine parts (10,) of the arm with a payload of `m_p` kg.
+
+        Its centre of mass is at `x` (the tip by default), `y` m in the frame of link 2, its inertia about it is `J`.
+        """
+        z = payload_phasors(m_p, self.l1, complex(self.l2 if x is None else x, y), J, self.g)
+        k = with_payload(self.constants(), np.array([z[0], z[1], z[2].real, z[3].real, z[4].real]))
+        return np.concatenate([k, self.sines() + np.array([z[2].imag, z[4].imag, z[3].imag])])
 
     def payload_constants(self, m_p: float) -> FloatArray:
         """Constants z1 … z5 of a tip payload of `m_p` kg (Table 2): (5,), in `PAYLOAD_UNITS`."""
@@ -105,6 +124,30 @@ def payload_constants(m_p: float, l1: float, l2: float, g: float) -> FloatArray:
     return m_p * np.array([l1**2, l2**2, l1 * l2, g * l1, g * l2])
 
 
+def payload_phasors(
+    m_p: float, l1: float, r: complex, J: float, g: float, turn: float = 0.0
+) -> tuple[float, float, complex, complex, complex]:
+    """Constants z1, z2 and phasors z3, z4, z5 of a payload that is a body.
+
+    Parameters
+    ----------
+    m_p : float, kg
+    l1 : float, m, length of link 1
+    r : complex, m
+        Its centre of mass x + i y in the frame of link 2: x along the link from joint 2.
+    J : float, kg m^2, its inertia about its centre of mass
+    g : float, m/s^2
+    turn : float, rad
+        What has to be added to the logged θ1 to be the angle from the horizontal.
+
+    Notes
+    -----
+    Table 2 for y = J = 0.
+    """
+    upright = g * m_p * complex(np.cos(turn), np.sin(turn))
+    return m_p * l1**2, m_p * abs(r) ** 2 + J, m_p * l1 * r, upright * l1, upright * r
+
+
 def with_payload(k: FloatArray, z: FloatArray) -> FloatArray:
     """Constants (7,) of the arm `k` that carries the payload `z` (5,): eq. (5) against eq. (3)."""
     k1, k2, k3, k4, k5, k6, k7 = k
@@ -112,23 +155,40 @@ def with_payload(k: FloatArray, z: FloatArray) -> FloatArray:
     return np.array([k1 + z3, k2 + z5, k3 + z2, k4 + z4, k5 + z1, k6, k7])
 
 
+def _moments(k: FloatArray) -> tuple[complex, complex, complex]:
+    """The moments k1, k2 and k4 of constants (7,), or with their sine parts (10,), as phasors."""
+    sines = k[7:] if len(k) > 7 else np.zeros(3)
+    return k[0] + 1j * sines[0], k[1] + 1j * sines[1], k[3] + 1j * sines[2]
+
+
+def _turned(K: complex, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Real and imaginary part of K exp(i angle)."""
+    c, s = np.cos(angle), np.sin(angle)
+    if not np.any(K.imag):
+        return K.real * c, K.real * s
+    return K.real * c - K.imag * s, K.real * s + K.imag * c
+
+
 def mass_matrix(k: FloatArray, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """M11, M12 = M21 and M22 of eq. (2) at `theta` (2, ...), each (...) in kg m^2."""
-    k1, _, k3, _, k5, _, _ = k
-    coupling = k1 * np.cos(theta[1])
+    """M11, M12 = M21 and M22 of eq. (2) at `theta` (2, ...), each (...) in kg m^2; `k` is (7,), or (10,) of phasors."""
+    first, _, _ = _moments(k)
+    k3, k5 = k[2], k[4]
+    coupling, _ = _turned(first, theta[1])
     return k5 + k3 + 2 * coupling, k3 + coupling, np.full_like(coupling, k3)
 
 
 def passive_torque(k: FloatArray, theta: FloatArray, omega: FloatArray) -> FloatArray:
-    """V + U + W of eq. (1): the torque (2, ...) in N m that the arm needs at zero acceleration."""
-    k1, k2, _, k4, _, k6, k7 = k
+    """V + U + W of eq. (1): the torque (2, ...) in N m that the arm needs at zero acceleration; `k` as for M."""
+    first, second, fourth = _moments(k)
+    k6, k7 = k[5], k[6]
     theta1, theta2 = theta
     omega1, omega2 = omega
-    k1_s2 = k1 * np.sin(theta2)
-    k2_c12 = k2 * np.cos(theta1 + theta2)
+    _, k1_s2 = _turned(first, theta2)
+    k2_c12, _ = _turned(second, theta1 + theta2)
+    k4_c1, _ = _turned(fourth, theta1)
     return np.stack(
         [
-            -k1_s2 * (2 * omega1 + omega2) * omega2 + k6 * omega1 + k4 * np.cos(theta1) + k2_c12,
+            -k1_s2 * (2 * omega1 + omega2) * omega2 + k6 * omega1 + k4_c1 + k2_c12,
             k1_s2 * omega1**2 + k7 * omega2 + k2_c12,
         ]
     )

@@ -25,7 +25,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.physics.expressions import Expression, Product, Values
 from algid.physics.motion import Motion, Widths, sine_cosine
-from algid.physics.parameters import PAYLOAD, Parameter
+from algid.physics.parameters import BODY, PAYLOAD, Parameter
 from algid.physics.signals import ACCELERATIONS, rate
 from algid.physics.terms import ALWAYS, OPTIONAL, Term
 
@@ -38,11 +38,15 @@ DELAYS = tuple(name for term in OPTIONAL if term.timing == "delay" for name in t
 CHOICES = tuple(term.name for term in OPTIONAL)
 """Names that ``--model`` takes."""
 PARAMETERS: dict[str, Parameter] = {
-    one.name: one for one in (*(one for term in EVERY_TERM.values() for one in term.parameters), *PAYLOAD)
+    one.name: one for one in (*(one for term in EVERY_TERM.values() for one in term.parameters), *PAYLOAD, *BODY)
 }
 COLUMN_NAMES = tuple(name for term in (*ALWAYS, *TERMS.values()) for name in term.names)
 UNITS = {name: parameter.unit for name, parameter in PARAMETERS.items()}
 RIGID = tuple(name for term in ALWAYS if term.inertial for name in term.names)
+SINES = {own: of for term in TERMS.values() for own, of in term.sines}
+"""Parameters that are the sine part of another."""
+LARGEST_PHASE = np.pi / 4
+"""rad: beyond, a phase is another convention."""
 _SIGN_TRIALS = 4  # as many patterns as the signs of two loads have
 
 
@@ -250,9 +254,9 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
 
     Notes
     -----
-    Friction by load, gains and turned angles make the torque bilinear in c: Y is taken at `c` then, with the load and
-    the angles that c gives, a joint's rows times its gain, and nothing in the columns of gains and angles. The column
-    of a low-pass, which is no function of the motion at one instant, is nothing too.
+    Friction by load and gains make the torque bilinear in c: Y is taken at `c` then, with the load that c gives, a
+    joint's rows times its gain, and nothing in the columns of gains. The column of a low-pass, which is no function of
+    the motion at one instant, is nothing too.
 
     Raises
     ------
@@ -263,7 +267,6 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
         raise ValueError(f"the regressor of {', '.join(model.terms)} depends on the coefficients, got none")
     c = np.zeros(len(model.names)) if c is None else c
     compiled = model.compiled
-    motion = motion.turned(turns(model, c))
     values = Values(motion, model.shape)
     Y = np.zeros((2, len(compiled.names), motion.theta.shape[1]))
     for joint, place, entry in compiled.regressor:
@@ -272,6 +275,20 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
         load = Y[joint, list(compiled.loads)].T @ c[list(compiled.loads)]
         Y[joint, compiled.place[name]] = np.abs(load) * _sign(model, motion.omega[joint])
     return _amplified(model, c, Y)
+
+
+def loads_of(model: Model) -> tuple[str, ...]:
+    """Names of the columns that are the joints' load, which a payload changes."""
+    return tuple(model.names[place] for place in model.compiled.loads)
+
+
+def phasor(model: Model, c: FloatArray, name: str) -> complex:
+    """The moment `name` of the coefficients `c` (q,) as a phasor, its sine part imaginary; 0 without a column."""
+    place = model.compiled.place
+    if name not in place:
+        return 0j
+    sine = next((own for own, of in SINES.items() if of == name and own in place), None)
+    return complex(c[place[name]], 0.0 if sine is None else c[place[sine]])
 
 
 def attributes(model: Model, kind: str) -> list[tuple[str, int]]:
@@ -285,14 +302,6 @@ def gains(model: Model, c: FloatArray) -> FloatArray:
     for name, joint in attributes(model, "gains"):
         factor[joint] *= 1 + c[model.compiled.place[name]]
     return factor
-
-
-def turns(model: Model, c: FloatArray) -> FloatArray:
-    """What (2,) in rad is added to each joint's angle at the coefficients `c` (q,)."""
-    turned = np.zeros(2)
-    for name, joint in attributes(model, "turns"):
-        turned[joint] += c[model.compiled.place[name]]
-    return turned
 
 
 def _amplified(model: Model, c: FloatArray, rows: FloatArray) -> FloatArray:
@@ -323,12 +332,10 @@ def sensitivity(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
 
     Notes
     -----
-    The regressor where the torque is linear in c. Else, with sgn L, t = tanh(ω / ω_s), load shares e, gains g and
-    turned angles z,
+    The regressor where the torque is linear in c. Else, with sgn L, t = tanh(ω / ω_s), load shares e and gains g,
 
         ∂τ_i/∂k_j = Y_ij (1 + e_i t_i sgn L_i)        for the columns j of the load
         ∂τ_i/∂g_i = τ_i / (1 + g_i)
-        ∂τ_i/∂z_j = ∂τ_i/∂θ_j
     """
     J = regressor(model, motion, c)
     if model.linear:
@@ -337,14 +344,9 @@ def sensitivity(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
     factor = gains(model, c)
     for name, joint in attributes(model, "gains"):
         J[joint, place[name]] = J[joint].T @ c / factor[joint]
-    if turning := attributes(model, "turns"):
-        slope = partials(model, c, motion)[0]
-        for name, joint in turning:
-            J[:, place[name]] = slope[:, joint]
-    turned = motion.turned(turns(model, c))
     for name, joint in attributes(model, "by_load"):
         load = J[joint, loads].T @ c[loads]  # a gain scales it, which leaves its sign
-        J[joint, loads] *= 1 + c[place[name]] * _sign(model, turned.omega[joint]) * np.sign(load)
+        J[joint, loads] *= 1 + c[place[name]] * _sign(model, motion.omega[joint]) * np.sign(load)
     return J
 
 
@@ -362,7 +364,7 @@ def partials(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
     (3, 2, 2, N), N m/rad, N m s/rad and N m s²/rad
         By order of θ's derivative, torque's joint and angle's joint. Where a load is nothing its sign is too.
     """
-    compiled, motion = model.compiled, motion.turned(turns(model, c))
+    compiled = model.compiled
     values = Values(motion, model.shape)
     P = np.empty((3, 2, 2, motion.theta.shape[1]))
     for where, weighted in compiled.partials.items():
@@ -403,15 +405,11 @@ def inertia(model: Model, c: FloatArray, theta: FloatArray) -> FloatArray:
 
     `c` is (q,), or (q, ...) for arms of their own at each sample.
     """
-    values = Values(Motion(_turned(theta, turns(model, c)), theta, theta), model.shape)
+    values = Values(Motion(theta, theta, theta), model.shape)
     M = np.empty((2, 2, *theta.shape[1:]))
     for entry, weighted in model.compiled.inertia.items():
         M[entry] = summed(weighted, c, values)
     return M
-
-
-def _turned(theta: FloatArray, by: FloatArray) -> FloatArray:
-    return theta + by.reshape(2, *[1] * (theta.ndim - 1)) if np.any(by) else theta
 
 
 def acceleration(model: Model, c: FloatArray, theta: FloatArray, omega: FloatArray, tau: FloatArray) -> FloatArray:
@@ -438,8 +436,7 @@ def acceleration(model: Model, c: FloatArray, theta: FloatArray, omega: FloatArr
     """
     compiled = model.compiled
     by_load = attributes(model, "by_load")
-    motion = Motion(_turned(theta, turns(model, c)), omega, omega)
-    values = Values(motion, model.shape)
+    values = Values(Motion(theta, omega, omega), model.shape)
     left = np.array(tau, dtype=np.float64)
     for joint, factor in enumerate(gains(model, c)):
         if factor != 1:

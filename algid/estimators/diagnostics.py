@@ -24,7 +24,7 @@ from algid.estimators.fit import Fit, Status
 from algid.estimators.identifiability import sizes
 from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Normal
-from algid.model import CHOICES, EVERY_TERM, PARAMETERS, Model
+from algid.model import CHOICES, EVERY_TERM, PARAMETERS, Model, inertia, phasor
 from algid.notices import Notice
 
 _NOT_NEGATIVE = tuple(name for name, parameter in PARAMETERS.items() if parameter.sign == "+")
@@ -57,9 +57,10 @@ def bounds(shared: Shared) -> dict[str, Callable[[FloatArray], float]]:
         "det M > 0 at theta2 = pi": lambda beta: _mass(shared, beta)[2],
     }
     if shared.model.gravity > 0:
-        first, second = (shared.names.index(name) for name in ("k1", "k2"))
-        # Table 1: k1 k2 = m2² g l1 lc2²
-        found["k1 k2 >= 0"] = lambda beta: float(beta[first] * beta[second])
+        # Table 1: k1 k2 = m2² g l1 lc2²; as phasors, θ1's zero lies between them
+        found["k1 k2 >= 0"] = lambda beta: (
+            (phasor(shared.model, beta, "k1") * phasor(shared.model, beta, "k2").conjugate()).real
+        )
     for place, name in enumerate(shared.names):
         if name in _NOT_NEGATIVE:
             found[f"{name} >= 0"] = lambda beta, place=place: float(beta[place])  # type: ignore[misc]
@@ -68,10 +69,13 @@ def bounds(shared: Shared) -> dict[str, Callable[[FloatArray], float]]:
 
 def _mass(shared: Shared, beta: FloatArray) -> tuple[float, float, float]:
     """M22 and the determinant of M at θ2 = 0 and π."""
-    value = shared.model.values(beta[: len(shared.model.names)])
-    k1, k3, k5, j2 = (value[name] for name in ("k1", "k3", "k5", "j2"))
-    det = [(k5 + k3 + 2 * k1 * c) * (k3 + j2) - (k3 + k1 * c) ** 2 for c in (1.0, -1.0)]
-    return float(k3 + j2), float(det[0]), float(det[1])
+    c = beta[: len(shared.model.names)]
+    bent = -np.angle(phasor(shared.model, c, "k1")) if "k1" in shared.model.names else 0.0
+    bent = bent if abs(bent) <= np.pi / 2 else bent + np.pi  # k1 itself may be negative: a convention of θ2
+    poses = np.array([[0.0, 0.0], [bent, bent + np.pi]])
+    (m11, m12), (m21, m22) = inertia(shared.model, c, poses)
+    det = m11 * m22 - m12 * m21
+    return float(m22[0]), float(det[0]), float(det[1])
 
 
 def broken_bounds(fit: Fit) -> list[BrokenBound]:
@@ -98,12 +102,16 @@ def length_by_constants(fit: Fit) -> tuple[float, float] | None:
     if fit.shared.model.gravity == 0:
         return None
     places = [fit.names.index(name) for name in ("k1", "k2")]
-    k1, k2 = fit.values[places]
-    if np.any(np.isinf(fit.std[places])) or k2 == 0:
+    if np.any(np.isinf(fit.std[places])) or not fit.values[places[1]]:
         return None
-    slope = fit.shared.model.gravity * np.array([1 / k2, -k1 / k2**2])
-    variance = float(slope @ fit.covariance[np.ix_(places, places)] @ slope)
-    return float(fit.shared.model.gravity * k1 / k2), float(np.sqrt(max(variance, 0.0)))
+
+    def length(beta: FloatArray) -> float:
+        k1, k2 = (phasor(fit.shared.model, beta, name) for name in ("k1", "k2"))
+        sign = 1.0 if (k1 * k2.conjugate()).real >= 0 else -1.0
+        return sign * fit.shared.model.gravity * abs(k1) / abs(k2)
+
+    slope = _slope(length, fit.values, sizes(fit.names, fit.values))
+    return length(fit.values), float(np.sqrt(max(float(slope @ fit.covariance @ slope), 0.0)))
 
 
 def _slope(bound: Callable[[FloatArray], float], beta: FloatArray, size: FloatArray) -> FloatArray:

@@ -21,14 +21,14 @@ window's moment is the sum over its blocks. The cost is O(N), whatever the lengt
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from algid.arm import FloatArray
-from algid.model import Model, Motion, attributes, gains, sine_cosine, torque, turns
+from algid.model import TERMS, Model, Motion, attributes, gains, loads_of, torque
 from algid.physics.expressions import Values
 from algid.signals.filters import correlate, differentiator, half_length
 from algid.signals.segments import Segment
@@ -143,7 +143,7 @@ class Windows:
         Notes
         -----
         Where the torque is bilinear in the coefficients, X is linearised at the coefficients `at` (q,) so that
-        least squares on it gives better ones; without `at` the columns of gain2, zero1, zero2, e1, e2 are nothing.
+        least squares on it gives better ones; without `at` the columns of gains and of friction by load are nothing.
         The load is that of `at` (a fixed point, not a derivative): least squares settles in a few rounds.
         """
         size = len(model.names) + delay + 1
@@ -152,18 +152,13 @@ class Windows:
             return np.zeros((2, size, 0))
         here = np.zeros(len(model.names)) if at is None else at
         tau = piece.tau[:, margin - self.whole : len(piece) - margin - self.whole]
-        turned = turns(model, here)[:, None]
-        theta, omega = piece.theta[:, margin : len(piece) - margin] + turned, self._velocity(piece)
+        theta, omega = piece.theta[:, margin : len(piece) - margin], self._velocity(piece)
         X = np.zeros((2, size, (len(piece) - 2 * margin) // self.step - OVERLAP + 1))
         self._fill(X, model, theta, omega)
         if at is not None:
             place = model.compiled.place
             for name, joint, dissipated in self._dissipated(model, at, theta, omega):
                 X[joint, place[name]] = self.moments(dissipated[None], self._plain[0])[0]
-            if "zero" in model.terms:
-                for name, both in self._turned(model.values(at), theta, omega).items():
-                    if name in place:
-                        X[0, place[name]], X[1, place[name]] = both
         X *= gains(model, here)[:, None, None]
         X[:, -1] = self.moments(tau, self._shifted[0])
         if at is not None:
@@ -197,30 +192,12 @@ class Windows:
         shared = attributes(model, "by_load")
         if not shared:
             return
-        rigid = Model(gravity=model.gravity)
-        value = model.values(c)
-        loads = set(rigid.compiled.loads)
-        k = np.array([value[name] if place in loads else 0.0 for place, name in enumerate(rigid.names)])
+        rigid = replace(model, terms=tuple(term for term in model.terms if TERMS[term].inertial))
+        value, loads = model.values(c), loads_of(rigid)
+        k = np.array([value[name] if name in loads else 0.0 for name in rigid.names])
         load = torque(rigid, k, Motion(theta, omega, np.gradient(omega, self.dt, axis=1)))
         for name, joint in shared:
             yield name, joint, np.abs(load[joint]) * np.tanh(omega[joint] / model.coulomb_speed)
-
-    def _turned(
-        self, value: dict[str, float], theta: FloatArray, omega: FloatArray
-    ) -> dict[str, tuple[FloatArray, FloatArray]]:
-        """Derivatives of both joints' moments by zero1 and zero2."""
-        weight, slope, bend = self._plain
-        k1, k2, k4 = value["k1"], value["k2"], value["k4"]
-        (s1, s2), (c1, c2) = sine_cosine(theta)
-        s1_, s12_, turned_ = self.moments(
-            np.stack([s1, s1 * c2 + c1 * s2, omega[0] * (omega[0] + omega[1]) * c2]), weight
-        )
-        (momentum_slope,) = self.moments((s2 * omega[0])[None], slope)
-        (c2_bend,) = self.moments(c2[None], bend)
-        return {
-            "zero1": (-k4 * s1_ - k2 * s12_, -k2 * s12_),
-            "zero2": (k1 * (c2_bend + 2 * momentum_slope) - k2 * s12_, k1 * (momentum_slope + turned_) - k2 * s12_),
-        }
 
     def _velocity(self, piece: Segment) -> FloatArray:
         inner = slice(self.margin, len(piece) - self.margin)
@@ -257,14 +234,11 @@ def _linearise_bilinear(X: FloatArray, model: Model, at: FloatArray) -> None:
     """Complete X, made at `at`, by the columns of the gains, and the torque by what the linearisation at `at` adds.
 
     With Y the regressor at c0 and J the derivative there, τ = Y c0 + J (c - c0) is J c = τ + (J - Y) c0; J and Y
-    differ in the columns of gains and turned angles alone.
+    differ in the columns of gains alone.
     """
-    place = model.compiled.place
-    moved = [place[name] for name, _ in attributes(model, "turns")]
-    linear = at.copy()
-    linear[moved] = 0.0
-    factor = gains(model, at)
+    place, factor = model.compiled.place, gains(model, at)
+    moved = []
     for name, joint in attributes(model, "gains"):
-        X[joint, place[name]] = X[joint, : len(at)].T @ linear / factor[joint]
+        X[joint, place[name]] = X[joint, : len(at)].T @ at / factor[joint]
         moved.append(place[name])
     X[:, -1] += np.einsum("j,ajr->ar", at[moved], X[:, moved])

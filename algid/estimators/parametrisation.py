@@ -3,7 +3,7 @@
 ======  ==============================================================  ========
 symbol  name                                                            shape
 ======  ==============================================================  ========
-beta    shared parameters: columns, delay, then m_p, l1, l2             (Q,)
+beta    shared parameters: columns, delay, then m_p, l1, l2, y_p, J_p   (Q,)
 c       coefficients of one log: columns, delay                         (q,)
 T       dc/dβ                                                           (q, Q)
 ======  ==============================================================  ========
@@ -19,12 +19,15 @@ from functools import cached_property
 
 import numpy as np
 
-from algid.arm import FloatArray, payload_constants
-from algid.model import DELAYS, Model
-from algid.physics.parameters import PAYLOAD
+from algid.arm import FloatArray, payload_phasors
+from algid.model import DELAYS, SINES, Model
+from algid.physics.parameters import BODY, PAYLOAD
 
-PAYLOAD_PARAMETERS = tuple(one.name for one in PAYLOAD)
-_LOADED = {"k1": 2, "k2": 4, "k3": 1, "k4": 3, "k5": 0}  # which z adds to which k: eq. (5) against eq. (3)
+PAYLOAD_PARAMETERS = tuple(one.name for one in (*PAYLOAD, *BODY))
+# which z adds to which k, and its part: eq. (5) against eq. (3), the moments as phasors
+_LOADED = {"k5": (0, "real"), "k3": (1, "real"), "k1": (2, "real"), "k4": (3, "real"), "k2": (4, "real")} | {
+    sine: ({"k1": 2, "k4": 3, "k2": 4}[name], "imag") for sine, name in SINES.items()
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +43,15 @@ class Shared:
         Whether there are loaded logs.
     lengths : dict
         Known link lengths "l1", "l2" in m, which are not estimated.
+    body : names among `algid.physics.parameters.BODY`
+        What the payload has that is no point at the tip.
     """
 
     model: Model
     delay: bool = False
     payload: bool = False
     lengths: dict[str, float] = field(default_factory=dict)
+    body: tuple[str, ...] = ()
 
     @cached_property
     def log_names(self) -> tuple[str, ...]:
@@ -57,37 +63,61 @@ class Shared:
         """Names of the shared parameters."""
         if not self.payload:
             return self.log_names
-        return self.log_names + tuple(name for name in PAYLOAD_PARAMETERS if name not in self.lengths)
+        own = (*(one.name for one in PAYLOAD if one.name not in self.lengths), *self.body)
+        return self.log_names + own
 
-    def physical(self, beta: FloatArray) -> tuple[float, float, float]:
-        """m_p, l1, l2."""
+    def physical(self, beta: FloatArray) -> tuple[float, float, complex, float]:
+        """m_p, l1, the payload's place x + i y, and its inertia."""
         value = dict(zip(self.names, map(float, beta), strict=True)) | self.lengths
-        return value["m_p"], value["l1"], value["l2"]
+        return value["m_p"], value["l1"], complex(value["l2"], value.get("y_p", 0.0)), value.get("J_p", 0.0)
+
+    def turn(self, beta: FloatArray) -> tuple[float, FloatArray]:
+        """What has to be added to θ1, arg K2 - arg K1 in rad, and its derivative (q,) by the log's coefficients."""
+        slope = np.zeros(len(self.log_names))
+        turn = 0.0
+        place = self.model.compiled.place
+        for name, sign in (("k2", 1.0), ("k1", -1.0)):
+            sine = next((own for own, of in SINES.items() if of == name and own in place), None)
+            if sine is None or name not in place:
+                return 0.0, np.zeros(len(self.log_names))
+            K = complex(beta[place[name]], beta[place[sine]])
+            turn += sign * float(np.angle(K))
+            size = max(abs(K) ** 2, 1e-300)
+            slope[place[name]] -= sign * K.imag / size
+            slope[place[sine]] += sign * K.real / size
+        return turn, slope
 
     def coefficients(self, beta: FloatArray, loaded: bool) -> FloatArray:
         """Coefficients c (q,) of a log."""
         c = beta[: len(self.log_names)].copy()
         if loaded:
-            z = payload_constants(*self.physical(beta), self.model.gravity)
-            for row, part in self._rows():
-                c[row] += z[part]
+            turn, _ = self.turn(beta)
+            z = payload_phasors(*self.physical(beta), self.model.gravity, turn)
+            for row, (part, side) in self._rows():
+                c[row] += getattr(z[part], side)
         return c
 
     def jacobian(self, beta: FloatArray, loaded: bool) -> FloatArray:
         """T (q, Q)."""
         T = np.eye(len(self.log_names), len(self.names))
         if loaded:
-            m_p, l1, l2 = self.physical(beta)
+            m_p, l1, r, _ = self.physical(beta)
             g = self.model.gravity
-            slope = {
-                "m_p": (l1**2, l2**2, l1 * l2, g * l1, g * l2),
-                "l1": (2 * m_p * l1, 0.0, m_p * l2, m_p * g, 0.0),
-                "l2": (0.0, 2 * m_p * l2, m_p * l1, 0.0, m_p * g),
+            turn, slope = self.turn(beta)
+            up = g * complex(np.cos(turn), np.sin(turn))
+            by: dict[str, tuple[complex, ...]] = {
+                "m_p": (l1**2, abs(r) ** 2, l1 * r, up * l1, up * r),
+                "l1": (2 * m_p * l1, 0.0, m_p * r, m_p * up, 0.0),
+                "l2": (0.0, 2 * m_p * r.real, m_p * l1, 0.0, m_p * up),
+                "y_p": (0.0, 2 * m_p * r.imag, 1j * m_p * l1, 0.0, 1j * m_p * up),
+                "J_p": (0.0, 1.0, 0.0, 0.0, 0.0),
             }
-            for column in range(len(self.log_names), len(self.names)):
-                for row, part in self._rows():
-                    T[row, column] = slope[self.names[column]][part]
+            turned = (0.0, 0.0, 0.0, 1j * m_p * up * l1, 1j * m_p * up * r)
+            for row, (part, side) in self._rows():
+                T[row, : len(slope)] += getattr(complex(turned[part]), side) * slope
+                for column in range(len(self.log_names), len(self.names)):
+                    T[row, column] = getattr(complex(by[self.names[column]][part]), side)
         return T
 
-    def _rows(self) -> list[tuple[int, int]]:
+    def _rows(self) -> list[tuple[int, tuple[int, str]]]:
         return [(row, _LOADED[name]) for row, name in enumerate(self.log_names) if name in _LOADED]

@@ -17,6 +17,7 @@ from typing import Literal
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.estimators.body import with_body
 from algid.estimators.combine import Prior, combine
 from algid.estimators.fit import Fit, conclude
 from algid.estimators.identifiability import judge, open_directions
@@ -141,14 +142,16 @@ def fit(
     fitted = conclude("refined", shared, informations, beta, start.moved, prior, coloured=coloured, samples=samples)
     # No surer than the weak estimate: a joint at rest trembles in noise, which is no motion.
     pairs = zip(fitted.status, start.status, strict=True)
-    return replace(
-        fitted,
-        status=tuple(own if before == "OK" else before for own, before in pairs),
-        unidentifiable=tuple(dict.fromkeys(fitted.unidentifiable + start.unidentifiable)),
-        noise=tuple(log.noise for log in logs),
-        whiteness=whiteness,
-        residual=tuple(outcome.residual for outcome in outcomes),
-        iterations=iterations,
+    return with_body(
+        replace(
+            fitted,
+            status=tuple(own if before == "OK" else before for own, before in pairs),
+            unidentifiable=tuple(dict.fromkeys(fitted.unidentifiable + start.unidentifiable)),
+            noise=tuple(log.noise for log in logs),
+            whiteness=whiteness,
+            residual=tuple(outcome.residual for outcome in outcomes),
+            iterations=iterations,
+        )
     )
 
 

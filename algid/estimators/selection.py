@@ -26,7 +26,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.estimators.term_grams import CHANGE, Coefficients, Grams, Training, term_names
 from algid.estimators.weak import Source, WeakSettings
-from algid.model import CHOICES, EVERY_TERM, PARAMETERS, TERMS, Model, without_delay
+from algid.model import CHOICES, EVERY_TERM, LARGEST_PHASE, PARAMETERS, SINES, TERMS, Model, without_delay
 from algid.physics.motion import Widths
 
 CHOICE = tuple(name for name, term in EVERY_TERM.items() if name in CHOICES and term.timing != "lag")
@@ -226,7 +226,8 @@ class _Search:
         value = self.grams.coefficients([*among, *terms])[False]
         names = [name for term in terms for name in term_names(term) if name in value]
         ranges = ((value[name], PARAMETERS[name].plausible) for name in names)
-        return all(low <= found <= high for found, (low, high) in ranges)
+        turned = (np.arctan2(abs(value[name]), value[SINES[name]]) for name in names if name in SINES)
+        return all(low <= found <= high for found, (low, high) in ranges) and all(t <= LARGEST_PHASE for t in turned)
 
     def run(self) -> list[str]:
         """The terms that stay."""

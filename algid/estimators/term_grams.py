@@ -26,7 +26,7 @@ from algid.estimators.combine import long_run_variance, scaled_pinv
 from algid.estimators.modulating_functions import OVERLAP, row_weights
 from algid.estimators.too_short import TooShortError
 from algid.estimators.weak import Normal, Source, WeakSettings, normal_equations
-from algid.model import DELAYS, EVERY_TERM, RIGID
+from algid.model import DELAYS, EVERY_TERM, loads_of
 from algid.physics.terms import ALWAYS
 from algid.signals.segments import Segment, pieces, spread_pieces
 
@@ -88,7 +88,8 @@ class Grams:
     def __init__(self, logs: Sequence[Training], settings: WeakSettings, at: Mapping[bool, Coefficients]) -> None:
         self.settings = settings = replace(settings, estimate_delay=True)
         self.names = (*settings.model.names, CHANGE)
-        self._rigid = [place for place, name in enumerate(self.names) if name in RIGID]
+        loads = loads_of(settings.model)
+        self._rigid = [place for place, name in enumerate(self.names) if name in loads]
         normals = []
         for log in logs:
             here = np.array([at[log.loaded].get(name, 0.0) for name in settings.model.names])
@@ -152,7 +153,8 @@ class Grams:
         names = {name for term in terms for name in term_names(term)}
         names |= {name for term in ALWAYS for name in term.names}
         basic = [place for place, name in enumerate(self.names) if name in names]
-        return np.array([*basic, *range(len(self.names), self.size)])
+        loaded = [len(self.names) + row for row, place in enumerate(self._rigid) if self.names[place] in names]
+        return np.array([*basic, *(loaded if self._both else [])])
 
     def coefficients(self, terms: Iterable[str]) -> dict[bool, dict[str, float]]:
         """Coefficients by name of the sub-model with `terms`, of unloaded (False) and of loaded logs (True).

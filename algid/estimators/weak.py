@@ -22,6 +22,7 @@ from typing import Literal, TypeVar
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.estimators.body import with_body
 from algid.estimators.combine import FEWEST_LOGS, BlockSums, LogInformation, Prior, combine, scaled_pinv
 from algid.estimators.fit import Fit, conclude
 from algid.estimators.innovations import LAGS, ResidualSums, pooled, residual_sums
@@ -118,7 +119,7 @@ def fit(
             break
     moved = np.max([normal.moved for normal in every], axis=0)
     without = _left_out(shared, normals, loaded_normals, prior, base, beta) if len(every) >= FEWEST_LOGS else None
-    return conclude("weak", shared, logs, beta, moved, prior, coloured=True, without=without)
+    return with_body(conclude("weak", shared, logs, beta, moved, prior, coloured=True, without=without))
 
 
 def _left_out(

@@ -61,7 +61,7 @@ def _definitions(expressions: list[Weighted], form: str) -> str:
     atoms = sorted({atom for expression in expressions for product in expression for atom in product})
     lines = [form.format(f"{atom.name} = {atom.source}") for atom in atoms if atom.source]
     bare = " ".join([*lines, *(atom.name for atom in atoms)])
-    first = [form.format(f"q{n} = $ANGLE{n}") for n in (1, 2) if re.search(rf"\bq{n}\b", bare)]
+    first = [form.format(f"q{n} = theta[{n - 1}]") for n in (1, 2) if re.search(rf"\bq{n}\b", bare)]
     first += [form.format(f"w{n} = omega[{n - 1}]") for n in (1, 2) if re.search(rf"\bw{n}\b", bare)]
     return "".join([*first, *lines])
 
@@ -108,19 +108,12 @@ def _written(arm: Description, form: str, by_term: Mapping[str, str], parts: dic
         own.gravity(loads),
     )
     define = by_term["definition"]
-    turned = dict.fromkeys((0, 1), "")
-    for name, joint in attributes(model, "turns"):
-        turned[joint] += f" + {name.upper()}"
     parts = parts | {
         "DEFINE_GRAVITY": _definitions(g, define),
         "DEFINE_INERTIA": _definitions([*M.values(), *X.values()], define),
         "DEFINE_LOAD": _definitions(list(M.values()), define),
         "DEFINE_REST": _definitions(n, define),
         "DEFINE_FRICTION": _definitions(r, define),
-    }
-    parts = {
-        name: Template(text).safe_substitute({f"ANGLE{j + 1}": f"theta[{j}]{turned[j]}" for j in turned})
-        for name, text in parts.items()
     }
     for joint in range(2):
         number = joint + 1

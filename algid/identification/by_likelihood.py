@@ -10,6 +10,7 @@ import numpy as np
 
 from algid.errors import LogError
 from algid.estimators import instruments, refined, weak
+from algid.estimators.body import with_body
 from algid.estimators.combine import Prior
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, constrained
 from algid.estimators.fit import Fit
@@ -110,6 +111,7 @@ def run_fit(survey: Survey, settings: Settings, chosen: Selection, prior: Prior 
                 fit = _foretelling(fit, unloaded, loaded, ours, settings, prior)
     except TooShortError as error:
         raise LogError(f"{', '.join(log.name for log in survey.logs)}: {error}; record longer") from error
+    fit = with_body(fit)
     return constrained(fit) if settings.constrain else fit, sums
 
 

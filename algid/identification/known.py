@@ -7,12 +7,14 @@ from functools import partial
 
 import numpy as np
 
-from algid.arm import FloatArray, payload_constants, with_payload
+from algid.arm import FloatArray
 from algid.errors import ResultError
 from algid.estimators.combine import Prior
+from algid.estimators.parametrisation import Shared
 from algid.identification.source import Role
 from algid.model import Model, without_delay
 from algid.notices import Notice
+from algid.physics.parameters import BODY, PAYLOAD
 from algid.results import Result
 from algid.settings import Settings
 
@@ -70,17 +72,16 @@ def torque_constants(result: Result, model: Model, role: Role, file: str) -> Flo
         If one of them has no estimate.
     """
     values = {name: found.estimate for name, found in {**result.parameters, **result.payload}.items()}
-    wanted = [*model.names, *(("m_p", "l1", "l2") if role == "loaded" else ())]
+    wanted = [*model.names, *((one.name for one in PAYLOAD) if role == "loaded" else ())]
     values |= {name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None}
     missing = next((name for name in wanted if values.get(name) is None), None)
     if missing is not None:
         raise ResultError(f"{file}: the result has no {missing}; identify it from logs that tell it")
     known = {name: float(value) for name, value in values.items() if value is not None}
-    if role == "loaded":
-        z = payload_constants(known["m_p"], known["l1"], known["l2"], model.gravity)
-        k = with_payload(np.array([known.get(f"k{number}", 0.0) for number in range(1, 8)]), z)
-        known |= {f"k{number + 1}": float(value) for number, value in enumerate(k)}
-    return np.array([known[name] for name in model.names])
+    if role != "loaded":
+        return np.array([known[name] for name in model.names])
+    shared = Shared(model, payload=True, body=tuple(one.name for one in BODY if one.name in known))
+    return shared.coefficients(np.array([known[name] for name in shared.names]), loaded=True)
 
 
 def has_error_bar(result: Result, name: str) -> bool:

@@ -88,6 +88,8 @@ def mend(log: Log, found: Judgement | None) -> Mend | None:
     """
     if found is None or not found.alone or found.best.convention == AS_READ:
         return None
+    if _is_phase(found.best.convention):
+        return None
     convention = min(
         (found.best.convention, found.best.convention.mirrored()), key=lambda one: len(list(_clauses(one)))
     )
@@ -109,6 +111,15 @@ def mend(log: Log, found: Judgement | None) -> Mend | None:
         _settings(convention, log),
         another=not small or replace(convention, zero=(0.0, 0.0)) != AS_READ,
     )
+
+
+def _is_phase(convention: Convention) -> bool:
+    """Whether nothing but zeros differs, by more than a bad calibration and less than a convention.
+
+    A centre of mass off its link's line turns gravity alike: the phases of the moments say which, and how far.
+    """
+    turned = [abs(angle) for angle in convention.zero]
+    return replace(convention, zero=(0.0, 0.0)) == AS_READ and _SMALL < max(turned) < LARGEST_PHASE
 
 
 def _clauses(convention: Convention) -> Iterator[str]:

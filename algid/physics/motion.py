@@ -40,10 +40,6 @@ class Motion:
         (s1, s2), (c1, c2) = sine_cosine(self.theta)
         return s1, c1, s2, c2, s1 * c2 + c1 * s2, c1 * c2 - s1 * s2
 
-    def turned(self, by: FloatArray) -> Motion:
-        """The motion with `by` (2,) rad added to its angles."""
-        return Motion(self.theta + by[:, None], self.omega, self.alpha) if np.any(by) else self
-
 
 def sine_cosine(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Sine and cosine of angles, each in the shape of `theta`, through one tangent of the half angle.

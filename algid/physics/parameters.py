@@ -64,3 +64,8 @@ PAYLOAD = (
     Parameter("l2", "l₂", "m", "distance of the payload from joint 2, along link 2", LENGTH, "+"),
 )
 """What loaded logs tell beside the arm."""
+BODY = (
+    Parameter("y_p", "y_p", "m", "distance of the payload's centre of mass off link 2's line", LENGTH),
+    Parameter("J_p", "J_p", "kg m^2", "inertia of the payload about its centre of mass", INERTIA, "+"),
+)
+"""What a payload that is no point at the tip has beside: both are nothing where the logs do not tell them."""

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from algid.arm import Arm
+from algid.arm import Arm, FloatArray
 from algid.errors import SettingError
 from algid.files import read_toml
 from algid.limits import PHYSICAL, Range
@@ -30,6 +30,7 @@ Friction = Annotated[float, _within(PHYSICAL.friction)]
 Gravity = Annotated[float, _within(PHYSICAL.gravity)]
 Payload = Annotated[float, _within((0.0, PHYSICAL.mass[1]))]
 Centre = Annotated[float, _within((-PHYSICAL.length[1], PHYSICAL.length[1]))]
+Turn = Annotated[float, _within((-3.15, 3.15))]  # rad, of a centre of mass off its link's line
 Percent = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _SOME = Field(min_length=1, max_length=1000)
 Amplitudes = Annotated[list[Annotated[float, _within(PHYSICAL.torque)]], _SOME]
@@ -46,6 +47,16 @@ class Case:
     payload: float
     torque: MultiSine | None
     paper_error_percent: dict[str, float]
+    place: tuple[float | None, float] = (None, 0.0)
+    """Of the payload's centre of mass, x and y in m in the frame of link 2; without x it is at the tip."""
+    inertia: float = 0.0
+    """Of the payload about its centre of mass, kg m^2."""
+
+    def constants(self, payload: float) -> FloatArray:
+        """Constants (10,) of the arm with so many kg: an object of another mass has the shape of the case's payload."""
+        share = payload / self.payload if self.payload else 1.0
+        x, y = self.place
+        return self.arm.phasors(payload, x, y, share * self.inertia if payload else 0.0)
 
 
 class _Table(BaseModel):
@@ -64,6 +75,8 @@ class _ArmTable(_Table):
     b1: Friction = 0.0
     b2: Friction = 0.0
     g: Gravity = 9.81
+    delta1: Turn = 0.0
+    delta2: Turn = 0.0
 
     def arm(self) -> Arm:
         """The arm; a link of which only length and mass are given is uniform: l / 2, m l² / 12."""
@@ -78,6 +91,9 @@ class _ArmTable(_Table):
 
 class _PayloadTable(_Table):
     m_p: Payload
+    x: Centre | None = None
+    y: Centre = 0.0
+    J: Inertia = 0.0
 
 
 class _JointTorque(_Table):
@@ -146,6 +162,8 @@ def _read_case(path: Path) -> Case:
         name=path.stem,
         arm=content.arm.arm(),
         payload=content.payload.m_p,
+        place=(content.payload.x, content.payload.y),
+        inertia=content.payload.J,
         torque=None if content.torque is None else content.torque.multi_sine(),
         paper_error_percent=dict(content.paper_error_percent),
     )

@@ -8,7 +8,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from algid.arm import with_payload
 from algid.log import Log, Truth
 from algid.progress import Progress
 from algid.synth.cases import Case
@@ -62,7 +61,7 @@ def synthesise(case: Case, torque: Torque, recording: Recording, progress: Progr
     for payload in (0.0, case.payload):
         role = "loaded" if payload else "unloaded"
         sensors = replace(recording.sensors, seed=recording.sensors.seed + len(logs))
-        k = with_payload(case.arm.constants(), case.arm.payload_constants(payload))
+        k = case.constants(payload)
         t = sample_times(recording.rate, recording.duration, sensors)
         motion = simulate(k, torque, t, initial[:2], initial[2:], _counted(progress, role, recording))
         logs.append(record(motion, sensors, Truth(case.arm, payload, case.name), f"{case.name}-{role}"))
@@ -72,10 +71,10 @@ def synthesise(case: Case, torque: Torque, recording: Recording, progress: Progr
 def rehearse(case: Case, plan: Reference, recording: Recording, progress: Progress | None = None) -> list[Log]:
     """The unloaded and, with a payload, the loaded log of a case whose controller follows a plan from its start."""
     logs: list[Log] = []
-    unloaded = case.arm.constants()
+    unloaded = case.constants(0.0)
     for payload in dict.fromkeys((0.0, case.payload)):
         role = "loaded" if payload else "unloaded"
-        k = with_payload(unloaded, case.arm.payload_constants(payload))
+        k = case.constants(payload)
         sensors = replace(recording.sensors, seed=recording.sensors.seed + bool(payload))
         t = sample_times(recording.rate, recording.duration, sensors)
         motion = follow(k, plan, t, unloaded, bool(payload), _counted(progress, role, recording))
@@ -113,7 +112,7 @@ def with_schedule(
         close = min(end, t[-1])
         if not own.size or close <= start:
             continue
-        k = with_payload(case.arm.constants(), case.arm.payload_constants(mass))
+        k = case.constants(mass)
         every = np.unique(np.concatenate([[start], own, [close]]))
         motion = simulate(k, torque, every, state[:2], state[2:], _counted(progress, "schedule", recording))
         state = np.concatenate([motion.theta[:, -1], motion.omega[:, -1]])

@@ -167,7 +167,7 @@ def test_what_a_log_cannot_mean_is_told_alike_by_every_command(flag: str, text: 
         assert refused(command, f"{flag}={text}") == line, command
 
 
-TERMS = "coulomb, offset, rotor, stribeck, asymmetry, load, gain, zero, lag, delay"
+TERMS = "coulomb, offset, rotor, stribeck, asymmetry, load, gain, phases, lag, delay"
 OF_SETTINGS = [
     ("--model", "magic", f"--model: expected auto, plain or some of {TERMS}; found 'magic'"),
     ("--model", "stribeck", "--model: stribeck has no meaning without coulomb; add coulomb to the list"),

@@ -115,13 +115,13 @@ def test_a_payload_that_is_given_is_as_wrong_as_told(tmp_path: Path) -> None:
 
 
 def test_terms_that_no_plan_holds_are_left_out_and_said(tmp_path: Path) -> None:
-    value = values_of(ODD, f1=0.4, f2=0.3, gain2=0.05, zero1=0.01, zero2=0.02)
-    prior = believed(result_of(value, Model(("coulomb", "gain", "zero"))), tmp_path)
+    value = values_of(ODD, f1=0.4, f2=0.3, gain2=0.05, e1=0.01, e2=0.02)
+    prior = believed(result_of(value, Model(("coulomb", "gain", "load"))), tmp_path)
     assert prior.belief.shared.model.terms == ("coulomb",)
     (doubt,) = prior.doubts
     assert doubt.text == (
-        "the plan leaves out torque gain of joint 2 over that of joint 1, less 1 and zero offsets of the angles: where "
-        "they are estimated too, error bars are somewhat larger than predicted"
+        "the plan leaves out friction in proportion to the joint's load and torque gain of joint 2 over that of joint 1"
+        ", less 1: where they are estimated too, error bars are somewhat larger than predicted"
     )
 
 

@@ -19,11 +19,13 @@ def torque_by_hand() -> sp.Matrix:
     angles = [sp.Function(f"q{joint}")(t) for joint in (1, 2)]
     speeds = [angle.diff(t) for angle in angles]
     value = {name: sp.Symbol(name) for name in COLUMN_NAMES}
-    q1, q2 = angles[0] + value["zero1"], angles[1] + value["zero2"]
+    q1, q2 = angles
     k1, k2, k3, k4, k5 = (value[f"k{number}"] for number in range(1, 6))
-    kinetic = ((k5 + k3 + 2 * k1 * sp.cos(q2)) * speeds[0] ** 2 + k3 * speeds[1] ** 2) / 2
-    kinetic += (k3 + k1 * sp.cos(q2)) * speeds[0] * speeds[1]
+    coupling = k1 * sp.cos(q2) - value["k1s"] * sp.sin(q2)
+    kinetic = ((k5 + k3 + 2 * coupling) * speeds[0] ** 2 + k3 * speeds[1] ** 2) / 2
+    kinetic += (k3 + coupling) * speeds[0] * speeds[1]
     potential = k4 * sp.sin(q1) + k2 * sp.sin(q1 + q2)
+    potential += value["k4s"] * sp.cos(q1) + value["k2s"] * sp.cos(q1 + q2)
     lagrangian = kinetic - potential
     torques = []
     for joint, (angle, speed) in enumerate(zip(angles, speeds, strict=True), 1):

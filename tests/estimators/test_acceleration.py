@@ -83,20 +83,3 @@ def test_what_a_model_lacks_is_nothing_in_the_order_of_all_columns() -> None:
         "k7": 5.0,
         "j2": 6.0,
     }
-
-
-def test_a_motion_that_is_not_turned_is_itself() -> None:
-    motion = Motion(*_states(5, 20))
-    assert motion.turned(np.zeros(2)) is motion
-    turned = motion.turned(np.array([0.1, -0.2]))
-    np.testing.assert_allclose(turned.theta, motion.theta + np.array([[0.1], [-0.2]]))
-    s1, c1, s2, c2, s12, c12 = turned.trigonometry
-    for found, expected in (
-        (s1, np.sin(turned.theta[0])),
-        (c1, np.cos(turned.theta[0])),
-        (s2, np.sin(turned.theta[1])),
-    ):
-        np.testing.assert_allclose(found, expected, atol=1e-15)
-    np.testing.assert_allclose(c2, np.cos(turned.theta[1]), atol=1e-15)
-    np.testing.assert_allclose(s12, np.sin(turned.theta.sum(axis=0)), atol=1e-15)
-    np.testing.assert_allclose(c12, np.cos(turned.theta.sum(axis=0)), atol=1e-15)

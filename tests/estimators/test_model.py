@@ -23,8 +23,9 @@ VALUES = {
     "e1": 0.05,
     "e2": 0.08,
     "gain2": 0.06,
-    "zero1": 0.02,
-    "zero2": -0.03,
+    "k1s": 0.004,
+    "k2s": -0.2,
+    "k4s": 0.3,
     "lag": 0.0,
 }
 C = np.array([VALUES[name] for name in FULL.names])
@@ -54,7 +55,7 @@ def test_the_regressor_gives_the_torque_and_is_its_slope_where_the_torque_is_lin
     assert not FULL.linear
     assert np.array_equal(regressor(linear, _motion()), sensitivity(linear, c, _motion()))
     assert np.allclose(np.einsum("aqn,q->an", regressor(FULL, _motion(), C), C), torque(FULL, C, _motion()))
-    with pytest.raises(ValueError, match=r"load, gain, zero.* depends on the coefficients"):
+    with pytest.raises(ValueError, match=r"load, gain.* depends on the coefficients"):
         regressor(FULL, _motion())
 
 
@@ -101,7 +102,7 @@ def test_partials_are_the_slopes_of_the_torque(model: Model) -> None:
 
 
 def test_a_horizontal_arm_has_no_gravity_columns() -> None:
-    model = Model(("zero",), gravity=0.0)
-    assert model.names == ("k1", "k3", "k5", "k6", "k7", "zero2")
+    model = Model(("phases",), gravity=0.0)
+    assert model.names == ("k1", "k3", "k5", "k6", "k7", "k1s")
     assert regressor(model, _motion(), np.zeros(6)).shape == (2, 6, 50)
     assert model.expand(np.ones(6))[[1, 3]].tolist() == [0.0, 0.0]

@@ -24,7 +24,7 @@ def _chosen(bench: Bench, terms: tuple[str, ...], **asked: object) -> Selection:
 
 
 @pytest.mark.parametrize(
-    "terms", [(), ("coulomb",), ("offset", "rotor"), ("load",), ("gain",), ("zero",), ("lag",)], ids="+".join
+    "terms", [(), ("coulomb",), ("offset", "rotor"), ("load",), ("gain",), ("phases",), ("lag",)], ids="+".join
 )
 def test_the_terms_that_are_there_are_chosen_and_no_other(bench: Bench, terms: tuple[str, ...]) -> None:
     chosen = _chosen(bench, terms)

@@ -133,7 +133,7 @@ SETS = [
     Model(),
     Model(("coulomb",)),
     Model(("coulomb", "stribeck", "asymmetry", "rotor")),
-    Model(("offset", "gain", "zero")),
+    Model(("offset", "gain", "phases")),
     Model(("load",), coulomb_speed=0.5),
     FULL,
     Model(("coulomb", "load", "rotor", "gain"), gravity=0.0),

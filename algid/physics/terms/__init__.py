@@ -10,15 +10,15 @@ from algid.physics.terms.gain import GAIN
 from algid.physics.terms.lag import LAG
 from algid.physics.terms.load import LOAD
 from algid.physics.terms.offset import OFFSET
+from algid.physics.terms.phases import PHASES
 from algid.physics.terms.rigid import RIGID
 from algid.physics.terms.rotor import ROTOR
 from algid.physics.terms.stribeck import STRIBECK
 from algid.physics.terms.viscous import VISCOUS
-from algid.physics.terms.zero import ZERO
 
 __all__ = ["ALWAYS", "OPTIONAL", "Term", "TorqueColumn"]
 
 ALWAYS: tuple[Term, ...] = (RIGID, VISCOUS)
 """Eq. (1): what every arm has."""
-OPTIONAL: tuple[Term, ...] = (COULOMB, OFFSET, ROTOR, STRIBECK, ASYMMETRY, LOAD, GAIN, ZERO, LAG, DELAY)
+OPTIONAL: tuple[Term, ...] = (COULOMB, OFFSET, ROTOR, STRIBECK, ASYMMETRY, LOAD, GAIN, PHASES, LAG, DELAY)
 """What real joints add; all their parameters are zero on an arm without them."""

@@ -50,7 +50,7 @@ class Term:
     shapes : names of the widths that its columns have, fields of `algid.physics.motion.Widths`
     by_load : pairs of a parameter and the joint whose load times the smooth sign of its velocity it multiplies
     gains : pairs of a parameter g and the joint whose torque it multiplies by 1 + g
-    turns : pairs of a parameter and the joint to whose angle it is added
+    sines : pairs of a parameter and the one whose sine part it is: both are one phasor
     timing : "delay" or "lag"
         Whether its one parameter is a time by which the torque is late, as a whole or after a low-pass.
     """
@@ -66,7 +66,7 @@ class Term:
     shapes: tuple[str, ...] = ()
     by_load: tuple[tuple[str, int], ...] = ()
     gains: tuple[tuple[str, int], ...] = ()
-    turns: tuple[tuple[str, int], ...] = ()
+    sines: tuple[tuple[str, str], ...] = ()
     timing: Literal["delay", "lag"] | None = None
 
     @property
@@ -82,4 +82,4 @@ class Term:
     @property
     def linear(self) -> bool:
         """Whether the torque is linear in its parameters beside those of other terms."""
-        return not (self.by_load or self.gains or self.turns)
+        return not (self.by_load or self.gains)

@@ -1,0 +1,87 @@
+"""A payload that is a body: its centre of mass off link 2's line and its inertia, where the loaded logs tell them.
+
+Payloads act through the chain rule alone (`algid.estimators.parametrisation`), so that what the logs say of them
+follows from the quadratic likelihoods of a fit, without a further pass.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from algid.estimators.fit import Fit, conclude
+from algid.model import PARAMETERS, SINES
+from algid.physics.parameters import BODY
+
+WORTH = 2.0
+"""Wald statistic a parameter, beyond which it is kept (Akaike 1974): a stricter one would bias the mass of bodies
+whose inertia is of the size of its own error."""
+
+
+def with_body(fit: Fit) -> Fit:
+    """The fit with the payload's offset and inertia, as far as its logs tell them.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of a point payload; one without loaded logs is returned as it is.
+
+    Returns
+    -------
+    Fit
+        The one with the most parameters of the body each of which is worth its price; an inertia is positive.
+    """
+    if not fit.shared.payload or not fit.converged:
+        return fit
+    across = bool(set(SINES) & set(fit.shared.log_names))  # an offset shows in the sine parts alone
+    names = [one.name for one in BODY if across or one.sign == "+"]
+    for count in range(len(names), 0, -1):
+        found = [_with(fit, chosen) for chosen in combinations(names, count)]
+        worthy = [one for one in found if _least_worth(one) > WORTH]
+        if worthy:
+            return max(worthy, key=_least_worth)
+    return _with(fit, ()) if fit.shared.body else fit
+
+
+def _with(fit: Fit, body: Sequence[str]) -> Fit:
+    """The fit with these parameters of the body, from the same likelihoods."""
+    if tuple(body) == fit.shared.body:
+        return fit
+    shared = replace(fit.shared, body=tuple(body))
+    known = dict(zip(fit.names, fit.values.tolist(), strict=True))
+    start = np.array([known.get(name, 0.0) for name in shared.names])
+    coloured = fit.intervals != "likelihood"
+    found = conclude(
+        fit.estimator, shared, fit.logs, start, fit.moved, fit.prior, coloured=coloured, samples=fit.freedom
+    )
+    before = dict(zip(fit.names, fit.status, strict=True))
+    statuses = zip(found.names, found.status, strict=True)
+    status = tuple(own if before.get(name, "OK") == "OK" else before[name] for name, own in statuses)
+    return replace(
+        found,
+        status=status,
+        noise=fit.noise,
+        whiteness=fit.whiteness,
+        residual=fit.residual,
+        iterations=fit.iterations,
+        endogeneity=fit.endogeneity,
+        note=fit.note,
+    )
+
+
+def _worths(fit: Fit) -> list[float]:
+    """Wald statistics of the body's parameters; nothing of a negative inertia, or of one that the logs leave open."""
+    worths = []
+    for name in fit.shared.body:
+        place = fit.names.index(name)
+        value, std = float(fit.values[place]), float(fit.std[place])
+        allowed = value > 0 or PARAMETERS[name].sign == "±"
+        worths.append((value / std) ** 2 if allowed and std > 0 and np.isfinite(std) else 0.0)
+    return worths
+
+
+def _least_worth(fit: Fit) -> float:
+    return min(_worths(fit))
