@@ -55,7 +55,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "check": room("errors files results", "pydantic"),
     "identification": room(
-        "arm errors estimators files inspection log model notices profile progress readers report results runtime "
+        "arm errors estimators files inspection log model notices physics profile progress readers report results runtime "
         "settings signals table4",
         "numpy pyarrow",
     ),

@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from algid.estimators.fit import Fit, conclude
-from algid.model import PARAMETERS, SINES
+from algid.model import SINES
 from algid.physics.parameters import BODY
 
 WORTH = 2.0
@@ -73,13 +73,18 @@ def _with(fit: Fit, body: Sequence[str]) -> Fit:
 
 
 def _worths(fit: Fit) -> list[float]:
-    """Wald statistics of the body's parameters; nothing of a negative inertia, or of one that the logs leave open."""
+    """Wald statistics of the body's parameters; nothing of what no object at the tip has, or the logs leave open.
+
+    An inertia is positive, and its radius of gyration no longer than joint 2 is away.
+    """
     worths = []
+    m_p, _, r, J = fit.shared.physical(fit.values)
+    if J < 0 or m_p * abs(r) ** 2 < J:
+        return [0.0]
     for name in fit.shared.body:
         place = fit.names.index(name)
         value, std = float(fit.values[place]), float(fit.std[place])
-        allowed = value > 0 or PARAMETERS[name].sign == "±"
-        worths.append((value / std) ** 2 if allowed and std > 0 and np.isfinite(std) else 0.0)
+        worths.append((value / std) ** 2 if std > 0 and np.isfinite(std) else 0.0)
     return worths
 
 

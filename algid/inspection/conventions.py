@@ -19,7 +19,7 @@ from algid.notices import Remedy
 from algid.signals.segments import Segment, append, segments
 from algid.words import counted
 
-_SMALL = 0.1  # rad: a zero this close is a bad calibration, not another convention
+_SMALL = np.pi / 4  # rad: a zero this close, or a centre of mass off its link, is a phase and no other convention
 _TOLD = 0.01  # rad: a zero closer than this is not worth a word
 _SAME = 1e-3  # of a scale or rad: as good as equal
 
@@ -88,8 +88,6 @@ def mend(log: Log, found: Judgement | None) -> Mend | None:
     """
     if found is None or not found.alone or found.best.convention == AS_READ:
         return None
-    if _is_phase(found.best.convention):
-        return None
     convention = min(
         (found.best.convention, found.best.convention.mirrored()), key=lambda one: len(list(_clauses(one)))
     )
@@ -111,15 +109,6 @@ def mend(log: Log, found: Judgement | None) -> Mend | None:
         _settings(convention, log),
         another=not small or replace(convention, zero=(0.0, 0.0)) != AS_READ,
     )
-
-
-def _is_phase(convention: Convention) -> bool:
-    """Whether nothing but zeros differs, by more than a bad calibration and less than a convention.
-
-    A centre of mass off its link's line turns gravity alike: the phases of the moments say which, and how far.
-    """
-    turned = [abs(angle) for angle in convention.zero]
-    return replace(convention, zero=(0.0, 0.0)) == AS_READ and _SMALL < max(turned) < LARGEST_PHASE
 
 
 def _clauses(convention: Convention) -> Iterator[str]:

@@ -44,7 +44,7 @@ def test_a_loaded_log_has_the_constants_of_table_2(lengths: dict[str, float], mo
     np.testing.assert_allclose(shared.coefficients(beta, True), c, rtol=1e-14)
     T = np.array(expected.jacobian(symbols).subs(at)).astype(float)
     np.testing.assert_allclose(shared.jacobian(beta, True), T, rtol=1e-14, atol=1e-15)
-    assert shared.physical(beta) == pytest.approx((0.35, 0.2, 0.3))
+    assert shared.physical(beta) == pytest.approx((0.35, 0.2, 0.3, 0.0))
     np.testing.assert_array_equal(shared.coefficients(beta, False), beta[: len(shared.log_names)])
     np.testing.assert_array_equal(shared.jacobian(beta, False), np.eye(len(shared.log_names), beta.size))
 
@@ -55,3 +55,27 @@ def test_without_a_payload_the_parameters_are_those_of_a_log() -> None:
     beta = np.arange(9.0)
     shared.coefficients(beta, False)[0] = 99.0
     assert beta[0] == 0.0  # what is handed out is no view of what was handed in
+
+
+@pytest.mark.parametrize("body", [(), ("J_p",), ("y_p",), ("y_p", "J_p")], ids="+".join)
+def test_a_body_and_phasors_follow_from_the_complex_form(body: tuple[str, ...]) -> None:
+    """Kinetic and potential energy of a body carried along, against the coefficients and their differences."""
+    shared = Shared(Model(("phases",)), payload=True, body=body)
+    value = {**VALUES, "k1s": 0.02, "k2s": -0.03, "k4s": 0.05, "y_p": 0.04, "J_p": 0.003}
+    beta = np.array([value[name] for name in shared.names])
+    turn = np.angle(complex(0.2, -0.03)) - np.angle(complex(0.1, 0.02))
+    r = complex(0.3, 0.04 if "y_p" in body else 0.0)
+    added = shared.coefficients(beta, True) - shared.coefficients(beta, False)
+    grown = dict(zip(shared.log_names, added.tolist(), strict=True))
+    up = 9.81 * 0.35 * np.exp(1j * turn)
+    assert complex(grown["k1"], grown["k1s"]) == pytest.approx(0.35 * 0.2 * r)
+    assert complex(grown["k2"], grown["k2s"]) == pytest.approx(up * r)
+    assert complex(grown["k4"], grown["k4s"]) == pytest.approx(up * 0.2)
+    assert grown["k3"] == pytest.approx(0.35 * abs(r) ** 2 + (0.003 if "J_p" in body else 0.0))
+    assert grown["k5"] == pytest.approx(0.35 * 0.2**2)
+    T = shared.jacobian(beta, True)
+    for place in range(beta.size):
+        step = np.zeros(beta.size)
+        step[place] = 1e-7
+        slope = (shared.coefficients(beta + step, True) - shared.coefficients(beta - step, True)) / 2e-7
+        np.testing.assert_allclose(T[:, place], slope, atol=1e-7)

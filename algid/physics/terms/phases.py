@@ -1,7 +1,7 @@
 """Sine parts of the three moments: centres of mass off the links' lines, zeros of the angles a little off.
 
-The moments are phasors, K = k + i k_s. The columns of the sine parts are those of k1, k2 and k4 with the angle a quarter
-turn on. With centres of mass turned by δ off the links' lines and encoder zeros off by ε, arg K1 = δ2 + ε2 and
+The moments are phasors, K = k + i k_s: the columns of the sine parts are those of k1, k2 and k4 with the angle a
+quarter turn on. With centres of mass turned by δ off the links' lines and encoder zeros off by ε, arg K1 = δ2 + ε2 and
 arg K2 = δ2 + ε1 + ε2.
 """
 
