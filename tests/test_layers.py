@@ -55,8 +55,8 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "check": room("errors files results", "pydantic"),
     "identification": room(
-        "arm errors estimators files inspection log model notices physics profile progress readers report results runtime "
-        "settings signals table4",
+        "arm errors estimators files inspection log model notices physics profile progress readers report results "
+        "runtime settings signals table4",
         "numpy pyarrow",
     ),
     "api": room("log synth"),

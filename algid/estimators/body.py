@@ -68,7 +68,7 @@ def _with(fit: Fit, body: Sequence[str]) -> Fit:
         residual=fit.residual,
         iterations=fit.iterations,
         endogeneity=fit.endogeneity,
-        note=fit.note,
+        notes=fit.notes,
     )
 
 
