@@ -24,7 +24,7 @@ from algid.identification.series import torque_coefficients
 from algid.identification.source import LogSource
 from algid.identification.survey import Survey
 from algid.identification.velocities import with_velocities
-from algid.model import TERMS, Model, without_delay
+from algid.model import CHOICES, EVERY_TERM, Model, without_delay
 from algid.notices import Notice
 from algid.results import Result
 from algid.runtime import beside
@@ -165,8 +165,10 @@ def without_nothing(chosen: Selection, fit: Fit, settings: Settings) -> Selectio
     size = dict(zip(fit.names, np.abs(fit.values) / np.maximum(fit.std, 1e-300), strict=True))
     nothing = {
         term
-        for term in chosen.model.terms
-        if term not in settings.terms and all(size.get(name, 0.0) < NOTHING for name in TERMS[term].names)
+        for term in CHOICES
+        if (term in chosen.model.terms or set(EVERY_TERM[term].names) & set(fit.names))
+        and term not in settings.terms
+        and all(size.get(name, 0.0) < NOTHING for name in EVERY_TERM[term].names)
     }
     trials = tuple(
         replace(trial, kept=False, reason="the fit finds it to be zero within its error")
@@ -175,7 +177,9 @@ def without_nothing(chosen: Selection, fit: Fit, settings: Settings) -> Selectio
         for trial in chosen.trials
     )
     terms = tuple(term for term in chosen.model.terms if term not in nothing)
-    return replace(chosen, model=replace(chosen.model, terms=terms), trials=trials) if nothing else chosen
+    delay = chosen.delay and nothing == set(without_delay(nothing))
+    fewer = replace(chosen, model=replace(chosen.model, terms=terms), delay=delay, trials=trials)
+    return fewer if nothing else chosen
 
 
 def _foretelling(

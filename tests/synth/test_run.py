@@ -11,9 +11,10 @@ import pytest
 
 from algid.arm import Arm, FloatArray, inverse_dynamics, mass_matrix, with_payload
 from algid.errors import SettingError
+from algid.identification.identify import identify
 from algid.log import Log
 from algid.synth.cases import Case
-from algid.synth.excitation import MultiSine, no_torque
+from algid.synth.excitation import MultiSine, no_torque, wide_multi_sine
 from algid.synth.follow import STIFFNESS, Reference, follow, read_plan
 from algid.synth.run import Recording, rehearse, synthesise, with_schedule
 from algid.synth.sensors import Sensors
@@ -177,3 +178,25 @@ def test_a_file_that_is_no_plan_is_refused(text: str, found: str, tmp_path: Path
     assert found in str(refused.value)
     with pytest.raises(SettingError, match="expected what algid design wrote"):
         read_plan(tmp_path)
+
+
+@pytest.mark.slow
+def test_bent_links_and_a_body_at_the_tip_are_found_without_a_flag() -> None:
+    """Centres of mass 10° off both links, a payload of 5 cm radius of gyration: all within their intervals' reach."""
+    arm = Arm(4.0, 2.5, 0.2, 0.15, 0.4, 0.35, 0.06, 0.03, 0.8, 0.5, 9.81, np.radians(10), np.radians(10))
+    case = Case("bent", arm, 0.5, None, {}, (None, 0.0), 0.5 * 0.05**2)
+    sensors = Sensors(position_noise=1e-4, torque_noise=2e-2, seed=1)
+    logs = synthesise(case, wide_multi_sine(arm, 3), Recording(rate=500.0, duration=10.0, sensors=sensors))
+    unloaded, loaded = (replace(log, origin=replace(log.origin, truth=None)) for log in logs)
+    result = identify(unloaded, loaded)
+    names = ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "k1s", "k2s", "k4s")
+    truth = dict(zip(names, arm.phasors().tolist(), strict=True))
+    truth |= {"m_p": 0.5, "l1": 0.4, "l2": 0.35, "J_p": 0.5 * 0.05**2}
+    found = {name: one for name, one in result.estimates.items() if name in truth}
+    assert set(found) == set(truth)
+    for name, one in found.items():
+        assert one.status == "OK", name
+        assert one.estimate is not None
+        assert one.std is not None
+        assert abs(one.estimate - truth[name]) < 4 * one.std, name
+    assert not result.fit.broken_bounds  # type: ignore[union-attr]
