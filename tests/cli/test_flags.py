@@ -30,6 +30,7 @@ CALLS: dict[str, tuple[str, ...]] = {
     "convert": ("log.csv", "out.csv"),
     "guide": (),
     "profile new": ("log.csv",),
+    "example": (),
 }
 """A call of each command that no file answers: what is wrong with a flag is told before one is sought."""
 READERS = ("inspect", "convert", "identify", "batch", "validate", "track")

@@ -85,15 +85,15 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
 def test_what_a_library_raises_names_the_file_and_the_stage(
     raised: BaseException, code: int, line: str, run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("algid.inspection.report.sniff", raising(raised))
+    monkeypatch.setattr("algid.inspection.report.format_of", raising(raised))
     assert run("inspect", "log.csv") == (code, f"algid: {line}\n")
 
 
 def test_a_fault_of_algid_is_called_one(run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("algid.inspection.report.sniff", lambda _path: None)  # then algid's own line fails
+    monkeypatch.setattr("algid.inspection.report.format_of", lambda _path: None)  # then algid's own line fails
     line = (
-        "algid: internal error: while opening log.csv: AttributeError: 'NoneType' object has no attribute "
-        "'startswith'; this is a fault of algid: report it, see where with ALGID_TRACEBACK=1\n"
+        "algid: internal error: while opening log.csv: AttributeError: 'NoneType' object has no attribute 'name'; "
+        "this is a fault of algid: report it, see where with ALGID_TRACEBACK=1\n"
     )
     assert run("inspect", "log.csv") == (EXIT_INTERNAL, line)
     monkeypatch.setenv("ALGID_TRACEBACK", "1")
@@ -107,7 +107,7 @@ def test_a_fault_of_algid_is_called_one(run: Callable[..., Any], monkeypatch: py
 def test_an_end_that_is_meant_keeps_its_meaning(
     raised: BaseException, code: int, run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("algid.inspection.report.sniff", raising(raised))
+    monkeypatch.setattr("algid.inspection.report.format_of", raising(raised))
     found, told = run("inspect", "log.csv")
     assert found == code
     assert told in ("", "algid: stopped; nothing half-written is left\n")
@@ -167,7 +167,11 @@ def test_a_tampered_result_drives_no_terminal(result: Path, tmp_path: Path) -> N
     content = json.loads((result / "result.json").read_text())
     for row in content["table4"]:
         row["parameter"] = HOSTILE
-    content |= {"version": HOSTILE, "estimator": HOSTILE, "warnings": [HOSTILE], "notes": [HOSTILE]}
+    content |= {
+        "version": HOSTILE,
+        "estimator": HOSTILE,
+        "notices": [{"code": HOSTILE, "text": HOSTILE, "note": note} for note in (True, False)],
+    }
     content["log"]["path"] = HOSTILE
     content["parameters"][HOSTILE] = content["parameters"].pop("k3") | {"unit": HOSTILE}
     folder = tmp_path / "tampered.algid"
