@@ -89,19 +89,27 @@ def payload_yaml(result: Result, file: str, knowns: Knowns) -> str:
     if length is None:
         raise ResultError(f"{file}: the result does not tell where the payload hangs; give --l2")
     spread = 0.0 if given or found is None else found.std
+    y, y_std = _told(result, "y_p")
+    J, _ = _told(result, "J_p")
     where = "given" if given else "identified"
     return (
         f"# Payload by algid export, from {json.dumps(file)}, estimator {result.estimator}; SI units.\n"
-        "# Mass identified; taken as a point at the tip, so that two coordinates and the inertia are chosen as 0.\n"
+        "# Mass identified; what is 0 below was not told by the logs, or lies out of the arm's plane.\n"
         f"# centre_of_gravity x {where}, in the frame of link 2: x along the link from joint 2.\n"
         "payload:\n"
         f"  mass: {mass.estimate!r}  # kg\n"
         f"  mass_std: {_or_null(mass.std)}\n"
         "  frame: link2\n"
-        f"  centre_of_gravity: [{float(length)!r}, 0.0, 0.0]  # m\n"
-        f"  centre_of_gravity_std: [{_or_null(spread)}, 0.0, 0.0]\n"
-        "  inertia: {ixx: 0.0, iyy: 0.0, izz: 0.0, ixy: 0.0, ixz: 0.0, iyz: 0.0}  # kg m^2\n"
+        f"  centre_of_gravity: [{float(length)!r}, {y!r}, 0.0]  # m\n"
+        f"  centre_of_gravity_std: [{_or_null(spread)}, {_or_null(y_std)}, 0.0]\n"
+        f"  inertia: {{ixx: 0.0, iyy: 0.0, izz: {J!r}, ixy: 0.0, ixz: 0.0, iyz: 0.0}}  # kg m^2\n"
     )
+
+
+def _told(result: Result, name: str) -> tuple[float, float | None]:
+    """What a result tells of its payload's body, and how surely: nothing where it is a point at the tip."""
+    found = result.payload.get(name)
+    return (0.0, 0.0) if found is None or found.estimate is None else (found.estimate, found.std)
 
 
 def _or_null(value: float | None) -> str:

@@ -24,12 +24,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from algid.arm import FloatArray, payload_constants
+from algid.arm import FloatArray
 from algid.errors import ResultError
 from algid.estimators.noise import first_guess
+from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
 from algid.identification.known import model_of, prior_of, shift_of
-from algid.model import Model
+from algid.model import SINES, Model
 from algid.results import Result
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.filters import smoothed
@@ -51,11 +52,19 @@ class IdentifiedArm:
     l2: float
     noise: NoiseLevels
     shift: float = 0.0
+    y: float = 0.0
+    """m, of a payload's centre of mass off link 2's line."""
+    gyration: float = 0.0
+    """m, a payload's radius of gyration."""
 
     @property
     def unit(self) -> FloatArray:
         """D (q,): what a payload of 1 kg adds to the coefficients."""
-        return self.added(payload_constants(1.0, self.l1, self.l2, self.model.gravity))
+        across = bool(set(SINES) & set(self.model.names))
+        shared = Shared(self.model, payload=True, body=(*(("y_p",) if across else ()), "J_p"))
+        body = {"m_p": 1.0, "l1": self.l1, "l2": self.l2, "y_p": self.y, "J_p": self.gyration**2}
+        beta = np.concatenate([self.k, [body[name] for name in shared.names[self.k.size :]]])
+        return shared.coefficients(beta, True) - shared.coefficients(beta, False)
 
     @property
     def tip_equivalent(self) -> float:
@@ -185,8 +194,17 @@ def arm_of(
         if min(noise) > 0
         else first_guess(first.theta, first.tau),
         shift_of(result)(first.dt),
+        *_body(result),
     )
     return known, covariance
+
+
+def _body(result: Result) -> tuple[float, float]:
+    """Offset and radius of gyration in m of the payload behind a result: objects are taken to be shaped like it."""
+    y, J, m_p = (
+        float(result.payload[name].estimate or 0.0) if name in result.payload else 0.0 for name in ("y_p", "J_p", "m_p")
+    )
+    return y, float(np.sqrt(max(J, 0.0) / m_p)) if m_p > 0 else 0.0
 
 
 def _length(result: Result, name: str, given: float | None) -> float:

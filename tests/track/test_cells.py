@@ -221,3 +221,17 @@ def test_track_json_holds_what_was_found() -> None:
     assert content["arm"] == {"path": "arm", "sha256": "0" * 64}
     assert content["data_lost"] is True
     assert [one["text"] for one in content["notices"]] == ["a warning"]
+
+
+def test_an_object_is_shaped_like_the_payload_that_was_identified() -> None:
+    """What a kilogram adds to the coefficients, with its offset and its inertia, in the complex form."""
+    model = Model(("phases",))
+    k = np.array([0.1, 0.5, 0.2, 0.9, 0.4, 0.1, 0.1, 0.02, 0.1, 0.05])  # arg K1 = arg K2: θ1's zero is right
+    noise = NoiseLevels(np.full(2, 1e-4), np.full(2, 1e-2))
+    arm = IdentifiedArm(model, k, 0.4, 0.3, noise, 0.0, 0.05, 0.07)
+    added = dict(zip(model.names, arm.unit.tolist(), strict=True))
+    r = complex(0.3, 0.05)
+    assert added["k3"] == pytest.approx(abs(r) ** 2 + 0.07**2)
+    assert complex(added["k1"], added["k1s"]) == pytest.approx(0.4 * r)
+    assert complex(added["k2"], added["k2s"]) == pytest.approx(9.81 * r)
+    assert complex(added["k4"], added["k4s"]) == pytest.approx(9.81 * 0.4)
