@@ -5,14 +5,18 @@ from __future__ import annotations
 import inspect
 import json
 import re
+from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import polars as pl
+import pyarrow as pa
 import pytest
 
 import algid
-from algid.errors import ResultError
+from algid.errors import LogError, ResultError
 from algid.identification.identify import identify
 from algid.log import ChannelReading, Reading
 from algid.results import Result, Status, write_result
@@ -213,3 +217,91 @@ def test_a_log_is_made_of_arrays_either_way_round_and_gives_the_same_result() ->
     assert {"verdict", "to_frame", "parameters"} <= set(dir(one))
     assert not any(name.startswith("model_") for name in dir(one))
     assert one.verdict.word in one._repr_html_()
+
+
+WEAK = algid.Settings(estimator="weak")
+
+
+@pytest.fixture(scope="module")
+def columns() -> dict[str, Any]:
+    """The columns of a log whose angles are in degrees, one of which is a time."""
+    log, _ = algid.synthesise("case1", duration=2.0, excitation="wide")
+    angles = {f"theta{joint + 1} [deg]": np.degrees(log.theta[joint]) for joint in (0, 1)}
+    return {"time": log.t, **angles, "tau1": log.tau[0], "tau2": log.tau[1]}
+
+
+def _pandas(columns: dict[str, Any]) -> object:
+    return pytest.importorskip("pandas").DataFrame(columns)
+
+
+def _pandas_by_time(columns: dict[str, Any]) -> object:
+    return pytest.importorskip("pandas").DataFrame(columns).set_index("time")
+
+
+def _lists(columns: dict[str, Any]) -> object:
+    frame = pl.DataFrame(columns)
+    return frame.select("time", *frame.columns[1:3], tau=pl.concat_list("tau1", "tau2"))
+
+
+@pytest.mark.parametrize("made", [dict, pl.DataFrame, pa.table, _lists, _pandas, _pandas_by_time])
+def test_columns_in_memory_are_read_as_a_file_of_them(
+    made: Callable[[dict[str, Any]], object], columns: dict[str, Any], tmp_path: Path
+) -> None:
+    pl.DataFrame(columns).write_parquet(tmp_path / "log.parquet")
+    of_file = algid.identify(tmp_path / "log.parquet", settings=WEAK)
+    found = algid.identify(made(columns), settings=WEAK)
+    assert found.parameters == of_file.parameters
+    assert found.payload == of_file.payload
+    assert found.log.reading == of_file.log.reading or made is _lists
+    assert [notice.code for notice in found.notices] == [notice.code for notice in of_file.notices]
+
+
+def test_matrices_are_taken_either_way_round(columns: dict[str, Any]) -> None:
+    log = algid.read_log({"t": columns["time"], "q": np.ones((2, columns["time"].size)), "tau": np.ones((2001, 2))})
+    assert log.theta.shape == log.tau.shape == (2, 2001)
+    assert log.origin.mapping["theta2"] == "q[1]"
+
+
+def test_several_logs_in_memory_are_pooled_and_a_twin_counts_once(columns: dict[str, Any]) -> None:
+    frame = pl.DataFrame(columns)
+    pooled = algid.identify([frame[:1000], columns | {"tau1": columns["tau1"] + 1e-6}, frame[:1000]], settings=WEAK)
+    assert [log.rows for log in pooled.logs] == [1000, 2001]
+    assert "SAME_LOG" in [notice.code for notice in pooled.notices]
+
+
+@pytest.mark.parametrize("made", [pl.DataFrame, pa.table, _pandas])
+def test_rows_of_a_frame_that_lack_a_value_go_with_a_notice(
+    made: Callable[[dict[str, Any]], object], columns: dict[str, Any]
+) -> None:
+    torque = [None if row == 7 else value for row, value in enumerate(columns["tau2"].tolist())]
+    log = algid.read_log(made(columns | {"tau2": torque}))
+    assert len(log) == 2000
+    assert "EMPTY_CELLS" in [notice.code for notice in log.notices]
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"tau2": "a"}, "^log: column 'tau2' for tau2 holds String; expected numbers$"),
+        ({"tau2": None}, "^log: column 'tau2' for tau2 holds Null; expected numbers$"),
+        ({"theta1 [deg]": float("nan")}, "^log: theta1 .* expected a finite number"),
+    ],
+)
+def test_a_frame_that_is_no_log_is_refused(columns: dict[str, Any], changes: dict[str, Any], expected: str) -> None:
+    frame = pl.DataFrame(columns).with_columns(**{name: pl.lit(value) for name, value in changes.items()})
+    with pytest.raises(LogError, match=expected):
+        algid.identify(frame, settings=WEAK)
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({}, "^log: no arrays of two samples or more; found nothing$"),
+        ({"t": [0.0, 0.1], "q": [[1.0], [1.0, 2.0]]}, "^log: 'q' is no array .*; give numbers of one shape$"),
+        ({"t": [0.0, 0.1, 0.2], "q1": [1.0, 2.0]}, r"the log also holds, of another length: q1 \(2\)$"),
+        ({"t": [0.0, 0.1]}, "^log: no column for theta1, theta2, tau1, tau2; found 't'; name them: "),
+    ],
+)
+def test_a_dict_that_is_no_log_is_refused(given: dict[str, Any], expected: str) -> None:
+    with pytest.raises(LogError, match=expected):
+        algid.identify(given, settings=WEAK)

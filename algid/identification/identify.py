@@ -65,8 +65,9 @@ def identify(
 
     Parameters
     ----------
-    unloaded, loaded : path or `Log`, or several
-        Logs of the arm without and with the payload.
+    unloaded, loaded : path, `Log`, pandas or polars frame, or dict of arrays; or several
+        Logs of the arm without and with the payload. The columns of frames and dicts are found by their names and by
+        `profile`, as those of a file.
     settings : Settings
     parameters : Result or path of one
         An arm identified before; then no unloaded log is needed.

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Literal
 from algid.errors import LogError
 from algid.log import Log, Origin
 from algid.notices import Notice
+from algid.readers import open_log, read_log
+from algid.readers.memory import Columns, is_columns
 from algid.readers.timebase import check_step
 from algid.results import LogSummary, Result
 from algid.runtime import ahead
@@ -35,7 +37,7 @@ class Staged:
     whole: bool = True
 
 
-LogLike = str | Path | Log | Staged
+LogLike = str | Path | Log | Staged | Columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +74,7 @@ def open_source(
 
     Parameters
     ----------
-    log : path, `Log` or `Staged`
+    log : path, `Log`, `Staged`, or columns as `algid.readers.memory` takes them
     role : 'unloaded' or 'loaded'
     profile : Profile
         What the log's names, units and signs mean.
@@ -85,6 +87,8 @@ def open_source(
     LogError
         If the log cannot be opened, or its metadata name another payload than its role.
     """
+    if is_columns(log):
+        log = read_log(log, profile)
     if isinstance(log, Log):
         log = _in_radians(log)
         check_step(log.origin.path, log.stamp_ns)
@@ -92,8 +96,6 @@ def open_source(
             log.origin.path, role, log.origin, lambda: iter([log]), len(log), gravity, partial(_hash_of_arrays, log)
         )
     else:
-        from algid.readers import open_log
-
         path = log.path if isinstance(log, Staged) else Path(log)
         reader = open_log(path, profile)
         name, whole = (log.url, log.whole) if isinstance(log, Staged) else (str(log), True)
@@ -128,7 +130,9 @@ def open_sources(
     A log that is given twice, byte for byte, counts once, and the first of the two has a notice of the other. Only logs
     that promise as many samples as another are hashed for it.
     """
-    several = [] if logs is None else [logs] if isinstance(logs, str | Path | Log | Staged) else logs
+    several = (
+        [] if logs is None else [logs] if isinstance(logs, str | Path | Log | Staged) or is_columns(logs) else logs
+    )
     sources = [open_source(log, role, profile, gravity) for log in several]
     lengths = Counter(source.promised for source in sources if source.digest)
     kept: list[LogSource] = []

@@ -11,15 +11,17 @@ from algid.log import Log
 if TYPE_CHECKING:
     from algid.profile import Profile
     from algid.readers.assemble import TableReader
+    from algid.readers.memory import Columns
 
 
-def open_log(path: str | Path, profile: Profile | None = None) -> TableReader:
+def open_log(path: str | Path | Columns, profile: Profile | None = None) -> TableReader:
     """Open a log of any format, known from its content; its samples are read by `TableReader.blocks`.
 
     Parameters
     ----------
-    path : str or Path
-        A CSV (also compressed), Parquet, MCAP, Feather, NumPy, MATLAB or ROS 1 bag file, or a rosbag2 folder.
+    path : str, Path or columns
+        A CSV (also compressed), Parquet, MCAP, Feather, NumPy, MATLAB or ROS 1 bag file, or a rosbag2 folder; or a
+        pandas or polars frame, or a dict of arrays, as `algid.readers.memory` takes them.
     profile : Profile, optional
         What the log's names, units and signs mean, where the log does not tell.
 
@@ -31,17 +33,22 @@ def open_log(path: str | Path, profile: Profile | None = None) -> TableReader:
     from algid.profile import Profile
     from algid.readers.formats import format_of
 
+    if not isinstance(path, str | Path):
+        from algid.readers.memory import NAME, open_columns
+
+        with during("opening", NAME):
+            return open_columns(path, profile or Profile())
     with during("opening", path):
         return format_of(Path(path)).open(Path(path), profile or Profile())
 
 
-def read_log(path: str | Path, profile: Profile | None = None) -> Log:
+def read_log(path: str | Path | Columns, profile: Profile | None = None) -> Log:
     """Read a whole log: see `open_log`.
 
     Parameters
     ----------
-    path : str or Path
-        A file of any format that algid reads, or a rosbag2 folder.
+    path : str, Path or columns
+        A file of any format that algid reads, or a rosbag2 folder; or a pandas or polars frame, or a dict of arrays.
     profile : Profile, optional
         What the log's names, units and signs mean, where the log does not tell.
 

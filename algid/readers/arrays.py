@@ -40,17 +40,46 @@ def open_arrays(path: Path, kind: str, profile: Profile) -> TableReader:
     LogError
         If the file is damaged, too large to be read as a whole, or lacks a channel.
     """
+    content, others = contents_of(path, kind)
+    return open_content(str(path), kind, content, profile, others=others)
+
+
+def open_content(
+    path: str,
+    kind: str,
+    content: Content,
+    profile: Profile,
+    *,
+    units: Mapping[str, str] | None = None,
+    others: tuple[str, ...] = (),
+) -> TableReader:
+    """Open a log of columns that are in memory, under the name `path`.
+
+    Parameters
+    ----------
+    path, kind : str
+    content : Content
+    profile : Profile
+    units : mapping
+        Units by column that are stated elsewhere than in the columns' names.
+    others : tuple of str
+        What else the log holds, for the error of a channel that is missing.
+
+    Raises
+    ------
+    LogError
+        If a channel is missing, or is not of numbers.
+    """
     import polars as pl
 
-    content, others = contents_of(path, kind)
     schema = content.schema
     try:
-        columns = assign(str(path), schema.names(), profile, {})
+        columns = assign(path, schema.names(), profile, units or {})
     except LogError as error:
         if not others:
             raise
-        raise LogError(f"{error}; the file also holds, of another length: {', '.join(others[:_MOST_TOLD])}") from error
-    columns = of_numbers(str(path), columns, schema)
+        raise LogError(f"{error}; the log also holds, of another length: {', '.join(others[:_MOST_TOLD])}") from error
+    columns = of_numbers(path, columns, schema)
 
     def frames(columns: Columns, rows: int, most: int | None) -> Iterator[pl.DataFrame]:
         numbers = [number(name, pl.col(source), schema[source]) for name, source in columns.sources.items()]
@@ -58,7 +87,7 @@ def open_arrays(path: Path, kind: str, profile: Profile) -> TableReader:
         for first in range(0, end, rows):
             yield content.part(first, min(first + rows, end), set(columns.sources.values())).select(numbers)
 
-    return flat_reader(str(path), kind, columns, frames, profile, content.rows)
+    return flat_reader(path, kind, columns, frames, profile, content.rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +130,7 @@ def contents_of(path: Path, kind: str) -> tuple[Content, tuple[str, ...]]:
             frame = frame_of_lines(path)
             content = Content(frame, frame.height)
         else:
-            columns, others = _columns(path, _LOADERS[kind](path))
+            columns, others = columns_of(str(path), _LOADERS[kind](path))
             content = Content(columns, len(next(iter(columns.values()), ())))
         width = len(content.schema)  # of types that polars does not take it tells here
     if width > LIMITS.columns:
@@ -182,7 +211,7 @@ def _leaves(content: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, NDAr
             yield f"{prefix}{name}", value
 
 
-def _columns(path: Path, arrays: Mapping[str, NDArray[Any]]) -> tuple[dict[str, NDArray[Any]], tuple[str, ...]]:
+def columns_of(path: str, arrays: Mapping[str, NDArray[Any]]) -> tuple[dict[str, NDArray[Any]], tuple[str, ...]]:
     """Columns as long as the time, or as the longest array, and the arrays that are not, with their shapes.
 
     A nested name's last part stands for it where that is unique.

@@ -164,7 +164,7 @@ def test_hdf5_that_is_damaged_or_leads_elsewhere_is_refused(tmp_path: Path) -> N
 def test_a_matlab_file_whose_matrices_fit_nothing_says_what_it_holds(tmp_path: Path) -> None:
     path = tmp_path / "a.mat"
     scipy.io.savemat(path, {"A": np.eye(80), "q": np.ones((50, 2)), "t": np.arange(200.0)})
-    words = r"no column for theta1, .* the file also holds, of another length: A \(80 × 80\), q \(50 × 2\)"
+    words = r"no column for theta1, .* the log also holds, of another length: A \(80 × 80\), q \(50 × 2\)"
     with pytest.raises(LogError, match=words):
         read_log(path)
     found = inspect_log(path)

@@ -1,0 +1,95 @@
+"""Logs that are handed over in memory: a frame of columns or a dict of arrays, read as a file of them would be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, TypeGuard, cast
+
+import numpy as np
+
+from algid.errors import LogError
+from algid.limits import LIMITS
+from algid.readers.arrays import Content, columns_of, open_content
+from algid.readers.frames import cells
+from algid.words import counted
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from algid.profile import Profile
+    from algid.readers.assemble import TableReader
+
+NAME = "log"
+"""What a log in memory is called, as by `algid.Log.from_arrays`."""
+
+Columns = Any
+"""A pandas or polars frame, a pyarrow table, or a mapping of names to arrays: the first two are no dependencies."""
+
+
+def is_columns(given: object) -> TypeGuard[Columns]:
+    """Whether columns are given: a mapping, or what hands over its columns as Arrow's, as frames do."""
+    return isinstance(given, Mapping) or any(hasattr(given, name) for name in ("__arrow_c_stream__", "__dataframe__"))
+
+
+def open_columns(given: Columns, profile: Profile) -> TableReader:
+    """Open a log of columns in memory.
+
+    Parameters
+    ----------
+    given : frame, table or mapping
+        A mapping may hold matrices too, (N, 2) or (2, N); an index of a pandas frame counts as a column if it has a
+        name.
+    profile : Profile
+
+    Raises
+    ------
+    LogError
+        If the columns cannot be taken over, a channel is missing, or one is not of numbers.
+    """
+    if isinstance(given, Mapping):
+        columns, others = columns_of(NAME, {str(name): _array(name, values) for name, values in given.items()})
+        content = Content(columns, len(next(iter(columns.values()), ())))
+        return open_content(NAME, "arrays", _checked(content), profile, others=others)
+    frame, units = _frame(given)
+    return open_content(NAME, "frame", _checked(Content(frame, frame.height)), profile, units=units)
+
+
+def _array(name: object, values: object) -> np.ndarray[Any, Any]:
+    try:
+        return np.asarray(values)
+    except Exception as error:  # whatever the values' own library raises
+        raise LogError(f"{NAME}: {name!r} is no array ({error}); give numbers of one shape") from error
+
+
+def _checked(content: Content) -> Content:
+    width = len(content.schema)
+    if width > LIMITS.columns:
+        raise LogError(f"{NAME}: {counted(width, 'column')}; expected {LIMITS.columns} at most")
+    return content
+
+
+def _frame(given: Columns) -> tuple[pl.DataFrame, dict[str, str]]:
+    """The columns as a frame, a list's cells as columns, and the units that its metadata state."""
+    import polars as pl
+    import pyarrow as pa
+
+    from algid.readers.parquet import units_of_schema
+
+    units: dict[str, str] = {}
+    if isinstance(given, pl.DataFrame):
+        frame = given
+    else:
+        try:
+            table = pa.table(given)
+            frame = cast("pl.DataFrame", pl.from_arrow(table))
+        except Exception as error:  # whatever the frame's own library raises
+            reason = str(error).split("\n", maxsplit=1)[0][:200]
+            raise LogError(f"{NAME}: the frame cannot be taken over ({reason}); give columns of numbers") from error
+        units = units_of_schema(table.schema, {name: name for name in table.column_names})
+
+    def width(column: str) -> int:
+        first = frame[column].drop_nulls().head(1)
+        return len(first.item()) if first.len() else 0
+
+    flat = {name: cell.alias(name) for name, (cell, _) in cells(frame.schema, width).items()}
+    return frame.select(*flat.values()), units
