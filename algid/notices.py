@@ -139,7 +139,11 @@ MESSAGES: Mapping[str, str] = {
         "the torque's error is far larger and slower than its sensor's noise (unmodelled dynamics): the likelihood of "
         "white noise does not hold, and the {kept} estimate with robust intervals stands in its place"
     ),
-    "WIDER_MODEL": "error bars are as if the model had {terms} too",
+    "SHRUNK_TERMS": "every term of the torque is shrunk to what the logs tell of it: none is chosen",
+    "UNLIKE_GAINS": (
+        "the gains of the torques differ: torque 2 is {ratio:.3f} ± {half:.2g} times (95 %) what torque 1 has it; no "
+        "log tells which is right, and where torque 2 is, k1 … k7 and every mass are larger by that factor"
+    ),
     "JOINT_STILL": "{joints} never moved: give a log in which both joints do",
     "JOINTS_CONTRADICT": (
         "joint 1 by itself tells {name} as {first:.2g} {unit} and joint 2 as {second:.2g}: one of them is hardly "

@@ -21,8 +21,7 @@ from typing import Any
 import numpy as np
 
 from algid.arm import CONSTANT_NAMES
-from algid.estimators import refined
-from algid.estimators.hedged import hedged
+from algid.estimators import refined, shrunk
 from algid.estimators.selection import Selection, select
 from algid.estimators.weak import WeakSettings
 from algid.model import Model
@@ -54,7 +53,7 @@ def draw(job: tuple[str, int, int, str]) -> Row:
     settings = refined.RefinedSettings(model=chosen.model, estimate_delay=chosen.delay, weak=weak)
     fit = refined.fit(*logs, settings)
     if fit.refuted and mode == MODES[0]:
-        fit = hedged(fit, *logs, weak)
+        fit = shrunk.fit(*logs, replace(weak, model=chosen.shapes or chosen.model, estimate_delay=False))
     truth = _scenes[row, arm, False].truth
     names = [*CONSTANT_NAMES, "m_p"]
     places = [fit.names.index(name) for name in names]

@@ -21,9 +21,8 @@ from typing import Any
 import numpy as np
 
 from algid.arm import CONSTANT_NAMES, FloatArray
-from algid.estimators import refined
+from algid.estimators import refined, shrunk
 from algid.estimators.fit import Fit
-from algid.estimators.hedged import hedged
 from algid.estimators.selection import Selection, select
 from algid.estimators.weak import Source, WeakSettings
 from algid.identification.by_likelihood import without_nothing
@@ -93,8 +92,9 @@ def _fitted(sources: Sequence[Source], kind: Kind) -> tuple[Fit, Selection]:
     fewer = without_nothing(chosen, fit, Settings())
     if fewer != chosen:
         fit, chosen = _refined(sources, fewer, weak)
-    own = replace(weak, model=chosen.model, estimate_delay=chosen.delay)
-    return hedged(fit, sources, (), own) if fit.refuted else fit, chosen
+    return shrunk.fit(
+        sources, settings=replace(weak, model=chosen.shapes or chosen.model)
+    ) if fit.refuted else fit, chosen
 
 
 def _refined(sources: Sequence[Source], chosen: Selection, weak: WeakSettings) -> tuple[Fit, Selection]:

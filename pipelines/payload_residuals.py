@@ -139,7 +139,7 @@ def weighed(job: tuple[Path, str, int, float]) -> tuple[float, float, float]:
     sources = [*open_sources(unloaded, "unloaded", None, 9.81), *open_sources(loaded, "loaded", None, 9.81)]
     survey = _Unexamined(sources)
     with one_blas_thread():
-        fit, _ = run_fit(survey, settings, choose_model(survey, settings), None)
+        fit, _, _ = run_fit(survey, settings, choose_model(survey, settings), None)
     place = fit.names.index("m_p")
     return float(fit.values[place]) - mass, float(fit.std[place]), float(fit.quantile * fit.std[place])
 

@@ -49,6 +49,8 @@ class Errors:
     offset, drift : shares of a torque offset and of its random walk over the log
     lag, delay : s, of the logged torque behind the true one, and ahead of it
     zero : rad, of both angles
+    push : share of a torque that no sensor sees, an Ornstein-Uhlenbeck process of `PERSISTENCE` s
+    hold : s, from one change of the motors' torque to the next; it is logged as it is set
     """
 
     coulomb: float = 0.0
@@ -67,6 +69,8 @@ class Errors:
     lag: float = 0.0
     delay: float = 0.0
     zero: tuple[float, float] = (0.0, 0.0)
+    push: float = 0.0
+    hold: float = 0.0
 
     @property
     def mechanical(self) -> Errors:
@@ -75,6 +79,7 @@ class Errors:
 
 
 DEGREE = np.pi / 180
+PERSISTENCE = 0.05  # s
 ROWS = {
     "none": Errors(),
     "Coulomb friction 3 %": Errors(coulomb=0.03),
@@ -124,6 +129,16 @@ def scenes(rows: list[str], arms: list[int]) -> dict[tuple[str, int, bool], Scen
     return {key: _sensed(ROWS[key[0]], *moved[ROWS[key[0]].mechanical, *key[1:]]) for key in keys}
 
 
+def campaigns(errors: Errors, arms: list[int], unloaded: int, loaded: int = 0) -> dict[int, list[Scene]]:
+    """By arm so many unloaded and loaded motions, all different, of one row of errors."""
+    keys = [(arm, kind, run) for arm in arms for kind in (False, True) for run in range(loaded if kind else unloaded)]
+    cases = [_Case.of(errors.mechanical, arm, kind, run) for arm, kind, run in keys]
+    found: dict[int, list[Scene]] = {arm: [] for arm in arms}
+    for case, theta in zip(cases, _integrate(cases), strict=True):
+        found[case.seed].append(_sensed(errors, case, theta))
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class _Case:
     errors: Errors
@@ -136,25 +151,40 @@ class _Case:
     torque: FloatArray
     size: FloatArray
     width: float
+    push: FloatArray
 
     @classmethod
-    def of(cls, errors: Errors, seed: int, loaded: bool) -> _Case:
+    def of(cls, errors: Errors, seed: int, loaded: bool, run: int = 0) -> _Case:
         arm, payload = random_arm(seed)
         k = arm.constants()
-        wide = wide_multi_sine(arm, 1000 * seed + loaded)
+        wide = wide_multi_sine(arm, 1000 * seed + loaded + 10 * run)
         times = np.arange(2 * round(DURATION / STEP) + 1) * (STEP / 2)
         torque = wide(times)
+        if errors.hold:
+            every = round(2 * errors.hold / STEP)
+            torque = torque[:, np.arange(times.size) // every * every]
         width = float(np.exp(np.random.default_rng(seed).uniform(np.log(0.03), np.log(0.2))))
         # The unloaded arm's, so that the loaded one has the same joints.
         size = np.sqrt(np.mean(wide_multi_sine(arm, 1000 * seed)(times) ** 2, axis=1))
         if loaded:
             k = with_payload(k, arm.payload_constants(payload))
-        return cls(errors, seed, arm, payload, loaded, k, times, torque, size, width)
+        push = size[:, None] * errors.push * _wandering(times.size, np.random.default_rng([seed, loaded, run]))
+        return cls(errors, seed, arm, payload, loaded, k, times, torque, size, width, push)
+
+
+def _wandering(count: int, rng: np.random.Generator) -> FloatArray:
+    """An Ornstein-Uhlenbeck process (2, count) of unit variance, at half the steps of the integration."""
+    from scipy.signal import lfilter
+
+    keep = np.exp(-0.5 * STEP / PERSISTENCE)
+    white = np.sqrt(1 - keep**2) * rng.standard_normal((2, count))
+    white[:, 0] /= np.sqrt(1 - keep**2)
+    return np.asarray(lfilter([1.0], [1.0, -keep], white, axis=1))
 
 
 def _integrate(cases: list[_Case]) -> list[FloatArray]:
     """Motor angles (2, N) at `RATE` of each case."""
-    drive = np.stack([case.torque for case in cases], axis=-1)
+    drive = np.stack([case.torque + case.push for case in cases], axis=-1)
     arms = _Arms(cases)
     state = np.zeros((10, len(cases)))
     state[0] = state[4] = -np.pi / 2

@@ -13,6 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from algid.estimators.fit import Fit, conclude
+from algid.estimators.shrunk_fit import concluded
 from algid.model import SINES
 from algid.physics.parameters import BODY
 
@@ -53,10 +54,13 @@ def _with(fit: Fit, body: Sequence[str]) -> Fit:
     shared = replace(fit.shared, body=tuple(body))
     known = dict(zip(fit.names, fit.values.tolist(), strict=True))
     start = np.array([known.get(name, 0.0) for name in shared.names])
-    coloured = fit.intervals != "likelihood"
-    found = conclude(
-        fit.estimator, shared, fit.logs, start, fit.moved, fit.prior, coloured=coloured, samples=fit.freedom
-    )
+    if fit.shrinkage is not None and fit.prior is not None:
+        found = concluded(shared, fit.logs, start, fit.prior, fit.shrinkage, fit.moved)
+    else:
+        coloured = fit.intervals != "likelihood"
+        found = conclude(
+            fit.estimator, shared, fit.logs, start, fit.moved, fit.prior, coloured=coloured, samples=fit.freedom
+        )
     before = dict(zip(fit.names, fit.status, strict=True))
     statuses = zip(found.names, found.status, strict=True)
     status = tuple(own if before.get(name, "OK") == "OK" else before[name] for name, own in statuses)

@@ -79,9 +79,14 @@ def _mass(shared: Shared, beta: FloatArray) -> tuple[float, float, float]:
 
 
 def broken_bounds(fit: Fit) -> list[BrokenBound]:
-    """Bounds that the estimates break; a parameter that the logs leave open breaks none."""
+    """Bounds that the estimates break.
+
+    A parameter that the logs leave open breaks none, nor does a term that is shrunk: it takes up what the model lacks.
+    """
     size = sizes(fit.names, fit.values)
-    open_ones = {f"{name} >= 0" for name, std in zip(fit.names, fit.std, strict=True) if np.isinf(std)}
+    shrunk = () if fit.shrinkage is None else fit.shrinkage.names
+    spreads = zip(fit.names, fit.std, strict=True)
+    open_ones = {f"{name} >= 0" for name, std in spreads if np.isinf(std) or name in shrunk}
     broken = []
     for name, bound in bounds(fit.shared).items():
         value = bound(fit.values)

@@ -18,7 +18,6 @@ from algid.estimators.combine import (
     jackknife,
     left_out,
     sandwich,
-    scaled_pinv,
 )
 from algid.estimators.identifiability import Whiteness, examine, open_directions
 from algid.estimators.innovations import NORMAL, ResidualSums
@@ -61,6 +60,7 @@ class Fit:
     endogeneity : how far instruments are from least squares, in standard deviations; None where not asked
     notes : what is to be said of the fit, such as why the refined estimator handed back the weak estimate
     moved : (2,), rad, how far each joint travelled
+    shrinkage : the prior's part on the torque's terms; None where none is shrunk
     """
 
     estimator: Estimator
@@ -83,6 +83,7 @@ class Fit:
     endogeneity: float | None = None
     notes: tuple[Notice, ...] = ()
     moved: FloatArray = field(default_factory=lambda: np.full(2, np.inf))
+    shrinkage: Prior | None = None
 
     def __post_init__(self) -> None:
         keep_arrays(self)
@@ -153,10 +154,10 @@ def own_estimates(fit: Fit) -> tuple[OwnEstimate, ...]:
     found = []
     shared = Shared(fit.shared.model, fit.shared.delay)
     for log in fit.logs:
-        S, g = log.total
-        values = log.c0 + scaled_pinv(S) @ g
+        alone = [replace(log, loaded=False)]
+        values, S, _ = combine(shared, alone, log.c0, fit.shrinkage)
         known = examine(fit.shared.log_names, values, S, fit.moved)
-        meat, _ = sandwich(shared, [replace(log, loaded=False)], values)
+        meat, _ = sandwich(shared, alone, values, fit.shrinkage)
         covariance = known.covariance @ meat @ known.covariance if fit.intervals != "likelihood" else known.covariance
         std = np.where(known.determined, np.sqrt(np.maximum(np.diag(covariance), 0.0)), np.inf)
         found.append(OwnEstimate(log.loaded, values, std))

@@ -199,6 +199,12 @@ class Windows:
         for name, joint in shared:
             yield name, joint, np.abs(load[joint]) * np.tanh(omega[joint] / model.coulomb_speed)
 
+    def square_speeds(self, piece: Segment) -> FloatArray:
+        """Each joint's squared velocity (2, R) in (rad/s)², averaged over each window of `equations`."""
+        if (len(piece) - 2 * self.margin) // self.step < OVERLAP:
+            return np.zeros((2, 0))
+        return self.moments(self._velocity(piece) ** 2, self._plain[0])
+
     def _velocity(self, piece: Segment) -> FloatArray:
         inner = slice(self.margin, len(piece) - self.margin)
         if self.bandwidth is None:
@@ -210,7 +216,7 @@ class Windows:
         return correlate(piece.theta[:, self.margin - reach : len(piece) - self.margin + reach], kernel)
 
 
-def row_weights(gram: FloatArray, v: FloatArray, rows: int) -> FloatArray:
+def row_weights(gram: FloatArray, v: FloatArray, rows: int | FloatArray) -> FloatArray:
     """Inverse residual variance (2,) of a row of each joint.
 
     Parameters
@@ -219,7 +225,7 @@ def row_weights(gram: FloatArray, v: FloatArray, rows: int) -> FloatArray:
         Gram matrices of the columns by joint, the torque last.
     v : (m,)
         What makes a residual of the columns: the coefficients with their sign turned, and 1 for the torque.
-    rows : int
+    rows : int or (2,)
 
     Notes
     -----

@@ -74,7 +74,8 @@ class Selection:
     """The model chosen, whether a delay is estimated beside it, and who chose.
 
     `trials` are those of the terms, and `held_out` is what was left out of the fit in turn; where the terms were
-    given there are none.
+    given there are none. `shapes` is the model of the most common terms, whose friction has the shape that logs give
+    it before any is chosen; `shrunk` says that none was chosen in the end, but every term shrunk.
     """
 
     model: Model
@@ -82,6 +83,8 @@ class Selection:
     chosen_by: Literal["logs", "settings", "parameters"] = "settings"
     trials: tuple[TermTrial, ...] = ()
     held_out: Literal["logs", "blocks"] | None = None
+    shapes: Model | None = None
+    shrunk: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,10 +172,11 @@ def select(
         fixed = tuple(dict.fromkeys((*fixed, *(term for term in terms if term in _DELAY))))
     model = replace(look.settings.model, terms=without_delay(terms))
     delayed = len(model.terms) < len(terms)
+    shapes = start.settings.model
     if not candidates:
-        return Selection(model, delayed)
+        return Selection(model, delayed, shapes=shapes)
     trials = tuple(searches[0 if term in _DELAY else -1].trial(term, terms, kept) for term in everything)
-    return _as_lag(start, look, terms, Selection(model, delayed, "logs", trials, grams.held_out))
+    return _as_lag(start, look, terms, Selection(model, delayed, "logs", trials, grams.held_out, shapes))
 
 
 def _lowest(x: FloatArray, y: Sequence[float]) -> float:

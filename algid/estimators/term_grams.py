@@ -131,7 +131,7 @@ class Grams:
             for (loaded, normal), w in zip(normals, weights, strict=True)
         ]
         self.cost = -sum(
-            share * normal.rows * float(np.sum(np.log(w))) for (_, normal), w in zip(normals, weights, strict=True)
+            share * float(normal.rows @ np.log(w)) for (_, normal), w in zip(normals, weights, strict=True)
         )
 
     def _places(self, loaded: bool) -> IntArray:

@@ -61,6 +61,9 @@ class WeakSettings:
     delay : float, s
         After how long a logged torque acts; where the estimate of it starts with `estimate_delay`.
     estimate_delay : bool
+    rest : (2,) float, rad/s
+        Speeds of the joints, RMS over a window, below which a joint stands: dry friction holds it then, and its window
+        is left out. None looks at every window.
     """
 
     model: Model = field(default_factory=Model)
@@ -69,6 +72,7 @@ class WeakSettings:
     hold: Literal["foh", "zoh"] = "foh"
     delay: float = 0.0
     estimate_delay: bool = False
+    rest: tuple[float, float] | None = None
 
 
 def fit(
@@ -103,7 +107,7 @@ def fit(
     at: list[FloatArray | None] = [None, None]
     for _ in range(_PASSES):
         normals, loaded_normals = _normals(unloaded, settings, at[0]), _normals(loaded, settings, at[1])
-        beta, logs = _start(shared, normals, loaded_normals, prior)
+        beta, logs = first_estimate(shared, normals, loaded_normals, prior)
         base, change = settings.delay, 0.0
         if shared.delay:
             change = float(beta[len(model.names)])
@@ -136,7 +140,7 @@ def _left_out(
         if (unloaded and not rest) or (loaded and not rest_loaded):
             found.append(beta)
             continue
-        start, others = _from(shared, *_start(shared, rest, rest_loaded, prior), base)
+        start, others = _from(shared, *first_estimate(shared, rest, rest_loaded, prior), base)
         found.append(combine(shared, others, start, prior)[0])
     return np.array(found)
 
@@ -153,7 +157,7 @@ def _normals(sources: Sequence[Source], settings: WeakSettings, at: FloatArray |
     return [normal for normal in found if normal is not None]
 
 
-def _start(
+def first_estimate(
     shared: Shared, unloaded: list[Normal], loaded: list[Normal], prior: Prior | None
 ) -> tuple[FloatArray, list[LogInformation]]:
     """Shared parameters from which `conclude` starts, and each log's likelihood."""
@@ -195,14 +199,14 @@ def _from(
 class Normal:
     """Normal equations of one log: Gram matrices (B, 2, q + 1, q + 1) by stretch and joint, the torque last.
 
-    `samples` counts the log's samples, `rows` the windows, `dt` is in s, and `moved` (2,) is the spread of each
-    joint's angle in rad.
+    `samples` counts the log's samples, `rows` (2,) the windows of each joint, `dt` is in s, and `moved` (2,) is the
+    spread of each joint's angle in rad.
     """
 
     gram: FloatArray
     dt: float
     samples: int
-    rows: int
+    rows: FloatArray
     moved: FloatArray
 
 
@@ -215,7 +219,7 @@ def normal_equations(source: Source, settings: WeakSettings, at: FloatArray | No
 
     def gather(window: float) -> tuple[Normal | None, float]:
         sums = BlockSums()
-        samples = rows = 0
+        samples, rows = 0, np.zeros(2)
         longest = dt = 0.0
         low, high = np.full(2, np.inf), np.full(2, -np.inf)
         for piece, windows, fresh in overlapping(source(), settings, window):
@@ -225,12 +229,28 @@ def normal_equations(source: Source, settings: WeakSettings, at: FloatArray | No
             low = np.minimum(low, piece.theta.min(axis=1))
             high = np.maximum(high, piece.theta.max(axis=1))
             X = windows.equations(settings.model, piece, settings.estimate_delay, at)
-            rows += X.shape[2]
-            if X.shape[2]:
-                sums.add(grams(X, OVERLAP))
-        return (Normal(sums.values(), dt, samples, rows, high - low) if rows else None), longest
+            if not X.shape[2]:
+                continue
+            moving = np.ones((2, X.shape[2]), dtype=bool)
+            if settings.rest is not None:
+                moving = windows.square_speeds(piece) >= np.square(settings.rest)[:, None]
+                X = np.where(moving[:, None], X, 0.0)
+            rows += moving.sum(axis=1)
+            sums.add(grams(X, OVERLAP))
+        return (Normal(sums.values(), dt, samples, rows, high - low) if rows.any() else None), longest
 
     return _with_window(gather, settings.window)
+
+
+def speeds(sources: Sequence[Source], settings: WeakSettings) -> FloatArray:
+    """Speed (2,) in rad/s of each joint, RMS over the windows of logs."""
+    squares, count = np.zeros(2), 0
+    for source in sources:
+        for piece, windows, _ in overlapping(source(), settings):
+            found = windows.square_speeds(piece)
+            squares += found.sum(axis=1)
+            count += found.shape[1]
+    return np.sqrt(squares / max(count, 1))
 
 
 def residuals(source: Source, settings: WeakSettings, c: FloatArray) -> ResidualSums | None:

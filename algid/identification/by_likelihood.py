@@ -9,22 +9,22 @@ from functools import partial
 import numpy as np
 
 from algid.errors import LogError
-from algid.estimators import instruments, refined, weak
+from algid.estimators import instruments, refined, shrunk, weak
 from algid.estimators.body import with_body
 from algid.estimators.combine import Prior
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, constrained
+from algid.estimators.doubt import doubted
 from algid.estimators.fit import Fit
-from algid.estimators.hedged import hedged
 from algid.estimators.innovations import ResidualSums, pooled
-from algid.estimators.prediction import PredictionSums, cross_validate
-from algid.estimators.selection import CHOICE, Selection, needs_shape, select
+from algid.estimators.prediction import PredictionSums
+from algid.estimators.selection import CHOICE, FIRST_TERMS, Selection, TermTrial, needs_shape, select
 from algid.estimators.too_short import TooShortError
 from algid.identification.known import model_of
 from algid.identification.series import torque_coefficients
 from algid.identification.source import LogSource
 from algid.identification.survey import Survey
 from algid.identification.velocities import with_velocities
-from algid.model import CHOICES, EVERY_TERM, Model, without_delay
+from algid.model import CHOICES, DELAYS, EVERY_TERM, Model, without_delay
 from algid.notices import Notice
 from algid.results import Result
 from algid.runtime import beside
@@ -65,8 +65,10 @@ def _given(model: Model, terms: Sequence[str]) -> Selection:
     return Selection(replace(model, terms=wanted), len(without_delay(terms)) < len(terms))
 
 
-def run_fit(survey: Survey, settings: Settings, chosen: Selection, prior: Prior | None) -> tuple[Fit, Predictions]:
-    """Fit the settings' estimator to logs.
+def run_fit(
+    survey: Survey, settings: Settings, chosen: Selection, prior: Prior | None
+) -> tuple[Fit, Predictions, Selection]:
+    """Fit the settings' estimator to logs; where its likelihood is refuted, every term shrunk: see `shrunk`.
 
     Parameters
     ----------
@@ -80,7 +82,8 @@ def run_fit(survey: Survey, settings: Settings, chosen: Selection, prior: Prior 
 
     Returns
     -------
-    The fit, and the sums that score its prediction of each log, where a pass of the estimator could gather them.
+    The fit, the sums that score its prediction of each log, where a pass of the estimator could gather them, and the
+    model that it has in the end.
 
     Raises
     ------
@@ -107,12 +110,34 @@ def run_fit(survey: Survey, settings: Settings, chosen: Selection, prior: Prior 
                 weak=ours,
             )
             fit = refined.fit(unloaded, loaded, refining, survey.progress)
-            if fit.refuted:
-                fit = _foretelling(fit, unloaded, loaded, ours, settings, prior)
+            if fit.refuted and settings.chooses:
+                fit, chosen = _shrunk(fit, unloaded, loaded, ours, settings, chosen, prior)
+                sums.clear()
     except TooShortError as error:
         raise LogError(f"{', '.join(log.name for log in survey.logs)}: {error}; record longer") from error
     fit = with_body(fit)
-    return constrained(fit) if settings.constrain else fit, sums
+    return constrained(fit) if settings.constrain else fit, sums, chosen
+
+
+_SHRUNK = "kept and shrunk: where the likelihood is refuted no term is chosen"
+
+
+def _shrunk(
+    refuted: Fit,
+    unloaded: Sequence[Pass],
+    loaded: Sequence[Pass],
+    ours: weak.WeakSettings,
+    settings: Settings,
+    chosen: Selection,
+    prior: Prior | None,
+) -> tuple[Fit, Selection]:
+    """The fit with every term shrunk in place of the `refuted` one's, and its model."""
+    shaped = replace(ours, model=chosen.shapes or chosen.model)
+    fit = shrunk.fit(unloaded, loaded, shaped, settings.lengths, prior)
+    fit = replace(fit, notes=(*refuted.notes, Notice("SHRUNK_TERMS", note=True)))
+    terms = (*fit.shared.model.terms, *(DELAYS if fit.shared.delay else ()))
+    trials = tuple(TermTrial(term, True, np.nan, np.nan, _SHRUNK) for term in terms)
+    return fit, Selection(fit.shared.model, fit.shared.delay, chosen.chosen_by, trials, shrunk=True)
 
 
 def residual_of(survey: Survey, settings: Settings, chosen: Selection, fit: Fit) -> ResidualSums | None:
@@ -135,8 +160,8 @@ def residual_of(survey: Survey, settings: Settings, chosen: Selection, fit: Fit)
     return pooled([one for one in sums if one is not None])
 
 
-def with_hedge(fit: Fit, survey: Survey, settings: Settings, chosen: Selection, prior: Prior | None) -> Fit:
-    """The fit; where its likelihood is refuted, with what left-out terms could hide in its error bars: see `hedged`.
+def with_doubt(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) -> Fit:
+    """The fit; where its likelihood is refuted, with what makes k1 … k5 doubtful: see `doubted`.
 
     One that physics contradicts stays as sure as it is, so that the contradiction is reported.
     """
@@ -145,7 +170,8 @@ def with_hedge(fit: Fit, survey: Survey, settings: Settings, chosen: Selection, 
     if any(bound.distance is not None and bound.distance > FAR_BEYOND for bound in broken_bounds(fit)):
         return fit
     unloaded, loaded = _passes(survey, settings)
-    return hedged(fit, unloaded, loaded, _weak_settings(settings, chosen), settings.lengths, prior)
+    common = _weak_settings(settings, replace(chosen, model=replace(chosen.model, terms=FIRST_TERMS)))
+    return doubted(fit, unloaded, loaded, common)
 
 
 def with_endogeneity(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) -> Fit:
@@ -160,7 +186,7 @@ def without_nothing(chosen: Selection, fit: Fit, settings: Settings) -> Selectio
     A term may earn its place before the weak estimator by what differentiation leaves behind; the efficient fit then
     finds each of its coefficients within `NOTHING` standard deviations of zero.
     """
-    if chosen.chosen_by != "logs":
+    if chosen.chosen_by != "logs" or chosen.shrunk:
         return chosen
     size = dict(zip(fit.names, np.abs(fit.values) / np.maximum(fit.std, 1e-300), strict=True))
     nothing = {
@@ -180,26 +206,6 @@ def without_nothing(chosen: Selection, fit: Fit, settings: Settings) -> Selectio
     delay = chosen.delay and nothing == set(without_delay(nothing))
     fewer = replace(chosen, model=replace(chosen.model, terms=terms), delay=delay, trials=trials)
     return fewer if nothing else chosen
-
-
-def _foretelling(
-    fit: Fit,
-    unloaded: Sequence[Pass],
-    loaded: Sequence[Pass],
-    weak_settings: weak.WeakSettings,
-    settings: Settings,
-    prior: Prior | None,
-) -> Fit:
-    """The weak `fit`, or the instruments' where that foretells logs better that it has not seen."""
-    least = cross_validate(fit, unloaded, loaded, settings.torque_shift)
-    if least is None:  # of a kind of log there is one alone
-        return fit
-    other = instruments.fit(unloaded, loaded, weak_settings, settings.lengths, prior, fit)
-    found = cross_validate(other, unloaded, loaded, settings.torque_shift) if other.converged else None
-    if found is None or np.sum(found.nrmse**2) >= np.sum(least.nrmse**2):
-        return fit
-    notes = tuple(note for note in fit.notes if note.code != "REFUTED")
-    return replace(other, notes=(*notes, Notice("REFUTED", numbers={"kept": "instruments"})))
 
 
 def _weak_settings(settings: Settings, chosen: Selection) -> weak.WeakSettings:

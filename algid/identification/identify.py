@@ -190,8 +190,8 @@ def _by_likelihood(survey: Survey, settings: Settings, earlier: Earlier | None, 
         choose_model,
         residual_of,
         run_fit,
+        with_doubt,
         with_endogeneity,
-        with_hedge,
         without_nothing,
     )
     from algid.identification.known import prior_of
@@ -201,11 +201,11 @@ def _by_likelihood(survey: Survey, settings: Settings, earlier: Earlier | None, 
     chosen = choose_model(survey, settings, None if earlier is None else earlier.result)
     prior = None if earlier is None else prior_of(earlier.result, chosen.model, earlier.file)
     survey.begin("fitting")
-    fit, predictions = run_fit(survey, settings, chosen, prior)
+    fit, predictions, chosen = run_fit(survey, settings, chosen, prior)
     fewer = without_nothing(chosen, fit, settings)
-    if fewer != chosen:
-        chosen, (fit, predictions) = fewer, run_fit(survey, settings, fewer, prior)
-    fit = with_endogeneity(with_hedge(fit, survey, settings, chosen, prior), survey, settings, chosen)
+    if fewer is not chosen:
+        fit, predictions, chosen = run_fit(survey, settings, fewer, prior)
+    fit = with_endogeneity(with_doubt(fit, survey, settings, chosen), survey, settings, chosen)
     survey.begin("prediction")
     outcome = outcome_of(fit, predictions, survey, settings, chosen)
     if folder is not None:

@@ -203,6 +203,7 @@ def fit_summary(
             stribeck_speed=chosen.model.stribeck_speed,
             chosen_by=chosen.chosen_by,
             held_out=chosen.held_out,
+            shrunk=list(fit.shrinkage.names) if fit.shrinkage is not None else [],
         ),
         terms=_terms(fit, chosen),
         broken_bounds=[
@@ -247,7 +248,7 @@ def _terms(fit: Fit, chosen: Selection) -> list[results.TermCriterion]:
             term=trial.term,
             kept=trial.kept,
             gain_heldout=finite(trial.prediction),
-            evidence=0.5 * trial.evidence,  # a Wald statistic is twice a difference of log-likelihoods
+            evidence=finite(0.5 * trial.evidence),  # a Wald statistic is twice a difference of log-likelihoods
             why=trial.reason,
         )
         for trial in chosen.trials

@@ -32,6 +32,7 @@ def fit_warnings(fit: Fit) -> Iterator[Notice]:
     if fit.endogeneity is not None and fit.endogeneity > ENDOGENEOUS and fit.estimator != "instruments":
         instruments = Remedy({"estimator": "instruments"}, "to compare")
         yield Notice("ENDOGENEITY", numbers={"distance": fit.endogeneity}, remedies=(instruments,))
+    yield from _of_gains(fit)
     if "m_p" in fit.names:
         yield from _of_payload(fit)
     given, by_constants = fit.shared.lengths.get("l1"), length_by_constants(fit)
@@ -43,6 +44,16 @@ def fit_warnings(fit: Fit) -> Iterator[Notice]:
     apart = payload_distance(fit)
     if apart is not None and apart > FAR_APART:
         yield Notice("LOGS_APART", numbers={"distance": apart})
+
+
+def _of_gains(fit: Fit) -> Iterator[Notice]:
+    """That the gains of the two torques differ, where the logs tell them apart."""
+    if "gain2" not in fit.names:
+        return
+    place = fit.names.index("gain2")
+    gain, half = float(fit.values[place]), fit.quantile * float(fit.std[place])
+    if abs(gain) > half:
+        yield Notice("UNLIKE_GAINS", numbers={"ratio": 1 + gain, "half": half})
 
 
 def _of_payload(fit: Fit) -> Iterator[Notice]:

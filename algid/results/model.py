@@ -135,7 +135,8 @@ class Endogeneity(_Model):
 class TorqueModel(_Model):
     """The torque's terms beside eq. (1), the speeds in rad/s that shape friction, and who chose the terms.
 
-    `held_out` says what was left out of the fit to try each term: whole logs, or blocks of them.
+    `held_out` says what was left out of the fit to try each term: whole logs, or blocks of them. `shrunk` names the
+    coefficients of terms that were not chosen: each is what the logs and what physics expects of it agree on.
     """
 
     terms: list[str]
@@ -143,6 +144,7 @@ class TorqueModel(_Model):
     stribeck_speed: float
     chosen_by: Literal["logs", "settings", "parameters"]
     held_out: Literal["logs", "blocks"] | None = None
+    shrunk: list[str] = []
 
 
 class Bound(_Model):

@@ -187,11 +187,18 @@ def _reasons(result: Result, *, failed: bool) -> Iterator[Notice]:
     if failed and not causes and (is_implausible(result) or unexplained is not None):
         yield Notice("UNKNOWN_CAUSE")
     yield from causes
-    yield from _of_statuses(result.estimates)
+    yield from _of_statuses(_chosen(result))
     if result.fit is not None:
         yield from _of_fit(result.fit, failed=failed)
     yield from _far_from_truth(result)
     yield from (one for one in warnings if one.code not in CAUSES)
+
+
+def _chosen(result: Result) -> dict[str, Estimate]:
+    """The estimates less those of terms that no log had to tell from zero."""
+    model = None if result.fit is None else result.fit.model
+    shrunk = () if model is None else model.shrunk
+    return {name: found for name, found in result.estimates.items() if name not in shrunk}
 
 
 def _of_statuses(estimates: dict[str, Estimate]) -> Iterator[Notice]:

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 
 from algid.estimators import refined, weak
 from algid.estimators.diagnostics import term_worths
-from algid.estimators.hedged import hedged
+from algid.estimators.doubt import doubted
 from algid.estimators.prediction import cross_validate
 from algid.estimators.refined import RefinedSettings
 from algid.estimators.weak import Source, WeakSettings
@@ -63,9 +63,9 @@ def test_friction_earns_its_place_and_the_offset_does_not(sources: list[Source])
 def test_runs_in_which_a_joint_is_hardly_driven_are_not_ok_alone() -> None:
     """Joint 1 of the first coasts (0.02 N m), joint 2 of the others (0.01 N m, and 2 mrad of travel in the second)."""
     settings = WeakSettings(Model(("coulomb",), coulomb_speed=0.05), bandwidth=60.0)
-    doubted = {}
+    in_doubt = {}
     for name in ("143747", "143906", "144115", "143524", "154220"):
         log = _run(RUNS / f"20230629-{name}.csv")
-        found = hedged(weak.fit([partial(list, [log])], settings=settings), [partial(list, [log])], [], settings)
-        doubted[name] = "OK" not in found.status[:5]
-    assert doubted == {"143747": True, "143906": True, "144115": True, "143524": False, "154220": False}
+        found = doubted(weak.fit([partial(list, [log])], settings=settings), [partial(list, [log])], [], settings)
+        in_doubt[name] = "OK" not in found.status[:5]
+    assert in_doubt == {"143747": True, "143906": True, "144115": True, "143524": False, "154220": False}

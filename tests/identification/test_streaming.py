@@ -54,7 +54,7 @@ def estimates(log: LogSource, settings: Settings) -> tuple[FloatArray, FloatArra
         values = np.array([one.estimate for one in result.parameters.values()], dtype=np.float64)
         return values, 1e-9 * np.abs(values), result  # condition numbers to 1e6, times rounding
     chosen = choose_model(survey, settings)
-    fit, predictions = run_fit(survey, settings, chosen, None)
+    fit, predictions, chosen = run_fit(survey, settings, chosen, None)
     assert fit.converged
     # A window or sample lost at a seam moves an estimate by 1e-4 of its deviation or more; rounding, times the
     # condition of the normal equations, by 1e-9 of it.

@@ -1,0 +1,53 @@
+"""Where no error bar stands for k1 … k5: a joint stood still, or the joints' equations contradict each other.
+
+Where a likelihood is refuted and there are few logs, what differs from run to run does not show by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from algid.estimators import weak
+from algid.estimators.combine import FEWEST_LOGS
+from algid.estimators.diagnostics import joints_apart
+from algid.estimators.fit import Fit
+from algid.estimators.identifiability import STILL
+from algid.estimators.weak import Source, WeakSettings
+from algid.model import RIGID, UNITS
+from algid.notices import Notice
+
+
+def doubted(fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings) -> Fit:
+    """The fit with status WEAK_EXCITATION for k1 … k5 where they are doubtful.
+
+    Parameters
+    ----------
+    fit : Fit
+        With `FEWEST_LOGS` logs or more it is returned as it is.
+    unloaded, loaded : sequences of callables
+        Each gives a fresh iterable of `Segment`.
+    settings : WeakSettings
+        Of the fit: its window, bandwidth, hold and delay; a model that is linear.
+    """
+    if len(fit.logs) >= FEWEST_LOGS:
+        return fit
+    doubt = _doubt(fit, unloaded, loaded, settings)
+    return fit if doubt is None else fit.marked("WEAK_EXCITATION", RIGID).noted(doubt)
+
+
+def _doubt(fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings) -> Notice | None:
+    still = [f"joint {joint + 1}" for joint in range(2) if fit.moved[joint] < STILL]
+    if still:
+        return Notice("JOINT_STILL", numbers={"joints": still})
+    value = dict(zip(fit.names, fit.values.tolist(), strict=True))
+    settings = replace(settings, estimate_delay=False, delay=value.get("delay", settings.delay))
+    for sources in (unloaded, loaded):
+        every = [weak.normal_equations(source, settings) for source in sources]
+        normals = [normal for normal in every if normal is not None]
+        apart = joints_apart(normals, settings.model) if normals else None
+        if apart is not None:
+            unit = UNITS[apart.name]
+            numbers = {"name": apart.name, "first": apart.first, "second": apart.second, "unit": unit}
+            return Notice("JOINTS_CONTRADICT", numbers=numbers)
+    return None

@@ -1,0 +1,161 @@
+"""The arm's parameters where no likelihood of white noise holds: every term of the torque, shrunk to what logs tell.
+
+The windows of the weak form are gathered with the columns of all terms, linearised where they are not linear, and
+weighed by each joint's residual, log by log; `algid.estimators.shrinkage` finds parameters and spreads. A joint that
+stands is held by dry friction, which is any torque up to f there: its windows say nothing and are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.estimators import weak
+from algid.estimators.combine import LogInformation, Prior
+from algid.estimators.fit import Fit
+from algid.estimators.modulating_functions import OVERLAP, row_weights
+from algid.estimators.parametrisation import Shared
+from algid.estimators.shrinkage import SCALES, Expected, dispersion, divided, joined, shrink
+from algid.estimators.shrunk_fit import concluded
+from algid.estimators.weak import Normal, Source, WeakSettings
+from algid.model import DELAYS, SINES, TERMS
+
+AT_REST = 0.1
+"""Of a joint's RMS speed over all logs: slower windows are of a joint that stands."""
+_ROUNDS = 3
+_REWEIGHTINGS = 4
+
+
+def fit(
+    unloaded: Sequence[Source],
+    loaded: Sequence[Source] = (),
+    settings: WeakSettings | None = None,
+    lengths: Mapping[str, float] | None = None,
+    known: Prior | None = None,
+) -> Fit:
+    """Parameters of the arm, of every term and of its payload where there are loaded logs.
+
+    Parameters
+    ----------
+    unloaded, loaded : sequences of callables
+        Each gives a fresh iterable of `Segment`, the stretches of one log in time; called a few times.
+    settings : WeakSettings
+        Window, bandwidth, hold and delay; its model's gravity and shapes of friction. With a delay that is not zero
+        none is estimated.
+    lengths : mapping of "l1", "l2" to m, where known
+    known : Prior
+        What an earlier result knows of the arm and of its terms; unloaded logs are not needed then.
+
+    Raises
+    ------
+    ValueError
+        If no log is long enough for a window, or there is neither an unloaded log nor `known`.
+    """
+    settings = settings or WeakSettings()
+    logs = _Logs(tuple(unloaded), tuple(loaded))
+    held = () if known is None else known.names
+    first = logs.normals(_with_terms(settings, ()), {})
+    terms = offered([normal for _, normal in first], held)
+    estimates_delay = settings.estimate_delay or settings.delay == 0
+    settings = replace(_with_terms(settings, terms), estimate_delay=estimates_delay)
+    rest = AT_REST * weak.speeds([*unloaded, *loaded], settings)
+    settings = replace(settings, rest=(float(rest[0]), float(rest[1])))
+    shared = Shared(settings.model, estimates_delay, bool(loaded), dict(lengths or {}))
+    moved = np.max([normal.moved for _, normal in first], axis=0)
+    return _found(logs, shared, settings, known, held, moved)
+
+
+def offered(normals: Sequence[Normal], held: Sequence[str] = ()) -> tuple[str, ...]:
+    """The terms that logs may tell: a joint without a motor has no gain, a lag is a delay to first order."""
+    driven = all(normal.gram[:, joint, -1, -1].any() for normal in normals for joint in (0, 1))
+    return tuple(
+        term
+        for term, content in TERMS.items()
+        if (term in SCALES and (driven or not content.gains)) or set(content.names) & set(held)
+    )
+
+
+def _with_terms(settings: WeakSettings, terms: Sequence[str]) -> WeakSettings:
+    return replace(settings, model=replace(settings.model, terms=tuple(terms)), estimate_delay=False)
+
+
+@dataclass(frozen=True)
+class _Logs:
+    unloaded: tuple[Source, ...]
+    loaded: tuple[Source, ...]
+
+    def normals(self, settings: WeakSettings, at: Mapping[bool, FloatArray]) -> list[tuple[bool, Normal]]:
+        """Normal equations of each log that is long enough, and whether it is loaded."""
+        found = []
+        for kind, sources in ((False, self.unloaded), (True, self.loaded)):
+            for source in sources:
+                normal = weak.normal_equations(source, settings, at.get(kind))
+                if normal is not None:
+                    found.append((kind, normal))
+        return found
+
+
+def _found(
+    logs: _Logs, shared: Shared, settings: WeakSettings, known: Prior | None, held: Sequence[str], moved: FloatArray
+) -> Fit:
+    base = settings.delay
+    at: dict[bool, FloatArray] = {}
+    normals = logs.normals(settings, at)
+    bare, burdened = ([normal for kind, normal in normals if kind is loaded] for loaded in (False, True))
+    beta, _ = weak.first_estimate(shared, bare, burdened, known)
+    first = bare + burdened
+    share: FloatArray = np.ones(0)
+    for number in range(_ROUNDS):
+        if number:
+            at = {kind: shared.coefficients(beta, kind)[: len(settings.model.names)] for kind, _ in normals}
+            if shared.delay:
+                base = float(beta[len(settings.model.names)])
+                settings = replace(settings, delay=base)
+            normals = logs.normals(settings, at)
+        expected = expectation(shared, first, settings, beta, held)
+        share = share if number else np.ones(len(expected.names))
+        for _ in range(_REWEIGHTINGS):
+            likelihoods = [_weighed(shared, normal, kind, beta, base) for kind, normal in normals]
+            phi = dispersion(shared, likelihoods, beta)
+            scaled = divided(likelihoods, phi)
+            beta, share = shrink(shared, scaled, beta, expected, share, known)
+    own = expected.prior(share)
+    return concluded(shared, scaled, beta, joined(known, own), own, moved)
+
+
+def _weighed(shared: Shared, normal: Normal, loaded: bool, beta: FloatArray, base: float) -> LogInformation:
+    """A log's likelihood with the weights of its residual at `beta` (Q,); its columns tell the delay's change."""
+    c0 = shared.coefficients(beta, loaded)
+    c = c0.copy()
+    if shared.delay:
+        c[-1] -= base
+    weights = row_weights(normal.gram.sum(axis=0), np.append(-c, 1.0), normal.rows)
+    # Overlapping rows repeat each other: a window's worth of rows counts as two.
+    gram = np.einsum("a,baxy->bxy", weights * (2.0 / OVERLAP), normal.gram)
+    return LogInformation(loaded, c0, gram[:, :-1, :-1], gram[:, :-1, -1] - gram[:, :-1, :-1] @ c)
+
+
+def expectation(
+    shared: Shared, normals: Sequence[Normal], settings: WeakSettings, beta: FloatArray, held: Sequence[str] = ()
+) -> Expected:
+    """What physics expects of the terms of logs whose torque has the size that `normals` tell, save of those `held`."""
+    squares = np.sum([normal.gram[:, :, -1, -1].sum(axis=0) for normal in normals], axis=0)
+    torque = np.sqrt(squares / np.maximum(np.sum([normal.rows for normal in normals], axis=0), 1.0))
+    torque = np.where(torque > 0, torque, torque.max())  # a joint without a motor bears a load like the other's
+    inertia = float(abs(beta[shared.names.index("k3")]))
+    late = 0.5 * normals[0].dt if settings.hold == "foh" else 0.0  # a torque held by a digital controller
+    rows = []
+    for term in (*shared.model.terms, *(DELAYS if shared.delay else ())):
+        scale = SCALES.get(term)
+        for name in DELAYS if term in DELAYS else TERMS[term].names:
+            if scale is None or name in held or name not in shared.names:
+                continue
+            cosine = abs(float(beta[shared.names.index(SINES[name])])) if name in SINES else 0.0
+            own = float(torque[1 if name.endswith("2") else 0])
+            unit = {"unit": 1.0, "k3": inertia, "torque": own, "cosine": cosine}[scale.of]
+            rows.append((name, term, late if term in DELAYS else 0.0, scale.size * unit, scale.usual))
+    names, terms, means, spreads, usual = zip(*rows, strict=True)
+    return Expected(names, terms, np.array(means), np.array(spreads), np.array(usual))

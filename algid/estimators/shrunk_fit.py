@@ -1,0 +1,86 @@
+"""What parameters found with shrunk terms are worth: their covariance, statuses, and what the logs leave open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.estimators.combine import LogInformation, Prior, combine, scaled_pinv
+from algid.estimators.fit import Fit, Intervals, Status
+from algid.estimators.identifiability import examine
+from algid.estimators.parametrisation import Shared
+from algid.estimators.shrinkage import spread
+
+QUANTILE = 2.3
+"""Half width of a 95 % interval in standard deviations, which rest on few logs: `make run-to-run` holds it."""
+
+
+def concluded(
+    shared: Shared,
+    logs: Sequence[LogInformation],
+    beta: FloatArray,
+    prior: Prior,
+    shrinkage: Prior,
+    moved: FloatArray,
+) -> Fit:
+    """The fit of likelihoods divided by φ, with error bars and statuses.
+
+    Parameters
+    ----------
+    shared : Shared
+    logs : each log's quadratic likelihood
+    beta : (Q,)
+        Where the solver starts.
+    prior : Prior
+        All that is known beforehand.
+    shrinkage : Prior
+        Its part on the terms that are shrunk.
+    moved : (2,), rad
+        How far each joint travelled.
+    """
+    beta, H, _ = combine(shared, logs, beta, prior)
+    statuses, sentences = _judged(shared.names, beta, H, shrinkage.names, moved)
+    without = _left_out(shared, logs, beta, prior)
+    wide = spread(shared, logs, beta, prior, without)
+    intervals: Intervals = "sandwich" if wide.jackknife is None else "jackknife"
+    ways = [way for way in (wide.jackknife, wide.scores, wide.stretches) if way is not None]
+    return Fit(
+        estimator="weak",
+        shared=shared,
+        values=beta,
+        covariance=np.mean(ways, axis=0),
+        intervals=intervals,
+        quantile=QUANTILE,
+        freedom=wide.freedom,
+        status=statuses,
+        unidentifiable=sentences,
+        logs=tuple(logs),
+        prior=prior,
+        shrinkage=shrinkage,
+        without=without,
+        moved=moved,
+    )
+
+
+def _judged(
+    names: Sequence[str], beta: FloatArray, H: FloatArray, shrunk: Sequence[str], moved: FloatArray
+) -> tuple[tuple[Status, ...], tuple[str, ...]]:
+    """Each parameter's status, and sentences about what is open; a term is never open, since physics bounds it."""
+    free = np.array([name not in shrunk for name in names])
+    own = scaled_pinv(scaled_pinv(H)[np.ix_(free, free)])
+    judged = examine([name for name in names if name not in shrunk], beta[free], own, moved)
+    determined = iter(judged.determined)
+    statuses: list[Status] = ["OK" if not yes or next(determined) else "NOT_IDENTIFIABLE" for yes in free]
+    return tuple(statuses), judged.sentences
+
+
+def _left_out(shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior) -> FloatArray:
+    """Parameters (n, Q) without each log, with the same spreads; without the only one of its kind, those of all."""
+    rows = []
+    for place, log in enumerate(logs):
+        rest = [*logs[:place], *logs[place + 1 :]]
+        alone = not any(other.loaded is log.loaded for other in rest)
+        rows.append(beta if alone else combine(shared, rest, beta, prior)[0])
+    return np.array(rows)
