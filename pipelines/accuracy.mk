@@ -1,4 +1,4 @@
-.PHONY: accuracy accuracy-quick
+.PHONY: accuracy accuracy-quick run-to-run
 
 ACCURACY_DRAWS ?= 100
 ACCURACY_MODEL_DRAWS ?= 4
@@ -10,3 +10,6 @@ accuracy: setup ## errors against the Cramér-Rao bound, peers, real arm; into b
 
 accuracy-quick: setup
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.accuracy --quick -o build/accuracy
+
+run-to-run: setup ## halves of two real arms' runs: whether intervals hold, and repeatability beside output error
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.run_to_run ../shared/data/dfki
