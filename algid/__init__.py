@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from algid.errors import AlgidError
     from algid.identification.identify import identify
     from algid.log import Log
+    from algid.profile import Profile
     from algid.readers import read_log
     from algid.results import Result, read_result
     from algid.settings import Settings
@@ -31,6 +32,7 @@ __all__ = [
     "AlgidError",
     "Arm",
     "Log",
+    "Profile",
     "Result",
     "Settings",
     "__version__",
@@ -46,6 +48,7 @@ _HOMES = {
     "AlgidError": "algid.errors",
     "Arm": "algid.arm",
     "Log": "algid.log",
+    "Profile": "algid.profile",
     "Result": "algid.results",
     "Settings": "algid.settings",
     "identify": "algid.identification.identify",

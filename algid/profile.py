@@ -98,10 +98,42 @@ class Torque(Channel):
 class Profile(_Strict):
     """What a log's names, units and signs mean. Angles become θ1 from the horizontal, θ2 from link 1.
 
-    `start` and `end`, in s since the log's first sample, cut it; `accept` names checks that may warn but not refuse.
-    `drive` is where the second motor stands: in its joint, or at the base, where a belt or a parallelogram takes its
-    torque to θ1 + θ2. Torques then become those of the joints: τ1 + τ2 and τ2. `passive` is a joint without a motor, as
-    an acrobot's first or a pendubot's second: its torque is nought, whatever the log says.
+    Parameters
+    ----------
+    topic : str
+        Where the joint states stand in a log of messages.
+    joints : pair of str
+        The two joints, where the log has more or does not tell which is the first.
+    clock : 'header' or 'log'
+        Stamps of the messages' own header, or those of the recorder.
+    time, time_unit : str
+        The column of the time, and its unit: 's', 'ms', 'us' or 'ns'.
+    zero : 'horizontal' or 'hanging'
+        Where θ1 is zero.
+    second_angle : 'relative' or 'absolute'
+        Whether θ2 counts from link 1, or from where θ1 does.
+    drive : 'joint' or 'base'
+        Where the second motor stands: in its joint, or at the base, where a belt or a parallelogram takes its torque
+        to θ1 + θ2. Torques then become those of the joints: τ1 + τ2 and τ2.
+    passive : 1 or 2
+        A joint without a motor, as an acrobot's first or a pendubot's second: its torque is zero, whatever the log
+        says.
+    gravity : float, m/s^2
+    velocity : bool
+        Whether recorded velocities are read.
+    signs, offsets : pairs of 1 or -1, and of float in rad
+        Of the joints.
+    start, end : float, s since the log's first sample
+        Where it is cut.
+    accept : codes of checks
+        Which may warn but not refuse.
+    theta1, theta2, tau1, tau2, omega1, omega2 : dict
+        Of one channel its `source`, `unit`, `sign`, `offset`, `gear_ratio` and what else its kind has.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        If a setting or its value is not known.
     """
 
     topic: str | None = None

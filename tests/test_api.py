@@ -16,7 +16,7 @@ import pyarrow as pa
 import pytest
 
 import algid
-from algid.errors import LogError, ResultError
+from algid.errors import LogError, ResultError, SettingError
 from algid.identification.identify import identify
 from algid.log import ChannelReading, Reading
 from algid.results import Result, Status, write_result
@@ -50,7 +50,12 @@ def _sections(thing: object) -> dict[str, set[str]]:
     """By numpydoc's heading the names that its lines explain: before a colon, with commas between them."""
     parts = re.split(r"^(\w+)\n-+\n", inspect.getdoc(thing) or "", flags=re.MULTILINE)[1:]
     return {
-        heading: {name for line in text.splitlines() if line[:1].strip() for name in line.split(" :")[0].split(", ")}
+        heading: {
+            name
+            for line in text.splitlines()
+            if line[:1].strip()
+            for name in line.split(" :")[0].lstrip("*").split(", ")
+        }
         for heading, text in zip(parts[::2], parts[1::2], strict=True)
     }
 
@@ -305,3 +310,57 @@ def test_a_frame_that_is_no_log_is_refused(columns: dict[str, Any], changes: dic
 def test_a_dict_that_is_no_log_is_refused(given: dict[str, Any], expected: str) -> None:
     with pytest.raises(LogError, match=expected):
         algid.identify(given, settings=WEAK)
+
+
+def test_settings_are_keywords_as_they_are_flags(columns: dict[str, Any]) -> None:
+    frame = pl.DataFrame(columns)
+    asked = algid.Settings(estimator="weak", model="coulomb", gravity=9.8, poles=(-80, -390, -391, -392, -393, -394))
+    poles = "-80,-390,-391,-392,-393,-394"
+    for given in (poles, [-80, -390, -391, -392, -393, -394]):
+        found = algid.identify(frame, estimator="weak", model="coulomb", gravity=9.8, poles=given)
+        assert found.parameters == algid.identify(frame, settings=asked).parameters
+    over = algid.identify(frame, settings=asked, model="plain")
+    assert (over.settings["model"], over.settings["gravity"]) == ("plain", 9.8)
+
+
+def test_a_profile_is_given_in_any_form_and_its_settings_as_keywords(columns: dict[str, Any], tmp_path: Path) -> None:
+    frame, file = pl.DataFrame(columns), tmp_path / "algid.toml"
+    file.write_text('zero = "hanging"\ngravity = 9.7\n[tau1]\nsign = -1\n', encoding="utf-8")
+    content: dict[str, Any] = {"zero": "hanging", "gravity": 9.7, "tau1": {"sign": -1}}
+    ways: list[dict[str, Any]] = [
+        {"profile": file},
+        {"profile": str(file)},
+        {"profile": content},
+        {"profile": algid.Profile.model_validate(content)},
+        {"zero": "hanging", "gravity": 9.7, "tau1": {"sign": -1}},
+        {"profile": content | {"zero": "horizontal", "gravity": 9.0}, "zero": "hanging", "gravity": 9.7},
+    ]
+    found = [algid.identify(frame, settings=WEAK, **way) for way in ways]
+    assert all(one.parameters == found[0].parameters for one in found)
+    assert {one.settings["gravity"] for one in found} == {9.7}
+    readings = [one.log.reading for one in found]
+    assert all(one and one.zero == "hanging" for one in readings)
+    assert [one and one.channels["tau1"].sign for one in readings] == [-1] * 6
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ({"estimater": "weak"}, "^estimater: no setting has this name; did you mean estimator\\?$"),
+        ({"xyzzy": 1}, "^xyzzy: no setting has this name; known are estimator, .*, zero, "),
+        ({"estimator": "weakest"}, "^--estimator: expected one of refined, .*, found 'weakest'$"),
+        ({"model": "coulomb,nothing"}, "^--model: expected auto, plain or some of .*; found 'nothing'$"),
+        ({"gravity": -1}, "^--gravity: expected a number from "),
+        ({"bandwidth": None}, "^--bandwidth: expected a number from "),
+        ({"poles": [1, 2]}, "^--poles 1,2: "),
+        ({"poles": 7}, "^--poles: expected text or numbers, found 7$"),
+        ({"zero": "down"}, "^setting zero: expected 'horizontal' or 'hanging', found 'down'$"),
+        ({"tau1": {"unit": "m"}}, "^setting tau1.unit: expected "),
+        ({"profile": {"zeros": "hanging"}}, "^setting zeros: extra inputs are not permitted, found 'hanging'$"),
+        ({"profile": "nowhere.toml"}, "^nowhere.toml: "),
+        ({"profile": 3}, "^profile: expected a path, a dict or a Profile, found int$"),
+    ],
+)
+def test_a_keyword_is_checked_as_its_flag(columns: dict[str, Any], options: dict[str, Any], expected: str) -> None:
+    with pytest.raises(SettingError, match=expected):
+        algid.identify(columns, **options)

@@ -14,6 +14,7 @@ from algid.errors import LogError, ResultError, SettingError
 from algid.estimators.paper import SHORTEST
 from algid.files import refuse_misleading, result_folder, whole_folder
 from algid.identification.by_paper import run_paper
+from algid.identification.options import with_options
 from algid.identification.outcome import Identified
 from algid.identification.series import write_fit_series
 from algid.identification.source import LogLike, LogSource, open_sources, read_otherwise, with_twins_marked
@@ -25,6 +26,7 @@ from algid.runtime import one_blas_thread
 from algid.settings import Settings
 
 if TYPE_CHECKING:
+    from algid.identification.options import ProfileLike
     from algid.profile import Profile
 
 SERIES_SECONDS = 600.0  # the paper's convergence series is drawn beside other estimators up to this length of log
@@ -51,7 +53,7 @@ def identify(
     settings: Settings | None = None,
     *,
     parameters: Result | str | Path | None = None,
-    profile: Profile | None = None,
+    profile: ProfileLike | None = None,
     out: str | Path | None = None,
     name: str | None = None,
     force: bool = False,
@@ -60,6 +62,7 @@ def identify(
     command: str | None = None,
     shared_library: bool = False,
     progress: Progress | None = None,
+    **options: Any,
 ) -> Result:
     """Identify the constants k1 … k7 of an arm and, from loaded logs, its tip payload.
 
@@ -71,7 +74,7 @@ def identify(
     settings : Settings
     parameters : Result or path of one
         An arm identified before; then no unloaded log is needed.
-    profile : Profile
+    profile : Profile, path of one, or dict of what would stand in its file
         What the logs' names, units and signs mean; where it is silent, what was said of the earlier result's logs.
     out : Path
         Folder to write into; None writes nothing.
@@ -89,6 +92,9 @@ def identify(
         Put the pages' plotting library once beside the result folders instead of into each page.
     progress : callable
         Called with the stage and how many samples of how many it has gone over, as the work goes on.
+    **options : of `Settings` and of `Profile`, by their names
+        ``estimator="weak"``, ``zero="hanging"``: over `settings` and `profile`, as flags are over a file.
+        `velocity` is that of `Settings`.
 
     Returns
     -------
@@ -100,22 +106,23 @@ def identify(
     AlgidError
         If a log cannot be used, or nothing can be written.
     SettingError
-        If logs are to be cross-validated of which there is one alone.
+        If a setting is not known or wrong, or logs are to be cross-validated of which there is one alone.
     ValueError
         If there is neither an unloaded log nor `parameters`.
     """
     refuse_misleading(name)
-    settings, out = settings or Settings(), None if out is None else Path(out)
+    out = None if out is None else Path(out)
+    settings, meaning = with_options(settings, profile, options)
     earlier = Earlier.of(parameters)
-    profile = profile if earlier is None else reused(profile, earlier.result)
-    if profile is not None and "gravity" in profile.model_fields_set and settings.gravity == Settings.gravity:
-        settings = replace(settings, gravity=profile.gravity)
+    meaning = meaning if earlier is None else reused(meaning, earlier.result)
+    if meaning is not None and "gravity" in meaning.model_fields_set and settings.gravity == Settings.gravity:
+        settings = replace(settings, gravity=meaning.gravity)
     sources = with_twins_marked(
-        open_sources(unloaded, "unloaded", profile, settings.gravity),
-        open_sources(loaded, "loaded", profile, settings.gravity),
+        open_sources(unloaded, "unloaded", meaning, settings.gravity),
+        open_sources(loaded, "loaded", meaning, settings.gravity),
     )
     survey = Survey(sources, progress)
-    said = {} if profile is None else profile.model_dump(mode="json", exclude_unset=True)
+    said = {} if meaning is None else meaning.model_dump(mode="json", exclude_unset=True)
     if not survey.unloaded and (earlier is None or not survey.loaded):
         raise ValueError("an unloaded log is needed, or parameters and a loaded log")
     if settings.cross_validate and (len(survey.unloaded) == 1 or len(survey.loaded) == 1):

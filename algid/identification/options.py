@@ -1,0 +1,91 @@
+"""What a caller says beside the logs: a profile in any form, and single settings by their names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from algid.errors import SettingError
+from algid.settings import Settings, flag
+
+if TYPE_CHECKING:
+    from algid.profile import Profile
+
+    ProfileLike = Profile | str | Path | Mapping[str, Any]
+    """A profile, the path of its file, or what would stand in that."""
+
+
+def with_options(
+    settings: Settings | None, profile: ProfileLike | None, options: Mapping[str, Any]
+) -> tuple[Settings, Profile | None]:
+    """Settings and profile with single settings of either over them, as flags are over a file.
+
+    Parameters
+    ----------
+    settings : Settings or None
+    profile : Profile, path of one, mapping or None
+    options : mapping
+        By the names of the fields of `Settings`, and of `Profile`'s that `Settings` does not have.
+
+    Raises
+    ------
+    SettingError
+        If an option is not known, or a value is wrong.
+    """
+    given, known = settings or Settings(), profile_of(profile)
+    if not options:
+        return given, known
+    from algid.profile import Profile, with_settings
+
+    own = {field.name: field.metadata.get("parse") for field in fields(Settings)}
+    _refuse_unknown(options, [*own, *Profile.model_fields])
+    of_settings = {name: value for name, value in options.items() if name in own}
+    of_profile = {name: value for name, value in options.items() if name not in own}
+    for name, value in of_settings.items():
+        parse = own[name]
+        if parse is not None and value is not None:
+            of_settings[name] = parse(_text(name, value))
+    if of_profile:
+        known = with_settings(known or Profile(), of_profile)
+    if known is not None and "gravity" in of_settings:
+        known = with_settings(known, {"gravity": of_settings["gravity"]})
+    return replace(given, **of_settings), known
+
+
+def profile_of(given: ProfileLike | None) -> Profile | None:
+    """The profile that is given in any form.
+
+    Raises
+    ------
+    SettingError
+        If its file cannot be read, or a setting of it is wrong.
+    """
+    from algid.profile import Profile, load_profile, over
+
+    if given is None or isinstance(given, Profile):
+        return given
+    if isinstance(given, str | Path):
+        return load_profile(Path(given))
+    if not isinstance(given, Mapping):
+        raise SettingError(f"profile: expected a path, a dict or a Profile, found {type(given).__name__}")
+    return over(None, given)
+
+
+def _refuse_unknown(options: Mapping[str, Any], known: list[str]) -> None:
+    for name in options:
+        if name not in known:
+            near = get_close_matches(name, known, n=1)
+            mend = f"did you mean {near[0]}?" if near else f"known are {', '.join(dict.fromkeys(known))}"
+            raise SettingError(f"{name}: no setting has this name; {mend}")
+
+
+def _text(name: str, value: object) -> str:
+    """What the command line would be given."""
+    if isinstance(value, str):
+        return value
+    if not isinstance(value, list | tuple):
+        raise SettingError(f"{flag(name)}: expected text or numbers, found {value!r:.60}")
+    return ",".join(map(str, value))
