@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import inspect
 import json
 import re
@@ -19,7 +20,9 @@ import algid
 from algid.errors import LogError, ResultError, SettingError
 from algid.identification.identify import identify
 from algid.log import ChannelReading, Reading
-from algid.results import Result, Status, write_result
+from algid.model import PARAMETERS
+from algid.results import Estimate, Result, Status, write_result
+from algid.results.notebook import interval_bar
 from tests.report.folders import build
 
 
@@ -222,6 +225,45 @@ def test_a_log_is_made_of_arrays_either_way_round_and_gives_the_same_result() ->
     assert {"verdict", "to_frame", "parameters"} <= set(dir(one))
     assert not any(name.startswith("model_") for name in dir(one))
     assert one.verdict.word in one._repr_html_()
+
+
+def test_a_notebook_shows_each_meaning_and_a_bar_of_each_interval(tmp_path: Path) -> None:
+    made = build(tmp_path / "a.algid", duration=1.0)
+    shown = made._repr_html_()
+    bounded = [found for found in made.estimates.values() if found.ci95 and None not in found.ci95]
+    assert bounded
+    assert shown.count("<svg") == len(bounded)
+    assert PARAMETERS["k1"].meaning in html.unescape(shown)
+
+
+@pytest.mark.parametrize(
+    ("interval", "rect", "zero"),
+    [
+        ((1.0, 2.0), (60.0, 59.0), 1.0),  # half of the scale from 0 to 2
+        ((-2.0, -1.0), (1.0, 59.0), 119.0),
+        ((-1.0, 3.0), (1.0, 118.0), 30.5),
+        ((1.0, 1.0), (119.0, 1.0), 1.0),
+    ],
+)
+def test_a_bar_is_drawn_against_zero(interval: tuple[float, float], rect: tuple[float, float], zero: float) -> None:
+    middle = sum(interval) / 2
+    drawn = interval_bar(Estimate(estimate=middle, std=0.1, ci95=interval, unit="kg"))
+    assert f'<rect x="{rect[0]:.1f}" y="3" width="{rect[1]:.1f}"' in drawn
+    assert f'd="M{zero:.1f} 0v' in drawn
+    assert f'cx="{rect[0] + (rect[1] / 2 if interval[0] < interval[1] else 0):.1f}"' in drawn
+
+
+@pytest.mark.parametrize(
+    "found",
+    [
+        Estimate(estimate=None, unit="kg"),
+        Estimate(estimate=1.0, unit="kg"),
+        Estimate(estimate=1.0, std=1.0, ci95=(None, None), unit="kg"),
+        Estimate(estimate=0.0, std=0.0, ci95=(0.0, 0.0), unit="kg"),
+    ],
+)
+def test_what_has_no_interval_has_no_bar(found: Estimate) -> None:
+    assert interval_bar(found) == ""
 
 
 WEAK = algid.Settings(estimator="weak")

@@ -8,7 +8,6 @@ on when it was made, so that the same log and settings give the same bytes.
 
 from __future__ import annotations
 
-import html
 import json
 from collections.abc import Iterator
 from enum import StrEnum
@@ -23,7 +22,7 @@ from algid.limits import LIMITS
 from algid.log import Reading
 from algid.notices import Notice, from_flags
 from algid.text import visible
-from algid.verdict import MOST_REASONS, Verdict
+from algid.verdict import Verdict
 from algid.words import counted
 
 SCHEMA_VERSION: Literal[3] = 3
@@ -345,16 +344,9 @@ class Result(_Model):
 
     def _repr_html_(self) -> str:
         """For notebooks."""
-        heading, *rows = [("Parameter", "Estimate", "± std", "Unit", "Status"), *self._rows()]
-        head = "".join(f"<th>{cell}</th>" for cell in heading)
-        body = "".join(f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
-        title = html.escape(f"{self.estimator} estimate from {ascii(self.log.path)[1:-1]}{self._others}")
-        judged = self.verdict
-        reasons = "".join(f"<li>{html.escape(visible(one.text, 1000))}</li>" for one in judged.reasons[:MOST_REASONS])
-        said = (
-            f"<p><strong>{judged.word}</strong>: {html.escape(visible(judged.headline, 1000))}.</p><ul>{reasons}</ul>"
-        )
-        return f"{said}<table><caption>{title}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+        from algid.results.notebook import html_of
+
+        return html_of(self, f"{self.estimator} estimate from {ascii(self.log.path)[1:-1]}{self._others}")
 
     @property
     def _others(self) -> str:
