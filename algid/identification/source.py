@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Literal
 from algid.errors import LogError
 from algid.log import Log, Origin
 from algid.notices import Notice
-from algid.readers import open_log, read_log
 from algid.readers.memory import Columns, is_columns
 from algid.readers.timebase import check_step
 from algid.results import LogSummary, Result
@@ -87,8 +86,10 @@ def open_source(
     LogError
         If the log cannot be opened, or its metadata name another payload than its role.
     """
+    from algid.readers import open_log
+
     if is_columns(log):
-        log = read_log(log, profile)
+        log = open_log(log, profile).whole()
     if isinstance(log, Log):
         log = _in_radians(log)
         check_step(log.origin.path, log.stamp_ns)
