@@ -155,18 +155,22 @@ def with_payload(k: FloatArray, z: FloatArray) -> FloatArray:
     return np.array([k1 + z3, k2 + z5, k3 + z2, k4 + z4, k5 + z1, k6, k7])
 
 
-def _moments(k: FloatArray) -> tuple[complex, complex, complex]:
-    """The moments k1, k2 and k4 of constants (7,), or with their sine parts (10,), as phasors."""
+def _moments(k: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The moments k1, k2 and k4 of constants (7,), or with their sine parts (10,): (cosine part, sine part) each."""
     sines = k[7:] if len(k) > 7 else np.zeros(3)
-    return k[0] + 1j * sines[0], k[1] + 1j * sines[1], k[3] + 1j * sines[2]
+    return np.array([k[0], sines[0]]), np.array([k[1], sines[1]]), np.array([k[3], sines[2]])
 
 
-def _turned(K: complex, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Real and imaginary part of K exp(i angle)."""
-    c, s = np.cos(angle), np.sin(angle)
-    if not np.any(K.imag):
-        return K.real * c, K.real * s
-    return K.real * c - K.imag * s, K.real * s + K.imag * c
+def _turned(moment: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Real and imaginary part of (c + i s) exp(i angle) for a moment (c, s).
+
+    They are written out, so that they stay analytic in `moment`: derivatives by complex steps pass through.
+    """
+    cosine, sine = np.cos(angle), np.sin(angle)
+    along, across = moment
+    if not np.any(across):
+        return along * cosine, along * sine
+    return along * cosine - across * sine, along * sine + across * cosine
 
 
 def mass_matrix(k: FloatArray, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 _EXCESS = "excess"
 
+_SPLIT = 1 << 20
+
 
 def sidecar(path: Path) -> Path:
     """Where the truth of a CSV log stands: ``LOG.csv.truth.json``."""
@@ -121,7 +123,7 @@ def _lines(path: Path, kind: str, dialect: Dialect) -> Iterator[tuple[int, bytes
     """
     comment = dialect.comment.encode() if dialect.comment else b"\n"
     rest, number = b"", 0
-    for piece in chain(pieces(path, kind), [b"\n"]):
+    for piece in chain(_small(pieces(path, kind)), [b"\n"]):
         *lines, rest = (rest + piece).split(b"\n")
         if len(rest) > LIMITS.line_bytes:
             raise LogError(f"{path}: a line of more than 65,000 characters; expected rows of numbers")
@@ -129,6 +131,13 @@ def _lines(path: Path, kind: str, dialect: Dialect) -> Iterator[tuple[int, bytes
             number += 1
             if number > dialect.skip and not line.startswith(comment):
                 yield number, line
+
+
+def _small(found: Iterator[bytes]) -> Iterator[bytes]:
+    """The same bytes, at most `_SPLIT` at once: a list of empty lines takes eight times their bytes."""
+    for piece in found:
+        for start in range(0, len(piece), _SPLIT):
+            yield piece[start : start + _SPLIT]
 
 
 def _without_values(path: Path, kind: str, dialect: Dialect, columns: Columns) -> int:

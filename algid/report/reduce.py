@@ -26,7 +26,7 @@ from algid.errors import ResultError
 
 ROWS = 1 << 18
 
-LARGEST = 1e100
+LARGEST = 1e20
 """Beyond this nothing of an arm is a number: squares would overflow."""
 
 Block = dict[str, FloatArray]

@@ -96,7 +96,6 @@ def test_an_option_that_names_a_pipe_is_refused(command: str, option: str, place
         ["validate", "pipe", "case1-unloaded.mcap"],
         ["export", "pipe", "--to", "c"],
         ["batch", "pipe.toml", "-o", "batch"],
-        ["batch", "pipe.csv", "-o", "batch"],
         ["fleet", "piped"],
         ["track", "pipe", "--parameters", "case1-unloaded.algid"],
         ["check", "pipe.json"],
@@ -127,6 +126,14 @@ def refused(arguments: list[str]) -> None:
     assert done.exit_code != 0
     assert len(text.splitlines()) == 1, (done.output, done.exception)
     assert "no regular file" in text or (arguments[0] == "batch" and "found none" in text), text
+
+
+def test_a_pipe_among_a_batchs_logs_fails_alone(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(place)
+    with soon():
+        done = CliRunner().invoke(app, ["batch", "pipe.csv", "-o", "batch"])
+    assert done.exit_code == 1
+    assert "pipe: failed: pipe.csv: it is no regular file" in " ".join(done.output.split())
 
 
 @pytest.mark.parametrize("command", [["report"], ["report", "--export", "mcap"]], ids=" ".join)
