@@ -155,13 +155,17 @@ def with_payload(k: FloatArray, z: FloatArray) -> FloatArray:
     return np.array([k1 + z3, k2 + z5, k3 + z2, k4 + z4, k5 + z1, k6, k7])
 
 
-def _moments(k: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The moments k1, k2 and k4 of constants (7,), or with their sine parts (10,): (cosine part, sine part) each."""
+Moment = tuple[FloatArray, FloatArray]
+"""A phasor as its cosine and sine part: numbers, or arrays of many arms."""
+
+
+def _moments(k: FloatArray) -> tuple[Moment, Moment, Moment]:
+    """The moments k1, k2 and k4 of constants (7, ...), or with their sine parts (10, ...)."""
     sines = k[7:] if len(k) > 7 else np.zeros(3)
-    return np.array([k[0], sines[0]]), np.array([k[1], sines[1]]), np.array([k[3], sines[2]])
+    return (k[0], sines[0]), (k[1], sines[1]), (k[3], sines[2])
 
 
-def _turned(moment: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _turned(moment: Moment, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Real and imaginary part of (c + i s) exp(i angle) for a moment (c, s).
 
     They are written out, so that they stay analytic in `moment`: derivatives by complex steps pass through.
