@@ -24,6 +24,17 @@ def holds_95(ratios: FloatArray) -> None:
     assert narrower < low, f"{narrower} of {size.size} within intervals of 90 %, of {low:g} at least: too few draws"
 
 
+def holds_at_least_95(ratios: FloatArray) -> None:
+    """Fail unless errors over half widths are those of 95 % intervals or of wider ones.
+
+    For intervals that are wider by design, where noise is assumed that the simulation does not have.
+    """
+    size = np.abs(np.ravel(ratios))
+    low, _ = binom.interval(1 - CHANCE, size.size, 0.95)
+    inside = int(np.sum(size <= 1))
+    assert inside >= low, f"{inside} of {size.size} within, {low:g} at least expected"
+
+
 def in_axes(error: FloatArray, covariance: FloatArray, quantile: float) -> FloatArray:
     """Errors (Q,) over half widths along the covariance's own axes (Q,), where they are independent."""
     return np.linalg.solve(np.linalg.cholesky(covariance), error) / quantile

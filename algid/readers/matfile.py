@@ -61,12 +61,13 @@ class _Walk:
             if kind == _MATRIX:
                 self.elements(content, start, start + size, depth + 1)
             elif kind == _PACKED:
-                inside = self._inside(content[start : start + size])
+                with memoryview(content) as whole, whole[start : start + size] as packed:
+                    inside = self._inside(packed)
                 self.elements(inside, 0, len(inside), depth + 1)
             size += 0 if kind == _PACKED else -size % 8  # but for packed ones, elements are padded to 8 bytes
             place = max(place + self._tag.size, start + size) if start > place + 4 else place + self._tag.size
 
-    def _inside(self, packed: bytes) -> bytes:
+    def _inside(self, packed: memoryview) -> bytes:
         left = LIMITS.whole_bytes - self._unpacked
         stream = zlib.decompressobj()
         inside = stream.decompress(packed, left)

@@ -19,6 +19,7 @@ from algid.identification.source import Staged
 from algid.log import Log
 from algid.profile import Angle, Profile
 from algid.readers.mcap import opened
+from algid.readers.mcap.load import _LOOKED_BESIDE
 from algid.results import Result
 from algid.settings import Settings
 from algid.stores import open_store
@@ -68,10 +69,11 @@ def test_of_a_log_with_cameras_the_joints_chunks_are_fetched(served: Served, log
     assert needed < 0.012 * path.stat().st_size
     copy = staged(_put(served, path), tmp_path / "copy")
     assert not copy.whole
-    assert sum(served.answers) < 2 * needed
+    looked_at = _LOOKED_BESIDE + needed // 4  # chunks of other channels may redefine ours
+    assert sum(served.answers) < 2 * needed + looked_at
     assert len(served.answers) < len(found.spans) + 8
     assert copy.path.stat().st_size == path.stat().st_size
-    assert copy.path.stat().st_blocks * 512 < 3 * needed
+    assert copy.path.stat().st_blocks * 512 < 3 * needed + looked_at
     assert identify(copy, settings=WEAK).log.sha256 is None
     assert _same(copy, path)
 

@@ -26,7 +26,7 @@ from algid.synth.simulator import SimulatedMotion, simulate
 from algid.track.result import track_json
 from algid.track.run import track_log
 from tests.cli.commands import app
-from tests.intervals import holds_95, in_axes
+from tests.intervals import holds_at_least_95, in_axes
 
 DT = 2e-3
 SIGMA = 1e-3  # rad; ten times as much in N m
@@ -88,7 +88,8 @@ def test_exact_logs_give_exact_constants(estimator: object, passive: int) -> Non
 def test_intervals_hold_where_a_joint_has_no_motor(passive: int) -> None:
     motion, k = moved("case1", passive), load_case("case1").arm.constants()
     fits = [refined.fit([source(logged(motion, seed))]) for seed in range(140)]
-    holds_95(np.array([in_axes(fit.values - k, fit.covariance, fit.quantile) for fit in fits]))
+    # The motorless row has a noise of its own, a thousandth of the other joint's torque; here it has none.
+    holds_at_least_95(np.array([in_axes(fit.values - k, fit.covariance, fit.quantile) for fit in fits]))
 
 
 def test_a_log_needs_no_torque_of_a_joint_without_motor(tmp_path: Path) -> None:
