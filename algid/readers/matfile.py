@@ -16,6 +16,7 @@ from algid.limits import LIMITS
 _HEAD = 128
 _MATRIX, _PACKED = 14, 15
 _TYPES = frozenset({1, 2, 3, 4, 5, 6, 7, 9, 12, 13, _MATRIX, _PACKED, 16, 17, 18})
+_PIECE = 1 << 20
 _HDF5 = 2
 """The major version of 7.3."""
 
@@ -46,7 +47,7 @@ class _Walk:
         self._tag = struct.Struct(f"{order}II")
         self._found = self._unpacked = 0
 
-    def elements(self, content: bytes | mmap.mmap, place: int, end: int, depth: int) -> None:
+    def elements(self, content: bytearray | mmap.mmap, place: int, end: int, depth: int) -> None:
         """The elements between two bytes, and those within them."""
         while place + self._tag.size <= end:
             self._found += 1
@@ -61,17 +62,21 @@ class _Walk:
             if kind == _MATRIX:
                 self.elements(content, start, start + size, depth + 1)
             elif kind == _PACKED:
-                with memoryview(content) as whole, whole[start : start + size] as packed:
-                    inside = self._inside(packed)
+                inside = self._inside(content, start, start + size)
                 self.elements(inside, 0, len(inside), depth + 1)
             size += 0 if kind == _PACKED else -size % 8  # but for packed ones, elements are padded to 8 bytes
             place = max(place + self._tag.size, start + size) if start > place + 4 else place + self._tag.size
 
-    def _inside(self, packed: memoryview) -> bytes:
-        left = LIMITS.whole_bytes - self._unpacked
+    def _inside(self, content: bytearray | mmap.mmap, start: int, end: int) -> bytearray:
+        """What the packed bytes between two places hold; pages of the file are let go as they are read."""
         stream = zlib.decompressobj()
-        inside = stream.decompress(packed, left)
+        inside = bytearray()
+        for place in range(start, end, _PIECE):
+            left = LIMITS.whole_bytes - self._unpacked - len(inside)
+            inside += stream.decompress(content[place : min(place + _PIECE, end)], max(left, 1))
+            if stream.unconsumed_tail or left <= 0:
+                raise ValueError("its elements unpack to more than 1 GiB")
+            if isinstance(content, mmap.mmap):
+                content.madvise(mmap.MADV_DONTNEED)
         self._unpacked += len(inside)
-        if stream.unconsumed_tail:
-            raise ValueError("its elements unpack to more than 1 GiB")
         return inside
