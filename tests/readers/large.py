@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sqlite3
 import struct
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -173,3 +175,22 @@ def write_db3(path: Path, rows: int) -> None:
 
 
 WRITERS = {"mcap": write_mcap, "bag": write_bag, "db3": write_db3}
+
+
+MOST_BYTES = 600e6
+"""What reading 1e7 samples may take."""
+_PEAK = """
+import re, sys
+from pathlib import Path
+from algid.readers import open_log
+rows = sum(map(len, open_log(sys.argv[1]).blocks()))
+status = Path("/proc/self/status").read_text()  # of this program alone: ru_maxrss goes on from the one that starts it
+print(rows, 1024 * int(re.search(r"VmHWM:\\s*(\\d+)", status)[1]))
+"""
+
+
+def peak_of_reading(path: Path) -> tuple[int, int]:
+    """Samples of a log, and the bytes that a program of its own takes to go through its blocks."""
+    done = subprocess.run([sys.executable, "-c", _PEAK, str(path)], capture_output=True, text=True, check=True)
+    rows, peak = map(int, done.stdout.split())
+    return rows, peak

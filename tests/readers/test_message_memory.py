@@ -2,25 +2,13 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from algid.readers import read_log
-from tests.readers.large import WRITERS
-
-_MOST = 600e6
-_PEAK = """
-import re, sys
-from pathlib import Path
-from algid.readers import open_log
-rows = sum(map(len, open_log(sys.argv[1]).blocks()))
-status = Path("/proc/self/status").read_text()  # of this program alone: ru_maxrss goes on from the one that starts it
-print(rows, 1024 * int(re.search(r"VmHWM:\\s*(\\d+)", status)[1]))
-"""
+from tests.readers.large import MOST_BYTES, WRITERS, peak_of_reading
 
 
 @pytest.mark.parametrize("form", WRITERS)
@@ -41,10 +29,9 @@ def test_ten_million_samples_are_read_in_bounded_memory(form: str, tmp_path: Pat
     path = tmp_path / f"log.{form}"
     try:
         WRITERS[form](path, 10_000_000)
-        done = subprocess.run([sys.executable, "-c", _PEAK, str(path)], capture_output=True, text=True, check=True)
+        rows, peak = peak_of_reading(path)
     finally:
         path.unlink(missing_ok=True)
-    rows, peak = map(int, done.stdout.split())
     assert rows == 10_000_000
     print(f"{form}: {peak / 1e6:.0f} MB")
-    assert peak < _MOST, f"{peak / 1e6:.0f} MB"
+    assert peak < MOST_BYTES, f"{peak / 1e6:.0f} MB"
