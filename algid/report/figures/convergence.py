@@ -147,13 +147,6 @@ def _epsilons(read: SeriesLog) -> list[Layout]:
     return [upright(end, "@muted") for end in ends] if len(ends) <= MOST_WINDOWS else []
 
 
-def _says(name: str, target: Target) -> str:
-    found = target.found
-    final = "" if found is None else f"; final estimate {resolved(found.estimate, found.std)} {target.unit}"
-    truth = "" if target.truth is None else f"; truth {significant(target.truth)} {target.unit}"
-    return f"{name} over time{final}{truth}"
-
-
 def _legend(read: SeriesLog, targets: Mapping[str, Target]) -> tuple[Legend, ...]:
     entries = [Legend("series", "the paper's estimate over time", "@blue")]
     if read.coarse:
