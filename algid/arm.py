@@ -12,8 +12,8 @@ z       payload constants z1 … z5 (Table 2) (5,)        `PAYLOAD_UNITS`
 m_p     tip payload                         scalar      kg
 ======  ==================================  ==========  ===============
 
-θ1 is measured from the horizontal, θ2 from link 1; gravity pulls along −y. An arm with a payload obeys the
-same equations with the constants of `with_payload`, so everything below serves both.
+θ1 is measured from the horizontal, θ2 from link 1; gravity pulls along −y. An arm with a payload
+obeys the same equations with the constants of `with_payload`, so everything below serves both.
 """
 
 from __future__ import annotations
@@ -86,7 +86,10 @@ class Arm:
     delta2: float = 0.0
 
     def constants(self) -> FloatArray:
-        """Constants k1 … k7 (Table 1): (7,), in `CONSTANT_UNITS`; of phasors the parts along the links."""
+        """Constants k1 … k7 (Table 1): (7,), in `CONSTANT_UNITS`.
+
+        Of phasors the parts along the links.
+        """
         along1, along2 = self.lc1 * np.cos(self.delta1), self.lc2 * np.cos(self.delta2)
         return np.array(
             [
@@ -101,14 +104,22 @@ class Arm:
         )
 
     def sines(self) -> FloatArray:
-        """The sine parts of k1, k2 and k4: (3,), in their units; nothing where the links are straight."""
-        across1, across2 = self.lc1 * np.sin(self.delta1), self.lc2 * np.sin(self.delta2)
-        return np.array([self.m2 * self.l1 * across2, self.m2 * self.g * across2, self.m1 * self.g * across1])
+        """The sine parts of k1, k2 and k4: (3,), in their units.
 
-    def phasors(self, m_p: float = 0.0, x: float | None = None, y: float = 0.0, J: float = 0.0) -> FloatArray:
+        Nothing where the links are straight.
+        """
+        across1, across2 = self.lc1 * np.sin(self.delta1), self.lc2 * np.sin(self.delta2)
+        return np.array(
+            [self.m2 * self.l1 * across2, self.m2 * self.g * across2, self.m1 * self.g * across1]
+        )
+
+    def phasors(
+        self, m_p: float = 0.0, x: float | None = None, y: float = 0.0, J: float = 0.0
+    ) -> FloatArray:
         """Constants k1 … k7 and their sine parts (10,) of the arm with a payload of `m_p` kg.
 
-        Its centre of mass is at `x` (the tip by default), `y` m in the frame of link 2, its inertia about it is `J`.
+        Its centre of mass is at `x` (the tip by default), `y` m in the frame of link 2, its
+        inertia about it is `J`.
         """
         z = payload_phasors(m_p, self.l1, complex(self.l2 if x is None else x, y), J, self.g)
         k = with_payload(self.constants(), np.array([z[0], z[1], z[2].real, z[3].real, z[4].real]))
@@ -168,7 +179,8 @@ def _moments(k: FloatArray) -> tuple[Moment, Moment, Moment]:
 def _turned(moment: Moment, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Real and imaginary part of (c + i s) exp(i angle) for a moment (c, s).
 
-    They are written out, so that they stay analytic in `moment`: derivatives by complex steps pass through.
+    They are written out, so that they stay analytic in `moment`: derivatives by complex steps pass
+    through.
     """
     cosine, sine = np.cos(angle), np.sin(angle)
     along, across = moment
@@ -178,7 +190,10 @@ def _turned(moment: Moment, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def mass_matrix(k: FloatArray, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """M11, M12 = M21 and M22 of eq. (2) at `theta` (2, ...), each (...) in kg m^2; `k` is (7,), or (10,) of phasors."""
+    """M11, M12 = M21 and M22 of eq. (2) at `theta` (2, ...), each (...) in kg m^2.
+
+    `k` is (7,), or (10,) of phasors.
+    """
     first, _, _ = _moments(k)
     k3, k5 = k[2], k[4]
     coupling, _ = _turned(first, theta[1])
@@ -186,7 +201,10 @@ def mass_matrix(k: FloatArray, theta: FloatArray) -> tuple[FloatArray, FloatArra
 
 
 def passive_torque(k: FloatArray, theta: FloatArray, omega: FloatArray) -> FloatArray:
-    """V + U + W of eq. (1): the torque (2, ...) in N m that the arm needs at zero acceleration; `k` as for M."""
+    """V + U + W of eq. (1): the torque (2, ...) in N m that the arm needs at zero acceleration.
+
+    `k` as for M.
+    """
     first, second, fourth = _moments(k)
     k6, k7 = k[5], k[6]
     theta1, theta2 = theta
@@ -202,14 +220,18 @@ def passive_torque(k: FloatArray, theta: FloatArray, omega: FloatArray) -> Float
     )
 
 
-def inverse_dynamics(k: FloatArray, theta: FloatArray, omega: FloatArray, alpha: FloatArray) -> FloatArray:
+def inverse_dynamics(
+    k: FloatArray, theta: FloatArray, omega: FloatArray, alpha: FloatArray
+) -> FloatArray:
     """Torque (2, ...) in N m that moves the arm so: eq. (1)."""
     m11, m12, m22 = mass_matrix(k, theta)
     inertial = np.stack([m11 * alpha[0] + m12 * alpha[1], m12 * alpha[0] + m22 * alpha[1]])
     return inertial + passive_torque(k, theta, omega)
 
 
-def forward_dynamics(k: FloatArray, theta: FloatArray, omega: FloatArray, tau: FloatArray) -> FloatArray:
+def forward_dynamics(
+    k: FloatArray, theta: FloatArray, omega: FloatArray, tau: FloatArray
+) -> FloatArray:
     """Acceleration (2, ...) in rad/s^2 under the torque `tau` (2, ...): eq. (1) solved for θ̈."""
     m11, m12, m22 = mass_matrix(k, theta)
     free1, free2 = tau - passive_torque(k, theta, omega)
@@ -238,7 +260,9 @@ def regressor(theta: FloatArray, omega: FloatArray, alpha: FloatArray) -> FloatA
                     zeros,
                 ]
             ),
-            np.stack([c2 * alpha1 + s2 * omega1**2, c12, alpha1 + alpha2, zeros, zeros, zeros, omega2]),
+            np.stack(
+                [c2 * alpha1 + s2 * omega1**2, c12, alpha1 + alpha2, zeros, zeros, zeros, omega2]
+            ),
         ]
     )
 

@@ -41,7 +41,10 @@ class _Tolerances(BaseModel):
 
 
 def judge(
-    result: Result, against: Literal["paper", "truth"], max_error: float | None, tolerance_file: Path | None
+    result: Result,
+    against: Literal["paper", "truth"],
+    max_error: float | None,
+    tolerance_file: Path | None,
 ) -> list[Judged]:
     """Rows of Table 4 beside their limits.
 
@@ -53,7 +56,9 @@ def judge(
         If the result holds no truth to compare with, or no case of the paper.
     """
     if not any(row.truth is not None for row in result.table4):
-        raise ResultError(f"{result.log.path}: the log holds no true parameters; only synthetic logs can be checked")
+        raise ResultError(
+            f"{result.log.path}: the log holds no true parameters; only synthetic logs can be checked"
+        )
     limits = _limits(result, against == "paper", max_error, tolerance_file)
     return [
         Judged(row.parameter, row.error_percent, limits[row.parameter])
@@ -78,13 +83,21 @@ def _limits(
         names = [row.parameter for row in known]
         for name in limits:
             if name not in names:
-                raise SettingError(f"{tolerance_file}: max_error_percent.{name}: expected one of {', '.join(names)}")
+                raise SettingError(
+                    f"{tolerance_file}: max_error_percent.{name}: expected one of {', '.join(names)}"
+                )
         return limits
     if of_paper:
-        limits = {row.parameter: row.paper_error_percent for row in known if row.paper_error_percent is not None}
+        limits = {
+            row.parameter: row.paper_error_percent
+            for row in known
+            if row.paper_error_percent is not None
+        }
         if not limits:
             raise ResultError(f"{result.log.path}: not a case of the paper; check --against truth")
         return limits
     if max_error is None:
-        raise SettingError("--against truth: give the largest error with --max-error or --tolerance-file")
+        raise SettingError(
+            "--against truth: give the largest error with --max-error or --tolerance-file"
+        )
     return {row.parameter: max_error for row in known}

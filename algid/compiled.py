@@ -1,9 +1,10 @@
 """LAPACK's banded routines and four distributions, from SciPy's compiled modules without the packages around them.
 
-Importing `scipy.linalg` and `scipy.special` takes 0.2 s, a third of what a short log takes as a whole, nearly all of it
-for a layer over other array libraries. Both packages are thin here: what is wanted are routines of one extension module
-each. They are loaded by themselves, under their own names, so that a later import of the package finds them. Where
-that fails, the packages are imported.
+Importing `scipy.linalg` and `scipy.special` takes 0.2 s, a third of what a short log takes as a
+whole, nearly all of it for a layer over other array libraries. Both packages are thin here: what
+is wanted are routines of one extension module each. They are loaded by themselves, under their own
+names, so that a later import of the package finds them. Where that fails, the packages are
+imported.
 """
 
 from __future__ import annotations
@@ -74,7 +75,10 @@ def chi2_tail(freedom: Any, x: Any) -> Any:
 
 
 def chi2_exceeded(freedom: Any, tail: Any) -> Any:
-    """What χ² of `freedom` degrees exceeds with the probability `tail`; any shapes that broadcast."""
+    """What χ² of `freedom` degrees exceeds with the probability `tail`.
+
+    Any shapes that broadcast.
+    """
     return 2 * _gamma()[1](np.multiply(0.5, freedom), tail)
 
 
@@ -101,8 +105,9 @@ _STEPS = 60
 def student_quantile(freedom: float, probability: float = 0.975) -> float:
     """Quantile of Student's t of any `freedom` of 1 or more, for a `probability` from 0.5 to 0.9999.
 
-    Newton's method on P = 1/2 + ∫ density, from the normal quantile. With t = √ν tan φ the integrand is
-    cos^(ν−1) φ, which Gauss and Legendre's rule integrates to rounding; P is concave, so that the steps ascend.
+    Newton's method on P = 1/2 + ∫ density, from the normal quantile. With t = √ν tan φ the
+    integrand is cos^(ν−1) φ, which Gauss and Legendre's rule integrates to rounding; P is concave,
+    so that the steps ascend.
     """
     if math.isinf(freedom):
         return NormalDist().inv_cdf(probability)

@@ -1,7 +1,7 @@
 """Files and folders under construction: named after what they become, and held until they are that.
 
-A process holds what it makes. The system lets go of it however the process ends, so that what nobody holds is what a
-killed process left. Where a file system cannot hold, nothing is removed.
+A process holds what it makes. The system lets go of it however the process ends, so that what
+nobody holds is what a killed process left. Where a file system cannot hold, nothing is removed.
 """
 
 from __future__ import annotations
@@ -23,7 +23,9 @@ MARK = ".algid-"
 OLD = ".algid-old-"
 """Likewise, of a result that makes room for its successor where the two cannot be exchanged."""
 MOST_TRIES = 100
-_LEFT = re.compile(rf"\.(?P<name>.*)(?P<kind>{re.escape(OLD)}|{re.escape(MARK)})[0-9a-f]{{8}}", re.DOTALL)
+_LEFT = re.compile(
+    rf"\.(?P<name>.*)(?P<kind>{re.escape(OLD)}|{re.escape(MARK)})[0-9a-f]{{8}}", re.DOTALL
+)
 
 
 @contextmanager
@@ -98,7 +100,10 @@ def _lock(handle: int) -> None:
 
 
 def remove(place: Path) -> None:
-    """Remove a file, a folder or a link, as far as it goes; a signal that comes meanwhile is raised after it."""
+    """Remove a file, a folder or a link, as far as it goes.
+
+    a signal that comes meanwhile is raised after it.
+    """
     try:
         _remove(place)
     except BaseException:
@@ -117,14 +122,18 @@ def _remove(place: Path) -> None:
 def folders_below(root: Path) -> Iterator[tuple[str, list[str]]]:
     """A folder and those within it, each with the names of what is no folder in it, or was left by algid.
 
-    Links are not followed, and what cannot be looked at is passed over. ``os.walk`` of Python 3.11 ends at a thousand.
+    Links are not followed, and what cannot be looked at is passed over. ``os.walk`` of Python 3.11
+    ends at a thousand.
     """
     pending = [str(root)]
     while pending:
         folder = pending.pop()
         try:
             with os.scandir(folder) as entries:
-                found = [(e.name, e.is_dir(follow_symlinks=False) and not _LEFT.fullmatch(e.name)) for e in entries]
+                found = [
+                    (e.name, e.is_dir(follow_symlinks=False) and not _LEFT.fullmatch(e.name))
+                    for e in entries
+                ]
         except OSError:
             continue
         yield folder, [name for name, is_folder in found if not is_folder]
@@ -163,7 +172,10 @@ def _left_in(folder: Path, name: str | None) -> list[_Left]:
 
 
 def _take_away(found: _Left) -> None:
-    """Remove what no process holds. Raises `OSError` where one does, or where nothing can be held."""
+    """Remove what no process holds.
+
+    Raises `OSError` where one does, or where nothing can be held.
+    """
     handle = os.open(found.path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -178,8 +190,8 @@ def _take_away(found: _Left) -> None:
 def put_in_place(temporary: Path, target: Path, *, replace: bool) -> None:
     """Give a folder its name at one stroke.
 
-    What stands there is exchanged for it and bears its temporary name then; it is always whole, and never absent
-    where the file system can exchange two names.
+    What stands there is exchanged for it and bears its temporary name then; it is always whole,
+    and never absent where the file system can exchange two names.
 
     Raises
     ------
@@ -203,11 +215,15 @@ def put_in_place(temporary: Path, target: Path, *, replace: bool) -> None:
         except FileNotFoundError:  # another run has moved it: look again
             if not os.path.lexists(temporary):
                 raise
-        except OSError as error:  # a folder's name is given to no file, and to no folder that holds something
+        except (
+            OSError
+        ) as error:  # a folder's name is given to no file, and to no folder that holds something
             if error.errno not in (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR):
                 raise
             if not replace:
-                raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(target)) from error
+                raise FileExistsError(
+                    errno.EEXIST, os.strerror(errno.EEXIST), str(target)
+                ) from error
     raise OSError(errno.EBUSY, os.strerror(errno.EBUSY), str(target))
 
 
@@ -245,7 +261,16 @@ def _exchanged(one: Path, other: Path) -> bool:
     rename = _renameat2()
     if rename is None:
         return False
-    if rename(_AT_FDCWD, os.fsencode(one), _AT_FDCWD, os.fsencode(other), ctypes.c_uint(_RENAME_EXCHANGE)) == 0:
+    if (
+        rename(
+            _AT_FDCWD,
+            os.fsencode(one),
+            _AT_FDCWD,
+            os.fsencode(other),
+            ctypes.c_uint(_RENAME_EXCHANGE),
+        )
+        == 0
+    ):
         return True
     number = ctypes.get_errno()
     if number in _UNABLE:

@@ -1,7 +1,8 @@
 """What goes wrong outside algid: files, settings, results of another make.
 
-Every message names the file or setting, the place, what was expected, what was found and what to do.
-A caller's mistake is a `ValueError`; numerics that fail on one window are a status, not an exception.
+Every message names the file or setting, the place, what was expected, what was found and what to
+do. A caller's mistake is a `ValueError`; numerics that fail on one window are a status, not an
+exception.
 """
 
 from __future__ import annotations
@@ -13,9 +14,12 @@ LONGEST_TEXT = 2000  # characters
 LONGEST_CHAIN = 100
 
 
-# What stands before the @ of an object's URL; a slash in it should have been written %2F, and may not have been.
+# What stands before the @ of an object's URL; a slash in it should have been written %2F, and may
+# not have been.
 _USER = re.compile(r"\b(s3|gs|az|abfss?)(:/{1,2})([^\s/?#]*@|[^\s/?#@]*:[^\s?#]*@)", re.IGNORECASE)
-_SECRET = re.compile(r"([?&][a-z_]*(?:secret|sig|key|password|token)[a-z_]*=)[^&\s]*", re.IGNORECASE)
+_SECRET = re.compile(
+    r"([?&][a-z_]*(?:secret|sig|key|password|token)[a-z_]*=)[^&\s]*", re.IGNORECASE
+)
 
 
 class AlgidError(Exception):
@@ -52,7 +56,9 @@ def without_credentials(text: str) -> str:
 
     def kept(found: re.Match[str]) -> str:
         scheme, mark, user = found.groups()
-        name = user.partition(":")[0].rstrip("@") if scheme.lower().startswith(("az", "abfs")) else ""
+        name = (
+            user.partition(":")[0].rstrip("@") if scheme.lower().startswith(("az", "abfs")) else ""
+        )
         return f"{scheme}{mark}{name}{'@' if name else ''}"
 
     return _SECRET.sub(r"\1", _USER.sub(kept, text)) if ":/" in text else text

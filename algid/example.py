@@ -1,7 +1,8 @@
 """Logs to try algid on: four runs of an arm that is simulated with all that a first real log has, and a payload.
 
-Its angles are zero where it hangs straight down, and its log does not say so; its joints have dry friction, and its
-sensors noise and steps. What it truly is stands in `ARM`, `FRICTION` and `PAYLOAD`, and in none of the files.
+Its angles are zero where it hangs straight down, and its log does not say so; its joints have dry
+friction, and its sensors noise and steps. What it truly is stands in `ARM`, `FRICTION` and
+`PAYLOAD`, and in none of the files.
 """
 
 from __future__ import annotations
@@ -77,5 +78,7 @@ def run(number: int, payload: float) -> Log:
     strong = wide_multi_sine(ARM, seed=number)
     motion = simulate(k, lambda at: STRENGTH * strong(at), t, HANGING, np.zeros(2))
     tau = motion.tau + np.array(FRICTION)[:, None] * np.sign(motion.omega)
-    log = record(replace(motion, tau=tau), sensors, Truth(ARM, payload, "example"), f"run{number + 1}")
+    log = record(
+        replace(motion, tau=tau), sensors, Truth(ARM, payload, "example"), f"run{number + 1}"
+    )
     return replace(log, theta=log.theta - HANGING[:, None], origin=replace(log.origin, truth=None))

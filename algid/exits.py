@@ -63,5 +63,9 @@ def epilog(command: str) -> str:
 
 def table() -> str:
     """All codes as a table in Markdown, as README and guide have it."""
-    rows = [f"| {int(code)} | {meaning} | {WHAT_TO_DO[code]} |" for code, meaning in MEANINGS.items()]
-    return "\n".join(["| exit code | meaning | what a scheduler should do |", "|---|---|---|", *rows])
+    rows = [
+        f"| {int(code)} | {meaning} | {WHAT_TO_DO[code]} |" for code, meaning in MEANINGS.items()
+    ]
+    return "\n".join(
+        ["| exit code | meaning | what a scheduler should do |", "|---|---|---|", *rows]
+    )

@@ -1,7 +1,7 @@
 """What ends a command that nobody foresaw: one line for its user, and an exit code.
 
-An exception that a library raises about what it was given is told with the file and the stage. Any other is an error
-inside algid, and is called one.
+An exception that a library raises about what it was given is told with the file and the stage. Any
+other is an error inside algid, and is called one.
 """
 
 from __future__ import annotations
@@ -51,7 +51,8 @@ def fault(error: BaseException) -> tuple[str, int]:
     str
         What could not be done, why, and what to do.
     int
-        `EXIT_USAGE` where memory, the system or a library refused a file; `EXIT_INTERNAL` where algid is wrong.
+        `EXIT_USAGE` where memory, the system or a library refused a file; `EXIT_INTERNAL` where
+        algid is wrong.
     """
     notes = [note for note in getattr(error, "__notes__", []) if note.startswith("while ")]
     doing = notes[0] if notes else ""
@@ -59,14 +60,20 @@ def fault(error: BaseException) -> tuple[str, int]:
     reason = text_of(error).partition("\n")[0][:_LONGEST_REASON]
     trace = f"see where with {TRACEBACK}=1"
     if isinstance(error, MemoryError):
-        return f"{place}not enough memory ({reason}); cut the log with --start and --end", EXIT_USAGE
+        return (
+            f"{place}not enough memory ({reason}); cut the log with --start and --end",
+            EXIT_USAGE,
+        )
     if isinstance(error, OSError) and error.strerror:
         name = "" if error.filename is None else f"{error.filename}: "
         return f"{place}{name}{error.strerror}; mend that and run it again, or {trace}", EXIT_USAGE
     if doing and not _ours(error.__traceback__):
         remedy = "look at the file, or write it anew in another format"
         return f"{place}a library cannot take it ({reason}); {remedy}; {trace}", EXIT_USAGE
-    return f"internal error: {place}{reason}; this is a fault of algid: report it, {trace}", EXIT_INTERNAL
+    return (
+        f"internal error: {place}{reason}; this is a fault of algid: report it, {trace}",
+        EXIT_INTERNAL,
+    )
 
 
 def _ours(trace: TracebackType | None) -> bool:

@@ -35,7 +35,11 @@ def writing(place: Path | str, trouble: str = "cannot write") -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        remedy = "give a shorter name" if error.errno == errno.ENAMETOOLONG else "choose another folder with -o"
+        remedy = (
+            "give a shorter name"
+            if error.errno == errno.ENAMETOOLONG
+            else "choose another folder with -o"
+        )
         raise OutputError(f"{place}: {trouble} ({reason_of(error)}); {remedy}") from error
 
 
@@ -111,15 +115,18 @@ def read_whole(path: Path) -> bytes:
 def read_start(path: Path, most: int) -> bytes:
     """The first `most` bytes of a file.
 
-    A file of no size is empty, whatever reading it would bring: those that the kernel makes up, such as /proc/kmsg,
-    say that they have none, and some of them wait for ever.
+    A file of no size is empty, whatever reading it would bring: those that the kernel makes up,
+    such as /proc/kmsg, say that they have none, and some of them wait for ever.
 
     Raises
     ------
     OSError
-        If it cannot be read or is no regular file: a pipe would be waited for, and a device has no end.
+        If it cannot be read or is no regular file: a pipe would be waited for, and a device has no
+        end.
     """
-    handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)  # else opening a pipe waits already
+    handle = os.open(
+        path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK
+    )  # else opening a pipe waits already
     with os.fdopen(handle, "rb") as stream:
         found = os.fstat(handle)
         if not stat.S_ISREG(found.st_mode):
@@ -179,7 +186,8 @@ def parsed_toml(text: str) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        If it is not TOML (`tomllib.TOMLDecodeError`), or larger or of longer dotted keys than `LIMITS` allow.
+        If it is not TOML (`tomllib.TOMLDecodeError`), or larger or of longer dotted keys than
+        `LIMITS` allow.
     RecursionError
         If lists or tables lie too deep within one another.
     """
@@ -214,7 +222,9 @@ def first_misfit(error: ValidationError) -> str:
     first, *others = error.errors(include_url=False, include_context=False)
     place = ".".join(str(part) for part in first["loc"]) or "top level"
     more = f" (and {len(others)} more)" if others else ""
-    if first["type"] == "unexpected_keyword_argument":  # the same misfit has other words in a dataclass than in a model
+    if (
+        first["type"] == "unexpected_keyword_argument"
+    ):  # the same misfit has other words in a dataclass than in a model
         said = "extra inputs are not permitted"
     else:  # a unit or a code keeps its capitals
         words = first["msg"].partition(", unable to parse")[0]
@@ -235,7 +245,9 @@ def result_folder(first_log: str, parent: Path, name: str | None = None) -> Path
 def refuse_misleading(name: str | None) -> None:
     """Raises `SettingError` where the name of a result's folder is none, or would lead elsewhere."""
     if name == "":
-        raise SettingError("--name: expected a name for the result folder, found ''; leave it out for the log's own")
+        raise SettingError(
+            "--name: expected a name for the result folder, found ''; leave it out for the log's own"
+        )
     if name is not None and (name in (".", "..") or "/" in name or not name.isprintable()):
         found = f"found {name!r:.60}; -o names the folder around it"
         raise SettingError(f"--name: expected a name without slashes, {found}")
@@ -264,7 +276,8 @@ def whole_folder(folder: Path, force: bool, *, sweep: bool = True) -> Iterator[P
     Raises
     ------
     OutputError
-        If the folder cannot be made or written to, or exists and `force` is not set, at the start or at the end.
+        If the folder cannot be made or written to, or exists and `force` is not set, at the start
+        or at the end.
     """
     refuse_existing(folder, force)
     with ExitStack() as stack:
@@ -304,7 +317,9 @@ def remove_whole(place: Path) -> None:
 
 @contextmanager
 def temporary_folder() -> Iterator[Path]:
-    """A folder for what is needed for a while; those of processes that were killed are removed on the way.
+    """A folder for what is needed for a while.
+
+    Those of processes that were killed are removed on the way.
 
     Raises
     ------
@@ -317,7 +332,9 @@ def temporary_folder() -> Iterator[Path]:
             remove_left(place, TEMPORARY)
             folder = stack.enter_context(under_construction(place / TEMPORARY, _make_own_folder))
         except OSError as error:
-            raise OutputError(f"no temporary folder can be made ({reason_of(error)}); name one in TMPDIR") from error
+            raise OutputError(
+                f"no temporary folder can be made ({reason_of(error)}); name one in TMPDIR"
+            ) from error
         yield folder
 
 

@@ -1,7 +1,8 @@
 """Bounds on what a file may claim, ask for or hold: one object, so that none is forgotten and each can be tested.
 
-A size, a count or a depth that stands in a file is anybody's. Whatever loops over such a number, or reserves memory for
-it, compares it with a bound from here first. Each is far beyond what a recorder of a two-link arm writes.
+A size, a count or a depth that stands in a file is anybody's. Whatever loops over such a number,
+or reserves memory for it, compares it with a bound from here first. Each is far beyond what a
+recorder of a two-link arm writes.
 """
 
 from __future__ import annotations

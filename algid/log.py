@@ -13,8 +13,8 @@ Time runs along the last axis, here and everywhere in algid.
 
 What travels with a synthetic log: the true arm and payload, and sums that betray changed values.
 
-Written as one JSON object named "algid": an MCAP metadata record, a Parquet key, or a file ``LOG.truth.json``
-beside a CSV log.
+Written as one JSON object named "algid": an MCAP metadata record, a Parquet key, or a file
+``LOG.truth.json`` beside a CSV log.
 """
 
 from __future__ import annotations
@@ -43,7 +43,8 @@ VELOCITY_COLUMNS = ("omega1", "omega2")
 class Truth:
     """The arm and the payload (kg) behind a synthetic log, and the case they are taken from.
 
-    `schedule` holds pairs of time in s and payload from then on, where the payload changes during the log.
+    `schedule` holds pairs of time in s and payload from then on, where the payload changes during
+    the log.
     """
 
     arm: Arm
@@ -63,8 +64,8 @@ Teller = Literal["flag", "profile", "names", "order"]
 class ChannelReading:
     """How one channel was read: algid's value is `factor` times the recorded one, plus `offset`.
 
-    `unit` is that of the recorded values; `told` by a flag or a profile, by the channel's own name, or not at all
-    ("assumed"). `offset` is in rad, N m or rad/s.
+    `unit` is that of the recorded values; `told` by a flag or a profile, by the channel's own
+    name, or not at all ("assumed"). `offset` is in rad, N m or rad/s.
     """
 
     __pydantic_config__: ClassVar = STRICT
@@ -90,7 +91,8 @@ class Reading:
     channels : by canonical name how each channel was read
     joints : names of joint 1 and joint 2 in the log, where it has names
     joints_told : 'flag', 'profile', 'names' or 'order'
-        Who said which joint is the first: the user, the joints' own names, or only their order in the log.
+        Who said which joint is the first: the user, the joints' own names, or only their order in
+        the log.
     topics : topics that were read, the one that sets the time first
     clock : 'header', 'log' (the recorder's times) or 'column'
         'header' stands for the messages' own stamps, unless they turn out to stand still.
@@ -193,7 +195,13 @@ class Log:
 
     @classmethod
     def from_arrays(
-        cls, t: ArrayLike, theta: ArrayLike, tau: ArrayLike, omega: ArrayLike | None = None, *, name: str = "log"
+        cls,
+        t: ArrayLike,
+        theta: ArrayLike,
+        tau: ArrayLike,
+        omega: ArrayLike | None = None,
+        *,
+        name: str = "log",
     ) -> Log:
         """A log of samples in memory.
 
@@ -221,7 +229,9 @@ class Log:
         signals = {"theta": theta, "tau": tau} | ({} if omega is None else {"omega": omega})
         rows = {key: _two_rows(key, value, times.size) for key, value in signals.items()}
         stamps = np.round(times * 1e9).astype(np.int64)
-        return cls(stamps, rows["theta"], rows["tau"], Origin(name, "arrays", {}), rows.get("omega"))
+        return cls(
+            stamps, rows["theta"], rows["tau"], Origin(name, "arrays", {}), rows.get("omega")
+        )
 
     def __len__(self) -> int:
         return self.stamp_ns.size
@@ -267,8 +277,8 @@ def _two_rows(name: str, values: ArrayLike, count: int) -> FloatArray:
 def usual_period(stamp_ns: IntArray) -> float:
     """Usual time between samples (N,) in s: the median step, or the mean pace where samples come in bursts.
 
-    A buffer that is emptied every ten samples leaves nine steps of microseconds for one of ten periods: the median
-    step says nothing then. Steps over 64 samples do.
+    A buffer that is emptied every ten samples leaves nine steps of microseconds for one of ten
+    periods: the median step says nothing then. Steps over 64 samples do.
     """
     median = float(np.median(np.diff(stamp_ns)))
     far = min(64, (stamp_ns.size - 1) // 4)
@@ -345,7 +355,9 @@ def loads(text: str | bytes) -> Companion:
             return Companion(None, sums)
         arm = Arm(**{name: _finite(value) for name, value in content["arm"].items()})
         case = None if content["case"] is None else str(content["case"])
-        schedule = tuple((_finite(time), _finite(mass)) for time, mass in content.get("schedule", ()))
+        schedule = tuple(
+            (_finite(time), _finite(mass)) for time, mass in content.get("schedule", ())
+        )
         return Companion(Truth(arm, _finite(content["payload"]), case, schedule), sums)
     except (KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         raise ValueError(f"not the truth of a synthetic log: {error!r}") from error

@@ -10,8 +10,8 @@ P       partials, ∂τ/∂θ, ∂τ/∂θ̇ and ∂τ/∂θ̈                  
 L       load of a joint: inertia, Coriolis and gravity              (2, N)     N m
 ======  ==========================================================  =========  =========
 
-Which columns there are, their derivatives and what acts on the torque's channel are the terms' own business; here they
-are put in order once a model (`Compiled`) and evaluated along motions.
+Which columns there are, their derivatives and what acts on the torque's channel are the terms' own
+business; here they are put in order once a model (`Compiled`) and evaluated along motions.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ DELAYS = tuple(name for term in OPTIONAL if term.timing == "delay" for name in t
 CHOICES = tuple(term.name for term in OPTIONAL)
 """Names that ``--model`` takes."""
 PARAMETERS: dict[str, Parameter] = {
-    one.name: one for one in (*(one for term in EVERY_TERM.values() for one in term.parameters), *PAYLOAD, *BODY)
+    one.name: one
+    for one in (*(one for term in EVERY_TERM.values() for one in term.parameters), *PAYLOAD, *BODY)
 }
 COLUMN_NAMES = tuple(name for term in (*ALWAYS, *TERMS.values()) for name in term.names)
 UNITS = {name: parameter.unit for name, parameter in PARAMETERS.items()}
@@ -107,12 +108,25 @@ class Model:
     @property
     def iterated(self) -> tuple[str, ...]:
         """Names of the coefficients in which the torque is not linear."""
-        return tuple(name for term in self.terms if not TERMS[term].linear for name in TERMS[term].names)
+        return tuple(
+            name for term in self.terms if not TERMS[term].linear for name in TERMS[term].names
+        )
 
     @cached_property
     def lag_name(self) -> str | None:
-        """The coefficient that is the time constant of a low-pass of the torque; None where there is no such term."""
-        return next((name for term in self.terms if TERMS[term].timing == "lag" for name in TERMS[term].names), None)
+        """The coefficient that is the time constant of a low-pass of the torque.
+
+        None where there is no such term.
+        """
+        return next(
+            (
+                name
+                for term in self.terms
+                if TERMS[term].timing == "lag"
+                for name in TERMS[term].names
+            ),
+            None,
+        )
 
     def lag(self, c: FloatArray) -> float:
         """The time constant in s of the torque's low-pass; 0 without."""
@@ -171,7 +185,9 @@ class Compiled:
     def only(self, weighted: Weighted, places: Iterable[int]) -> Weighted:
         """What the columns at `places` give of it."""
         wanted = set(places)
-        kept = {p: tuple(pair for pair in pairs if pair[0] in wanted) for p, pairs in weighted.items()}
+        kept = {
+            p: tuple(pair for pair in pairs if pair[0] in wanted) for p, pairs in weighted.items()
+        }
         return {product: pairs for product, pairs in kept.items() if pairs}
 
 
@@ -254,9 +270,9 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
 
     Notes
     -----
-    Friction by load and gains make the torque bilinear in c: Y is taken at `c` then, with the load that c gives, a
-    joint's rows times its gain, and nothing in the columns of gains. The column of a low-pass, which is no function of
-    the motion at one instant, is nothing too.
+    Friction by load and gains make the torque bilinear in c: Y is taken at `c` then, with the load
+    that c gives, a joint's rows times its gain, and nothing in the columns of gains. The column of
+    a low-pass, which is no function of the motion at one instant, is nothing too.
 
     Raises
     ------
@@ -264,7 +280,9 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
         If the model is not linear and `c` is not given.
     """
     if c is None and not model.linear:
-        raise ValueError(f"the regressor of {', '.join(model.terms)} depends on the coefficients, got none")
+        raise ValueError(
+            f"the regressor of {', '.join(model.terms)} depends on the coefficients, got none"
+        )
     c = np.zeros(len(model.names)) if c is None else c
     compiled = model.compiled
     values = Values(motion, model.shape)
@@ -283,7 +301,10 @@ def loads_of(model: Model) -> tuple[str, ...]:
 
 
 def phasor(model: Model, c: FloatArray, name: str) -> complex:
-    """The moment `name` of the coefficients `c` (q,) as a phasor, its sine part imaginary; 0 without a column."""
+    """The moment `name` of the coefficients `c` (q,) as a phasor, its sine part imaginary.
+
+    0 without a column.
+    """
     place = model.compiled.place
     if name not in place:
         return 0j
@@ -293,7 +314,12 @@ def phasor(model: Model, c: FloatArray, name: str) -> complex:
 
 def attributes(model: Model, kind: str) -> list[tuple[str, int]]:
     """Pairs of a parameter and the joint on which it acts in the way `kind`, of the columns that the model has."""
-    return [pair for term in model.terms for pair in getattr(TERMS[term], kind) if pair[0] in model.compiled.place]
+    return [
+        pair
+        for term in model.terms
+        for pair in getattr(TERMS[term], kind)
+        if pair[0] in model.compiled.place
+    ]
 
 
 def gains(model: Model, c: FloatArray) -> FloatArray:
@@ -332,7 +358,8 @@ def sensitivity(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
 
     Notes
     -----
-    The regressor where the torque is linear in c. Else, with sgn L, t = tanh(ω / ω_s), load shares e and gains g,
+    The regressor where the torque is linear in c. Else, with sgn L, t = tanh(ω / ω_s), load shares
+    e and gains g,
 
         ∂τ_i/∂k_j = Y_ij (1 + e_i t_i sgn L_i)        for the columns j of the load
         ∂τ_i/∂g_i = τ_i / (1 + g_i)
@@ -362,7 +389,8 @@ def partials(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
     Returns
     -------
     (3, 2, 2, N), N m/rad, N m s/rad and N m s²/rad
-        By order of θ's derivative, torque's joint and angle's joint. Where a load is nothing its sign is too.
+        By order of θ's derivative, torque's joint and angle's joint. Where a load is nothing its
+        sign is too.
     """
     compiled = model.compiled
     values = Values(motion, model.shape)
@@ -377,7 +405,9 @@ def partials(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
                 load += c[place] * values.sum(entry)
         for order in range(3):
             for angle in range(2):
-                by_load = summed(compiled.only(compiled.partials[order, joint, angle], loads), c, values)
+                by_load = summed(
+                    compiled.only(compiled.partials[order, joint, angle], loads), c, values
+                )
                 P[order, joint, angle] += share * sign * np.sign(load) * by_load
         P[1, joint, joint] += share * np.abs(load) * (1 - sign**2) / model.coulomb_speed
     factor = gains(model, c)
@@ -393,7 +423,10 @@ def _sign(model: Model, omega: FloatArray) -> FloatArray:
 
 
 def damping(model: Model, c: FloatArray) -> FloatArray:
-    """Derivative (2,) of each joint's torque by its velocity at rest, in N m s/rad; without friction by load."""
+    """Derivative (2,) of each joint's torque by its velocity at rest, in N m s/rad.
+
+    Without friction by load.
+    """
     rest = Motion(np.zeros((2, 1)), np.zeros((2, 1)), np.zeros((2, 1)))
     values = Values(rest, model.shape)
     found = [summed(model.compiled.partials[1, joint, joint], c, values) for joint in range(2)]
@@ -412,7 +445,9 @@ def inertia(model: Model, c: FloatArray, theta: FloatArray) -> FloatArray:
     return M
 
 
-def acceleration(model: Model, c: FloatArray, theta: FloatArray, omega: FloatArray, tau: FloatArray) -> FloatArray:
+def acceleration(
+    model: Model, c: FloatArray, theta: FloatArray, omega: FloatArray, tau: FloatArray
+) -> FloatArray:
     """Accelerations that torques give: `torque` solved for θ̈, without a low-pass.
 
     Parameters
@@ -427,8 +462,8 @@ def acceleration(model: Model, c: FloatArray, theta: FloatArray, omega: FloatArr
 
     Notes
     -----
-    With L = M θ̈ + n the load, D = 1 + e tanh(ω / ω_s) sgn L, R the inertia that is no load, friction and offsets in r
-    and gains g,
+    With L = M θ̈ + n the load, D = 1 + e tanh(ω / ω_s) sgn L, R the inertia that is no load,
+    friction and offsets in r and gains g,
 
         (D M + R) θ̈ = τ / (1 + g) - r - D n
 
@@ -448,7 +483,10 @@ def acceleration(model: Model, c: FloatArray, theta: FloatArray, omega: FloatArr
         return _solved(a, b, d, e, left)
     others = [place for place in range(len(compiled.names)) if place not in compiled.loads]
     M, R = (
-        [summed(compiled.only(weighted, places), c, values) for weighted in compiled.inertia.values()]
+        [
+            summed(compiled.only(weighted, places), c, values)
+            for weighted in compiled.inertia.values()
+        ]
         for places in (compiled.loads, others)
     )
     n = np.zeros_like(left)
@@ -461,9 +499,14 @@ def acceleration(model: Model, c: FloatArray, theta: FloatArray, omega: FloatArr
     signs = np.sign(left)
     for _ in range(_SIGN_TRIALS):
         D = 1 + share * signs
-        first, second = (D[0] * M[0] + R[0], D[0] * M[1] + R[1]), (D[1] * M[2] + R[2], D[1] * M[3] + R[3])
+        first, second = (
+            (D[0] * M[0] + R[0], D[0] * M[1] + R[1]),
+            (D[1] * M[2] + R[2], D[1] * M[3] + R[3]),
+        )
         alpha = _solved(*first, *second, left - D * n)
-        found = np.sign(np.stack([M[0] * alpha[0] + M[1] * alpha[1], M[2] * alpha[0] + M[3] * alpha[1]]) + n)
+        found = np.sign(
+            np.stack([M[0] * alpha[0] + M[1] * alpha[1], M[2] * alpha[0] + M[3] * alpha[1]]) + n
+        )
         if np.array_equal(found, signs):
             break
         signs = found
@@ -471,7 +514,11 @@ def acceleration(model: Model, c: FloatArray, theta: FloatArray, omega: FloatArr
 
 
 def _solved(
-    a: FloatArray | float, b: FloatArray | float, c: FloatArray | float, d: FloatArray | float, right: FloatArray
+    a: FloatArray | float,
+    b: FloatArray | float,
+    c: FloatArray | float,
+    d: FloatArray | float,
+    right: FloatArray,
 ) -> FloatArray:
     """X (2, N) with [[a, b], [c, d]] x = right."""
     return np.stack([d * right[0] - b * right[1], a * right[1] - c * right[0]]) / (a * d - b * c)

@@ -1,7 +1,10 @@
-"""What algid has noticed: a code with its numbers and what mends it; whoever shows it writes the words.
+"""What algid has noticed: a code with its numbers and what mends it.
 
-A `Notice` is data: nobody searches, cuts or compares its text. A `Remedy` holds settings by name and value, which are
-written as flags for the command that was typed, as lines of a profile, or as Python's keywords.
+Whoever shows it writes the words.
+
+A `Notice` is data: nobody searches, cuts or compares its text. A `Remedy` holds settings by name
+and value, which are written as flags for the command that was typed, as lines of a profile, or as
+Python's keywords.
 """
 
 from __future__ import annotations
@@ -17,8 +20,32 @@ from algid.text import joined
 from algid.words import counted
 
 OWN_FLAGS = (
-    *("zero", "second_angle", "drive", "passive", "joints", "angle_unit", "torque_unit", "topic", "clock", "start"),
-    *("end", "accept", "gravity", "estimator", "model", "delay", "l1", "l2", "range", "speed", "torque", "runs"),
+    *(
+        "zero",
+        "second_angle",
+        "drive",
+        "passive",
+        "joints",
+        "angle_unit",
+        "torque_unit",
+        "topic",
+        "clock",
+        "start",
+    ),
+    *(
+        "end",
+        "accept",
+        "gravity",
+        "estimator",
+        "model",
+        "delay",
+        "l1",
+        "l2",
+        "range",
+        "speed",
+        "torque",
+        "runs",
+    ),
 )
 """Settings with a flag of their own; any other is one of a profile, behind ``--set``."""
 NO_PROFILE = ("estimator", "model", "delay", "l1", "l2", "range", "speed", "torque", "runs")
@@ -30,7 +57,9 @@ OPEN = {"source": "NAME", "gear_ratio": "N", "offset": "RAD", "torque_constant":
 
 @dataclass(frozen=True)
 class Remedy:
-    """Settings that mend what a notice is of, by name: ``zero``, ``tau1.sign``; None stands for the user's own value.
+    """Settings that mend what a notice is of, by name: ``zero``, ``tau1.sign``.
+
+    None stands for the user's own value.
 
     `when` is the case that it is meant for, in words.
     """
@@ -49,10 +78,17 @@ class Remedy:
         words: list[str] = []
         for name, value in self.settings.items():
             if name in OWN_FLAGS:
-                plain = ",".join(map(str, value)) if isinstance(value, list | tuple) else str(_shown(name, value))
+                plain = (
+                    ",".join(map(str, value))
+                    if isinstance(value, list | tuple)
+                    else str(_shown(name, value))
+                )
                 words += ["--" + name.replace("_", "-"), plain]
             else:
-                words += ["--set", f"{name}={_toml(name, value) if value is not None else _shown(name, value)}"]
+                words += [
+                    "--set",
+                    f"{name}={_toml(name, value) if value is not None else _shown(name, value)}",
+                ]
         return tuple(words)
 
     @property
@@ -111,7 +147,9 @@ class _Words(string.Formatter):
         if "|" in spec:
             one, many = spec.removeprefix("# ").split("|")
             count = len(value) if isinstance(value, list | tuple) else value
-            return counted(count, one, many) if spec.startswith("# ") else one if count == 1 else many
+            return (
+                counted(count, one, many) if spec.startswith("# ") else one if count == 1 else many
+            )
         if isinstance(value, list | tuple):
             return joined(list(map(str, value)))
         return str(format(value, spec))
@@ -255,7 +293,9 @@ class Notice:
         if self.text:
             return
         try:
-            object.__setattr__(self, "text", _Words().vformat(MESSAGES[self.code], (), self.numbers))
+            object.__setattr__(
+                self, "text", _Words().vformat(MESSAGES[self.code], (), self.numbers)
+            )
         except (LookupError, TypeError, ValueError) as error:
             raise ValueError(
                 f"code {self.code!r:.60}: it has no text for the numbers {sorted(self.numbers)}"
@@ -268,7 +308,10 @@ class Notice:
 
     @property
     def advice(self) -> str:
-        """What mends it, in words: flags, and the profile's lines beside them; empty where nothing is known."""
+        """What mends it, in words: flags, and the profile's lines beside them.
+
+        Empty where nothing is known.
+        """
         return "; ".join(map(str, self.remedies))
 
     @property
@@ -298,12 +341,19 @@ def _place(logs: Sequence[str]) -> str:
 
 
 def merged(notices: Iterable[Notice]) -> list[Notice]:
-    """Of each code the first notice, with the logs of all of them; what tells of lost samples stands by itself."""
+    """Of each code the first notice, with the logs of all of them.
+
+    What tells of lost samples stands by itself.
+    """
     found: dict[object, Notice] = {}
     for place, one in enumerate(notices):
         key = place if one.lossy else (one.code, one.note)
         known = found.get(key)
-        found[key] = one if known is None else replace(known, logs=tuple(dict.fromkeys((*known.logs, *one.logs))))
+        found[key] = (
+            one
+            if known is None
+            else replace(known, logs=tuple(dict.fromkeys((*known.logs, *one.logs))))
+        )
     return list(found.values())
 
 
@@ -311,7 +361,9 @@ def from_flags(flags: Sequence[str]) -> Remedy:
     """The remedy that flags stand for, as results of an earlier schema hold them."""
     settings: dict[str, Any] = {}
     for flag, value in zip(flags[::2], flags[1::2], strict=False):
-        name, text = (value.partition("=")[::2]) if flag == "--set" else (flag.removeprefix("--"), value)
+        name, text = (
+            (value.partition("=")[::2]) if flag == "--set" else (flag.removeprefix("--"), value)
+        )
         try:
             settings[name.replace("-", "_")] = json.loads(text)
         except json.JSONDecodeError:

@@ -1,6 +1,7 @@
 """Profiles: what a log's names, units and signs mean, in a file `algid.toml` beside the logs.
 
-Everything is optional; what a profile leaves out is taken from the log. A key that is not known is refused.
+Everything is optional; what a profile leaves out is taken from the log. A key that is not known is
+refused.
 """
 
 from __future__ import annotations
@@ -22,9 +23,13 @@ def _usual(unit: object) -> object:
 
 
 AngleUnit = Annotated[Literal["rad", "mrad", "deg", "rev", "counts"], BeforeValidator(_usual)]
-VelocityUnit = Annotated[Literal["rad", "mrad", "deg", "rev", "counts", "rpm"], BeforeValidator(_usual)]
+VelocityUnit = Annotated[
+    Literal["rad", "mrad", "deg", "rev", "counts", "rpm"], BeforeValidator(_usual)
+]
 TorqueUnit = Annotated[
-    Literal["N m", "mN m", "N cm", "kN m", "kgf m", "kgf cm", "lbf ft", "lbf in", "ozf in", "A", "mA"],
+    Literal[
+        "N m", "mN m", "N cm", "kN m", "kgf m", "kgf cm", "lbf ft", "lbf in", "ozf in", "A", "mA"
+    ],
     BeforeValidator(_usual),
 ]
 Check = Literal[
@@ -65,7 +70,9 @@ class Channel(_Strict):
 
 
 class Angle(Channel):
-    """An angle: `offset` in rad is added after unit and sign; `counts` are encoder counts in one turn.
+    """An angle: `offset` in rad is added after unit and sign.
+
+    `counts` are encoder counts in one turn.
 
     `gear_ratio` is how often the encoder turns while the joint turns once: 1 for one at the joint.
     """
@@ -87,7 +94,8 @@ class Velocity(Channel):
 class Torque(Channel):
     """A torque: `offset` in N m. Amperes need `torque_constant` in N m/A at the motor.
 
-    `gear_ratio` is how often the motor turns while the joint turns once: 1 for a torque at the joint.
+    `gear_ratio` is how often the motor turns while the joint turns once: 1 for a torque at the
+    joint.
     """
 
     unit: TorqueUnit | None = None
@@ -96,7 +104,9 @@ class Torque(Channel):
 
 
 class Profile(_Strict):
-    """What a log's names, units and signs mean. Angles become θ1 from the horizontal, θ2 from link 1.
+    """What a log's names, units and signs mean.
+
+    Angles become θ1 from the horizontal, θ2 from link 1.
 
     Parameters
     ----------
@@ -113,11 +123,12 @@ class Profile(_Strict):
     second_angle : 'relative' or 'absolute'
         Whether θ2 counts from link 1, or from where θ1 does.
     drive : 'joint' or 'base'
-        Where the second motor stands: in its joint, or at the base, where a belt or a parallelogram takes its torque
-        to θ1 + θ2. Torques then become those of the joints: τ1 + τ2 and τ2.
+        Where the second motor stands: in its joint, or at the base, where a belt or a
+        parallelogram takes its torque to θ1 + θ2. Torques then become those of the joints: τ1 + τ2
+        and τ2.
     passive : 1 or 2
-        A joint without a motor, as an acrobot's first or a pendubot's second: its torque is zero, whatever the log
-        says.
+        A joint without a motor, as an acrobot's first or a pendubot's second: its torque is zero,
+        whatever the log says.
     gravity : float, m/s^2
     velocity : bool
         Whether recorded velocities are read.
@@ -128,7 +139,8 @@ class Profile(_Strict):
     accept : codes of checks
         Which may warn but not refuse.
     theta1, theta2, tau1, tau2, omega1, omega2 : dict
-        Of one channel its `source`, `unit`, `sign`, `offset`, `gear_ratio` and what else its kind has.
+        Of one channel its `source`, `unit`, `sign`, `offset`, `gear_ratio` and what else its kind
+        has.
 
     Raises
     ------
@@ -166,7 +178,10 @@ class Profile(_Strict):
         return "flag" if setting in self._flags else "profile"
 
     def place(self, name: str) -> tuple[str | None, str | None]:
-        """Topic and field of the canonical channel `name`; a source may be both, ``/joint_states: effort[elbow]``."""
+        """Topic and field of the canonical channel `name`.
+
+        a source may be both, ``/joint_states: effort[elbow]``.
+        """
         channel = self.channel(name)
         topic, colon, field = (channel.source or "").partition(": ")
         if colon and topic.startswith("/"):
@@ -202,7 +217,9 @@ def with_settings(profile: Profile, settings: Mapping[str, Any]) -> Profile:
 
 
 def over(profile: Profile | None, earlier: Mapping[str, Any]) -> Profile | None:
-    """The profile of an earlier result, as that holds it, with what `profile` sets over it; None where neither is.
+    """The profile of an earlier result, as that holds it, with what `profile` sets over it.
+
+    None where neither is.
 
     Raises
     ------

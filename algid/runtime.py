@@ -1,12 +1,14 @@
 """Bounds on the threads of the linear algebra.
 
-algid multiplies small blocks: a second thread of BLAS gains nothing there and spins while it waits, which on a
-busy machine makes the same products several times slower. Whole logs are what runs side by side.
+algid multiplies small blocks: a second thread of BLAS gains nothing there and spins while it
+waits, which on a busy machine makes the same products several times slower. Whole logs are what
+runs side by side.
 
 Memory that was used once is kept for the next block of a log, or the next log.
 
-glibc hands freed arrays back to the system and takes them anew for the next ones, filled with zeros page by page:
-a fifth of the processor time of short logs, an eighth of the time that `weak` takes for a day.
+glibc hands freed arrays back to the system and takes them anew for the next ones, filled with
+zeros page by page: a fifth of the processor time of short logs, an eighth of the time that `weak`
+takes for a day.
 
 Work that runs beside other work, in threads of its own where the process has cores for them.
 """
@@ -27,7 +29,12 @@ from typing import Any, Generic, TypeVar
 
 from algid.errors import SettingError
 
-_VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+_VARIABLES = (
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "BLIS_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
 
 
 def bound_by_environment() -> None:
@@ -51,9 +58,13 @@ def check_environment() -> None:
         If POLARS_MAX_THREADS is no number of threads, or too few files may be open at once.
     """
     threads = os.environ.get("POLARS_MAX_THREADS")
-    if threads is not None and not (threads.isascii() and threads.isdigit() and 0 < int(threads[:5]) <= MOST_THREADS):
+    if threads is not None and not (
+        threads.isascii() and threads.isdigit() and 0 < int(threads[:5]) <= MOST_THREADS
+    ):
         expected = f"expected a whole number from 1 to {MOST_THREADS}"
-        raise SettingError(f"POLARS_MAX_THREADS: {expected}, found {threads!r:.60}; mend or unset it")
+        raise SettingError(
+            f"POLARS_MAX_THREADS: {expected}, found {threads!r:.60}; mend or unset it"
+        )
     may_open(OPEN_FILES)
 
 
@@ -64,7 +75,9 @@ def may_open(files: int) -> None:
     if soft != resource.RLIM_INFINITY and soft < files <= most:
         resource.setrlimit(resource.RLIMIT_NOFILE, (files, hard))
     elif most < files:
-        raise SettingError(f"the limit on open files: expected {files} or more, found {hard}; raise it with ulimit -n")
+        raise SettingError(
+            f"the limit on open files: expected {files} or more, found {hard}; raise it with ulimit -n"
+        )
 
 
 @contextmanager
@@ -77,14 +90,28 @@ def one_blas_thread() -> Iterator[None]:
 
 
 _NOT_ENDING = {
-    *("SIGKILL", "SIGSTOP", "SIGTSTP", "SIGTTIN", "SIGTTOU", "SIGCONT", "SIGCHLD", "SIGURG", "SIGWINCH", "SIGINFO"),
+    *(
+        "SIGKILL",
+        "SIGSTOP",
+        "SIGTSTP",
+        "SIGTTIN",
+        "SIGTTOU",
+        "SIGCONT",
+        "SIGCHLD",
+        "SIGURG",
+        "SIGWINCH",
+        "SIGINFO",
+    ),
     *("SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL", "SIGABRT", "SIGTRAP", "SIGSYS", "SIGEMT"),
 }
 """Signals that nobody can handle, that end no process, or that tell of a fault in it."""
 
 
 def ending_signals() -> list[int]:
-    """Signals that would end this process; of those it was told to ignore, as by nohup, Ctrl-C and SIGTERM alone."""
+    """Signals that would end this process.
+
+    Of those it was told to ignore, as by nohup, Ctrl-C and SIGTERM alone.
+    """
     others = {getattr(signal, name) for name in _NOT_ENDING if hasattr(signal, name)}
     wanted = (signal.SIGINT, signal.SIGTERM)
     return sorted(
@@ -132,7 +159,10 @@ def keep_to_one_core() -> None:
 
 
 def executor(threads: int) -> Executor:
-    """Threads for work beside other work; where the process keeps to one core, calls run as they are handed in."""
+    """Threads for work beside other work.
+
+    Where the process keeps to one core, calls run as they are handed in.
+    """
     from concurrent.futures import ThreadPoolExecutor
 
     return ThreadPoolExecutor(threads) if _has_other_cores else _AtOnce()
@@ -160,7 +190,9 @@ def ahead(source: Iterator[T]) -> Iterator[T]:
 
 
 def beside(source: Iterable[T], work: Callable[[T], None]) -> Iterator[T]:
-    """The same items, each worked on in a thread of its own while it is used; in order, one at a time.
+    """The same items, each worked on in a thread of its own while it is used.
+
+    In order, one at a time.
 
     Once the items are at their end, so is the work; its exception is raised here.
     """
@@ -174,7 +206,10 @@ def beside(source: Iterable[T], work: Callable[[T], None]) -> Iterator[T]:
 
 
 class Beside(Generic[T]):
-    """A piece of work in a thread of its own, which does not keep the process alive; done at once on one core."""
+    """A piece of work in a thread of its own, which does not keep the process alive.
+
+    Done at once on one core.
+    """
 
     def __init__(self, work: Callable[[], T]) -> None:
         self._work = work

@@ -1,6 +1,7 @@
 """Everything that decides an identification, as one value that travels into its result.
 
-The command line derives its options from the fields: what one is called, what it may be, and its help stand here only.
+The command line derives its options from the fields: what one is called, what it may be, and its
+help stand here only.
 """
 
 from __future__ import annotations
@@ -69,15 +70,18 @@ class Settings:
     Parameters
     ----------
     estimator : 'refined' (maximum likelihood, the default), 'weak' (least squares on windows), 'instruments' or 'paper'
-        Instruments are for arms whose unmodelled torque drives the motion: see `algid.estimators.instruments`.
+        Instruments are for arms whose unmodelled torque drives the motion: see
+        `algid.estimators.instruments`.
     velocity : 'observer' or 'measured'
         Where joint velocities come from. The refined estimator needs none.
     observer : 'luenberger' (eq. 6), 'zero-phase', or None
-        None takes the paper's observer for the paper's method and the zero-phase differentiator otherwise.
+        None takes the paper's observer for the paper's method and the zero-phase differentiator
+        otherwise.
     poles : six complex, rad/s, three a joint, or None
         Of the paper's observer; None takes the paper's.
     window : float, s, or None
-        After how long the paper's integrals restart (2 s), or the length of the weak form's windows (0.4 s).
+        After how long the paper's integrals restart (2 s), or the length of the weak form's
+        windows (0.4 s).
     bandwidth : float, Hz, of the zero-phase differentiator
     gravity : float, m/s^2, 0 for an arm that moves in a horizontal plane
     model : 'auto', 'plain', or terms of the torque between commas
@@ -105,7 +109,10 @@ class Settings:
     )
     poles: tuple[complex, ...] | None = field(
         default=None,
-        metadata={"help": "Six poles of the paper's observer, rad/s, three a joint, like -80,-390,….", "parse": _poles},
+        metadata={
+            "help": "Six poles of the paper's observer, rad/s, three a joint, like -80,-390,….",
+            "parse": _poles,
+        },
     )
     window: float | None = field(
         default=None,
@@ -115,7 +122,8 @@ class Settings:
         },
     )
     bandwidth: float = field(
-        default=60.0, metadata={"range": PHYSICAL.bandwidth, "help": "Of the zero-phase differentiator, Hz."}
+        default=60.0,
+        metadata={"range": PHYSICAL.bandwidth, "help": "Of the zero-phase differentiator, Hz."},
     )
     gravity: float = field(
         default=9.81,
@@ -137,13 +145,18 @@ class Settings:
     )
     delay: float = field(
         default=0.0,
-        metadata={"range": PHYSICAL.delay, "help": "From torque to angle, s, where known; --model delay estimates it."},
+        metadata={
+            "range": PHYSICAL.delay,
+            "help": "From torque to angle, s, where known; --model delay estimates it.",
+        },
     )
     l1: float | None = field(
-        default=None, metadata={"range": PHYSICAL.length, "help": "Length of link 1, m, where known."}
+        default=None,
+        metadata={"range": PHYSICAL.length, "help": "Length of link 1, m, where known."},
     )
     l2: float | None = field(
-        default=None, metadata={"range": PHYSICAL.length, "help": "Length of link 2, m, where known."}
+        default=None,
+        metadata={"range": PHYSICAL.length, "help": "Length of link 2, m, where known."},
     )
     payload_mass: float | None = field(
         default=None,
@@ -164,7 +177,9 @@ class Settings:
                 continue
             expected = _expected(one.metadata.get("range"), _kinds()[one.name], value)
             if expected:
-                raise SettingError(f"{flag(one.name)}: expected {expected}, found {reprlib.repr(value)}")
+                raise SettingError(
+                    f"{flag(one.name)}: expected {expected}, found {reprlib.repr(value)}"
+                )
         if self.model not in ("auto", "plain"):
             self._check_terms()
         if self.estimator == "paper":
@@ -172,7 +187,9 @@ class Settings:
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> Settings:
-        """The settings in a result's `settings`, which hold more than these; defaults where it lacks one.
+        """The settings in a result's `settings`, which hold more than these.
+
+        Defaults where it lacks one.
 
         Raises
         ------
@@ -203,12 +220,16 @@ class Settings:
     @property
     def luenberger(self) -> bool:
         """Whether velocities come from the paper's observer."""
-        return (self.observer or ("luenberger" if self.estimator == "paper" else "zero-phase")) == "luenberger"
+        return (
+            self.observer or ("luenberger" if self.estimator == "paper" else "zero-phase")
+        ) == "luenberger"
 
     @property
     def lengths(self) -> dict[str, float]:
         """The link lengths that are known, in m."""
-        return {name: value for name, value in (("l1", self.l1), ("l2", self.l2)) if value is not None}
+        return {
+            name: value for name, value in (("l1", self.l1), ("l2", self.l2)) if value is not None
+        }
 
     def torque_shift(self, dt: float, found_delay: float | None = None) -> float:
         """Time in s after which a logged torque acts: half a sample of hold, and the delay, found or set."""
@@ -222,19 +243,27 @@ class Settings:
         from algid.signals.observers import PAPER_POLES
 
         poles = map(complex, self.poles or PAPER_POLES)
-        return asdict(self) | {"poles": [pole.real if pole.imag == 0 else str(pole) for pole in poles]}
+        return asdict(self) | {
+            "poles": [pole.real if pole.imag == 0 else str(pole) for pole in poles]
+        }
 
     def _check_terms(self) -> None:
         from algid.model import CHOICES, EVERY_TERM
 
         for term in self.terms:
             if term not in CHOICES:
-                raise SettingError(f"--model: expected auto, plain or some of {', '.join(CHOICES)}; found {term!r}")
+                raise SettingError(
+                    f"--model: expected auto, plain or some of {', '.join(CHOICES)}; found {term!r}"
+                )
             needed = EVERY_TERM[term].needs
             if needed is not None and needed not in self.terms:
-                raise SettingError(f"--model: {term} has no meaning without {needed}; add {needed} to the list")
+                raise SettingError(
+                    f"--model: {term} has no meaning without {needed}; add {needed} to the list"
+                )
         if sum(EVERY_TERM[term].timing is not None for term in self.terms) > 1:
-            raise SettingError("--model: no log tells a delay from a lag beside it; leave one of them out")
+            raise SettingError(
+                "--model: no log tells a delay from a lag beside it; leave one of them out"
+            )
 
     def _refuse_what_the_paper_lacks(self) -> None:
         if self.model not in ("auto", "plain"):
@@ -249,7 +278,9 @@ class Settings:
                     f"{flag(name)}: the paper's method has no such term; use --estimator refined or weak"
                 )
         if self.gravity == 0:
-            raise SettingError("--gravity 0: the paper's payload needs gravity; use --estimator refined or weak")
+            raise SettingError(
+                "--gravity 0: the paper's payload needs gravity; use --estimator refined or weak"
+            )
 
 
 _SHORT_FORMS = {

@@ -1,10 +1,12 @@
 """Where files live: a folder of this machine, or a prefix of an object store behind s3://, gs:// or az://.
 
-Files appear whole or not at all: on this machine through `algid.files.whole_file`, in object stores by their nature.
+Files appear whole or not at all: on this machine through `algid.files.whole_file`, in object
+stores by their nature.
 
-A URL names an object by its key, percent-encoded: ``%3F`` for ``?``, ``%23`` for ``#``, ``%25`` for ``%``. Whatever
-else no URL may hold, such as blanks, may stand as it is. URLs of objects that are found below a prefix are encoded
-and keep the prefix's credentials; what is printed and kept of them is `public`.
+A URL names an object by its key, percent-encoded: ``%3F`` for ``?``, ``%23`` for ``#``, ``%25``
+for ``%``. Whatever else no URL may hold, such as blanks, may stand as it is. URLs of objects that
+are found below a prefix are encoded and keep the prefix's credentials; what is printed and kept of
+them is `public`.
 """
 
 from __future__ import annotations
@@ -67,7 +69,10 @@ class Store:
     folder: Path | None = None
 
     def read(self, name: str) -> bytes | None:
-        """The content, or None where there is no such file. Raises `LogError` where it cannot be read."""
+        """The content, or None where there is no such file.
+
+        Raises `LogError` where it cannot be read.
+        """
         with _translated(f"{self.place}/{name}", LogError, "it cannot be read"):
             try:
                 if self.folder is not None:
@@ -91,7 +96,10 @@ class Store:
             stream.write(content)
 
     def remove(self, name: str) -> None:
-        """Remove a file, or a folder with all that is in it; nothing where there is none. Raises `OutputError`."""
+        """Remove a file, or a folder with all that is in it; nothing where there is none.
+
+        Raises `OutputError`.
+        """
         from pyarrow.fs import FileType
 
         path = f"{self.root}/{name}"
@@ -120,11 +128,19 @@ class Store:
             return _names_below(self.folder, under)
         path = f"{self.root}/{under}".rstrip("/")
         with _translated(self.place, OutputError, "its objects cannot be listed"):
-            found = self.filesystem.get_file_info(FileSelector(path, recursive=True, allow_not_found=True))
+            found = self.filesystem.get_file_info(
+                FileSelector(path, recursive=True, allow_not_found=True)
+            )
             bucket = self.root.partition("/")[0]
             if not found and not _is_there(self.filesystem.get_file_info(bucket)):
-                raise OutputError(f"{self.place}: there is no bucket {bucket}; check its name, or make it")
-        files = (info for info in found if info.type == FileType.File and not info.base_name.startswith("."))
+                raise OutputError(
+                    f"{self.place}: there is no bucket {bucket}; check its name, or make it"
+                )
+        files = (
+            info
+            for info in found
+            if info.type == FileType.File and not info.base_name.startswith(".")
+        )
         return sorted(info.path.removeprefix(f"{self.root}/") for info in files)
 
     def exists(self, name: str) -> bool:
@@ -136,7 +152,12 @@ class Store:
 def _names_below(root: Path, under: str) -> list[str]:
     """Of a folder of this machine: links to folders are not followed, what cannot be looked at is passed over."""
     start = len(str(root)) + 1
-    paths = (f"{folder}/{name}" for folder, names in folders_below(root / under) for name in names if name[0] != ".")
+    paths = (
+        f"{folder}/{name}"
+        for folder, names in folders_below(root / under)
+        for name in names
+        if name[0] != "."
+    )
     return sorted(path[start:] for path in paths if Path(path).is_file())
 
 
@@ -180,7 +201,10 @@ def connect(url: str) -> tuple[FileSystem, str]:
 
 
 def list_urls(url: str) -> list[tuple[str, str]]:
-    """Objects at or below a URL: each one's URL, and its name below it. Raises `OutputError` as `Store.names` does."""
+    """Objects at or below a URL: each one's URL, and its name below it.
+
+    Raises `OutputError` as `Store.names` does.
+    """
     store = Store(*connect(url), shown(url))
     base, mark, query = url.partition("?")
     below = [(f"{base.rstrip('/')}/{quote(name)}{mark}{query}", name) for name in store.names("")]
@@ -215,7 +239,9 @@ def reading(url: str) -> Iterator[tuple[Any, str]]:
 
 
 @contextmanager
-def _translated(place: str, kind: type[AlgidError], what: str, do: str = "check name and rights") -> Iterator[None]:
+def _translated(
+    place: str, kind: type[AlgidError], what: str, do: str = "check name and rights"
+) -> Iterator[None]:
     """What a store's client raises becomes an error of ours that names the place, `what` cannot be done, what to do."""
     import pyarrow as pa
 
@@ -226,7 +252,10 @@ def _translated(place: str, kind: type[AlgidError], what: str, do: str = "check 
 
 
 def _first_line(error: BaseException) -> str:
-    """Of what an object store's client says; before it is cut, so that no half of a secret stays."""
+    """Of what an object store's client says.
+
+    Before it is cut, so that no half of a secret stays.
+    """
     return without_credentials(str(error)).split("\n", maxsplit=1)[0][:200]
 
 
@@ -239,14 +268,19 @@ def _is_there(info: FileInfo) -> bool:
 def put_folder(store: Store, name: str, folder: Path) -> None:
     """Make the files below `name` those of a folder.
 
-    ``result.json`` vouches for the others: the one that is there goes before any of them, the new one comes last.
+    ``result.json`` vouches for the others: the one that is there goes before any of them, the new
+    one comes last.
 
     Raises
     ------
     OutputError
         If a file cannot be written, or one that is there cannot be removed.
     """
-    files = {f"{name}/{path.relative_to(folder).as_posix()}": path for path in folder.rglob("*") if path.is_file()}
+    files = {
+        f"{name}/{path.relative_to(folder).as_posix()}": path
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
     voucher = f"{name}/result.json"
     there = store.names(name)
     others = (files.keys() | there) - {voucher}

@@ -70,7 +70,10 @@ def paper_errors(truth: Truth | None) -> dict[str, float]:
 
 
 def table4(
-    found: Mapping[str, float], std: Mapping[str, float], true: Mapping[str, float], paper: Mapping[str, float]
+    found: Mapping[str, float],
+    std: Mapping[str, float],
+    true: Mapping[str, float],
+    paper: Mapping[str, float],
 ) -> list[Table4Row]:
     """The twelve rows; what was not estimated, or is not known, is null."""
     rows = []

@@ -23,7 +23,9 @@ def printable(text: str) -> str:
     """`text` with every character that cannot be seen, but for line feeds and tabs, as an escape that JSON knows."""
     if text.isascii() and text.replace("\n", "").replace("\t", "").isprintable():
         return text
-    return "".join(c if c in "\n\t" or unicodedata.category(c) not in _HIDDEN else _as_json(c) for c in text)
+    return "".join(
+        c if c in "\n\t" or unicodedata.category(c) not in _HIDDEN else _as_json(c) for c in text
+    )
 
 
 def _as_json(character: str) -> str:
@@ -36,7 +38,13 @@ def _shown(character: str) -> str:
     if unicodedata.category(character) not in _HIDDEN:
         return character
     code = ord(character)
-    return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
+    return (
+        f"\\x{code:02x}"
+        if code < 0x100
+        else f"\\u{code:04x}"
+        if code < 0x10000
+        else f"\\U{code:08x}"
+    )
 
 
 def file_name(path: str) -> str:
@@ -46,7 +54,9 @@ def file_name(path: str) -> str:
 
 def joined(words: list[str]) -> str:
     """The words as a list in a sentence: a, b and c."""
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}" if words else ""
+    return (
+        words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}" if words else ""
+    )
 
 
 def unit_text(unit: str) -> str:
@@ -61,7 +71,10 @@ MOST_DIGITS = 8
 
 
 def significant(value: float | None, digits: int = 5) -> str:
-    """`value` with that many significant digits; a dash where there is none, ∞ where it is unbounded."""
+    """`value` with that many significant digits.
+
+    a dash where there is none, ∞ where it is unbounded.
+    """
     if value is None or math.isnan(value):
         return ABSENT
     if math.isinf(value):
@@ -71,18 +84,31 @@ def significant(value: float | None, digits: int = 5) -> str:
     exponent = int(f"{value:.{digits - 1}e}".partition("e")[2])  # once rounded
     if SMALLEST_FIXED <= abs(value) < LARGEST_FIXED:
         return f"{value:.{max(digits - 1 - exponent, 0)}f}"
-    mantissa = f"{value / 10.0**exponent:.{digits - 1}f}" if abs(exponent) < 300 else f"{value:.{digits - 1}e}"
+    mantissa = (
+        f"{value / 10.0**exponent:.{digits - 1}f}"
+        if abs(exponent) < 300
+        else f"{value:.{digits - 1}e}"
+    )
     return f"{mantissa}e{exponent}" if "e" not in mantissa else mantissa
 
 
 def resolved(value: float | None, std: float | None) -> str:
-    """`value` down to the second significant digit of its standard deviation; five digits where there is none."""
+    """`value` down to the second significant digit of its standard deviation.
+
+    Five digits where there is none.
+    """
     return significant(value, digits_of(value, std))
 
 
 def digits_of(value: float | None, std: float | None) -> int:
     """Significant digits of `value` that its standard deviation leaves worth writing: two to eight."""
-    if value is None or std is None or not (math.isfinite(value) and math.isfinite(std)) or value == 0 or std <= 0:
+    if (
+        value is None
+        or std is None
+        or not (math.isfinite(value) and math.isfinite(std))
+        or value == 0
+        or std <= 0
+    ):
         return 5
     leading = math.floor(math.log10(abs(value))) - math.floor(math.log10(std))
     return min(max(leading + 2, 2), MOST_DIGITS)

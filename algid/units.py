@@ -53,9 +53,16 @@ _FOREIGN = frozenset(_FOREIGN_NAMES.split())
 
 
 def unit_of(text: str) -> str | None:
-    """The unit that `text` names, in algid's writing of it (``Nm`` → ``N m``); None where it names none."""
+    """The unit that `text` names, in algid's writing of it (``Nm`` → ``N m``).
+
+    None where it names none.
+    """
     plain = text.strip().lower().strip(".")
-    for spelling in (plain, plain.replace(" ", ""), "".join(one for one in plain if one not in " .*·⋅")):
+    for spelling in (
+        plain,
+        plain.replace(" ", ""),
+        "".join(one for one in plain if one not in " .*·⋅"),
+    ):
         if spelling in _BY_NAME:
             return _BY_NAME[spelling]
     return None

@@ -9,7 +9,11 @@ from typing import Literal
 from algid.notices import Notice
 
 Grade = Literal["good", "reservations", "failed"]
-GRADE_WORDS: dict[Grade, str] = {"good": "Good", "reservations": "With reservations", "failed": "Failed"}
+GRADE_WORDS: dict[Grade, str] = {
+    "good": "Good",
+    "reservations": "With reservations",
+    "failed": "Failed",
+}
 MOST_REASONS = 3
 """Reasons that a terminal or a page shows at first."""
 
@@ -41,7 +45,9 @@ class Verdict:
     @property
     def sentence(self) -> str:
         """Grade and headline, and where it is usable with reservations the first of them."""
-        but = f", but {self.reasons[0].text}" if self.grade == "reservations" and self.reasons else ""
+        but = (
+            f", but {self.reasons[0].text}" if self.grade == "reservations" and self.reasons else ""
+        )
         return f"{self.word}: {self.headline}{but}."
 
     @property
@@ -61,5 +67,9 @@ def graded(
 ) -> Verdict:
     """The verdict on `headline`: failed where there is a `failure`, after which `things` must not be used."""
     if failure is not None:
-        return Verdict("failed", f"{failure}; do not use these {things}", tuple(reasons), tuple(notes), command)
-    return Verdict("reservations" if reasons else "good", headline, tuple(reasons), tuple(notes), command)
+        return Verdict(
+            "failed", f"{failure}; do not use these {things}", tuple(reasons), tuple(notes), command
+        )
+    return Verdict(
+        "reservations" if reasons else "good", headline, tuple(reasons), tuple(notes), command
+    )

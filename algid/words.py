@@ -4,7 +4,9 @@ from __future__ import annotations
 
 
 def counted(count: int, one: str, many: str = "") -> str:
-    """A number and its noun, with what follows where that changes with it: 1 log, 2 logs; 1 row lacks, 2 rows lack.
+    """A number and its noun, with what follows where that changes with it: 1 log, 2 logs.
+
+    1 row lacks, 2 rows lack.
 
     Parameters
     ----------

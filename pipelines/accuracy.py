@@ -1,7 +1,7 @@
 """How accurate the estimators are, and whether their error bars are honest: `make accuracy`.
 
-Writes `accuracy.md`, `accuracy.json` and `accuracy.html` into the output folder. `--draws 100` is the full
-run; `--quick` makes it short. Every figure stands beside the one asked for.
+Writes `accuracy.md`, `accuracy.json` and `accuracy.html` into the output folder. `--draws 100` is
+the full run; `--quick` makes it short. Every figure stands beside the one asked for.
 """
 
 from __future__ import annotations
@@ -51,28 +51,41 @@ def fit_pair(fit: Callable[..., Fit], bare: Segment, burdened: Segment) -> Fit:
 
 
 def _draw(job: tuple[str, float, bool, int]) -> dict[str, Any]:
-    """Estimates of every method on one pair of logs; the refined and the weak one with their error bars."""
+    """Estimates of every method on one pair of logs.
+
+    The refined and the weak one with their error bars.
+    """
     name, sigma, encoder, seed = job
     here = scene_of(name)
     rng = np.random.default_rng([seed, sum(name.encode())])
-    bare, burdened = (scenes.noisy(log, sigma, 10 * sigma, encoder, rng) for log in (here.bare, here.burdened))
-    fits = {"refined": fit_pair(refined.fit, bare, burdened), "weak": fit_pair(weak.fit, bare, burdened)}
+    bare, burdened = (
+        scenes.noisy(log, sigma, 10 * sigma, encoder, rng) for log in (here.bare, here.burdened)
+    )
+    fits = {
+        "refined": fit_pair(refined.fit, bare, burdened),
+        "weak": fit_pair(weak.fit, bare, burdened),
+    }
     found: dict[str, Any] = {"filtered": scenes.filtered_least_squares(bare, burdened, here.arm.g)}
     found["paper"] = scenes.paper(bare, burdened, here.arm.g)
     for method, fit in fits.items():
         found[method] = fit.values[:8]
         found[f"{method} inside"] = np.abs(fit.values - here.truth) <= fit.quantile * fit.std
-    found["fell back"] = np.array(fits["refined"].estimator != "refined" or not fits["refined"].converged)
+    found["fell back"] = np.array(
+        fits["refined"].estimator != "refined" or not fits["refined"].converged
+    )
     return found
 
 
 def noise_rows(pool: ProcessPoolExecutor, draws: int) -> list[Row]:
     """Every arm and noise: RMS over the bound, bias over σ, coverage, and the methods side by side."""
     jobs = [(name, sigma, encoder) for name in SCENES for sigma, encoder in _noises()]
-    drawn = list(pool.map(_draw, [(*job, seed) for job in jobs for seed in range(draws)], chunksize=4))
+    drawn = list(
+        pool.map(_draw, [(*job, seed) for job in jobs for seed in range(draws)], chunksize=4)
+    )
     bounds = dict(zip(SCENES, pool.map(bound, SCENES), strict=True))
     return [
-        _noise_row(*job, drawn[index * draws : (index + 1) * draws], bounds[job[0]]) for index, job in enumerate(jobs)
+        _noise_row(*job, drawn[index * draws : (index + 1) * draws], bounds[job[0]])
+        for index, job in enumerate(jobs)
     ]
 
 
@@ -86,7 +99,9 @@ def bound(name: str) -> FloatArray:
     return joint_bound(here.bare, here.burdened, here.truth, here.arm.g, 1e-3, 1e-2) / 1e-3
 
 
-def _noise_row(name: str, sigma: float, encoder: bool, drawn: list[dict[str, Any]], bound: FloatArray) -> Row:
+def _noise_row(
+    name: str, sigma: float, encoder: bool, drawn: list[dict[str, Any]], bound: FloatArray
+) -> Row:
     here = scene_of(name)
     truth, sigmas = here.truth[:8], sigma * bound[:8]
     errors = {method: np.array([draw[method] for draw in drawn]) - truth for method in METHODS}
@@ -99,12 +114,16 @@ def _noise_row(name: str, sigma: float, encoder: bool, drawn: list[dict[str, Any
         "sigma_theta": sigma,
         "encoder": encoder,
         "rms_over_bound": {method: (value / sigmas).tolist() for method, value in rms.items()},
-        "rms_percent": {method: (100 * value / np.abs(truth)).tolist() for method, value in rms.items()},
+        "rms_percent": {
+            method: (100 * value / np.abs(truth)).tolist() for method, value in rms.items()
+        },
         "bias_over_sigma": bias.tolist(),
         "coverage": float(np.mean([draw["refined inside"] for draw in drawn])),
         "weak_coverage": float(np.mean([draw["weak inside"] for draw in drawn])),
         "fell_back": int(np.sum([draw["fell back"] for draw in drawn])),
-        "pooled_over_bound": {method: float(np.sqrt(np.mean((rms[method] / sigmas) ** 2))) for method in METHODS},
+        "pooled_over_bound": {
+            method: float(np.sqrt(np.mean((rms[method] / sigmas) ** 2))) for method in METHODS
+        },
     }
 
 
@@ -114,11 +133,21 @@ def table4_rows() -> list[Row]:
     for name in ("case1", "case2"):
         here, case = scene_of(name), load_case(name)
         rng = np.random.default_rng(0)
-        fit = fit_pair(refined.fit, *(scenes.noisy(log, 0.0, 0.0, False, rng) for log in (here.bare, here.burdened)))
+        fit = fit_pair(
+            refined.fit,
+            *(scenes.noisy(log, 0.0, 0.0, False, rng) for log in (here.bare, here.burdened)),
+        )
         estimated, true = (_table4(fit, beta) for beta in (fit.values, here.truth))
         for row, paper_error in case.paper_error_percent.items():
             error = 100 * abs(estimated[row] / true[row] - 1)
-            rows.append({"case": name, "row": row, "error_percent": error, "paper_error_percent": paper_error})
+            rows.append(
+                {
+                    "case": name,
+                    "row": row,
+                    "error_percent": error,
+                    "paper_error_percent": paper_error,
+                }
+            )
     return rows
 
 
@@ -145,21 +174,35 @@ def timing_rows(draws: int) -> list[Row]:
     k = here.arm.constants()
     held = _held(here)
     return [
-        {"what": "delay of 5 ms: error, ms", "value": float(1e3 * np.abs(found[:, 7] - 5e-3).max()), "asked": 0.1},
+        {
+            "what": "delay of 5 ms: error, ms",
+            "value": float(1e3 * np.abs(found[:, 7] - 5e-3).max()),
+            "asked": 0.1,
+        },
         {
             "what": "friction bias with it estimated, %",
             "value": float(100 * np.abs(found[:, 5:7].mean(axis=0) / k[5:7] - 1).max()),
             "asked": 0.1,
         },
         {"what": "friction bias with it ignored, %", "value": float(errors[0][1]), "asked": None},
-        {"what": "friction bias of a held torque, hold known, %", "value": held["zoh"], "asked": 0.05},
-        {"what": "friction bias of a held torque, hold ignored, %", "value": held["foh"], "asked": None},
+        {
+            "what": "friction bias of a held torque, hold known, %",
+            "value": held["zoh"],
+            "asked": 0.05,
+        },
+        {
+            "what": "friction bias of a held torque, hold ignored, %",
+            "value": held["foh"],
+            "asked": None,
+        },
     ]
 
 
 def _delayed(here: scenes.Scene, seed: int) -> tuple[FloatArray, float]:
     log = scenes.noisy(here.bare, 1e-4, 1e-3, False, np.random.default_rng(seed))
-    late = replace(log, theta=log.theta[:, :-5], tau=log.tau[:, 5:])  # the logged torque acts 5 ms after its stamp
+    late = replace(
+        log, theta=log.theta[:, :-5], tau=log.tau[:, 5:]
+    )  # the logged torque acts 5 ms after its stamp
     estimated = refined.fit([lambda: [late]], settings=refined.RefinedSettings(estimate_delay=True))
     ignored = refined.fit([lambda: [late]]).values[5:7] / here.arm.constants()[5:7] - 1
     return estimated.values, float(100 * np.abs(ignored).max())
@@ -191,10 +234,14 @@ def cost_rows() -> list[Row]:
         seconds.append((time.process_time() - begin) / repeats)
     slope = np.polyfit(np.log(lengths), np.log(seconds), 1)[0]
     rows: list[Row] = [
-        {"what": f"{10 * n} s of log, s", "value": s, "asked": None} for n, s in zip(lengths, seconds, strict=True)
+        {"what": f"{10 * n} s of log, s", "value": s, "asked": None}
+        for n, s in zip(lengths, seconds, strict=True)
     ]
     rows[0]["asked"] = 0.5
-    return [*rows, {"what": "slope of cost in a log-log fit, at most", "value": float(slope), "asked": 1.1}]
+    return [
+        *rows,
+        {"what": "slope of cost in a log-log fit, at most", "value": float(slope), "asked": 1.1},
+    ]
 
 
 def _first(logs: list[Segment], count: int) -> list[Segment]:

@@ -16,7 +16,10 @@ from algid.estimators.weak import Source
 from algid.model import Model
 from algid.signals.segments import Segment
 
-ASKED = (0.123, 0.078)  # N m; the parameters published with the data reach 0.149 and 0.085 behind the same filter
+ASKED = (
+    0.123,
+    0.078,
+)  # N m; the parameters published with the data reach 0.149 and 0.085 behind the same filter
 AIM = (0.118, 0.072)
 
 
@@ -30,7 +33,10 @@ def run(path: Path) -> Segment:
     dt = float(np.median(np.diff(t[keep])))
     even = t[keep][0] + dt * np.arange(int((t[-1] - t[keep][0]) / dt))
     return Segment(
-        0.0, dt, CubicSpline(t[keep], theta[:, keep], axis=1)(even), CubicSpline(t[keep], tau[:, keep], axis=1)(even)
+        0.0,
+        dt,
+        CubicSpline(t[keep], theta[:, keep], axis=1)(even),
+        CubicSpline(t[keep], tau[:, keep], axis=1)(even),
     )
 
 
@@ -38,13 +44,20 @@ def evaluate(folder: Path) -> list[dict[str, Any]]:
     """RMSE by joint of each model, and what the differentiator's bandwidth does to k2."""
     runs = [run(path) for path in sorted((folder / "C1_sysid").glob("*.csv"))]
     sources: list[Source] = [lambda log=log: [log] for log in runs]  # type: ignore[misc]
-    given = [Selection(Model(terms), delay=False) for terms in ((), ("coulomb", "offset"), ("coulomb", "rotor"))]
+    given = [
+        Selection(Model(terms), delay=False)
+        for terms in ((), ("coulomb", "offset"), ("coulomb", "rotor"))
+    ]
     rows: list[dict[str, Any]] = []
     for chosen in (select(sources, (), weak.WeakSettings(bandwidth=60.0)), *given):
-        settings = weak.WeakSettings(model=chosen.model, bandwidth=60.0, estimate_delay=chosen.delay)
+        settings = weak.WeakSettings(
+            model=chosen.model, bandwidth=60.0, estimate_delay=chosen.delay
+        )
         fit = refined.fit(
             sources,
-            settings=refined.RefinedSettings(model=chosen.model, estimate_delay=chosen.delay, weak=settings),
+            settings=refined.RefinedSettings(
+                model=chosen.model, estimate_delay=chosen.delay, weak=settings
+            ),
         )
         score = cross_validate(fit, sources)
         assert score is not None
@@ -58,6 +71,13 @@ def evaluate(folder: Path) -> list[dict[str, Any]]:
 
 def _bandwidth(sources: list[Source]) -> dict[str, Any]:
     model = Model(("coulomb", "rotor"))
-    fits = [weak.fit(sources, settings=weak.WeakSettings(model=model, bandwidth=hertz)) for hertz in (10.0, 30.0)]
+    fits = [
+        weak.fit(sources, settings=weak.WeakSettings(model=model, bandwidth=hertz))
+        for hertz in (10.0, 30.0)
+    ]
     change = abs(fits[1].values[1] - fits[0].values[1]) / fits[1].std[1]
-    return {"what": "change of k2 from 10 Hz to 30 Hz of bandwidth, σ", "value": float(change), "asked": 1.0}
+    return {
+        "what": "change of k2 from 10 Hz to 30 Hz of bandwidth, σ",
+        "value": float(change),
+        "asked": 1.0,
+    }

@@ -2,9 +2,9 @@
 
     python -m pipelines.accuracy_models --arms 4 --draws 4
 
-Each row of `real_arms.ROWS` is simulated on hidden arms, ten seconds unloaded and ten loaded, and identified once
-with no flag and once with all the old flags. Coverage counts the 95 % intervals of k1 … k7 and m_p that hold the
-truth.
+Each row of `real_arms.ROWS` is simulated on hidden arms, ten seconds unloaded and ten loaded, and
+identified once with no flag and once with all the old flags. Coverage counts the 95 % intervals of
+k1 … k7 and m_p that hold the truth.
 """
 
 from __future__ import annotations
@@ -53,7 +53,9 @@ def draw(job: tuple[str, int, int, str]) -> Row:
     settings = refined.RefinedSettings(model=chosen.model, estimate_delay=chosen.delay, weak=weak)
     fit = refined.fit(*logs, settings)
     if fit.refuted and mode == MODES[0]:
-        fit = shrunk.fit(*logs, replace(weak, model=chosen.shapes or chosen.model, estimate_delay=False))
+        fit = shrunk.fit(
+            *logs, replace(weak, model=chosen.shapes or chosen.model, estimate_delay=False)
+        )
     truth = _scenes[row, arm, False].truth
     names = [*CONSTANT_NAMES, "m_p"]
     places = [fit.names.index(name) for name in names]
@@ -103,7 +105,8 @@ def markdown(lines: Sequence[Row]) -> str:
     ]
     for line in lines:
         estimators, terms = (
-            ", ".join(f"{name} {count}" for name, count in line[key].items()) for key in ("estimators", "terms")
+            ", ".join(f"{name} {count}" for name, count in line[key].items())
+            for key in ("estimators", "terms")
         )
         text.append(
             f"| {line['row']} | {line['mode']} | {estimators} | {line['coverage']:.0f} | {line['z95']:.1f} "
@@ -116,7 +119,13 @@ def evaluate(rows: Sequence[str], arms: int, draws: int) -> list[Row]:
     """The lines of `rows`."""
     seeds = list(range(FIRST_ARM, FIRST_ARM + arms))
     made = real_arms.scenes(list(rows), seeds)
-    jobs = [(row, arm, seed, mode) for row in rows for mode in MODES for arm in seeds for seed in range(draws)]
+    jobs = [
+        (row, arm, seed, mode)
+        for row in rows
+        for mode in MODES
+        for arm in seeds
+        for seed in range(draws)
+    ]
     with ProcessPoolExecutor(2, initializer=install, initargs=(made,)) as pool:
         return summarised(pool.map(draw, jobs, chunksize=2))
 
@@ -126,7 +135,9 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path("build/accuracy"))
     parser.add_argument("--arms", type=int, default=4)
     parser.add_argument("--draws", type=int, default=4)
-    parser.add_argument("--row", action="append", choices=list(real_arms.ROWS), help="only this row, or these")
+    parser.add_argument(
+        "--row", action="append", choices=list(real_arms.ROWS), help="only this row, or these"
+    )
     given = parser.parse_args()
     given.output.mkdir(parents=True, exist_ok=True)
     lines = evaluate(given.row or list(real_arms.ROWS), given.arms, given.draws)

@@ -2,8 +2,8 @@
 
     python -m pipelines.accuracy_refined --draws 100
 
-The draws are those of `make accuracy`, at σ_θ = 1e-3 rad and with 12-bit encoders; errors over the bound do not
-depend on σ_θ, as that command shows.
+The draws are those of `make accuracy`, at σ_θ = 1e-3 rad and with 12-bit encoders; errors over the
+bound do not depend on σ_θ, as that command shows.
 """
 
 from __future__ import annotations
@@ -24,9 +24,14 @@ def draw(name: str, sigma: float, encoder: bool, seed: int) -> tuple[FloatArray,
     """Errors (8,) of k1 … k7 and m_p on one pair of logs, and which intervals (10,) hold the truth."""
     here = accuracy.scene_of(name)
     rng = np.random.default_rng([seed, sum(name.encode())])
-    bare, loaded = (accuracy_scenes.noisy(log, sigma, 10 * sigma, encoder, rng) for log in (here.bare, here.burdened))
+    bare, loaded = (
+        accuracy_scenes.noisy(log, sigma, 10 * sigma, encoder, rng)
+        for log in (here.bare, here.burdened)
+    )
     fit = accuracy.fit_pair(refined.fit, bare, loaded)
-    return fit.values[:8] - here.truth[:8], np.abs(fit.values - here.truth) <= fit.quantile * fit.std
+    return fit.values[:8] - here.truth[:8], np.abs(
+        fit.values - here.truth
+    ) <= fit.quantile * fit.std
 
 
 def line(pool: ProcessPoolExecutor, name: str, sigma: float, encoder: bool, draws: int) -> str:
@@ -43,11 +48,17 @@ def line(pool: ProcessPoolExecutor, name: str, sigma: float, encoder: bool, draw
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--draws", type=int, default=100)
     draws = parser.parse_args().draws
     with ProcessPoolExecutor(2) as pool:
-        accuracy.install(dict(zip(accuracy.SCENES, pool.map(accuracy_scenes.scene, accuracy.SCENES), strict=True)))
+        accuracy.install(
+            dict(
+                zip(accuracy.SCENES, pool.map(accuracy_scenes.scene, accuracy.SCENES), strict=True)
+            )
+        )
     print("| arm | σ_θ | k1 | k2 | k3 | k4 | k5 | k6 | k7 | m_p | largest bias / σ | coverage % |")
     print("|---" * 12 + "|")
     encoder_noise = accuracy_scenes.ENCODER_STEP / np.sqrt(12)

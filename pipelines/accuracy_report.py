@@ -11,12 +11,21 @@ LABELS = ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "m_p")
 
 def markdown(found: dict[str, Any]) -> str:
     """All tables, asked beside measured."""
-    lines = [f"# Accuracy, {found['draws']} draws", "", *_noise(found["noise"]), "", *_side_by_side(found["noise"])]
+    lines = [
+        f"# Accuracy, {found['draws']} draws",
+        "",
+        *_noise(found["noise"]),
+        "",
+        *_side_by_side(found["noise"]),
+    ]
     lines += ["", *_table4(found["table4"])]
     for title in ("timing", "cost", "dfki"):
         if found[title]:
             lines += ["", f"## {title}", "", "| what | asked | measured |", "|---|---|---|"]
-            lines += [f"| {row['what']} | {_number(row['asked'])} | {_number(row['value'])} |" for row in found[title]]
+            lines += [
+                f"| {row['what']} | {_number(row['asked'])} | {_number(row['value'])} |"
+                for row in found[title]
+            ]
     return "\n".join(lines) + "\n"
 
 
@@ -30,7 +39,9 @@ def _noise(rows: list[dict[str, Any]]) -> list[str]:
         "",
         "Asked: RMS ≤ 1.2 (encoder 1.5), bias ≤ 0.3, coverage 92 to 98 % (encoder ≥ 90 %).",
         "",
-        "| arm | turns | σ_θ | RMS / bound: " + " | ".join(LABELS) + " | largest bias / σ | coverage % | fell back |",
+        "| arm | turns | σ_θ | RMS / bound: "
+        + " | ".join(LABELS)
+        + " | largest bias / σ | coverage % | fell back |",
         "|" + "---|" * (len(LABELS) + 6),
     ]
     for row in rows:
@@ -57,7 +68,9 @@ def _side_by_side(rows: list[dict[str, Any]]) -> list[str]:
     for row in rows:
         pooled = row["pooled_over_bound"]
         first = "yes" if min(pooled, key=pooled.__getitem__) == "refined" else "no"
-        lines.append(f"| {row['arm']} | {_sigma(row)} | {' | '.join(_number(pooled[m]) for m in METHODS)} | {first} |")
+        lines.append(
+            f"| {row['arm']} | {_sigma(row)} | {' | '.join(_number(pooled[m]) for m in METHODS)} | {first} |"
+        )
     return lines
 
 

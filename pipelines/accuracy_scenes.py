@@ -48,9 +48,14 @@ def random_arm(seed: int) -> tuple[Arm, float]:
     m1, m2 = rng.uniform(0.4, 3.0), rng.uniform(0.2, 1.5)
     l1, l2 = rng.uniform(0.15, 0.5, 2)
     lc1, lc2 = l1 * rng.uniform(0.35, 0.65), l2 * rng.uniform(0.35, 0.65)
-    inertia1, inertia2 = m1 * l1**2 / 12 * rng.uniform(0.7, 1.5), m2 * l2**2 / 12 * rng.uniform(0.7, 1.5)
+    inertia1, inertia2 = (
+        m1 * l1**2 / 12 * rng.uniform(0.7, 1.5),
+        m2 * l2**2 / 12 * rng.uniform(0.7, 1.5),
+    )
     b1, b2 = rng.uniform(0.05, 0.3, 2)
-    return Arm(m1, m2, lc1, lc2, l1, l2, inertia1, inertia2, b1, b2), float(m2 * rng.uniform(0.25, 1.0))
+    return Arm(m1, m2, lc1, lc2, l1, l2, inertia1, inertia2, b1, b2), float(
+        m2 * rng.uniform(0.25, 1.0)
+    )
 
 
 def case_of(name: str) -> Case:
@@ -62,7 +67,10 @@ def case_of(name: str) -> Case:
 
 
 def scene(name: str) -> Scene:
-    """The scene `case1`, `case2`, or `arm<seed>`; arms of odd seed get a torque that turns joint 1 round."""
+    """The scene `case1`, `case2`, or `arm<seed>`.
+
+    Arms of odd seed get a torque that turns joint 1 round.
+    """
     if name.startswith("case"):
         case = load_case(name)
         arm, payload, bias = case.arm, case.payload, 0.0
@@ -73,7 +81,13 @@ def scene(name: str) -> Scene:
     k = arm.constants()
     loaded = with_payload(k, arm.payload_constants(payload))
     seed = sum(name.encode())
-    return Scene(name, arm, payload, _moved(k, _torque(arm, seed, bias)), _moved(loaded, _torque(arm, seed + 1, bias)))
+    return Scene(
+        name,
+        arm,
+        payload,
+        _moved(k, _torque(arm, seed, bias)),
+        _moved(loaded, _torque(arm, seed + 1, bias)),
+    )
 
 
 def _torque(arm: Arm, seed: int, bias: float) -> Torque:
@@ -87,13 +101,17 @@ def _moved(k: FloatArray, torque: Torque) -> Truth:
     return Truth(t, motion.theta, motion.omega, motion.tau)
 
 
-def noisy(truth: Truth, sigma_theta: float, sigma_tau: float, encoder: bool, rng: np.random.Generator) -> Segment:
+def noisy(
+    truth: Truth, sigma_theta: float, sigma_tau: float, encoder: bool, rng: np.random.Generator
+) -> Segment:
     """One draw of a log: Gaussian noise on the angles, or an encoder of twelve bits at a random phase."""
     theta = truth.theta + sigma_theta * rng.standard_normal(truth.theta.shape)
     if encoder:
         phase = rng.uniform(0, ENCODER_STEP, (2, 1))
         theta = np.round((truth.theta + phase) / ENCODER_STEP) * ENCODER_STEP - phase
-    return Segment(0.0, 1 / RATE, theta, truth.tau + sigma_tau * rng.standard_normal(truth.tau.shape))
+    return Segment(
+        0.0, 1 / RATE, theta, truth.tau + sigma_tau * rng.standard_normal(truth.tau.shape)
+    )
 
 
 def filtered_least_squares(bare: Segment, burdened: Segment, gravity: float) -> FloatArray:
@@ -112,7 +130,8 @@ def _inverse_dynamics(log: Segment, cutoff: float) -> FloatArray:
     theta, tau = sosfiltfilt(sections, np.stack([log.theta, log.tau]), axis=-1)
     omega = np.gradient(theta, log.dt, axis=1)
     Y = regressor(theta, omega, np.gradient(omega, log.dt, axis=1))
-    # Filtered alike, as Gautier's practice is: the regressor's products pass the same filter as the torque.
+    # Filtered alike, as Gautier's practice is: the regressor's products pass the same filter as
+    # the torque.
     Y = sosfiltfilt(sections, Y, axis=-1)
     tau = sosfiltfilt(sections, tau, axis=-1)
     inner = slice(300, -300)

@@ -2,9 +2,9 @@
 
     python -m pipelines.accuracy_short --draws 20
 
-Both cases and three random arms without any error but white noise. Coverage counts the 95 % intervals of k1 … k7 that
-hold the truth; asked are 92 % or more. With no flag the logs choose the terms, so that intervals are those after
-selection; a term that is kept is a false one.
+Both cases and three random arms without any error but white noise. Coverage counts the 95 %
+intervals of k1 … k7 that hold the truth; asked are 92 % or more. With no flag the logs choose the
+terms, so that intervals are those after selection; a term that is kept is a false one.
 """
 
 from __future__ import annotations
@@ -55,7 +55,9 @@ KINDS = {
     "2 s": Kind(2.0),
     "10 s": Kind(10.0),
     "10 s, torque held at 100 Hz": Kind(10.0, 100.0, "zoh"),
-    "5 s, Coulomb friction in the model, k6 and k7": Kind(5.0, terms=("coulomb",), counted=("k6", "k7")),
+    "5 s, Coulomb friction in the model, k6 and k7": Kind(
+        5.0, terms=("coulomb",), counted=("k6", "k7")
+    ),
 }
 
 
@@ -81,7 +83,11 @@ def draw(job: tuple[str, str, int]) -> tuple[list[bool], tuple[str, ...], str]:
     fit, chosen = _fitted([lambda: [log]], kind)
     places = [CONSTANT_NAMES.index(name) for name in kind.counted]
     inside = np.abs(fit.values[:7] - k)[places] <= (fit.quantile * fit.std[:7])[places]
-    return inside.tolist(), (*chosen.model.terms, *(("delay",) if chosen.delay else ())), fit.estimator
+    return (
+        inside.tolist(),
+        (*chosen.model.terms, *(("delay",) if chosen.delay else ())),
+        fit.estimator,
+    )
 
 
 def _fitted(sources: Sequence[Source], kind: Kind) -> tuple[Fit, Selection]:
@@ -97,9 +103,13 @@ def _fitted(sources: Sequence[Source], kind: Kind) -> tuple[Fit, Selection]:
     ) if fit.refuted else fit, chosen
 
 
-def _refined(sources: Sequence[Source], chosen: Selection, weak: WeakSettings) -> tuple[Fit, Selection]:
+def _refined(
+    sources: Sequence[Source], chosen: Selection, weak: WeakSettings
+) -> tuple[Fit, Selection]:
     weak = replace(weak, model=chosen.model, estimate_delay=chosen.delay)
-    settings = refined.RefinedSettings(model=chosen.model, hold=weak.hold, estimate_delay=chosen.delay, weak=weak)
+    settings = refined.RefinedSettings(
+        model=chosen.model, hold=weak.hold, estimate_delay=chosen.delay, weak=weak
+    )
     return refined.fit(sources, settings=settings), chosen
 
 
@@ -108,28 +118,41 @@ def evaluate(draws: int, kinds: Iterable[str] = KINDS) -> list[Row]:
     rows: list[Row] = []
     with ProcessPoolExecutor(2) as pool:
         for what in kinds:
-            found = list(pool.map(draw, [(arm, what, seed) for arm in ARMS for seed in range(draws)], chunksize=4))
+            found = list(
+                pool.map(
+                    draw, [(arm, what, seed) for arm in ARMS for seed in range(draws)], chunksize=4
+                )
+            )
             coverage = 100 * float(np.mean([one for inside, _, _ in found for one in inside]))
             rows.append({"what": f"{what}: coverage, %", "value": coverage, "asked": ASKED})
             if KINDS[what].terms is None:
                 false = 100 * float(np.mean([bool(terms) for _, terms, _ in found]))
-                rows.append({"what": f"{what}: draws with a false term, %", "value": false, "asked": None})
+                rows.append(
+                    {"what": f"{what}: draws with a false term, %", "value": false, "asked": None}
+                )
             handed = 100 * float(np.mean([estimator != "refined" for _, _, estimator in found]))
             rows.append({"what": f"{what}: handed over, %", "value": handed, "asked": None})
     return rows
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("-o", "--output", type=Path, default=Path("build/accuracy"))
     parser.add_argument("--draws", type=int, default=40)
-    parser.add_argument("--kind", action="append", choices=list(KINDS), help="only this row, or these")
+    parser.add_argument(
+        "--kind", action="append", choices=list(KINDS), help="only this row, or these"
+    )
     given = parser.parse_args()
     rows = evaluate(given.draws, given.kind or KINDS)
     given.output.mkdir(parents=True, exist_ok=True)
     (given.output / "short.json").write_text(json.dumps(rows, indent=1))
     for row in rows:
-        print(f"{row['what']}: {row['value']:.3g}" + (f" (asked {row['asked']:g})" if row["asked"] else ""))
+        print(
+            f"{row['what']}: {row['value']:.3g}"
+            + (f" (asked {row['asked']:g})" if row["asked"] else "")
+        )
 
 
 if __name__ == "__main__":

@@ -2,8 +2,9 @@
 
 Usage: python -m pipelines.bench [-o FOLDER] [--rounds N] [--day]
 
-Writes bench.md, bench.parquet (the table) and runs.parquet (every run). Each contender is a process of its own;
-its start-up is the same process on a log of one second. `--day` takes 24 h of log instead.
+Writes bench.md, bench.parquet (the table) and runs.parquet (every run). Each contender is a
+process of its own; its start-up is the same process on a log of one second. `--day` takes 24 h of
+log instead.
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ from pipelines.bench_table import Row, day_rows, markdown, rows
 
 HOUR, MILLION, DAY = 3_600_000, 1_000_000, 86_400_000
 _QUICK = 3  # runs a round of what takes a second: a start-up is taken from it, and both scatter
-EMPTY_APP = "import typer\napp = typer.Typer()\nfor n in ('a', 'b'): app.command(n)(lambda: None)\napp()"
+EMPTY_APP = (
+    "import typer\napp = typer.Typer()\nfor n in ('a', 'b'): app.command(n)(lambda: None)\napp()"
+)
 
 
 @dataclass
@@ -74,10 +77,16 @@ def contenders(folder: Path) -> list[Contender]:
         Contender("second, report", identify(second, out)),
     ]
     for name, log in (("second", second), ("million", million)):
-        found.append(Contender(f"weak {name}", identify(log, out, *weak, "--model", "plain"), times=_QUICK))
+        found.append(
+            Contender(f"weak {name}", identify(log, out, *weak, "--model", "plain"), times=_QUICK)
+        )
         found.append(Contender(f"chosen {name}", identify(log, out, *weak), times=_QUICK))
-        found.append(Contender(f"paper {name}", identify(log, out, "--estimator", "paper", "--no-report")))
-        found += [Contender(f"{p} {name}", peer(p, log), rounds=3) for p in ("least_squares", "pysindy")]
+        found.append(
+            Contender(f"paper {name}", identify(log, out, "--estimator", "paper", "--no-report"))
+        )
+        found += [
+            Contender(f"{p} {name}", peer(p, log), rounds=3) for p in ("least_squares", "pysindy")
+        ]
         found.append(Contender(f"pinocchio {name}", peer("pinocchio", log), rounds=1))
     found.append(Contender("refined second", identify(second, out, "--no-report")))
     found.append(Contender("refined hour", identify(hour, out, "--no-report"), rounds=2))
@@ -90,7 +99,10 @@ def readers(folder: Path) -> list[Contender]:
         bag = bench_logs.bag(folder / "bag", 100_000)
     except ImportError:
         return []
-    return [Contender(f"{name} bag", peer(name, bag), rounds=2) for name in ("algid_reader", "mcap_ros2", "rosbags")]
+    return [
+        Contender(f"{name} bag", peer(name, bag), rounds=2)
+        for name in ("algid_reader", "mcap_ros2", "rosbags")
+    ]
 
 
 def day(folder: Path) -> list[Contender]:
@@ -99,22 +111,38 @@ def day(folder: Path) -> list[Contender]:
     for kind, build in (("parquet", bench_logs.parquet), ("mcap", bench_logs.mcap)):
         for name, samples in (("second", 1000), ("hour", HOUR), ("day", DAY)):
             command = identify(
-                build(folder / f"{name}.{kind}", samples), folder / "out", "--estimator", "weak", "--no-report"
+                build(folder / f"{name}.{kind}", samples),
+                folder / "out",
+                "--estimator",
+                "weak",
+                "--no-report",
             )
             found.append(Contender(f"{kind} {name}", command, rounds=1 if name == "day" else 3))
     return found
 
 
-def write(folder: Path, table: Sequence[Row], runs: Sequence[Contender], extra: str = "", name: str = "bench") -> None:
+def write(
+    folder: Path,
+    table: Sequence[Row],
+    runs: Sequence[Contender],
+    extra: str = "",
+    name: str = "bench",
+) -> None:
     """Write the table as Markdown and Parquet, and every run."""
-    machine = (
-        f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, polars {pl.__version__}"
-    )
+    machine = f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, polars {pl.__version__}"
     load = "load average before and after: {:.1f}, {:.1f}".format(*_LOADS[:1], os.getloadavg()[0])
-    (folder / f"{name}.md").write_text(f"{markdown(table)}\n{machine}; {load}.\n{extra}", encoding="utf-8")
+    (folder / f"{name}.md").write_text(
+        f"{markdown(table)}\n{machine}; {load}.\n{extra}", encoding="utf-8"
+    )
     pl.DataFrame([vars(row) for row in table]).write_parquet(folder / f"{name}.parquet")
     raw = [
-        {"contender": one.name, "round": number, "wall_s": cost.wall, "cpu_s": cost.cpu, "peak_mb": cost.peak}
+        {
+            "contender": one.name,
+            "round": number,
+            "wall_s": cost.wall,
+            "cpu_s": cost.cpu,
+            "peak_mb": cost.peak,
+        }
         for one in runs
         for number, cost in enumerate(one.costs)
     ]

@@ -2,8 +2,9 @@
 
 Usage: python -m pipelines.bench_batch FOLDER [LOGS [KILLS]]
 
-The machine's load is printed beside the figures: on a shared machine they say less. Processor time says more there,
-though not all: idle processes of Dask take 2 % of a core each, for as long as the others let the batch last.
+The machine's load is printed beside the figures: on a shared machine they say less. Processor time
+says more there, though not all: idle processes of Dask take 2 % of a core each, for as long as the
+others let the batch last.
 """
 
 from __future__ import annotations
@@ -123,7 +124,11 @@ class Dask:
         said = self.folder / f"{kind}{time.monotonic_ns()}.txt"
         with said.open("wb") as stream:
             command = [sys.executable, "-c", code, *flags, "--no-dashboard"]
-            self.running.append(subprocess.Popen(command, env={**os.environ, **CLUSTER}, stdout=stream, stderr=stream))
+            self.running.append(
+                subprocess.Popen(
+                    command, env={**os.environ, **CLUSTER}, stdout=stream, stderr=stream
+                )
+            )
         end = time.monotonic() + 60
         while until not in said.read_text():
             if time.monotonic() > end or self.running[-1].poll() is not None:
@@ -152,8 +157,16 @@ def kills(source: Path, out: Path, count: int, seconds: float) -> list[tuple[str
     share = count // 4
     pool = ("--workers", "2")
     found = [
-        ("the parent", count - 3 * share, _survives(source, out, pool, count - 3 * share, seconds, kill, expected)),
-        ("a worker of the pool", share, _survives(source, out, pool, share, seconds, kill_a_worker, expected)),
+        (
+            "the parent",
+            count - 3 * share,
+            _survives(source, out, pool, count - 3 * share, seconds, kill, expected),
+        ),
+        (
+            "a worker of the pool",
+            share,
+            _survives(source, out, pool, share, seconds, kill_a_worker, expected),
+        ),
     ]
     with dask(2, out.with_name("dask")) as cluster:
         flags = ("--scheduler", ADDRESS)
@@ -162,8 +175,13 @@ def kills(source: Path, out: Path, count: int, seconds: float) -> list[tuple[str
         def kill_of_cluster(_parent: int, instants: random.Random) -> None:
             cluster.kill_a_worker(instants)
 
-        for whom, killing in (("the parent of a Dask batch", kill), ("a Dask worker", kill_of_cluster)):
-            found.append((whom, share, _survives(source, out, flags, share, seconds, killing, expected)))
+        for whom, killing in (
+            ("the parent of a Dask batch", kill),
+            ("a Dask worker", kill_of_cluster),
+        ):
+            found.append(
+                (whom, share, _survives(source, out, flags, share, seconds, killing, expected))
+            )
     return found
 
 
@@ -204,8 +222,12 @@ def kill_a_worker(parent: int, instants: random.Random) -> None:
     """Kill one of the processes that work for the batch `parent`."""
     tasks = Path(f"/proc/{parent}/task")
     with suppress(OSError):  # it may end meanwhile
-        found = [int(c) for task in tasks.iterdir() for c in (task / "children").read_text().split()]
-        working = [pid for pid in found if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+        found = [
+            int(c) for task in tasks.iterdir() for c in (task / "children").read_text().split()
+        ]
+        working = [
+            pid for pid in found if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()
+        ]
         if not working:
             return
         os.kill(instants.choice(working), signal.SIGKILL)
@@ -220,18 +242,27 @@ def main(folder: Path, count: int = 1000, killed: int = 50) -> None:
     before = spent(resource.RUSAGE_SELF)
     bare = alone(source, out)
     ideal = spent(resource.RUSAGE_SELF) - before
-    print(f"{count} logs of 10 s at 1 kHz; {os.cpu_count()} cores, load {load:.1f} to {os.getloadavg()[0]:.1f}.")
+    print(
+        f"{count} logs of 10 s at 1 kHz; {os.cpu_count()} cores, load {load:.1f} to {os.getloadavg()[0]:.1f}."
+    )
     print("\n| what | asked | measured |\n|---|---|---|")
     print(f"| two workers over one | ≥ 1.8 | {one / two:.2f} ({one:.1f} s, {two:.1f} s) |")
-    print(f"| overhead of one worker beyond identification | ≤ 15 % | {100 * (one / bare - 1):.0f} % ({bare:.1f} s) |")
+    print(
+        f"| overhead of one worker beyond identification | ≤ 15 % | {100 * (one / bare - 1):.0f} % ({bare:.1f} s) |"
+    )
     with dask(2, folder / "dask") as running:
         pids = [process.pid for process in running.running]
         before = spent(resource.RUSAGE_CHILDREN, pids)
         cluster = run(source, out, "--scheduler", ADDRESS)
         used = spent(resource.RUSAGE_CHILDREN, pids) - before
-    print(f"| Dask's two workers over the process pool's | ≥ 0.95 | {two / cluster:.2f} ({cluster:.1f} s) |")
+    print(
+        f"| Dask's two workers over the process pool's | ≥ 0.95 | {two / cluster:.2f} ({cluster:.1f} s) |"
+    )
     share = f"{ideal / used:.2f} ({ideal:.1f} s of {used:.1f} s)"
-    print(f"| processor time of identification over all that Dask's batch takes | ≥ 0.95 | {share} |", flush=True)
+    print(
+        f"| processor time of identification over all that Dask's batch takes | ≥ 0.95 | {share} |",
+        flush=True,
+    )
     small = folder / "small"
     small.mkdir()
     for path in sorted(source.iterdir())[:12]:
@@ -239,7 +270,10 @@ def main(folder: Path, count: int = 1000, killed: int = 50) -> None:
     seconds = run(small, out, "--workers", "2")
     for whom, times, same in kills(small, out, killed, seconds):
         outcome = "the same bytes" if same else "DIFFERENT"
-        print(f"| {times} kills of {whom} at random instants | as undisturbed | {outcome} |", flush=True)
+        print(
+            f"| {times} kills of {whom} at random instants | as undisturbed | {outcome} |",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

@@ -1,10 +1,11 @@
 """What a designed motion is worth, and whether its error bars come true: `make bench-design`.
 
-Both cases of the paper and five random arms, within ± 1.2 rad, 3 rad/s and twice the torque of the loaded arm's
-weight, 10 s. Beside each design stand random Fourier motions scaled to the same limits, and the motion with the least
-condition number (the peers' criterion) within them. Then the campaign is rehearsed: a controller follows the motion
-on the true arm, the logs get noise, and the errors of what `refined` finds are set over the error bars predicted, with
-the true arm as prior and with priors whose masses are 20 % wrong. Writes `design.md` and `design.json`.
+Both cases of the paper and five random arms, within ± 1.2 rad, 3 rad/s and twice the torque of the
+loaded arm's weight, 10 s. Beside each design stand random Fourier motions scaled to the same
+limits, and the motion with the least condition number (the peers' criterion) within them. Then the
+campaign is rehearsed: a controller follows the motion on the true arm, the logs get noise, and the
+errors of what `refined` finds are set over the error bars predicted, with the true arm as prior
+and with priors whose masses are 20 % wrong. Writes `design.md` and `design.json`.
 """
 
 from __future__ import annotations
@@ -71,7 +72,9 @@ def campaign_of(prior: Case, limits: Limits) -> Campaign:
     """The campaign that is planned for a prior within limits."""
     known = of_case(prior, prior.name, True, KnownBefore())
     experiment = Experiment(known.belief.shared, (1, 1), NOISE, RATE)
-    return Campaign(experiment, known.belief, limits, asked_for(known.belief, None, prior.name), DURATION)
+    return Campaign(
+        experiment, known.belief, limits, asked_for(known.belief, None, prior.name), DURATION
+    )
 
 
 class LeastConditionNumber(PositionProblem):
@@ -88,7 +91,10 @@ class LeastConditionNumber(PositionProblem):
     def _condition(slopes: Slopes) -> tuple[float, FloatArray]:
         """Logarithm of the condition number and its derivative by Y (2, q, N)."""
         values, vectors = np.linalg.eigh(np.einsum("aqn,arn->qr", slopes.Y, slopes.Y))
-        A = np.outer(vectors[:, -1], vectors[:, -1]) / values[-1] - np.outer(vectors[:, 0], vectors[:, 0]) / values[0]
+        A = (
+            np.outer(vectors[:, -1], vectors[:, -1]) / values[-1]
+            - np.outer(vectors[:, 0], vectors[:, 0]) / values[0]
+        )
         return 0.5 * float(np.log(values[-1] / values[0])), np.einsum("qr,arn->aqn", A, slopes.Y)
 
 
@@ -96,7 +102,9 @@ def problem_of(kind: Callable[..., PositionProblem], campaign: Campaign) -> Posi
     limits = campaign.limits.within(campaign.margin)
     loads = [campaign.belief.load(loaded) for loaded in campaign.experiment.kinds]
     rest = resting(limits, campaign.experiment.shared.model, loads)
-    return kind(campaign.experiment, campaign.belief, limits, campaign.asked, campaign.duration, rest)
+    return kind(
+        campaign.experiment, campaign.belief, limits, campaign.asked, campaign.duration, rest
+    )
 
 
 def bound(campaign: Campaign, slopes: Slopes) -> float:
@@ -137,13 +145,17 @@ def rehearsed(name: str, error: tuple[float, float, float] | None, draws: int) -
     prior = case if error is None else wrong(case, *error)
     design = plan(campaign_of(prior, limits))
     k, t = case.arm.constants(), design.t
-    followed = Reference(t, design.motion.theta, design.motion.omega, design.torque[False], design.torque[True])
+    followed = Reference(
+        t, design.motion.theta, design.motion.omega, design.torque[False], design.torque[True]
+    )
     motions = []
     for loaded in (False, True):
         own = with_payload(k, case.arm.payload_constants(case.payload * loaded))
         motions.append(follow(own, followed, t, k, loaded, None))
     truth = np.concatenate([k, [case.payload, case.arm.l1, case.arm.l2]])
-    rng = np.random.default_rng([sum(name.encode()), 0 if error is None else 1 + WRONG.index(error)])
+    rng = np.random.default_rng(
+        [sum(name.encode()), 0 if error is None else 1 + WRONG.index(error)]
+    )
     errors = [_identified(motions, rng) - truth for _ in range(draws)]
     return {
         "arm": name,
@@ -196,7 +208,12 @@ def main() -> None:
     with ProcessPoolExecutor(2) as pool:
         values = list(pool.map(partial(worth, randoms=options.randoms), names))
         jobs: list[Job] = [(name, None, options.draws) for name in names] if options.draws else []
-        jobs += [(name, error, -(-options.draws // len(WRONG))) for name in names for error in WRONG if options.draws]
+        jobs += [
+            (name, error, -(-options.draws // len(WRONG)))
+            for name in names
+            for error in WRONG
+            if options.draws
+        ]
         rehearsals = list(pool.map(_rehearsed, jobs))
     figures = judged(values, rehearsals)
     options.out.mkdir(parents=True, exist_ok=True)
@@ -215,7 +232,11 @@ def _rehearsed(job: Job) -> Row:
 def judged(values: list[Row], rehearsals: list[Row]) -> list[Row]:
     """Each figure asked for beside what was measured."""
     figures = [
-        _figure("largest bound over the random motions' median", 0.5, max(row["over_random"] for row in values)),
+        _figure(
+            "largest bound over the random motions' median",
+            0.5,
+            max(row["over_random"] for row in values),
+        ),
         _figure(
             "largest bound over that of the least condition number",
             1.0,
@@ -229,10 +250,18 @@ def judged(values: list[Row], rehearsals: list[Row]) -> list[Row]:
             ratios([row for row in rehearsals if row["wrong"]]),
         )
         figures += [
-            _figure("error over predicted ±, all arms, most (true prior)", 1.1, max(right.values())),
-            _figure("error over predicted ±, all arms, least (true prior), inverted", 1 / 0.9, 1 / min(right.values())),
+            _figure(
+                "error over predicted ±, all arms, most (true prior)", 1.1, max(right.values())
+            ),
+            _figure(
+                "error over predicted ±, all arms, least (true prior), inverted",
+                1 / 0.9,
+                1 / min(right.values()),
+            ),
             _figure("error over predicted ±, most (masses 20 % wrong)", 1.3, max(off.values())),
-            _figure("share of a limit used by any true arm", 1.0, max(row["used"] for row in rehearsals)),
+            _figure(
+                "share of a limit used by any true arm", 1.0, max(row["used"] for row in rehearsals)
+            ),
         ]
     return figures
 
@@ -248,15 +277,32 @@ def markdown(values: list[Row], rehearsals: list[Row], figures: list[Row]) -> st
         f"| {row['figure']} | ≤ {row['at_most']:.3g} | {row['measured']:.3g} | {'✓' if row['reached'] else 'missed'} |"
         for row in figures
     ]
-    lines += ["", "| arm | design, % | random median, % | random best, % | least condition, % | cpu, s |"]
+    lines += [
+        "",
+        "| arm | design, % | random median, % | random best, % | least condition, % | cpu, s |",
+    ]
     lines += ["|---|---|---|---|---|---|"]
-    columns = ("design_percent", "random_median_percent", "random_best_percent", "condition_percent", "cpu_seconds")
-    lines += [f"| {row['arm']} | " + " | ".join(f"{row[name]:.3g}" for name in columns) + " |" for row in values]
+    columns = (
+        "design_percent",
+        "random_median_percent",
+        "random_best_percent",
+        "condition_percent",
+        "cpu_seconds",
+    )
+    lines += [
+        f"| {row['arm']} | " + " | ".join(f"{row[name]:.3g}" for name in columns) + " |"
+        for row in values
+    ]
     for wrongly, title in ((False, "true prior"), (True, "masses 20 % wrong")):
         rows = [row for row in rehearsals if row["wrong"] == wrongly]
         if not rows:
             continue
-        lines += ["", f"Error over predicted ±, {title}:", "", f"| arm | {' | '.join(rows[0]['names'])} | limit used |"]
+        lines += [
+            "",
+            f"Error over predicted ±, {title}:",
+            "",
+            f"| arm | {' | '.join(rows[0]['names'])} | limit used |",
+        ]
         lines += ["|---" * (len(rows[0]["names"]) + 2) + "|"]
         for name in dict.fromkeys(row["arm"] for row in rows):
             own = [row for row in rows if row["arm"] == name]

@@ -62,7 +62,9 @@ def joint_and_imu(path: Path) -> None:
         joints = _channel(writer, "/joint_states", JOINT_STATE, JOINT_STATE_DEFINITION)
         imu = _channel(writer, "/imu/data", _IMU, _IMU_DEFINITION)
         other = imu_payloads(ROWS // 5)
-        for row, (stamp, payload) in enumerate(zip(log.stamp_ns.tolist(), payloads(log), strict=True)):
+        for row, (stamp, payload) in enumerate(
+            zip(log.stamp_ns.tolist(), payloads(log), strict=True)
+        ):
             writer.add_message(joints, stamp, payload, stamp, row)
             if row % 5 == 0:
                 writer.add_message(imu, stamp + 1000, next(other), stamp + 1000, row // 5)
@@ -88,9 +90,13 @@ def with_cameras(path: Path, gigabytes: float = 2.0) -> None:
         writer = Writer(stream, chunk_size=4 << 20, compression=CompressionType.ZSTD)
         writer.start(profile="ros2", library="algid bench")
         joints = _channel(writer, "/joint_states", JOINT_STATE, JOINT_STATE_DEFINITION)
-        camera = _channel(writer, "/camera/image", "sensor_msgs/msg/CompressedImage", "uint8[] data\n")
+        camera = _channel(
+            writer, "/camera/image", "sensor_msgs/msg/CompressedImage", "uint8[] data\n"
+        )
         head = struct.pack("<BBBBI", 0, 1, 0, 0, len(image))
-        for row, (stamp, payload) in enumerate(zip(log.stamp_ns.tolist(), payloads(log), strict=True)):
+        for row, (stamp, payload) in enumerate(
+            zip(log.stamp_ns.tolist(), payloads(log), strict=True)
+        ):
             writer.add_message(joints, stamp, payload, stamp, row)
             if row % 16 == 0:
                 writer.add_message(camera, stamp, head + image, stamp, row // 16)
@@ -116,8 +122,12 @@ def protobuf_states(path: Path, rows: int = PROTOBUF_ROWS) -> None:
     file = descriptor_pb2.FileDescriptorProto(name="arm.proto", package="arm", syntax="proto3")
     file.dependency.append("google/protobuf/timestamp.proto")
     message = file.message_type.add(name="State")
-    message.field.add(name="timestamp", number=1, type=11, label=1, type_name=".google.protobuf.Timestamp")
-    for number, (name, kind) in enumerate((("name", 9), ("position", 1), ("velocity", 1), ("effort", 1)), 2):
+    message.field.add(
+        name="timestamp", number=1, type=11, label=1, type_name=".google.protobuf.Timestamp"
+    )
+    for number, (name, kind) in enumerate(
+        (("name", 9), ("position", 1), ("velocity", 1), ("effort", 1)), 2
+    ):
         message.field.add(name=name, number=number, type=kind, label=3)
     stamp = descriptor_pb2.FileDescriptorProto()
     timestamp_pb2.DESCRIPTOR.CopyToProto(stamp)
@@ -132,7 +142,9 @@ def protobuf_states(path: Path, rows: int = PROTOBUF_ROWS) -> None:
         writer = Writer(stream, chunk_size=768 * 1024, compression=CompressionType.ZSTD)
         writer.start(library="algid bench")
         schema = writer.register_schema(name="arm.State", encoding="protobuf", data=data)
-        channel = writer.register_channel(topic="/arm", message_encoding="protobuf", schema_id=schema)
+        channel = writer.register_channel(
+            topic="/arm", message_encoding="protobuf", schema_id=schema
+        )
         for row, stamp_ns in enumerate(log.stamp_ns.tolist()):
             one = state(name=["j1", "j2"])
             one.timestamp.seconds, one.timestamp.nanos = divmod(stamp_ns, 10**9)

@@ -23,7 +23,10 @@ def table(robots: int, days: int, growth: float = 0.0, seed: int = 0) -> pl.Data
     """A log a day of each robot, estimates within 0.5 %; k6 grows by `growth` a month."""
     rng = np.random.default_rng(seed)
     day, robot = np.tile(np.arange(days), robots), np.repeat(np.arange(robots), days)
-    times = np.array([START.replace(tzinfo=None) + timedelta(days=d) for d in range(days)], dtype="datetime64[us]")
+    times = np.array(
+        [START.replace(tzinfo=None) + timedelta(days=d) for d in range(days)],
+        dtype="datetime64[us]",
+    )
     frame = pl.DataFrame(
         {
             "job": pl.Series(np.arange(robot.size)).cast(pl.String),
@@ -46,7 +49,9 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     table(2740, 365).write_parquet(folder / "jobs.parquet")
     start = time.perf_counter()
-    subprocess.run([sys.executable, "-m", "algid", "fleet", str(folder)], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        [sys.executable, "-m", "algid", "fleet", str(folder)], check=True, stdout=subprocess.DEVNULL
+    )
     seconds = time.perf_counter() - start
     memory = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1e6
     quiet = history_of(folder / "jobs.parquet").windows["drift"].sum()

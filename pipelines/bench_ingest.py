@@ -2,8 +2,8 @@
 
 Usage: python -m pipelines.bench_ingest [FOLDER]
 
-Prints a Markdown table. Times are medians of rounds in which what is compared takes turns, page cache warm, imports
-excluded: a processor that drifts by a quarter within a run favours neither.
+Prints a Markdown table. Times are medians of rounds in which what is compared takes turns, page
+cache warm, imports excluded: a processor that drifts by a quarter within a run favours neither.
 """
 
 from __future__ import annotations
@@ -88,7 +88,9 @@ def peak_above_arrays(path: Path) -> float:
         "arrays = sum(a.nbytes for a in (log.stamp_ns, log.theta, log.tau, log.omega))\n"
         "print((status('VmHWM') - before - arrays) / 1e6)"
     )
-    done = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True
+    )
     return float(done.stdout)
 
 
@@ -106,13 +108,28 @@ def joints(folder: Path) -> None:
         bench_files.joint_and_imu(path)
     limit, ours = medians(11, lambda: decompress(path), lambda: read_log(path))
     detail = f"{ours:.3f} s, decompression {limit:.3f} s"
-    row("1,000,000 JointState + 200,000 Imu, zstd, to decompression", "≤ 3", f"{ours / limit:.2f}", detail)
+    row(
+        "1,000,000 JointState + 200,000 Imu, zstd, to decompression",
+        "≤ 3",
+        f"{ours / limit:.2f}",
+        detail,
+    )
     start = time.perf_counter()
     theirs = peer(path, DecoderFactory(), "/joint_states")
     slow = time.perf_counter() - start
     equal = "bit-exact" if theirs is not None and same(read_log(path), theirs) else "DIFFERENT"
-    row("the same, mcap-ros2-support to algid", "≥ 40", f"{slow / ours:.0f}", f"{slow:.1f} s, {equal}")
-    row("the same, memory beyond the arrays, MB", "≤ 64", f"{peak_above_arrays(path):.0f}", "peak resident")
+    row(
+        "the same, mcap-ros2-support to algid",
+        "≥ 40",
+        f"{slow / ours:.0f}",
+        f"{slow:.1f} s, {equal}",
+    )
+    row(
+        "the same, memory beyond the arrays, MB",
+        "≤ 64",
+        f"{peak_above_arrays(path):.0f}",
+        "peak resident",
+    )
 
 
 def protobuf(folder: Path) -> None:

@@ -1,7 +1,7 @@
 """The logs that `bench` identifies from: a periodic motion and the torque it takes, tiled without end.
 
-The motion of 10 s is a sum of harmonics, so that its derivatives and, by eq. (1), its torque are closed forms;
-each repetition gets torque noise of its own, and the encoder's steps.
+The motion of 10 s is a sum of harmonics, so that its derivatives and, by eq. (1), its torque are
+closed forms; each repetition gets torque noise of its own, and the encoder's steps.
 """
 
 from __future__ import annotations
@@ -57,7 +57,9 @@ def blocks(rows: int, case: str = "case1") -> Iterator[Log]:
     """A log of `rows` samples in blocks; the same for the same length."""
     draw = np.random.default_rng(1)
     theta, omega, alpha = motion()
-    clean = np.tile(inverse_dynamics(load_case(case).arm.constants(), theta, omega, alpha), (1, _BLOCK))
+    clean = np.tile(
+        inverse_dynamics(load_case(case).arm.constants(), theta, omega, alpha), (1, _BLOCK)
+    )
     theta = np.tile(np.rint(theta / ENCODER_STEP) * ENCODER_STEP, (1, _BLOCK))
     for first in range(0, rows, theta.shape[1]):
         count = min(theta.shape[1], rows - first)
@@ -83,9 +85,13 @@ def mcap(path: Path, rows: int) -> Path:
 
 
 def _write_mcap(stream: BinaryIO, log: Iterator[Log]) -> None:
-    schema = struct.pack("<H", 1) + _text(JOINT_STATE) + _text("ros2msg") + _text(JOINT_STATE_DEFINITION)
+    schema = (
+        struct.pack("<H", 1) + _text(JOINT_STATE) + _text("ros2msg") + _text(JOINT_STATE_DEFINITION)
+    )
     channel = struct.pack("<HH", 0, 1) + _text(TOPIC) + _text("cdr") + struct.pack("<I", 0)
-    head = _record(1, _text("ros2") + _text("algid bench")) + _record(3, schema) + _record(4, channel)
+    head = (
+        _record(1, _text("ros2") + _text("algid bench")) + _record(3, schema) + _record(4, channel)
+    )
     stream.write(_MAGIC + head)
     packer = zstandard.ZstdCompressor(level=1, threads=0)
     index, sequence, first_ns, last_ns = [], 0, 0, 0
@@ -99,16 +105,29 @@ def _write_mcap(stream: BinaryIO, log: Iterator[Log]) -> None:
     summary = stream.tell()
     counts = struct.pack("<IHQ", 10, 0, sequence)
     figures = struct.pack("<QHIIIIQQ", sequence, 1, 1, 0, 0, len(index), first_ns, last_ns) + counts
-    stream.write(_record(3, schema) + _record(4, channel) + _record(0x0B, figures) + b"".join(index))
+    stream.write(
+        _record(3, schema) + _record(4, channel) + _record(0x0B, figures) + b"".join(index)
+    )
     stream.write(_record(2, struct.pack("<QQI", summary, 0, 0)) + _MAGIC)
 
 
-def _write_chunk(stream: BinaryIO, part: Log, sequence: int, packer: zstandard.ZstdCompressor) -> bytes:
-    """Write the samples of `part` as a chunk of messages and its message index; gives its chunk index record."""
+def _write_chunk(
+    stream: BinaryIO, part: Log, sequence: int, packer: zstandard.ZstdCompressor
+) -> bytes:
+    """Write the samples of `part` as a chunk of messages and its message index.
+
+    Gives its chunk index record.
+    """
     plain, size = _messages(part, sequence)
     span = struct.pack("<QQ", int(part.stamp_ns[0]), int(part.stamp_ns[-1]))
     packed = packer.compress(plain)
-    body = span + struct.pack("<QI", len(plain), 0) + _text("zstd") + struct.pack("<Q", len(packed)) + packed
+    body = (
+        span
+        + struct.pack("<QI", len(plain), 0)
+        + _text("zstd")
+        + struct.pack("<Q", len(packed))
+        + packed
+    )
     start, chunk = stream.tell(), _record(6, body)
     entries = np.stack([part.stamp_ns, size * np.arange(len(part))], axis=1).astype("<u8").tobytes()
     index = _record(7, struct.pack("<HI", 0, len(entries)) + entries)
@@ -121,7 +140,13 @@ def _messages(part: Log, sequence: int) -> tuple[bytes, int]:
     """The samples of `part` as message records, and the bytes of one."""
     payload = list(payloads(part))
     size = len(payload[0])
-    fields = [("code", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log", "<u8")]
+    fields = [
+        ("code", "u1"),
+        ("length", "<u8"),
+        ("channel", "<u2"),
+        ("sequence", "<u4"),
+        ("log", "<u8"),
+    ]
     rows = np.zeros(len(part), np.dtype([*fields, ("publish", "<u8"), ("data", f"V{size}")]))
     rows["code"], rows["length"] = 5, 22 + size
     rows["sequence"] = sequence + np.arange(len(part))

@@ -2,7 +2,8 @@
 
 Usage: python -m pipelines.bench_long [FOLDER] [SAMPLES]
 
-Processor time and wall time of each, and of a track how they grow from half the gaps to all of them.
+Processor time and wall time of each, and of a track how they grow from half the gaps to all of
+them.
 """
 
 from __future__ import annotations
@@ -36,12 +37,34 @@ def main() -> None:
         print(f"{name}: {timed(*arguments)}", flush=True)
     arm = folder / "arm.csv"
     write_log(arm, moving(30_000, 0, 1000.0))
-    timed("identify", arm, "-o", folder, "--force", "--no-report", "-q", "--estimator", "weak", "--model", "plain")
+    timed(
+        "identify",
+        arm,
+        "-o",
+        folder,
+        "--force",
+        "--no-report",
+        "-q",
+        "--estimator",
+        "weak",
+        "--model",
+        "plain",
+    )
     lengths = ("--l1", "0.16", "--l2", "0.12")
     for gaps in (HOUR_GAPS // 2, HOUR_GAPS):
         hour = folder / f"hour-{gaps}.parquet"
         write_log(hour, moving(HOUR_AT_100_HZ, gaps, 100.0))
-        spent = timed("track", hour, "--parameters", folder / "arm.algid", *lengths, "-o", folder, "--force", "-q")
+        spent = timed(
+            "track",
+            hour,
+            "--parameters",
+            folder / "arm.algid",
+            *lengths,
+            "-o",
+            folder,
+            "--force",
+            "-q",
+        )
         print(f"track an hour at 100 Hz, {gaps} gaps: {spent}", flush=True)
 
 
@@ -58,7 +81,9 @@ def moving(samples: int, gaps: int, rate: float) -> Log:
     tau = np.empty((2, samples))
     for first in range(0, samples, 1 << 18):
         part = slice(first, first + (1 << 18))
-        tau[:, part] = np.einsum("ij...,j->i...", regressor(theta[:, part], omega[:, part], alpha[:, part]), k)
+        tau[:, part] = np.einsum(
+            "ij...,j->i...", regressor(theta[:, part], omega[:, part], alpha[:, part]), k
+        )
     stamp_ns = np.round(t * 1e9).astype(np.int64)
     if gaps:
         lost = np.zeros(samples, dtype=np.int64)
@@ -77,9 +102,7 @@ def timed(*arguments: object) -> str:
         raise RuntimeError(f"{command}: {done.returncode}: {done.stderr[-500:]}")
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return (
-        f"{time.perf_counter() - start:.1f} s, {spent:.1f} s of processors, at most {after.ru_maxrss >> 10} MB so far"
-    )
+    return f"{time.perf_counter() - start:.1f} s, {spent:.1f} s of processors, at most {after.ru_maxrss >> 10} MB so far"
 
 
 if __name__ == "__main__":

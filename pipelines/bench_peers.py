@@ -1,7 +1,8 @@
 """What algid is timed against, one process a peer: `python -m pipelines.bench_peers NAME LOG`.
 
-A peer that estimates prints the seven constants; one that reads prints the seconds that reading took, imports
-excluded. Every estimating peer reads the log with polars and filters it as users of these tools do.
+A peer that estimates prints the seven constants; one that reads prints the seconds that reading
+took, imports excluded. Every estimating peer reads the log with polars and filters it as users of
+these tools do.
 """
 
 from __future__ import annotations
@@ -61,7 +62,9 @@ def pinocchio(path: Path) -> FloatArray:
     found = np.linalg.lstsq(W, np.concatenate([tau[0], tau[1]]), rcond=1e-8)[0]
     x1, inertia1, m2, x2, inertia2 = found[[1, 9, 10, 11, 19]]
     g = 9.81
-    return np.array([l1 * x2, g * x2, inertia2, g * (x1 + m2 * l1), inertia1 + m2 * l1**2, found[20], found[21]])
+    return np.array(
+        [l1 * x2, g * x2, inertia2, g * (x1 + m2 * l1), inertia1 + m2 * l1**2, found[20], found[21]]
+    )
 
 
 def _two_links(pin: Any) -> tuple[Any, float]:
@@ -158,7 +161,8 @@ def _seconds(work: Callable[[], object], times: int) -> float:
 
 
 PEERS: dict[str, Callable[[Path], Any]] = {
-    peer.__name__: peer for peer in (least_squares, pinocchio, pysindy, polars, algid_reader, mcap_ros2, rosbags)
+    peer.__name__: peer
+    for peer in (least_squares, pinocchio, pysindy, polars, algid_reader, mcap_ros2, rosbags)
 }
 
 if __name__ == "__main__":

@@ -35,7 +35,8 @@ class Cost:
 def run(command: Sequence[str]) -> Cost:
     """Run a command to its end; BLAS keeps to one thread, for the peers' good as well as algid's.
 
-    Modules are compiled once, as they are where pip has installed them, even if the environment forbids it.
+    Modules are compiled once, as they are where pip has installed them, even if the environment
+    forbids it.
 
     Raises
     ------
@@ -45,7 +46,9 @@ def run(command: Sequence[str]) -> Cost:
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
     launcher = [sys.executable, "-I", "-S", "-c", _LAUNCH, *command]
-    text = subprocess.run(launcher, capture_output=True, text=True, env=environment, check=True).stdout
+    text = subprocess.run(
+        launcher, capture_output=True, text=True, env=environment, check=True
+    ).stdout
     output, _, figures = text.rstrip().rpartition("\n")
     code, wall, cpu, peak = json.loads(figures)
     if code not in (0, 3):  # 3: algid tells that a constant could not be identified

@@ -28,7 +28,9 @@ def stages(path: Path) -> str:
         equations = _seconds(lambda: normal_equations(lambda: held, settings))
         solved = _seconds(lambda: fit([lambda: held], (), settings))
         predicted = _seconds(lambda: _predict(held, settings))
-        whole = _seconds(lambda: identify(path, settings=Settings(estimator="weak", model="plain"), report=False))
+        whole = _seconds(
+            lambda: identify(path, settings=Settings(estimator="weak", model="plain"), report=False)
+        )
     lines = [
         ("reading in blocks", read),
         ("uniform segments", sampled - read),

@@ -54,12 +54,26 @@ def _busy(costs: Mapping[str, Cost], name: str) -> float:
 
 def _weak(costs: Mapping[str, Cost]) -> list[Row]:
     ours, theirs = _net(costs, "weak"), float(json.loads(costs["polars"].output))
-    detail = f"{ours:.3f} s less start-up against {theirs:.4f} s; processor {_busy(costs, 'weak'):.3f} s"
+    detail = (
+        f"{ours:.3f} s less start-up against {theirs:.4f} s; processor {_busy(costs, 'weak'):.3f} s"
+    )
     peak = costs["weak million"].peak
     chosen = _net(costs, "chosen")
     return [
-        Row("weak, 1,000,000 samples of Parquet, to polars reading them", "≤ 10", f"{ours / theirs:.1f}", detail, peak),
-        Row("the same, and the torque's terms chosen", "", f"{chosen / theirs:.1f}", f"{chosen:.3f} s", None),
+        Row(
+            "weak, 1,000,000 samples of Parquet, to polars reading them",
+            "≤ 10",
+            f"{ours / theirs:.1f}",
+            detail,
+            peak,
+        ),
+        Row(
+            "the same, and the torque's terms chosen",
+            "",
+            f"{chosen / theirs:.1f}",
+            f"{chosen:.3f} s",
+            None,
+        ),
     ]
 
 
@@ -74,26 +88,72 @@ def _peers(costs: Mapping[str, Cost], failed: Mapping[str, str]) -> list[Row]:
         theirs = _net(costs, peer)
         whole, own = costs[f"{peer} million"].wall, costs["weak million"].wall
         busy = _busy(costs, peer) / _busy(costs, "weak")
-        detail = (
-            f"{theirs:.2f} s less start-up, processor {busy:.1f}; whole processes {whole:.2f} s against {own:.2f} s"
+        detail = f"{theirs:.2f} s less start-up, processor {busy:.1f}; whole processes {whole:.2f} s against {own:.2f} s"
+        found.append(
+            Row(
+                f"{name}, to weak",
+                "≥ 5",
+                f"{theirs / ours:.1f}",
+                detail,
+                costs[f"{peer} million"].peak,
+            )
         )
-        found.append(Row(f"{name}, to weak", "≥ 5", f"{theirs / ours:.1f}", detail, costs[f"{peer} million"].peak))
     return found
 
 
 def _others(costs: Mapping[str, Cost]) -> list[Row]:
-    refined, paper, ten = costs["refined hour"], costs["paper million"], costs["ten seconds, report"]
+    refined, paper, ten = (
+        costs["refined hour"],
+        costs["paper million"],
+        costs["ten seconds, report"],
+    )
     second, shown = costs["refined second"], costs["second, report"]
     times, each = _HOUR / refined.wall, 1e6 * _net(costs, "paper") / 1e6
     ours, theirs = costs["help"].wall, costs["empty typer help"].wall
     wall = f"{refined.wall:.1f} s, start-up included; processor {refined.cpu:.1f} s"
     return [
-        Row("refined, an hour at 1 kHz, times real time", "≥ 100, aim 200", f"{times:.0f}", wall, refined.peak),
-        Row("paper's series, µs a sample", "≤ 5", f"{each:.2f}", f"{paper.wall:.2f} s in all", paper.peak),
-        Row("ten seconds, refined, report, s", "≤ 2.5", f"{ten.wall:.2f}", f"processor {ten.cpu:.2f} s", ten.peak),
-        Row("one second, refined, no report, s", "≤ 0.5", f"{second.wall:.2f}", f"processor {second.cpu:.2f} s", None),
-        Row("one second, refined, report, s", "≤ 0.6", f"{shown.wall:.2f}", f"processor {shown.cpu:.2f} s", None),
-        Row("--help to an empty typer app's", "≤ 1.3", f"{ours / theirs:.2f}", f"{ours:.3f} s", costs["help"].peak),
+        Row(
+            "refined, an hour at 1 kHz, times real time",
+            "≥ 100, aim 200",
+            f"{times:.0f}",
+            wall,
+            refined.peak,
+        ),
+        Row(
+            "paper's series, µs a sample",
+            "≤ 5",
+            f"{each:.2f}",
+            f"{paper.wall:.2f} s in all",
+            paper.peak,
+        ),
+        Row(
+            "ten seconds, refined, report, s",
+            "≤ 2.5",
+            f"{ten.wall:.2f}",
+            f"processor {ten.cpu:.2f} s",
+            ten.peak,
+        ),
+        Row(
+            "one second, refined, no report, s",
+            "≤ 0.5",
+            f"{second.wall:.2f}",
+            f"processor {second.cpu:.2f} s",
+            None,
+        ),
+        Row(
+            "one second, refined, report, s",
+            "≤ 0.6",
+            f"{shown.wall:.2f}",
+            f"processor {shown.cpu:.2f} s",
+            None,
+        ),
+        Row(
+            "--help to an empty typer app's",
+            "≤ 1.3",
+            f"{ours / theirs:.2f}",
+            f"{ours:.3f} s",
+            costs["help"].peak,
+        ),
     ]
 
 
@@ -104,11 +164,21 @@ def _readers(costs: Mapping[str, Cost], failed: Mapping[str, str]) -> list[Row]:
     found = []
     for peer, name in READERS.items():
         if f"{peer} bag" not in costs:
-            found.append(Row(f"{name}, 100,000 joint states, to algid", "", "did not run", failed[f"{peer} bag"], None))
+            found.append(
+                Row(
+                    f"{name}, 100,000 joint states, to algid",
+                    "",
+                    "did not run",
+                    failed[f"{peer} bag"],
+                    None,
+                )
+            )
             continue
         theirs = float(json.loads(costs[f"{peer} bag"].output))
         detail = f"{theirs:.2f} s against {ours:.3f} s"
-        found.append(Row(f"{name}, 100,000 joint states, to algid", "", f"{theirs / ours:.0f}", detail, None))
+        found.append(
+            Row(f"{name}, 100,000 joint states, to algid", "", f"{theirs / ours:.0f}", detail, None)
+        )
     return found
 
 
@@ -117,14 +187,28 @@ def day_rows(costs: Mapping[str, Cost], failed: Mapping[str, str]) -> list[Row]:
     found = []
     for kind in ("parquet", "mcap"):
         if f"{kind} day" not in costs:
-            found.append(Row(f"{kind}, 24 h", "", "did not run", failed.get(f"{kind} day", ""), None))
+            found.append(
+                Row(f"{kind}, 24 h", "", "did not run", failed.get(f"{kind} day", ""), None)
+            )
             continue
         second, hour, day = (costs[f"{kind} {name}"] for name in ("second", "hour", "day"))
         growth = (day.wall - second.wall) / (_DAY / _HOUR) / (hour.wall - second.wall)
         busy = (day.cpu - second.cpu) / (_DAY / _HOUR) / (hour.cpu - second.cpu)
         detail = f"{day.wall:.1f} s, processor {day.cpu:.1f} s; an hour {hour.wall:.2f} s, start-up {second.wall:.2f} s"
         found += [
-            Row(f"{kind}, 24 h at 1 kHz, peak memory, MB", "≤ 1000", f"{day.peak:.0f}", detail, day.peak),
-            Row(f"{kind}, time a sample, 24 h to 1 h", "≤ 1.1", f"{growth:.2f}", f"of the processor {busy:.2f}", None),
+            Row(
+                f"{kind}, 24 h at 1 kHz, peak memory, MB",
+                "≤ 1000",
+                f"{day.peak:.0f}",
+                detail,
+                day.peak,
+            ),
+            Row(
+                f"{kind}, time a sample, 24 h to 1 h",
+                "≤ 1.1",
+                f"{growth:.2f}",
+                f"of the processor {busy:.2f}",
+                None,
+            ),
         ]
     return found

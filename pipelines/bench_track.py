@@ -2,8 +2,8 @@
 
 Usage: python -m pipelines.bench_track [--draws 300] [--hard 100]
 
-Logs of 1 kHz with noise of 1e-3 rad and 1e-2 N m. Each draw has noise of its own and, where the constants are
-identified, an identification of its own: 5 s without payload, 5 s with 0.3515 kg.
+Logs of 1 kHz with noise of 1e-3 rad and 1e-2 N m. Each draw has noise of its own and, where the
+constants are identified, an identification of its own: 5 s without payload, 5 s with 0.3515 kg.
 """
 
 from __future__ import annotations
@@ -35,7 +35,9 @@ DRIVE = excitation(CASE, "wide")
 SIGMA_THETA, SIGMA_TAU = 1e-3, 1e-2
 NEAR = 0.5  # s: a change found farther from a true one is a false one
 DURATION = 4.5  # s
-FRICTION = np.array([[0.05], [0.02]])  # N m, Coulomb; gravity asks up to 0.47 and 0.05 of the bare arm
+FRICTION = np.array(
+    [[0.05], [0.02]]
+)  # N m, Coulomb; gravity asks up to 0.47 and 0.05 of the bare arm
 Schedule = tuple[tuple[float, float], ...]
 
 FIFTY: tuple[Schedule, ...] = (
@@ -44,7 +46,10 @@ FIFTY: tuple[Schedule, ...] = (
     ((1.27, 0.10), (2.63, 0.05)),
 )
 TEN: tuple[Schedule, ...] = (((1.5, 0.01), (3.0, 0.0)), ((0.83, 0.35), (2.11, 0.34), (3.37, 0.35)))
-QUICK: tuple[Schedule, ...] = (((1.2, 0.05), (1.9, 0.0), (2.5, 0.05)), ((1.3, 0.05), (1.7, 0.02), (2.3, 0.07)))
+QUICK: tuple[Schedule, ...] = (
+    ((1.2, 0.05), (1.9, 0.0), (2.5, 0.05)),
+    ((1.3, 0.05), (1.7, 0.02), (2.3, 0.07)),
+)
 
 
 @dataclass(frozen=True)
@@ -123,7 +128,9 @@ def drawn(log: Log, scene: Scene, rng: np.random.Generator) -> Log:
     tau = log.tau + SIGMA_TAU * rng.standard_normal(log.tau.shape)
     if scene.friction:
         assert log.omega is not None
-        tau = tau + FRICTION * np.tanh(log.omega / 0.2)  # the torque that an arm with friction needs for that motion
+        tau = tau + FRICTION * np.tanh(
+            log.omega / 0.2
+        )  # the torque that an arm with friction needs for that motion
     if scene.encoder is None:
         theta = log.theta + SIGMA_THETA * rng.standard_normal(log.theta.shape)
     else:
@@ -136,7 +143,9 @@ def arm_for(scene: Scene, log: Log, rng: np.random.Generator) -> tuple[Identifie
     """The arm as the scene knows it, and the covariance of what it knows."""
     if not scene.identified:
         noise = NoiseLevels(np.full(2, SIGMA_THETA), np.full(2, SIGMA_TAU))
-        return IdentifiedArm(Model(), CASE.arm.constants(), CASE.arm.l1, CASE.arm.l2, noise), np.zeros((9, 9))
+        return IdentifiedArm(
+            Model(), CASE.arm.constants(), CASE.arm.l1, CASE.arm.l2, noise
+        ), np.zeros((9, 9))
     settings = Settings(model="coulomb") if scene.modelled else Settings()
     bare, burdened = (drawn(one, scene, rng) for one in calibration())
     result = identify(bare, burdened, settings, report=False)
@@ -177,7 +186,11 @@ def rate() -> str:
     t = np.arange(60_001) * 1e-3
     motion = simulate(CASE.arm.constants(), DRIVE, t)
     minute = replace(
-        picking(FIFTY[0]), stamp_ns=np.arange(t.size) * 1_000_000, theta=motion.theta, tau=motion.tau, omega=None
+        picking(FIFTY[0]),
+        stamp_ns=np.arange(t.size) * 1_000_000,
+        theta=motion.theta,
+        tau=motion.tau,
+        omega=None,
     )
     log = drawn(minute, SCENES[0], np.random.default_rng(1))
     start = time.perf_counter()
@@ -187,8 +200,12 @@ def rate() -> str:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print a Markdown table of figures asked for and measured."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--draws", type=int, default=300, help="of each scene that figures are asked of")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--draws", type=int, default=300, help="of each scene that figures are asked of"
+    )
     parser.add_argument("--hard", type=int, default=100, help="of each harder scene")
     wanted = parser.parse_args(arguments)
     print("| what | asked | measured |\n|---|---|---|")

@@ -1,10 +1,11 @@
 """Which wrong conventions of a log are noticed, and by what: `make conventions`.
 
-Each arm is simulated with and without friction, its log spoiled by one mistake and identified with no flag. A row
-passes where a right log is called right, and where a wrong one has failed (exit 3) and the convention that is named
-brings the constants back; sensors that fail, and logs in each other's place, must be named by their code, never be
-Good, and have failed where an error is beyond `FAR` of its own σ. Rows that no log can tell stand at the end. Writes
-`conventions.md` into the output folder.
+Each arm is simulated with and without friction, its log spoiled by one mistake and identified with
+no flag. A row passes where a right log is called right, and where a wrong one has failed (exit 3)
+and the convention that is named brings the constants back; sensors that fail, and logs in each
+other's place, must be named by their code, never be Good, and have failed where an error is beyond
+`FAR` of its own σ. Rows that no log can tell stand at the end. Writes `conventions.md` into the
+output folder.
 """
 
 from __future__ import annotations
@@ -104,14 +105,21 @@ def motion_of(name: str, *, loaded: bool = False) -> tuple[FloatArray, Simulated
 
 
 def log_of(motion: SimulatedMotion, spoil: Spoil, *, friction: bool, seed: int = 0) -> Log:
-    """The log of a motion by noisy sensors, spoiled; the motors overcome Coulomb friction where there is some."""
+    """The log of a motion by noisy sensors, spoiled.
+
+    The motors overcome Coulomb friction where there is some.
+    """
     rng = np.random.default_rng(seed)
     tau = motion.tau
     if friction:
         tau = tau + COULOMB * np.abs(tau).max(axis=1, keepdims=True) * np.tanh(motion.omega / 0.02)
     theta = motion.theta + SIGMA_THETA * rng.standard_normal(tau.shape)
     read = spoil(theta, tau + SIGMA_TAU * rng.standard_normal(tau.shape))
-    return Log(np.round(motion.t[: read[0].shape[1]] * 1e9).astype(np.int64), *read, Origin("arm.csv", "csv", {}))
+    return Log(
+        np.round(motion.t[: read[0].shape[1]] * 1e9).astype(np.int64),
+        *read,
+        Origin("arm.csv", "csv", {}),
+    )
 
 
 def mended(log: Log, k: FloatArray) -> bool:
@@ -126,7 +134,9 @@ def furthest(result: Result, k: FloatArray) -> float:
     """Largest error of k1 … k7 in its own standard deviations."""
     found = [result.parameters[name] for name in CONSTANT_NAMES]
     errors = [
-        abs(one.estimate - true) / one.std for one, true in zip(found, k, strict=True) if one.estimate and one.std
+        abs(one.estimate - true) / one.std
+        for one, true in zip(found, k, strict=True)
+        if one.estimate and one.std
     ]
     return max(errors, default=0.0)
 
@@ -150,7 +160,9 @@ def row(
         passed, words = _noticed(result, SPOILED[name][1], k), SPOILED[name][1]
     else:
         passed = found.grade == "failed" and named is not None and mended(log, k)
-    return _line(name, arm, friction, f"{furthest(result, k):.3g}", GRADE_WORDS[found.grade], words, passed)
+    return _line(
+        name, arm, friction, f"{furthest(result, k):.3g}", GRADE_WORDS[found.grade], words, passed
+    )
 
 
 def _noticed(result: Result, code: str, k: FloatArray) -> bool:
@@ -160,16 +172,24 @@ def _noticed(result: Result, code: str, k: FloatArray) -> bool:
     return named and level != "good" and (level == "failed" or furthest(result, k) <= FAR)
 
 
-def _line(name: str, arm: str, friction: bool, far: str, level: str, words: str, passed: bool) -> tuple[str, bool]:
+def _line(
+    name: str, arm: str, friction: bool, far: str, level: str, words: str, passed: bool
+) -> tuple[str, bool]:
     cells = (name, arm, "yes" if friction else "no", far, level, words)
     return f"| {' | '.join(cells)} | {'yes' if passed else 'NO'} |", passed
 
 
 def exchanged(arm: str, k: FloatArray, *, friction: bool) -> tuple[str, bool]:
-    """The row of a loaded and an unloaded log in each other's place; a joint may turn as often as it will."""
+    """The row of a loaded and an unloaded log in each other's place.
+
+    a joint may turn as often as it will.
+    """
     turning = Origin("arm.csv", "csv", {}, reading=Reading(accepted=("DEGREES",)))
     loaded, unloaded = (
-        replace(log_of(motion_of(arm, loaded=kind)[1], ROWS["nothing"], friction=friction, seed=kind), origin=turning)
+        replace(
+            log_of(motion_of(arm, loaded=kind)[1], ROWS["nothing"], friction=friction, seed=kind),
+            origin=turning,
+        )
         for kind in (True, False)
     )
     result = identify(loaded, unloaded, report=False)
@@ -184,7 +204,9 @@ def lines_of(arm: str) -> list[tuple[str, bool]]:
     rows = {**ROWS, **{name: spoil for name, (spoil, _) in SPOILED.items()}, **INVISIBLE}
     found = []
     for friction in (False, True):
-        found += [row(name, spoil, arm, k, motion, friction=friction) for name, spoil in rows.items()]
+        found += [
+            row(name, spoil, arm, k, motion, friction=friction) for name, spoil in rows.items()
+        ]
         found.append(exchanged(arm, k, friction=friction))
     return found
 
@@ -207,7 +229,9 @@ def main() -> None:
                 print(line, flush=True)
     arguments.output.mkdir(parents=True, exist_ok=True)
     summary = f"{len(lines) - 2 - failed} of {len(lines) - 2} rows pass."
-    (arguments.output / "conventions.md").write_text("\n".join([*lines, "", summary, ""]), encoding="utf-8")
+    (arguments.output / "conventions.md").write_text(
+        "\n".join([*lines, "", summary, ""]), encoding="utf-8"
+    )
     print(summary)
     raise SystemExit(failed > 0)
 

@@ -1,9 +1,10 @@
 """The Cramér-Rao bound of a two-link arm's constants and payload, by a road of its own.
 
-Angles are measured with white noise, and so are the torques that drive the arm. Linearised along the true
-motion, the arm is a linear system driven by the torque's noise; a Kalman filter whitens what the angles tell,
-and the sensitivity of its innovations to the initial state and to the parameters gives Fisher's information
-(Friedland 1969, separated bias). Nothing is shared with `algid.estimators`: no stencil, no window, no regressor.
+Angles are measured with white noise, and so are the torques that drive the arm. Linearised along
+the true motion, the arm is a linear system driven by the torque's noise; a Kalman filter whitens
+what the angles tell, and the sensitivity of its innovations to the initial state and to the
+parameters gives Fisher's information (Friedland 1969, separated bias). Nothing is shared with
+`algid.estimators`: no stencil, no window, no regressor.
 
 ======  ====================================================  =======================
 symbol  name                                                  shape
@@ -60,9 +61,13 @@ def information(
     return rest - cross.T @ np.linalg.solve(start, cross)
 
 
-def _linear(truth: Truth, p: FloatArray, gravity: float, loaded: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _linear(
+    truth: Truth, p: FloatArray, gravity: float, loaded: bool
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """F, B, E at the middle of each interval, by complex steps."""
-    middle = [0.5 * (signal[:, 1:] + signal[:, :-1]) for signal in (truth.theta, truth.omega, truth.tau)]
+    middle = [
+        0.5 * (signal[:, 1:] + signal[:, :-1]) for signal in (truth.theta, truth.omega, truth.tau)
+    ]
     n = middle[0].shape[1]
 
     def rate(theta: FloatArray, omega: FloatArray, tau: FloatArray, q: FloatArray) -> FloatArray:
@@ -85,7 +90,9 @@ def _linear(truth: Truth, p: FloatArray, gravity: float, loaded: bool) -> tuple[
     return F.swapaxes(0, 1), B.swapaxes(0, 1), E.swapaxes(0, 1)
 
 
-def _discrete(F: FloatArray, B: FloatArray, E: FloatArray, dt: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _discrete(
+    F: FloatArray, B: FloatArray, E: FloatArray, dt: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Transition over a sample and the integrals of what drives it, to fourth order in dt."""
     eye = np.eye(4)
     integral = dt * (eye + F @ (eye * dt / 2 + F @ (eye * dt**2 / 6 + F * dt**3 / 24)))
@@ -93,7 +100,12 @@ def _discrete(F: FloatArray, B: FloatArray, E: FloatArray, dt: float) -> tuple[F
 
 
 def joint_bound(
-    bare: Truth, burdened: Truth, p: FloatArray, gravity: float, sigma_theta: float, sigma_tau: float
+    bare: Truth,
+    burdened: Truth,
+    p: FloatArray,
+    gravity: float,
+    sigma_theta: float,
+    sigma_tau: float,
 ) -> FloatArray:
     """Least standard deviations (10,) of k1 … k7, m_p, l1, l2 from an unloaded and a loaded log."""
     total = information(burdened, p, gravity, sigma_theta, sigma_tau, loaded=True)

@@ -2,9 +2,10 @@
 
     python -m pipelines.disturbance
 
-The disturbance is an Ornstein-Uhlenbeck torque of 50 ms and 30 % of the drive's RMS on each joint, added to what the
-log holds. Asked of the instruments: a bias of k1 and k3 of 1 % at most where the log tells it, the error of the mean
-over the draws being below `TOLD` %. All draws are integrated side by side.
+The disturbance is an Ornstein-Uhlenbeck torque of 50 ms and 30 % of the drive's RMS on each joint,
+added to what the log holds. Asked of the instruments: a bias of k1 and k3 of 1 % at most where the
+log tells it, the error of the mean over the draws being below `TOLD` %. All draws are integrated
+side by side.
 """
 
 from __future__ import annotations
@@ -68,16 +69,25 @@ def _source(log: Segment) -> Source:
 
 
 def evaluate(draws: int, arms: int = 3) -> list[dict[str, Any]]:
-    """Bias in % and coverage of each estimator, by arm; the mean statistic of Durbin, Wu and Hausman."""
+    """Bias in % and coverage of each estimator, by arm.
+
+    The mean statistic of Durbin, Wu and Hausman.
+    """
     rows: list[dict[str, Any]] = []
     for number in range(arms):
-        name, arm = ("case1", load_case("case1").arm) if number == 0 else (f"arm{number}", random_arm(number)[0])
+        name, arm = (
+            ("case1", load_case("case1").arm)
+            if number == 0
+            else (f"arm{number}", random_arm(number)[0])
+        )
         sources = [_source(log) for log in logs(arm, draws, 20 + number)]
         k = arm.constants()
         starts = [weak.fit([source]) for source in sources]
         fits = {
             "weak": starts,
-            "instruments": [instruments.fit([s], start=f) for s, f in zip(sources, starts, strict=True)],
+            "instruments": [
+                instruments.fit([s], start=f) for s, f in zip(sources, starts, strict=True)
+            ],
         }
         for estimator, found in fits.items():
             errors = np.array([fit.values for fit in found]) - k
@@ -85,8 +95,14 @@ def evaluate(draws: int, arms: int = 3) -> list[dict[str, Any]]:
             bias = 100 * errors.mean(axis=0) / k
             own = 100 * errors.std(axis=0, ddof=1) / np.sqrt(draws) / k
             for place in (0, 2, 3, 4):
-                what = f"{name}, {estimator}: bias of {CONSTANT_NAMES[place]} (± {own[place]:.2g}), %"
-                asked = 1.0 if estimator == "instruments" and place in (0, 2) and own[place] < TOLD else None
+                what = (
+                    f"{name}, {estimator}: bias of {CONSTANT_NAMES[place]} (± {own[place]:.2g}), %"
+                )
+                asked = (
+                    1.0
+                    if estimator == "instruments" and place in (0, 2) and own[place] < TOLD
+                    else None
+                )
                 rows.append({"what": what, "value": float(bias[place]), "asked": asked})
             rows.append(
                 {
@@ -111,7 +127,9 @@ def evaluate(draws: int, arms: int = 3) -> list[dict[str, Any]]:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--draws", type=int, default=32)
     for row in evaluate(parser.parse_args().draws):
         print(f"{row['what']}: {row['value']:.3g}")

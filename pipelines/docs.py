@@ -21,7 +21,9 @@ def pages(folder: Path) -> None:
         (folder / f"{topic}.md").write_text(text_of(topic), encoding="utf-8")
     rows = "\n".join(f"- [{topic}]({topic}.md): {words}" for topic, words in SUMMARIES.items())
     first = f"# algid\n\n{(algid.__doc__ or '').splitlines()[0].partition(': ')[2]}\n\n{rows}\n"
-    (folder / "index.md").write_text(f"{first}- [reference](reference.md): every public name\n", encoding="utf-8")
+    (folder / "index.md").write_text(
+        f"{first}- [reference](reference.md): every public name\n", encoding="utf-8"
+    )
     names = [f"::: {home}.{name}\n" for name, home in algid._HOMES.items()]
     (folder / "reference.md").write_text("# Reference\n\n" + "\n".join(names), encoding="utf-8")
 

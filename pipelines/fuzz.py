@@ -1,10 +1,14 @@
-"""Read damaged and hostile logs; fail on a traceback, a hang, much memory, or a wrong result without a word.
+"""Read damaged and hostile logs.
+
+Fail on a traceback, a hang, much memory, or a wrong result without a word.
 
 Usage: python -m pipelines.fuzz [FILES] [SEED]
 
-A batch goes over every one of the hostile files too, and has to end with a result or a reason for each.
+A batch goes over every one of the hostile files too, and has to end with a result or a reason for
+each.
 
-So many files with damaged bytes (`pipelines.mutations`) and as many that lie by their structure (`pipelines.hostile`).
+So many files with damaged bytes (`pipelines.mutations`) and as many that lie by their structure
+(`pipelines.hostile`).
 """
 
 from __future__ import annotations
@@ -34,7 +38,12 @@ FILES = 20_000
 _BATCH = 500
 _SECONDS = 5.0
 _MEMORY = 1 << 30
-_QUICK = ("--estimator", "weak", "--model", "plain")  # it is the batch that is tried, not the choice of a model
+_QUICK = (
+    "--estimator",
+    "weak",
+    "--model",
+    "plain",
+)  # it is the batch that is tried, not the choice of a model
 FAILURES = ("crash", "traceback", "hang", "silent")
 
 
@@ -55,10 +64,14 @@ def main() -> int:
                 str(first),
                 str(min(_BATCH, seed + files - first)),
             ]
-            done = subprocess.run(command, capture_output=True, text=True, timeout=_BATCH * _SECONDS, check=False)
+            done = subprocess.run(
+                command, capture_output=True, text=True, timeout=_BATCH * _SECONDS, check=False
+            )
             if done.returncode != 0:
                 total["crash"] += 1
-                print(f"{source}, seed {first}: crashed with {done.returncode}\n{done.stderr[-2000:]}")
+                print(
+                    f"{source}, seed {first}: crashed with {done.returncode}\n{done.stderr[-2000:]}"
+                )
             for line in done.stdout.splitlines():
                 kind, _, text = line.partition("\t")
                 if kind == "memory":
@@ -69,14 +82,20 @@ def main() -> int:
                     total[kind.removeprefix("count ")] += int(text)
                 else:
                     print(line, flush=True)
-        print(f"{files} {source} files: {dict(total)}; at most {memory >> 20} MB, {slowest:.2f} s", flush=True)
+        print(
+            f"{files} {source} files: {dict(total)}; at most {memory >> 20} MB, {slowest:.2f} s",
+            flush=True,
+        )
         failed += sum(total[kind] for kind in FAILURES) + (memory > _MEMORY)
     failed += batches(files, seed)
     return int(failed > 0)
 
 
 def batches(files: int, seed: int) -> int:
-    """Have ``algid batch`` go over the hostile files, `_BATCH` at a time; how many of these runs were no good."""
+    """Have ``algid batch`` go over the hostile files, `_BATCH` at a time.
+
+    How many of these runs were no good.
+    """
     failed = 0
     total: Counter[str] = Counter()
     for first in range(seed, seed + files, _BATCH):
@@ -85,13 +104,36 @@ def batches(files: int, seed: int) -> int:
             logs, out = Path(place, "logs"), Path(place, "out")
             logs.mkdir()
             names = {path.name for path, _ in corpus(logs, count, first)}
-            command = [sys.executable, "-m", "algid", "batch", str(logs), "-o", str(out), "--no-report", "-q", *_QUICK]
-            done = subprocess.run(command, capture_output=True, text=True, timeout=_BATCH * _SECONDS, check=False)
-            jobs = pl.read_parquet(out / "jobs.parquet") if (out / "jobs.parquet").exists() else pl.DataFrame()
-            wrong = done.returncode not in (0, 1, 3) or "Traceback" in done.stderr or jobs.height != len(names)
+            command = [
+                sys.executable,
+                "-m",
+                "algid",
+                "batch",
+                str(logs),
+                "-o",
+                str(out),
+                "--no-report",
+                "-q",
+                *_QUICK,
+            ]
+            done = subprocess.run(
+                command, capture_output=True, text=True, timeout=_BATCH * _SECONDS, check=False
+            )
+            jobs = (
+                pl.read_parquet(out / "jobs.parquet")
+                if (out / "jobs.parquet").exists()
+                else pl.DataFrame()
+            )
+            wrong = (
+                done.returncode not in (0, 1, 3)
+                or "Traceback" in done.stderr
+                or jobs.height != len(names)
+            )
             failed += wrong
             if wrong:
-                print(f"batch over hostile, seed {first}: exit {done.returncode}, {jobs.height} of {len(names)} jobs")
+                print(
+                    f"batch over hostile, seed {first}: exit {done.returncode}, {jobs.height} of {len(names)} jobs"
+                )
                 print(done.stderr[-2000:], flush=True)
             total.update(jobs["status"].to_list() if jobs.height else [])
     print(f"algid batch over {files} hostile files: {dict(total)}", flush=True)
@@ -104,8 +146,12 @@ def batch(source: str, seed: int, files: int) -> int:
     slowest = 0.0
     folder = Path(tempfile.mkdtemp(prefix="algid-fuzz-"))
     try:
-        for name, path, log in _damaged(folder, seed, files) if source == "damaged" else _hostile(folder, seed, files):
-            start = time.process_time()  # a busy machine is no hang; one that waits is ended with its batch
+        for name, path, log in (
+            _damaged(folder, seed, files) if source == "damaged" else _hostile(folder, seed, files)
+        ):
+            start = (
+                time.process_time()
+            )  # a busy machine is no hang; one that waits is ended with its batch
             kind, text = outcome(path, log)
             seconds = time.process_time() - start
             slowest = max(slowest, seconds)
@@ -117,7 +163,9 @@ def batch(source: str, seed: int, files: int) -> int:
         shutil.rmtree(folder)
     for kind, count in counts.items():
         print(f"count {kind}\t{count}")
-    print(f"slowest\t{slowest}\nmemory\t{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024}")
+    print(
+        f"slowest\t{slowest}\nmemory\t{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024}"
+    )
     return 0
 
 
@@ -140,7 +188,8 @@ def _hostile(folder: Path, seed: int, files: int) -> Iterator[tuple[str, Path, L
 def outcome(path: Path, log: Log | None) -> tuple[str, str]:
     """What comes of a file: "same", "told", "refused", or one of `FAILURES`; and more of it.
 
-    `log` is what stands in the file unless it is said otherwise; None where any answer is right that is one.
+    `log` is what stands in the file unless it is said otherwise; None where any answer is right
+    that is one.
     """
     try:
         found = read_log(path)
@@ -163,11 +212,17 @@ def _compared(found: Log, log: Log) -> tuple[str, str]:
         noticed = any(notice.lossy for notice in found.notices)
     else:
         noticed = bool(found.notices)
-    return ("told", "") if noticed else ("silent", f"{len(found)} samples of {len(log)}, truth {found.origin.truth}")
+    return (
+        ("told", "")
+        if noticed
+        else ("silent", f"{len(found)} samples of {len(log)}, truth {found.origin.truth}")
+    )
 
 
 def _equal(one: np.ndarray | None, other: np.ndarray | None) -> bool:
-    return one is other or (one is not None and other is not None and one.tobytes() == other.tobytes())
+    return one is other or (
+        one is not None and other is not None and one.tobytes() == other.tobytes()
+    )
 
 
 if __name__ == "__main__":

@@ -1,9 +1,12 @@
-"""Give batches hostile records, manifests and folders; fail on a traceback, a hang, a lost job, or a touch elsewhere.
+"""Give batches hostile records, manifests and folders.
+
+Fail on a traceback, a hang, a lost job, or a touch elsewhere.
 
 Usage: python -m pipelines.fuzz_batches [CASES] [SEED]
 
-Jobs end at once here, as failed or with an empty result: it is what a batch makes of its folders that is tried. It ends
-with a row a job and a record a row, and the next run has nothing left to do; or it is refused in one line.
+Jobs end at once here, as failed or with an empty result: it is what a batch makes of its folders
+that is tried. It ends with a row a job and a record a row, and the next run has nothing left to
+do; or it is refused in one line.
 """
 
 from __future__ import annotations
@@ -58,7 +61,9 @@ class AtOnce(Executor):
             if status is End.OK:
                 with whole_folder(Path(task.out, f"{task.job.name}.algid"), force=True) as folder:
                     (folder / "result.json").touch()
-            inputs = tuple(replace(stat_of(path), sha256="c") for path in (*task.job.logs, *task.job.loaded))
+            inputs = tuple(
+                replace(stat_of(path), sha256="c") for path in (*task.job.logs, *task.job.loaded)
+            )
             future.set_result(failed_record(task, "as asked", status, inputs=inputs))
         except AlgidError as error:
             future.set_result(failed_record(task, str(error)))
@@ -89,7 +94,9 @@ def main() -> int:
         total[kind] += 1
         if kind in FAILURES:
             print(f"{kind}: seed {number}: {text}", flush=True)
-    print(f"{cases} batches: {dict(total)}; the slowest {slowest:.1f} s; {time.monotonic() - start:.0f} s in all")
+    print(
+        f"{cases} batches: {dict(total)}; the slowest {slowest:.1f} s; {time.monotonic() - start:.0f} s in all"
+    )
     return int(any(total[kind] for kind in FAILURES))
 
 
@@ -124,13 +131,19 @@ def outcome(place: Path, draw: random.Random) -> tuple[str, str]:
         return "elsewhere", str(touched)
     missing = {job.name for job in jobs} - first[0]
     if missing or (
-        source is logs and not _logs_below(logs) <= {path for job in jobs for path in job.logs + job.loaded}
+        source is logs
+        and not _logs_below(logs) <= {path for job in jobs for path in job.logs + job.loaded}
     ):
         return "lost", str(missing)
     again = AtOnce()
     if _run(jobs, out, again)[0] != first[0] or again.ran:
         return "again", f"{again.ran} jobs"
-    left = [name for _, _, names in os.walk(out) for name in names if ".algid-" in name and name.startswith(".")]
+    left = [
+        name
+        for _, _, names in os.walk(out)
+        for name in names
+        if ".algid-" in name and name.startswith(".")
+    ]
     return ("left", str(left)) if left else ("done", "")
 
 
@@ -150,7 +163,19 @@ def _logs_below(folder: Path) -> set[str]:
     endings = ("*.csv", "*.mcap", "*.parquet", "*.csv.gz", "*.CSV")
     tests = [word for name in endings for word in ("-o", "-name", name)][1:]
     hidden = ["(", "-name", ".*", "-o", "-type", "d", "-name", "*.algid", ")", "-prune", "-o"]
-    command = ["find", f"{folder}/", "-mindepth", "1", *hidden, "-type", "f", "(", *tests, ")", "-print0"]
+    command = [
+        "find",
+        f"{folder}/",
+        "-mindepth",
+        "1",
+        *hidden,
+        "-type",
+        "f",
+        "(",
+        *tests,
+        ")",
+        "-print0",
+    ]
     found = subprocess.run(command, capture_output=True, check=True).stdout.split(b"\0")
     paths = (os.fsdecode(path).replace("//", "/", 1) for path in found if path)
     return {path for path in paths if not _in_bag(Path(path), folder)}
@@ -158,7 +183,9 @@ def _logs_below(folder: Path) -> set[str]:
 
 def _in_bag(path: Path, folder: Path) -> bool:
     return any(
-        (one / "metadata.yaml").is_file() for one in path.parents if one != folder and one.is_relative_to(folder)
+        (one / "metadata.yaml").is_file()
+        for one in path.parents
+        if one != folder and one.is_relative_to(folder)
     )
 
 

@@ -1,9 +1,12 @@
-"""Call algid with hostile flags, TOML files and results; fail on a traceback, a hang, or what it leaves behind.
+"""Call algid with hostile flags, TOML files and results.
+
+Fail on a traceback, a hang, or what it leaves behind.
 
 Usage: python -m pipelines.fuzz_calls [CALLS] [SEED]
 
-Each call ends with a result, or with one line and an exit code; it takes 20 s of a processor at most, prints nothing
-that drives a terminal, and writes nothing outside of the folder it was given, nor anything half-written within.
+Each call ends with a result, or with one line and an exit code; it takes 20 s of a processor at
+most, prints nothing that drives a terminal, and writes nothing outside of the folder it was given,
+nor anything half-written within.
 """
 
 from __future__ import annotations
@@ -34,7 +37,19 @@ SECONDS = 20.0
 _BATCH = 250
 _MEMORY = 6 << 30  # of addresses, of which numpy and polars take two before they begin
 CODES = (0, 1, 2, 3, 4)
-FAILURES = ("crash", "internal", "traceback", "hang", "memory", "warning", "lines", "code", "escape", "left", "json")
+FAILURES = (
+    "crash",
+    "internal",
+    "traceback",
+    "hang",
+    "memory",
+    "warning",
+    "lines",
+    "code",
+    "escape",
+    "left",
+    "json",
+)
 
 
 def main() -> int:
@@ -52,12 +67,17 @@ def main() -> int:
             count = min(_BATCH, seed + calls - first)
             counts, most = _batched(sound, first, count)
             total, slowest = total + counts, max(slowest, most)
-    print(f"{calls} calls: {dict(total)}; the slowest {slowest:.1f} s; {time.monotonic() - start:.0f} s in all")
+    print(
+        f"{calls} calls: {dict(total)}; the slowest {slowest:.1f} s; {time.monotonic() - start:.0f} s in all"
+    )
     return int(any(total[kind] for kind in FAILURES))
 
 
 def _batched(sound: Path, first: int, count: int) -> tuple[Counter[str], float]:
-    """Run so many calls in a process of their own; a crash in one of them is one, and the others go on behind it."""
+    """Run so many calls in a process of their own.
+
+    a crash in one of them is one, and the others go on behind it.
+    """
     counts: Counter[str] = Counter()
     slowest = 0.0
     while count > 0:
@@ -97,7 +117,9 @@ def batch(sound: Path, first: int, count: int) -> None:
             shutil.rmtree("out", ignore_errors=True)
             call = draw_call(seed, place)
             kind, text, seconds = outcome(call, outer)
-            print(json.dumps({"kind": kind, "text": text, "seconds": seconds}), file=out, flush=True)
+            print(
+                json.dumps({"kind": kind, "text": text, "seconds": seconds}), file=out, flush=True
+            )
 
 
 def _stop(_number: int, _frame: FrameType | None) -> NoReturn:
@@ -106,7 +128,10 @@ def _stop(_number: int, _frame: FrameType | None) -> NoReturn:
 
 
 def outcome(call: Call, outer: Path) -> tuple[str, str, float]:
-    """What comes of a call: "done", "refused", or one of `FAILURES`; more of it; and how long it took, in s."""
+    """What comes of a call: "done", "refused", or one of `FAILURES`; more of it.
+
+    And how long it took, in s.
+    """
     before, own = _listing(outer), {path.name for path in Path().iterdir()}
     start = time.process_time()
     signal.setitimer(signal.ITIMER_PROF, SECONDS)
@@ -121,7 +146,9 @@ def outcome(call: Call, outer: Path) -> tuple[str, str, float]:
     seconds = time.process_time() - start
     kind, why = judged(call, code, out, err)
     new = {path.name for path in Path().iterdir()} - own - {"out"}
-    if kind not in FAILURES and (_listing(outer) != before or any(name.startswith(".") for name in new)):
+    if kind not in FAILURES and (
+        _listing(outer) != before or any(name.startswith(".") for name in new)
+    ):
         kind, why = "left", f"{sorted(new)} {sorted(_listing(outer) - before)}"
     for name in new:
         shutil.rmtree(name, ignore_errors=True) if Path(name).is_dir() else Path(name).unlink()
@@ -131,7 +158,9 @@ def outcome(call: Call, outer: Path) -> tuple[str, str, float]:
 
 def _listing(outer: Path) -> set[str]:
     """What stands in the folders above the call's own."""
-    return {str(path) for folder in (outer, outer / "a", outer / "a" / "b") for path in folder.iterdir()}
+    return {
+        str(path) for folder in (outer, outer / "a", outer / "a" / "b") for path in folder.iterdir()
+    }
 
 
 def judged(call: Call, code: int, out: str, err: str) -> tuple[str, str]:
@@ -145,7 +174,11 @@ def judged(call: Call, code: int, out: str, err: str) -> tuple[str, str]:
         return "memory", _trace(err)
     if "Warning: " in err:
         return "warning", err[-600:]
-    if "Traceback" in err and "AlgidError" not in err and not any(line.startswith("algid: ") for line in last):
+    if (
+        "Traceback" in err
+        and "AlgidError" not in err
+        and not any(line.startswith("algid: ") for line in last)
+    ):
         return "traceback", _trace(err)
     if code not in CODES:
         return "code", f"{code}: {err[-300:]}"
@@ -153,7 +186,9 @@ def judged(call: Call, code: int, out: str, err: str) -> tuple[str, str]:
     if printable(out) != out or (printable(err) != err and not own_words):
         return "escape", repr((out + err)[-600:])
     told = bool(last) and last[-1].startswith(("algid: ", "╰"))
-    if code == 2 and not told and "inspect" not in call.arguments:  # which prints why, among the rest
+    if (
+        code == 2 and not told and "inspect" not in call.arguments
+    ):  # which prints why, among the rest
         return "lines", err[-600:]
     if code == 2 and "a library cannot take it" in err:
         return "library", ""
@@ -168,7 +203,11 @@ def judged(call: Call, code: int, out: str, err: str) -> tuple[str, str]:
 def _trace(err: str) -> str:
     """The places in algid of a traceback, the last ones first, and its last line."""
     lines = [line.strip() for line in err.splitlines()]
-    places = [line.rpartition("/algid/")[2] for line in lines if line.startswith("File ") and "/algid/" in line]
+    places = [
+        line.rpartition("/algid/")[2]
+        for line in lines
+        if line.startswith("File ") and "/algid/" in line
+    ]
     return f"{' < '.join(places[:-6:-1])}: {lines[-2:]}"
 
 

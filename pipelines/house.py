@@ -1,8 +1,8 @@
 """How the house stands: files, lines, helpers with one caller, tests to code, and a log's way through the rooms.
 
-The way is traced: `algid identify` on a short log, every call from one module of algid to another. A climb is a call
-into a room above the caller's, of those in the order of the table of allowed imports; to take the next item from a
-generator that was handed down is none.
+The way is traced: `algid identify` on a short log, every call from one module of algid to another.
+A climb is a call into a room above the caller's, of those in the order of the table of allowed
+imports; to take the next item from a generator that was handed down is none.
 """
 
 from __future__ import annotations
@@ -59,20 +59,28 @@ def _lines(text: str) -> int:
 def _docstring_lines(text: str) -> int:
     found = 0
     for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
+        if (
+            isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
+            and ast.get_docstring(node) is not None
+        ):
             found += (node.body[0].end_lineno or 0) - node.body[0].lineno + 1
     return found
 
 
 def _with_one_caller(text: str) -> int:
-    """Private functions and methods that their module names once; what a decorator hands on is called by others."""
+    """Private functions and methods that their module names once.
+
+    What a decorator hands on is called by others.
+    """
     nodes = list(ast.walk(ast.parse(text)))
     named = Counter(node.id for node in nodes if isinstance(node, ast.Name))
     named += Counter(node.attr for node in nodes if isinstance(node, ast.Attribute))
     private = [
         node.name
         for node in nodes
-        if isinstance(node, ast.FunctionDef) and node.name.startswith("_") and not node.decorator_list
+        if isinstance(node, ast.FunctionDef)
+        and node.name.startswith("_")
+        and not node.decorator_list
     ]
     return sum(not name.startswith("__") and named[name] == 1 for name in private)
 

@@ -1,10 +1,11 @@
 """How many small changes of the code the tests see: `make mutants`.
 
-mutmut changes one operator, number or argument at a time in the rooms whose numbers are believed, and runs tests that
-touch the changed function: those of its module, then of its room, then others, as many as `BUDGET` holds. Of all
-mutants a sample is drawn room by room at a fixed seed: one for each is worth what it would catch, and all of them would
-take days. Prints the share that was killed, and every survivor as a patch, to be read: a survivor is a missing test, or
-a change that changes nothing.
+mutmut changes one operator, number or argument at a time in the rooms whose numbers are believed,
+and runs tests that touch the changed function: those of its module, then of its room, then others,
+as many as `BUDGET` holds. Of all mutants a sample is drawn room by room at a fixed seed: one for
+each is worth what it would catch, and all of them would take days. Prints the share that was
+killed, and every survivor as a patch, to be read: a survivor is a missing test, or a change that
+changes nothing.
 """
 
 from __future__ import annotations
@@ -27,8 +28,22 @@ CODE = (
     *(f"{room}/*" for room in ("estimators", "signals", "track", "fleet", "inspection")),
 )
 TESTS = (
-    *("test_arm.py", "test_check.py", "test_units.py", "estimators", "signals", "track", "fleet", "inspection"),
-    *("identification/test_identify.py", "readers/test_profile.py", "batch/test_run.py", "batch/test_discover.py"),
+    *(
+        "test_arm.py",
+        "test_check.py",
+        "test_units.py",
+        "estimators",
+        "signals",
+        "track",
+        "fleet",
+        "inspection",
+    ),
+    *(
+        "identification/test_identify.py",
+        "readers/test_profile.py",
+        "batch/test_run.py",
+        "batch/test_discover.py",
+    ),
 )
 COPIED = ("tests", "pipelines", "data", "README.md", "CHANGELOG.md", "LICENSE", "constraints.txt")
 BUDGET = 20.0  # s of tests for a mutant
@@ -57,7 +72,9 @@ def prepare(folder: Path) -> None:
     }
     lines = [f"{key} = {json.dumps(value)}" for key, value in options.items()]
     text = Path("pyproject.toml").read_text(encoding="utf-8")
-    (folder / "pyproject.toml").write_text(text + "\n[tool.mutmut]\n" + "\n".join(lines) + "\n", encoding="utf-8")
+    (folder / "pyproject.toml").write_text(
+        text + "\n[tool.mutmut]\n" + "\n".join(lines) + "\n", encoding="utf-8"
+    )
 
 
 def chosen(tests: list[str], seconds: dict[str, float], name: str) -> list[str]:
@@ -69,7 +86,11 @@ def chosen(tests: list[str], seconds: dict[str, float], name: str) -> list[str]:
 
     def far(test: str) -> tuple[bool, bool, float]:
         file = test.partition("::")[0]
-        return not file.endswith(named), not file.startswith((f"tests/{own}/", f"tests/test_{own}")), seconds[test]
+        return (
+            not file.endswith(named),
+            not file.startswith((f"tests/{own}/", f"tests/test_{own}")),
+            seconds[test],
+        )
 
     for test in sorted(tests, key=far):
         spent += seconds[test]
@@ -82,7 +103,11 @@ def chosen(tests: list[str], seconds: dict[str, float], name: str) -> list[str]:
 def names_in(folder: Path) -> list[str]:
     """The mutants' names."""
     metas = sorted((folder / "mutants").rglob("*.py.meta"))
-    return [name for path in metas for name in json.loads(path.read_text(encoding="utf-8"))["exit_code_by_key"]]
+    return [
+        name
+        for path in metas
+        for name in json.loads(path.read_text(encoding="utf-8"))["exit_code_by_key"]
+    ]
 
 
 def jobs(folder: Path, drawn: list[str]) -> Iterator[tuple[str, list[str], int]]:
@@ -103,7 +128,9 @@ def tried(folder: Path, drawn: list[str]) -> Iterator[tuple[str, str]]:
     (folder / "jobs").write_text(lines, encoding="utf-8")
     trial = [sys.executable, "-m", "pipelines.mutants_trial"]
     with (folder / "jobs").open() as stdin:
-        running = subprocess.Popen(trial, cwd=folder / "mutants", stdin=stdin, stdout=subprocess.PIPE, text=True)
+        running = subprocess.Popen(
+            trial, cwd=folder / "mutants", stdin=stdin, stdout=subprocess.PIPE, text=True
+        )
         for line in running.stdout or ():
             name, code = line.split()
             yield name, "survived" if code == "0" else "killed"
@@ -124,7 +151,11 @@ def sample(names: list[str], count: int, seed: int) -> list[str]:
         by_room[room(name)].append(name)
     draw = random.Random(seed)
     shares = {key: max(2, round(count * len(own) / len(names))) for key, own in by_room.items()}
-    return [name for key, own in by_room.items() for name in draw.sample(own, min(shares[key], len(own)))]
+    return [
+        name
+        for key, own in by_room.items()
+        for name in draw.sample(own, min(shares[key], len(own)))
+    ]
 
 
 def main() -> None:
@@ -134,27 +165,35 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--asked", type=float, default=0.85)
     parser.add_argument("--folder", type=Path, default=Path("build/mutants"))
-    parser.add_argument("--again", action="store_true", help="draw from the mutants that FOLDER holds from before")
+    parser.add_argument(
+        "--again", action="store_true", help="draw from the mutants that FOLDER holds from before"
+    )
     options = parser.parse_args()
     mutmut = [str(Path(sys.executable).with_name("mutmut"))]
     if not options.again:
         prepare(options.folder)
         # A name that none has: the mutants are made and the tests timed, nothing more.
-        subprocess.run([*mutmut, "run", "none of them"], cwd=options.folder, check=False, capture_output=True)
+        subprocess.run(
+            [*mutmut, "run", "none of them"], cwd=options.folder, check=False, capture_output=True
+        )
     drawn = sample(names_in(options.folder), options.count, options.seed)
     ends: dict[str, str] = {}
     for name, end in tried(options.folder, drawn):
         ends[name] = end
         print(f"{len(ends)} of {len(drawn)}", end="\r", file=sys.stderr, flush=True)
         if end != "killed":
-            shown = subprocess.run([*mutmut, "show", name], cwd=options.folder, capture_output=True, text=True)
+            shown = subprocess.run(
+                [*mutmut, "show", name], cwd=options.folder, capture_output=True, text=True
+            )
             print(re.sub(r"^(?![-+@]).*\n", "", shown.stdout, flags=re.MULTILINE), end="")
             print(f"# {name}: {end}\n", flush=True)
     killed = Counter(room(name) for name, end in ends.items() if end == "killed")
     for key, number in sorted(Counter(map(room, ends)).items()):
         print(f"{key:12} {killed[key]:3} of {number:3}")
     share = killed.total() / len(ends)
-    print(f"killed {killed.total()} of {len(ends)}: {100 * share:.0f} % (asked {100 * options.asked:.0f} %)")
+    print(
+        f"killed {killed.total()} of {len(ends)}: {100 * share:.0f} % (asked {100 * options.asked:.0f} %)"
+    )
     raise SystemExit(0 if share >= options.asked else 1)
 
 

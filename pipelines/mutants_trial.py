@@ -1,7 +1,8 @@
 """Tries mutants, for `pipelines.mutants`: run in mutmut's copy of the project, where each name switches one change on.
 
-Reads lines of JSON: a mutant's name, its tests, the seconds of processor time that they may take. Writes a line for
-each: the name, and what pytest ended with in a process of its own (0 where no test failed; negative: a signal).
+Reads lines of JSON: a mutant's name, its tests, the seconds of processor time that they may take.
+Writes a line for each: the name, and what pytest ended with in a process of its own (0 where no
+test failed; negative: a signal).
 """
 
 from __future__ import annotations
@@ -47,7 +48,12 @@ def main() -> None:
     """Import all tests once, then a process a mutant."""
     jobs = [json.loads(line) for line in sys.stdin]
     os.environ["MUTANT_UNDER_TEST"] = ""
-    _quietly(["--collect-only", *sorted({test.partition("::")[0] for _, tests, _ in jobs for test in tests})])
+    _quietly(
+        [
+            "--collect-only",
+            *sorted({test.partition("::")[0] for _, tests, _ in jobs for test in tests}),
+        ]
+    )
     for name, tests, limit in jobs:
         print(name, _tried(name, tests, limit), flush=True)
 

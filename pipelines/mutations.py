@@ -11,7 +11,19 @@ from algid.arm import Arm
 from algid.log import Log, Origin, Truth
 from algid.writers import FORMATS, mcap, write_log
 
-_NUMBERS = (0, 1, 0x7F, 0xFF, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF, 1 << 40, (1 << 63) - 1, (1 << 64) - 1)
+_NUMBERS = (
+    0,
+    1,
+    0x7F,
+    0xFF,
+    0x7FFF,
+    0xFFFF,
+    0x7FFFFFFF,
+    0xFFFFFFFF,
+    1 << 40,
+    (1 << 63) - 1,
+    (1 << 64) - 1,
+)
 _WORDS = (
     b"nan",
     b"inf",
@@ -77,7 +89,8 @@ def _zeros(content: bytes, draw: random.Random) -> bytes:
     return content[:place] + bytes(min(length, len(content) - place)) + content[place + length :]
 
 
-# the end holds footers and summaries, the start magic and headers: both deserve more than their share
+# the end holds footers and summaries, the start magic and headers: both deserve more than their
+# share
 def _near_the_end(content: bytes, draw: random.Random) -> bytes:
     cut = max(0, len(content) - draw.choice((64, 400, 2000)))
     return content[:cut] + draw.choice((_flip_bit, _set_byte, _set_number))(content[cut:], draw)
@@ -100,7 +113,13 @@ def clean_log(rows: int = 400) -> Log:
     theta = np.stack([np.sin(3 * t), np.cos(5 * t)])
     tau = np.stack([np.cos(2 * t) * 4, np.sin(7 * t)])
     omega = np.stack([3 * np.cos(3 * t), -5 * np.sin(5 * t)])
-    return Log(np.arange(rows) * 1_000_000 + 1_700_000_000_000_000_000, theta, tau, Origin("", "", {}), omega)
+    return Log(
+        np.arange(rows) * 1_000_000 + 1_700_000_000_000_000_000,
+        theta,
+        tau,
+        Origin("", "", {}),
+        omega,
+    )
 
 
 def clean_files(folder: Path) -> list[Path]:

@@ -1,9 +1,9 @@
 """An output-error fit of an arm: the peer beside which repeatability on real runs is judged.
 
-Each stretch of `WINDOW` s starts at the state of the motion below `CUTOFF` Hz, is simulated with the logged torque,
-and the parameters minimise what the simulated angles miss of the measured ones, each joint weighed by its own misfit
-and each log as the others. Viscous and Coulomb friction of width `WIDTH` and the rotor of joint 2 are in the model,
-and nothing of the estimators is used.
+Each stretch of `WINDOW` s starts at the state of the motion below `CUTOFF` Hz, is simulated with
+the logged torque, and the parameters minimise what the simulated angles miss of the measured ones,
+each joint weighed by its own misfit and each log as the others. Viscous and Coulomb friction of
+width `WIDTH` and the rotor of joint 2 are in the model, and nothing of the estimators is used.
 
 ======  ===============================================  ======
 symbol  name                                             shape
@@ -44,7 +44,10 @@ class _Windows:
 
 
 def fit(logs: Sequence[Segment], first: FloatArray, gain: bool = False) -> FloatArray:
-    """Parameters `NAMES`, and gain2 where asked, of logs; `first` (7,) are constants to start from."""
+    """Parameters `NAMES`, and gain2 where asked, of logs.
+
+    `first` (7,) are constants to start from.
+    """
     windows = [_cut(log) for log in logs]
     p = np.concatenate([first, [0.05, 0.05, 0.1 * first[2]], [0.0] * gain])
     damping = 1e-3
@@ -115,7 +118,14 @@ def _rate(p: FloatArray, x: FloatArray, tau: FloatArray) -> FloatArray:
     theta1, theta2, w1, w2 = x
     s2, c2, c12 = np.sin(theta2), np.cos(theta2), np.cos(theta1 + theta2)
     m11, m12, m22 = k5 + k3 + 2 * k1 * c2, k3 + k1 * c2, k3 + j2
-    b1 = tau[0] + k1 * s2 * (2 * w1 + w2) * w2 - k4 * np.cos(theta1) - k2 * c12 - k6 * w1 - f1 * np.tanh(w1 / WIDTH)
+    b1 = (
+        tau[0]
+        + k1 * s2 * (2 * w1 + w2) * w2
+        - k4 * np.cos(theta1)
+        - k2 * c12
+        - k6 * w1
+        - f1 * np.tanh(w1 / WIDTH)
+    )
     b2 = tau[1] / gain - k1 * s2 * w1**2 - k2 * c12 - k7 * w2 - f2 * np.tanh(w2 / WIDTH)
     det = m11 * m22 - m12**2
     return np.stack([w1, w2, (m22 * b1 - m12 * b2) / det, (m11 * b2 - m12 * b1) / det])

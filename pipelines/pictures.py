@@ -30,13 +30,17 @@ THEMES = {"light": "1", "dark": "0"}  # as Chromium numbers them
 
 def main() -> int:
     """Draw the pictures; 1 where Chromium is missing."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("result", type=Path)
     parser.add_argument("-o", "--output", type=Path, default=Path("pipelines/pictures"))
     wanted = parser.parse_args()
     wanted.output.mkdir(parents=True, exist_ok=True)
     result = read_result(wanted.result)
-    (wanted.output / "terminal.svg").write_text(terminal_svg(result, wanted.result), encoding="utf-8")
+    (wanted.output / "terminal.svg").write_text(
+        terminal_svg(result, wanted.result), encoding="utf-8"
+    )
     chromium = shutil.which("chromium")
     if chromium is None:
         print("chromium is not installed: no picture of the report", file=sys.stderr)
@@ -49,7 +53,9 @@ def main() -> int:
 
 def terminal_svg(result: Result, folder: Path) -> str:
     """What `algid report` prints, as SVG without the web font that rich asks for."""
-    console = Console(record=True, width=112, file=io.StringIO(), force_terminal=True, color_system="truecolor")
+    console = Console(
+        record=True, width=112, file=io.StringIO(), force_terminal=True, color_system="truecolor"
+    )
     console.print(Text(f"$ algid report {folder.name}\n"))
     print_document(result_document(result), console)
     svg = console.export_svg(title="algid", unique_id="algid")

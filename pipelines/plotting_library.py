@@ -1,7 +1,7 @@
 """The plotting library that pages carry: plotly.js with the traces of two axes alone, a third of the whole.
 
-Run by the build of a wheel and by `pip install -e .`. Where npm is not at hand the pages carry the whole library
-out of the package `plotly`, and are one megabyte larger.
+Run by the build of a wheel and by `pip install -e .`. Where npm is not at hand the pages carry the
+whole library out of the package `plotly`, and are one megabyte larger.
 """
 
 from __future__ import annotations
@@ -37,8 +37,16 @@ class PlottingLibrary(BuildHookInterface[Any]):  # type: ignore[misc]  # hatchli
             return
         try:
             content = fetched()
-        except (OSError, subprocess.SubprocessError, tarfile.TarError, KeyError, ValueError) as error:
-            self.app.display_warning(f"pages carry the whole of plotly: {PACKAGE} cannot be had ({error})")
+        except (
+            OSError,
+            subprocess.SubprocessError,
+            tarfile.TarError,
+            KeyError,
+            ValueError,
+        ) as error:
+            self.app.display_warning(
+                f"pages carry the whole of plotly: {PACKAGE} cannot be had ({error})"
+            )
             return
         target.write_bytes(gzip.compress(content, 9, mtime=0))
 

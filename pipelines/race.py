@@ -2,12 +2,15 @@
 
     python -m pipelines.race -o build/race
 
-Simulated: five kinds of arms (`pipelines.race_scenes`), three seeds of each, one log of 10 s at 500 Hz, another to
-predict. Real, where `--data` is: the runs of two builds of a torque-controlled arm, by halves and leave one out.
+Simulated: five kinds of arms (`pipelines.race_scenes`), three seeds of each, one log of 10 s at
+500 Hz, another to predict. Real, where `--data` is: the runs of two builds of a torque-controlled
+arm, by halves and leave one out.
 
-=======================  ===============================================================================
+=======================
+===============================================================================
 column                   what it is
-=======================  ===============================================================================
+=======================
+===============================================================================
 error over bound         RMS of k1 … k7's errors over their Cramér-Rao bound; straight arms and encoders
 error, %                 median over parameters and arms of the error's magnitude
 intervals that hold      share of 95 % intervals that hold the truth, or of halves that agree
@@ -15,7 +18,8 @@ repeatability, %         mean over k1 … k5 of the scatter between halves
 held out                 RMSE of the torque of a log not used, motion below 20 Hz, residual below 5 Hz
 processor                seconds a fit, without imports
 choices                  what a user had to choose beforehand
-=======================  ===============================================================================
+=======================
+===============================================================================
 """
 
 from __future__ import annotations
@@ -107,7 +111,9 @@ def simulated_row(job: tuple[str, int, str]) -> Row:
     try:
         answer, seconds = _answered(peer, [here.log], here.l1)
     except Exception as error:  # a contender that falls is a result
-        return Row(peer, kind, [], None, None, [], [], 0.0, f"{type(error).__name__}: {error}"[:200])
+        return Row(
+            peer, kind, [], None, None, [], [], 0.0, f"{type(error).__name__}: {error}"[:200]
+        )
     miss = answer.values - here.truth
     inside = None
     if answer.interval is not None:
@@ -116,7 +122,16 @@ def simulated_row(job: tuple[str, int, str]) -> Row:
         inside = ((low <= here.truth) & (here.truth <= high))[given].tolist()
     bound = None if here.bound is None else (np.abs(miss) / here.bound).tolist()
     every, moving = held_out(answer, here.ahead)
-    return Row(peer, kind, (100 * np.abs(miss / here.truth)).tolist(), bound, inside, every, moving, seconds)
+    return Row(
+        peer,
+        kind,
+        (100 * np.abs(miss / here.truth)).tolist(),
+        bound,
+        inside,
+        every,
+        moving,
+        seconds,
+    )
 
 
 @cache
@@ -128,7 +143,9 @@ def _runs(folder: Path, build: str) -> tuple[Segment, ...]:
         log = algid.read_log(path)
         t = log.stamp_ns * 1e-9
         even = np.arange(t[0], t[-1], 0.002)
-        theta, tau = (np.stack([np.interp(even, t, row) for row in rows]) for rows in (log.theta, log.tau))
+        theta, tau = (
+            np.stack([np.interp(even, t, row) for row in rows]) for rows in (log.theta, log.tau)
+        )
         theta[0] -= np.pi / 2  # these logs measure θ1 from hanging
         found.append(Segment(0.0, 0.002, theta, tau))
     return tuple(found)
@@ -158,7 +175,9 @@ def real_rows(folder: Path, pool: ProcessPoolExecutor) -> list[dict[str, Any]]:
 
 
 def _halves(
-    found: list[tuple[Answer | None, float]], halves: list[tuple[int, ...]], runs: tuple[Segment, ...]
+    found: list[tuple[Answer | None, float]],
+    halves: list[tuple[int, ...]],
+    runs: tuple[Segment, ...],
 ) -> dict[str, Any]:
     agree: list[bool] = []
     scatter, every, moving = [], [], []
@@ -169,7 +188,9 @@ def _halves(
         mean = 0.5 * (one.values + other.values)
         scatter.append(np.abs(one.values - other.values)[:5] / np.sqrt(2) / np.abs(mean)[:5])
         if one.interval is not None and other.interval is not None:
-            wide = np.hypot(*(0.5 * np.ptp(interval, axis=1) for interval in (one.interval, other.interval)))
+            wide = np.hypot(
+                *(0.5 * np.ptp(interval, axis=1) for interval in (one.interval, other.interval))
+            )
             apart = np.abs(one.values - other.values)
             agree += (apart <= wide)[np.isfinite(wide)].tolist()
         for answer, ahead in ((one, halves[place + 1]), (other, halves[place])):
@@ -181,7 +202,9 @@ def _halves(
         "agree": float(np.mean(agree)) if agree else None,
         "repeatability": float(100 * np.mean(scatter)) if scatter else None,
         "held_out": np.sqrt(np.mean(np.square(every), axis=0)).tolist() if every else None,
-        "held_out_moving": np.sqrt(np.nanmean(np.square(moving), axis=0)).tolist() if moving else None,
+        "held_out_moving": np.sqrt(np.nanmean(np.square(moving), axis=0)).tolist()
+        if moving
+        else None,
         "seconds": float(np.mean([seconds for _, seconds in found])),
     }
 
@@ -195,7 +218,10 @@ def simulated_table(rows: Sequence[Row]) -> str:
         good = [row for row in own if not row.failed]
         bounds = np.array([value for row in good if row.over_bound for value in row.over_bound])
         inside = [value for row in good if row.inside is not None for value in row.inside]
-        errors = [[value for row in good if row.logs == kind for value in row.error_percent] for kind in KINDS]
+        errors = [
+            [value for row in good if row.logs == kind for value in row.error_percent]
+            for kind in KINDS
+        ]
         lines.append(
             f"| {peer} | {_number(np.sqrt(np.nanmean(bounds**2)) if bounds.size else None)} | "
             + " / ".join(_number(np.nanmedian(one) if one else None) for one in errors)
@@ -203,7 +229,9 @@ def simulated_table(rows: Sequence[Row]) -> str:
             + f"{_number(np.nanmedian([row.held_out for row in good]) if good else None)} N m | "
             + f"{_number(np.mean([row.seconds for row in good]) if good else None)} | {choices} |"
         )
-        lines += [f"| | failed on {row.logs}: {row.failed} | | | | | |" for row in own if row.failed]
+        lines += [
+            f"| | failed on {row.logs}: {row.failed} | | | | | |" for row in own if row.failed
+        ]
     return "\n".join(lines)
 
 
@@ -212,7 +240,10 @@ def real_table(rows: Sequence[dict[str, Any]]) -> str:
     heading = "| build | contender | halves that agree, % | repeatability, % | held out, N m, joint 1 / 2 "
     lines = [f"{heading}| moving alone | processor s |", "|---|---|---|---|---|---|---|"]
     for row in rows:
-        pairs = [" / ".join(map(_number, row[name] or [None, None])) for name in ("held_out", "held_out_moving")]
+        pairs = [
+            " / ".join(map(_number, row[name] or [None, None]))
+            for name in ("held_out", "held_out_moving")
+        ]
         agree = None if row["agree"] is None else 100 * row["agree"]
         lines.append(
             f"| {row['build']} | {row['peer']} | {_number(agree)} | {_number(row['repeatability'])} "
@@ -227,7 +258,9 @@ def _number(value: Any) -> str:
 
 def main() -> None:
     """Run the race and write `race.md` and `race.json`."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--data", type=Path, default=Path("../shared/data"))
     parser.add_argument("-o", "--output", type=Path, default=Path("build/race"))
     given = parser.parse_args()

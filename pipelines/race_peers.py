@@ -1,8 +1,9 @@
 """The contenders of the race: each takes the same logs and gives k1 … k7, their deviations where it has any.
 
-An answer's values are k1 … k7; what else a contender knows of the torque (Coulomb friction, a rotor, an offset) is in
-`terms`, so that its prediction is judged with all that it identified. `CHOICES` counts what a user of each has to
-choose before it runs: filters, windows, starts, bounds, widths, terms.
+An answer's values are k1 … k7; what else a contender knows of the torque (Coulomb friction, a
+rotor, an offset) is in `terms`, so that its prediction is judged with all that it identified.
+`CHOICES` counts what a user of each has to choose before it runs: filters, windows, starts,
+bounds, widths, terms.
 """
 
 from __future__ import annotations
@@ -44,7 +45,9 @@ def algid_by(estimator: str) -> Callable[[Sequence[Segment]], Answer]:
         for place, log in enumerate(logs):
             stamps = np.round(np.arange(len(log)) * log.dt * 1e9).astype(np.int64)
             read.append(Log(stamps, log.theta, log.tau, Origin(str(place), "csv", {})))
-        settings = algid.Settings() if estimator == "default" else algid.Settings(estimator=estimator)  # type: ignore[arg-type]
+        settings = (
+            algid.Settings() if estimator == "default" else algid.Settings(estimator=estimator)  # type: ignore[arg-type]
+        )
         result = algid.identify(read, settings=settings, report=False)
         rows = [result.parameters.get(name) for name in CONSTANT_NAMES]
         values = [np.nan if row is None or row.estimate is None else row.estimate for row in rows]
@@ -62,7 +65,9 @@ def algid_by(estimator: str) -> Callable[[Sequence[Segment]], Answer]:
     return answer
 
 
-def filtered(log: Segment, cutoff: float = CUTOFF) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def filtered(
+    log: Segment, cutoff: float = CUTOFF
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Angles, velocities, accelerations and torques (2, N) behind one zero-phase filter."""
     from scipy.signal import butter, sosfiltfilt
 
@@ -92,7 +97,10 @@ def _rows(log: Segment) -> tuple[FloatArray, FloatArray]:
 def least_squares(logs: Sequence[Segment]) -> Answer:
     """Least squares behind a filter of 20 Hz, with Coulomb friction and a rotor: what a lab writes in an hour."""
     pieces = [_rows(log) for log in logs]
-    A, b = np.concatenate([one for one, _ in pieces]), np.concatenate([other for _, other in pieces])
+    A, b = (
+        np.concatenate([one for one, _ in pieces]),
+        np.concatenate([other for _, other in pieces]),
+    )
     found = np.linalg.lstsq(A, b, rcond=None)[0]
     variance = np.sum((b - A @ found) ** 2) / (b.size - found.size)
     std = np.sqrt(variance * np.diag(np.linalg.pinv(A.T @ A)))
@@ -109,14 +117,18 @@ def pinocchio(logs: Sequence[Segment], l1: float) -> Answer:
     model = pin.Model()
     model.gravity.linear = np.array([0.0, -9.81, 0.0])
     first = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "joint1")
-    model.addJoint(first, pin.JointModelRZ(), pin.SE3(np.eye(3), np.array([l1, 0.0, 0.0])), "joint2")
+    model.addJoint(
+        first, pin.JointModelRZ(), pin.SE3(np.eye(3), np.array([l1, 0.0, 0.0])), "joint2"
+    )
     data = model.createData()
     gram, moment = np.zeros((24, 24)), np.zeros(24)
     for log in logs:
         theta, omega, alpha, tau = filtered(log)
         edge = round(_DROPPED / log.dt)
         for i in range(edge, theta.shape[1] - edge, max(1, round(1 / (4 * CUTOFF * log.dt)))):
-            block = pin.computeJointTorqueRegressor(model, data, theta[:, i], omega[:, i], alpha[:, i])
+            block = pin.computeJointTorqueRegressor(
+                model, data, theta[:, i], omega[:, i], alpha[:, i]
+            )
             row = np.zeros((2, 24))
             row[:, :20] = block
             row[0, 20:22] = omega[0, i], np.tanh(omega[0, i] / COULOMB_WIDTH)
@@ -126,7 +138,15 @@ def pinocchio(logs: Sequence[Segment], l1: float) -> Answer:
     found = np.linalg.pinv(gram, rcond=1e-12, hermitian=True) @ moment
     x1, inertia1, m2, x2, inertia2 = found[[1, 9, 10, 11, 19]]
     g = 9.81
-    values = [l1 * x2, g * x2, inertia2, g * (x1 + m2 * l1), inertia1 + m2 * l1**2, found[20], found[22]]
+    values = [
+        l1 * x2,
+        g * x2,
+        inertia2,
+        g * (x1 + m2 * l1),
+        inertia1 + m2 * l1**2,
+        found[20],
+        found[22],
+    ]
     return Answer(np.array(values), None, {"f1": float(found[21]), "f2": float(found[23])})
 
 
@@ -189,9 +209,10 @@ _ARM_XML = """
 def mujoco_sysid(logs: Sequence[Segment], l1: float) -> Answer:
     """MuJoCo's sysid: simulated against measured angles in stretches of 0.5 s, with its own covariance.
 
-    The masses and the length of link 1 are taken as known, so that its six parameters are determined; it starts
-    from filtered least squares. A sensor of MuJoCo shows the state before its step: the measured angles are handed
-    over one sample on. Torques act as the mean of the samples around each step.
+    The masses and the length of link 1 are taken as known, so that its six parameters are
+    determined; it starts from filtered least squares. A sensor of MuJoCo shows the state before
+    its step: the measured angles are handed over one sample on. Torques act as the mean of the
+    samples around each step.
     """
     import mujoco as package
     from mujoco import sysid as identification
@@ -204,19 +225,27 @@ def mujoco_sysid(logs: Sequence[Segment], l1: float) -> Answer:
     for name, change in _CHANGES.items():
         value = start[name]
         low, high = sorted((0.1 * value, 10 * value))
-        parameters.add(sysid.Parameter(name, [value], min_value=[low], max_value=[high], modifier=change))
+        parameters.add(
+            sysid.Parameter(name, [value], min_value=[low], max_value=[high], modifier=change)
+        )
     states, controls, sensors = _stretches(logs, spec.compile())
     names = [f"stretch{place}" for place in range(len(states))]
     sequences = sysid.ModelSequences("arm", spec, names, states, controls, sensors)
     residual = sysid.build_residual_fn(models_sequences=[sequences])
     best, outcome = sysid.optimize(
-        initial_params=parameters, residual_fn=residual, optimizer="mujoco", verbose=False, output=io.StringIO()
+        initial_params=parameters,
+        residual_fn=residual,
+        optimizer="mujoco",
+        verbose=False,
+        output=io.StringIO(),
     )
     x = np.array([float(best[name].value[0]) for name in _CHANGES])
     misfit, _, _ = residual(outcome.x, best)
     covariance, _ = sysid.calculate_intervals(misfit, outcome.jac)
     values = _constants(x, start, l1)
-    slope = np.stack([_constants(x + step, start, l1) - values for step in 1e-6 * np.diag(x)]) / (1e-6 * x[:, None])
+    slope = np.stack([_constants(x + step, start, l1) - values for step in 1e-6 * np.diag(x)]) / (
+        1e-6 * x[:, None]
+    )
     half = 1.96 * np.sqrt(np.diag(slope.T @ covariance @ slope))
     return Answer(values, np.stack([values - half, values + half], axis=1))
 
@@ -273,9 +302,14 @@ def _stretches(logs: Sequence[Segment], model: Any) -> tuple[list[Any], list[Any
 
 
 def _physical(k: FloatArray, l1: float) -> dict[str, float]:
-    """Masses, centres and inertias of an arm with the constants k (7,); a mass of each link is chosen."""
+    """Masses, centres and inertias of an arm with the constants k (7,).
+
+    a mass of each link is chosen.
+    """
     _, k2, k3, k4, k5, b1, b2 = k
-    m2 = min(2 * (k2 / _G) ** 2 / k3, 0.9 * k5 / l1**2)  # half of k3 about the centre, where link 1 allows it
+    m2 = min(
+        2 * (k2 / _G) ** 2 / k3, 0.9 * k5 / l1**2
+    )  # half of k3 about the centre, where link 1 allows it
     first = k4 / _G - m2 * l1
     m1 = max(2 * first**2 / (k5 - m2 * l1**2), 1e-3)
     lc2, lc1 = k2 / _G / m2, first / m1

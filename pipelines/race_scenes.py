@@ -7,8 +7,8 @@ K       moments K1, K2, K4 as phasors                     (3,) complex
 x       angles and velocities of both joints              (4,)
 ======  ================================================  =======================
 
-With centres of mass at angles δ off their links, K1 = m2 l1 lc2 exp(i δ2), K2 = g m2 lc2 exp(i δ2) and
-K4 = m1 g lc1 exp(i δ1) + m2 g l1; the constants k1, k2, k4 are their magnitudes.
+With centres of mass at angles δ off their links, K1 = m2 l1 lc2 exp(i δ2), K2 = g m2 lc2 exp(i δ2)
+and K4 = m1 g lc1 exp(i δ1) + m2 g l1; the constants k1, k2, k4 are their magnitudes.
 """
 
 from __future__ import annotations
@@ -146,7 +146,8 @@ def _moved(plant: _Plant, drive: Drive, held: bool = False) -> Truth:
         for part in range(SUBSTEPS):
             at = now + part * h
             first, middle, last = (
-                torques[:, sample] if held else drive(at + share * h, x) for share in (0.0, 0.5, 1.0)
+                torques[:, sample] if held else drive(at + share * h, x)
+                for share in (0.0, 0.5, 1.0)
             )
             a = plant.rate(x, first)
             b = plant.rate(x + 0.5 * h * a, middle)

@@ -1,6 +1,7 @@
 """Arms with the errors of real joints and sensors, simulated by a road of its own: no code of the estimators.
 
-All arms of all rows are integrated side by side by the classical Runge-Kutta method, at steps of `STEP` s.
+All arms of all rows are integrated side by side by the classical Runge-Kutta method, at steps of
+`STEP` s.
 
 ======  ====================================================  =======================
 symbol  name                                                  shape
@@ -10,8 +11,8 @@ m, q    angles of the motors and of the links                 (2, S)
 x       travel of the base along the horizontal               (S,)
 ======  ====================================================  =======================
 
-A joint of motor inertia B, stiffness K and play ±p passes K times the twist m − q beyond the play. Stiff joints
-have m = q. A base on springs moves with the reaction of the links.
+A joint of motor inertia B, stiffness K and play ±p passes K times the twist m − q beyond the play.
+Stiff joints have m = q. A base on springs moves with the reaction of the links.
 """
 
 from __future__ import annotations
@@ -75,7 +76,9 @@ class Errors:
     @property
     def mechanical(self) -> Errors:
         """Those that change the motion, without those of the sensors."""
-        return replace(self, gains=(1.0, 1.0), offset=0.0, drift=0.0, lag=0.0, delay=0.0, zero=(0.0, 0.0))
+        return replace(
+            self, gains=(1.0, 1.0), offset=0.0, drift=0.0, lag=0.0, delay=0.0, zero=(0.0, 0.0)
+        )
 
 
 DEGREE = np.pi / 180
@@ -99,7 +102,14 @@ ROWS = {
     "elastic joints, 15 Hz": Errors(elastic=15.0),
     "a base that gives, 8 Hz": Errors(base=8.0),
     "all of it, mildly": Errors(
-        coulomb=0.04, stribeck=0.02, asymmetry=0.005, load=0.02, rotor=0.05, ripple=0.005, offset=0.01, delay=1e-3
+        coulomb=0.04,
+        stribeck=0.02,
+        asymmetry=0.005,
+        load=0.02,
+        rotor=0.05,
+        ripple=0.005,
+        offset=0.01,
+        delay=1e-3,
     ),
 }
 
@@ -121,7 +131,10 @@ class Scene:
 
 
 def scenes(rows: list[str], arms: list[int]) -> dict[tuple[str, int, bool], Scene]:
-    """Scenes by row, arm and load; the friction's width is each arm's own, from 0.03 to 0.2 rad/s."""
+    """Scenes by row, arm and load.
+
+    The friction's width is each arm's own, from 0.03 to 0.2 rad/s.
+    """
     keys = [(row, seed, loaded) for row in rows for seed in arms for loaded in (False, True)]
     moving = list(dict.fromkeys((ROWS[row].mechanical, seed, loaded) for row, seed, loaded in keys))
     cases = [_Case.of(*key) for key in moving]
@@ -129,9 +142,16 @@ def scenes(rows: list[str], arms: list[int]) -> dict[tuple[str, int, bool], Scen
     return {key: _sensed(ROWS[key[0]], *moved[ROWS[key[0]].mechanical, *key[1:]]) for key in keys}
 
 
-def campaigns(errors: Errors, arms: list[int], unloaded: int, loaded: int = 0) -> dict[int, list[Scene]]:
+def campaigns(
+    errors: Errors, arms: list[int], unloaded: int, loaded: int = 0
+) -> dict[int, list[Scene]]:
     """By arm so many unloaded and loaded motions, all different, of one row of errors."""
-    keys = [(arm, kind, run) for arm in arms for kind in (False, True) for run in range(loaded if kind else unloaded)]
+    keys = [
+        (arm, kind, run)
+        for arm in arms
+        for kind in (False, True)
+        for run in range(loaded if kind else unloaded)
+    ]
     cases = [_Case.of(errors.mechanical, arm, kind, run) for arm, kind, run in keys]
     found: dict[int, list[Scene]] = {arm: [] for arm in arms}
     for case, theta in zip(cases, _integrate(cases), strict=True):
@@ -168,7 +188,11 @@ class _Case:
         size = np.sqrt(np.mean(wide_multi_sine(arm, 1000 * seed)(times) ** 2, axis=1))
         if loaded:
             k = with_payload(k, arm.payload_constants(payload))
-        push = size[:, None] * errors.push * _wandering(times.size, np.random.default_rng([seed, loaded, run]))
+        push = (
+            size[:, None]
+            * errors.push
+            * _wandering(times.size, np.random.default_rng([seed, loaded, run]))
+        )
         return cls(errors, seed, arm, payload, loaded, k, times, torque, size, width, push)
 
 
@@ -208,7 +232,10 @@ def _integrate(cases: list[_Case]) -> list[FloatArray]:
 
 
 class _Arms:
-    """The right side of all cases' equations of motion; a state holds m, ṁ, q, q̇, x, ẋ in its rows."""
+    """The right side of all cases' equations of motion.
+
+    a state holds m, ṁ, q, q̇, x, ẋ in its rows.
+    """
 
     def __init__(self, cases: list[_Case]) -> None:
         def each(name: str) -> FloatArray:
@@ -217,7 +244,9 @@ class _Arms:
         self.k = np.stack([case.k for case in cases], axis=-1)
         size = np.stack([case.size for case in cases], axis=-1)
         self.width = np.array([case.width for case in cases])
-        self.f, self.s, self.a, self.r = (each(n) * size for n in ("coulomb", "stribeck", "asymmetry", "ripple"))
+        self.f, self.s, self.a, self.r = (
+            each(n) * size for n in ("coulomb", "stribeck", "asymmetry", "ripple")
+        )
         self.speed, self.e, self.play = each("stribeck_speed"), each("load"), each("play")
         own = np.stack([case.arm.constants() for case in cases], axis=-1)  # without payload
         self.j2 = each("rotor") * own[2]
@@ -230,14 +259,19 @@ class _Arms:
         self.first, self.second = self.k[3] / 9.81, self.k[1] / 9.81  # Σ m lc along each link, kg m
         self.base = base > 0
         self.mass = np.array([4 * (case.arm.m1 + case.arm.m2) for case in cases])  # of base and arm
-        self.spring, self.damper = self.mass * (2 * np.pi * base) ** 2, 0.1 * self.mass * 2 * np.pi * base
+        self.spring, self.damper = (
+            self.mass * (2 * np.pi * base) ** 2,
+            0.1 * self.mass * 2 * np.pi * base,
+        )
 
     def rate(self, state: FloatArray, tau: FloatArray) -> FloatArray:
         """The state's derivative under the motors' torque `tau` (2, S)."""
         m, m_dot, q, q_dot, (x, x_dot) = state[:2], state[2:4], state[4:6], state[6:8], state[8:]
         net = tau - self._friction(m, m_dot)
         twist = m - q
-        passed = self.stiffness * (twist - np.clip(twist, -self.play, self.play)) + self.damping * (m_dot - q_dot)
+        passed = self.stiffness * (twist - np.clip(twist, -self.play, self.play)) + self.damping * (
+            m_dot - q_dot
+        )
         acting = np.where(self.stiff, net, passed)
         alpha, x_ddot = self._accelerations(q, q_dot, acting, x, x_dot)
         motor = np.where(self.stiff, alpha, (net - passed) / self.motor)
@@ -258,9 +292,13 @@ class _Arms:
         c1, c2, c12 = np.cos(q[0]), np.cos(q[1]), np.cos(q[0] + q[1])
         m11, m12, m22 = k5 + k3 + 2 * k1 * c2, k3 + k1 * c2, k3
         w1, w2 = q_dot
-        h = np.stack([-k1 * s2 * (2 * w1 + w2) * w2 + k4 * c1 + k2 * c12, k1 * s2 * w1**2 + k2 * c12])
+        h = np.stack(
+            [-k1 * s2 * (2 * w1 + w2) * w2 + k4 * c1 + k2 * c12, k1 * s2 * w1**2 + k2 * c12]
+        )
         # The base's acceleration enters both joints as a tilt of gravity would.
-        pull = np.where(self.base, np.stack([-self.first * s1 - self.second * s12, -self.second * s12]), 0.0)
+        pull = np.where(
+            self.base, np.stack([-self.first * s1 - self.second * s12, -self.second * s12]), 0.0
+        )
         thrown = self.first * c1 * w1**2 + self.second * c12 * (w1 + w2) ** 2
         force = -self.spring * x - self.damper * x_dot + np.where(self.base, thrown, 0.0)
         total = self.mass
@@ -278,7 +316,9 @@ class _Arms:
                 a21, a22 = a21 - pull[0] * pull[1] / total, a22 - pull[1] ** 2 / total
             determinant = a11 * a22 - a12 * a21
             alpha = np.stack([a22 * b[0] - a12 * b[1], a11 * b[1] - a21 * b[0]]) / determinant
-            sign = np.sign(np.stack([m11 * alpha[0] + m12 * alpha[1], m12 * alpha[0] + m22 * alpha[1]]) + h)
+            sign = np.sign(
+                np.stack([m11 * alpha[0] + m12 * alpha[1], m12 * alpha[0] + m22 * alpha[1]]) + h
+            )
         x_ddot = np.where(self.base, (force - pull[0] * alpha[0] - pull[1] * alpha[1]) / total, 0.0)
         return alpha, x_ddot
 
@@ -294,15 +334,21 @@ def _sensed(errors: Errors, case: _Case, theta: FloatArray) -> Scene:
 
         decay = np.exp(-0.5 * STEP / errors.lag)
         mean = (1 - decay) * errors.lag / (0.5 * STEP)
-        dense, _ = lfilter([1 - mean, mean - decay], [1, -decay], dense, axis=1, zi=mean * dense[:, :1])
+        dense, _ = lfilter(
+            [1 - mean, mean - decay], [1, -decay], dense, axis=1, zi=mean * dense[:, :1]
+        )
     stride = 2 * round(1 / RATE / STEP)
     ahead = round(errors.delay / (0.5 * STEP))
-    tau = np.concatenate([dense[:, ahead:], np.repeat(dense[:, -1:], ahead, axis=1)], axis=1)[:, ::stride]
+    tau = np.concatenate([dense[:, ahead:], np.repeat(dense[:, -1:], ahead, axis=1)], axis=1)[
+        :, ::stride
+    ]
     rng = np.random.default_rng([case.seed, case.loaded])
     size = case.size[:, None]
     walk = np.cumsum(rng.standard_normal(tau.shape), axis=1) / np.sqrt(tau.shape[1])
     tau = tau + size * (errors.offset * np.array([[1.0], [-1.0]]) + errors.drift * walk)
-    return Scene(case.arm, case.payload, theta - np.array(errors.zero)[:, None], tau, _truth(case, errors))
+    return Scene(
+        case.arm, case.payload, theta - np.array(errors.zero)[:, None], tau, _truth(case, errors)
+    )
 
 
 def _truth(case: _Case, errors: Errors) -> dict[str, float]:

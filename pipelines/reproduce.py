@@ -2,10 +2,11 @@
 
     python -m pipelines.reproduce
 
-The paper does not state its torque, its observer's gain, nor when it reads its errors. Of random slow torques (four
-harmonics a joint, at most 4 N m, 0.1 to 1.5 Hz, from rest), this prints which share has all twelve errors within
-those of Table 4, with a 95 % interval (Clopper and Pearson 1934), for both cases and two gains of the observer, and
-the errors of their best and of their median. Then it prints the median of the largest error over speed and pole.
+The paper does not state its torque, its observer's gain, nor when it reads its errors. Of random
+slow torques (four harmonics a joint, at most 4 N m, 0.1 to 1.5 Hz, from rest), this prints which
+share has all twelve errors within those of Table 4, with a 95 % interval (Clopper and Pearson
+1934), for both cases and two gains of the observer, and the errors of their best and of their
+median. Then it prints the median of the largest error over speed and pole.
 
 ======  ===================================================  ===========  ======
 symbol  name                                                 shape        unit
@@ -62,7 +63,9 @@ def three_a_joint(poles: Sequence[float]) -> FloatArray:
 def placed(poles: Sequence[float]) -> FloatArray:
     """The gain L (6, 2) of `scipy.signal.place_poles`, which couples the joints."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # its iteration does not settle for these poles
+        warnings.simplefilter(
+            "ignore", UserWarning
+        )  # its iteration does not settle for these poles
         found = place_poles(A.T, C.T, np.array(poles))
     return np.asarray(found.gain_matrix.T)
 
@@ -76,7 +79,8 @@ GAINS: dict[str, Callable[[Sequence[float]], FloatArray]] = {
 def observed(theta: FloatArray, gain: FloatArray) -> FloatArray:
     """Velocities (2, B, N) by the observer of any `gain` (6, 2), at rest before the first angles.
 
-    The observer ẋ = (A − L C) x + L y is discretised exactly for angles that are linear between samples.
+    The observer ẋ = (A − L C) x + L y is discretised exactly for angles that are linear between
+    samples.
     """
     held = np.zeros((10, 10))
     held[:6, :6], held[:6, 6:8] = (A - gain @ C) * DT, gain * DT
@@ -105,7 +109,9 @@ def _gain(name: str, slow_pole: float) -> FloatArray:
     return GAINS[name]((slow_pole, *PAPER_POLES[1:]))
 
 
-def case_errors(case: Case, genes: FloatArray, gain: FloatArray, judged: slice = JUDGED) -> FloatArray:
+def case_errors(
+    case: Case, genes: FloatArray, gain: FloatArray, judged: slice = JUDGED
+) -> FloatArray:
     """Table 4's errors (12, B) in percent by an observer of `gain` (6, 2), read at `judged`."""
     k = case.arm.constants()
     tau = torques(genes, DT * np.arange(SAMPLES))
@@ -138,8 +144,13 @@ def print_choices() -> None:
     print()
 
 
-def worst_shares(case_name: str, genes: FloatArray, gains: Sequence[str], slow_poles: Sequence[float]) -> FloatArray:
-    """The largest error as a share of the paper's (gains, poles, B); infinite where a system is singular."""
+def worst_shares(
+    case_name: str, genes: FloatArray, gains: Sequence[str], slow_poles: Sequence[float]
+) -> FloatArray:
+    """The largest error as a share of the paper's (gains, poles, B).
+
+    Infinite where a system is singular.
+    """
     case = load_case(case_name)
     k = case.arm.constants()
     loaded = with_payload(k, case.arm.payload_constants(case.payload))
@@ -173,7 +184,9 @@ def _map_batch(job: tuple[str, float]) -> FloatArray:
 def print_shares(pool: ProcessPoolExecutor, count: int) -> None:
     """Print which share of `count` random torques reaches Table 4."""
     batches = -(-count // BATCH)
-    print(f"Random torques that reach Table 4, of {batches * BATCH}; errors as multiples of the paper's")
+    print(
+        f"Random torques that reach Table 4, of {batches * BATCH}; errors as multiples of the paper's"
+    )
     print(f"{'case':6} {'gain':20} {'reach it':>8} {'share, 95 %':>22} {'best':>8} {'median':>8}")
     for case_name in CASES:
         jobs = [(case_name, BATCH, seed) for seed in range(batches)]
@@ -200,7 +213,9 @@ def print_map(pool: ProcessPoolExecutor) -> None:
 
 def main() -> None:
     """Print the shares and the map."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--torques", type=int, default=10_000)
     given = parser.parse_args()
     print_choices()

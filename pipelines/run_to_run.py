@@ -2,11 +2,12 @@
 
     python -m pipelines.run_to_run ../shared/data/dfki --splits 16
 
-Each split gives two estimates that share no run: by `algid identify` without a flag (each half chooses its own terms
-and its own estimator), and by the weak estimator with given terms. z is their difference over its standard deviation;
-asked of what no flag gives: an RMS between 0.7 and 1.2, and 92 to 99 % of the differences inside what both 95 %
-intervals allow. Repeatability is the scatter of k1 … k5 between halves over their size, the mean of the five; asked is
-that of an output-error fit on the same splits (`pipelines.output_error`), which takes minutes.
+Each split gives two estimates that share no run: by `algid identify` without a flag (each half
+chooses its own terms and its own estimator), and by the weak estimator with given terms. z is
+their difference over its standard deviation; asked of what no flag gives: an RMS between 0.7 and
+1.2, and 92 to 99 % of the differences inside what both 95 % intervals allow. Repeatability is the
+scatter of k1 … k5 between halves over their size, the mean of the five; asked is that of an
+output-error fit on the same splits (`pipelines.output_error`), which takes minutes.
 """
 
 from __future__ import annotations
@@ -46,7 +47,10 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True)
 class _Half:
-    """By name estimate, standard deviation and half width of the interval; the estimator; the terms."""
+    """By name estimate, standard deviation and half width of the interval; the estimator.
+
+    The terms.
+    """
 
     found: dict[str, tuple[float, float, float]]
     estimator: str
@@ -74,8 +78,12 @@ def _estimated(job: tuple[Path, tuple[int, ...], str]) -> _Half:
     folder, places, model = job
     logs = [_runs(folder)[place] for place in places]
     if model == OUTPUT_ERROR:
-        start = weak.fit([_source(log) for log in logs], settings=WeakSettings(Model(("coulomb", "rotor"))))
-        found = zip(output_error.NAMES, output_error.fit(logs, start.values[:7]).tolist(), strict=True)
+        start = weak.fit(
+            [_source(log) for log in logs], settings=WeakSettings(Model(("coulomb", "rotor")))
+        )
+        found = zip(
+            output_error.NAMES, output_error.fit(logs, start.values[:7]).tolist(), strict=True
+        )
         return _Half({name: (value, np.nan, np.nan) for name, value in found}, model, ())
     return _identified(logs) if model == NO_FLAG else _weak(logs, model)
 
@@ -83,13 +91,20 @@ def _estimated(job: tuple[Path, tuple[int, ...], str]) -> _Half:
 def _identified(logs: Sequence[Segment]) -> _Half:
     as_logs = [
         Log(
-            np.round(np.arange(len(log)) * log.dt * 1e9).astype(np.int64), log.theta, log.tau, Origin(str(n), "csv", {})
+            np.round(np.arange(len(log)) * log.dt * 1e9).astype(np.int64),
+            log.theta,
+            log.tau,
+            Origin(str(n), "csv", {}),
         )
         for n, log in enumerate(logs)
     ]
     result = identify(as_logs, report=False)
     terms = tuple(result.fit.model.terms) if result.fit and result.fit.model else ()
-    return _Half({name: one for name, e in result.parameters.items() if (one := _numbers(e))}, result.estimator, terms)
+    return _Half(
+        {name: one for name, e in result.parameters.items() if (one := _numbers(e))},
+        result.estimator,
+        terms,
+    )
 
 
 def _numbers(found: Estimate) -> tuple[float, float, float] | None:
@@ -104,7 +119,9 @@ def _weak(logs: Sequence[Segment], model: str) -> _Half:
     fit = weak.fit([_source(log) for log in logs], settings=WeakSettings(Model(terms)))
     found = zip(fit.names, fit.values.tolist(), fit.std.tolist(), strict=True)
     return _Half(
-        {name: (value, std, fit.quantile * std) for name, value, std in found if np.isfinite(std)}, "weak", terms
+        {name: (value, std, fit.quantile * std) for name, value, std in found if np.isfinite(std)},
+        "weak",
+        terms,
     )
 
 
@@ -142,7 +159,9 @@ def evaluate(folder: Path, splits: int, model: str = NO_FLAG) -> list[Row]:
         },
         {
             "what": "estimators and terms of the halves",
-            "value": dict(Counter(chain.from_iterable((half.estimator, *half.terms) for half in found))),
+            "value": dict(
+                Counter(chain.from_iterable((half.estimator, *half.terms) for half in found))
+            ),
             "asked": None,
         },
     ]
@@ -163,11 +182,15 @@ def _repeatability(found: Sequence[_Half]) -> float:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("folder", type=Path)
     parser.add_argument("--splits", type=int, default=16)
     parser.add_argument("--arm", action="append", choices=ARMS, help="only this arm, or these")
-    parser.add_argument("--model", action="append", choices=MODELS, help="only this model, or these")
+    parser.add_argument(
+        "--model", action="append", choices=MODELS, help="only this model, or these"
+    )
     given = parser.parse_args()
     for arm in given.arm or ARMS:
         for model in given.model or MODELS:

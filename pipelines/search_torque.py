@@ -1,18 +1,20 @@
 """Search the slow multi-sine torques with which the paper's method reaches the errors of its Table 4.
 
-The paper does not state the torque behind Table 4. Its observer lags more the faster the arm moves, so the
-torque decides the errors. This script seeks, for one case, four harmonics a joint (0.1 to 1.5 Hz, at most
-4 N m) that drive the unloaded and the loaded arm alike from rest, so that the largest of the twelve errors, each
-as a share of the paper's, is as small as possible: CMA-ES from the best of many Sobol points, seeded, hence
-repeatable. (The errors have poles wherever P_r is singular, so that least squares gets nowhere, and differential
-evolution stalls at three times the paper's.) It needs the package cma:
+The paper does not state the torque behind Table 4. Its observer lags more the faster the arm
+moves, so the torque decides the errors. This script seeks, for one case, four harmonics a joint
+(0.1 to 1.5 Hz, at most 4 N m) that drive the unloaded and the loaded arm alike from rest, so that
+the largest of the twelve errors, each as a share of the paper's, is as small as possible: CMA-ES
+from the best of many Sobol points, seeded, hence repeatable. (The errors have poles wherever P_r
+is singular, so that least squares gets nowhere, and differential evolution stalls at three times
+the paper's.) It needs the package cma:
 
     pip install cma
     python -m pipelines.search_torque case1
     python -m pipelines.search_torque case2 --seed 1 --starts 1
 
-print the [torque] tables of data/cases/. The search simulates by its own fixed-step Runge-Kutta method
-over all candidates at once; what it finds is judged by `algid identify` on logs from `algid synth`.
+print the [torque] tables of data/cases/. The search simulates by its own fixed-step Runge-Kutta
+method over all candidates at once; what it finds is judged by `algid identify` on logs from `algid
+synth`.
 """
 
 from __future__ import annotations
@@ -35,7 +37,11 @@ SUBSTEPS = 2
 JUDGED = slice(-200, None, 10)  # the last 0.2 s of the second, thinned out
 HARMONICS = 4
 ENOUGH = 0.9  # of the paper's errors: the search may stop
-BOUNDS = [(0.0, 4.0)] * (2 * HARMONICS) + [(0.1, 1.5)] * (2 * HARMONICS) + [(0.0, 2 * np.pi)] * (2 * HARMONICS)
+BOUNDS = (
+    [(0.0, 4.0)] * (2 * HARMONICS)
+    + [(0.1, 1.5)] * (2 * HARMONICS)
+    + [(0.0, 2 * np.pi)] * (2 * HARMONICS)
+)
 
 
 def torques(genes: FloatArray, t: FloatArray) -> FloatArray:
@@ -56,7 +62,9 @@ def motions(k: FloatArray, genes: FloatArray) -> FloatArray:
         first, middle, last = np.moveaxis(tau[..., 2 * step : 2 * step + 3], -1, 0)
         a1 = forward_dynamics(k, theta, omega, first)
         a2 = forward_dynamics(k, theta + 0.5 * h * omega, omega + 0.5 * h * a1, middle)
-        a3 = forward_dynamics(k, theta + 0.5 * h * (omega + 0.5 * h * a1), omega + 0.5 * h * a2, middle)
+        a3 = forward_dynamics(
+            k, theta + 0.5 * h * (omega + 0.5 * h * a1), omega + 0.5 * h * a2, middle
+        )
         a4 = forward_dynamics(k, theta + h * (omega + 0.5 * h * a2), omega + h * a3, last)
         theta = theta + h * omega + h**2 / 6 * (a1 + a2 + a3)
         omega = omega + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
@@ -130,7 +138,9 @@ def first_points(case: Case, points: int, count: int, seed: int) -> FloatArray:
     """The best `count` of `points` Sobol points (count, 24)."""
     low, high = np.array(BOUNDS).T
     drawn = low + (high - low) * qmc.Sobol(len(BOUNDS), rng=seed).random(points)
-    score = np.concatenate([worst_share(case, batch.T) for batch in np.split(drawn, range(256, points, 256))])
+    score = np.concatenate(
+        [worst_share(case, batch.T) for batch in np.split(drawn, range(256, points, 256))]
+    )
     best: FloatArray = drawn[np.argsort(score)[:count]]
     return best
 
@@ -140,19 +150,31 @@ def evolve(case: Case, start: FloatArray, generations: int, seed: int) -> tuple[
     import cma
 
     low, high = np.array(BOUNDS).T
-    options = {"bounds": [0, 1], "popsize": 64, "seed": seed + 1, "verbose": -9, "maxiter": generations}
+    options = {
+        "bounds": [0, 1],
+        "popsize": 64,
+        "seed": seed + 1,
+        "verbose": -9,
+        "maxiter": generations,
+    }
     strategy = cma.CMAEvolutionStrategy((start - low) / (high - low), 0.1, options)
     while not strategy.stop() and strategy.best.f > ENOUGH:
         candidates = np.array(strategy.ask())
         strategy.tell(candidates, worst_share(case, (low + (high - low) * candidates).T).tolist())
         if strategy.countiter % 50 == 0:
-            print(f"generation {strategy.countiter}: worst error / paper's {strategy.best.f:.3g}", file=sys.stderr)
+            print(
+                f"generation {strategy.countiter}: worst error / paper's {strategy.best.f:.3g}",
+                file=sys.stderr,
+            )
     best = np.round(low + (high - low) * np.array(strategy.best.x), 4)
     return best, float(worst_share(case, best[:, None])[0])
 
 
 def search(case: Case, points: int, starts: int, generations: int, seed: int) -> FloatArray:
-    """The best candidate (24,) of several evolutions; the first that is good enough ends the search."""
+    """The best candidate (24,) of several evolutions.
+
+    The first that is good enough ends the search.
+    """
     best: FloatArray = np.empty(0)
     best_share = np.inf
     for start in first_points(case, points, starts, seed):
@@ -167,26 +189,37 @@ def search(case: Case, points: int, starts: int, generations: int, seed: int) ->
 def torque_table(genes: FloatArray) -> str:
     """The candidate (24,) as the [torque] table of a case file."""
     lines = []
-    parts = dict(zip(("amplitude", "frequency", "phase"), genes.reshape(3, 2, HARMONICS), strict=True))
+    parts = dict(
+        zip(("amplitude", "frequency", "phase"), genes.reshape(3, 2, HARMONICS), strict=True)
+    )
     for joint in range(2):
         lines.append(f"[torque.joint{joint + 1}]")
-        lines += [f"{name} = {[round(float(v), 4) for v in values[joint]]}" for name, values in parts.items()]
+        lines += [
+            f"{name} = {[round(float(v), 4) for v in values[joint]]}"
+            for name, values in parts.items()
+        ]
     return "\n".join(lines)
 
 
 def main() -> None:
     """Search for one case and print its torque."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("case", choices=["case1", "case2"])
     parser.add_argument("--points", type=int, default=2048, help="Sobol points to sift")
-    parser.add_argument("--starts", type=int, default=4, help="best points to evolve, one after the other")
+    parser.add_argument(
+        "--starts", type=int, default=4, help="best points to evolve, one after the other"
+    )
     parser.add_argument("--generations", type=int, default=400, help="from each")
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     case = load_case(arguments.case)
     best = search(case, arguments.points, arguments.starts, arguments.generations, arguments.seed)
     print(torque_table(best))
-    for name, error in zip(case.paper_error_percent, errors(case, best[:, None])[:, 0], strict=True):
+    for name, error in zip(
+        case.paper_error_percent, errors(case, best[:, None])[:, 0], strict=True
+    ):
         print(f"# {name:12} {error:+.5f} %  paper {case.paper_error_percent[name]} %")
 
 

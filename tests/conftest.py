@@ -14,7 +14,9 @@ bound_by_environment()  # as the command does, before anything loads numpy
 
 from hypothesis import HealthCheck, settings  # noqa: E402
 
-settings.register_profile("any-machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile(
+    "any-machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
 settings.load_profile("any-machine")  # no test judges a machine by its speed
 
 SHARED = Path(__file__).parents[2] / "shared"

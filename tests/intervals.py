@@ -7,27 +7,33 @@ from scipy.stats import binom
 
 from algid.arm import FloatArray
 
-AS_90 = 1.6448536269514722 / 1.959963984540054  # half width of a normal interval of 90 % over one of 95 %
+AS_90 = (
+    1.6448536269514722 / 1.959963984540054
+)  # half width of a normal interval of 90 % over one of 95 %
 CHANCE = 1e-3  # that right intervals fail, one side and the other together
 
 
 def holds_95(ratios: FloatArray) -> None:
     """Fail unless independent errors over the half widths of their intervals, `ratios`, are those of 95 % intervals.
 
-    As many as 95 % of them have to lie within ±1, by the binomial distribution; and had the intervals been of 90 %,
-    the same draws would fail: a test that could not tell them apart fails too.
+    As many as 95 % of them have to lie within ±1, by the binomial distribution; and had the
+    intervals been of 90 %, the same draws would fail: a test that could not tell them apart fails
+    too.
     """
     size = np.abs(np.ravel(ratios))
     low, high = binom.interval(1 - CHANCE, size.size, 0.95)
     inside, narrower = int(np.sum(size <= 1)), int(np.sum(size <= AS_90))
     assert low <= inside <= high, f"{inside} of {size.size} within, {low:g} to {high:g} expected"
-    assert narrower < low, f"{narrower} of {size.size} within intervals of 90 %, of {low:g} at least: too few draws"
+    assert narrower < low, (
+        f"{narrower} of {size.size} within intervals of 90 %, of {low:g} at least: too few draws"
+    )
 
 
 def holds_at_least_95(ratios: FloatArray) -> None:
     """Fail unless errors over half widths are those of 95 % intervals or of wider ones.
 
-    For intervals that are wider by design, where noise is assumed that the simulation does not have.
+    For intervals that are wider by design, where noise is assumed that the simulation does not
+    have.
     """
     size = np.abs(np.ravel(ratios))
     low, _ = binom.interval(1 - CHANCE, size.size, 0.95)

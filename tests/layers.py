@@ -10,7 +10,16 @@ from functools import cache
 
 PURE = frozenset(
     {
-        *("__future__", "abc", "bisect", "collections", "contextlib", "dataclasses", "enum", "functools"),
+        *(
+            "__future__",
+            "abc",
+            "bisect",
+            "collections",
+            "contextlib",
+            "dataclasses",
+            "enum",
+            "functools",
+        ),
         *("itertools", "math", "operator", "string", "typing", "warnings"),
     }
 )
@@ -54,9 +63,17 @@ def _misfit(own: str, name: str, sources: Mapping[str, str], allowed: Room) -> s
         other = _room(name if name in sources else name.rpartition(".")[0])
         if name == "algid.__version__" or other == own or other in allowed.rooms:
             return None
-        return f"imports {name}" if other else f"reaches through algid for {name}: name the module it stands in"
+        return (
+            f"imports {name}"
+            if other
+            else f"reaches through algid for {name}: name the module it stands in"
+        )
     if top in sys.stdlib_module_names:
-        return None if allowed.library is None or top in allowed.library else f"imports {top} of the standard library"
+        return (
+            None
+            if allowed.library is None or top in allowed.library
+            else f"imports {top} of the standard library"
+        )
     return None if top in allowed.packages else f"imports the package {top}"
 
 
@@ -72,7 +89,10 @@ def parsed(text: str) -> ast.Module:
 
 
 def imported(module: str, text: str, sources: Mapping[str, str]) -> Iterator[str]:
-    """What a module's text imports, anywhere in it, by exact names; "?" where a name is computed."""
+    """What a module's text imports, anywhere in it, by exact names.
+
+    "?" where a name is computed.
+    """
     for node in ast.walk(parsed(text)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -83,7 +103,11 @@ def imported(module: str, text: str, sources: Mapping[str, str]) -> Iterator[str
                 yield exact if exact in sources or base == "algid" else base
         elif isinstance(node, ast.Call) and _imports(node.func):
             first = node.args[0] if node.args else None
-            yield first.value if isinstance(first, ast.Constant) and isinstance(first.value, str) else "?"
+            yield (
+                first.value
+                if isinstance(first, ast.Constant) and isinstance(first.value, str)
+                else "?"
+            )
 
 
 def _absolute(module: str, node: ast.ImportFrom, sources: Mapping[str, str]) -> str:

@@ -21,15 +21,17 @@ from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.stores import connect
 from algid.writers.mcap import payloads
 
-DENIED = b"<?xml version='1.0'?><Error><Code>AccessDenied</Code><Message>Access Denied</Message></Error>"
+DENIED = (
+    b"<?xml version='1.0'?><Error><Code>AccessDenied</Code><Message>Access Denied</Message></Error>"
+)
 
 
 @dataclass
 class Served:
     """A bucket of its own, the query behind an S3 URL, and the bytes that each answer to a GET had.
 
-    `asked` has the method, path and authorization of each request, `denied` says which are answered by 403, and
-    `after` is called once a GET of a path is answered.
+    `asked` has the method, path and authorization of each request, `denied` says which are
+    answered by 403, and `after` is called once a GET of a path is answered.
     """
 
     bucket: str
@@ -53,7 +55,10 @@ class Served:
         """The application, its answers counted."""
 
         def counted(environ: dict[str, Any], start: Any) -> list[bytes]:
-            method, path = environ["REQUEST_METHOD"], environ["PATH_INFO"].encode("latin-1").decode()
+            method, path = (
+                environ["REQUEST_METHOD"],
+                environ["PATH_INFO"].encode("latin-1").decode(),
+            )
             self.asked.append((method, path, environ.get("HTTP_AUTHORIZATION", "")))
             if self.denied(method, path):
                 start("403 Forbidden", [("Content-Type", "application/xml")])
@@ -69,7 +74,10 @@ class Served:
 
 @contextmanager
 def s3(monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
-    """A server with a bucket that no other test sees (moto keeps them for the process); skips where moto is absent."""
+    """A server with a bucket that no other test sees (moto keeps them for the process).
+
+    Skips where moto is absent.
+    """
     server = pytest.importorskip("moto.server", reason="moto is absent")
     for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
         monkeypatch.setenv(name, "testing")
@@ -81,7 +89,8 @@ def s3(monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
     running.start()
     place = quote(f"127.0.0.1:{port}")
     served = Served(
-        f"lab-{uuid.uuid4().hex}", f"?scheme=http&endpoint_override={place}&region=us-east-1&allow_bucket_creation=true"
+        f"lab-{uuid.uuid4().hex}",
+        f"?scheme=http&endpoint_override={place}&region=us-east-1&allow_bucket_creation=true",
     )
     running._server.app = served.counting(running._server.app)
     try:
@@ -102,12 +111,17 @@ def with_cameras(path: Path, log: Log, images: int, size: int = 1 << 20, every: 
         camera = _channel(writer, "/camera", "sensor_msgs/msg/CompressedImage", "uint8[] data\n")
         writer.add_metadata("calibration", {"camera": "none"})
         shots = images * every // len(log)
-        for row, (stamp, payload) in enumerate(zip(log.stamp_ns.tolist(), payloads(log), strict=True)):
+        for row, (stamp, payload) in enumerate(
+            zip(log.stamp_ns.tolist(), payloads(log), strict=True)
+        ):
             if row % every == 0:
                 for _ in range(shots):
                     close_chunk()
                     writer.add_message(
-                        camera, stamp, struct.pack("<BBBBI", 0, 1, 0, 0, size) + noise.bytes(size), stamp
+                        camera,
+                        stamp,
+                        struct.pack("<BBBBI", 0, 1, 0, 0, size) + noise.bytes(size),
+                        stamp,
                     )
                 close_chunk()
             writer.add_message(joints, stamp, payload, stamp, row)

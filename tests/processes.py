@@ -1,7 +1,8 @@
 """`algid` as its users start it: a process with its own arguments, folder, environment, descriptors and exit code.
 
-A fresh interpreter spends most of a second on imports. One server a test process has done them, computes nothing, and
-forks for each command. What depends on the interpreter's start or on signals is tested with processes of its own.
+A fresh interpreter spends most of a second on imports. One server a test process has done them,
+computes nothing, and forks for each command. What depends on the interpreter's start or on signals
+is tested with processes of its own.
 """
 
 from __future__ import annotations
@@ -41,9 +42,13 @@ LOADED = (
 class Outcome:
     """What a command printed and returned."""
 
-    def __init__(self, *arguments: str | Path, cwd: Path | None = None, env: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self, *arguments: str | Path, cwd: Path | None = None, env: Mapping[str, str] | None = None
+    ) -> None:
         with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
-            self.code = begin(*arguments, stdout=out.fileno(), stderr=err.fileno(), cwd=cwd, env=env)()
+            self.code = begin(
+                *arguments, stdout=out.fileno(), stderr=err.fileno(), cwd=cwd, env=env
+            )()
             self.out, self.err = (_text(stream.fileno()) for stream in (out, err))
 
 
@@ -54,9 +59,16 @@ def _text(descriptor: int) -> str:
 
 
 def begin(
-    *arguments: object, stdout: int, stderr: int, cwd: Path | None = None, env: Mapping[str, str] | None = None
+    *arguments: object,
+    stdout: int,
+    stderr: int,
+    cwd: Path | None = None,
+    env: Mapping[str, str] | None = None,
 ) -> Callable[[], int]:
-    """Start `algid` with these descriptors; what is returned waits for its end and gives the exit code."""
+    """Start `algid` with these descriptors.
+
+    What is returned waits for its end and gives the exit code.
+    """
     argv, own_env = ["algid", *map(str, arguments)], dict(env or os.environ)
     if FRESH in os.environ:
         command = [sys.executable, "-m", *argv]
@@ -102,7 +114,9 @@ def serve() -> None:
         asked, descriptors, _, _ = socket.recv_fds(requests, LARGEST, 2)
         if not asked:
             return
-        with warnings.catch_warnings(action="ignore"):  # of a fork beside the idle threads of polars and pyarrow
+        with warnings.catch_warnings(
+            action="ignore"
+        ):  # of a fork beside the idle threads of polars and pyarrow
             child = os.fork()
         if child == 0:
             requests.close()

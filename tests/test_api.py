@@ -46,7 +46,9 @@ def test_what_notebooks_call_says_all_that_it_takes_and_gives(name: str) -> None
 
 
 def test_a_result_says_what_each_of_its_fields_is() -> None:
-    assert _sections(Result)["Attributes"] == set(Result.model_fields) | set(Result.model_computed_fields)
+    assert _sections(Result)["Attributes"] == set(Result.model_fields) | set(
+        Result.model_computed_fields
+    )
 
 
 def _sections(thing: object) -> dict[str, set[str]]:
@@ -81,7 +83,9 @@ def test_a_result_is_read_by_a_string_and_shows_itself_as_a_short_table(tmp_path
     k1 = made.parameters["k1"]
     assert lines[3].split()[:2] == ["k1", f"{k1.estimate:.6g}"]
     assert lines[3].endswith("OK")
-    hostile = found.model_copy(update={"log": found.log.model_copy(update={"path": "<b>\x1b[31m\n.csv"})})
+    hostile = found.model_copy(
+        update={"log": found.log.model_copy(update={"path": "<b>\x1b[31m\n.csv"})}
+    )
     assert "<b>" not in hostile._repr_html_()
     assert hostile._repr_html_().count("<tr>") == 1 + len(made.estimates)
     assert "\x1b" not in str(hostile)
@@ -132,7 +136,9 @@ READING = Reading(
 
 
 def test_a_result_keeps_all_that_a_reader_decided(tmp_path: Path) -> None:
-    assert all(getattr(READING, field.name) != getattr(Reading(), field.name) for field in fields(Reading))
+    assert all(
+        getattr(READING, field.name) != getattr(Reading(), field.name) for field in fields(Reading)
+    )
     made = build(tmp_path / "a.algid", duration=1.0)
     made = made.model_copy(update={"log": made.log.model_copy(update={"reading": READING})})
     write_result(made, tmp_path / "result.json")
@@ -154,8 +160,16 @@ def test_a_result_keeps_all_that_a_reader_decided(tmp_path: Path) -> None:
         ("nonsense", 1, "log.reading.nonsense: extra inputs are not permitted, found 1"),
         ("passive", "a", "log.reading.passive: expected a valid integer, found 'a'"),
         ("offsets", [1.0], r"log.reading.offsets.1: field required, found \[1.0\]"),
-        ("channels.tau1.nonsense", 1, "log.reading.channels.tau1.nonsense: extra inputs are not permitted, found 1"),
-        ("channels.tau1.factor", "x", "log.reading.channels.tau1.factor: expected a valid number, found 'x'"),
+        (
+            "channels.tau1.nonsense",
+            1,
+            "log.reading.channels.tau1.nonsense: extra inputs are not permitted, found 1",
+        ),
+        (
+            "channels.tau1.factor",
+            "x",
+            "log.reading.channels.tau1.factor: expected a valid number, found 'x'",
+        ),
         (
             "joints_told",
             "nobody",
@@ -167,7 +181,9 @@ def test_a_reading_that_is_none_is_refused_by_its_place(
     tmp_path: Path, place: str, value: object, expected: str
 ) -> None:
     made = build(tmp_path / "a.algid", duration=1.0)
-    content = made.model_copy(update={"log": made.log.model_copy(update={"reading": READING})}).model_dump(mode="json")
+    content = made.model_copy(
+        update={"log": made.log.model_copy(update={"reading": READING})}
+    ).model_dump(mode="json")
     *folders, name = place.split(".")
     inner = content["log"]["reading"]
     for folder in folders:
@@ -175,13 +191,17 @@ def test_a_reading_that_is_none_is_refused_by_its_place(
     inner[name] = value
     file = tmp_path / "result.json"
     file.write_text(json.dumps(content), encoding="utf-8")
-    with pytest.raises(ResultError, match=rf"^{file}: {expected}; identify again with this version$"):
+    with pytest.raises(
+        ResultError, match=rf"^{file}: {expected}; identify again with this version$"
+    ):
         algid.read_result(file)
 
 
 def other(**changes: Any) -> list[str]:
     """The clauses that tell `READING` from one with `changes`; those of a channel are its own."""
-    channel = {name: changes.pop(name) for name in list(changes) if name in ("unit", "factor", "offset")}
+    channel = {
+        name: changes.pop(name) for name in list(changes) if name in ("unit", "factor", "offset")
+    }
     channels = {"tau1": replace(READING.channels["tau1"], **channel)}
     return list(READING.differences(replace(READING, channels=channels, **changes)))
 
@@ -204,7 +224,10 @@ def test_readings_of_other_words_for_the_same_numbers_do_not_differ() -> None:
     assert other(factor=-2.0) == []
     assert other(offset=0.25 + 5e-10) == []
     assert other(offset=0.25 + 2e-9) == ["tau1 offset by 0.25 instead of 0.25"]
-    assert list(READING.differences(Reading(zero="hanging", second_angle="absolute", drive="base"))) == []
+    assert (
+        list(READING.differences(Reading(zero="hanging", second_angle="absolute", drive="base")))
+        == []
+    )
 
 
 def test_a_log_is_made_of_arrays_either_way_round_and_gives_the_same_result() -> None:
@@ -245,7 +268,9 @@ def test_a_notebook_shows_each_meaning_and_a_bar_of_each_interval(tmp_path: Path
         ((1.0, 1.0), (119.0, 1.0), 1.0),
     ],
 )
-def test_a_bar_is_drawn_against_zero(interval: tuple[float, float], rect: tuple[float, float], zero: float) -> None:
+def test_a_bar_is_drawn_against_zero(
+    interval: tuple[float, float], rect: tuple[float, float], zero: float
+) -> None:
     middle = sum(interval) / 2
     drawn = interval_bar(Estimate(estimate=middle, std=0.1, ci95=interval, unit="kg"))
     assert f'<rect x="{rect[0]:.1f}" y="3" width="{rect[1]:.1f}"' in drawn
@@ -304,14 +329,18 @@ def test_columns_in_memory_are_read_as_a_file_of_them(
 
 
 def test_matrices_are_taken_either_way_round(columns: dict[str, Any]) -> None:
-    log = algid.read_log({"t": columns["time"], "q": np.ones((2, columns["time"].size)), "tau": np.ones((2001, 2))})
+    log = algid.read_log(
+        {"t": columns["time"], "q": np.ones((2, columns["time"].size)), "tau": np.ones((2001, 2))}
+    )
     assert log.theta.shape == log.tau.shape == (2, 2001)
     assert log.origin.mapping["theta2"] == "q[1]"
 
 
 def test_several_logs_in_memory_are_pooled_and_a_twin_counts_once(columns: dict[str, Any]) -> None:
     frame = pl.DataFrame(columns)
-    pooled = algid.identify([frame[:1000], columns | {"tau1": columns["tau1"] + 1e-6}, frame[:1000]], settings=WEAK)
+    pooled = algid.identify(
+        [frame[:1000], columns | {"tau1": columns["tau1"] + 1e-6}, frame[:1000]], settings=WEAK
+    )
     assert [log.rows for log in pooled.logs] == [1000, 2001]
     assert "SAME_LOG" in [notice.code for notice in pooled.notices]
 
@@ -334,8 +363,12 @@ def test_rows_of_a_frame_that_lack_a_value_go_with_a_notice(
         ({"theta1 [deg]": float("nan")}, "^log: theta1 .* expected a finite number"),
     ],
 )
-def test_a_frame_that_is_no_log_is_refused(columns: dict[str, Any], changes: dict[str, Any], expected: str) -> None:
-    frame = pl.DataFrame(columns).with_columns(**{name: pl.lit(value) for name, value in changes.items()})
+def test_a_frame_that_is_no_log_is_refused(
+    columns: dict[str, Any], changes: dict[str, Any], expected: str
+) -> None:
+    frame = pl.DataFrame(columns).with_columns(
+        **{name: pl.lit(value) for name, value in changes.items()}
+    )
     with pytest.raises(LogError, match=expected):
         algid.identify(frame, settings=WEAK)
 
@@ -344,9 +377,18 @@ def test_a_frame_that_is_no_log_is_refused(columns: dict[str, Any], changes: dic
     ("given", "expected"),
     [
         ({}, "^log: no arrays of two samples or more; found nothing$"),
-        ({"t": [0.0, 0.1], "q": [[1.0], [1.0, 2.0]]}, "^log: 'q' is no array .*; give numbers of one shape$"),
-        ({"t": [0.0, 0.1, 0.2], "q1": [1.0, 2.0]}, r"the log also holds, of another length: q1 \(2\)$"),
-        ({"t": [0.0, 0.1]}, "^log: no column for theta1, theta2, tau1, tau2; found 't'; name them: "),
+        (
+            {"t": [0.0, 0.1], "q": [[1.0], [1.0, 2.0]]},
+            "^log: 'q' is no array .*; give numbers of one shape$",
+        ),
+        (
+            {"t": [0.0, 0.1, 0.2], "q1": [1.0, 2.0]},
+            r"the log also holds, of another length: q1 \(2\)$",
+        ),
+        (
+            {"t": [0.0, 0.1]},
+            "^log: no column for theta1, theta2, tau1, tau2; found 't'; name them: ",
+        ),
     ],
 )
 def test_a_dict_that_is_no_log_is_refused(given: dict[str, Any], expected: str) -> None:
@@ -356,7 +398,9 @@ def test_a_dict_that_is_no_log_is_refused(given: dict[str, Any], expected: str) 
 
 def test_settings_are_keywords_as_they_are_flags(columns: dict[str, Any]) -> None:
     frame = pl.DataFrame(columns)
-    asked = algid.Settings(estimator="weak", model="coulomb", gravity=9.8, poles=(-80, -390, -391, -392, -393, -394))
+    asked = algid.Settings(
+        estimator="weak", model="coulomb", gravity=9.8, poles=(-80, -390, -391, -392, -393, -394)
+    )
     poles = "-80,-390,-391,-392,-393,-394"
     for given in (poles, [-80, -390, -391, -392, -393, -394]):
         found = algid.identify(frame, estimator="weak", model="coulomb", gravity=9.8, poles=given)
@@ -365,7 +409,9 @@ def test_settings_are_keywords_as_they_are_flags(columns: dict[str, Any]) -> Non
     assert (over.settings["model"], over.settings["gravity"]) == ("plain", 9.8)
 
 
-def test_a_profile_is_given_in_any_form_and_its_settings_as_keywords(columns: dict[str, Any], tmp_path: Path) -> None:
+def test_a_profile_is_given_in_any_form_and_its_settings_as_keywords(
+    columns: dict[str, Any], tmp_path: Path
+) -> None:
     frame, file = pl.DataFrame(columns), tmp_path / "algid.toml"
     file.write_text('zero = "hanging"\ngravity = 9.7\n[tau1]\nsign = -1\n', encoding="utf-8")
     content: dict[str, Any] = {"zero": "hanging", "gravity": 9.7, "tau1": {"sign": -1}}
@@ -375,7 +421,11 @@ def test_a_profile_is_given_in_any_form_and_its_settings_as_keywords(columns: di
         {"profile": content},
         {"profile": algid.Profile.model_validate(content)},
         {"zero": "hanging", "gravity": 9.7, "tau1": {"sign": -1}},
-        {"profile": content | {"zero": "horizontal", "gravity": 9.0}, "zero": "hanging", "gravity": 9.7},
+        {
+            "profile": content | {"zero": "horizontal", "gravity": 9.0},
+            "zero": "hanging",
+            "gravity": 9.7,
+        },
     ]
     found = [algid.identify(frame, settings=WEAK, **way) for way in ways]
     assert all(one.parameters == found[0].parameters for one in found)
@@ -391,18 +441,26 @@ def test_a_profile_is_given_in_any_form_and_its_settings_as_keywords(columns: di
         ({"estimater": "weak"}, "^estimater: no setting has this name; did you mean estimator\\?$"),
         ({"xyzzy": 1}, "^xyzzy: no setting has this name; known are estimator, .*, zero, "),
         ({"estimator": "weakest"}, "^--estimator: expected one of refined, .*, found 'weakest'$"),
-        ({"model": "coulomb,nothing"}, "^--model: expected auto, plain or some of .*; found 'nothing'$"),
+        (
+            {"model": "coulomb,nothing"},
+            "^--model: expected auto, plain or some of .*; found 'nothing'$",
+        ),
         ({"gravity": -1}, "^--gravity: expected a number from "),
         ({"bandwidth": None}, "^--bandwidth: expected a number from "),
         ({"poles": [1, 2]}, "^--poles 1,2: "),
         ({"poles": 7}, "^--poles: expected text or numbers, found 7$"),
         ({"zero": "down"}, "^setting zero: expected 'horizontal' or 'hanging', found 'down'$"),
         ({"tau1": {"unit": "m"}}, "^setting tau1.unit: expected "),
-        ({"profile": {"zeros": "hanging"}}, "^setting zeros: extra inputs are not permitted, found 'hanging'$"),
+        (
+            {"profile": {"zeros": "hanging"}},
+            "^setting zeros: extra inputs are not permitted, found 'hanging'$",
+        ),
         ({"profile": "nowhere.toml"}, "^nowhere.toml: "),
         ({"profile": 3}, "^profile: expected a path, a dict or a Profile, found int$"),
     ],
 )
-def test_a_keyword_is_checked_as_its_flag(columns: dict[str, Any], options: dict[str, Any], expected: str) -> None:
+def test_a_keyword_is_checked_as_its_flag(
+    columns: dict[str, Any], options: dict[str, Any], expected: str
+) -> None:
     with pytest.raises(SettingError, match=expected):
         algid.identify(columns, **options)

@@ -29,7 +29,9 @@ def lagrangian_torque() -> Callable[..., list[float]]:
     """τ(θ, ω, α, arm, m_p) by the Euler-Lagrange equations of two rigid links and a point mass."""
     time = sp.symbols("t")
     angle = [sp.Function(f"q{i}")(time) for i in (1, 2)]
-    m1, m2, lc1, lc2, l1, l2, i1, i2, b1, b2, g, m_p = symbols = sp.symbols("m1 m2 lc1 lc2 l1 l2 I1 I2 b1 b2 g m_p")
+    m1, m2, lc1, lc2, l1, l2, i1, i2, b1, b2, g, m_p = symbols = sp.symbols(
+        "m1 m2 lc1 lc2 l1 l2 I1 I2 b1 b2 g m_p"
+    )
     absolute = angle[0] + angle[1]
     elbow = sp.Matrix([l1 * sp.cos(angle[0]), l1 * sp.sin(angle[0])])
     direction = sp.Matrix([sp.cos(absolute), sp.sin(absolute)])
@@ -50,7 +52,11 @@ def lagrangian_torque() -> Callable[..., list[float]]:
 
 def states(count: int = 200) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     draw = np.random.default_rng(7)
-    return draw.uniform(-6, 6, (2, count)), draw.normal(0, 5, (2, count)), draw.normal(0, 50, (2, count))
+    return (
+        draw.uniform(-6, 6, (2, count)),
+        draw.normal(0, 5, (2, count)),
+        draw.normal(0, 50, (2, count)),
+    )
 
 
 def physical(arm: Arm) -> tuple[float, ...]:
@@ -75,7 +81,9 @@ def test_forward_dynamics_inverts_inverse_dynamics() -> None:
     theta, omega, alpha = states()
     tau = inverse_dynamics(k, theta, omega, alpha)
     # the mass matrix has a condition number of about 10
-    np.testing.assert_allclose(forward_dynamics(k, theta, omega, tau), alpha, rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(
+        forward_dynamics(k, theta, omega, tau), alpha, rtol=1e-10, atol=1e-10
+    )
 
 
 def test_regressor_times_constants_is_the_torque() -> None:
@@ -109,7 +117,9 @@ def test_mass_matrix_of_a_real_arm_is_positive_definite() -> None:
 def test_energy_of_an_arm_at_rest_is_its_height_times_its_weight() -> None:
     arm = load_case("case1").arm
     upright = energy(arm.constants(), np.array([np.pi / 2, 0.0]), np.zeros(2))
-    assert upright == pytest.approx(arm.g * (arm.m1 * arm.lc1 + arm.m2 * (arm.l1 + arm.lc2)), rel=1e-14)
+    assert upright == pytest.approx(
+        arm.g * (arm.m1 * arm.lc1 + arm.m2 * (arm.l1 + arm.lc2)), rel=1e-14
+    )
 
 
 def test_energy_grows_by_what_the_drives_do_less_what_friction_takes() -> None:
@@ -119,7 +129,9 @@ def test_energy_grows_by_what_the_drives_do_less_what_friction_takes() -> None:
     tau = np.random.default_rng(8).normal(0, 1, omega.shape)
     alpha = forward_dynamics(k, theta, omega, tau)
     h = 1e-6
-    ahead, behind = (energy(k, theta + sign * h * omega, omega + sign * h * alpha) for sign in (1, -1))
+    ahead, behind = (
+        energy(k, theta + sign * h * omega, omega + sign * h * alpha) for sign in (1, -1)
+    )
     power = np.sum(tau * omega, axis=0) - k[5] * omega[0] ** 2 - k[6] * omega[1] ** 2
     np.testing.assert_allclose((ahead - behind) / (2 * h), power, atol=1e-5 * np.abs(power).max())
 
@@ -131,7 +143,11 @@ def _by_pinocchio(pin: Any, arm: Arm, payload: float) -> Any:
     first = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "joint1")
     elbow = pin.SE3(np.eye(3), np.array([arm.l1, 0.0, 0.0]))
     second = model.addJoint(first, pin.JointModelRZ(), elbow, "joint2")
-    links = [(first, arm.m1, arm.lc1, arm.I1), (second, arm.m2, arm.lc2, arm.I2), (second, payload, arm.l2, 0.0)]
+    links = [
+        (first, arm.m1, arm.lc1, arm.I1),
+        (second, arm.m2, arm.lc2, arm.I2),
+        (second, payload, arm.l2, 0.0),
+    ]
     for joint, mass, along, inertia in links:
         body = pin.Inertia(mass, np.array([along, 0.0, 0.0]), np.diag([0.0, inertia, inertia]))
         model.appendBodyToJoint(joint, body, pin.SE3.Identity())
@@ -151,7 +167,10 @@ def test_torque_inertia_and_energy_are_those_of_pinocchio(payload: float, g: flo
         k = with_payload(arm.constants(), arm.payload_constants(payload))
         model = _by_pinocchio(pin, arm, payload)
         data = model.createData()
-        torque, accelerations = inverse_dynamics(k, theta, omega, alpha), forward_dynamics(k, theta, omega, alpha)
+        torque, accelerations = (
+            inverse_dynamics(k, theta, omega, alpha),
+            forward_dynamics(k, theta, omega, alpha),
+        )
         m11, m12, m22 = mass_matrix(k, theta)
         energies = energy(k, theta, omega)
         for n in range(20):
@@ -160,10 +179,16 @@ def test_torque_inertia_and_energy_are_those_of_pinocchio(payload: float, g: flo
             expected = pin.rnea(model, data, q, v, a) + drag
             # rounding of sums of terms up to 1e4 N m
             np.testing.assert_allclose(torque[:, n], expected, rtol=1e-11, atol=1e-10)
-            np.testing.assert_allclose(accelerations[:, n], pin.aba(model, data, q, v, a - drag), rtol=1e-8, atol=1e-8)
+            np.testing.assert_allclose(
+                accelerations[:, n], pin.aba(model, data, q, v, a - drag), rtol=1e-8, atol=1e-8
+            )
             M = np.triu(pin.crba(model, data, q))
-            np.testing.assert_allclose([m11[n], m12[n], m22[n]], [M[0, 0], M[0, 1], M[1, 1]], rtol=1e-12)
-            whole = pin.computeKineticEnergy(model, data, q, v) + pin.computePotentialEnergy(model, data, q)
+            np.testing.assert_allclose(
+                [m11[n], m12[n], m22[n]], [M[0, 0], M[0, 1], M[1, 1]], rtol=1e-12
+            )
+            whole = pin.computeKineticEnergy(model, data, q, v) + pin.computePotentialEnergy(
+                model, data, q
+            )
             np.testing.assert_allclose(energies[n], whole, rtol=1e-12, atol=1e-12)
 
 

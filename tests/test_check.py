@@ -12,8 +12,22 @@ from algid.errors import ResultError, SettingError
 from algid.results import LogSummary, Result, Table4Row
 
 ROWS = (
-    Table4Row(parameter="k1", unit="kg m^2", estimate=1.02, truth=1.0, error_percent=2.0, paper_error_percent=2.0),
-    Table4Row(parameter="k2", unit="N m", estimate=3.0, truth=2.0, error_percent=50.0, paper_error_percent=1.234567),
+    Table4Row(
+        parameter="k1",
+        unit="kg m^2",
+        estimate=1.02,
+        truth=1.0,
+        error_percent=2.0,
+        paper_error_percent=2.0,
+    ),
+    Table4Row(
+        parameter="k2",
+        unit="N m",
+        estimate=3.0,
+        truth=2.0,
+        error_percent=50.0,
+        paper_error_percent=1.234567,
+    ),
     Table4Row(parameter="k3", unit="kg m^2", estimate=None, truth=1.0, paper_error_percent=9.0),
     Table4Row(parameter="m_p", unit="kg", estimate=0.5, truth=0.5, error_percent=0.0),
     Table4Row(parameter="l1", unit="m", estimate=0.5),
@@ -26,18 +40,29 @@ def _result(*rows: Table4Row) -> Result:
 
 
 def _judged(
-    against: Literal["paper", "truth"] = "paper", max_error: float | None = None, file: Path | None = None
+    against: Literal["paper", "truth"] = "paper",
+    max_error: float | None = None,
+    file: Path | None = None,
 ) -> list[tuple[str, float | None, float, bool]]:
     rows = judge(_result(*ROWS), against, max_error, file)
     return [(row.parameter, row.error, row.limit, row.passed) for row in rows]
 
 
 def test_each_row_is_held_against_the_papers_own_error() -> None:
-    assert _judged() == [("k1", 2.0, 2.0, True), ("k2", 50.0, 1.234567, False), ("k3", None, 9.0, False)]
+    assert _judged() == [
+        ("k1", 2.0, 2.0, True),
+        ("k2", 50.0, 1.234567, False),
+        ("k3", None, 9.0, False),
+    ]
 
 
 def test_one_limit_holds_for_every_row_with_a_truth() -> None:
-    assert [row[::3] for row in _judged("truth", 2.0)] == [("k1", True), ("k2", False), ("k3", False), ("m_p", True)]
+    assert [row[::3] for row in _judged("truth", 2.0)] == [
+        ("k1", True),
+        ("k2", False),
+        ("k3", False),
+        ("m_p", True),
+    ]
     assert [row[2] for row in _judged("truth", 2.0)] == [2.0] * 4
 
 
@@ -47,9 +72,15 @@ def test_a_file_names_the_rows_that_are_checked(tmp_path: Path) -> None:
     for against in ("paper", "truth"):
         assert _judged(against, file=file) == [("k2", 50.0, 49.9, False), ("m_p", 0.0, 0.0, True)]
     file.write_text("[max_error_percent]\nl1 = 1\n")  # there, but without a truth
-    with pytest.raises(SettingError, match=r"limits.toml: max_error_percent.l1: expected one of k1, k2, k3, m_p$"):
+    with pytest.raises(
+        SettingError, match=r"limits.toml: max_error_percent.l1: expected one of k1, k2, k3, m_p$"
+    ):
         _judged(file=file)
-    for text, said in (("", "max_error_percent"), ("[max_error_percent]\nk1 = -1\n", "k1"), ("more = 1\n", "more")):
+    for text, said in (
+        ("", "max_error_percent"),
+        ("[max_error_percent]\nk1 = -1\n", "k1"),
+        ("more = 1\n", "more"),
+    ):
         file.write_text(text)
         with pytest.raises(SettingError, match=said):
             _judged(file=file)
@@ -58,11 +89,17 @@ def test_a_file_names_the_rows_that_are_checked(tmp_path: Path) -> None:
 def test_limits_that_are_missing_or_doubled_are_refused(tmp_path: Path) -> None:
     with pytest.raises(SettingError, match=r"^--max-error and --tolerance-file: give one of them$"):
         _judged(max_error=1.0, file=tmp_path / "limits.toml")
-    with pytest.raises(SettingError, match=r"^--against truth: give the largest error with --max-error or --tol"):
+    with pytest.raises(
+        SettingError, match=r"^--against truth: give the largest error with --max-error or --tol"
+    ):
         _judged("truth")
-    with pytest.raises(ResultError, match=r"^log\.mcap: the log holds no true parameters; only synthetic logs"):
+    with pytest.raises(
+        ResultError, match=r"^log\.mcap: the log holds no true parameters; only synthetic logs"
+    ):
         judge(_result(ROWS[4]), "truth", 1.0, None)
-    with pytest.raises(ResultError, match=r"^log\.mcap: not a case of the paper; check --against truth$"):
+    with pytest.raises(
+        ResultError, match=r"^log\.mcap: not a case of the paper; check --against truth$"
+    ):
         judge(_result(ROWS[3]), "paper", None, None)
 
 

@@ -28,7 +28,9 @@ def test_the_routines_solve_as_scipys_do() -> None:
     assert info == 0
     np.testing.assert_array_equal(ours, expected)
     rhs = rng.random((40, 3))
-    for own, other in zip(lapack.dtbtrs(ours, rhs, uplo="L"), theirs.dtbtrs(ours, rhs, uplo="L"), strict=True):
+    for own, other in zip(
+        lapack.dtbtrs(ours, rhs, uplo="L"), theirs.dtbtrs(ours, rhs, uplo="L"), strict=True
+    ):
         np.testing.assert_array_equal(own, other)
 
 
@@ -82,7 +84,9 @@ REFUSAL = (
 @pytest.mark.parametrize("broken", [False, True])
 def test_packages_are_imported_where_modules_do_not_load_alone(broken: bool) -> None:
     script = BROKEN.format(broken=broken, refusal=REFUSAL)
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
     packages, ours, theirs_too, loaded = json.loads(done.stdout)
     assert ("scipy.linalg" in packages) is broken
     assert ours == pytest.approx(theirs_too, rel=1e-14)

@@ -88,9 +88,17 @@ def test_a_sweep_that_is_quicker_than_the_hold_takes_nothing_from_the_maker(
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
 
 
-def test_folders_of_a_users_own_names_are_not_swept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_folders_of_a_users_own_names_are_not_swept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    names = ["algid-results", "algid-1234abcd", ".a.algid.notes", ".a.algid-backup", ".a.algid-0123abcde"]
+    names = [
+        "algid-results",
+        "algid-1234abcd",
+        ".a.algid.notes",
+        ".a.algid-backup",
+        ".a.algid-0123abcde",
+    ]
     for name in names:
         (tmp_path / name).mkdir()
         os.utime(tmp_path / name, (0, 0))
@@ -125,7 +133,10 @@ def test_of_two_writers_the_second_is_refused_and_with_force_the_last_one_stands
 @pytest.mark.parametrize("kind", ["file", "link", "dangling link", "empty folder"])
 @pytest.mark.parametrize("prepare", [lambda _patch: None, _without_exchange])
 def test_whatever_stands_there_is_replaced_by_force_alone_and_links_are_not_followed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, prepare: Callable[[pytest.MonkeyPatch], None], kind: str
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    prepare: Callable[[pytest.MonkeyPatch], None],
+    kind: str,
 ) -> None:
     prepare(monkeypatch)
     path, other = tmp_path / "a", tmp_path / "other"
@@ -169,7 +180,9 @@ def test_a_result_that_is_replaced_is_never_absent(tmp_path: Path) -> None:
     assert [found.name for found in tmp_path.iterdir()] == ["a"]
 
 
-def test_an_old_result_goes_back_to_its_place_where_its_successor_never_came(tmp_path: Path) -> None:
+def test_an_old_result_goes_back_to_its_place_where_its_successor_never_came(
+    tmp_path: Path,
+) -> None:
     aside = tmp_path / f".a.algid{construction.OLD}0123abcd"
     aside.mkdir()
     remove_left(tmp_path, "a.algid")
@@ -207,7 +220,9 @@ def test_a_file_system_without_holds_is_written_to_and_not_swept(
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
 
 
-def test_a_signal_during_the_clearing_up_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_signal_during_the_clearing_up_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     rmtree, signals = shutil.rmtree, [KeyboardInterrupt]
 
     def interrupted(path: Path, **more: Any) -> None:
@@ -232,12 +247,20 @@ def test_a_signal_during_the_clearing_up_leaves_nothing(tmp_path: Path, monkeypa
     ("error", "said"),
     [
         (OSError(errno.ENOSPC, "No space left on device"), "No space left on device"),
-        (OSError("Error writing bytes to file. Detail: [errno 28] No space left on device"), "No space left on device"),
+        (
+            OSError("Error writing bytes to file. Detail: [errno 28] No space left on device"),
+            "No space left on device",
+        ),
         (OSError("the library's own\nwords"), "the library's own"),
         (OSError(), "OSError"),
     ],
 )
-def test_what_the_system_says_is_told_whoever_raises_it(tmp_path: Path, error: OSError, said: str) -> None:
-    with pytest.raises(OutputError, match=rf"cannot write \({re.escape(said)}\); choose"), whole_file(tmp_path / "a"):
+def test_what_the_system_says_is_told_whoever_raises_it(
+    tmp_path: Path, error: OSError, said: str
+) -> None:
+    with (
+        pytest.raises(OutputError, match=rf"cannot write \({re.escape(said)}\); choose"),
+        whole_file(tmp_path / "a"),
+    ):
         raise error
     assert list(tmp_path.iterdir()) == []

@@ -17,7 +17,9 @@ DATA = Path(__file__).parents[1] / "data"
 
 
 def test_schema_that_ships_is_that_of_the_models() -> None:
-    shipped = json.loads((resources.files("algid") / "result.schema.json").read_text(encoding="utf-8"))
+    shipped = json.loads(
+        (resources.files("algid") / "result.schema.json").read_text(encoding="utf-8")
+    )
     assert shipped == result_schema()
 
 
@@ -34,6 +36,8 @@ def test_example_arm_is_an_arm() -> None:
 @pytest.mark.parametrize("kind", ["mcap", "parquet", "csv"])
 def test_example_logs_hold_the_same_samples(kind: str) -> None:
     log, reference = read_log(DATA / f"example.{kind}"), read_log(DATA / "example.csv")
-    np.testing.assert_array_equal(log.stamp_ns - log.stamp_ns[0], reference.stamp_ns - reference.stamp_ns[0])
+    np.testing.assert_array_equal(
+        log.stamp_ns - log.stamp_ns[0], reference.stamp_ns - reference.stamp_ns[0]
+    )
     np.testing.assert_array_equal(log.theta, reference.theta)
     np.testing.assert_array_equal(log.tau, reference.tau)

@@ -1,9 +1,10 @@
 """Every command of the README and the guide, run as it stands, and its output compared with the one shown.
 
-A fence ``sh`` is run by bash in an empty folder of its page, one block after another; ``sh install`` needs the
-network and a clean clone (the slow lane runs it); ``sh elsewhere`` needs a cluster that is not here. A fence ``text``
-shows what the block before it prints: numbers may differ by what another processor rounds, ``…`` stands for the rest
-of a line or for lines left out. A fence ``python`` is run too; one without a word draws.
+A fence ``sh`` is run by bash in an empty folder of its page, one block after another; ``sh
+install`` needs the network and a clean clone (the slow lane runs it); ``sh elsewhere`` needs a
+cluster that is not here. A fence ``text`` shows what the block before it prints: numbers may
+differ by what another processor rounds, ``…`` stands for the rest of a line or for lines left out.
+A fence ``python`` is run too; one without a word draws.
 """
 
 from __future__ import annotations
@@ -47,14 +48,26 @@ def blocks(text: str) -> list[Block]:
 
 def run(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """Run a block as a person would type it: bash, the environment activated, stop at the first failure."""
-    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}", "COLUMNS": "80"}
+    environment = {
+        **os.environ,
+        "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
+        "COLUMNS": "80",
+    }
     return subprocess.run(
-        ["bash", "-e", "-u", "-c", command], cwd=folder, env=environment, capture_output=True, text=True, check=False
+        ["bash", "-e", "-u", "-c", command],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
     )
 
 
 def mismatch(shown: str, printed: str) -> str | None:
-    """The first shown line that the printed ones do not hold, in their order; None where all are there."""
+    """The first shown line that the printed ones do not hold, in their order.
+
+    None where all are there.
+    """
     lines = iter(printed.splitlines())
     for wanted in shown.splitlines():
         if wanted.strip() in ("", "…"):
@@ -84,11 +97,15 @@ def test_every_block_says_what_it_is(page: str) -> None:
     for block in blocks(PAGES[page].read_text(encoding="utf-8")):
         known = {"sh", "sh install", "sh elsewhere", "text", "python", "csv", "yaml", ""}
         assert block.info in known, f"{page}, line {block.line}"
-        assert block.info.startswith("sh") or not COMMAND.search(block.text), f"{page}, line {block.line}: not run"
+        assert block.info.startswith("sh") or not COMMAND.search(block.text), (
+            f"{page}, line {block.line}: not run"
+        )
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", [page for page, path in PAGES.items() if "```sh\n" in path.read_text("utf-8")])
+@pytest.mark.parametrize(
+    "page", [page for page, path in PAGES.items() if "```sh\n" in path.read_text("utf-8")]
+)
 def test_commands_run_as_they_stand(page: str, tmp_path: Path) -> None:
     text = PAGES[page].read_text(encoding="utf-8")
     shutil.copytree(ROOT / "data", tmp_path / "data")
@@ -96,7 +113,9 @@ def test_commands_run_as_they_stand(page: str, tmp_path: Path) -> None:
     for block in blocks(text):
         if block.info == "sh":
             done = run(block.text, tmp_path)
-            assert done.returncode == 0, f"{page}, line {block.line}:\n{block.text}{done.stdout}{done.stderr}"
+            assert done.returncode == 0, (
+                f"{page}, line {block.line}:\n{block.text}{done.stdout}{done.stderr}"
+            )
             printed = done.stdout + done.stderr
         elif block.info == "text":
             assert mismatch(block.text, printed) is None, f"{page}, line {block.line}:\n{printed}"
@@ -106,23 +125,36 @@ def test_commands_run_as_they_stand(page: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif("CI" in os.environ, reason="CI runs in a clean clone that it has just installed")
+@pytest.mark.skipif(
+    "CI" in os.environ, reason="CI runs in a clean clone that it has just installed"
+)
 def test_the_readme_installs_from_a_clean_clone(tmp_path: Path) -> None:
     """With the network: what `make setup` installs has to be had."""
-    block = next(one for one in blocks(PAGES["README"].read_text(encoding="utf-8")) if one.info == "sh install")
+    block = next(
+        one
+        for one in blocks(PAGES["README"].read_text(encoding="utf-8"))
+        if one.info == "sh install"
+    )
     assert block.text.splitlines()[1:] == ["make demo", "make test"]
-    steps = block.text.replace("…", str(ROOT)).replace("make test", ". .venv/bin/activate")  # these are its tests
+    steps = block.text.replace("…", str(ROOT)).replace(
+        "make test", ". .venv/bin/activate"
+    )  # these are its tests
     done = run(steps + "which algid\nalgid --version\n", tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "Table 4" in done.stdout
-    assert done.stdout.splitlines()[-2:] == [str(tmp_path / "algid/.venv/bin/algid"), f"algid {algid.__version__}"]
+    assert done.stdout.splitlines()[-2:] == [
+        str(tmp_path / "algid/.venv/bin/algid"),
+        f"algid {algid.__version__}",
+    ]
 
 
 def test_the_site_has_a_page_for_each_topic_and_every_public_name(tmp_path: Path) -> None:
     pages(tmp_path / "pages")
     guide = {path.stem for path in (Path(algid.__file__).parent / "guide").glob("*.md")}
     assert {path.stem for path in (tmp_path / "pages").iterdir()} == guide | {"index", "reference"}
-    named = re.findall(r"^::: algid\.[\w.]+\.(\w+)$", (tmp_path / "pages/reference.md").read_text(), re.MULTILINE)
+    named = re.findall(
+        r"^::: algid\.[\w.]+\.(\w+)$", (tmp_path / "pages/reference.md").read_text(), re.MULTILINE
+    )
     assert sorted(named) == sorted(set(algid.__all__) - {"__version__"})
     assert "<!--" not in "".join(path.read_text() for path in (tmp_path / "pages").iterdir())
 

@@ -19,7 +19,9 @@ def example(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("example")
     done = Outcome("example", "-o", folder)
     assert (done.code, done.err) == (0, "")
-    assert done.out.split() == [str(folder / f"{name}.csv") for name in LOGS] + [str(folder / PROFILE)]
+    assert done.out.split() == [str(folder / f"{name}.csv") for name in LOGS] + [
+        str(folder / PROFILE)
+    ]
     return folder
 
 
@@ -37,7 +39,9 @@ def test_a_log_does_not_say_how_its_zero_lies_and_physics_does(example: Path) ->
     found = {one.code for one in inspect_log(example / "run1.csv").findings}
     assert "WRONG_CONVENTION" in found
     profile = load_profile(example / PROFILE)
-    assert "WRONG_CONVENTION" not in {one.code for one in inspect_log(example / "run1.csv", profile).findings}
+    assert "WRONG_CONVENTION" not in {
+        one.code for one in inspect_log(example / "run1.csv", profile).findings
+    }
 
 
 def test_with_its_profile_the_arm_is_found(example: Path) -> None:

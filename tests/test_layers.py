@@ -143,20 +143,46 @@ def test_a_sound_house_is_let_stand() -> None:
         pytest.param("algid.arm", "import algid.cli.app", id="upwards"),
         pytest.param("algid.arm", "from algid import cli", id="upwards, as a name of the package"),
         pytest.param("algid.arm", "from .cli import app", id="upwards, relative"),
-        pytest.param("algid.estimators.weak", "from ..cli.app import main", id="upwards, relative to a folder"),
-        pytest.param("algid.arm", "def f():\n    from algid.cli import app", id="upwards, in a function"),
         pytest.param(
-            "algid.arm", "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import algid.cli", id="for types"
+            "algid.estimators.weak",
+            "from ..cli.app import main",
+            id="upwards, relative to a folder",
         ),
-        pytest.param("algid.arm", "import importlib\nimportlib.import_module('algid.cli')", id="by its name as text"),
+        pytest.param(
+            "algid.arm", "def f():\n    from algid.cli import app", id="upwards, in a function"
+        ),
+        pytest.param(
+            "algid.arm",
+            "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import algid.cli",
+            id="for types",
+        ),
+        pytest.param(
+            "algid.arm",
+            "import importlib\nimportlib.import_module('algid.cli')",
+            id="by its name as text",
+        ),
         pytest.param("algid.arm", "__import__('algid.cli')", id="by the function behind import"),
-        pytest.param("algid.synth.run", "import importlib\nimportlib.import_module(name)", id="a computed name"),
-        pytest.param("algid.synth.run", "from algid.estimators.weak import fit", id="the simulator, an estimator"),
-        pytest.param("algid.synth.run", "from algid import identify", id="the simulator, through the package"),
+        pytest.param(
+            "algid.synth.run",
+            "import importlib\nimportlib.import_module(name)",
+            id="a computed name",
+        ),
+        pytest.param(
+            "algid.synth.run",
+            "from algid.estimators.weak import fit",
+            id="the simulator, an estimator",
+        ),
+        pytest.param(
+            "algid.synth.run", "from algid import identify", id="the simulator, through the package"
+        ),
         pytest.param("algid.synth.run", "import algid\nalgid.identify()", id="the package whole"),
         pytest.param("algid.estimators.weak", "import polars", id="mathematics, tables"),
         pytest.param("algid.estimators.weak", "from pathlib import Path", id="mathematics, files"),
-        pytest.param("algid.estimators.weak", "def f():\n    import os.path", id="mathematics, files, in a function"),
+        pytest.param(
+            "algid.estimators.weak",
+            "def f():\n    import os.path",
+            id="mathematics, files, in a function",
+        ),
         pytest.param("algid.attic.box", "", id="a room without a place"),
     ],
 )

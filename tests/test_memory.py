@@ -27,7 +27,11 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="the C library is not glibc")
 def test_the_same_arrays_again_take_no_new_pages() -> None:
     faults = {
-        way: int(subprocess.run([sys.executable, "-c", CODE, way], capture_output=True, check=True).stdout)
+        way: int(
+            subprocess.run(
+                [sys.executable, "-c", CODE, way], capture_output=True, check=True
+            ).stdout
+        )
         for way in ("keep", "leave")
     }
     assert faults["keep"] < 0.05 * faults["leave"]

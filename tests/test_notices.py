@@ -1,4 +1,7 @@
-"""Notices are codes with numbers; remedies are written for a command line, a profile and Python alike."""
+"""Notices are codes with numbers.
+
+Remedies are written for a command line, a profile and Python alike.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,16 @@ import tomllib
 import pytest
 
 from algid.cli.settings import OF_PROFILE, profile_from
-from algid.notices import MESSAGES, NO_PROFILE, OWN_FLAGS, UNIT_OF, Notice, Remedy, from_flags, merged
+from algid.notices import (
+    MESSAGES,
+    NO_PROFILE,
+    OWN_FLAGS,
+    UNIT_OF,
+    Notice,
+    Remedy,
+    from_flags,
+    merged,
+)
 from algid.profile import Profile, with_settings
 from algid.results.verdict import CAUSES
 
@@ -45,7 +57,9 @@ def test_flags_lines_and_keywords_of_a_remedy_mean_the_same(remedy: Remedy) -> N
     own: list[str] = []
     tables: list[str] = []
     for line in (
-        remedy.lines.split(", ") if "offsets" not in remedy.settings and "joints" not in remedy.settings else ()
+        remedy.lines.split(", ")
+        if "offsets" not in remedy.settings and "joints" not in remedy.settings
+        else ()
     ):
         text, _, place = line.partition(" of ")
         tables.extend(f"{table}\n{text}" for table in (place.split(" and ") if place else ()))
@@ -59,26 +73,42 @@ def test_flags_lines_and_keywords_of_a_remedy_mean_the_same(remedy: Remedy) -> N
 def test_what_only_the_user_knows_is_left_open() -> None:
     remedy = Remedy({"tau1.source": None}, "name the measured torque")
     assert not remedy.complete
-    assert str(remedy) == 'name the measured torque: --set tau1.source=NAME (profile: source = "NAME" of [tau1])'
+    assert (
+        str(remedy)
+        == 'name the measured torque: --set tau1.source=NAME (profile: source = "NAME" of [tau1])'
+    )
     assert Notice("EFFORT_ZERO", "zero", remedies=(remedy, REMEDIES[0])).remedy == REMEDIES[0]
 
 
 def test_every_flag_of_its_own_is_one() -> None:
     assert set(OWN_FLAGS) - set(NO_PROFILE) - {"gravity"} <= set(OF_PROFILE)
     assert set(UNIT_OF) <= set(OWN_FLAGS)
-    assert set(CAUSES) - set(MESSAGES) == {"EARLIER_CAUSE", "STUCK_SENSOR", "DEAD_EFFORT"}  # these bring their words
+    assert set(CAUSES) - set(MESSAGES) == {
+        "EARLIER_CAUSE",
+        "STUCK_SENSOR",
+        "DEAD_EFFORT",
+    }  # these bring their words
 
 
 def test_numbers_agree_with_their_nouns() -> None:
-    assert Notice("LOST_SAMPLES", numbers={"count": 1}).text.startswith("1 step of the angles is twice")
-    assert Notice("LOST_SAMPLES", numbers={"count": 2000}).text.startswith("2,000 steps of the angles are twice")
+    assert Notice("LOST_SAMPLES", numbers={"count": 1}).text.startswith(
+        "1 step of the angles is twice"
+    )
+    assert Notice("LOST_SAMPLES", numbers={"count": 2000}).text.startswith(
+        "2,000 steps of the angles are twice"
+    )
     assert Notice("NOT_IDENTIFIABLE", numbers={"names": ["k5"]}).text == "k5 is not identifiable"
-    assert Notice("NOT_IDENTIFIABLE", numbers={"names": ["k3", "k5"]}).text == "k3 and k5 are not identifiable"
+    assert (
+        Notice("NOT_IDENTIFIABLE", numbers={"names": ["k3", "k5"]}).text
+        == "k3 and k5 are not identifiable"
+    )
 
 
 def test_equal_notices_of_several_logs_become_one_and_each_loss_stays() -> None:
     jitter = [Notice("JITTER", f"by {place} ms", logs=(f"{place}.csv",)) for place in range(5)]
-    lost = [Notice("NOT_FINITE", f"{place} samples", lossy=True, logs=("0.csv",)) for place in range(2)]
+    lost = [
+        Notice("NOT_FINITE", f"{place} samples", lossy=True, logs=("0.csv",)) for place in range(2)
+    ]
     found = merged([*jitter, *lost])
     assert [one.code for one in found] == ["JITTER", "NOT_FINITE", "NOT_FINITE"]
     assert found[0].logs == ("0.csv", "1.csv", "2.csv", "3.csv", "4.csv")
@@ -87,7 +117,11 @@ def test_equal_notices_of_several_logs_become_one_and_each_loss_stays() -> None:
 
 def test_flags_of_an_earlier_schema_become_settings() -> None:
     flags = ["--zero", "hanging", "--set", "tau1.sign=-1", "--second-angle", "absolute"]
-    assert from_flags(flags).settings == {"zero": "hanging", "tau1.sign": -1, "second_angle": "absolute"}
+    assert from_flags(flags).settings == {
+        "zero": "hanging",
+        "tau1.sign": -1,
+        "second_angle": "absolute",
+    }
 
 
 def test_a_notice_is_plain_data() -> None:

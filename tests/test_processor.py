@@ -18,7 +18,9 @@ AVX2 = {"sse4_2", "avx", "avx2"}
         ("armv8", set(), []),
     ],
 )
-def test_other_kernels_differ_from_the_default(default: str, features: set[str], expected: list[str]) -> None:
+def test_other_kernels_differ_from_the_default(
+    default: str, features: set[str], expected: list[str]
+) -> None:
     assert other_kernels(default, features) == expected
 
 

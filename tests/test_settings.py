@@ -28,7 +28,9 @@ def test_every_setting_is_an_option_with_its_default_and_help() -> None:
     "settings",
     [
         Settings(),
-        Settings(estimator="paper", poles=(-50 + 20j, -50 - 20j, -60.0, -80.0, -90.0, -100.0), window=1.5),
+        Settings(
+            estimator="paper", poles=(-50 + 20j, -50 - 20j, -60.0, -80.0, -90.0, -100.0), window=1.5
+        ),
         Settings(model="coulomb,delay", torque_hold="zoh", l1=0.3, cross_validate=True),
     ],
 )
@@ -48,7 +50,12 @@ def test_text_of_an_option_that_means_nothing_names_the_option() -> None:
 
 
 def test_short_forms_of_older_results_name_terms_of_the_model() -> None:
-    older = {"friction": "coulomb", "torque_offset": True, "rotor_inertia": True, "delay": "estimate"}
+    older = {
+        "friction": "coulomb",
+        "torque_offset": True,
+        "rotor_inertia": True,
+        "delay": "estimate",
+    }
     short = Settings.of({"model": "auto", **older})
     assert short == Settings(model="coulomb,offset,rotor,delay")
     assert Settings.of({"model": "rotor", "friction": "coulomb"}).terms == ("rotor", "coulomb")

@@ -27,7 +27,9 @@ def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
 
 
 def test_a_batch_reads_and_writes_objects(served: Served, tmp_path: Path) -> None:
-    unloaded, _ = algid.synthesise("case1", duration=1.5, excitation="wide", sensors=Sensors(1e-4, 1e-3))
+    unloaded, _ = algid.synthesise(
+        "case1", duration=1.5, excitation="wide", sensors=Sensors(1e-4, 1e-3)
+    )
     algid.write_log(tmp_path / "a.mcap", unloaded)
     store = open_store(served.url("logs"))
     store.write("r1/a.mcap", (tmp_path / "a.mcap").read_bytes())
@@ -36,10 +38,15 @@ def test_a_batch_reads_and_writes_objects(served: Served, tmp_path: Path) -> Non
     recipe = Recipe(out, Settings(estimator="weak"), lambda _file: None, report=False)
     jobs = jobs_of([served.url("logs")], out)
     ended = Batch(open_store(out), recipe, Here(), 1, lambda _progress: None).run(jobs)
-    assert [(record.job.name, record.status) for record in ended.records] == [("bad", End.FAILED), ("r1/a", End.OK)]
+    assert [(record.job.name, record.status) for record in ended.records] == [
+        ("bad", End.FAILED),
+        ("r1/a", End.OK),
+    ]
     assert Batch(open_store(out), recipe, Here(), 1, lambda _progress: None).run(jobs).ran == 0
     (tmp_path / "result.json").write_bytes(open_store(out).read("r1/a.algid/result.json") or b"")
-    assert algid.read_result(tmp_path / "result.json").log.path.startswith(f"s3://{served.bucket}/logs/r1/a.mcap")
+    assert algid.read_result(tmp_path / "result.json").log.path.startswith(
+        f"s3://{served.bucket}/logs/r1/a.mcap"
+    )
     (tmp_path / "jobs.parquet").write_bytes(open_store(out).read("jobs.parquet") or b"")
     assert pl.read_parquet(tmp_path / "jobs.parquet")["status"].to_list() == ["failed", "ok"]
 
@@ -55,13 +62,22 @@ def place(request: pytest.FixtureRequest, tmp_path: Path) -> str:
 
 def test_every_store_reads_what_it_wrote(place: str) -> None:
     store = open_store(place)
-    assert (store.read("a/b"), store.exists("a/b"), store.names("a"), store.names("")) == (None, False, [], [])
+    assert (store.read("a/b"), store.exists("a/b"), store.names("a"), store.names("")) == (
+        None,
+        False,
+        [],
+        [],
+    )
     for name in ("a/b", "a/c/d", "a/.hidden", "e"):
         store.write(name, name.encode())
     store.write("e", b"again")
     assert store.read("e") == b"again"
     assert store.read("a/.hidden") == b"a/.hidden"
-    assert (store.exists("a/b"), store.exists("a"), store.exists("a/absent")) == (True, False, False)
+    assert (store.exists("a/b"), store.exists("a"), store.exists("a/absent")) == (
+        True,
+        False,
+        False,
+    )
     assert store.names("a") == ["a/b", "a/c/d"]
     assert store.names("") == ["a/b", "a/c/d", "e"]
 
@@ -72,7 +88,9 @@ def test_a_place_that_cannot_be_written_is_told(tmp_path: Path, served: Served) 
         open_store(str(tmp_path / "file")).write("below", b"")
     with pytest.raises(OutputError, match="check the URL"):
         open_store("s3://lab/?bogus=1")
-    elsewhere = f"s3://{served.bucket}-absent/out{served.query.replace('&allow_bucket_creation=true', '')}"
+    elsewhere = (
+        f"s3://{served.bucket}-absent/out{served.query.replace('&allow_bucket_creation=true', '')}"
+    )
     with pytest.raises(OutputError, match="cannot write there"):
         open_store(elsewhere).write("a", b"")
 
@@ -83,7 +101,10 @@ def test_objects_below_a_url_and_one_that_is_not_there(served: Served) -> None:
     assert list_urls(served.url("logs/r1/a.csv")) == [(served.url("logs/r1/a.csv"), "a.csv")]
     assert object_stat(served.url("logs/r1/a.csv"))[0] == 3
     assert object_stat(served.url("logs/absent")) == (0, 0)
-    with pytest.raises(LogError, match="check name and rights"), reading(served.url("absent")) as (filesystem, path):
+    with (
+        pytest.raises(LogError, match="check name and rights"),
+        reading(served.url("absent")) as (filesystem, path),
+    ):
         filesystem.open_input_file(path)
 
 

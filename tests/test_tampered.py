@@ -37,22 +37,58 @@ def changed(content: dict[str, Any], *path: str | int, value: Any) -> dict[str, 
 @pytest.mark.parametrize(
     ("path", "value", "told"),
     [
-        (("parameters", "k1", "estimate"), 1e308, "parameters.k1.estimate: expected a number below 1e+60 in size"),
-        (("parameters", "k1", "estimate"), math.inf, "parameters.k1.estimate: expected a number below 1e+60 in size"),
-        (("parameters", "k1", "estimate"), math.nan, "parameters.k1.estimate: expected a number below 1e+60 in size"),
-        (("parameters", "k1", "estimate"), 10**400, "parameters.k1.estimate: expected a number below 1e+60 in size"),
+        (
+            ("parameters", "k1", "estimate"),
+            1e308,
+            "parameters.k1.estimate: expected a number below 1e+60 in size",
+        ),
+        (
+            ("parameters", "k1", "estimate"),
+            math.inf,
+            "parameters.k1.estimate: expected a number below 1e+60 in size",
+        ),
+        (
+            ("parameters", "k1", "estimate"),
+            math.nan,
+            "parameters.k1.estimate: expected a number below 1e+60 in size",
+        ),
+        (
+            ("parameters", "k1", "estimate"),
+            10**400,
+            "parameters.k1.estimate: expected a number below 1e+60 in size",
+        ),
         (("parameters", "k1", "estimate"), 1e50, "'k1': expected a number below 1e+30 in size"),
-        (("parameters", "k2", "estimate"), 5e-324, "'k2': estimate: expected 0, or 1e-30 or more in size"),
+        (
+            ("parameters", "k2", "estimate"),
+            5e-324,
+            "'k2': estimate: expected 0, or 1e-30 or more in size",
+        ),
         (("parameters", "k1", "std"), -1.0, "'k1': std: expected 0, or 1e-30 or more, found -1"),
-        (("fit", "covariance", 0, 0), -1.0, "fit.covariance.0.0: expected 0, or 1e-30 or more, found -1"),
+        (
+            ("fit", "covariance", 0, 0),
+            -1.0,
+            "fit.covariance.0.0: expected 0, or 1e-30 or more, found -1",
+        ),
         (("fit", "covariance_names", 1), "k1", "fit.covariance_names: expected each once"),
         (("fit", "noise", "tau1"), -1.0, "fit.noise.tau1: expected 0, or 1e-30 or more, found -1"),
         (("log", "rows"), -1, "rows, duration and rate may not be negative"),
         (("log", "start_ns"), 10**30, "nor the start 2^63 ns"),
-        (("settings", "gravity"), "heavy", "--gravity: expected a number from 0 to 1000, found 'heavy'"),
+        (
+            ("settings", "gravity"),
+            "heavy",
+            "--gravity: expected a number from 0 to 1000, found 'heavy'",
+        ),
         (("settings", "gravity"), True, "--gravity: expected a number from 0 to 1000, found True"),
-        (("settings", "payload_mass"), "x", "--payload-mass: expected a number from 1e-09 to 1e+06, found 'x'"),
-        (("settings", "estimator"), "magic", "--estimator: expected one of refined, weak, instruments, paper"),
+        (
+            ("settings", "payload_mass"),
+            "x",
+            "--payload-mass: expected a number from 1e-09 to 1e+06, found 'x'",
+        ),
+        (
+            ("settings", "estimator"),
+            "magic",
+            "--estimator: expected one of refined, weak, instruments, paper",
+        ),
         (("settings", "constrain"), 3, "--constrain: expected true or false, found 3"),
         (("settings", "model"), [1], "--model: expected text, found [1]"),
         (("settings", "poles"), 7, "--poles: expected six numbers, found 7"),
@@ -88,7 +124,9 @@ def jobs() -> pl.DataFrame:
     columns: dict[str, Any] = {
         "job": [f"r1/{row}" for row in range(rows)],
         "robot": ["r1"] * rows,
-        "time": pl.datetime_range(pl.datetime(2026, 1, 1), pl.datetime(2026, 1, rows), "1d", eager=True),
+        "time": pl.datetime_range(
+            pl.datetime(2026, 1, 1), pl.datetime(2026, 1, rows), "1d", eager=True
+        ),
         "status": ["ok"] * rows,
         "label_payload": [0.5] * rows,
     }
@@ -99,17 +137,39 @@ def jobs() -> pl.DataFrame:
 
 COLUMNS = ("job", "robot", "time", "status", "label_payload", "k1", "k1_std", "m_p", "m_p_std")
 KINDS: tuple[Any, ...] = (
-    *(pl.String, pl.Int64, pl.Float32, pl.Boolean, pl.Date, pl.Datetime("ns"), pl.Datetime("ms", "Europe/Rome")),
-    *(pl.Duration("us"), pl.Time, pl.Binary, pl.Categorical, pl.Null, pl.List(pl.Float64), pl.Struct({"a": pl.Int8})),
+    *(
+        pl.String,
+        pl.Int64,
+        pl.Float32,
+        pl.Boolean,
+        pl.Date,
+        pl.Datetime("ns"),
+        pl.Datetime("ms", "Europe/Rome"),
+    ),
+    *(
+        pl.Duration("us"),
+        pl.Time,
+        pl.Binary,
+        pl.Categorical,
+        pl.Null,
+        pl.List(pl.Float64),
+        pl.Struct({"a": pl.Int8}),
+    ),
 )
 
 
 @pytest.mark.parametrize("column", COLUMNS)
-def test_a_column_of_another_type_is_taken_or_refused_with_its_name(column: str, tmp_path: Path) -> None:
+def test_a_column_of_another_type_is_taken_or_refused_with_its_name(
+    column: str, tmp_path: Path
+) -> None:
     path = tmp_path / "jobs.parquet"
     sound = jobs()
     variants = [sound.with_columns(pl.lit(None, kind).alias(column)) for kind in KINDS]
-    variants += [sound.drop(column), sound.head(0), sound.with_columns(pl.lit(None, sound[column].dtype).alias(column))]
+    variants += [
+        sound.drop(column),
+        sound.head(0),
+        sound.with_columns(pl.lit(None, sound[column].dtype).alias(column)),
+    ]
     for kind in KINDS:
         try:
             variants.append(sound.with_columns(pl.col(column).cast(kind, strict=False)))
@@ -129,10 +189,14 @@ def test_a_column_of_another_type_is_taken_or_refused_with_its_name(column: str,
 
 @pytest.mark.parametrize("value", [1e308, -1e308, math.inf, math.nan, 5e-324, 0.0, -1.0])
 @pytest.mark.parametrize("column", ["k1", "k1_std", "m_p", "m_p_std", "label_payload"])
-def test_numbers_beyond_all_bounds_are_no_estimates(column: str, value: float, tmp_path: Path) -> None:
+def test_numbers_beyond_all_bounds_are_no_estimates(
+    column: str, value: float, tmp_path: Path
+) -> None:
     path = tmp_path / "jobs.parquet"
     places = pl.int_range(pl.len()) == 3
-    jobs().with_columns(pl.when(places).then(pl.lit(value)).otherwise(pl.col(column)).alias(column)).write_parquet(path)
+    jobs().with_columns(
+        pl.when(places).then(pl.lit(value)).otherwise(pl.col(column)).alias(column)
+    ).write_parquet(path)
     history = history_of(path)
     assert history.logs == 12
     json.dumps(history.as_dict(), allow_nan=False)

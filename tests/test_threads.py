@@ -11,4 +11,6 @@ def test_blas_is_bounded_within_the_block() -> None:
 
     np.ones((4, 4)) @ np.ones((4, 4))
     with one_blas_thread():
-        assert {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"} <= {1}
+        assert {
+            pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"
+        } <= {1}

@@ -34,10 +34,17 @@ def test_endless_nesting_is_refused(text: str, tmp_path: Path) -> None:
         ("a = [" + "1," * (1 << 21) + "]", "more than 4 MiB"),
     ],
 )
-def test_more_work_than_any_honest_file_asks_for_is_refused(text: str, said: str, tmp_path: Path) -> None:
+def test_more_work_than_any_honest_file_asks_for_is_refused(
+    text: str, said: str, tmp_path: Path
+) -> None:
     path = tmp_path / "long.toml"
     path.write_text(text)
-    for read in (load_profile, lambda path: load_case(str(path)), read_manifest, lambda path: request(path, {})):
+    for read in (
+        load_profile,
+        lambda path: load_case(str(path)),
+        read_manifest,
+        lambda path: request(path, {}),
+    ):
         with pytest.raises(SettingError, match=f"long.toml: .*{said}"):
             read(path)
 

@@ -13,7 +13,12 @@ INCH_POUND = constants.inch * constants.pound_force
 
 
 def test_units_are_what_the_standards_say() -> None:
-    assert pytest.approx({"rad": 1, "mrad": 1e-3, "deg": constants.degree, "rev": 2 * math.pi}, rel=1e-15) == ANGLE
+    assert (
+        pytest.approx(
+            {"rad": 1, "mrad": 1e-3, "deg": constants.degree, "rev": 2 * math.pi}, rel=1e-15
+        )
+        == ANGLE
+    )
     assert pytest.approx({**ANGLE, "rpm": 2 * math.pi / constants.minute}, rel=1e-15) == VELOCITY
     assert {
         "N m": 1,

@@ -56,16 +56,30 @@ def fixed(value: ast.FormattedValue) -> bool:
     """Whether this is a constant of the house, a text, or a measured number with its digits: 1.3 degrees."""
     inner = value.value
     if isinstance(inner, ast.Call):
-        asked = inner.func.id if isinstance(inner.func, ast.Name) else ast.unparse(inner.func).rpartition(".")[2]
+        asked = (
+            inner.func.id
+            if isinstance(inner.func, ast.Name)
+            else ast.unparse(inner.func).rpartition(".")[2]
+        )
         if asked in ("counted", "significant", "join"):
             return True
-    name = inner.attr if isinstance(inner, ast.Attribute) else inner.id if isinstance(inner, ast.Name) else ""
+    name = (
+        inner.attr
+        if isinstance(inner, ast.Attribute)
+        else inner.id
+        if isinstance(inner, ast.Name)
+        else ""
+    )
     if name in TEXTS:
         return True
     if isinstance(inner, ast.Attribute) and ast.unparse(inner.value) == "LIMITS":
         return True
     digits = ast.unparse(value.format_spec) if value.format_spec else ""
-    return value.conversion != -1 or bool(name and name == name.upper()) or bool(re.search(r"\.[1-9]\d*[efg]", digits))
+    return (
+        value.conversion != -1
+        or bool(name and name == name.upper())
+        or bool(re.search(r"\.[1-9]\d*[efg]", digits))
+    )
 
 
 def unhelped(source: str) -> Iterator[str]:
@@ -74,7 +88,11 @@ def unhelped(source: str) -> Iterator[str]:
         if not isinstance(node, ast.JoinedStr):
             continue
         for value, after in zip(node.values, node.values[1:], strict=False):
-            if isinstance(value, ast.FormattedValue) and isinstance(after, ast.Constant) and not fixed(value):
+            if (
+                isinstance(value, ast.FormattedValue)
+                and isinstance(after, ast.Constant)
+                and not fixed(value)
+            ):
                 noun = plural(str(after.value))
                 if noun:
                     yield f"{value.lineno}: {{{ast.unparse(value.value)}}} {noun}"
@@ -101,7 +119,9 @@ def test_what_the_walk_finds(source: str, found: list[str]) -> None:
 
 def test_no_number_stands_before_a_plural_of_its_own_making() -> None:
     found = [
-        f"{path.relative_to(ROOT)}:{one}" for path in sorted(ROOT.rglob("*.py")) for one in unhelped(path.read_text())
+        f"{path.relative_to(ROOT)}:{one}"
+        for path in sorted(ROOT.rglob("*.py"))
+        for one in unhelped(path.read_text())
     ]
     assert found == []
 
@@ -109,11 +129,22 @@ def test_no_number_stands_before_a_plural_of_its_own_making() -> None:
 def behind_a_profile(source: str) -> Iterator[str]:
     """Every text that gives the line of a profile, and no flag or filled-in word before it."""
     tree = ast.parse(source)
-    within = {id(part) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in ast.walk(node)}
+    within = {
+        id(part)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.JoinedStr)
+        for part in ast.walk(node)
+    }
     for node in ast.walk(tree):
         if isinstance(node, ast.JoinedStr):
-            text = "".join(str(part.value) if isinstance(part, ast.Constant) else "--x" for part in node.values)
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in within:
+            text = "".join(
+                str(part.value) if isinstance(part, ast.Constant) else "--x" for part in node.values
+            )
+        elif (
+            isinstance(node, ast.Constant)
+            and isinstance(node.value, str)
+            and id(node) not in within
+        ):
             text = node.value
         else:
             continue

@@ -1,11 +1,11 @@
 """The workers of a Dask cluster behind the interface of the local ones.
 
-Dask runs the call of a worker that dies elsewhere, and waits without end for a worker where there is none. Whatever
-is the cluster's own fault and no job's (its scheduler gone, no worker left, a worker of another version) ends every
-call in hand with `WorkersGoneError`.
+Dask runs the call of a worker that dies elsewhere, and waits without end for a worker where there
+is none. Whatever is the cluster's own fault and no job's (its scheduler gone, no worker left, a
+worker of another version) ends every call in hand with `WorkersGoneError`.
 
-What runs on a worker before its version is known is sent by value: functions within functions, which import nothing
-of algid but its version.
+What runs on a worker before its version is known is sent by value: functions within functions,
+which import nothing of algid but its version.
 """
 
 from __future__ import annotations
@@ -48,7 +48,9 @@ LOOK_EVERY = 0.1  # s, for jobs of an earlier batch
 WATCH_EVERY = 1.0  # s, for what the cluster still has
 PATIENCE = 60.0  # s without any worker: one that died may be started again
 CLOSE_SECONDS = 5.0
-ANSWER_SECONDS = 5.0  # s in which an answer travels; it may have been lost with its worker, and be made anew
+ANSWER_SECONDS = (
+    5.0  # s in which an answer travels; it may have been lost with its worker, and be made anew
+)
 MOST_DEATHS = 2  # the scheduler gives a task up at the next one
 LAST_SECONDS = 5.0  # s that a job has to end once it is interrupted
 TASK_SECONDS = 1.0  # s that a task should last: each costs the scheduler and the client some 13 ms
@@ -60,31 +62,42 @@ MOST_TOGETHER = 16
 def cluster(address: str, out: str, timeout: float | None = None) -> Iterator[tuple[Executor, int]]:
     """The workers of a Dask cluster, and how many jobs to hand out at once.
 
-    Waits for jobs of an earlier batch on `out` that was killed: their threads cannot be stopped from outside.
+    Waits for jobs of an earlier batch on `out` that was killed: their threads cannot be stopped
+    from outside.
 
     Raises
     ------
     SettingError
-        If ``algid[dask]`` is not installed, nothing answers at `address`, or it has no workers, or one that is of
-        another version or does not see `out`.
+        If ``algid[dask]`` is not installed, nothing answers at `address`, or it has no workers, or
+        one that is of another version or does not see `out`.
     """
     try:
         from distributed import Client
     except ImportError as error:
-        raise SettingError("--scheduler: Dask is not installed; pip install 'algid[dask]'") from error
+        raise SettingError(
+            "--scheduler: Dask is not installed; pip install 'algid[dask]'"
+        ) from error
     _reach(address)
     try:
         client: Any = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
-        raise SettingError(f"--scheduler {address}: no scheduler answers ({error}); start dask scheduler") from error
+        raise SettingError(
+            f"--scheduler {address}: no scheduler answers ({error}); start dask scheduler"
+        ) from error
     made = None
-    loggers = {name: logging.getLogger(name).level for name in ("distributed", "distributed.client")}
-    for name in loggers:  # of a scheduler that is lost they have tracebacks; the batch says it in a line
+    loggers = {
+        name: logging.getLogger(name).level for name in ("distributed", "distributed.client")
+    }
+    for (
+        name
+    ) in loggers:  # of a scheduler that is lost they have tracebacks; the batch says it in a line
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         threads = sum(client.nthreads().values())
         if not threads:
-            raise SettingError(f"--scheduler {address}: it has no workers; start dask worker {address}")
+            raise SettingError(
+                f"--scheduler {address}: it has no workers; start dask worker {address}"
+            )
         misfit = misfit_of(__version__, None if is_url(out) else str(lock_file(out)), shown(out))
         prefix = f"algid-{hashlib.sha256(public(out).encode()).hexdigest()[:16]}-"
         _refuse_misfits(client, misfit, address)
@@ -100,7 +113,9 @@ def cluster(address: str, out: str, timeout: float | None = None) -> Iterator[tu
             logging.getLogger(name).setLevel(level)
 
 
-_ADDRESS = re.compile(r"((?:tcp|tls)://)?(?P<host>\[[0-9A-Fa-f:.]+\]|[\w.-]+):(?P<port>[0-9]{1,5})", re.ASCII)
+_ADDRESS = re.compile(
+    r"((?:tcp|tls)://)?(?P<host>\[[0-9A-Fa-f:.]+\]|[\w.-]+):(?P<port>[0-9]{1,5})", re.ASCII
+)
 
 
 def _reach(address: str) -> None:
@@ -113,12 +128,16 @@ def _reach(address: str) -> None:
     """
     found = _ADDRESS.fullmatch(address)
     if found is None or not 0 < int(found["port"]) < 1 << 16:
-        raise SettingError(f"--scheduler: expected an address like tcp://HOST:8786, found {address!r:.60}")
+        raise SettingError(
+            f"--scheduler: expected an address like tcp://HOST:8786, found {address!r:.60}"
+        )
     try:
         asyncio.run(asyncio.wait_for(_greet(address), CONNECT_SECONDS))
     except Exception as error:  # whatever there is that answers something else
         reason = " ".join(str(error).split())[:200] or f"no word within {CONNECT_SECONDS} s"
-        raise SettingError(f"--scheduler {address}: no scheduler answers ({reason}); start dask scheduler") from error
+        raise SettingError(
+            f"--scheduler {address}: no scheduler answers ({reason}); start dask scheduler"
+        ) from error
 
 
 async def _greet(address: str) -> None:
@@ -129,7 +148,10 @@ async def _greet(address: str) -> None:
 
 
 def misfit_of(version: str, mark: str | None, out: str) -> Callable[[], str | None]:
-    """What says on a worker why jobs must not run there, or None; `mark` is a file in OUT that is there meanwhile."""
+    """What says on a worker why jobs must not run there, or None.
+
+    `mark` is a file in OUT that is there meanwhile.
+    """
 
     def misfit() -> str | None:
         import os  # by value there is no module around it
@@ -166,7 +188,10 @@ def _wait_for_earlier(client: Any, prefix: str) -> None:
 
 @dataclass(eq=False)
 class _Call:
-    """A call on its way; `alone` once it was in a task that took workers with it, and none knows by which call."""
+    """A call on its way.
+
+    `alone` once it was in a task that took workers with it, and none knows by which call.
+    """
 
     packed: bytes
     future: Future[Any]
@@ -174,7 +199,9 @@ class _Call:
 
 
 class _Cluster(Executor):
-    """Calls run on the cluster, several in a task where they are short; they fail as those of `Workers` do.
+    """Calls run on the cluster, several in a task where they are short.
+
+    They fail as those of `Workers` do.
 
     A future fails with `WorkersGoneError` where the cluster can run no calls any more.
     """
@@ -198,7 +225,8 @@ class _Cluster(Executor):
         self._seconds = TASK_SECONDS  # that a call takes, as the last task had it
         self._gone: str | None = None
         self._ended = threading.Event()
-        # Not Dask's own thread for what is finished: Python waits for that one at its end, and it may wait for ever.
+        # Not Dask's own thread for what is finished: Python waits for that one at its end, and it
+        # may wait for ever.
         for loop in (self._settle_finished, self._watch):
             threading.Thread(target=loop, daemon=True).start()
 
@@ -230,7 +258,9 @@ class _Cluster(Executor):
             calls = self._next_calls()
             key = self._prefix + uuid.uuid4().hex
             try:
-                remote = self._client.submit(self._task, [call.packed for call in calls], self._timeout, key=key)
+                remote = self._client.submit(
+                    self._task, [call.packed for call in calls], self._timeout, key=key
+                )
             except Exception as error:  # the client is closed, or cannot say what it is to send
                 self._waiting.extendleft(reversed(calls))
                 self._give_up(f"the scheduler takes no jobs ({text_of(error)})")
@@ -277,7 +307,9 @@ class _Cluster(Executor):
             if died is None:
                 self._seconds = max(seconds / max(len(calls), 1), 1e-3)
             elif len(calls) > 1:
-                self._waiting.extendleft(_Call(call.packed, call.future, alone=True) for call in reversed(calls))
+                self._waiting.extendleft(
+                    _Call(call.packed, call.future, alone=True) for call in reversed(calls)
+                )
                 calls = []
             self._send()
         for place, call in enumerate(calls):
@@ -299,7 +331,9 @@ class _Cluster(Executor):
             if threads or not self._sent:
                 seen, self._threads = time.monotonic(), threads or self._threads
             elif time.monotonic() - seen > PATIENCE:
-                return self._give_up(f"it has had no workers for {PATIENCE:g} s; start dask worker {self._address}")
+                return self._give_up(
+                    f"it has had no workers for {PATIENCE:g} s; start dask worker {self._address}"
+                )
         return None
 
     def _give_up(self, reason: str) -> None:
@@ -345,7 +379,8 @@ def answered_in_turn(calls: list[bytes], timeout: float | None) -> tuple[float, 
 def answered_within(call: bytes, timeout: float | None) -> bytes:
     """`answered` in a thread of its own, which is interrupted after `timeout` and, if it goes on, given up.
 
-    A thread of Python cannot be ended from outside; an exception reaches it between two of its own instructions.
+    A thread of Python cannot be ended from outside; an exception reaches it between two of its own
+    instructions.
     """
     answers: SimpleQueue[bytes] = SimpleQueue()
     thread = threading.Thread(target=lambda: answers.put(answered(call)), daemon=True)
@@ -354,7 +389,9 @@ def answered_within(call: bytes, timeout: float | None) -> bytes:
     if thread.is_alive():
         assert timeout is not None
         reason = TOO_LONG.format(timeout)
-        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident or 0), ctypes.py_object(SystemExit))
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(
+            ctypes.c_ulong(thread.ident or 0), ctypes.py_object(SystemExit)
+        )
         thread.join(LAST_SECONDS)
         if thread.is_alive():
             reason += f"; it still runs on {socket.gethostname()}, process {os.getpid()}: restart that worker"

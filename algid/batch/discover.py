@@ -1,6 +1,9 @@
-"""From sources to jobs: files, folders, globs and manifests; X-unloaded.* and X-loaded.* make one job X.
+"""From sources to jobs: files, folders, globs and manifests.
 
-A log that cannot be a job, by its name or because another has it too, is one that fails alone: see `Job.trouble`.
+X-unloaded.* and X-loaded.* make one job X.
+
+A log that cannot be a job, by its name or because another has it too, is one that fails alone: see
+`Job.trouble`.
 """
 
 from __future__ import annotations
@@ -49,7 +52,9 @@ def jobs_of(sources: Sequence[str], out: str, alone: str = "logs") -> list[Job]:
             manifest = not is_url(source) and is_manifest(Path(source))
             found = read_manifest(Path(source)) if manifest else _paired(_logs(source, out), alone)
         except (OSError, ValueError) as error:  # ValueError: a NUL in a path
-            raise SettingError(f"{source}: cannot look there ({error}); check its name and rights") from error
+            raise SettingError(
+                f"{source}: cannot look there ({error}); check its name and rights"
+            ) from error
         for job in found:
             before = jobs.get(job.name, job)
             jobs[job.name] = job if before == job else _of_one_name(before, job)
@@ -68,11 +73,19 @@ def _logs(source: str, out: str) -> list[Found]:
         return [(url, _stem(name), None) for url, name in found]
     path = Path(source)
     if path.is_dir() and not _is_bag(path):
-        return [_below(path, one) for one in _walk(path, out) if one.trouble or one.bag or _is_log(one.name)]
+        return [
+            _below(path, one)
+            for one in _walk(path, out)
+            if one.trouble or one.bag or _is_log(one.name)
+        ]
     matches = [_File(source, _is_bag(path))] if path.exists() else list(_matches(source, out))
     if not matches:
         raise SettingError(f"{source}: there is no such file, folder or match; check the name")
-    return [(one.path, _stem(one.name), one.trouble) for one in matches if one.bag or not Path(one.path).is_dir()]
+    return [
+        (one.path, _stem(one.name), one.trouble)
+        for one in matches
+        if one.bag or not Path(one.path).is_dir()
+    ]
 
 
 def _written_by_batch(source: str, out: str) -> Callable[[str], bool]:
@@ -82,7 +95,9 @@ def _written_by_batch(source: str, out: str) -> Callable[[str], bool]:
 
     def own(name: str) -> bool:
         *folders, _ = parts = name.split("/")
-        if any(part.startswith(".") for part in parts) or any(part.endswith(".algid") for part in folders):
+        if any(part.startswith(".") for part in parts) or any(
+            part.endswith(".algid") for part in folders
+        ):
             return True
         return inside is not None and (name.startswith(inside) if inside else name == TABLE)
 
@@ -110,8 +125,8 @@ def _below(folder: Path, one: _File) -> Found:
 def _walk(folder: Path, out: str) -> Iterator[_File]:
     """Files below a folder; hidden ones, results and what lies in `out` are passed over.
 
-    Each folder is looked through once, whatever links lead there, and those above `folder` are not; a name that goes
-    through no link comes first.
+    Each folder is looked through once, whatever links lead there, and those above `folder` are
+    not; a name that goes through no link comes first.
 
     Raises
     ------
@@ -119,7 +134,9 @@ def _walk(folder: Path, out: str) -> Iterator[_File]:
         If nobody may look into `folder` itself.
     """
     results = _mark(out) if Path(out).is_dir() else None
-    above = {_mark(str(one)) for one in folder.resolve().parents}  # a link there leads to all that there is
+    above = {
+        _mark(str(one)) for one in folder.resolve().parents
+    }  # a link there leads to all that there is
     seen = above | ({results} if results != _mark(str(folder)) else set())
     pending, links = [str(folder)], deque[str]()
     while pending or links:
@@ -133,7 +150,10 @@ def _walk(folder: Path, out: str) -> Iterator[_File]:
         except OSError as error:
             if place == str(folder):
                 raise
-            yield _File(place, trouble=f"{kept_path(place)}: cannot look there ({error.strerror}); check its rights")
+            yield _File(
+                place,
+                trouble=f"{kept_path(place)}: cannot look there ({error.strerror}); check its rights",
+            )
             continue
         if BAG in files and place != str(folder):
             yield _File(place, bag=True)
@@ -154,7 +174,9 @@ def _entries(folder: str) -> tuple[list[str], list[str], list[str]]:
     with os.scandir(folder) as entries:
         for entry in entries:
             if not entry.name.startswith("."):
-                (files if not _is_folder(entry) else links if entry.is_symlink() else folders).append(entry.name)
+                (
+                    files if not _is_folder(entry) else links if entry.is_symlink() else folders
+                ).append(entry.name)
     return sorted(files), sorted(folders), sorted(links)
 
 
@@ -166,7 +188,10 @@ def _is_folder(entry: os.DirEntry[str]) -> bool:
 
 
 def _matches(pattern: str, out: str) -> Iterator[_File]:
-    """Files and bags that a pattern names; ``**`` goes through folders as `_walk` does, and follows links once."""
+    """Files and bags that a pattern names.
+
+    ``**`` goes through folders as `_walk` does, and follows links once.
+    """
     parts = Path(pattern).parts
     first = parts.index("**") if "**" in parts else len(parts)
     found = sorted(glob.glob(str(Path(*parts[:first]))))  # noqa: PTH207  # a pattern may be absolute
@@ -175,7 +200,9 @@ def _matches(pattern: str, out: str) -> Iterator[_File]:
         return
     for folder in (Path(match) for match in found if Path(match).is_dir()):
         files = (one for one in _walk(folder, out) if not one.trouble)
-        yield from (one for one in files if _fits(Path(one.path).relative_to(folder).parts, parts[first:]))
+        yield from (
+            one for one in files if _fits(Path(one.path).relative_to(folder).parts, parts[first:])
+        )
 
 
 def _fits(parts: Sequence[str], pattern: Sequence[str]) -> bool:
@@ -183,7 +210,11 @@ def _fits(parts: Sequence[str], pattern: Sequence[str]) -> bool:
     places = {0}  # of the pattern, after the parts so far
     for part in parts:
         places = _onward(places, pattern)
-        fitting = {n for n in places if n < len(pattern) and (pattern[n] == "**" or fnmatchcase(part, pattern[n]))}
+        fitting = {
+            n
+            for n in places
+            if n < len(pattern) and (pattern[n] == "**" or fnmatchcase(part, pattern[n]))
+        }
         places = {n if pattern[n] == "**" else n + 1 for n in fitting}
     return len(pattern) in _onward(places, pattern)
 
@@ -231,7 +262,9 @@ def _job(name: str, path: str, *, loaded: bool, trouble: str | None) -> Job:
         told = trouble or f"{kept_path(path)}: a log's name becomes a folder's: {fault}; rename it"
         return Job(safe_name(name), logs=(path,), trouble=told)
     robot = name.rpartition("/")[0] or None
-    return Job(name, loaded=(path,), robot=robot) if loaded else Job(name, logs=(path,), robot=robot)
+    return (
+        Job(name, loaded=(path,), robot=robot) if loaded else Job(name, logs=(path,), robot=robot)
+    )
 
 
 def _together(first: Job, second: Job) -> Job:
@@ -243,7 +276,10 @@ def _together(first: Job, second: Job) -> Job:
 
 def _of_one_name(first: Job, second: Job) -> Job:
     """What stands for two jobs of one name: it cannot be run."""
-    logs, loaded = (tuple(dict.fromkeys(one)) for one in (first.logs + second.logs, first.loaded + second.loaded))
+    logs, loaded = (
+        tuple(dict.fromkeys(one))
+        for one in (first.logs + second.logs, first.loaded + second.loaded)
+    )
     paths = ", ".join(map(kept_path, [*logs, *loaded][:MOST_NAMED]))
     trouble = f"{first.name}: two jobs of one name ({paths}); rename a log, or name the jobs in a manifest"
     return replace(first, logs=logs, loaded=loaded, trouble=trouble)

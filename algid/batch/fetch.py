@@ -1,9 +1,10 @@
 """Logs out of an object store onto this machine: of MCAP and Parquet what is needed, of everything else the whole.
 
-The format's own reader says what it needs. What it finds where is known from a few small parts of the object: the
-summary and the heads of the message indexes of an MCAP file, the footer of a Parquet file. What is fetched of an
-object lies in a sparse file of its size, at its own places; the rest are zeros, which no MCAP or Parquet reader takes
-for data. An object without such parts, or of which nearly all is needed, is fetched whole; its hash is known then.
+The format's own reader says what it needs. What it finds where is known from a few small parts of
+the object: the summary and the heads of the message indexes of an MCAP file, the footer of a
+Parquet file. What is fetched of an object lies in a sparse file of its size, at its own places;
+the rest are zeros, which no MCAP or Parquet reader takes for data. An object without such parts,
+or of which nearly all is needed, is fetched whole; its hash is known then.
 """
 
 from __future__ import annotations
@@ -90,7 +91,9 @@ class Partial(File):
         """
         wanted = merged(ranges)
         if wanted and not 0 <= wanted[0][0] <= wanted[-1][1] <= self.size:
-            raise DamagedError(f"bytes {wanted[0][0]} to {wanted[-1][1]} of an object of {self.size}")
+            raise DamagedError(
+                f"bytes {wanted[0][0]} to {wanted[-1][1]} of an object of {self.size}"
+            )
         wanted = merged(without(wanted, self._held), GAP)
 
         def copy(start: int, end: int) -> None:
@@ -103,7 +106,11 @@ class Partial(File):
                 view, start = view[written:], start + written
 
         with ThreadPoolExecutor(_REQUESTS, thread_name_prefix="algid-fetch") as pool:
-            pieces = [(p, min(p + _PIECE, end)) for start, end in wanted for p in range(start, end, _PIECE)]
+            pieces = [
+                (p, min(p + _PIECE, end))
+                for start, end in wanted
+                for p in range(start, end, _PIECE)
+            ]
             for _ in pool.map(lambda piece: copy(*piece), pieces):
                 pass
         self._held = merged([*self._held, *wanted])
@@ -166,8 +173,8 @@ def staged(url: str, folder: Path, profile: Profile | None = None) -> Staged:
 def _one_version(filesystem: FileSystem, path: str, url: str) -> Iterator[NativeFile]:
     """An object, opened; looked at again when the block ends.
 
-    Requests for parts of an object tell nothing of each other: where it was replaced between two of them, what was
-    fetched is of neither, and what its reader complains of is not the cause.
+    Requests for parts of an object tell nothing of each other: where it was replaced between two
+    of them, what was fetched is of neither, and what its reader complains of is not the cause.
 
     Raises
     ------
@@ -224,12 +231,14 @@ def _fetched_in_part(part: Partial, profile: Profile | None) -> bool:
 def _wanted_of_mcap(part: Partial, profile: Profile | None) -> list[Range]:
     """The chunks that hold the joints, with the indexes behind them.
 
-    The catalogue looks at the summary, and beyond it at heads of message indexes, metadata, and what lies between.
+    The catalogue looks at the summary, and beyond it at heads of message indexes, metadata, and
+    what lies between.
 
     Raises
     ------
     UnforeseenError
-        If the file has no summary, one too large to fetch, or one that makes the catalogue look at the whole file.
+        If the file has no summary, one too large to fetch, or one that makes the catalogue look at
+        the whole file.
     """
     from mcap import records
 
@@ -245,18 +254,28 @@ def _wanted_of_mcap(part: Partial, profile: Profile | None) -> list[Range]:
         body = content[record.start : record.end]
         if record.code == framing.CHUNK_INDEX:
             chunks.append(framing.chunk_index(body))
-            wanted += [(offset, offset + _INDEX_HEAD) for offset in chunks[-1].message_index_offsets.values()]
+            wanted += [
+                (offset, offset + _INDEX_HEAD)
+                for offset in chunks[-1].message_index_offsets.values()
+            ]
         elif record.code == _METADATA_INDEX:
             place = framing.parse(records.MetadataIndex, body)
             if place.length <= LIMITS.record_bytes:
                 wanted.append((place.offset, place.offset + place.length))
     chunks.sort(key=lambda chunk: chunk.chunk_start_offset)
-    part.fetch([*wanted, *((first, last) for first, last in between(chunks, start) if last - first <= SMALL)])
+    part.fetch(
+        [
+            *wanted,
+            *((first, last) for first, last in between(chunks, start) if last - first <= SMALL),
+        ]
+    )
     found = catalogue(part)  # a scan of the whole is unforeseen
     part.on_demand = True
     source = McapSource(part, found)
     topics = plan(source, profile).topics
-    channels = frozenset[int]().union(*(channels_of(source, topic.name, topic.type) for topic in topics))
+    channels = frozenset[int]().union(
+        *(channels_of(source, topic.name, topic.type) for topic in topics)
+    )
     spans = [*spans_of(found, channels), *spans_beside(found, channels)]
     return [(span.start, span.start + span.length + span.index_length) for span in spans]
 
@@ -275,7 +294,10 @@ def _wanted_of_parquet(part: Partial, profile: Profile | None) -> list[Range]:
     part.fetch([(start, part.size)])
     try:
         metadata = pq.read_metadata(part.path)
-        if any(metadata.schema.column(place).max_repetition_level for place in range(metadata.num_columns)):
+        if any(
+            metadata.schema.column(place).max_repetition_level
+            for place in range(metadata.num_columns)
+        ):
             raise UnforeseenError("lists have widths that the footer does not tell")
         names = set(open_parquet(part.path, profile or Profile()).origin.mapping.values())
     except (pa.ArrowException, OSError, LogError) as error:

@@ -1,4 +1,7 @@
-"""What a worker does with one job: identify, and say how it ended. No exception leaves this file."""
+"""What a worker does with one job: identify, and say how it ended.
+
+No exception leaves this file.
+"""
 
 from __future__ import annotations
 
@@ -73,7 +76,9 @@ def run_task(task: Task) -> JobRecord | DiskFull:
         return failed_record(task, reason, inputs=inputs, seconds=time.perf_counter() - start)
     judged = result.verdict
     lacking = ["samples were lost"] if result.data_lost else []
-    lacking += [f"{name} {one.status.value}" for name, one in result.estimates.items() if not one.usable]
+    lacking += [
+        f"{name} {one.status.value}" for name, one in result.estimates.items() if not one.usable
+    ]
     hashes = {log.path: log.sha256 for log in result.logs}
     return _record(
         task,
@@ -113,12 +118,21 @@ def failed_record(task: Task, reason: str, status: End = End.FAILED, **known: An
 def kept(job: Job) -> Job:
     """A job as records hold it: its URLs without credentials."""
     logs, loaded = (tuple(map(kept_path, paths)) for paths in (job.logs, job.loaded))
-    return replace(job, logs=logs, loaded=loaded, profile=None if job.profile is None else kept_path(job.profile))
+    return replace(
+        job,
+        logs=logs,
+        loaded=loaded,
+        profile=None if job.profile is None else kept_path(job.profile),
+    )
 
 
 def _record(task: Task, **known: Any) -> JobRecord:
     return JobRecord(
-        job=kept(task.job), basis=task.basis, settings=task.settings.as_json(), version=__version__, **known
+        job=kept(task.job),
+        basis=task.basis,
+        settings=task.settings.as_json(),
+        version=__version__,
+        **known,
     )
 
 
@@ -128,7 +142,10 @@ def inputs_of(job: Job) -> tuple[Input, ...]:
 
 
 def _looked_at(path: str) -> Input:
-    """A log as it is now; as one that is not there where it cannot be looked at: its reader says why."""
+    """A log as it is now.
+
+    As one that is not there where it cannot be looked at: its reader says why.
+    """
     try:
         return stat_of(path)
     except AlgidError:
@@ -158,16 +175,25 @@ def _identified(task: Task) -> Result:
                 shared_library=not is_url(task.out),
             )
         if is_url(task.out):
-            put_folder(open_store(task.out), f"{task.job.name}.algid", place.with_name(f"{place.name}.algid"))
+            put_folder(
+                open_store(task.out),
+                f"{task.job.name}.algid",
+                place.with_name(f"{place.name}.algid"),
+            )
         return result
 
 
 def _here(paths: Sequence[str], folder: Path, profile: Profile | None) -> list[str | Staged]:
     """Logs as they can be read on this machine."""
-    return [staged(path, folder / str(n), profile) if is_url(path) else path for n, path in enumerate(paths)]
+    return [
+        staged(path, folder / str(n), profile) if is_url(path) else path
+        for n, path in enumerate(paths)
+    ]
 
 
-def basis_of(settings: Mapping[str, Any], profile: Profile | None, parameters: Result | None, report: bool) -> str:
+def basis_of(
+    settings: Mapping[str, Any], profile: Profile | None, parameters: Result | None, report: bool
+) -> str:
     """A hash of everything but the logs that decides a job's outcome."""
     content = {
         "settings": settings,

@@ -16,7 +16,18 @@ TABLE = "jobs.parquet"
 """The table of all jobs, in OUT."""
 COLUMNS = frozenset(
     {
-        *("job", "robot", "time", "status", "reason", "seconds", "log_seconds", "estimator", "version", "settings"),
+        *(
+            "job",
+            "robot",
+            "time",
+            "status",
+            "reason",
+            "seconds",
+            "log_seconds",
+            "estimator",
+            "version",
+            "settings",
+        ),
         *("logs", "sha256", "size", "changed", "verdict", "headline", "reasons", "command"),
     }
 )
@@ -50,15 +61,26 @@ class Job:
 
 
 def name_fault(name: str) -> str | None:
-    """Why no result and no record of that name can lie in OUT beside all others; None where they can."""
+    """Why no result and no record of that name can lie in OUT beside all others.
+
+    None where they can.
+    """
     *folders, _ = parts = name.split("/")
     for part in parts:
-        if not part or part.startswith(".") or not part.isprintable() or "\\" in part or _bytes(part) > 200:
+        if (
+            not part
+            or part.startswith(".")
+            or not part.isprintable()
+            or "\\" in part
+            or _bytes(part) > 200
+        ):
             return "expected parts of 1 to 200 printable characters, none starting with a dot"
     if _bytes(name) > LIMITS.name_bytes:
         return f"expected at most {LIMITS.name_bytes} bytes"
     if any(part.lower().endswith(".algid") for part in folders) or folders[:1] == [TABLE]:
-        return f"expected no folder that ends in .algid, and none that is {TABLE}: these are results"
+        return (
+            f"expected no folder that ends in .algid, and none that is {TABLE}: these are results"
+        )
     return None
 
 
@@ -72,8 +94,8 @@ def checked_name(name: str, place: str) -> str:
     Raises
     ------
     SettingError
-        If a part of it is empty, starts with a dot, or holds what no file name should; if it is too long, or lies
-        within another job's result.
+        If a part of it is empty, starts with a dot, or holds what no file name should; if it is
+        too long, or lies within another job's result.
     """
     fault = name_fault(name)
     if fault is not None:
@@ -84,7 +106,9 @@ def checked_name(name: str, place: str) -> str:
 def safe_name(name: str) -> str:
     """A name that can stand for one that cannot: what is readable of it, and a hash."""
     content = name.encode(errors="surrogatepass")
-    readable = "".join(letter if letter.isalnum() or letter in "-_. " else "%" for letter in name[:40])
+    readable = "".join(
+        letter if letter.isalnum() or letter in "-_. " else "%" for letter in name[:40]
+    )
     return f"%{readable}~{hashlib.sha256(content).hexdigest()[:8]}"
 
 

@@ -1,7 +1,8 @@
 """One batch at a time on one OUT, among the processes of one machine.
 
-Object stores have no locks: two machines that run batches on one URL at the same time do the same jobs twice, and each
-leaves a ``jobs.parquet`` of what it knows. Every object is whole all the same, and the next batch takes up all records.
+Object stores have no locks: two machines that run batches on one URL at the same time do the same
+jobs twice, and each leaves a ``jobs.parquet`` of what it knows. Every object is whole all the
+same, and the next batch takes up all records.
 """
 
 from __future__ import annotations
@@ -34,9 +35,13 @@ def locked(out: str) -> Iterator[None]:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle = _held(path)
     except BlockingIOError as error:
-        raise OutputError(f"{out}: another batch is at work there; wait for it or choose another -o") from error
+        raise OutputError(
+            f"{out}: another batch is at work there; wait for it or choose another -o"
+        ) from error
     except OSError as error:
-        raise OutputError(f"{out}: cannot write there ({error.strerror}); choose another folder with -o") from error
+        raise OutputError(
+            f"{out}: cannot write there ({error.strerror}); choose another folder with -o"
+        ) from error
     try:
         yield
     finally:

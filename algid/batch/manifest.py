@@ -1,8 +1,8 @@
 """Manifests: a CSV or TOML file with a row, or a table ``[[job]]``, for each job.
 
-``name`` and ``logs`` are needed where there is no ``loaded``; ``profile``, ``robot`` and ``time`` are optional,
-and whatever else stands there is a label. Several logs are a TOML list, or separated by semicolons in CSV. Paths
-are relative to the manifest.
+``name`` and ``logs`` are needed where there is no ``loaded``; ``profile``, ``robot`` and ``time``
+are optional, and whatever else stands there is a label. Several logs are a TOML list, or separated
+by semicolons in CSV. Paths are relative to the manifest.
 """
 
 from __future__ import annotations
@@ -29,7 +29,9 @@ def is_manifest(path: Path) -> bool:
         return True
     if path.suffix.lower() != ".csv" or not path.is_file():
         return False
-    head = read_start(path, LIMITS.line_bytes).decode("utf-8-sig", errors="replace")  # logs too come by here
+    head = read_start(path, LIMITS.line_bytes).decode(
+        "utf-8-sig", errors="replace"
+    )  # logs too come by here
     columns = next(csv.reader(head.splitlines()[:1]), [])
     return "name" in columns and ("logs" in columns or "loaded" in columns)
 
@@ -48,17 +50,27 @@ def read_manifest(path: Path) -> list[Job]:
         else:
             kind, rows = "row", _rows(path)
     except (OSError, csv.Error, ValueError, RecursionError) as error:
-        raise SettingError(f"{path}: the manifest cannot be read ({error!s:.200}); mend it") from error
+        raise SettingError(
+            f"{path}: the manifest cannot be read ({error!s:.200}); mend it"
+        ) from error
     labels = {name for row in rows for name in row}
     if len(labels) > LIMITS.columns:
-        raise SettingError(f"{path}: expected labels of at most {LIMITS.columns} names, found {len(labels)}")
-    return [_job(row, f"{path}: {kind} {number}", path.parent) for number, row in enumerate(rows, 1)]
+        raise SettingError(
+            f"{path}: expected labels of at most {LIMITS.columns} names, found {len(labels)}"
+        )
+    return [
+        _job(row, f"{path}: {kind} {number}", path.parent) for number, row in enumerate(rows, 1)
+    ]
 
 
 def _tables(path: Path) -> list[dict[str, object]]:
     content = parsed_toml(read_text(path))
     rows = content.get("job")
-    if set(content) != {"job"} or not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+    if (
+        set(content) != {"job"}
+        or not isinstance(rows, list)
+        or not all(isinstance(row, dict) for row in rows)
+    ):
         found = ", ".join(content) or "nothing"
         raise SettingError(f"{path}: expected tables [[job]] alone, found {found:.200}")
     return rows
@@ -72,7 +84,9 @@ def _rows(path: Path) -> list[dict[str, object]]:
         raise SettingError(f"{path}: two columns are named {twice[0]!r:.60}; rename one")
     cells = list(reader)
     if any(None in row for row in cells):
-        raise SettingError(f"{path}: a row has more cells than the header; quote commas within a cell")
+        raise SettingError(
+            f"{path}: a row has more cells than the header; quote commas within a cell"
+        )
     return [{name: cell for name, cell in row.items() if cell} for row in cells]
 
 
@@ -82,14 +96,18 @@ def _job(row: Mapping[str, object], place: str, folder: Path) -> Job:
         found = ", ".join(row) or "nothing"
         raise SettingError(f"{place}: expected a name and logs, found {found:.200}")
     profile = _paths(row, "profile", place, folder)
-    labels = {name: _label(row, name, place) for name in row if name not in ("logs", "loaded", "profile")}
+    labels = {
+        name: _label(row, name, place) for name in row if name not in ("logs", "loaded", "profile")
+    }
     name, robot, time = (labels.pop(own, None) for own in ("name", "robot", "time"))
     return Job(
         name=checked_name(str(row["name"] if isinstance(row["name"], str) else name), place),
         logs=logs,
         loaded=loaded,
         profile=profile[0] if profile else None,
-        robot=None if robot is None else str(row["robot"] if isinstance(row["robot"], str) else robot),
+        robot=None
+        if robot is None
+        else str(row["robot"] if isinstance(row["robot"], str) else robot),
         time=None if time is None else _time(str(row["time"]), place),
         labels={name: label for name, label in labels.items() if label is not None},
     )
@@ -110,7 +128,9 @@ def _label(row: Mapping[str, object], name: str, place: str) -> Label:
     except ValueError as error:
         expected = "expected text, a date, true, false or a finite number, whole ones of 64 bits"
         kind = type(row[name]).__name__
-        raise SettingError(f"{place}: {repr(name)[1:-1]:.60}: {expected}, found another {kind}") from error
+        raise SettingError(
+            f"{place}: {repr(name)[1:-1]:.60}: {expected}, found another {kind}"
+        ) from error
 
 
 def label_of(value: object) -> Label:
@@ -119,7 +139,8 @@ def label_of(value: object) -> Label:
     Raises
     ------
     ValueError
-        If it is neither text, a date, a truth value nor a finite number, or a whole one beyond 64 bits.
+        If it is neither text, a date, a truth value nor a finite number, or a whole one beyond 64
+        bits.
     """
     if isinstance(value, str):
         return _number_in(value)

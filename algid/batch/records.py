@@ -26,7 +26,9 @@ class End(StrEnum):
     """How a job ended."""
 
     OK = "ok"
-    INCOMPLETE = "incomplete"  # a result is there, but data were lost or a parameter is not identifiable
+    INCOMPLETE = (
+        "incomplete"  # a result is there, but data were lost or a parameter is not identifiable
+    )
     FAILED = "failed"  # there is no result, or one that must not be used
     KILLED = "killed"  # it took its worker with it, three times
 
@@ -40,7 +42,8 @@ class Input:
 
     A URL stands without the credentials that the job's own holds.
 
-    `ctime_ns` is the file system's own time of change, which no tool can set back; 0 for an object in a store.
+    `ctime_ns` is the file system's own time of change, which no tool can set back; 0 for an object
+    in a store.
     """
 
     path: str
@@ -52,11 +55,13 @@ class Input:
 
 @dataclass(frozen=True)
 class JobRecord:
-    """A job's end: `basis` stands for settings, profile, known parameters and version; `seconds` is its duration.
+    """A job's end: `basis` stands for settings, profile, known parameters and version.
 
-    `verdict` is the grade of the result, None where there is none; a job whose result must not be used failed.
-    `reasons` are codes and texts, `command` is what to run first.
-    `estimates` holds estimate, standard deviation and status by name, `estimator` whose they are; `start_ns` and
+    `seconds` is its duration.
+
+    `verdict` is the grade of the result, None where there is none; a job whose result must not be
+    used failed. `reasons` are codes and texts, `command` is what to run first. `estimates` holds
+    estimate, standard deviation and status by name, `estimator` whose they are; `start_ns` and
     `log_seconds` are the first log's first stamp and the length of all logs.
     """
 
@@ -79,7 +84,9 @@ class JobRecord:
 
 
 def stat_of(path: str) -> Input:
-    """Size and times of change of a log; of a folder, its files' total and latest. Zeros where there is none.
+    """Size and times of change of a log; of a folder, its files' total and latest.
+
+    Zeros where there is none.
 
     Raises
     ------
@@ -94,8 +101,12 @@ def stat_of(path: str) -> Input:
     except (FileNotFoundError, NotADirectoryError):
         return Input(kept_path(path), 0, 0)
     except OSError as error:
-        raise LogError(f"{path}: it cannot be looked at ({error.strerror}); check name and rights") from error
-    mtime, ctime = (max((getattr(s, name) for s in found), default=0) for name in ("st_mtime_ns", "st_ctime_ns"))
+        raise LogError(
+            f"{path}: it cannot be looked at ({error.strerror}); check name and rights"
+        ) from error
+    mtime, ctime = (
+        max((getattr(s, name) for s in found), default=0) for name in ("st_mtime_ns", "st_ctime_ns")
+    )
     return Input(kept_path(path), sum(s.st_size for s in found), mtime, ctime)
 
 
@@ -157,7 +168,9 @@ def prepare(store: Store) -> None:
         refuse_links(store.folder, f"{name}/x" if wanted else name)
         if os.path.lexists(path) and path.is_dir() != wanted:
             kind = "folder" if wanted else "file"
-            raise OutputError(f"{path}: expected a {kind} of algid's own; move it, or choose another folder with -o")
+            raise OutputError(
+                f"{path}: expected a {kind} of algid's own; move it, or choose another folder with -o"
+            )
     with writing(store.folder / FOLDER):
         (store.folder / FOLDER).mkdir(parents=True, exist_ok=True)
 
@@ -187,7 +200,9 @@ def read_records(store: Store) -> Known:
             record = _record_in(store.read(name) or b"", name)
             named = columns | record.estimates.keys() | record.job.labels.keys()
             if len(named) > LIMITS.columns:
-                raise ValueError(f"all records together name more than {LIMITS.columns} labels and estimates")
+                raise ValueError(
+                    f"all records together name more than {LIMITS.columns} labels and estimates"
+                )
             columns = named
             known.records[record.job.name] = record
         except (ValueError, LogError) as error:
@@ -222,13 +237,19 @@ def _fault(record: JobRecord, place: str) -> str | None:
     job = record.job
     whole = [record.start_ns or 0, *(number for one in record.inputs for number in (one.size,))]
     whole += [label for label in job.labels.values() if type(label) is int]
-    real = [record.seconds, record.log_seconds, *(x for one in record.estimates.values() for x in one[:2])]
+    real = [
+        record.seconds,
+        record.log_seconds,
+        *(x for one in record.estimates.values() for x in one[:2]),
+    ]
     real += [label for label in job.labels.values() if isinstance(label, float)]
     if name_fault(job.name) is not None or record_name(job.name) != place:
         return f"job.name: expected the job whose record lies here, found {job.name!r:.60}"
     if [one.path for one in record.inputs] != [*job.logs, *job.loaded]:
         return "inputs: expected the job's own logs"
-    if not all(math.isfinite(x) for x in real if x is not None) or not all(-(2**63) <= n < 2**63 for n in whole):
+    if not all(math.isfinite(x) for x in real if x is not None) or not all(
+        -(2**63) <= n < 2**63 for n in whole
+    ):
         return "expected finite numbers, whole ones of 64 bits"
     if not all(map(_is_estimates, record.estimates)):
         return "estimates: expected the names of parameters"

@@ -79,8 +79,8 @@ class Recipe:
 class BatchPlan:
     """Tasks to run, records of jobs that cannot even start, and records that stand as they are.
 
-    Of `unseen` jobs an earlier end is known, and it cannot be looked at whether their logs and results are as they
-    were: they fail this time, and what is known of them stays.
+    Of `unseen` jobs an earlier end is known, and it cannot be looked at whether their logs and
+    results are as they were: they fail this time, and what is known of them stays.
     """
 
     tasks: list[Task] = field(default_factory=list)
@@ -90,9 +90,16 @@ class BatchPlan:
 
 
 def plan(
-    jobs: Iterable[Job], records: Mapping[str, JobRecord], recipe: Recipe, store: Store, retry_failed: bool = False
+    jobs: Iterable[Job],
+    records: Mapping[str, JobRecord],
+    recipe: Recipe,
+    store: Store,
+    retry_failed: bool = False,
 ) -> BatchPlan:
-    """Sort jobs by what is known of them; a job whose logs and settings are as they were is not run again."""
+    """Sort jobs by what is known of them.
+
+    a job whose logs and settings are as they were is not run again.
+    """
     made = BatchPlan()
     for job in jobs:
         try:
@@ -116,7 +123,8 @@ def plan(
 def _standing(record: JobRecord | None, task: Task, store: Store) -> JobRecord | None:
     """The record with its job and logs as they are now, if it still tells what would come of the task.
 
-    Times of change that moved while the content did not are taken over, so that it is hashed once for them.
+    Times of change that moved while the content did not are taken over, so that it is hashed once
+    for them.
     """
     job = kept(task.job)
     if record is None or record.basis != task.basis:
@@ -172,7 +180,12 @@ class Batch:
     """
 
     def __init__(
-        self, store: Store, recipe: Recipe, executor: Executor, slots: int, progress: Callable[[Progress], None]
+        self,
+        store: Store,
+        recipe: Recipe,
+        executor: Executor,
+        slots: int,
+        progress: Callable[[Progress], None],
     ) -> None:
         self._store, self._recipe, self._executor = store, recipe, executor
         self._slots, self._progress = slots, progress
@@ -191,8 +204,8 @@ class Batch:
     def run(self, jobs: Sequence[Job], retry_failed: bool = False) -> Ended:
         """Bring `jobs` to an end, and write ``jobs.parquet``.
 
-        Labels, robot and time decide nothing about a job's outcome: a record that stands takes over new ones. Jobs of
-        earlier runs that are not among `jobs` keep their rows.
+        Labels, robot and time decide nothing about a job's outcome: a record that stands takes
+        over new ones. Jobs of earlier runs that are not among `jobs` keep their rows.
         """
         made = plan(jobs, self.records, self._recipe, self._store, retry_failed)
         unseen = {record.job.name: record for record in made.unseen}
@@ -202,7 +215,9 @@ class Batch:
         left = self._work(deque(made.tasks))
         self._write_table()
         now = {**self.records, **unseen}
-        return Ended([now[job.name] for job in jobs if job.name in now], self._ran, left, self._stopped)
+        return Ended(
+            [now[job.name] for job in jobs if job.name in now], self._ran, left, self._stopped
+        )
 
     def _write_table(self) -> None:
         """Write ``jobs.parquet`` where it is not that of the records."""
@@ -268,14 +283,20 @@ class Batch:
         return True
 
     def _without_old_result(self, record: JobRecord) -> JobRecord:
-        """The record of a job; where it failed and its logs are others than before, their result is removed."""
+        """The record of a job.
+
+        Where it failed and its logs are others than before, their result is removed.
+        """
         before = self.records.get(record.job.name)
         if _has_result(record) or before is None or same_logs(before.inputs, record.inputs):
             return record
         try:
             self._store.remove(f"{record.job.name}.algid")
         except OutputError as error:
-            return replace(record, reason=f"{record.reason}; the result of what its log held before stays: {error}")
+            return replace(
+                record,
+                reason=f"{record.reason}; the result of what its log held before stays: {error}",
+            )
         return record
 
     def _cannot_go_on(self, error: OutputError) -> None:
@@ -296,7 +317,11 @@ class Settling:
         """Those of `jobs` whose logs are as the last call saw them, and hold something."""
         now = {path: _seen(path) for job in jobs for path in (*job.logs, *job.loaded)}
         before, self._before = self._before, now
-        still = {p for p, seen in now.items() if p in before and seen == before[p] and (seen is None or seen.size > 0)}
+        still = {
+            p
+            for p, seen in now.items()
+            if p in before and seen == before[p] and (seen is None or seen.size > 0)
+        }
         return [job for job in jobs if still.issuperset((*job.logs, *job.loaded))]
 
 
@@ -310,7 +335,10 @@ def _seen(path: str) -> Input | None:
 
 @contextmanager
 def stopped_by_signals(stop: threading.Event) -> Iterator[None]:
-    """The first signal that would end the process sets `stop`; a second one raises `KeyboardInterrupt`."""
+    """The first signal that would end the process sets `stop`.
+
+    a second one raises `KeyboardInterrupt`.
+    """
 
     def handle(_number: int, _frame: FrameType | None) -> None:
         if stop.is_set():

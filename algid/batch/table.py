@@ -28,12 +28,11 @@ def write_jobs(store: Store, records: Sequence[JobRecord]) -> None:
 def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
     """A row a record.
 
-    Columns: job, robot, time, status, reason, seconds, log_seconds, estimator (whose numbers these are; the one
-    asked for stands in the settings), verdict
-    (good, reservations or failed), version, settings (JSON); logs, sha256, size in bytes and time of change
-    (lists; a log that was fetched in part has no sha256); ``label_X`` for each label, numbers where every one is,
-    text otherwise; ``k``, ``k_std`` and
-    ``k_status`` for each estimate, null where there is none.
+    Columns: job, robot, time, status, reason, seconds, log_seconds, estimator (whose numbers these
+    are; the one asked for stands in the settings), verdict (good, reservations or failed),
+    version, settings (JSON); logs, sha256, size in bytes and time of change (lists; a log that was
+    fetched in part has no sha256); ``label_X`` for each label, numbers where every one is, text
+    otherwise; ``k``, ``k_std`` and ``k_status`` for each estimate, null where there is none.
     """
     import polars as pl
 
@@ -51,9 +50,13 @@ def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
         "command": pl.Series([r.command for r in records], dtype=pl.String),
         "estimator": pl.Series([r.estimator for r in records], dtype=pl.String),
         "version": pl.Series([r.version for r in records], dtype=pl.String),
-        "settings": pl.Series([json.dumps(r.settings, sort_keys=True) for r in records], dtype=pl.String),
+        "settings": pl.Series(
+            [json.dumps(r.settings, sort_keys=True) for r in records], dtype=pl.String
+        ),
         "logs": pl.Series([[i.path for i in r.inputs] for r in records], dtype=pl.List(pl.String)),
-        "sha256": pl.Series([[i.sha256 for i in r.inputs] for r in records], dtype=pl.List(pl.String)),
+        "sha256": pl.Series(
+            [[i.sha256 for i in r.inputs] for r in records], dtype=pl.List(pl.String)
+        ),
         "size": pl.Series([[i.size for i in r.inputs] for r in records], dtype=pl.List(pl.Int64)),
         "changed": pl.Series(
             [[_in_int64(i.mtime_ns) for i in r.inputs] for r in records], dtype=pl.List(pl.Int64)
@@ -63,7 +66,9 @@ def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
         labels = [r.job.labels.get(name) for r in records]
         numbers = all(label is None or type(label) in (int, float) for label in labels)
         kind, dtype = (float, pl.Float64) if numbers else (str, pl.String)
-        columns[f"label_{name}"] = pl.Series([None if x is None else kind(x) for x in labels], dtype=dtype)
+        columns[f"label_{name}"] = pl.Series(
+            [None if x is None else kind(x) for x in labels], dtype=dtype
+        )
     for name in _names([r.estimates for r in records]):
         found = [r.estimates.get(name, (None, None, None)) for r in records]
         columns[name] = pl.Series([one[0] for one in found], dtype=pl.Float64)

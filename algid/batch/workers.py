@@ -1,8 +1,9 @@
 """Workers that may die, hang or fail in any way without harm to each other: processes of this machine.
 
-Each worker is a `concurrent.futures.ProcessPoolExecutor` of one process, tended by a thread here that knows which call
-it runs: such a pool gives up as a whole when a process of it dies, without telling whose call killed it. Calls and
-answers travel as bytes that are packed and unpacked here, so that what cannot be pickled fails its own call alone.
+Each worker is a `concurrent.futures.ProcessPoolExecutor` of one process, tended by a thread here
+that knows which call it runs: such a pool gives up as a whole when a process of it dies, without
+telling whose call killed it. Calls and answers travel as bytes that are packed and unpacked here,
+so that what cannot be pickled fails its own call alone.
 """
 
 from __future__ import annotations
@@ -26,12 +27,21 @@ from algid.errors import text_of
 from algid.files import temporary_folder
 
 # One thread a worker: more would fight for the same cores.
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "POLARS_MAX_THREADS", "ARROW_NUM_THREADS")
+THREADS = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "POLARS_MAX_THREADS",
+    "ARROW_NUM_THREADS",
+)
 TOO_LONG = "it took longer than {:g} s; raise --timeout, and run it again with --retry-failed"
 
 
 class WorkerDiedError(Exception):
-    """The process or machine that ran a call is gone; `kills` counts how often the call did that."""
+    """The process or machine that ran a call is gone.
+
+    `kills` counts how often the call did that.
+    """
 
     def __init__(self, how: str, kills: int = 1) -> None:
         super().__init__(how)
@@ -57,11 +67,14 @@ class Workers(Executor):
 
     Notes
     -----
-    A future fails with `WorkerDiedError` where its call's process dies, and with `CallFailedError` where the call
-    raises or takes longer than `timeout`: its process is ended then, and another takes its place.
+    A future fails with `WorkerDiedError` where its call's process dies, and with `CallFailedError`
+    where the call raises or takes longer than `timeout`: its process is ended then, and another
+    takes its place.
     """
 
-    def __init__(self, workers: int, memory_limit: int | None = None, timeout: float | None = None) -> None:
+    def __init__(
+        self, workers: int, memory_limit: int | None = None, timeout: float | None = None
+    ) -> None:
         self._calls: SimpleQueue[tuple[Future[Any], bytes] | None] = SimpleQueue()
         self._memory_limit, self._timeout = memory_limit, timeout
         self._running: set[_Worker] = set()
@@ -75,7 +88,9 @@ class Workers(Executor):
     @property
     def pids(self) -> list[int]:
         """Process numbers of the workers that run."""
-        return [worker.process.pid for worker in list(self._running) if worker.process.pid is not None]
+        return [
+            worker.process.pid for worker in list(self._running) if worker.process.pid is not None
+        ]
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Run ``fn(*args, **kwargs)`` in a worker."""
@@ -113,7 +128,11 @@ class Workers(Executor):
                     if self._ended.is_set():  # it was not yet there to be killed
                         worker.process.kill()
                 future.set_result(worker.answer(packed, self._timeout))
-            except (CallFailedError, WorkerDiedError, OSError) as error:  # OSError: no process could be started
+            except (
+                CallFailedError,
+                WorkerDiedError,
+                OSError,
+            ) as error:  # OSError: no process could be started
                 future.set_exception(error)
             if worker is not None and worker.gone:
                 self._running.discard(worker)
@@ -132,7 +151,9 @@ class _Worker:
         self.gone = False
         try:
             pid = self._pool.submit(os.getpid).result()
-            self.process = next(process for process in multiprocessing.active_children() if process.pid == pid)
+            self.process = next(
+                process for process in multiprocessing.active_children() if process.pid == pid
+            )
         except (BrokenProcessPool, StopIteration) as error:
             self._pool.shutdown()
             raise WorkerDiedError("the worker ended before it began") from error
@@ -157,7 +178,11 @@ class _Worker:
         except BrokenProcessPool as error:
             self.end()
             code = self.process.exitcode or 0
-            how = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+            how = (
+                f"was ended by {signal.Signals(-code).name}"
+                if code < 0
+                else f"ended with exit code {code}"
+            )
             raise WorkerDiedError(f"the worker {how}") from error
 
     def end(self) -> None:
@@ -169,7 +194,9 @@ class _Worker:
 
 def _prepare(memory_limit: int | None, temporary: Path) -> None:
     """The start of a worker's life."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
+    signal.signal(
+        signal.SIGINT, signal.SIG_IGN
+    )  # Ctrl-C reaches the whole group; the parent decides
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     os.environ.update(dict.fromkeys(THREADS, "1"))  # before anything loads numpy
     tempfile.tempdir = str(temporary)  # the parent removes it, however this process ends
@@ -181,7 +208,9 @@ def _prepare(memory_limit: int | None, temporary: Path) -> None:
     import polars as pl
     import pyarrow.parquet  # noqa: F401
 
-    pl.select(pl.lit(1)).lazy().collect()  # a library whose threads cannot start waits for them for ever
+    pl.select(
+        pl.lit(1)
+    ).lazy().collect()  # a library whose threads cannot start waits for them for ever
     # Data, not address space: allocators and threads reserve far more addresses than they use.
     _, hard = resource.getrlimit(resource.RLIMIT_DATA)
     limit = memory_limit if hard == resource.RLIM_INFINITY else min(memory_limit, hard)

@@ -77,7 +77,10 @@ def run(arguments: Sequence[str]) -> int:
 
 
 class _Stopping:
-    """Leave by an exception, so that what is half-written is taken away; what comes meanwhile has to wait."""
+    """Leave by an exception, so that what is half-written is taken away.
+
+    What comes meanwhile has to wait.
+    """
 
     def __init__(self) -> None:
         self._patient_until = 0.0

@@ -63,7 +63,10 @@ def _print_version(wanted: bool) -> None:
 
 def _root(
     _version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version."
+        ),
     ] = False,
 ) -> None:
     pass
@@ -93,7 +96,9 @@ def gathered(names: Iterable[str], *, listed: bool = False) -> typer.Typer:
             (lambda: None) if listed else command
         )
     if len(wanted) != 1:
-        profiles = typer.Typer(help="Profiles tell what a log's names, units and signs mean.", no_args_is_help=True)
+        profiles = typer.Typer(
+            help="Profiles tell what a log's names, units and signs mean.", no_args_is_help=True
+        )
         new = import_module("algid.cli.profile").new
         profiles.command("new", help=_help(new))(new)
         made.add_typer(profiles, name="profile")
@@ -106,4 +111,8 @@ def called(arguments: Sequence[str]) -> typer.Typer:
     completing = any(name.startswith("_ALGID_COMPLETE") for name in os.environ)
     if completing:
         return gathered(COMMANDS)
-    return gathered([first]) if first in COMMANDS else gathered(COMMANDS, listed=first in ("", "-h", "--help"))
+    return (
+        gathered([first])
+        if first in COMMANDS
+        else gathered(COMMANDS, listed=first in ("", "-h", "--help"))
+    )

@@ -25,38 +25,62 @@ if TYPE_CHECKING:
 def batch(
     choice: Choice,
     sources: Annotated[
-        list[str], typer.Argument(metavar="SOURCE...", help="Folders, logs, globs, URLs, or a manifest (CSV, TOML).")
+        list[str],
+        typer.Argument(
+            metavar="SOURCE...", help="Folders, logs, globs, URLs, or a manifest (CSV, TOML)."
+        ),
     ],
-    out: Annotated[str, typer.Option("-o", "--out", help="Folder, or s3://, gs://, az:// URL, for all results.")],
+    out: Annotated[
+        str,
+        typer.Option("-o", "--out", help="Folder, or s3://, gs://, az:// URL, for all results."),
+    ],
     parameters: Annotated[
-        Path | None, typer.Option(help="Result of the arm identified before: then logs are of the loaded arm.")
+        Path | None,
+        typer.Option(help="Result of the arm identified before: then logs are of the loaded arm."),
     ] = None,
     workers: Annotated[
         int | None, typer.Option(help="Worker processes; one a core by default.", min=1, max=4096)
     ] = None,
-    scheduler: Annotated[str | None, typer.Option(help="tcp://HOST:PORT of a Dask scheduler to run on.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="tcp://HOST:PORT of a Dask scheduler to run on.")
+    ] = None,
     memory_limit: Annotated[
-        str | None, typer.Option(help="Memory of each worker, like 2GB; a job that needs more fails alone.")
+        str | None,
+        typer.Option(help="Memory of each worker, like 2GB; a job that needs more fails alone."),
     ] = None,
     timeout: Annotated[
-        float, typer.Option(help="Seconds that a job may take; one that takes longer fails alone.", min=1e-3, max=1e7)
+        float,
+        typer.Option(
+            help="Seconds that a job may take; one that takes longer fails alone.",
+            min=1e-3,
+            max=1e7,
+        ),
     ] = 3600.0,
-    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Run jobs again that have failed.")] = False,
-    watch: Annotated[bool, typer.Option("--watch", help="Go on, and take logs as they arrive.")] = False,
-    report: Annotated[bool, typer.Option(help="Write pages and time series beside each result.json.")] = True,
+    retry_failed: Annotated[
+        bool, typer.Option("--retry-failed", help="Run jobs again that have failed.")
+    ] = False,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Go on, and take logs as they arrive.")
+    ] = False,
+    report: Annotated[
+        bool, typer.Option(help="Write pages and time series beside each result.json.")
+    ] = True,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Identify many logs: a result folder a job and OUT/jobs.parquet; what is done already is not done again.
+    """Identify many logs: a result folder a job and OUT/jobs.parquet.
 
-    X-unloaded.* and X-loaded.* are one job X. Ctrl-C ends it at once, and what was running is done by the
-    next run.
+    What is done already is not done again.
+
+    X-unloaded.* and X-loaded.* are one job X. Ctrl-C ends it at once, and what was running is done
+    by the next run.
 
     Example: algid batch logs/ -o results --workers 2
 
     Raises
     ------
     SettingError
-        If workers or their memory are given beside a scheduler, there is no OUT, or the sources hold no log.
+        If workers or their memory are given beside a scheduler, there is no OUT, or the sources
+        hold no log.
     """
     from algid.batch.discover import jobs_of
     from algid.batch.lock import locked
@@ -69,9 +93,13 @@ def batch(
         raise SettingError("-o: expected a folder or a URL, found none; name where results go")
     bytes_each = None if memory_limit is None else _bytes(memory_limit)
     if scheduler is not None and (workers is not None or memory_limit is not None):
-        raise SettingError("--scheduler: workers and their memory are the cluster's; set them where it is started")
+        raise SettingError(
+            "--scheduler: workers and their memory are the cluster's; set them where it is started"
+        )
     known = None if parameters is None else read_result(parameters)
-    profile = cache(lambda file: choice.profile(None if file is None else Path(file)))  # each file is read once
+    profile = cache(
+        lambda file: choice.profile(None if file is None else Path(file))
+    )  # each file is read once
     if scheduler is not None:  # a worker's own folder is another
         sources, out = [absolute(source) for source in sources], absolute(out)
     recipe = Recipe(out, choice.settings(), profile, known, report)
@@ -79,7 +107,9 @@ def batch(
     alone = "logs" if known is None else "loaded"
     jobs = [] if watch else jobs_of(sources, out, alone)
     if not (jobs or watch):
-        raise SettingError(f"{' '.join(sources)}: expected logs in MCAP, Parquet or CSV, found none")
+        raise SettingError(
+            f"{' '.join(sources)}: expected logs in MCAP, Parquet or CSV, found none"
+        )
     store = open_store(out)
     with locked(out):
         sweep(store)
@@ -91,7 +121,9 @@ def batch(
                 running = Batch(store, recipe, executor, slots, progress)
                 with stopped_by_signals(running.stop):
                     ended = (
-                        _watch(running, sources, out, alone, retry_failed) if watch else running.run(jobs, retry_failed)
+                        _watch(running, sources, out, alone, retry_failed)
+                        if watch
+                        else running.run(jobs, retry_failed)
                     )
         finally:
             sweep(store)
@@ -127,7 +159,9 @@ def _bytes(text: str) -> int:
     from algid.errors import SettingError
 
     if sys.platform == "darwin":
-        raise SettingError("--memory-limit: macOS does not bound the memory of a process; leave it out")
+        raise SettingError(
+            "--memory-limit: macOS does not bound the memory of a process; leave it out"
+        )
     units = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9, "ki": 2**10, "mi": 2**20, "gi": 2**30}
     number = text.strip().lower().removesuffix("b")
     unit = number.lstrip("0123456789.").strip()
@@ -142,7 +176,10 @@ def _bytes(text: str) -> int:
 
 @contextmanager
 def _progress(quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """A line for each job that ends, written over the last one; nothing where standard error is no terminal."""
+    """A line for each job that ends, written over the last one.
+
+    Nothing where standard error is no terminal.
+    """
     if quiet or not sys.stderr.isatty():
         yield lambda _progress: None
         return
@@ -192,7 +229,9 @@ def _conclude(ended: Ended, stopped: bool, out: str, quiet: bool) -> None:
             say(f"{visible(record.job.name)}: {record.status.value}: {visible(record.reason)}")
         counts = {end: sum(record.status is end for record in ended.records) for end in End}
         summary = ", ".join(f"{count} {end.value}" for end, count in counts.items() if count)
-        say(f"{summary or 'nothing done'}; {ended.ran} run now, {ended.left} left; {shown(out)}/jobs.parquet")
+        say(
+            f"{summary or 'nothing done'}; {ended.ran} run now, {ended.left} left; {shown(out)}/jobs.parquet"
+        )
     if ended.stopped is not None:
         complain(ended.stopped)
     elif stopped:

@@ -22,11 +22,15 @@ class Against(StrEnum):
 def check(
     result: Annotated[Path, typer.Argument(help="A result folder or its result.json.")],
     against: Annotated[
-        Against, typer.Option(help="paper: each error at most Table 4's; truth: each at most --max-error.")
+        Against,
+        typer.Option(help="paper: each error at most Table 4's; truth: each at most --max-error."),
     ] = Against.TRUTH,
-    max_error: Annotated[float | None, typer.Option(help="Largest error allowed, percent.", min=0, max=1e9)] = None,
+    max_error: Annotated[
+        float | None, typer.Option(help="Largest error allowed, percent.", min=0, max=1e9)
+    ] = None,
     tolerance_file: Annotated[
-        Path | None, typer.Option(help="TOML with a table [max_error_percent]: parameter = percent.")
+        Path | None,
+        typer.Option(help="TOML with a table [max_error_percent]: parameter = percent."),
     ] = None,
 ) -> None:
     """Compare a result's errors with their limits, row by row; exit code 1 when one is over.

@@ -13,9 +13,15 @@ from algid.errors import SettingError
 
 
 def compare(
-    results: Annotated[list[Path], typer.Argument(metavar="RESULT RESULT...", help="Two results or more.")],
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder to write the page compare.html to.")] = None,
-    form: Annotated[ResultFormat, typer.Option("--format", help="How to print the comparison.")] = ResultFormat.TABLE,
+    results: Annotated[
+        list[Path], typer.Argument(metavar="RESULT RESULT...", help="Two results or more.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder to write the page compare.html to.")
+    ] = None,
+    form: Annotated[
+        ResultFormat, typer.Option("--format", help="How to print the comparison.")
+    ] = ResultFormat.TABLE,
 ) -> None:
     """Lay results side by side: differences in σ from the first one, and which settings differ.
 
@@ -33,7 +39,9 @@ def compare(
     from algid.results import read_result
 
     if len(results) < 2:
-        raise SettingError(f"compare: expected two results or more, found {len(results)}; name another one")
+        raise SettingError(
+            f"compare: expected two results or more, found {len(results)}; name another one"
+        )
     read = [read_result(path) for path in results]
     found = compared(read, labels(results))
     if form is ResultFormat.TABLE:

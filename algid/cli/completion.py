@@ -20,7 +20,11 @@ def listed(known: Callable[[], list[str]]) -> Completion:
 
     def complete(incomplete: str) -> list[str]:
         *before, last = incomplete.split(",")
-        return [",".join([*before, word]) for word in known() if word.startswith(last) and word not in before]
+        return [
+            ",".join([*before, word])
+            for word in known()
+            if word.startswith(last) and word not in before
+        ]
 
     return complete
 
@@ -60,12 +64,18 @@ def settings_of_profile(incomplete: str) -> list[str]:
     found = []
     for name, field in Profile.model_fields.items():
         inner = getattr(field.annotation, "model_fields", None)
-        lines = {name: field} if inner is None else {f"{name}.{one}": part for one, part in inner.items()}
+        lines = (
+            {name: field}
+            if inner is None
+            else {f"{name}.{one}": part for one, part in inner.items()}
+        )
         for line, part in lines.items():
             if not equals and line.startswith(key):
                 found.append(f"{line}=")
             elif equals and line == key:
-                found += [f"{key}={word}" for word in _choices(part.annotation) if word.startswith(value)]
+                found += [
+                    f"{key}={word}" for word in _choices(part.annotation) if word.startswith(value)
+                ]
     return found
 
 
@@ -74,7 +84,10 @@ def or_files(*known: str) -> Completion:
 
     def complete(incomplete: str) -> list[str]:
         paths = sorted(glob.glob(f"{glob.escape(incomplete)}*"))  # noqa: PTH207  # as it was typed
-        return [*words(*known)(incomplete), *(f"{path}/" if Path(path).is_dir() else path for path in paths)]
+        return [
+            *words(*known)(incomplete),
+            *(f"{path}/" if Path(path).is_dir() else path for path in paths),
+        ]
 
     return complete
 

@@ -22,10 +22,14 @@ if TYPE_CHECKING:
 def convert(
     choice: Choice,
     source: Annotated[Path, typer.Argument(metavar="IN", help="The log to read.")],
-    target: Annotated[Path, typer.Argument(metavar="OUT", help="The log to write: .mcap, .parquet or .csv.")],
+    target: Annotated[
+        Path, typer.Argument(metavar="OUT", help="The log to write: .mcap, .parquet or .csv.")
+    ],
     force: Annotated[bool, typer.Option(help="Overwrite OUT.")] = False,
 ) -> None:
-    """Write a log in another format, in SI units, with canonical names; a synthetic log keeps its truth.
+    """Write a log in another format, in SI units, with canonical names.
+
+    a synthetic log keeps its truth.
 
     Example: algid convert rosbag2_2026/ arm.parquet --joints shoulder,elbow --zero hanging
 

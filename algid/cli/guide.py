@@ -55,7 +55,9 @@ TERMS_MARK = "<!-- terms -->"
 
 
 def guide(
-    topic: Annotated[GuideTopic | None, typer.Argument(help="One of the topics; the list of them without.")] = None,
+    topic: Annotated[
+        GuideTopic | None, typer.Argument(help="One of the topics; the list of them without.")
+    ] = None,
 ) -> None:
     """Read the guide in the terminal.
 
@@ -84,7 +86,10 @@ def _table_of_terms() -> str:
     """The torque's terms as a table of Markdown."""
     from algid.physics.terms import OPTIONAL
 
-    rows = ["| term | what it is | what it adds to the torque | its parameters |", "|---|---|---|---|"]
+    rows = [
+        "| term | what it is | what it adds to the torque | its parameters |",
+        "|---|---|---|---|",
+    ]
     for term in OPTIONAL:
         meanings = "; ".join(f"{one.name}, {one.unit}: {one.meaning}" for one in term.parameters)
         needs = f", beside `{term.needs}`" if term.needs else ""

@@ -24,37 +24,54 @@ OUTPUT = "Output"
 @takes_settings
 def identify(
     choice: Choice,
-    logs: Annotated[list[Path], typer.Argument(help="Logs of the arm without payload; loaded ones with --parameters.")],
+    logs: Annotated[
+        list[Path],
+        typer.Argument(help="Logs of the arm without payload; loaded ones with --parameters."),
+    ],
     loaded: Annotated[
         list[Path] | None, typer.Option(help="A log of the arm with its payload; may be repeated.")
     ] = None,
     out: Annotated[
-        Path, typer.Option("-o", "--out", help="Folder for the result folder LOG.algid.", rich_help_panel=OUTPUT)
+        Path,
+        typer.Option(
+            "-o", "--out", help="Folder for the result folder LOG.algid.", rich_help_panel=OUTPUT
+        ),
     ] = Path(),
     name: Annotated[
         str | None,
-        typer.Option(help="Of the result folder, NAME.algid; LOG's name by default.", rich_help_panel=OUTPUT),
+        typer.Option(
+            help="Of the result folder, NAME.algid; LOG's name by default.", rich_help_panel=OUTPUT
+        ),
     ] = None,
     parameters: Annotated[
-        Path | None, typer.Option(help="Result of the arm identified before: then LOGS are of the loaded arm.")
+        Path | None,
+        typer.Option(help="Result of the arm identified before: then LOGS are of the loaded arm."),
     ] = None,
     force: Annotated[
-        bool, typer.Option("--force", help="Replace a result that is there.", rich_help_panel=OUTPUT)
+        bool,
+        typer.Option("--force", help="Replace a result that is there.", rich_help_panel=OUTPUT),
     ] = False,
     report: Annotated[
-        bool, typer.Option(help="Write pages and time series beside result.json.", rich_help_panel=OUTPUT)
+        bool,
+        typer.Option(
+            help="Write pages and time series beside result.json.", rich_help_panel=OUTPUT
+        ),
     ] = True,
     export: ExportTo = None,
     output: Annotated[
         ResultFormat, typer.Option("--format", help="What to print.", rich_help_panel=OUTPUT)
     ] = ResultFormat.TABLE,
     quiet: Annotated[
-        bool, typer.Option("-q", "--quiet", help="Print nothing but errors.", rich_help_panel=OUTPUT)
+        bool,
+        typer.Option("-q", "--quiet", help="Print nothing but errors.", rich_help_panel=OUTPUT),
     ] = False,
     verbose: Annotated[
         bool,
         typer.Option(
-            "-v", "--verbose", help="All tables, reasons, logs, channels and settings.", rich_help_panel=OUTPUT
+            "-v",
+            "--verbose",
+            help="All tables, reasons, logs, channels and settings.",
+            rich_help_panel=OUTPUT,
         ),
     ] = False,
 ) -> None:
@@ -82,7 +99,9 @@ def identify(
         raise SettingError("--export: the log is made from the time series; leave --no-report out")
     keep_freed()
     settings = choice.settings()
-    unloaded, loaded = (logs, loaded or []) if parameters is None else ([], [*logs, *(loaded or [])])
+    unloaded, loaded = (
+        (logs, loaded or []) if parameters is None else ([], [*logs, *(loaded or [])])
+    )
     with progress("samples", quiet) as shown:
         result = run(
             unloaded,

@@ -26,7 +26,9 @@ MOST_SHOWN = 100
 def inspect(
     choice: Choice,
     log: Annotated[Path, typer.Argument(help="CSV, Parquet or MCAP log, or a rosbag2 folder.")],
-    output: Annotated[Literal["table", "json"], typer.Option("--format", help="table or json.")] = "table",
+    output: Annotated[
+        Literal["table", "json"], typer.Option("--format", help="table or json.")
+    ] = "table",
 ) -> None:
     """Show what a log holds, which channels would be used, and what is wrong with it.
 
@@ -35,8 +37,8 @@ def inspect(
     Raises
     ------
     typer.Exit
-        At the end: with 2 for a log that would be refused, 3 where physics contradicts its convention, 4 where samples
-        are missing, else with 0.
+        At the end: with 2 for a log that would be refused, 3 where physics contradicts its
+        convention, 4 where samples are missing, else with 0.
     """
     import json
 
@@ -49,26 +51,40 @@ def inspect(
         terminal = console(highlight=False)
         _print_content(found, terminal)
         _print_worth(found, terminal)
-    raise typer.Exit(Exit.USAGE if found.refused else exit_of(failed=found.contradicted, lost=found.lossy))
+    raise typer.Exit(
+        Exit.USAGE if found.refused else exit_of(failed=found.contradicted, lost=found.lossy)
+    )
 
 
 def _print_content(found: Inspection, console: Console) -> None:
     """What the log holds, and which of it would be used."""
     from rich.markup import escape
 
-    console.print(f"{escape(plain(found.path))}: {found.format}{', synthetic' if found.synthetic else ''}")
+    console.print(
+        f"{escape(plain(found.path))}: {found.format}{', synthetic' if found.synthetic else ''}"
+    )
     shown = found.entries[:MOST_SHOWN]
-    rows = [(one.name[:80], one.type[:60], _known(one.count, "d"), _known(one.rate, ".4g")) for one in shown]
+    rows = [
+        (one.name[:80], one.type[:60], _known(one.count, "d"), _known(one.rate, ".4g"))
+        for one in shown
+    ]
     if len(found.entries) > len(shown):
         rows.append((f"and {len(found.entries) - len(shown)} more", "", "", ""))
     rated = any(one.rate for one in shown)
     header = ("name", "type", "samples", "Hz")
-    _table(console, "channels", header if rated else header[:3], rows if rated else [row[:3] for row in rows])
+    _table(
+        console,
+        "channels",
+        header if rated else header[:3],
+        rows if rated else [row[:3] for row in rows],
+    )
     for entry in shown:
         if entry.joints or entry.fields:
             joints = f"joints {', '.join(entry.joints)}; " if entry.joints else ""
             fields = ", ".join(entry.fields[:12]) + (" …" if len(entry.fields) > 12 else "")
-            console.print(escape(plain(f"{entry.name}: {joints}fields {fields or 'without a number'}")))
+            console.print(
+                escape(plain(f"{entry.name}: {joints}fields {fields or 'without a number'}"))
+            )
     _table(console, "taken as", ("algid", "log"), sorted((found.mapping or {}).items()))
 
 
@@ -87,7 +103,13 @@ def _print_worth(found: Inspection, console: Console) -> None:
             f"jitter {clock.jitter * 1e3:.3g} ms, {counted(clock.gaps, 'gap')}, the longest {clock.longest_gap:.3g} s"
         )
     signals = [
-        (name, *(f"{value:.4g}" for value in (one.low, one.high, one.noise, one.step, 100 * one.saturated)))
+        (
+            name,
+            *(
+                f"{value:.4g}"
+                for value in (one.low, one.high, one.noise, one.step, 100 * one.saturated)
+            ),
+        )
         for name, one in (found.signals or {}).items()
     ]
     _table(console, "signals", ("channel", "low", "high", "noise", "step", "saturated %"), signals)
@@ -112,7 +134,9 @@ def plain(text: str) -> str:
     return "".join(letter if letter.isprintable() else "\ufffd" for letter in text)
 
 
-def _table(console: Console, title: str, header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
+def _table(
+    console: Console, title: str, header: tuple[str, ...], rows: Sequence[tuple[str, ...]]
+) -> None:
     from rich.markup import escape
     from rich.table import Table
 

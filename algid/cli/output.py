@@ -1,6 +1,7 @@
 """What commands print: the one place that makes text printable, whoever wrote it.
 
-A name in a log, a status in a result that was tampered with, a path: any may hold what drives a terminal.
+A name in a log, a status in a result that was tampered with, a path: any may hold what drives a
+terminal.
 """
 
 from __future__ import annotations
@@ -39,9 +40,13 @@ def console(**options: Any) -> Console:
     class Printable(Console):
         """Shows what a segment would do to the terminal, but for what rich itself has it do."""
 
-        def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        def render(
+            self, renderable: RenderableType, options: ConsoleOptions | None = None
+        ) -> Iterable[Segment]:
             """The segments of `renderable`, their text printable."""
             for segment in super().render(renderable, options):
-                yield segment if segment.control else Segment(printable(segment.text), segment.style)
+                yield (
+                    segment if segment.control else Segment(printable(segment.text), segment.style)
+                )
 
     return Printable(**options)

@@ -12,7 +12,9 @@ from algid.cli.output import say
 
 def new(
     log: Annotated[Path, typer.Argument(help="The log to write a profile for.")],
-    out: Annotated[Path, typer.Option("-o", "--out", help="Where to write it.")] = Path("algid.toml"),
+    out: Annotated[Path, typer.Option("-o", "--out", help="Where to write it.")] = Path(
+        "algid.toml"
+    ),
     force: Annotated[bool, typer.Option(help="Overwrite the profile.")] = False,
 ) -> None:
     """Write a profile with everything that can be set, filled in with what a log tells.

@@ -37,7 +37,9 @@ class Export(StrEnum):
 
 ExportTo = Annotated[
     Export | None,
-    typer.Option(help="Also write estimates.mcap, for Foxglove and PlotJuggler.", rich_help_panel="Output"),
+    typer.Option(
+        help="Also write estimates.mcap, for Foxglove and PlotJuggler.", rich_help_panel="Output"
+    ),
 ]
 
 
@@ -50,20 +52,28 @@ class PlotFormat(StrEnum):
 
 SavePlots = Annotated[
     Path | None,
-    typer.Option(help="Folder for each figure as a file of its own, for papers; needs matplotlib: algid[plots]."),
+    typer.Option(
+        help="Folder for each figure as a file of its own, for papers; needs matplotlib: algid[plots]."
+    ),
 ]
 
 
 def report(
     results: Annotated[
-        list[Path], typer.Argument(metavar="RESULT...", help="Folders of algid identify or algid track.")
+        list[Path],
+        typer.Argument(metavar="RESULT...", help="Folders of algid identify or algid track."),
     ],
-    form: Annotated[ResultFormat, typer.Option("--format", help="How to print the result.")] = ResultFormat.TABLE,
+    form: Annotated[
+        ResultFormat, typer.Option("--format", help="How to print the result.")
+    ] = ResultFormat.TABLE,
     export: ExportTo = None,
     save_plots: SavePlots = None,
-    plot_format: Annotated[PlotFormat, typer.Option(help="What --save-plots writes.")] = PlotFormat.PDF,
+    plot_format: Annotated[
+        PlotFormat, typer.Option(help="What --save-plots writes.")
+    ] = PlotFormat.PDF,
     shared_library: Annotated[
-        bool, typer.Option("--shared-library", help="Put the plotting library once beside the folders.")
+        bool,
+        typer.Option("--shared-library", help="Put the plotting library once beside the folders."),
     ] = False,
 ) -> None:
     """Write report.html and report.md into each RESULT and print its table.
@@ -76,7 +86,9 @@ def report(
         if is_track(folder):
             written, figures = _track(folder, form, mcap=export is not None)
         else:
-            written, figures = _identification(folder, form, shared_library, mcap=export is not None)
+            written, figures = _identification(
+                folder, form, shared_library, mcap=export is not None
+            )
         if save_plots is not None:
             from algid.report.plots import save_plots as save
 
@@ -85,7 +97,9 @@ def report(
             remark(f"wrote {path}")
 
 
-def _identification(folder: Path, form: ResultFormat, shared_library: bool, *, mcap: bool) -> Written:
+def _identification(
+    folder: Path, form: ResultFormat, shared_library: bool, *, mcap: bool
+) -> Written:
     """Write a result's pages and print it."""
     from algid.report.export import export_mcap
     from algid.report.gallery import gallery

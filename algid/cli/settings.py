@@ -1,6 +1,7 @@
 """The command line's options of `Settings`, one a field, and those of a profile: what a log means.
 
-A command declares its own options; `takes_settings` and `takes_profile` add these, and hand it a `Choice` of both.
+A command declares its own options; `takes_settings` and `takes_profile` add these, and hand it a
+`Choice` of both.
 """
 
 from __future__ import annotations
@@ -46,13 +47,25 @@ OF_PROFILE: Mapping[str, tuple[Any, str, Completion | None]] = {
     "torque_unit": (str, '"N m", "mN m", A or mA.', of_profile("unit", "tau1")),
     "zero": (str, "Where θ1 is zero: horizontal or hanging.", of_profile("zero")),
     "second_angle": (str, "θ2 is relative (to link 1) or absolute.", of_profile("second_angle")),
-    "drive": (str, "Where the second motor stands: in its joint, or at the base.", of_profile("drive")),
-    "passive": (str, "The joint without a motor, 1 or 2: its torque is zero.", of_profile("passive")),
+    "drive": (
+        str,
+        "Where the second motor stands: in its joint, or at the base.",
+        of_profile("drive"),
+    ),
+    "passive": (
+        str,
+        "The joint without a motor, 1 or 2: its torque is zero.",
+        of_profile("passive"),
+    ),
     "clock": (str, "Stamps of the messages' header, or of the log.", of_profile("clock")),
     "start": (str, "Leave out what comes before, s since the log's first sample.", None),
     "end": (str, "Leave out what comes after, s since the log's first sample.", None),
     "accept": (str, "Checks that may warn but not refuse, as CODE,CODE.", listed(refusing_checks)),
-    "set": (list[str], "Any setting of a profile, as tau1.sign=-1; may be repeated.", settings_of_profile),
+    "set": (
+        list[str],
+        "Any setting of a profile, as tau1.sign=-1; may be repeated.",
+        settings_of_profile,
+    ),
 }
 """Type, help and completion of a profile's file, of each of its settings with a flag of its own, and of any other."""
 CHANNELS_OF = {
@@ -67,12 +80,16 @@ def options_of_settings() -> Iterator[inspect.Parameter]:
     hints = get_type_hints(Settings)
     for field in fields(Settings):
         kind, default = hints[field.name], field.default
-        if field.metadata.get("profile"):  # the profile may say it: what is not given is not known here
+        if field.metadata.get(
+            "profile"
+        ):  # the profile may say it: what is not given is not known here
             kind, default = kind | None, None
         if "parse" in field.metadata:
             kind, default = str | None, None if default is None else f"{default:g}"
         panel = MODEL if field.name in MODELLED else METHOD
-        yield _option(field.name, kind, default, field.metadata["help"], panel, COMPLETED.get(field.name))
+        yield _option(
+            field.name, kind, default, field.metadata["help"], panel, COMPLETED.get(field.name)
+        )
 
 
 def options_of_profile() -> Iterator[inspect.Parameter]:
@@ -85,7 +102,9 @@ def _option(
     name: str, kind: Any, default: Any, text: str, panel: str, completed: Completion | None
 ) -> inspect.Parameter:
     option = typer.Option(flag(name), help=text, rich_help_panel=panel, autocompletion=completed)
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, option])
+    return inspect.Parameter(
+        name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, option]
+    )
 
 
 @dataclass(frozen=True)
@@ -109,19 +128,26 @@ class Choice:
         SettingError
             If an option is wrong.
         """
-        parsers = {field.name: field.metadata.get("parse", lambda given: given) for field in fields(Settings)}
+        parsers = {
+            field.name: field.metadata.get("parse", lambda given: given)
+            for field in fields(Settings)
+        }
         given = {name: value for name, value in self.settings_flags.items() if value is not None}
         return Settings(**{name: parsers[name](value) for name, value in given.items()})
 
     def profile(self, file: Path | None = None) -> Profile | None:
-        """The profile of `file`, or of ``--profile``, with the flags over it; None where none is given.
+        """The profile of `file`, or of ``--profile``, with the flags over it.
+
+        None where none is given.
 
         Raises
         ------
         SettingError
             If the file or a flag is wrong.
         """
-        found = profile_from({**self.profile_flags, "profile": file or self.profile_flags.get("profile")})
+        found = profile_from(
+            {**self.profile_flags, "profile": file or self.profile_flags.get("profile")}
+        )
         gravity = self.settings_flags.get("gravity")
         if found is None or gravity is None:
             return found
@@ -179,7 +205,9 @@ def _meaning(name: str, text: str) -> dict[str, Any]:
         return parsed_toml(f"{key} = {value}")
     except (ValueError, RecursionError) as error:  # a bare word
         if key.count(".") > LIMITS.toml_key_parts:
-            raise SettingError(f"--set {key[:40]}…: {error}; expected KEY=VALUE like tau1.sign=-1") from error
+            raise SettingError(
+                f"--set {key[:40]}…: {error}; expected KEY=VALUE like tau1.sign=-1"
+            ) from error
         setting: Any = value.strip()
         for part in reversed(key.split(".")):
             setting = {part.strip(): setting}
@@ -197,16 +225,24 @@ def takes_profile(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def _taking(
-    command: Callable[..., None], profile: Sequence[inspect.Parameter], settings: Sequence[inspect.Parameter]
+    command: Callable[..., None],
+    profile: Sequence[inspect.Parameter],
+    settings: Sequence[inspect.Parameter],
 ) -> Callable[..., None]:
     _, *own = inspect.signature(command, eval_str=True).parameters.values()
 
     @wraps(command)
     def with_options(**values: Any) -> None:
-        chosen, meaning = ({one.name: values.pop(one.name) for one in part} for part in (settings, profile))
+        chosen, meaning = (
+            {one.name: values.pop(one.name) for one in part} for part in (settings, profile)
+        )
         command(Choice(chosen, meaning), **values)
 
-    every = [*(one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in own), *profile, *settings]
+    every = [
+        *(one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in own),
+        *profile,
+        *settings,
+    ]
     with_options.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]  # typer reads it
     with_options.__annotations__ = {parameter.name: parameter.annotation for parameter in every}
     return with_options

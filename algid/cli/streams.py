@@ -21,8 +21,8 @@ SPELLINGS = {
 class _Pipe(io.FileIO):
     """A descriptor whose reader may leave, like ``head``, or whose disk may be full.
 
-    What is written after that goes nowhere. That a disk is full is raised, once, where there is a `name` to tell it by:
-    about standard error nobody can be told.
+    What is written after that goes nowhere. That a disk is full is raised, once, where there is a
+    `name` to tell it by: about standard error nobody can be told.
     """
 
     def __init__(self, handle: int, told_as: str | None) -> None:
@@ -52,7 +52,9 @@ def harden_streams() -> None:
     """Let this process print whatever it has to: to a reader that leaves, and in letters that the terminal lacks."""
     codecs.register_error("spelled", _spelled)
     for name, handle, told_as in (("stdout", 1, "standard output"), ("stderr", 2, None)):
-        if getattr(sys, name) is None:  # closed: else the next file to be opened would be taken for it
+        if (
+            getattr(sys, name) is None
+        ):  # closed: else the next file to be opened would be taken for it
             _to_nowhere(handle)
             setattr(sys, name, open(handle, "w", encoding="utf-8", closefd=False))  # noqa: SIM115
         stream = getattr(sys, name)
@@ -72,6 +74,9 @@ def _spelled(error: UnicodeError) -> tuple[str, int]:
         raise error
     spelled = ""
     for letter in error.object[error.start : error.end]:
-        near = SPELLINGS.get(letter) or unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode()
+        near = (
+            SPELLINGS.get(letter)
+            or unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode()
+        )
         spelled += near or letter.encode("ascii", "backslashreplace").decode()
     return spelled, error.end

@@ -49,10 +49,13 @@ def synth(
         ),
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write into.")] = Path(),
-    kind: Annotated[LogFormat, typer.Option("--format", help="Format of the logs.")] = LogFormat.MCAP,
+    kind: Annotated[
+        LogFormat, typer.Option("--format", help="Format of the logs.")
+    ] = LogFormat.MCAP,
     rate: Annotated[float, typer.Option(help="Samples a second, Hz.", min=1e-3, max=1e6)] = 1000.0,
     duration: Annotated[
-        float | None, typer.Option(help="Length of each log, s; 1, or as long as the motion.", min=1e-3, max=1e6)
+        float | None,
+        typer.Option(help="Length of each log, s; 1, or as long as the motion.", min=1e-3, max=1e6),
     ] = None,
     torque: Annotated[
         str | None,
@@ -62,13 +65,22 @@ def synth(
         ),
     ] = None,
     motion: Annotated[
-        Path | None, typer.Option(help="Folder of algid design: a controller follows its motion, instead of --torque.")
+        Path | None,
+        typer.Option(
+            help="Folder of algid design: a controller follows its motion, instead of --torque."
+        ),
     ] = None,
     torque_hold: Annotated[
-        Hold, typer.Option(help="Whether the drive holds (zoh) or ramps (foh) the torque between samples.")
+        Hold,
+        typer.Option(
+            help="Whether the drive holds (zoh) or ramps (foh) the torque between samples."
+        ),
     ] = Hold.EXACT,
     initial: Annotated[
-        str | None, typer.Option(help="Initial state θ1,θ2,ω1,ω2 in rad and rad/s; hanging at rest by default.")
+        str | None,
+        typer.Option(
+            help="Initial state θ1,θ2,ω1,ω2 in rad and rad/s; hanging at rest by default."
+        ),
     ] = None,
     position_noise: Annotated[
         float, typer.Option(help="Noise of the angles, rad (standard deviation).", min=0, max=1e3)
@@ -77,24 +89,37 @@ def synth(
         float, typer.Option(help="Noise of the torques, N m (standard deviation).", min=0, max=1e3)
     ] = 0.0,
     encoder_bits: Annotated[
-        int | None, typer.Option(help="Round angles to 2π / 2^bits, as an encoder does.", min=4, max=32)
+        int | None,
+        typer.Option(help="Round angles to 2π / 2^bits, as an encoder does.", min=4, max=32),
     ] = None,
-    jitter: Annotated[float, typer.Option(help="Jitter of the stamps, s (standard deviation).", min=0, max=1e3)] = 0.0,
-    drop: Annotated[float, typer.Option(help="Share of samples lost at random.", min=0, max=0.9)] = 0.0,
-    seed: Annotated[int, typer.Option(help="Seed of noise, jitter and losses.", min=0, max=2**63)] = 0,
+    jitter: Annotated[
+        float, typer.Option(help="Jitter of the stamps, s (standard deviation).", min=0, max=1e3)
+    ] = 0.0,
+    drop: Annotated[
+        float, typer.Option(help="Share of samples lost at random.", min=0, max=0.9)
+    ] = 0.0,
+    seed: Annotated[
+        int, typer.Option(help="Seed of noise, jitter and losses.", min=0, max=2**63)
+    ] = 0,
     force: Annotated[bool, typer.Option("--force", help="Overwrite logs that are there.")] = False,
     start_time: Annotated[
-        datetime | None, typer.Option(help="When the log starts, in UTC; its stamps count from zero by default.")
+        datetime | None,
+        typer.Option(help="When the log starts, in UTC; its stamps count from zero by default."),
     ] = None,
     payload_schedule: Annotated[
-        str | None, typer.Option(help="One log instead, its payload changing: S=KG,…, like 2=0.05,4=0; bare before.")
+        str | None,
+        typer.Option(
+            help="One log instead, its payload changing: S=KG,…, like 2=0.05,4=0; bare before."
+        ),
     ] = None,
 ) -> None:
     """Write CASE-unloaded and CASE-loaded logs of a simulated arm; the truth travels with them.
 
-    Velocities are in the logs only where angles are exact: with noise or an encoder the arm measures none.
+    Velocities are in the logs only where angles are exact: with noise or an encoder the arm
+    measures none.
 
-    Example: algid synth case1 -o logs --position-noise 1e-3 --torque-noise 1e-2 --duration 10 --torque wide
+    Example: algid synth case1 -o logs --position-noise 1e-3 --torque-noise 1e-2 --duration 10
+    --torque wide
 
     Raises
     ------
@@ -120,7 +145,11 @@ def synth(
             refuse_existing(out / f"{described.name}-{role}.{kind.value}", force)
 
     if motion is not None:
-        for flag, value in (("--initial", initial), ("--payload-schedule", payload_schedule), ("--torque", torque)):
+        for flag, value in (
+            ("--initial", initial),
+            ("--payload-schedule", payload_schedule),
+            ("--torque", torque),
+        ):
             if value is not None:
                 raise SettingError(
                     f"{flag} {value}: a motion starts where it was planned and carries one payload; leave it out"
@@ -129,9 +158,13 @@ def synth(
         _check_samples(rate, duration or plan.duration)
         refuse_existing_logs(roles)
         with progress("samples") as shown:
-            logs = rehearse(described, plan, Recording(rate, duration or plan.duration, sensors=sensors), shown)
+            logs = rehearse(
+                described, plan, Recording(rate, duration or plan.duration, sensors=sensors), shown
+            )
     else:
-        recording = Recording(rate=rate, duration=1.0 if duration is None else duration, sensors=sensors)
+        recording = Recording(
+            rate=rate, duration=1.0 if duration is None else duration, sensors=sensors
+        )
         if initial is not None:
             recording = replace(recording, initial=_state(initial))
         _check_samples(rate, recording.duration)
@@ -143,7 +176,9 @@ def synth(
         named = "case" if torque is None else torque
         drive = _torque(described, named, torque_hold)
         if torque_hold is not Hold.EXACT and named in EXCITATIONS:
-            drive = held(drive, rate, recording.duration, "zoh" if torque_hold is Hold.ZOH else "foh")
+            drive = held(
+                drive, rate, recording.duration, "zoh" if torque_hold is Hold.ZOH else "foh"
+            )
         schedule = None if payload_schedule is None else _schedule(payload_schedule)
         refuse_existing_logs(roles if schedule is None else ("schedule",))
         with progress("samples") as shown:
@@ -186,13 +221,20 @@ def _schedule(text: str) -> list[tuple[float, float]]:
     from algid.limits import PHYSICAL
 
     try:
-        schedule = [(float(time), float(mass)) for time, mass in (part.split("=") for part in text.split(","))]
+        schedule = [
+            (float(time), float(mass))
+            for time, mass in (part.split("=") for part in text.split(","))
+        ]
     except ValueError:
         schedule = []
     times = [time for time, _ in schedule]
     increasing = all(earlier < later for earlier, later in pairwise(times))
     longest, heaviest = PHYSICAL.duration[1], PHYSICAL.mass[1]
-    if not (schedule and increasing and all(0 <= time <= longest and 0 <= m <= heaviest for time, m in schedule)):
+    if not (
+        schedule
+        and increasing
+        and all(0 <= time <= longest and 0 <= m <= heaviest for time, m in schedule)
+    ):
         raise SettingError(
             f"--payload-schedule: expected increasing times and payloads of 0 or more like 2=0.05,4=0, found {text!r}"
         )
@@ -212,7 +254,9 @@ def _state(text: str) -> tuple[float, float, float, float]:
         raise SettingError(f"--initial: expected four numbers like -1.57,0,0,0, found {text!r}")
     turned, fast = PHYSICAL.angle[1], PHYSICAL.speed[1]
     if max(abs(first), abs(second)) > turned or max(abs(third), abs(fourth)) > fast:
-        raise SettingError(f"--initial: expected angles within {turned:g} rad and {fast:g} rad/s, found {text!r}")
+        raise SettingError(
+            f"--initial: expected angles within {turned:g} rad and {fast:g} rad/s, found {text!r}"
+        )
     return first, second, third, fourth
 
 
@@ -226,6 +270,8 @@ def _torque(case: Case, name: str, hold: Hold) -> Torque:
     if name in EXCITATIONS:
         return excitation(case, name)
     if not name or not Path(name).exists():
-        raise SettingError(f"--torque {name}: expected {', '.join(EXCITATIONS)} or a log, found neither")
+        raise SettingError(
+            f"--torque {name}: expected {', '.join(EXCITATIONS)} or a log, found neither"
+        )
     log = read_log(name)
     return SampledTorque(log.t, log.tau, "foh" if hold is Hold.FOH else "zoh")

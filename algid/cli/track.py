@@ -17,18 +17,32 @@ from algid.exits import Exit, exit_of
 @takes_profile
 def track(
     choice: Choice,
-    log: Annotated[Path, typer.Argument(help="A log of the arm while objects are picked and placed.")],
+    log: Annotated[
+        Path, typer.Argument(help="A log of the arm while objects are picked and placed.")
+    ],
     parameters: Annotated[Path, typer.Option(help="Result of the arm, with error bars.")],
-    out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the folder LOG.track.")] = Path(),
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="Folder for the folder LOG.track.")
+    ] = Path(),
     l1: Annotated[
-        float | None, typer.Option("--l1", help="Length of link 1, m; the result's by default.", min=1e-3, max=1e3)
+        float | None,
+        typer.Option(
+            "--l1", help="Length of link 1, m; the result's by default.", min=1e-3, max=1e3
+        ),
     ] = None,
     l2: Annotated[
-        float | None, typer.Option("--l2", help="Length of link 2, m; the result's by default.", min=1e-3, max=1e3)
+        float | None,
+        typer.Option(
+            "--l2", help="Length of link 2, m; the result's by default.", min=1e-3, max=1e3
+        ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a track that is there.")] = False,
-    export: Annotated[Export | None, typer.Option(help="Also write track.mcap, for Foxglove and PlotJuggler.")] = None,
-    form: Annotated[ResultFormat, typer.Option("--format", help="What to print.")] = ResultFormat.TABLE,
+    export: Annotated[
+        Export | None, typer.Option(help="Also write track.mcap, for Foxglove and PlotJuggler.")
+    ] = None,
+    form: Annotated[
+        ResultFormat, typer.Option("--format", help="What to print.")
+    ] = ResultFormat.TABLE,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
     """Find when the payload changed and what each stretch weighs; write LOG.track.
@@ -54,7 +68,9 @@ def track(
     with progress("passes", quiet) as shown:
         if shown is not None:
             shown("weighing the payload", 0, 0)
-        result = track_log(log, parameters, l1=l1, l2=l2, profile=choice.profile(), settings=settings)
+        result = track_log(
+            log, parameters, l1=l1, l2=l2, profile=choice.profile(), settings=settings
+        )
         with whole_folder(folder, force) as temporary:
             write_track(result, temporary, mcap=export is Export.MCAP)
     if not quiet:

@@ -27,16 +27,29 @@ if TYPE_CHECKING:
 @takes_profile
 def validate(
     choice: Choice,
-    result: Annotated[Path, typer.Argument(help="A result folder, its result.json, or a URDF file.")],
+    result: Annotated[
+        Path, typer.Argument(help="A result folder, its result.json, or a URDF file.")
+    ],
     logs: Annotated[list[Path], typer.Argument(help="Logs of the arm without payload.")],
-    loaded: Annotated[list[Path] | None, typer.Option(help="A log of the loaded arm; may be repeated.")] = None,
+    loaded: Annotated[
+        list[Path] | None, typer.Option(help="A log of the loaded arm; may be repeated.")
+    ] = None,
     max_nrmse: Annotated[
-        float | None, typer.Option(help="Largest RMSE over the torque's RMS allowed, for either joint.", min=0, max=1e9)
+        float | None,
+        typer.Option(
+            help="Largest RMSE over the torque's RMS allowed, for either joint.", min=0, max=1e9
+        ),
     ] = None,
     simulate: Annotated[
-        bool, typer.Option("--simulate", help="Also simulate the arm over 0.1, 0.5 and 2 s, and tell its angles' RMSE.")
+        bool,
+        typer.Option(
+            "--simulate",
+            help="Also simulate the arm over 0.1, 0.5 and 2 s, and tell its angles' RMSE.",
+        ),
     ] = False,
-    form: Annotated[ResultFormat, typer.Option("--format", help="How to print it.")] = ResultFormat.TABLE,
+    form: Annotated[
+        ResultFormat, typer.Option("--format", help="How to print it.")
+    ] = ResultFormat.TABLE,
 ) -> None:
     """Print RMSE, normalised RMSE and R² of the predicted torque; exit code 1 past --max-nrmse.
 
@@ -66,14 +79,20 @@ def validate(
         known = read_result(result)
         model, warnings, meaning = predictor_of(known, str(result)), (), reused(meaning, known)
     gravity = model.model.gravity
-    sources = open_sources(logs, "unloaded", meaning, gravity) + open_sources(loaded, "loaded", meaning, gravity)
+    sources = open_sources(logs, "unloaded", meaning, gravity) + open_sources(
+        loaded, "loaded", meaning, gravity
+    )
     with progress("samples") as shown:
         survey = Survey(sources, shown)
         survey.begin("prediction")
         found = judge(model, survey)
         rolled = roll(model, survey) if simulate else None
     summaries = [survey.summary(log) for log in survey.logs]
-    otherwise = [] if known is None else [one.sentence for one in read_otherwise(summaries, known, str(result))]
+    otherwise = (
+        []
+        if known is None
+        else [one.sentence for one in read_otherwise(summaries, known, str(result))]
+    )
     for warning in (*warnings, *otherwise):
         complain(warning)
     total = found.total
@@ -88,8 +107,15 @@ def validate(
     elif form is ResultFormat.MARKDOWN:
         say("\n".join(map(markdown_table, _tables(every, simulated))), end="")
     else:
-        predictions = {name: None if one is None else one.model_dump(mode="json") for name, one in every.items()}
-        content: dict[str, Any] = {"logs": predictions, "total": predictions.pop("all logs"), "over": over}
+        predictions = {
+            name: None if one is None else one.model_dump(mode="json")
+            for name, one in every.items()
+        }
+        content: dict[str, Any] = {
+            "logs": predictions,
+            "total": predictions.pop("all logs"),
+            "over": over,
+        }
         if simulated:
             content["simulation"] = simulated
         say(json.dumps(content, indent=2, allow_nan=False))
@@ -145,7 +171,10 @@ def _tables(every: Mapping[str, TorquePrediction | None], simulated: Simulated) 
     from algid.text import ABSENT, significant, visible
 
     def table(title: str, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> Table:
-        columns = (Column(headings[0], "name"), *(Column(heading, "number") for heading in headings[1:]))
+        columns = (
+            Column(headings[0], "name"),
+            *(Column(heading, "number") for heading in headings[1:]),
+        )
         return Table(title, columns, tuple(rows))
 
     predicted: list[tuple[str, ...]] = []
@@ -154,13 +183,18 @@ def _tables(every: Mapping[str, TorquePrediction | None], simulated: Simulated) 
             predicted.append((visible(name), *[ABSENT] * 4))
             continue
         for joint, figures in enumerate(zip(one.rmse, one.nrmse, one.r2, strict=True), start=1):
-            predicted.append((visible(name), str(joint), *(significant(figure, 4) for figure in figures)))
+            predicted.append(
+                (visible(name), str(joint), *(significant(figure, 4) for figure in figures))
+            )
     yield table("Torque prediction", ("Log", "Joint", "RMSE, N m", "RMSE / RMS", "R²"), predicted)
     if simulated:
         rolled = [
             (
                 *(visible(name), f"{row['horizon']:g}", str(row["starts"]), str(joint + 1)),
-                *(_number(row[kind][joint]) if row["starts"] else "-" for kind in ("rmse", "moved")),
+                *(
+                    _number(row[kind][joint]) if row["starts"] else "-"
+                    for kind in ("rmse", "moved")
+                ),
             )
             for name, rows in simulated.items()
             for row in rows

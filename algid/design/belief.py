@@ -1,8 +1,9 @@
 """What is believed of an arm before its run, how wrong that may be, and which of it a design is to make certain.
 
-β = β̄ + F u, where u is standard normal (a result's covariance) or anywhere in the box |u| ≤ 1 (masses and friction
-of which only a percentage is known, each its own u). Torques are linear in a log's coefficients, so the largest
-torque that any such arm asks for has a closed form: |Y c̄| + Σ |Y F| over the box, |Y c̄| + z ‖Y F‖ for the normal.
+β = β̄ + F u, where u is standard normal (a result's covariance) or anywhere in the box |u| ≤ 1
+(masses and friction of which only a percentage is known, each its own u). Torques are linear in a
+log's coefficients, so the largest torque that any such arm asks for has a closed form: |Y c̄| + Σ
+|Y F| over the box, |Y c̄| + z ‖Y F‖ for the normal.
 
 ======  ===========================================  =======
 symbol  name                                         shape
@@ -12,9 +13,9 @@ F       how they vary                                (Q, r)
 c̄       coefficients of a log                        (q,)
 ======  ===========================================  =======
 
-A design makes the largest relative bound among the parameters asked for small. The Cramér-Rao bound of parameter i is
-the root of C_ii, C = S⁻¹; relative to the size s_i of the parameter, its square is v_i. Their p-norm stands in for
-the largest, so that the figure has a derivative:
+A design makes the largest relative bound among the parameters asked for small. The Cramér-Rao
+bound of parameter i is the root of C_ii, C = S⁻¹; relative to the size s_i of the parameter, its
+square is v_i. Their p-norm stands in for the largest, so that the figure has a derivative:
 
     J = ½ log (Σ v_i^p)^(1/p),   dJ = tr(A dS),   A = −C diag(∂J/∂C_ii) C
 """
@@ -32,10 +33,13 @@ from algid.errors import SettingError
 from algid.estimators.identifiability import sizes
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS, Shared
 
-SURE = 4.0  # z: standard deviations of the prior within which no limit breaks; beyond are 6 arms in 100,000
+# z: standard deviations of the prior within which no limit breaks; beyond are 6 arms in 100,000
+SURE = 4.0
 UNKNOWN = 1e3  # relative bound at which a parameter that the motion leaves open is held
 _ROUND = 1e-6  # of the largest torque: how the corners of |Y F| are rounded
-_TINY = 1e-100  # N m, whose share squared is a double still: an arm at rest without weight asks for no torque at all
+# N m, whose share squared is a double still: an arm at rest without weight asks for no torque at
+# all
+_TINY = 1e-100
 _SEEN = 2.0  # standard deviations of the prior from zero, for a parameter to have a size of its own
 
 
@@ -110,7 +114,10 @@ class Asked:
     wanted: NDArray[np.bool_]
 
     def covariance(self, S: FloatArray) -> FloatArray:
-        """Covariance (Q, Q) of the estimates; a direction that S leaves open is held at `UNKNOWN` sizes."""
+        """Covariance (Q, Q) of the estimates.
+
+        a direction that S leaves open is held at `UNKNOWN` sizes.
+        """
         scaled = S * np.outer(self.size, self.size) + np.eye(self.size.size) / UNKNOWN**2
         return np.linalg.inv(0.5 * (scaled + scaled.T)) * np.outer(self.size, self.size)
 
@@ -134,12 +141,15 @@ class Asked:
 
 
 def asked_for(belief: Belief, names: Sequence[str] | None, source: str) -> Asked:
-    """What a design for the parameters `names` makes small; for all that the prior knows where None.
+    """What a design for the parameters `names` makes small.
+
+    For all that the prior knows where None.
 
     Raises
     ------
     SettingError
-        If there is no such parameter, or the prior cannot tell it from zero, so that it has no relative bound.
+        If there is no such parameter, or the prior cannot tell it from zero, so that it has no
+        relative bound.
     """
     every, mean = belief.shared.names, belief.mean
     known = np.abs(mean) > _SEEN * belief.std
@@ -149,7 +159,9 @@ def asked_for(belief: Belief, names: Sequence[str] | None, source: str) -> Asked
     for name in names:
         if name not in every:
             hint = " (there are no loaded runs)" if name in PAYLOAD_PARAMETERS else ""
-            raise SettingError(f"--for {name}: expected some of {', '.join(every)}, found {name!r}{hint}; leave it out")
+            raise SettingError(
+                f"--for {name}: expected some of {', '.join(every)}, found {name!r}{hint}; leave it out"
+            )
         place = every.index(name)
         if not known[place]:
             raise SettingError(

@@ -20,7 +20,9 @@ from algid.model import Motion
 from algid.progress import Progress
 
 Drive = Literal["position", "torque"]
-MARGIN = 0.05  # of each limit, kept for what a controller overshoots while its model is a fifth wrong
+MARGIN = (
+    0.05  # of each limit, kept for what a controller overshoots while its model is a fifth wrong
+)
 ARMS = 20  # of the belief, of which the worst is reported
 OPEN = 0.5  # relative bound from which on an estimate would be called not identifiable
 SECOND = 1.0  # s: for how long each stretch of the motion is, of which it is said what it teaches
@@ -134,8 +136,15 @@ def plan(campaign: Campaign, progress: Progress | None = None) -> Design:
     KeyboardInterrupt
         If it is interrupted before there is a motion; later, the best so far is the plan.
     """
-    t = np.arange(round(campaign.duration * campaign.experiment.rate) + 1) / campaign.experiment.rate
-    return _swung(campaign, t, progress) if campaign.drive == "torque" else _guided(campaign, t, progress)
+    t = (
+        np.arange(round(campaign.duration * campaign.experiment.rate) + 1)
+        / campaign.experiment.rate
+    )
+    return (
+        _swung(campaign, t, progress)
+        if campaign.drive == "torque"
+        else _guided(campaign, t, progress)
+    )
 
 
 def _guided(campaign: Campaign, t: FloatArray, progress: Progress | None) -> Design:
@@ -159,7 +168,13 @@ def _swung(campaign: Campaign, t: FloatArray, progress: Progress | None) -> Desi
     limits = campaign.limits.within(campaign.margin)
     start = limits.middle if campaign.experiment.shared.model.gravity == 0 else np.array(HANGING)
     problem = TorqueProblem(
-        campaign.experiment, campaign.belief, limits, campaign.asked, campaign.duration, start, campaign.seed
+        campaign.experiment,
+        campaign.belief,
+        limits,
+        campaign.asked,
+        campaign.duration,
+        start,
+        campaign.seed,
     )
     x, interrupted = search(problem, campaign.seed, progress)
     swung = problem.checked(x)
@@ -183,9 +198,12 @@ def _judged(
     every = max(1, round(experiment.rate / JUDGED_RATE))
     whole = informations(experiment, recorded, belief.mean, 1, experiment.rate)
     drawn = [
-        informations(experiment, recorded, arm, every, experiment.rate) for arm in belief.draws(ARMS, campaign.seed)
+        informations(experiment, recorded, arm, every, experiment.rate)
+        for arm in belief.draws(ARMS, campaign.seed)
     ]
-    C, *others = (campaign.asked.covariance(np.sum([one.S for one in arm], axis=0)) for arm in [whole, *drawn])
+    C, *others = (
+        campaign.asked.covariance(np.sum([one.S for one in arm], axis=0)) for arm in [whole, *drawn]
+    )
     parts = np.sum([one.parts(round(SECOND * experiment.rate)) for one in whole], axis=0)
     return Design(
         campaign=campaign,

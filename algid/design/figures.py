@@ -25,11 +25,17 @@ def _motion(design: Design) -> Figure:
     limits, motion = design.campaign.limits, design.motion
     panels = [
         _panel(design, "angles", motion.theta, "angle, rad", (limits.low, limits.high)),
-        _panel(design, "velocities", motion.omega, "velocity, rad/s", (-limits.speed, limits.speed)),
+        _panel(
+            design, "velocities", motion.omega, "velocity, rad/s", (-limits.speed, limits.speed)
+        ),
     ]
     for loaded, torque in design.torque.items():
         kind = "loaded" if loaded else "unloaded"
-        panels.append(_panel(design, f"torques, {kind}", torque, "torque, N m", (-limits.torque, limits.torque)))
+        panels.append(
+            _panel(
+                design, f"torques, {kind}", torque, "torque, N m", (-limits.torque, limits.torque)
+            )
+        )
     legend = (
         Legend("joint 1", "joint 1", COLOURS[0]),
         Legend("joint 2", "joint 2", COLOURS[1]),
@@ -42,7 +48,9 @@ def _motion(design: Design) -> Figure:
     return Figure("motion", "The motion", tuple(panels), reading, legend)
 
 
-def _panel(design: Design, what: str, values: FloatArray, title: str, limits: tuple[FloatArray, FloatArray]) -> Panel:
+def _panel(
+    design: Design, what: str, values: FloatArray, title: str, limits: tuple[FloatArray, FloatArray]
+) -> Panel:
     every = max(1, design.t.size // POINTS)
     t = design.t[::every]
     traces: list[Trace] = [
@@ -56,8 +64,15 @@ def _panel(design: Design, what: str, values: FloatArray, title: str, limits: tu
         for joint in range(2)
         if np.isfinite(side[joint]) and abs(side[joint]) < 3 * size
     ]
-    layout: dict[str, Any] = {"xaxis": axis("time, s"), "yaxis": axis(title), "shapes": levels, "hovermode": "x"}
-    return Panel(traces, layout, f"Planned {what} of both joints over time", what.capitalize(), 230, "plan")
+    layout: dict[str, Any] = {
+        "xaxis": axis("time, s"),
+        "yaxis": axis(title),
+        "shapes": levels,
+        "hovermode": "x",
+    }
+    return Panel(
+        traces, layout, f"Planned {what} of both joints over time", what.capitalize(), 230, "plan"
+    )
 
 
 def _teaching(design: Design) -> Figure:

@@ -1,8 +1,8 @@
 """What a motion tells about an arm, under the likelihood of `refined`, and how that changes with the motion.
 
-The information of a log is S = Yᵀ V⁻¹ Y with V = Σ_τ + G Σ_θ Gᵀ (`algid.estimators.whitening`). White noise of
-σ at R samples a second is, below half of r samples a second, white noise of σ √(r / R) at r: a motion of a few
-hertz is weighed at 50 to 100 samples a second.
+The information of a log is S = Yᵀ V⁻¹ Y with V = Σ_τ + G Σ_θ Gᵀ (`algid.estimators.whitening`).
+White noise of σ at R samples a second is, below half of r samples a second, white noise of σ √(r /
+R) at r: a motion of a few hertz is weighed at 50 to 100 samples a second.
 
 ======  ==========================================================  ==================
 symbol  name                                                        shape
@@ -15,8 +15,9 @@ A       derivative of a function of S                               (Q, Q)
 dY, dP  derivatives of Y and P by θ1, θ2, ω1, ω2, α1, α2            (6, ...)
 ======  ==========================================================  ==================
 
-For a fixed A, d tr(A S) = 2 tr(A Wᵀ dY) − 2 tr(A Wᵀ dG Σ_θ Gᵀ W): Y and P are functions of the motion at one
-instant, so six differences at all instants at once give the derivative by the whole motion.
+For a fixed A, d tr(A S) = 2 tr(A Wᵀ dY) − 2 tr(A Wᵀ dG Σ_θ Gᵀ W): Y and P are functions of the
+motion at one instant, so six differences at all instants at once give the derivative by the whole
+motion.
 """
 
 from __future__ import annotations
@@ -87,7 +88,9 @@ class Slopes:
 
     def _differences(self, function: Callable[[Motion], FloatArray]) -> FloatArray:
         """Central differences (6, ...) of a function of the motion by each of its components."""
-        return np.stack([(function(ahead) - function(behind)) / (2 * _STEP) for ahead, behind in self._beside])
+        return np.stack(
+            [(function(ahead) - function(behind)) / (2 * _STEP) for ahead, behind in self._beside]
+        )
 
     @cached_property
     def _beside(self) -> list[list[Motion]]:
@@ -130,7 +133,9 @@ class Information:
         for loaded in experiment.kinds:
             c, T = shared.coefficients(beta, loaded), shared.jacobian(beta, loaded)
             # samples at another rate than is recorded weigh as many times more
-            self._logs.append(self._whitened(c, T, experiment.runs[loaded] * (experiment.rate / slopes.rate)))
+            self._logs.append(
+                self._whitened(c, T, experiment.runs[loaded] * (experiment.rate / slopes.rate))
+            )
 
     def _whitened(self, c: FloatArray, T: FloatArray, count: float) -> _Log:
         slopes = self._slopes
@@ -138,7 +143,9 @@ class Information:
         H = along_stencil(P, self._weights) * self._ratio[:, :, None, None]
         factor = covariance_factor(H)
         q, n = slopes.Y.shape[1:]
-        rows = np.ascontiguousarray((slopes.Y / self._sigma[:, None, None]).transpose(1, 2, 0)).reshape(q, -1)
+        rows = np.ascontiguousarray(
+            (slopes.Y / self._sigma[:, None, None]).transpose(1, 2, 0)
+        ).reshape(q, -1)
         Z, failed = lapack.dtbtrs(factor, rows.T, uplo="L", trans="N")
         W, failed_too = lapack.dtbtrs(factor, Z, uplo="L", trans="T")
         if failed or failed_too:
@@ -149,10 +156,15 @@ class Information:
     @cached_property
     def S(self) -> FloatArray:
         """Information (Q, Q) of all runs."""
-        return np.sum([log.count * log.T.T @ (log.Z @ log.Z.T) @ log.T for log in self._logs], axis=0)
+        return np.sum(
+            [log.count * log.T.T @ (log.Z @ log.Z.T) @ log.T for log in self._logs], axis=0
+        )
 
     def parts(self, samples: int) -> FloatArray:
-        """Information (B, Q, Q) of each `samples` samples of the motion; the last part may be shorter."""
+        """Information (B, Q, Q) of each `samples` samples of the motion.
+
+        The last part may be shorter.
+        """
         total = []
         for log in self._logs:
             pieces = [log.Z[:, a : a + 2 * samples] for a in range(0, log.Z.shape[1], 2 * samples)]
@@ -170,7 +182,9 @@ class Information:
             to_Y += 2 * AW.transpose(1, 0, 2) / self._sigma[:, None, None]
             back = np.zeros((AW.shape[0], 2, n + POINTS - 1))  # Gᵀ W
             for point in range(POINTS):
-                back[:, :, point : point + n] += np.einsum("abn,qan->qbn", log.H[:, :, point], log.W)
+                back[:, :, point : point + n] += np.einsum(
+                    "abn,qan->qbn", log.H[:, :, point], log.W
+                )
             windows = np.lib.stride_tricks.sliding_window_view(back, n, axis=2)
             along = np.tensordot(self._weights, windows, axes=(1, 2))
             to_P = -2 * np.einsum("qan,oqbn->oabn", AW, along) * self._ratio[None, :, :, None]
@@ -186,6 +200,8 @@ def informations(
     for loaded, motion in motions.items():
         runs = (0, experiment.runs[1]) if loaded else (experiment.runs[0], 0)
         own = Experiment(experiment.shared, runs, experiment.noise, experiment.rate)
-        thinned = Motion(*(signal[:, ::every] for signal in (motion.theta, motion.omega, motion.alpha)))
+        thinned = Motion(
+            *(signal[:, ::every] for signal in (motion.theta, motion.omega, motion.alpha))
+        )
         found.append(Information(own, beta, Slopes(experiment.shared.model, thinned, rate / every)))
     return found

@@ -1,9 +1,9 @@
 """What a motion must keep within, and how much of each limit it uses.
 
-A usage is what is used of a limit, one where it is reached: the angle's distance from the middle of its range over
-half the range, speed, acceleration and torque over their limits, and the depth of the tip below the height of a
-stretched arm over what is allowed of it. A posture that the arm can be held in within all of them is where a motion
-rests; without one there is no motion either.
+A usage is what is used of a limit, one where it is reached: the angle's distance from the middle
+of its range over half the range, speed, acceleration and torque over their limits, and the depth
+of the tip below the height of a stretched arm over what is allowed of it. A posture that the arm
+can be held in within all of them is where a motion rests; without one there is no motion either.
 
 ======  ============================================  =========
 symbol  name                                          shape
@@ -60,7 +60,11 @@ class Limits:
     def middle(self) -> FloatArray:
         """Middle (2,) of the range; hanging where there is none."""
         bounded = np.isfinite(self.half)
-        return np.where(bounded, 0.5 * (np.where(bounded, self.low, 0.0) + np.where(bounded, self.high, 0.0)), HANGING)
+        return np.where(
+            bounded,
+            0.5 * (np.where(bounded, self.low, 0.0) + np.where(bounded, self.high, 0.0)),
+            HANGING,
+        )
 
     @property
     def half(self) -> FloatArray:
@@ -70,8 +74,14 @@ class Limits:
     def within(self, margin: float) -> Limits:
         """These limits less a share `margin` of each."""
         taken = np.where(np.isfinite(self.half), margin * self.half, 0.0)
-        kept = {name: (1 - margin) * getattr(self, name) for name in ("speed", "acceleration", "torque")}
-        height = self.height + margin * (self.lengths.sum() - self.height) if np.isfinite(self.height) else self.height
+        kept = {
+            name: (1 - margin) * getattr(self, name) for name in ("speed", "acceleration", "torque")
+        }
+        height = (
+            self.height + margin * (self.lengths.sum() - self.height)
+            if np.isfinite(self.height)
+            else self.height
+        )
         return replace(self, low=self.low + taken, high=self.high - taken, height=height, **kept)
 
     def height_of(self, theta: FloatArray) -> FloatArray:
@@ -146,7 +156,11 @@ def _kinematic(limits: Limits, motion: Motion) -> Iterator[_Found]:
         slope = np.zeros((COMPONENTS, both.size))
         slope[0] = -(l1 * np.cos(motion.theta[0]) + l2 * np.cos(both)) / room
         slope[1] = -l2 * np.cos(both) / room
-        yield Row("tip-height", None, upper=False), (l1 + l2 - limits.height_of(motion.theta)) / room, slope
+        yield (
+            Row("tip-height", None, upper=False),
+            (l1 + l2 - limits.height_of(motion.theta)) / room,
+            slope,
+        )
 
 
 def _torque(limit: FloatArray, slopes: Slopes, load: Load, derivatives: bool) -> Iterator[_Found]:
@@ -172,7 +186,9 @@ def resting(limits: Limits, model: Model, loads: Sequence[Load]) -> FloatArray:
     middle = limits.middle
     low = np.where(np.isfinite(limits.low), limits.low, middle - _WIDE)
     high = np.where(np.isfinite(limits.high), limits.high, middle + _WIDE)
-    grid = np.meshgrid(*(np.linspace(low[joint], high[joint], _STEPS) for joint in range(2)), indexing="ij")
+    grid = np.meshgrid(
+        *(np.linspace(low[joint], high[joint], _STEPS) for joint in range(2)), indexing="ij"
+    )
     theta = np.stack([axis.ravel() for axis in grid])
     still = Motion(theta, np.zeros_like(theta), np.zeros_like(theta))
     used = usage(limits, Slopes(model, still, 1.0), loads, derivatives=False)

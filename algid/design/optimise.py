@@ -1,8 +1,9 @@
 """Search for the best motion: sequential quadratic programming from several random ones.
 
-Each limit is one constraint: the soft maximum over time of its usage, log Σ exp(ρ u) / ρ, is never below the
-largest. The figure and the limits are smoothed less and less from stage to stage. A motion that the search ends
-with is drawn back to the resting start until it keeps every limit exactly.
+Each limit is one constraint: the soft maximum over time of its usage, log Σ exp(ρ u) / ρ, is never
+below the largest. The figure and the limits are smoothed less and less from stage to stage. A
+motion that the search ends with is drawn back to the resting start until it keeps every limit
+exactly.
 """
 
 from __future__ import annotations
@@ -98,7 +99,10 @@ def optimise(problem: Problem, rate: float, seed: int, progress: Progress | None
     try:
         rng = np.random.default_rng(seed)
         room = 0.5 * (1 + max(_EASY, problem.excess(problem.rest, FIRST.rate)))
-        starts = [search.run(kept(problem, problem.random(rng), FIRST.rate, room), FIRST) for _ in range(STARTS)]
+        starts = [
+            search.run(kept(problem, problem.random(rng), FIRST.rate, room), FIRST)
+            for _ in range(STARTS)
+        ]
         for x in sorted(starts, key=search.judged)[:KEPT]:
             better = x
             for stage in LATER:
@@ -115,7 +119,10 @@ def optimise(problem: Problem, rate: float, seed: int, progress: Progress | None
 
 
 def kept(problem: Problem, x: FloatArray, rate: float, most: float = 1.0) -> FloatArray:
-    """The motion `x`, drawn back to rest until it uses `most` of the limits; a small one is enlarged to that."""
+    """The motion `x`, drawn back to rest until it uses `most` of the limits.
+
+    a small one is enlarged to that.
+    """
     rest = problem.rest
     low, high = 0.0, 1.0
     while most < 1.0 and problem.excess(rest + high * (x - rest), rate) < most and high < 1e3:
@@ -154,7 +161,9 @@ class _Search:
         """The motion that a stage ends with."""
         from scipy.optimize import minimize
 
-        @lru_cache(maxsize=1)  # SLSQP asks for the figure, the limits and their gradients at one x after another
+        @lru_cache(
+            maxsize=1
+        )  # SLSQP asks for the figure, the limits and their gradients at one x after another
         def evaluated(key: bytes) -> Evaluation:
             return self._evaluated(np.frombuffer(key), stage)
 
@@ -183,7 +192,10 @@ class _Search:
         return ended.x if np.all(np.isfinite(ended.x)) else x
 
     def _evaluated(self, x: FloatArray, stage: Stage) -> Evaluation:
-        """The evaluation of `x`; a step so long that nothing can be said of the motion is one to be shortened."""
+        """The evaluation of `x`.
+
+        a step so long that nothing can be said of the motion is one to be shortened.
+        """
         try:
             found = self._problem.evaluate(x, stage)
         except np.linalg.LinAlgError:

@@ -30,7 +30,9 @@ def design_document(design: Design, source: str, doubts: Sequence[Notice] = ()) 
     return Document(
         title=f"Design for {name}",
         verdict=verdict(design, doubts),
-        sections=(Section((bound_table(design), limit_table(design), *_arm(design), *figures(design))),),
+        sections=(
+            Section((bound_table(design), limit_table(design), *_arm(design), *figures(design))),
+        ),
         kicker="a planned identification",
         name=name,
         facts=f"{significant(campaign.duration, 4)} s under {campaign.drive} control · logged at "

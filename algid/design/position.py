@@ -1,11 +1,13 @@
 """Motions under position control, at rest at both ends: a finite Fourier series a joint, blended to rest.
 
-θ_i(t) = c_i + w(t) Σ_l (a_il sin ω_l t + b_il cos ω_l t) / ω_l with ω_l = 2π l / T (Swevers et al. 1997). The window w
-rises from 0 to 1 and falls back with three derivatives that vanish at its ends, so that angle, velocity, acceleration
-and jerk start and end at rest. Coefficients are velocities: all of them weigh alike on the limits.
+θ_i(t) = c_i + w(t) Σ_l (a_il sin ω_l t + b_il cos ω_l t) / ω_l with ω_l = 2π l / T (Swevers et al.
+1997). The window w rises from 0 to 1 and falls back with three derivatives that vanish at its
+ends, so that angle, velocity, acceleration and jerk start and end at rest. Coefficients are
+velocities: all of them weigh alike on the limits.
 
-The motion is planned, the torque follows from the arm. Only the torque depends on which arm it is, so that its largest
-value over all arms of the belief has a closed form, and one motion stands for all of them.
+The motion is planned, the torque follows from the arm. Only the torque depends on which arm it is,
+so that its largest value over all arms of the belief has a closed form, and one motion stands for
+all of them.
 
 ======  =====================================================  ===========
 symbol  name                                                   shape
@@ -65,7 +67,9 @@ class Fourier:
         slope = np.concatenate([omega * cosine, -omega * sine])
         bend = np.concatenate([-(omega**2) * sine, -(omega**2) * cosine])
         w, dw, ddw = self.window(t)
-        return np.stack([w * value, w * slope + dw * value, w * bend + 2 * dw * slope + ddw * value])
+        return np.stack(
+            [w * value, w * slope + dw * value, w * bend + 2 * dw * slope + ddw * value]
+        )
 
     def window(self, t: FloatArray) -> FloatArray:
         """Window and its two derivatives (3, N)."""
@@ -119,7 +123,12 @@ class PositionProblem:
         duration: float,
         rest: FloatArray,
     ) -> None:
-        self._experiment, self._belief, self._limits, self._asked = experiment, belief, limits, asked
+        self._experiment, self._belief, self._limits, self._asked = (
+            experiment,
+            belief,
+            limits,
+            asked,
+        )
         self._loads = [belief.load(loaded) for loaded in experiment.kinds]
         self.family = Fourier(duration)
         self.rest = np.concatenate([rest, np.zeros(self.family.size - 2)])
@@ -155,13 +164,17 @@ class PositionProblem:
 
     def excess(self, x: FloatArray, rate: float) -> float:
         """The largest usage of any limit by any arm of the belief."""
-        return float(usage(self._limits, self.slopes(x, rate), self._loads, derivatives=False).u.max())
+        return float(
+            usage(self._limits, self.slopes(x, rate), self._loads, derivatives=False).u.max()
+        )
 
     def score(self, x: FloatArray) -> float:
         """The largest relative bound of the worst arm of the belief."""
         slopes = self.slopes(x, JUDGED_RATE)
         arms = [self._belief.mean, *self._belief.draws(JUDGED_ARMS, seed=0)]
-        return max(self._asked.largest(Information(self._experiment, arm, slopes).S) for arm in arms)
+        return max(
+            self._asked.largest(Information(self._experiment, arm, slopes).S) for arm in arms
+        )
 
 
 def middles(duration: float, rate: float) -> FloatArray:

@@ -60,7 +60,9 @@ class KnownBefore:
     @property
     def lengths(self) -> dict[str, float]:
         """The link lengths that are given, in m."""
-        return {name: value for name, value in (("l1", self.l1), ("l2", self.l2)) if value is not None}
+        return {
+            name: value for name, value in (("l1", self.l1), ("l2", self.l2)) if value is not None
+        }
 
 
 def prior_of(source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedArm:
@@ -79,7 +81,8 @@ def prior_of(source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedA
     ResultError
         If a result has no error bars where they are needed.
     SettingError
-        If no arm has such an inertia matrix, or a payload is to be carried of which nothing is known.
+        If no arm has such an inertia matrix, or a payload is to be carried of which nothing is
+        known.
     """
     path = Path(source)
     if path.is_dir() or path.suffix == ".json":
@@ -117,12 +120,18 @@ def of_case(case: Case, source: str, loaded: bool | None, knowns: KnownBefore) -
     ]
     mean = _parameters(shared, arm, mass)
     spread = np.stack([_parameters(shared, *other) - mean for other in wrong], axis=1)
-    return BelievedArm(source, Belief(shared, mean, spread, box=True), np.array([arm.l1, arm.l2]), None)
+    return BelievedArm(
+        source, Belief(shared, mean, spread, box=True), np.array([arm.l1, arm.l2]), None
+    )
 
 
-def _shared(model: Model, mass: float | None, loaded: bool | None, source: str, knowns: KnownBefore) -> Shared:
+def _shared(
+    model: Model, mass: float | None, loaded: bool | None, source: str, knowns: KnownBefore
+) -> Shared:
     if loaded and not mass:
-        raise SettingError(f"{source}: it knows no payload for the loaded runs; give --payload KG, or --runs 1,0")
+        raise SettingError(
+            f"{source}: it knows no payload for the loaded runs; give --payload KG, or --runs 1,0"
+        )
     return Shared(model, payload=bool(mass) if loaded is None else loaded, lengths=knowns.lengths)
 
 
@@ -133,9 +142,13 @@ def _parameters(shared: Shared, arm: Arm, mass: float) -> FloatArray:
     return np.array([value[name] for name in shared.names])
 
 
-def _of_result(result: Result, source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedArm:
+def _of_result(
+    result: Result, source: str, loaded: bool | None, knowns: KnownBefore
+) -> BelievedArm:
     model, left_out = _planned(model_of(result))
-    before = {name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None}
+    before = {
+        name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None
+    }
     lengths = before | knowns.lengths
     value = {name: found.estimate for name, found in result.estimates.items()} | lengths
     mass = value.get("m_p") if knowns.payload is None else knowns.payload
@@ -143,12 +156,17 @@ def _of_result(result: Result, source: str, loaded: bool | None, knowns: KnownBe
     value |= {} if mass is None else {"m_p": mass}
     missing = next((name for name in shared.names if value.get(name) is None), None)
     if missing is not None:
-        remedy = f"give --{missing}" if missing in ("l1", "l2") else "identify it from logs that tell it"
+        remedy = (
+            f"give --{missing}" if missing in ("l1", "l2") else "identify it from logs that tell it"
+        )
         raise ResultError(f"{source}: the result has no {missing}; {remedy}")
     mean = np.array([value[name] for name in shared.names], dtype=np.float64)
     given = {"m_p"} if knowns.payload is not None else set()
     spread = _spread(result, source, shared.names, mean, given, knowns.error)
-    reach = np.array([np.nan if value.get(name) is None else value[name] for name in ("l1", "l2")], dtype=np.float64)
+    reach = np.array(
+        [np.nan if value.get(name) is None else value[name] for name in ("l1", "l2")],
+        dtype=np.float64,
+    )
     levels = [0.0 if result.fit is None else result.fit.noise.get(name) or 0.0 for name in NOISE]
     noise = NoiseLevels(np.array(levels[:2]), np.array(levels[2:])) if min(levels) > 0 else None
     doubts = (*left_out, *contradictions(result, knowns.lengths))
@@ -165,7 +183,12 @@ def _planned(model: Model) -> tuple[Model, tuple[Notice, ...]]:
 
 
 def _spread(
-    result: Result, source: str, names: Sequence[str], mean: FloatArray, given: set[str], error: float | None
+    result: Result,
+    source: str,
+    names: Sequence[str],
+    mean: FloatArray,
+    given: set[str],
+    error: float | None,
 ) -> FloatArray:
     """F (Q, Q): a root of the result's covariance; what has no error bar is wrong by `error` at `SURE` deviations."""
     covariance = np.zeros((len(names), len(names)))
@@ -173,7 +196,9 @@ def _spread(
     if known and result.fit is not None:
         places = [result.fit.covariance_names.index(name) for name in known]
         rows = [names.index(name) for name in known]
-        covariance[np.ix_(rows, rows)] = np.array(result.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
+        covariance[np.ix_(rows, rows)] = np.array(result.fit.covariance, dtype=np.float64)[
+            np.ix_(places, places)
+        ]
     bare = [name for name in names if name not in known]
     without = [name for name in bare if name not in given]
     if without and error is None:
@@ -182,7 +207,9 @@ def _spread(
             if result.fit is None
             else f"the result leaves {', '.join(without)} without error bars"
         )
-        raise ResultError(f"{source}: {why}; identify from logs that tell, or say how wrong it may be: --prior-error")
+        raise ResultError(
+            f"{source}: {why}; identify from logs that tell, or say how wrong it may be: --prior-error"
+        )
     for name in bare:
         row = names.index(name)
         covariance[row, row] = ((WRONG if error is None else error) * mean[row] / SURE) ** 2

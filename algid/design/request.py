@@ -68,7 +68,9 @@ def request(file: Path | None, flags: Mapping[str, str | float | None]) -> Reque
             continue
         content[name] = _parsed(name, value) if isinstance(value, str) else value
         if content[name] is None:
-            raise SettingError(f"--{name.replace('_', '-')}: expected {_LIKE[name]}, found {value!r}")
+            raise SettingError(
+                f"--{name.replace('_', '-')}: expected {_LIKE[name]}, found {value!r}"
+            )
     return Request(content, "the flags" if file is None else str(file))
 
 
@@ -93,10 +95,14 @@ def limits_of(asked: Request, lengths: FloatArray) -> Limits:
         raise SettingError("--tip-height: the link lengths are not known; give --l1 and --l2")
     reach = float(np.sum(lengths))
     if height >= reach:
-        raise SettingError(f"--tip-height: expected less than the arm's reach, {reach:.4g} m, found {height:g} m")
+        raise SettingError(
+            f"--tip-height: expected less than the arm's reach, {reach:.4g} m, found {height:g} m"
+        )
     others = {name: _both(asked.get(name, np.inf)) for name in ("speed", "acceleration", "torque")}
     if not np.any(np.isfinite([high - low, *others.values()])):
-        raise SettingError("--range: without any limit no motion is the best, found inf for all; give one")
+        raise SettingError(
+            "--range: without any limit no motion is the best, found inf for all; give one"
+        )
     return Limits(low=low, high=high, height=height, lengths=lengths, **others)
 
 
@@ -105,7 +111,9 @@ def _check(name: str, value: Any) -> None:
     numbers = np.abs(np.array(0.0 if value is None else value, dtype=np.float64)).ravel()
     wrong = ~(np.isinf(numbers) | (numbers == 0) | ((numbers >= SMALLEST) & (numbers <= LARGEST)))
     if np.any(wrong):
-        raise SettingError(f"--{name}: expected from {SMALLEST:g} to {LARGEST:g}, or inf, found {numbers[wrong][0]:g}")
+        raise SettingError(
+            f"--{name}: expected from {SMALLEST:g} to {LARGEST:g}, or inf, found {numbers[wrong][0]:g}"
+        )
 
 
 def _both(value: Any) -> FloatArray:
@@ -149,10 +157,16 @@ def _parsed(name: str, text: str) -> Any:
     if [len(part) for part in parts] == [2, 2]:
         spans = name == "range" and not any(math.isnan(number) for part in parts for number in part)
         return tuple(parts) if spans else None
-    if len(parts) > 2 or any(len(part) != 1 for part in parts) or any(math.isnan(number) for number in numbers):
+    if (
+        len(parts) > 2
+        or any(len(part) != 1 for part in parts)
+        or any(math.isnan(number) for number in numbers)
+    ):
         return None
     if name == "runs":
-        whole = len(numbers) == 2 and all(0 <= number <= MOST_RUNS and number.is_integer() for number in numbers)
+        whole = len(numbers) == 2 and all(
+            0 <= number <= MOST_RUNS and number.is_integer() for number in numbers
+        )
         return (int(numbers[0]), int(numbers[1])) if whole and any(numbers) else None
     if not all(number > 0 or (number == 0 and name == "torque") for number in numbers):
         return None

@@ -39,7 +39,9 @@ class Swings:
 
     def motion(self, column: int) -> Motion:
         """The motion of one arm."""
-        return Motion(*(signal[:, :, column].T.copy() for signal in (self.theta, self.omega, self.alpha)))
+        return Motion(
+            *(signal[:, :, column].T.copy() for signal in (self.theta, self.omega, self.alpha))
+        )
 
 
 def step_for(model: Model, coefficients: FloatArray, duration: float) -> float:
@@ -47,7 +49,9 @@ def step_for(model: Model, coefficients: FloatArray, duration: float) -> float:
     fastest, still = 1.0, np.zeros((2, 1))
     for c in coefficients.T:
         M = inertia(model, c, still)[..., 0]
-        fastest = max(fastest, float(np.abs(np.linalg.eigvals(np.linalg.inv(M) * damping(model, c))).max()))
+        fastest = max(
+            fastest, float(np.abs(np.linalg.eigvals(np.linalg.inv(M) * damping(model, c))).max())
+        )
     step = max(min(_COARSEST, _STABLE / fastest), FINEST)
     return duration / int(np.ceil(duration / step))
 
@@ -70,7 +74,8 @@ def swing(
     torque : (2 N + 1, 2, B), N m
         At every half step of `step` s.
     lost : callable
-        Asked now and then whether states (4, B) are such that the rest does not matter: the motions end there.
+        Asked now and then whether states (4, B) are such that the rest does not matter: the
+        motions end there.
     """
 
     def rate(state: FloatArray, torque: FloatArray) -> FloatArray:

@@ -15,7 +15,9 @@ from algid.report.document import Column, Table
 from algid.text import ABSENT, percent, resolved, significant, unit_text
 from algid.verdict import Verdict, graded
 
-BINDS = 0.98  # of what the margin leaves: a limit that is used as far is what keeps the error bars from being less
+# of what the margin leaves: a limit that is used as far is what keeps the error bars from being
+# less
+BINDS = 0.98
 SIGNS = {
     "range": "rad",
     "speed": "rad/s",
@@ -63,7 +65,10 @@ def bound_table(design: Design) -> Table:
 
 
 def _runs(runs: tuple[int, int]) -> str:
-    words = [f"{count} {kind} run{'s' * (count > 1)}" for count, kind in zip(runs, ("unloaded", "loaded"), strict=True)]
+    words = [
+        f"{count} {kind} run{'s' * (count > 1)}"
+        for count, kind in zip(runs, ("unloaded", "loaded"), strict=True)
+    ]
     return " and ".join(word for word, count in zip(words, runs, strict=True) if count)
 
 
@@ -130,8 +135,13 @@ def verdict(design: Design, doubts: Sequence[Notice] = ()) -> Verdict:
     """The design in one clause, and what is against it: `doubts` about its prior, what no motion reaches."""
     reasons = [*doubts]
     if design.open_parameters:
-        wider = tuple(Remedy({name: None}, "widen") for name in ("range", "speed", "torque", "runs"))
-        reasons.insert(0, Notice("NOT_REACHED", numbers={"names": list(design.open_parameters)}, remedies=wider))
+        wider = tuple(
+            Remedy({name: None}, "widen") for name in ("range", "speed", "torque", "runs")
+        )
+        reasons.insert(
+            0,
+            Notice("NOT_REACHED", numbers={"names": list(design.open_parameters)}, remedies=wider),
+        )
     if design.interrupted:
         reasons.append(Notice("BROKEN_OFF"))
     return graded(_headline(design), reasons)

@@ -1,11 +1,13 @@
 """Open loop: a multi-sine of torques swings the arm from rest, and limits hold for arms drawn from the belief.
 
-τ_i(t) = w(t) τ̂_i Σ_l (a_il sin ω_l t + b_il cos ω_l t), with the window w of `algid.design.position` and amplitudes in
-shares of τ̂: the torque's limit or, where a drive is far stronger than its arm, what the believed arms need
-outstretched at the highest speed and acceleration that the limits leave to the fastest harmonic.
-Where the arm goes depends on the arm: each candidate is simulated for the believed arm and for arms drawn from the
-belief, without and with the payload, all in one batch. An evolution strategy (recombination of the better half, step
-sizes by the spread of it) needs no derivatives of that. A joint whose limit is zero has no drive and is swung along.
+τ_i(t) = w(t) τ̂_i Σ_l (a_il sin ω_l t + b_il cos ω_l t), with the window w of
+`algid.design.position` and amplitudes in shares of τ̂: the torque's limit or, where a drive is far
+stronger than its arm, what the believed arms need outstretched at the highest speed and
+acceleration that the limits leave to the fastest harmonic. Where the arm goes depends on the arm:
+each candidate is simulated for the believed arm and for arms drawn from the belief, without and
+with the payload, all in one batch. An evolution strategy (recombination of the better half, step
+sizes by the spread of it) needs no derivatives of that. A joint whose limit is zero has no drive
+and is swung along.
 """
 
 from __future__ import annotations
@@ -75,10 +77,19 @@ class TorqueProblem:
         seed: int,
     ) -> None:
         if not np.all(np.isfinite(limits.torque)):
-            raise SettingError("--torque: an open loop needs a limit at each joint, found inf; give one")
+            raise SettingError(
+                "--torque: an open loop needs a limit at each joint, found inf; give one"
+            )
         if np.any(start <= limits.low) or np.any(start >= limits.high):
-            raise SettingError("--range: an open loop starts hanging at rest, which the range leaves out; widen it")
-        self._experiment, self._belief, self._limits, self._asked = experiment, belief, limits, asked
+            raise SettingError(
+                "--range: an open loop starts hanging at rest, which the range leaves out; widen it"
+            )
+        self._experiment, self._belief, self._limits, self._asked = (
+            experiment,
+            belief,
+            limits,
+            asked,
+        )
         self._start = start
         self._family = Fourier(duration)
         self._driven = np.flatnonzero(limits.torque > 0)
@@ -86,16 +97,26 @@ class TorqueProblem:
         self._arms = np.vstack([belief.mean, belief.draws(SEARCHED_ARMS, seed)])
         self._checked = np.vstack([belief.mean, belief.draws(CHECKED_ARMS, seed + 1)])
         model = experiment.shared.model
-        self._step = step_for(model, self._coefficients(self._checked, list(experiment.kinds)), duration)
+        self._step = step_for(
+            model, self._coefficients(self._checked, list(experiment.kinds)), duration
+        )
         self._strength = np.minimum(limits.torque, self._need())
 
     def _need(self) -> FloatArray:
         """What arms of the belief ask for at most (2,), about, in motions within the limits."""
         limits, highest = self._limits, self._family.harmonics[-1]
         speed = np.minimum(np.minimum(limits.speed, limits.half * highest), FAST)
-        fastest = Motion(*(np.array([[0.0, 0.0], speed, np.minimum(limits.acceleration, speed * highest)])[..., None]))
+        fastest = Motion(
+            *(
+                np.array([[0.0, 0.0], speed, np.minimum(limits.acceleration, speed * highest)])[
+                    ..., None
+                ]
+            )
+        )
         Y = regressor(self._experiment.shared.model, fastest)[..., 0]
-        return np.max(np.abs(Y) @ np.abs(self._coefficients(self._arms, list(self._experiment.kinds))), axis=1)
+        return np.max(
+            np.abs(Y) @ np.abs(self._coefficients(self._arms, list(self._experiment.kinds))), axis=1
+        )
 
     def _coefficients(self, arms: FloatArray, kinds: list[bool]) -> FloatArray:
         """C (q, arms × kinds), the kinds of an arm side by side."""
@@ -116,7 +137,10 @@ class TorqueProblem:
         return x / np.sqrt(self._family.harmonics.size) * rng.uniform(0.05, 0.4)
 
     def _swings(
-        self, patterns: FloatArray, arms: FloatArray, lost: Callable[[FloatArray], bool] | None = None
+        self,
+        patterns: FloatArray,
+        arms: FloatArray,
+        lost: Callable[[FloatArray], bool] | None = None,
     ) -> Swings:
         """Every pattern (P, n) on every arm and kind, in that order of columns."""
         count = 2 * round(self._family.duration / self._step) + 1
@@ -148,7 +172,10 @@ class TorqueProblem:
         return np.array(found)
 
     def _bound(self, motions: dict[bool, Motion]) -> float:
-        """The believed arm's largest relative bound; infinite where nothing can be said of the motion."""
+        """The believed arm's largest relative bound.
+
+        Infinite where nothing can be said of the motion.
+        """
         every = max(1, int(1 / (self._step * _INFORMATION_RATE)))
         try:
             runs = informations(self._experiment, motions, self._belief.mean, every, 1 / self._step)
@@ -160,12 +187,17 @@ class TorqueProblem:
     def _used(self, x: FloatArray, t: FloatArray, motions: list[Motion]) -> list[Usage]:
         """Usages of limits by motions: kinematic ones, the torque itself, rest at the end of the believed arm."""
         model = self._experiment.shared.model
-        found = [usage(self._limits, Slopes(model, motion, 1.0), (), derivatives=False) for motion in motions]
+        found = [
+            usage(self._limits, Slopes(model, motion, 1.0), (), derivatives=False)
+            for motion in motions
+        ]
         share = np.abs(self.torques(x, t)[self._driven]) / self._limits.torque[self._driven, None]
         found.append(Usage(tuple(Row("torque", joint) for joint in self._driven.tolist()), share))
         believed = np.abs([motion.omega for motion in motions[: len(self._experiment.kinds)]])
         left = believed[:, :, -1] / (END * np.maximum(believed.max(axis=2), 1e-9))
-        found.append(Usage(tuple(Row("rest", joint) for joint in range(2)), left.max(axis=0)[:, None]))
+        found.append(
+            Usage(tuple(Row("rest", joint) for joint in range(2)), left.max(axis=0)[:, None])
+        )
         return found
 
     def checked(self, x: FloatArray) -> Swung:
@@ -191,11 +223,13 @@ class TorqueProblem:
         return Swung(shrunk, swings.t, dict(zip(kinds, motions, strict=False)), worst)
 
 
-def search(problem: TorqueProblem, seed: int, progress: Progress | None = None) -> tuple[FloatArray, bool]:
+def search(
+    problem: TorqueProblem, seed: int, progress: Progress | None = None
+) -> tuple[FloatArray, bool]:
     """The best pattern found (n,), and whether the search was broken off.
 
-    An evolution strategy with weighted recombination and a step size for each number (Ros & Hansen 2008 restrict
-    the covariance to a diagonal as well).
+    An evolution strategy with weighted recombination and a step size for each number (Ros & Hansen
+    2008 restrict the covariance to a diagonal as well).
 
     Raises
     ------
@@ -215,7 +249,10 @@ def search(problem: TorqueProblem, seed: int, progress: Progress | None = None) 
             if best is None or figures[order[0]] < best[0]:
                 best = float(figures[order[0]]), patterns[order[0]]
             if generation == 0:
-                middle, spread = patterns[order[0]], np.full(problem.size, 0.5 * np.std(patterns[order[0]]))
+                middle, spread = (
+                    patterns[order[0]],
+                    np.full(problem.size, 0.5 * np.std(patterns[order[0]])),
+                )
             else:
                 chosen = patterns[order[: POPULATION // 2]]
                 moved = weights @ chosen

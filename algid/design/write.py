@@ -1,6 +1,7 @@
 """A design's folder: the trajectory for controllers, players and people, and what it will tell.
 
-``trajectory.csv``, ``.parquet`` and ``.mcap``, ``joint_trajectory.yaml``, ``design.json``, ``report.html``.
+``trajectory.csv``, ``.parquet`` and ``.mcap``, ``joint_trajectory.yaml``, ``design.json``,
+``report.html``.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ from algid.log import Log, Origin
 from algid.model import UNITS, Motion
 from algid.notices import Notice
 
-POINTS = 50.0  # a second, of the joint trajectory: its controller joins them by polynomials of fifth degree
+# a second, of the joint trajectory: its controller joins them by polynomials of fifth degree
+POINTS = 50.0
 SCHEMA_VERSION = 2
 
 
@@ -49,7 +51,13 @@ def write_design(design: Design, folder: Path, origin: Provenance) -> None:
     with whole_file(folder / "trajectory.parquet") as temporary:
         frame.write_parquet(temporary)
     stamps, tau = np.round(design.t * 1e9).astype(np.int64), design.torque[min(design.torque)]
-    log = Log(stamps, design.motion.theta, tau, Origin("trajectory.mcap", "design", {}), design.motion.omega)
+    log = Log(
+        stamps,
+        design.motion.theta,
+        tau,
+        Origin("trajectory.mcap", "design", {}),
+        design.motion.omega,
+    )
     write_log(folder / "trajectory.mcap", log, kind="mcap")
     texts = {
         "design.json": design_json(design, origin),
@@ -69,13 +77,18 @@ def trajectory(design: Design) -> dict[str, FloatArray]:
     columns |= {f"tau{joint + 1}": design.torque[first][joint] for joint in range(2)}
     if True in design.torque and not first:
         if design.motions[True] is not design.motion:
-            columns |= {f"loaded_{name}": values for name, values in _signals(design.motions[True], ("theta",)).items()}
+            columns |= {
+                f"loaded_{name}": values
+                for name, values in _signals(design.motions[True], ("theta",)).items()
+            }
         columns |= {f"loaded_tau{joint + 1}": design.torque[True][joint] for joint in range(2)}
     return columns
 
 
 def _signals(motion: Motion, names: Sequence[str]) -> dict[str, FloatArray]:
-    return {f"{name}{joint + 1}": getattr(motion, name)[joint] for name in names for joint in range(2)}
+    return {
+        f"{name}{joint + 1}": getattr(motion, name)[joint] for name in names for joint in range(2)
+    }
 
 
 def joint_trajectory(design: Design, joints: tuple[str, str]) -> str:

@@ -1,7 +1,7 @@
 """A payload that is a body: its centre of mass off link 2's line and its inertia, where the loaded logs tell them.
 
-Payloads act through the chain rule alone (`algid.estimators.parametrisation`), so that what the logs say of them
-follows from the quadratic likelihoods of a fit, without a further pass.
+Payloads act through the chain rule alone (`algid.estimators.parametrisation`), so that what the
+logs say of them follows from the quadratic likelihoods of a fit, without a further pass.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ def with_body(fit: Fit) -> Fit:
     Returns
     -------
     Fit
-        The one with the most parameters of the body each of which is worth its price; an inertia is positive.
+        The one with the most parameters of the body each of which is worth its price; an inertia
+        is positive.
     """
     if not fit.shared.payload or not fit.converged:
         return fit
@@ -59,11 +60,20 @@ def _with(fit: Fit, body: Sequence[str]) -> Fit:
     else:
         coloured = fit.intervals != "likelihood"
         found = conclude(
-            fit.estimator, shared, fit.logs, start, fit.moved, fit.prior, coloured=coloured, samples=fit.freedom
+            fit.estimator,
+            shared,
+            fit.logs,
+            start,
+            fit.moved,
+            fit.prior,
+            coloured=coloured,
+            samples=fit.freedom,
         )
     before = dict(zip(fit.names, fit.status, strict=True))
     statuses = zip(found.names, found.status, strict=True)
-    status = tuple(own if before.get(name, "OK") == "OK" else before[name] for name, own in statuses)
+    status = tuple(
+        own if before.get(name, "OK") == "OK" else before[name] for name, own in statuses
+    )
     return replace(
         found,
         status=status,
@@ -77,7 +87,9 @@ def _with(fit: Fit, body: Sequence[str]) -> Fit:
 
 
 def _worths(fit: Fit) -> list[float]:
-    """Wald statistics of the body's parameters; nothing of what no object at the tip has, or the logs leave open.
+    """Wald statistics of the body's parameters.
+
+    Nothing of what no object at the tip has, or the logs leave open.
 
     An inertia is positive, and its radius of gyration no longer than joint 2 is away.
     """

@@ -7,9 +7,9 @@ S       information on a log's coefficients, by stretch      (B, q, q)  1 / (uni
 g       score at the coefficients `c0`, by stretch           (B, q)     1 / unit
 ======  ===================================================  =========  =================
 
-Near c0 the log-likelihood is g·(c − c0) − ½ (c − c0)ᵀ S (c − c0). Both are kept by stretch, in bounded memory,
-because what the stretches disagree about tells the error that white noise does not explain. When the stretches
-become too many, neighbours are added up.
+Near c0 the log-likelihood is g·(c − c0) − ½ (c − c0)ᵀ S (c − c0). Both are kept by stretch, in
+bounded memory, because what the stretches disagree about tells the error that white noise does not
+explain. When the stretches become too many, neighbours are added up.
 """
 
 from __future__ import annotations
@@ -101,7 +101,8 @@ def combine(
 
     Returns
     -------
-    beta (Q,), its information (Q, Q), and the log-likelihood there less that of each log's own coefficients c0
+    beta (Q,), its information (Q, Q), and the log-likelihood there less that of each log's own
+    coefficients c0
     """
     damping = 0.0
     value, gradient, S = likelihood(shared, logs, beta, prior)
@@ -128,8 +129,8 @@ def likelihood(
 
     Returns
     -------
-    Its value less that at the logs' own coefficients c0, its gradient Tᵀ (g − S (c − c0)) of shape (Q,), and its
-    information Tᵀ S T of shape (Q, Q), T = dc/dβ; the prior's with them.
+    Its value less that at the logs' own coefficients c0, its gradient Tᵀ (g − S (c − c0)) of shape
+    (Q,), and its information Tᵀ S T of shape (Q, Q), T = dc/dβ; the prior's with them.
     """
     size = len(shared.names)
     value, gradient, S = 0.0, np.zeros(size), np.zeros((size, size))
@@ -159,11 +160,13 @@ def sandwich(
     -------
     meat : (Q, Q), in the units of the information
     freedom : int
-        Independent stretches of log less parameters, at least 2; the covariance is larger by their ratio.
+        Independent stretches of log less parameters, at least 2; the covariance is larger by their
+        ratio.
 
     Notes
     -----
-    Between the inverses of the information it makes the sandwich of White 1982 and Newey & West 1987.
+    Between the inverses of the information it makes the sandwich of White 1982 and Newey & West
+    1987.
     """
     meat = np.zeros((len(shared.names), len(shared.names)))
     stretches = 0
@@ -201,8 +204,9 @@ def jackknife(logs: Sequence[LogInformation], without: FloatArray) -> FloatArray
 
     Notes
     -----
-    Tukey's jackknife, stratified by kind of log (Wolter 2007, eq. 4.5.3): Σ_h (n_h − 1)/n_h Σ_i (β_(hi) − β̄_h)². What
-    differs from run to run is in it. A kind of which there is one log alone adds nothing.
+    Tukey's jackknife, stratified by kind of log (Wolter 2007, eq. 4.5.3): Σ_h (n_h − 1)/n_h Σ_i
+    (β_(hi) − β̄_h)². What differs from run to run is in it. A kind of which there is one log alone
+    adds nothing.
     """
     if len(logs) < FEWEST_LOGS:
         return None
@@ -280,14 +284,17 @@ def long_run_variance(scores: FloatArray) -> tuple[FloatArray, int]:
 
     Notes
     -----
-    Newey & West 1987 with the bandwidth of Andrews 1991, eq. (6.2) and (6.4), from a first-order autoregression.
+    Newey & West 1987 with the bandwidth of Andrews 1991, eq. (6.2) and (6.4), from a first-order
+    autoregression.
     """
     count = scores.shape[0]
     power = np.sum(scores**2, axis=0)
     usable = scores[:, power > 0] / np.sqrt(power[power > 0])
     rho = np.clip(np.sum(usable[1:] * usable[:-1], axis=0), -0.97, 0.97)
     # α(1) with unit weights: each score was scaled to unit power above.
-    persistence = np.sum(4 * rho**2 / ((1 - rho) ** 6 * (1 + rho) ** 2)) / max(np.sum(1 / (1 - rho) ** 4), 1e-300)
+    persistence = np.sum(4 * rho**2 / ((1 - rho) ** 6 * (1 + rho) ** 2)) / max(
+        np.sum(1 / (1 - rho) ** 4), 1e-300
+    )
     lags = int(min(1.1447 * (persistence * count) ** (1 / 3), count / 4))
     total = scores.T @ scores
     for lag in range(1, lags + 1):

@@ -1,10 +1,12 @@
 """The convention of angles and torques under which a log obeys the equations of motion: each is tried.
 
-See `algid.estimators.conventions` for what each does to a log, and `algid.estimators.convention_sums` for the fits.
+See `algid.estimators.conventions` for what each does to a log, and
+`algid.estimators.convention_sums` for the fits.
 
-**What physics demands** (Table 1): M22 = k3 + j2 > 0, k5 > 0 and k3 k5 > k1² (M positive definite, by the inequality of
-Cauchy and Schwarz on m2 l1² ≤ k5, m2 lc2² ≤ k3), friction that brakes, k1 k2 ≥ 0; and k2, k4 ≥ 0: gravity pulls down.
-Friction is judged by its torque at the joint's RMS speed, since a real one falls with speed at first (Stribeck).
+**What physics demands** (Table 1): M22 = k3 + j2 > 0, k5 > 0 and k3 k5 > k1² (M positive definite,
+by the inequality of Cauchy and Schwarz on m2 l1² ≤ k5, m2 lc2² ≤ k3), friction that brakes, k1 k2
+≥ 0; and k2, k4 ≥ 0: gravity pulls down. Friction is judged by its torque at the joint's RMS speed,
+since a real one falls with speed at first (Stribeck).
 """
 
 from __future__ import annotations
@@ -30,8 +32,12 @@ from algid.estimators.convention_sums import (
 )
 from algid.estimators.conventions import AS_READ, Convention
 
-_CLEAN = 1e-3  # of a torque's power: what the arm's true convention leaves on a log that is nearly all model
-_FINE, _COARSE = (250.0, 40.0), (125.0, 12.0)  # Hz and s: what is looked at, and what scales are sought in
+# of a torque's power: what the arm's true convention leaves on a log that is nearly all model
+_CLEAN = 1e-3
+_FINE, _COARSE = (
+    (250.0, 40.0),
+    (125.0, 12.0),
+)  # Hz and s: what is looked at, and what scales are sought in
 _QUARTERS = (0.0, 0.5 * pi, pi, -0.5 * pi)
 _SHIFTED = 3  # conventions, of the best, whose zeros are set free
 _SCALES = (0.1, 400.0)  # from turns (0.16) to the motors behind large gears
@@ -94,7 +100,9 @@ class Candidate:
     @cached_property
     def demands(self) -> dict[str, float]:
         """What physics demands, and how many standard deviations the log is on the right side."""
-        return _demands(dict(zip(self.names, self.k.tolist(), strict=True)), self.covariance, self.speed)
+        return _demands(
+            dict(zip(self.names, self.k.tolist(), strict=True)), self.covariance, self.speed
+        )
 
     @property
     def broken(self) -> dict[str, float]:
@@ -112,7 +120,8 @@ class Candidate:
 class Judgement:
     """The log as it was read, the best convention, and whether it is `alone`.
 
-    It is where the log shows a real arm under it, and no other convention that physics allows comes near.
+    It is where the log shows a real arm under it, and no other convention that physics allows
+    comes near.
     """
 
     as_read: Candidate
@@ -120,11 +129,14 @@ class Judgement:
     alone: bool
 
 
-def judge(theta: FloatArray, tau: FloatArray, dt: float, *, gravity: bool = True) -> Judgement | None:
+def judge(
+    theta: FloatArray, tau: FloatArray, dt: float, *, gravity: bool = True
+) -> Judgement | None:
     """Try every convention on angles (2, N) in rad and torques (2, N) in N m, `dt` s apart.
 
-    None where the log is too short (six windows) or too slow (ten samples a window) to tell, a torque is zero, or an
-    angle spans more than any scale makes a joint's: such values are no angles, as a spike of 1e6 rad is none.
+    None where the log is too short (six windows) or too slow (ten samples a window) to tell, a
+    torque is zero, or an angle spans more than any scale makes a joint's: such values are no
+    angles, as a spike of 1e6 rad is none.
     """
     if theta.shape[1] * dt < 6 * WINDOW or 10 * dt > WINDOW or not np.all(np.any(tau != 0, axis=1)):
         return None
@@ -162,7 +174,9 @@ class _Trials:
         self._coarse = thinned(theta, tau, dt, *_COARSE)
         kept = [not name.startswith(("k2", "k4")) or gravity for name in COLUMNS]
         self._free = np.eye(len(COLUMNS))[:, kept]
-        self._zeros = [(turn, half) for half in (0.0, pi) for turn in (_QUARTERS if gravity else _QUARTERS[:1])]
+        self._zeros = [
+            (turn, half) for half in (0.0, pi) for turn in (_QUARTERS if gravity else _QUARTERS[:1])
+        ]
         self._names = tuple(name for name in ZEROED if name not in ("k2", "k4") or gravity)
         self.apart = max(APART, 2 * EVIDENCE * WINDOW / (self._fine.theta.shape[1] * self._fine.dt))
         """By how much the scores of two conventions differ that are told apart."""
@@ -175,7 +189,11 @@ class _Trials:
 
     def shifted(self, found: Sequence[Candidate]) -> Iterator[Candidate]:
         """The conventions that leave least when both zeros are free, with the zeros that fit best."""
-        scored = [pair for each in _families() for pair in zip(self._scores(each, self._fine), each, strict=True)]
+        scored = [
+            pair
+            for each in _families()
+            for pair in zip(self._scores(each, self._fine), each, strict=True)
+        ]
         for _, family in sorted(scored, key=lambda pair: pair[0])[:_SHIFTED]:
             yield from self._with_free_zero(family, found)
 
@@ -189,15 +207,21 @@ class _Trials:
             yield from found
             yield from self._with_free_zero(family, found)
 
-    def _with_zeros(self, families: Sequence[Convention], zeros: Sequence[tuple[float, float]]) -> Iterator[Candidate]:
+    def _with_zeros(
+        self, families: Sequence[Convention], zeros: Sequence[tuple[float, float]]
+    ) -> Iterator[Candidate]:
         """Each family of the same angles and drive with each of the zeros."""
         sums = self._sums(families[0], self._fine)
         fitted = solved(sums, families, np.stack([self._place(zero) for zero in zeros]))
         scores = _sizes(np.maximum(fitted[1], LEAST)).tolist()
-        for (family, zero), c, left, covariance, score in zip(product(families, zeros), *fitted, scores, strict=True):
+        for (family, zero), c, left, covariance, score in zip(
+            product(families, zeros), *fitted, scores, strict=True
+        ):
             yield Candidate(family, zero, self._names, c, covariance, left, score, sums.speed)
 
-    def _with_free_zero(self, family: Convention, found: Sequence[Candidate]) -> Iterator[Candidate]:
+    def _with_free_zero(
+        self, family: Convention, found: Sequence[Candidate]
+    ) -> Iterator[Candidate]:
         """The zeros that fit best, where they leave far less than those that were found."""
         (free,) = self._with_zeros([family], [self._best_zero(family)])
         if free.score < min(one.score for one in found if one.family == family) - self.apart:
@@ -214,15 +238,25 @@ class _Trials:
         start = np.array([np.arctan2(c[6], c[5]), np.arctan2(c[1], c[0])])
 
         def score(zero: FloatArray) -> float:
-            return float(_sizes(solved(sums, [family], self._place((zero[0], zero[1]))[None])[1][0]))
+            return float(
+                _sizes(solved(sums, [family], self._place((zero[0], zero[1]))[None])[1][0])
+            )
 
         from scipy.optimize import minimize
 
-        best = minimize(score, start, method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-3, "maxiter": 200}).x
+        best = minimize(
+            score,
+            start,
+            method="Nelder-Mead",
+            options={"xatol": 1e-4, "fatol": 1e-3, "maxiter": 200},
+        ).x
         return remainder(float(best[0]), 2 * pi), remainder(float(best[1]), 2 * pi)
 
     def _scaled(self, joints: tuple[int, int]) -> Convention | None:
-        """What the angles of `joints` have to be divided by; None where no scale leaves far less than none."""
+        """What the angles of `joints` have to be divided by.
+
+        None where no scale leaves far less than none.
+        """
 
         def score(scale: float, log: ThinnedLog) -> float:
             return self._scores([_scaled_by(scale, joints)], log)[0]
@@ -253,8 +287,13 @@ class _Trials:
         return T
 
     def _sums(self, family: Convention, log: ThinnedLog) -> ConventionSums:
-        """Sums for a family's angles and drive; those of the last pass over the log serve the next one too."""
-        angles = Convention(swapped=family.swapped, scale=family.scale, signs=family.signs, absolute=family.absolute)
+        """Sums for a family's angles and drive.
+
+        Those of the last pass over the log serve the next one too.
+        """
+        angles = Convention(
+            swapped=family.swapped, scale=family.scale, signs=family.signs, absolute=family.absolute
+        )
         if angles not in self._passes or log is not self._fine:
             passed = summed(angles, log)
             if log is not self._fine:
@@ -265,10 +304,15 @@ class _Trials:
 
 def _families() -> Iterator[list[Convention]]:
     """Every convention without scale and zeros, those of the same angles and drive together."""
-    for swapped, sign, absolute, base in product((False, True), (1, -1), (False, True), (False, True)):
+    for swapped, sign, absolute, base in product(
+        (False, True), (1, -1), (False, True), (False, True)
+    ):
         angles = Convention(swapped=swapped, signs=(1, sign), absolute=absolute, base=base)
         torques = product((False, True), (1, -1), (1, -1))
-        yield [replace(angles, torques_swapped=swap, torque_signs=(one, two)) for swap, one, two in torques]
+        yield [
+            replace(angles, torques_swapped=swap, torque_signs=(one, two))
+            for swap, one, two in torques
+        ]
 
 
 def _scaled_by(scale: float, joints: tuple[int, int]) -> Convention:
@@ -300,10 +344,15 @@ def _demands(k: dict[str, float], covariance: FloatArray, speed: FloatArray) -> 
         "M22 > 0": distance(m22, {"k3": 1, "j2": 1}),
         "k5 > 0": distance(k5, {"k5": 1}),
         "det M > 0": distance(
-            k5 * m22 + k["k3"] * k["j2"] - k1**2, {"k1": -2 * k1, "k3": k5 + k["j2"], "k5": m22, "j2": k5 + k["k3"]}
+            k5 * m22 + k["k3"] * k["j2"] - k1**2,
+            {"k1": -2 * k1, "k3": k5 + k["j2"], "k5": m22, "j2": k5 + k["k3"]},
         ),
-        "that the friction of joint 1 brakes": distance(k["k6"] * speed[0] + k["f1"], {"k6": float(speed[0]), "f1": 1}),
-        "that the friction of joint 2 brakes": distance(k["k7"] * speed[1] + k["f2"], {"k7": float(speed[1]), "f2": 1}),
+        "that the friction of joint 1 brakes": distance(
+            k["k6"] * speed[0] + k["f1"], {"k6": float(speed[0]), "f1": 1}
+        ),
+        "that the friction of joint 2 brakes": distance(
+            k["k7"] * speed[1] + k["f2"], {"k7": float(speed[1]), "f2": 1}
+        ),
     }
     if "k2" not in k:
         return found | {"k1 > 0": distance(k1, {"k1": 1})}

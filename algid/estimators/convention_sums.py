@@ -1,7 +1,7 @@
 """Sums over a log's windows that judge conventions: moments of mapped angles, solved for many conventions at once.
 
-See `algid.estimators.conventions` for what a convention is, and for why zeros, signs and order of torques need no pass
-over the log of their own.
+See `algid.estimators.conventions` for what a convention is, and for why zeros, signs and order of
+torques need no pass over the log of their own.
 
 ======  ==================================================================  ================
 symbol  name                                                                shape
@@ -26,7 +26,23 @@ from algid.estimators.modulating_functions import OVERLAP, Windows
 from algid.model import sine_cosine
 from algid.signals.filters import correlate, differentiator, half_length
 
-COLUMNS = ("k1", "k1'", "k2", "k2'", "k3", "k4", "k4'", "k5", "k6", "k7", "f1", "f2", "o1", "o2", "j2")
+COLUMNS = (
+    "k1",
+    "k1'",
+    "k2",
+    "k2'",
+    "k3",
+    "k4",
+    "k4'",
+    "k5",
+    "k6",
+    "k7",
+    "f1",
+    "f2",
+    "o1",
+    "o2",
+    "j2",
+)
 ZEROED = tuple(name for name in COLUMNS if not name.endswith("'"))
 WINDOW = 0.4  # s
 _BANDWIDTH = 40.0  # Hz, of the velocity beside k1
@@ -39,8 +55,8 @@ _FLOOR = 1e-9  # of a torque's power: a residual below it is rounding
 class ConventionSums:
     """Sums over the windows of a log whose angles were mapped.
 
-    Gram matrices of the columns (2, 15, 15), their products with both recorded torques (2, 15, 2), the power of these
-    (2,), and the joints' RMS speeds (2,) in rad/s.
+    Gram matrices of the columns (2, 15, 15), their products with both recorded torques (2, 15, 2),
+    the power of these (2,), and the joints' RMS speeds (2,) in rad/s.
     """
 
     gram: FloatArray
@@ -63,11 +79,15 @@ class ThinnedLog:
     kernels: FloatArray
 
 
-def thinned(theta: FloatArray, tau: FloatArray, dt: float, rate: float, longest: float) -> ThinnedLog:
+def thinned(
+    theta: FloatArray, tau: FloatArray, dt: float, rate: float, longest: float
+) -> ThinnedLog:
     """Means over as many samples as leave `rate` Hz, of the first `longest` s."""
     width = max(1, round(1 / (rate * dt)))
     count = min(theta.shape[1], round(longest / dt)) // width
-    theta, tau = (signal[:, : count * width].reshape(2, count, width).mean(axis=2) for signal in (theta, tau))
+    theta, tau = (
+        signal[:, : count * width].reshape(2, count, width).mean(axis=2) for signal in (theta, tau)
+    )
     dt *= width
     bandwidth = max(min(_BANDWIDTH, 0.2 / dt), 6.0 / WINDOW)
     windows = Windows(dt, WINDOW, 0.0, bandwidth)
@@ -77,15 +97,29 @@ def thinned(theta: FloatArray, tau: FloatArray, dt: float, rate: float, longest:
 
 def summed(angles: Convention, log: ThinnedLog) -> tuple[ConventionSums, ConventionSums]:
     """Sums for angles so mapped: with the second motor in its joint, and with it at the base."""
-    theta, omega = angles.angles(log.theta[:, log.reach : -log.reach]), angles.angles(log.omega)  # linear without zeros
+    theta, omega = (
+        angles.angles(log.theta[:, log.reach : -log.reach]),
+        angles.angles(log.omega),
+    )  # linear without zeros
     tau, windows = log.tau[:, log.reach : -log.reach], log.windows
     weight, slope, bend = log.kernels
     (s1, s2), (c1, c2) = sine_cosine(theta)
     friction = np.tanh(omega / _COULOMB_SPEED)
     centripetal = omega[0] * (omega[0] + omega[1])
-    weighed = [centripetal * s2, centripetal * c2, c1, s1, c1 * c2 - s1 * s2, s1 * c2 + c1 * s2, *friction, *tau]
+    weighed = [
+        centripetal * s2,
+        centripetal * c2,
+        c1,
+        s1,
+        c1 * c2 - s1 * s2,
+        s1 * c2 + c1 * s2,
+        *friction,
+        *tau,
+    ]
     turned2, turning2, c1_, s1_, c12_, s12_, f1, f2, *b = windows.moments(np.stack(weighed), weight)
-    slope1, slope2, momentum, momentum_ = windows.moments(np.stack([*theta, c2 * omega[0], s2 * omega[0]]), slope)
+    slope1, slope2, momentum, momentum_ = windows.moments(
+        np.stack([*theta, c2 * omega[0], s2 * omega[0]]), slope
+    )
     bend1, bend2, s2_bend, c2_bend = windows.moments(np.stack([*theta, s2, c2]), bend)
     zeros, one = np.zeros_like(f1), np.ones_like(f1)
     columns = {
@@ -143,7 +177,9 @@ def solved(
         scale = size[:, :, None] * size[:, None, :]
         inverse = np.linalg.inv(normal / scale + ridge) / scale
         c = np.einsum("zij,za,zaj->zi", inverse, weight, aimed)
-        squares = power - 2 * np.einsum("zai,zi->za", aimed, c) + np.einsum("zi,zaij,zj->za", c, gram, c)
+        squares = (
+            power - 2 * np.einsum("zai,zi->za", aimed, c) + np.einsum("zi,zaij,zj->za", c, gram, c)
+        )
         squares = np.maximum(squares, _FLOOR * power)
         weight = sums.independent / squares
     return c, squares / power, inverse

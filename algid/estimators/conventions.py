@@ -1,23 +1,28 @@
 """Conventions of angles and torques, each of which a log may obey: what they do to it, and what no log can tell.
 
-A log may have been recorded under another convention than algid's: signs, order of the joints, θ2 from the
-horizontal, another zero, angles of the motors, a second motor that stands at the base. Each such mistake is a linear
-map of (θ, τ), so each is tried: the log is mapped back and eq. (1), with friction and offsets, fitted in its weak form.
+A log may have been recorded under another convention than algid's: signs, order of the joints, θ2
+from the horizontal, another zero, angles of the motors, a second motor that stands at the base.
+Each such mistake is a linear map of (θ, τ), so each is tried: the log is mapped back and eq. (1),
+with friction and offsets, fitted in its weak form.
 
-**Zeros are linear.** With θ1 + δ1 and θ2 + δ2 in the place of the angles, k4 cos θ1 becomes k4 cos δ1 cos θ1 −
-k4 sin δ1 sin θ1; likewise k2 with δ1 + δ2, and k1 with δ2. Each of the three has therefore a second column, a quarter
-turn on, and one pass over the log serves every zero. Signs and order of the torques are linear in b. A second motor
-at the base turns θ1 + θ2 and does the work τ_m1 θ̇1 + τ_m2 (θ̇1 + θ̇2): its own equations are the difference of the
-joints' and the second joint's. Only order, relative sign, reference and scale of the angles need a pass of their own.
+**Zeros are linear.** With θ1 + δ1 and θ2 + δ2 in the place of the angles, k4 cos θ1 becomes k4 cos
+δ1 cos θ1 − k4 sin δ1 sin θ1; likewise k2 with δ1 + δ2, and k1 with δ2. Each of the three has
+therefore a second column, a quarter turn on, and one pass over the log serves every zero. Signs
+and order of the torques are linear in b. A second motor at the base turns θ1 + θ2 and does the
+work τ_m1 θ̇1 + τ_m2 (θ̇1 + θ̇2): its own equations are the difference of the joints' and the
+second joint's. Only order, relative sign, reference and scale of the angles need a pass of their
+own.
 
 **What no log can tell** (tests prove each):
 
-- θ → −θ, τ → −τ, δ1 → π − δ1, δ2 → −δ2: the arm seen from behind. All signs flipped is the same as θ1 from the other
-  horizontal, the constants are the same, and half of the conventions need not be tried. With zeros that hang it is
-  no mistake at all.
-- τ → a τ, and t → a t: a common gain, a clock that runs fast. The constants scale, no equation is broken.
-- θ2 → θ2 + π turns k1 and k2 round. Only k1 k2 = m2² g l1 lc2² ≥ 0 is demanded by physics; that k1 and k2 themselves
-  are positive says that link 2's centre of gravity lies on link 2's side of its joint, which no counterweight spoils.
+- θ → −θ, τ → −τ, δ1 → π − δ1, δ2 → −δ2: the arm seen from behind. All signs flipped is the same as
+  θ1 from the other horizontal, the constants are the same, and half of the conventions need not be
+  tried. With zeros that hang it is no mistake at all.
+- τ → a τ, and t → a t: a common gain, a clock that runs fast. The constants scale, no equation is
+  broken.
+- θ2 → θ2 + π turns k1 and k2 round. Only k1 k2 = m2² g l1 lc2² ≥ 0 is demanded by physics; that k1
+  and k2 themselves are positive says that link 2's centre of gravity lies on link 2's side of its
+  joint, which no counterweight spoils.
 - Without gravity, every δ1.
 """
 
@@ -35,9 +40,9 @@ from algid.arm import FloatArray
 class Convention:
     """What has to be done to angles and torques as they were read; by default nothing.
 
-    The angles of the joints change places, are divided by `scale`, multiplied by `signs`, θ1 is taken off an `absolute`
-    θ2, and `zero` is added. The torques change places and are multiplied by `torque_signs`. `base`: the second motor
-    stands at the base.
+    The angles of the joints change places, are divided by `scale`, multiplied by `signs`, θ1 is
+    taken off an `absolute` θ2, and `zero` is added. The torques change places and are multiplied
+    by `torque_signs`. `base`: the second motor stands at the base.
     """
 
     swapped: bool = False
@@ -52,8 +57,14 @@ class Convention:
     def angles(self, theta: FloatArray) -> FloatArray:
         """Angles (2, N) in rad under algid's convention out of those that were read."""
         first, second = theta[::-1] if self.swapped else theta
-        first, second = first * (self.signs[0] / self.scale[0]), second * (self.signs[1] / self.scale[1])
-        return np.stack([first, second - first if self.absolute else second]) + np.array(self.zero)[:, None]
+        first, second = (
+            first * (self.signs[0] / self.scale[0]),
+            second * (self.signs[1] / self.scale[1]),
+        )
+        return (
+            np.stack([first, second - first if self.absolute else second])
+            + np.array(self.zero)[:, None]
+        )
 
     def torques(self, tau: FloatArray) -> FloatArray:
         """Torques (2, N) at the joints in N m out of those that were read."""

@@ -1,12 +1,13 @@
 """What tells that estimates are wrong: bounds of physics, terms without worth, logs of another arm.
 
-Physics demands a positive definite mass matrix, no negative friction, mass, inertia k5 or length. M(θ) is positive
-definite for every θ2 where M22 > 0 and det M > 0; the determinant is concave in cos θ2, so its least value lies at
-θ2 = 0 or θ2 = π. Eq. (2), with the rotor inertia j2 in M22.
+Physics demands a positive definite mass matrix, no negative friction, mass, inertia k5 or length.
+M(θ) is positive definite for every θ2 where M22 > 0 and det M > 0; the determinant is concave in
+cos θ2, so its least value lies at θ2 = 0 or θ2 = π. Eq. (2), with the rotor inertia j2 in M22.
 
-A term's worth is the fall of the likelihood when its coefficients are set to zero, which near the estimate is
-the Wald statistic. It is formed with the covariance that the error bars rest on, so that coloured residuals do
-not make every term look significant; the Bayesian criterion (Schwarz 1978) counts as samples what is independent.
+A term's worth is the fall of the likelihood when its coefficients are set to zero, which near the
+estimate is the Wald statistic. It is formed with the covariance that the error bars rest on, so
+that coloured residuals do not make every term look significant; the Bayesian criterion (Schwarz
+1978) counts as samples what is independent.
 """
 
 from __future__ import annotations
@@ -19,7 +20,14 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.compiled import chi2_exceeded, chi2_tail, normal_exceeded
-from algid.estimators.combine import LogInformation, Prior, combine, likelihood, sandwich, scaled_pinv
+from algid.estimators.combine import (
+    LogInformation,
+    Prior,
+    combine,
+    likelihood,
+    sandwich,
+    scaled_pinv,
+)
 from algid.estimators.fit import Fit, Status
 from algid.estimators.identifiability import sizes
 from algid.estimators.parametrisation import Shared
@@ -31,7 +39,12 @@ _NOT_NEGATIVE = tuple(name for name, parameter in PARAMETERS.items() if paramete
 _NUDGE = 1e-6  # of a parameter's size: step of the differences
 FAR_BEYOND = 3.0
 """Standard deviations past a bound of physics that chance does not explain."""
-_INSIDE = (1e-6, 1e-5, 1e-4, 1e-3)  # of a parameter's size: distance kept from a bound, until the solver keeps it
+_INSIDE = (
+    1e-6,
+    1e-5,
+    1e-4,
+    1e-3,
+)  # of a parameter's size: distance kept from a bound, until the solver keeps it
 
 
 @dataclass(frozen=True)
@@ -49,7 +62,8 @@ class BrokenBound:
 def bounds(shared: Shared) -> dict[str, Callable[[FloatArray], float]]:
     """Functions of the shared parameters that must not be negative, by name.
 
-    Each takes (Q,) and gives a float in the bound's own unit: kg m², its square, the parameter's, or k1 k2's.
+    Each takes (Q,) and gives a float in the bound's own unit: kg m², its square, the parameter's,
+    or k1 k2's.
     """
     found: dict[str, Callable[[FloatArray], float]] = {
         "M22 > 0": lambda beta: _mass(shared, beta)[0],
@@ -71,7 +85,9 @@ def _mass(shared: Shared, beta: FloatArray) -> tuple[float, float, float]:
     """M22 and the determinant of M at θ2 = 0 and π."""
     c = beta[: len(shared.model.names)]
     bent = -np.angle(phasor(shared.model, c, "k1")) if "k1" in shared.model.names else 0.0
-    bent = bent if abs(bent) <= np.pi / 2 else bent + np.pi  # k1 itself may be negative: a convention of θ2
+    bent = (
+        bent if abs(bent) <= np.pi / 2 else bent + np.pi
+    )  # k1 itself may be negative: a convention of θ2
     poses = np.array([[0.0, 0.0], [bent, bent + np.pi]])
     (m11, m12), (m21, m22) = inertia(shared.model, c, poses)
     det = m11 * m22 - m12 * m21
@@ -81,7 +97,8 @@ def _mass(shared: Shared, beta: FloatArray) -> tuple[float, float, float]:
 def broken_bounds(fit: Fit) -> list[BrokenBound]:
     """Bounds that the estimates break.
 
-    A parameter that the logs leave open breaks none, nor does a term that is shrunk: it takes up what the model lacks.
+    A parameter that the logs leave open breaks none, nor does a term that is shrunk: it takes up
+    what the model lacks.
     """
     size = sizes(fit.names, fit.values)
     shrunk = () if fit.shrinkage is None else fit.shrinkage.names
@@ -99,10 +116,12 @@ def broken_bounds(fit: Fit) -> list[BrokenBound]:
 
 
 def length_by_constants(fit: Fit) -> tuple[float, float] | None:
-    """l1 = g k1 / k2 (Table 1) and its standard deviation, in m; None where the logs leave k1 or k2 open.
+    """l1 = g k1 / k2 (Table 1) and its standard deviation, in m.
 
-    No gain of both torques changes it: where it is not the length that is known, gravity is compensated in part, or
-    the zeros or the terms of the torque are wrong.
+    None where the logs leave k1 or k2 open.
+
+    No gain of both torques changes it: where it is not the length that is known, gravity is
+    compensated in part, or the zeros or the terms of the torque are wrong.
     """
     if fit.shared.model.gravity == 0:
         return None
@@ -121,7 +140,9 @@ def length_by_constants(fit: Fit) -> tuple[float, float] | None:
 
 def _slope(bound: Callable[[FloatArray], float], beta: FloatArray, size: FloatArray) -> FloatArray:
     steps = _NUDGE * np.diag(size)
-    return np.array([(bound(beta + step) - bound(beta - step)) / (2 * step.max()) for step in steps])
+    return np.array(
+        [(bound(beta + step) - bound(beta - step)) / (2 * step.max()) for step in steps]
+    )
 
 
 def constrained(fit: Fit) -> Fit:
@@ -134,9 +155,10 @@ def constrained(fit: Fit) -> Fit:
     Returns
     -------
     Fit
-        `fit` itself where it breaks no bound. Else the note names the bounds that had to be enforced; or those that
-        no point was found within: then the free estimates stand, with status NOT_CONVERGED. Standard deviations
-        stay those of the free fit: a bound that holds says nothing about the other parameters' noise.
+        `fit` itself where it breaks no bound. Else the note names the bounds that had to be
+        enforced; or those that no point was found within: then the free estimates stand, with
+        status NOT_CONVERGED. Standard deviations stay those of the free fit: a bound that holds
+        says nothing about the other parameters' noise.
     """
     enforced = broken_bounds(fit)
     if not enforced:
@@ -151,18 +173,31 @@ def constrained(fit: Fit) -> Fit:
         value, gradient, _ = likelihood(fit.shared, fit.logs, fit.values + scale * x, fit.prior)
         return -value / unit, -gradient * scale / unit
 
-    def margin(bound: Callable[[FloatArray], float], slope: float, inside: float, x: FloatArray) -> float:
+    def margin(
+        bound: Callable[[FloatArray], float], slope: float, inside: float, x: FloatArray
+    ) -> float:
         return bound(fit.values + scale * x) / slope - inside
 
     held = [
-        (bound, float(np.linalg.norm(_slope(bound, fit.values, size) * size))) for bound in bounds(fit.shared).values()
+        (bound, float(np.linalg.norm(_slope(bound, fit.values, size) * size)))
+        for bound in bounds(fit.shared).values()
     ]
     x, disobeyed = np.zeros(scale.size), enforced
     options = {"maxiter": 500, "ftol": 1e-12}
     for inside in _INSIDE:
-        demands = [{"type": "ineq", "fun": partial(margin, bound, slope or 1.0, inside)} for bound, slope in held]
+        demands = [
+            {"type": "ineq", "fun": partial(margin, bound, slope or 1.0, inside)}
+            for bound, slope in held
+        ]
         unit = 1 + abs(cost(x, 1.0)[0])  # the solver's tolerances are absolute
-        solution = minimize(partial(cost, unit=unit), x, jac=True, method="SLSQP", constraints=demands, options=options)
+        solution = minimize(
+            partial(cost, unit=unit),
+            x,
+            jac=True,
+            method="SLSQP",
+            constraints=demands,
+            options=options,
+        )
         if not np.all(np.isfinite(solution.x)):
             break
         x = solution.x
@@ -171,13 +206,18 @@ def constrained(fit: Fit) -> Fit:
         if not disobeyed:
             return moved.noted(Notice("CONSTRAINED", numbers={"bounds": _named(enforced)}))
     note = Notice("NOT_FEASIBLE", numbers={"bounds": _named(disobeyed)})
-    status: tuple[Status, ...] = tuple("NOT_CONVERGED" if word == "OK" else "NOT_IDENTIFIABLE" for word in fit.status)
+    status: tuple[Status, ...] = tuple(
+        "NOT_CONVERGED" if word == "OK" else "NOT_IDENTIFIABLE" for word in fit.status
+    )
     return replace(fit, converged=False, status=status).noted(note)
 
 
 def _named(bounds: Sequence[BrokenBound]) -> list[str]:
     return [
-        b.bound if b.distance is None else f"{b.bound} ({b.distance:.2g} standard deviations beyond)" for b in bounds
+        b.bound
+        if b.distance is None
+        else f"{b.bound} ({b.distance:.2g} standard deviations beyond)"
+        for b in bounds
     ]
 
 
@@ -205,14 +245,15 @@ def joints_apart(normals: Sequence[Normal], model: Model) -> JointsApart | None:
     Returns
     -------
     JointsApart or None
-        The constant whose difference has the most standard deviations, `FAR_BEYOND` at least, among those that differ
-        by more than half of the larger value.
+        The constant whose difference has the most standard deviations, `FAR_BEYOND` at least,
+        among those that differ by more than half of the larger value.
 
     Notes
     -----
-    Where one joint is hardly driven, what moves it is friction and play that the model lacks, and its equation is
-    solved by constants near nothing. Its residual is small then, so that it outweighs the joint that is driven. The
-    standard deviations are those of the sandwich, as for a fit.
+    Where one joint is hardly driven, what moves it is friction and play that the model lacks, and
+    its equation is solved by constants near nothing. Its residual is small then, so that it
+    outweighs the joint that is driven. The standard deviations are those of the sandwich, as for a
+    fit.
     """
     shared = Shared(model)
     both = [place for place, name in enumerate(model.names) if name in ("k1", "k2", "k3")]
@@ -221,7 +262,8 @@ def joints_apart(normals: Sequence[Normal], model: Model) -> JointsApart | None:
         grams = [normal.gram[:, joint] for normal in normals]
         nothing = np.zeros(len(model.names))
         c, covariance, _ = _by_themselves(
-            shared, [LogInformation(False, nothing, gram[:, :-1, :-1], gram[:, :-1, -1]) for gram in grams]
+            shared,
+            [LogInformation(False, nothing, gram[:, :-1, :-1], gram[:, :-1, -1]) for gram in grams],
         )
         found.append((c[both], np.diag(covariance)[both]))
     (first, of_first), (second, of_second) = found
@@ -268,13 +310,14 @@ def payload_distance(fit: Fit) -> float | None:
     Returns
     -------
     float or None
-        In standard deviations of a normal variable as unlikely; None where the logs of either kind do not determine
-        their own constants.
+        In standard deviations of a normal variable as unlikely; None where the logs of either kind
+        do not determine their own constants.
 
     Notes
     -----
-    The statistic compares the arm's constants with the loaded arm's, less the payload that fits best. Where they agree
-    it is χ² with as many degrees of freedom as constants less those of the payload.
+    The statistic compares the arm's constants with the loaded arm's, less the payload that fits
+    best. Where they agree it is χ² with as many degrees of freedom as constants less those of the
+    payload.
     """
     kinds = [[log for log in fit.logs if log.loaded is kind] for kind in (False, True)]
     if not fit.shared.payload or not all(kinds):
@@ -284,7 +327,9 @@ def payload_distance(fit: Fit) -> float | None:
         return None
     freedom = len(fit.shared.log_names) - (len(fit.shared.names) - len(fit.shared.log_names))
     arm = Prior.of(fit.shared.log_names, unloaded[0], unloaded[1])
-    information = LogInformation(True, loaded[0], scaled_pinv(loaded[1])[None], np.zeros_like(loaded[0])[None])
+    information = LogInformation(
+        True, loaded[0], scaled_pinv(loaded[1])[None], np.zeros_like(loaded[0])[None]
+    )
     _, _, value = combine(fit.shared, [information], fit.values, arm)
     return max(0.0, normal_exceeded(float(chi2_tail(freedom, max(0.0, -2 * value)))))
 
@@ -299,10 +344,13 @@ class MassScatter:
 
 
 def repeatability(fit: Fit) -> MassScatter | None:
-    """How far the payload differs from run to run; None with fewer than two loaded logs, or none that tell it.
+    """How far the payload differs from run to run.
 
-    Each loaded log is fitted for m_p, the arm and the lengths held as all logs tell them. The interval is that of the
-    standard deviation of normal numbers, by χ² of n − 1: wide where there are few runs.
+    None with fewer than two loaded logs, or none that tell it.
+
+    Each loaded log is fitted for m_p, the arm and the lengths held as all logs tell them. The
+    interval is that of the standard deviation of normal numbers, by χ² of n − 1: wide where there
+    are few runs.
     """
     loaded = [log for log in fit.logs if log.loaded]
     if "m_p" not in fit.names or len(loaded) < 2:
@@ -319,14 +367,20 @@ def repeatability(fit: Fit) -> MassScatter | None:
         masses.append(fit.values[place] + float(slope @ (g - S @ change)) / information)
     n = len(masses)
     std = float(np.std(masses, ddof=1))
-    low, high = (std * float(np.sqrt((n - 1) / chi2_exceeded(n - 1, tail))) for tail in (0.025, 0.975))
+    low, high = (
+        std * float(np.sqrt((n - 1) / chi2_exceeded(n - 1, tail))) for tail in (0.025, 0.975)
+    )
     return MassScatter(np.array(masses), std, (low, high))
 
 
-def _by_themselves(shared: Shared, logs: Sequence[LogInformation]) -> tuple[FloatArray, FloatArray, bool]:
+def _by_themselves(
+    shared: Shared, logs: Sequence[LogInformation]
+) -> tuple[FloatArray, FloatArray, bool]:
     """Coefficients (q,) that logs of one kind give, their sandwich (q, q), and whether all of them are determined."""
     S = np.sum([log.total[0] for log in logs], axis=0)
     inverse = scaled_pinv(S)
     c = inverse @ np.sum([log.total[1] + log.total[0] @ log.c0 for log in logs], axis=0)
-    meat, _ = sandwich(Shared(shared.model, shared.delay), [replace(log, loaded=False) for log in logs], c)
+    meat, _ = sandwich(
+        Shared(shared.model, shared.delay), [replace(log, loaded=False) for log in logs], c
+    )
     return c, inverse @ meat @ inverse, bool(np.linalg.matrix_rank(inverse @ S) == len(c))

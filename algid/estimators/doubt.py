@@ -1,6 +1,7 @@
 """Where no error bar stands for k1 … k5: a joint stood still, or the joints' equations contradict each other.
 
-Where a likelihood is refuted and there are few logs, what differs from run to run does not show by itself.
+Where a likelihood is refuted and there are few logs, what differs from run to run does not show by
+itself.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ from algid.model import RIGID, UNITS
 from algid.notices import Notice
 
 
-def doubted(fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings) -> Fit:
+def doubted(
+    fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
+) -> Fit:
     """The fit with status WEAK_EXCITATION for k1 … k5 where they are doubtful.
 
     Parameters
@@ -36,7 +39,9 @@ def doubted(fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], sett
     return fit if doubt is None else fit.marked("WEAK_EXCITATION", RIGID).noted(doubt)
 
 
-def _doubt(fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings) -> Notice | None:
+def _doubt(
+    fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
+) -> Notice | None:
     still = [f"joint {joint + 1}" for joint in range(2) if fit.moved[joint] < STILL]
     if still:
         return Notice("JOINT_STILL", numbers={"joints": still})
@@ -48,6 +53,11 @@ def _doubt(fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], setti
         apart = joints_apart(normals, settings.model) if normals else None
         if apart is not None:
             unit = UNITS[apart.name]
-            numbers = {"name": apart.name, "first": apart.first, "second": apart.second, "unit": unit}
+            numbers = {
+                "name": apart.name,
+                "first": apart.first,
+                "second": apart.second,
+                "unit": unit,
+            }
             return Notice("JOINTS_CONTRADICT", numbers=numbers)
     return None

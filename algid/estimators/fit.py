@@ -43,8 +43,8 @@ class Fit:
     covariance : (Q, Q)
         As wide as the logs leave it where a parameter is not identifiable; see `std`.
     intervals : "likelihood", "sandwich" or "jackknife"
-        What `covariance` rests on: white noise; blocks of the logs; or the larger of that and of the jackknife over
-        four logs or more, in which what differs from run to run is.
+        What `covariance` rests on: white noise; blocks of the logs; or the larger of that and of
+        the jackknife over four logs or more, in which what differs from run to run is.
     quantile : float
         Half width of a 95 % interval in standard deviations, normal or Student's.
     status : Q of "OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED", "WEAK_EXCITATION"
@@ -97,7 +97,9 @@ class Fit:
     def std(self) -> FloatArray:
         """Standard deviations (Q,): infinite where a parameter is not identifiable."""
         std = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        return read_only(np.where([status == "NOT_IDENTIFIABLE" for status in self.status], np.inf, std))
+        return read_only(
+            np.where([status == "NOT_IDENTIFIABLE" for status in self.status], np.inf, std)
+        )
 
     @property
     def ci95(self) -> FloatArray:
@@ -108,7 +110,10 @@ class Fit:
     def marked(self, status: Status, names: Collection[str] | None = None) -> Fit:
         """The fit with `status` in the place of OK, for the parameters `names`, by default all."""
         own = zip(self.names, self.status, strict=True)
-        marked = (status if word == "OK" and (names is None or name in names) else word for name, word in own)
+        marked = (
+            status if word == "OK" and (names is None or name in names) else word
+            for name, word in own
+        )
         return replace(self, status=tuple(marked))
 
     @property
@@ -121,9 +126,12 @@ class Fit:
         return replace(self, notes=(*self.notes, note))
 
     def spread(self, share: FloatArray) -> float:
-        """Standard deviation of the sum `share` (Q,) @ values; infinite where the logs leave that sum open.
+        """Standard deviation of the sum `share` (Q,) @ values.
 
-        A sum may be known where its terms are not: k3 + k5 of an arm whose second joint never moved.
+        Infinite where the logs leave that sum open.
+
+        A sum may be known where its terms are not: k3 + k5 of an arm whose second joint never
+        moved.
         """
         if not np.any((share != 0) & np.isinf(self.std)):
             return float(np.sqrt(max(float(share @ self.covariance @ share), 0.0)))
@@ -158,7 +166,11 @@ def own_estimates(fit: Fit) -> tuple[OwnEstimate, ...]:
         values, S, _ = combine(shared, alone, log.c0, fit.shrinkage)
         known = examine(fit.shared.log_names, values, S, fit.moved)
         meat, _ = sandwich(shared, alone, values, fit.shrinkage)
-        covariance = known.covariance @ meat @ known.covariance if fit.intervals != "likelihood" else known.covariance
+        covariance = (
+            known.covariance @ meat @ known.covariance
+            if fit.intervals != "likelihood"
+            else known.covariance
+        )
         std = np.where(known.determined, np.sqrt(np.maximum(np.diag(covariance), 0.0)), np.inf)
         found.append(OwnEstimate(log.loaded, values, std))
     return tuple(found)
@@ -189,8 +201,8 @@ def conclude(
         How far each joint travelled.
     prior : Prior, optional
     coloured : bool
-        Whether the residuals are not white: error bars then rest on a sandwich, and with `FEWEST_LOGS` logs on the
-        larger of that and of a jackknife.
+        Whether the residuals are not white: error bars then rest on a sandwich, and with
+        `FEWEST_LOGS` logs on the larger of that and of a jackknife.
     samples : int
         Independent samples behind error bars that rest on white noise.
     without : (n, Q), optional
@@ -198,8 +210,9 @@ def conclude(
 
     Notes
     -----
-    Where both a sandwich and a jackknife have a part in the variance, Student's quantile is that of the degrees of
-    freedom of Satterthwaite 1946, with the parts' mean share over the parameters.
+    Where both a sandwich and a jackknife have a part in the variance, Student's quantile is that
+    of the degrees of freedom of Satterthwaite 1946, with the parts' mean share over the
+    parameters.
     """
     beta, S, _ = combine(shared, logs, beta, prior)
     known = examine(shared.names, beta, S, moved)
@@ -209,7 +222,8 @@ def conclude(
     if coloured:
         meat, freedom = sandwich(shared, logs, beta, prior)
         robust = known.covariance @ meat @ known.covariance
-        # The long-run variance of a short log errs low; white noise alone is the least there can be.
+        # The long-run variance of a short log errs low; white noise alone is the least there can
+        # be.
         covariance = robust if estimator != "refined" else widened(robust, covariance)
         squares, intervals = float(freedom), "sandwich"
         without = left_out(shared, logs, beta, prior) if without is None else without
@@ -235,19 +249,26 @@ def conclude(
     )
 
 
-def _satterthwaite(within: FloatArray, wide: FloatArray, freedom: int, logs: Sequence[LogInformation]) -> float:
+def _satterthwaite(
+    within: FloatArray, wide: FloatArray, freedom: int, logs: Sequence[LogInformation]
+) -> float:
     """Independent squares behind variances of which `within` rests on `freedom` and the rest on what repeats.
 
     What repeats are the logs of each kind, less one.
     """
     known = np.diag(wide) > 0
-    share = float(np.mean(1 - np.diag(within)[known] / np.diag(wide)[known])) if known.any() else 0.0
+    share = (
+        float(np.mean(1 - np.diag(within)[known] / np.diag(wide)[known])) if known.any() else 0.0
+    )
     repeats = sum(max(0, sum(log.loaded is loaded for log in logs) - 1) for loaded in (False, True))
     return float(1 / (share**2 / max(1, repeats) + (1 - share) ** 2 / max(1, freedom)))
 
 
 def widened(robust: FloatArray, least: FloatArray) -> FloatArray:
     """The covariance `robust` (Q, Q) with no standard deviation below that of `least` (Q, Q), correlations kept."""
-    size, floor = np.sqrt(np.maximum(np.diag(robust), 0.0)), np.sqrt(np.maximum(np.diag(least), 0.0))
+    size, floor = (
+        np.sqrt(np.maximum(np.diag(robust), 0.0)),
+        np.sqrt(np.maximum(np.diag(least), 0.0)),
+    )
     factor = np.divide(np.maximum(size, floor), size, out=np.ones_like(size), where=size > 0)
     return robust * np.outer(factor, factor)

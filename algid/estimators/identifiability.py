@@ -1,13 +1,15 @@
-"""Which parameters, and which combinations of them, the logs determine; and whether innovations are white.
+"""Which parameters, and which combinations of them, the logs determine.
 
-A direction counts as undetermined when its standard deviation reaches the size of the parameters it mixes:
-the information matrix is scaled by the largest parameter of each physical class (inertia, gravity, friction …),
-and its small eigenvalues name the directions.
+And whether innovations are white.
 
-The error bars of the likelihood suppose innovations that are white and Gaussian: Ljung & Box's test on those of
-each joint, as they are and summed over 16 and 64 samples, so that slow colour is seen as well as fast. The smallest
-p-value counts three times over (Bonferroni), and a correlation too faint to matter counts as none. The excess
-kurtosis tells heavy tails.
+A direction counts as undetermined when its standard deviation reaches the size of the parameters
+it mixes: the information matrix is scaled by the largest parameter of each physical class
+(inertia, gravity, friction …), and its small eigenvalues name the directions.
+
+The error bars of the likelihood suppose innovations that are white and Gaussian: Ljung & Box's
+test on those of each joint, as they are and summed over 16 and 64 samples, so that slow colour is
+seen as well as fast. The smallest p-value counts three times over (Bonferroni), and a correlation
+too faint to matter counts as none. The excess kurtosis tells heavy tails.
 
 ======  ===================================================  ===============  ===============
 symbol  name                                                 shape            unit
@@ -38,7 +40,9 @@ _SCALES = tuple(
     for scale in dict.fromkeys(one.scale for one in PARAMETERS.values())
 )
 _UNDETERMINED = 0.5  # standard deviation of a direction, in sizes of its parameters
-_DAMPING = 0.1  # of √(inertia × gravity), half the critical damping: an arm may be free of friction, and that be known
+# of √(inertia × gravity), half the critical damping: an arm may be free of friction, and that be
+# known
+_DAMPING = 0.1
 _NOTHING = 1e-14  # of the largest eigenvalue: rounding
 _SHARE = 0.15  # of an eigenvector: below it a parameter has no part in the direction
 STILL = 0.01  # rad: a joint that moves less has not moved
@@ -53,7 +57,9 @@ class Identifiability:
     covariance: FloatArray
 
 
-def examine(names: Sequence[str], values: FloatArray, S: FloatArray, moved: FloatArray) -> Identifiability:
+def examine(
+    names: Sequence[str], values: FloatArray, S: FloatArray, moved: FloatArray
+) -> Identifiability:
     """Which parameters and combinations the information determines.
 
     Parameters
@@ -68,20 +74,25 @@ def examine(names: Sequence[str], values: FloatArray, S: FloatArray, moved: Floa
     Returns
     -------
     Identifiability
-        A parameter is open that has a share of `_SHARE` or more in an open direction. The covariance is the inverse
-        of S, as wide along open directions as S has it.
+        A parameter is open that has a share of `_SHARE` or more in an open direction. The
+        covariance is the inverse of S, as wide along open directions as S has it.
     """
     size = sizes(names, values)
     eigenvalues, vectors, lost = _spectrum(S, size)
     null = vectors[:, lost]
     part = np.sqrt(np.sum(null**2, axis=1))
     determined = tuple(bool(share < _SHARE) for share in part)
-    # A direction that the logs hardly tell is as wide here as it is: what it mixes with is that unsure.
+    # A direction that the logs hardly tell is as wide here as it is: what it mixes with is that
+    # unsure.
     inverse = (vectors / np.maximum(eigenvalues, _NOTHING * eigenvalues[-1] + 1e-300)) @ vectors.T
-    return Identifiability(tuple(_sentences(names, null, size, moved)), determined, inverse * np.outer(size, size))
+    return Identifiability(
+        tuple(_sentences(names, null, size, moved)), determined, inverse * np.outer(size, size)
+    )
 
 
-def open_directions(names: Sequence[str], values: FloatArray, S: FloatArray) -> tuple[FloatArray, FloatArray]:
+def open_directions(
+    names: Sequence[str], values: FloatArray, S: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Directions that the information S (Q, Q) on parameters `values` (Q,) leaves open.
 
     Returns
@@ -98,7 +109,11 @@ def _spectrum(S: FloatArray, size: FloatArray) -> tuple[FloatArray, FloatArray, 
     """Eigenvalues and vectors of the information on the parameters over their sizes, and which count as nothing."""
     scaled = S * np.outer(size, size)
     eigenvalues, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
-    return eigenvalues, vectors, eigenvalues < max(1 / _UNDETERMINED**2, _NOTHING * float(eigenvalues[-1]))
+    return (
+        eigenvalues,
+        vectors,
+        eigenvalues < max(1 / _UNDETERMINED**2, _NOTHING * float(eigenvalues[-1])),
+    )
 
 
 def sizes(names: Sequence[str], values: FloatArray) -> FloatArray:
@@ -109,19 +124,35 @@ def sizes(names: Sequence[str], values: FloatArray) -> FloatArray:
         return max((by_name[name] for name in members if name in by_name), default=0.0)
 
     sized = {scale: largest_of(members) for scale, members in _SCALES}
-    inertia, moment = (largest_of([n for n in RIGID if PARAMETERS[n].scale is scale]) for scale in (INERTIA, MOMENT))
-    # With both lengths known the torque is linear in the payload, which may be none, and that be known: its size is
+    inertia, moment = (
+        largest_of([n for n in RIGID if PARAMETERS[n].scale is scale])
+        for scale in (INERTIA, MOMENT)
+    )
+    # With both lengths known the torque is linear in the payload, which may be none, and that be
+    # known: its size is
     # that of a mass which at 1 m loads the arm as much as it loads itself.
-    if any(PARAMETERS[name].scale is MASS for name in names) and not any(PARAMETERS[n].scale is LENGTH for n in names):
+    if any(PARAMETERS[name].scale is MASS for name in names) and not any(
+        PARAMETERS[n].scale is LENGTH for n in names
+    ):
         sized[MASS] = max(sized[MASS], moment / 9.81, inertia)
     sized[VISCOUS] = max(sized[VISCOUS], _DAMPING * float(np.sqrt(inertia * moment)))
-    return np.array([max(sized[scale], scale.least) for scale in (PARAMETERS[name].scale for name in names)])
+    return np.array(
+        [max(sized[scale], scale.least) for scale in (PARAMETERS[name].scale for name in names)]
+    )
 
 
-def _sentences(names: Sequence[str], null: FloatArray, size: FloatArray, moved: FloatArray) -> list[str]:
+def _sentences(
+    names: Sequence[str], null: FloatArray, size: FloatArray, moved: FloatArray
+) -> list[str]:
     """What the directions `null` leave open, in words; `moved` (2,) in rad is why."""
     still = [str(joint + 1) for joint in range(2) if moved[joint] < STILL]
-    reason = ": neither joint moved" if len(still) == 2 else f": joint {still[0]} never moved" if still else ""
+    reason = (
+        ": neither joint moved"
+        if len(still) == 2
+        else f": joint {still[0]} never moved"
+        if still
+        else ""
+    )
     sentences = []
     for group in _groups(null):
         part = null[group]
@@ -130,7 +161,9 @@ def _sentences(names: Sequence[str], null: FloatArray, size: FloatArray, moved: 
         if free >= len(group):
             sentences += [f"{name} is not determined{reason}" for name in together]
         elif len(group) == 2:
-            relation = _relation(part[:, int(np.argmax(np.linalg.norm(part, axis=0)))] * size[group])
+            relation = _relation(
+                part[:, int(np.argmax(np.linalg.norm(part, axis=0)))] * size[group]
+            )
             sentences.append(f"{together[0]} and {together[1]} only {relation}{reason}")
         else:
             listed = ", ".join(together[:-1]) + f" and {together[-1]}"
@@ -183,12 +216,17 @@ class Correlations:
     fourth: FloatArray
 
     def __add__(self, other: Correlations) -> Correlations:
-        return Correlations(self.count + other.count, self.products + other.products, self.fourth + other.fourth)
+        return Correlations(
+            self.count + other.count, self.products + other.products, self.fourth + other.fourth
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Whiteness:
-    """The test's outcome by joint (2,): p-value, lag-one correlation, excess kurtosis; and the verdict."""
+    """The test's outcome by joint (2,): p-value, lag-one correlation, excess kurtosis.
+
+    And the verdict.
+    """
 
     p_value: FloatArray
     lag1: FloatArray
@@ -214,9 +252,15 @@ def correlations(w: FloatArray) -> Correlations:
     counts, products = [], []
     for scale in SCALES:
         whole = w.shape[1] // scale
-        x = w if scale == 1 else w[:, : whole * scale].reshape(2, whole, scale).sum(axis=2) / np.sqrt(scale)
+        x = (
+            w
+            if scale == 1
+            else w[:, : whole * scale].reshape(2, whole, scale).sum(axis=2) / np.sqrt(scale)
+        )
         counts.append(float(whole))
-        products.append([[row[lag:] @ row[: max(0, whole - lag)] for lag in range(_LAGS + 1)] for row in x])
+        products.append(
+            [[row[lag:] @ row[: max(0, whole - lag)] for lag in range(_LAGS + 1)] for row in x]
+        )
     return Correlations(np.array(counts), np.array(products), np.sum(w**4, axis=1))
 
 
@@ -234,14 +278,17 @@ def judge(sums: Correlations) -> Whiteness:
 
     Notes
     -----
-    Ljung & Box 1978: n (n + 2) Σ ρ_l² / (n − l) over the lags l is χ² with as many degrees of freedom.
+    Ljung & Box 1978: n (n + 2) Σ ρ_l² / (n − l) over the lags l is χ² with as many degrees of
+    freedom.
     """
     power = np.maximum(sums.products[:, :, :1], 1e-300)
     rho = sums.products[:, :, 1:] / power
     n = sums.count[:, None, None]
     lags = np.arange(1, _LAGS + 1)
     tested = lags < n / 4
-    statistic = np.sum(np.where(tested, n * (n + 2) * rho**2 / np.maximum(n - lags, 1), 0.0), axis=2)
+    statistic = np.sum(
+        np.where(tested, n * (n + 2) * rho**2 / np.maximum(n - lags, 1), 0.0), axis=2
+    )
     p = chi2_tail(np.maximum(tested.sum(axis=2), 1), statistic)
     # In a long log the least colour is significant; one this faint does not move an error bar.
     faint = np.sqrt(np.mean(rho**2, axis=2)) < _FAINT

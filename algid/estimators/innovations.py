@@ -1,8 +1,9 @@
 """Spectrum and autocorrelation of an estimator's own residual, and how far white noise's own would scatter.
 
-Sums over pieces of any length add up, so that a log is gone over in bounded memory. Each piece gives its whole
-periodogram (Hann's window), added up in narrow bins of equal ratio, and its lag products. Rows that overlap, as
-windows do, are correlated however white the noise: `stride` of them apart they are not.
+Sums over pieces of any length add up, so that a log is gone over in bounded memory. Each piece
+gives its whole periodogram (Hann's window), added up in narrow bins of equal ratio, and its lag
+products. Rows that overlap, as windows do, are correlated however white the noise: `stride` of
+them apart they are not.
 
 ======  =================================================  ============  ==============
 symbol  name                                               shape         unit
@@ -32,7 +33,9 @@ _BINS = 112
 _EDGES = np.geomspace(2.0**-14, 0.5, _BINS + 1)  # cycles a row
 _FIRST = 2  # lines of a periodogram below that the mean leaks into
 _NEIGHBOURS = (4 / 9, 1 / 36)  # squared correlation of Hann's lines one and two apart (Harris 1978)
-_FREEDOM = 12.0  # of a point of the spectrum at least: its band then is a factor of two or so either way
+_FREEDOM = (
+    12.0  # of a point of the spectrum at least: its band then is a factor of two or so either way
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +75,10 @@ class ResidualSums:
 
 
 def residual_sums(w: FloatArray, dt: float, stride: int = 1, lags: int = LAGS) -> ResidualSums:
-    """Sums for one piece of residual: the first two rows of w (s, n), n at least 4; the others have a spectrum only."""
+    """Sums for one piece of residual: the first two rows of w (s, n), n at least 4.
+
+    The others have a spectrum only.
+    """
     n = w.shape[1]
     taper = np.hanning(n + 1)[:-1]
     centred = w - w.mean(axis=1, keepdims=True)
@@ -81,15 +87,22 @@ def residual_sums(w: FloatArray, dt: float, stride: int = 1, lags: int = LAGS) -
     place = np.clip(np.searchsorted(_EDGES, frequency, side="right") - 1, 0, _BINS - 1)
     lines = np.bincount(place, minlength=_BINS).astype(np.float64)
     power = np.stack([np.bincount(place, row, minlength=_BINS) for row in periodogram])
-    near, far = (share * np.maximum(lines - apart, 0.0) for apart, share in enumerate(_NEIGHBOURS, start=1))
+    near, far = (
+        share * np.maximum(lines - apart, 0.0) for apart, share in enumerate(_NEIGHBOURS, start=1)
+    )
     scatter = lines + 2 * (near + far)
-    products = np.array([[row[lag:] @ row[: max(n - lag, 0)] for lag in range(lags + 1)] for row in w[:2]])
+    products = np.array(
+        [[row[lag:] @ row[: max(n - lag, 0)] for lag in range(lags + 1)] for row in w[:2]]
+    )
     pairs = np.maximum(n - np.arange(lags + 1, dtype=np.float64), 0.0)
     return ResidualSums(dt, stride, power.astype(np.float64), lines, scatter, products, pairs)
 
 
 def pooled(sums: Sequence[ResidualSums]) -> ResidualSums | None:
-    """The sums of logs together; those whose rows are spaced unlike the first one's are left out."""
+    """The sums of logs together.
+
+    Those whose rows are spaced unlike the first one's are left out.
+    """
     alike = [one for one in sums if abs(one.dt - sums[0].dt) <= ALIKE * sums[0].dt]
     return sum(alike[1:], alike[0]) if alike else None
 
@@ -141,8 +154,8 @@ class Autocorrelation:
 def autocorrelation(sums: ResidualSums) -> Autocorrelation:
     """Correlations at multiples of the stride.
 
-    The band is Bartlett's for a moving average over one stride: its variance is Σ r_i² / n, over lags i within the
-    stride, both ways (Bartlett 1946; Box & Jenkins, sec. 2.1.6).
+    The band is Bartlett's for a moving average over one stride: its variance is Σ r_i² / n, over
+    lags i within the stride, both ways (Bartlett 1946; Box & Jenkins, sec. 2.1.6).
     """
     mean = sums.products / np.maximum(sums.pairs, 1.0)
     r = np.divide(mean, mean[:, :1], out=np.zeros_like(mean), where=mean[:, :1] > 0)
@@ -157,5 +170,7 @@ def whiteness_of(sums: ResidualSums) -> Spectra:
     found = spectra(sums)
     variance = (sums.products[:, 0] / np.maximum(sums.pairs[0], 1.0))[:, None]
     level = 2 * sums.dt * variance
-    share = np.divide(found.density[:2], level, out=np.zeros_like(found.density[:2]), where=level > 0)
+    share = np.divide(
+        found.density[:2], level, out=np.zeros_like(found.density[:2]), where=level > 0
+    )
     return Spectra(found.frequency, share, found.low, found.high)

@@ -1,26 +1,31 @@
 """Instrumental variables on sliding windows: what the arm would have done, in place of what it did.
 
-On a real arm the torque that no model holds (friction, play, cogging) drives the motion. The columns X of the momentum
-form are then correlated with its residual, and least squares on them is attenuated, however they are weighed.
-Instruments Z are the same columns of a motion which that torque did not drive: simulated from each window's measured
-start with the measured torque and the present coefficients. The estimate solves
+On a real arm the torque that no model holds (friction, play, cogging) drives the motion. The
+columns X of the momentum form are then correlated with its residual, and least squares on them is
+attenuated, however they are weighed. Instruments Z are the same columns of a motion which that
+torque did not drive: simulated from each window's measured start with the measured torque and the
+present coefficients. The estimate solves
 
     Σ w Z (y − Xᵀ c) = 0
 
-(Janot, Vandanjon & Gautier 2014, IEEE Trans. Control Syst. Technol. 22; Brunot et al. 2018). Projected on the
-instruments, each log's likelihood is quadratic, so that logs, payloads and priors combine as for any estimator:
+(Janot, Vandanjon & Gautier 2014, IEEE Trans. Control Syst. Technol. 22; Brunot et al. 2018).
+Projected on the instruments, each log's likelihood is quadratic, so that logs, payloads and priors
+combine as for any estimator:
 
     S = Aᵀ V⁻¹ A,    g = Aᵀ V⁻¹ Σ w Z (y − Xᵀ c0),    A = Σ w Z Xᵀ,    V = Σ w Z Zᵀ
 
-======  =========================================================  ===========================  ======
+======  =========================================================  ===========================
+======
 symbol  name                                                       shape                        unit
-======  =========================================================  ===========================  ======
+======  =========================================================  ===========================
+======
 X       columns of the two equations                               (2, q, R)                    mixed
 Z       the same of the simulated motion                           (2, q, R)                    mixed
 y       the torque's moments                                       (2, R)                       N m
 w       inverse residual variance of a row of each joint           (2,)                         1/(N m)²
 gram    [Z X y] [Z X y]ᵀ by stretch and joint                      (B, 2, 2 q + 1, 2 q + 1)     mixed
-======  =========================================================  ===========================  ======
+======  =========================================================  ===========================
+======
 """
 
 from __future__ import annotations
@@ -34,7 +39,13 @@ from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.estimators import weak
-from algid.estimators.combine import BlockSums, LogInformation, Prior, long_run_variance, scaled_pinv
+from algid.estimators.combine import (
+    BlockSums,
+    LogInformation,
+    Prior,
+    long_run_variance,
+    scaled_pinv,
+)
 from algid.estimators.fit import Fit, conclude
 from algid.estimators.modulating_functions import OVERLAP, Windows, row_weights
 from algid.estimators.weak import Source, WeakSettings
@@ -56,7 +67,10 @@ ENDOGENEOUS = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """Sums of one log: `gram` as in the module's table; `rows` windows, of which `astray` could not be simulated."""
+    """Sums of one log: `gram` as in the module's table.
+
+    `rows` windows, of which `astray` could not be simulated.
+    """
 
     gram: FloatArray
     rows: int
@@ -76,7 +90,8 @@ def fit(
     Parameters
     ----------
     unloaded, loaded : sequences of callables
-        Each gives a fresh iterable of `Segment`, the stretches of one log in time; called up to nine times.
+        Each gives a fresh iterable of `Segment`, the stretches of one log in time; called up to
+        nine times.
     settings : WeakSettings
         Window, bandwidth, model, hold and delay, as for the weak estimator.
     lengths : dict
@@ -89,8 +104,8 @@ def fit(
     Returns
     -------
     Fit
-        With `converged` false and the weak estimate in its place where the coefficients move no arm: a mass matrix
-        that is not positive definite, or windows that go astray.
+        With `converged` false and the weak estimate in its place where the coefficients move no
+        arm: a mass matrix that is not positive definite, or windows that go astray.
 
     Raises
     ------
@@ -107,7 +122,9 @@ def fit(
         if not sources:
             continue
         c = shared.coefficients(start.values, kind)
-        if shared.delay:  # the windows are shifted by what is known of it: its column tells a change
+        if (
+            shared.delay
+        ):  # the windows are shifted by what is known of it: its column tells a change
             c[-1] = 0.0
         found = _solved(sources, settings, c, kind)
         if found is None:
@@ -121,7 +138,10 @@ def fit(
 def _solved(
     sources: Sequence[Source], settings: WeakSettings, c: FloatArray, loaded: bool
 ) -> list[LogInformation] | None:
-    """Each log's projected likelihood, once coefficients and instruments agree; None where the windows go astray."""
+    """Each log's projected likelihood, once coefficients and instruments agree.
+
+    None where the windows go astray.
+    """
     logs: list[LogInformation] = []
     for _ in range(_ROUNDS):
         found = [moments(source, settings, c) for source in sources]
@@ -139,14 +159,18 @@ def _solved(
     return logs
 
 
-def solve(sums: Sequence[Moments], c: FloatArray, loaded: bool) -> tuple[FloatArray, list[LogInformation]]:
+def solve(
+    sums: Sequence[Moments], c: FloatArray, loaded: bool
+) -> tuple[FloatArray, list[LogInformation]]:
     """Coefficients (q,) that logs share, from weights at `c`, and each log's projected likelihood there."""
     weights = [_weights(one, c) for one in sums]
     logs = [_information(one, weight, c, loaded) for one, weight in zip(sums, weights, strict=True)]
     S, g = (np.sum(part, axis=0) for part in zip(*(log.total for log in logs), strict=True))
     better = c + scaled_pinv(S) @ g
     weights = [_weights(one, better) for one in sums]
-    return better, [_information(one, weight, better, loaded) for one, weight in zip(sums, weights, strict=True)]
+    return better, [
+        _information(one, weight, better, loaded) for one, weight in zip(sums, weights, strict=True)
+    ]
 
 
 def _weights(sums: Moments, c: FloatArray) -> FloatArray:
@@ -165,7 +189,9 @@ def _information(sums: Moments, weights: FloatArray, c: FloatArray, loaded: bool
     return LogInformation(loaded, c, projection @ A, scores @ projection.T)
 
 
-def moments(source: Source, settings: WeakSettings, c: FloatArray, most: int | None = None) -> Moments | None:
+def moments(
+    source: Source, settings: WeakSettings, c: FloatArray, most: int | None = None
+) -> Moments | None:
     """Sums over one log, the windows simulated with coefficients `c`; None where those move no arm.
 
     At most `most` pieces are looked at.
@@ -177,10 +203,16 @@ def moments(source: Source, settings: WeakSettings, c: FloatArray, most: int | N
     while batch := list(islice(looked_at, _TOGETHER)):
         windows = batch[0][1]
         columns = [
-            windows.equations(settings.model, piece, settings.estimate_delay, linear)[:, :, ::_STRIDE]
+            windows.equations(settings.model, piece, settings.estimate_delay, linear)[
+                :, :, ::_STRIDE
+            ]
             for piece, _, _ in batch
         ]
-        cut = [_cut(piece, windows) for (piece, _, _), X in zip(batch, columns, strict=True) if X.shape[2]]
+        cut = [
+            _cut(piece, windows)
+            for (piece, _, _), X in zip(batch, columns, strict=True)
+            if X.shape[2]
+        ]
         if not cut:
             continue
         side_by_side = (np.concatenate(part, axis=1) for part in zip(*cut, strict=True))
@@ -189,7 +221,9 @@ def moments(source: Source, settings: WeakSettings, c: FloatArray, most: int | N
             return None
         motion, good = simulated
         plain = Windows(windows.dt, windows.length, 0.0, None)
-        Z = plain.equations(settings.model, motion, settings.estimate_delay, linear)[:, :-1, ::OVERLAP]
+        Z = plain.equations(settings.model, motion, settings.estimate_delay, linear)[
+            :, :-1, ::OVERLAP
+        ]
         both = np.where(good, np.concatenate([Z, np.concatenate(columns, axis=2)], axis=1), 0.0)
         rows += good.size
         astray += int(np.sum(np.logical_not(good)))
@@ -204,7 +238,9 @@ def _cut(piece: Segment, windows: Windows) -> tuple[FloatArray, FloatArray, Floa
     Gives angles and velocities (2, R) at their starts, torques (2, R, L + 1) and angles (2, R, L).
     """
     length, margin = OVERLAP * windows.step, windows.margin
-    starts = margin + np.arange(0, len(piece) - 2 * margin - length + 1, windows.step * _STRIDE, dtype=np.int64)
+    starts = margin + np.arange(
+        0, len(piece) - 2 * margin - length + 1, windows.step * _STRIDE, dtype=np.int64
+    )
     instants = starts[:, None] + np.arange(length + 1)
     at = np.clip(instants - windows.shift / windows.dt, 0, len(piece) - 1)
     before = np.minimum(at.astype(np.int64), len(piece) - 2)
@@ -223,20 +259,25 @@ def _simulated(
 ) -> tuple[Segment, NDArray[np.bool_]] | None:
     """The motion that windows cut from a log would have had, end to end, and which of them (R,) have not run away.
 
-    Runge-Kutta's fourth order in steps of some `_STEP` s, all windows side by side, from the measured start. (To
-    start earlier, so that what the unmodelled torque did before has faded, made the instruments too weak.)
+    Runge-Kutta's fourth order in steps of some `_STEP` s, all windows side by side, from the
+    measured start. (To start earlier, so that what the unmodelled torque did before has faded,
+    made the instruments too weak.)
     """
     # Samples that a step spans: every window is a multiple of it.
     stride = int(np.clip(2 ** np.floor(np.log2(max(_STEP / windows.dt, 1.0))), 2, OVERLAP))
     h = stride * windows.dt
     inside = np.arange(stride) / stride
-    acts = np.ascontiguousarray(np.moveaxis(tau[:, :, :: stride // 2], 2, 0))  # where the method asks for it
+    acts = np.ascontiguousarray(
+        np.moveaxis(tau[:, :, :: stride // 2], 2, 0)
+    )  # where the method asks for it
     thetas, omegas = np.empty_like(measured), np.empty_like(measured)
     for step, sample in enumerate(range(0, measured.shape[2], stride)):
         rates = []
         x, v = theta, omega
         for now, share in ((0, 0.5), (1, 0.5), (1, 1.0), (2, 0.0)):
-            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # `_has_inertia` judges afterwards
+            with np.errstate(
+                divide="ignore", invalid="ignore", over="ignore"
+            ):  # `_has_inertia` judges afterwards
                 rates.append((v, acceleration(model, c, x, v, acts[2 * step + now])))
             x, v = theta + share * h * rates[-1][0], omega + share * h * rates[-1][1]
         (v1, a1), (v2, a2), (v3, a3), (v4, a4) = rates
@@ -248,17 +289,25 @@ def _simulated(
     if not _has_inertia(model, c, thetas[:, :, ::stride]):
         return None
     good = np.abs(thetas - measured).max(axis=(0, 2)) < _ASTRAY
-    angles, torques, velocities = (signal.reshape(2, -1) for signal in (thetas, tau[:, :, :-1], omegas))
+    angles, torques, velocities = (
+        signal.reshape(2, -1) for signal in (thetas, tau[:, :, :-1], omegas)
+    )
     return Segment(0.0, windows.dt, angles, torques, velocities), good
 
 
-def _cubic(start: FloatArray, end: FloatArray, rise: FloatArray, last: FloatArray, s: FloatArray) -> FloatArray:
+def _cubic(
+    start: FloatArray, end: FloatArray, rise: FloatArray, last: FloatArray, s: FloatArray
+) -> FloatArray:
     """The cubic (2, R, S) at the shares `s` (S,) of a step, of values (2, R) at both ends and their rates a step."""
-    weights = np.stack([1 - s**2 * (3 - 2 * s), s**2 * (3 - 2 * s), s * (1 - s) ** 2, s**2 * (s - 1)])
+    weights = np.stack(
+        [1 - s**2 * (3 - 2 * s), s**2 * (3 - 2 * s), s * (1 - s) ** 2, s**2 * (s - 1)]
+    )
     return np.einsum("war,ws->ars", np.stack([start, end, rise, last]), weights)
 
 
-def _started(piece: Segment, windows: Windows, starts: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+def _started(
+    piece: Segment, windows: Windows, starts: NDArray[np.int64]
+) -> tuple[FloatArray, FloatArray]:
     """Angles and velocities (2, R) at the starts of windows."""
     if windows.bandwidth is None:
         assert piece.omega is not None  # `Windows.equations` has asked for it
@@ -277,22 +326,30 @@ def _has_inertia(model: Model, c: FloatArray, theta: FloatArray) -> bool:
     return bool(np.all((m11 > 0) & (m11 * m22 > m12**2)))
 
 
-def endogeneity(unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings, fit: Fit) -> float | None:
+def endogeneity(
+    unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings, fit: Fit
+) -> float | None:
     """How far instruments and least squares are apart on the same windows, in standard deviations of the former.
 
-    The statistic of Durbin, Wu and Hausman (Hausman 1978), coefficient by coefficient; the largest is returned. Beyond
-    `ENDOGENEOUS` the torque that the model lacks drives the motion. None where the windows cannot be simulated.
-    Of a long log the first pieces are looked at.
+    The statistic of Durbin, Wu and Hausman (Hausman 1978), coefficient by coefficient; the largest
+    is returned. Beyond `ENDOGENEOUS` the torque that the model lacks drives the motion. None where
+    the windows cannot be simulated. Of a long log the first pieces are looked at.
     """
     if fit.shared.delay:
-        settings = replace(settings, delay=float(fit.values[len(settings.model.names)]), estimate_delay=False)
+        settings = replace(
+            settings, delay=float(fit.values[len(settings.model.names)]), estimate_delay=False
+        )
     largest = None
     for kind, sources in ((False, unloaded), (True, loaded)):
         if not sources:
             continue
         c = fit.shared.coefficients(fit.values, kind)[: len(settings.model.names)]
         found = [moments(source, settings, c, _EXAMINED) for source in sources]
-        sums = [one for one in found if one is not None and one.rows and one.astray <= _FEWEST * one.rows]
+        sums = [
+            one
+            for one in found
+            if one is not None and one.rows and one.astray <= _FEWEST * one.rows
+        ]
         if sums:
             largest = max(largest or 0.0, _apart(sums, c, kind))
     return largest

@@ -1,7 +1,8 @@
 """What one log tells at given coefficients: its training set, its passes, its noise levels.
 
-A pass linearises every piece of a log, whitens it, and adds up information and scores by stretch. Between the
-passes of the training stay the pieces' trajectories and the log's noise levels, which is the state kept here.
+A pass linearises every piece of a log, whitens it, and adds up information and scores by stretch.
+Between the passes of the training stay the pieces' trajectories and the log's noise levels, which
+is the state kept here.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ _STRETCH = 64  # samples over which scores are summed
 _SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
 _FINEST = 1e-10  # relative noise that no sensor undercuts, and floating point can still weigh
 _EXCESS = 10.0  # torque error beyond the sensor's noise that tells unmodelled dynamics
-# Of what neighbouring torques differ by is noise of the torque: a short log may hide it in its angles' noise.
+# Of what neighbouring torques differ by is noise of the torque: a short log may hide it in its
+# angles' noise.
 _SURE = 0.9
 _NEGLIGIBLE = 1e-3  # torque error relative to the torque that no one need worry about
 
@@ -91,7 +93,10 @@ class LogEvidence:
         self._trajectories = [_first_trajectory(piece) for piece in self.kept]
         floor = _digitisation(self.kept)
         guesses = [first_guess(piece.theta, piece.tau) for piece in self.kept]
-        theta, tau = (np.median([getattr(level, name) for level in guesses], axis=0) for name in ("theta", "tau"))
+        theta, tau = (
+            np.median([getattr(level, name) for level in guesses], axis=0)
+            for name in ("theta", "tau")
+        )
         guess = floored(NoiseLevels(theta, tau), floor)
         self.noise = known or guess
         self._sensor = guess.tau
@@ -136,7 +141,10 @@ class LogEvidence:
         return gathered.outcome(self.loaded, c)
 
     def improve_noise(self, outcome: Outcome) -> float:
-        """Better noise levels from a training pass; the largest change of a log variance in its deviations."""
+        """Better noise levels from a training pass.
+
+        The largest change of a log variance in its deviations.
+        """
         if outcome.noise_score is None:
             return 0.0
         S, _ = outcome.information.total
@@ -190,4 +198,6 @@ class _Gathered:
     def outcome(self, loaded: bool, c: FloatArray, score: VarianceScore | None = None) -> Outcome:
         """What the pass at the coefficients `c` has given."""
         information = LogInformation(loaded, c, self._S.values(), self._g.values())
-        return Outcome(information, score, reduce(add, self._innovations), reduce(add, self._residual))
+        return Outcome(
+            information, score, reduce(add, self._innovations), reduce(add, self._residual)
+        )

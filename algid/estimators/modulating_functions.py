@@ -1,10 +1,11 @@
 """The momentum form of the equations of motion on sliding windows (method of modulating functions).
 
-Multiplied by a window φ that vanishes with three derivatives at both ends, and integrated by parts, eq. (1)
-needs no acceleration, and a velocity only beside k1:
+Multiplied by a window φ that vanishes with three derivatives at both ends, and integrated by
+parts, eq. (1) needs no acceleration, and a velocity only beside k1:
 
-    ∫φ τ1 = (k5+k3)∫φ'' θ1 + k1[−2∫φ' c2 θ̇1 + ∫φ'' s2] + k3∫φ'' θ2 − k6∫φ' θ1 + k4∫φ cos θ1 + k2∫φ cos(θ1+θ2)
-    ∫φ τ2 = k3∫φ''(θ1+θ2) + k1[−∫φ' c2 θ̇1 + ∫φ (θ̇1² + θ̇1 θ̇2) s2] − k7∫φ' θ2 + k2∫φ cos(θ1+θ2)
+    ∫φ τ1 = (k5+k3)∫φ'' θ1 + k1[−2∫φ' c2 θ̇1 + ∫φ'' s2] + k3∫φ'' θ2 − k6∫φ' θ1 + k4∫φ cos θ1 + k2∫φ
+    cos(θ1+θ2) ∫φ τ2 = k3∫φ''(θ1+θ2) + k1[−∫φ' c2 θ̇1 + ∫φ (θ̇1² + θ̇1 θ̇2) s2] − k7∫φ' θ2 + k2∫φ
+    cos(θ1+θ2)
 
 ======  =========================================================  ================  ======
 symbol  name                                                       shape             unit
@@ -14,8 +15,9 @@ h       samples from a window to the next, L / `OVERLAP`           scalar       
 X       columns of the two equations, the torque's moment last     (2, q + 1, R)     mixed
 ======  =========================================================  ================  ======
 
-The windows overlap `OVERLAP`-fold. Each signal meets each block of h samples once, in a matrix product; a
-window's moment is the sum over its blocks. The cost is O(N), whatever the length of the window.
+The windows overlap `OVERLAP`-fold. Each signal meets each block of h samples once, in a matrix
+product; a window's moment is the sum over its blocks. The cost is O(N), whatever the length of the
+window.
 """
 
 from __future__ import annotations
@@ -42,8 +44,8 @@ _WINDOW_INTEGRAL = 1 / 630  # Beta(5, 5)
 class Windows:
     """Windows of `length` s every `length / OVERLAP` s on samples `dt` s apart.
 
-    `shift` is the time in s after which a logged torque acts; `bandwidth` in Hz is the differentiator's, None
-    where the log's own velocities are used.
+    `shift` is the time in s after which a logged torque acts; `bandwidth` in Hz is the
+    differentiator's, None where the log's own velocities are used.
     """
 
     dt: float
@@ -85,7 +87,10 @@ class Windows:
         window = _WINDOW / _WINDOW_INTEGRAL
         return (
             np.stack(
-                [window.deriv(order)(s) / span ** (order + 1) if order else window(s) / span for order in range(3)]
+                [
+                    window.deriv(order)(s) / span ** (order + 1) if order else window(s) / span
+                    for order in range(3)
+                ]
             )
             * self.dt
         )
@@ -119,7 +124,9 @@ class Windows:
             result += parts[:, part : part + wanted, part]
         return result
 
-    def equations(self, model: Model, piece: Segment, delay: bool, at: FloatArray | None = None) -> FloatArray:
+    def equations(
+        self, model: Model, piece: Segment, delay: bool, at: FloatArray | None = None
+    ) -> FloatArray:
         """X, the columns of both joints' equations and the torque's moment, window by window.
 
         Parameters
@@ -142,9 +149,10 @@ class Windows:
 
         Notes
         -----
-        Where the torque is bilinear in the coefficients, X is linearised at the coefficients `at` (q,) so that
-        least squares on it gives better ones; without `at` the columns of gains and of friction by load are nothing.
-        The load is that of `at` (a fixed point, not a derivative): least squares settles in a few rounds.
+        Where the torque is bilinear in the coefficients, X is linearised at the coefficients `at`
+        (q,) so that least squares on it gives better ones; without `at` the columns of gains and
+        of friction by load are nothing. The load is that of `at` (a fixed point, not a
+        derivative): least squares settles in a few rounds.
         """
         size = len(model.names) + delay + 1
         margin = self.margin
@@ -163,7 +171,9 @@ class Windows:
         X[:, -1] = self.moments(tau, self._shifted[0])
         if at is not None:
             _linearise_bilinear(X, model, at)
-        tau_slope = self.moments(tau, self._shifted[1]) if delay or model.lag_name is not None else 0.0
+        tau_slope = (
+            self.moments(tau, self._shifted[1]) if delay or model.lag_name is not None else 0.0
+        )
         if model.lag_name is not None:
             X[:, model.names.index(model.lag_name)] = tau_slope
         if delay:
@@ -175,10 +185,16 @@ class Windows:
         values = Values(Motion(theta, omega, omega), model.shape)
         compiled = model.compiled
         for order, entries in enumerate((compiled.f, compiled.p, compiled.s)):
-            products = list(dict.fromkeys(p for _, _, entry in entries for p in entry.products if p))
+            products = list(
+                dict.fromkeys(p for _, _, entry in entries for p in entry.products if p)
+            )
             if products:
-                signals = np.stack([np.broadcast_to(values.of(product), theta.shape[1:]) for product in products])
-                moments = dict(zip(products, self.moments(signals, self._plain[order]), strict=True))
+                signals = np.stack(
+                    [np.broadcast_to(values.of(product), theta.shape[1:]) for product in products]
+                )
+                moments = dict(
+                    zip(products, self.moments(signals, self._plain[order]), strict=True)
+                )
             for joint, place, entry in entries:
                 for product, factor in entry.products.items():
                     # a window's integral is one, its derivatives' are nothing
@@ -213,7 +229,9 @@ class Windows:
             return piece.omega[:, inner]
         reach = half_length(self.dt, self.bandwidth)
         kernel = differentiator(self.dt, self.bandwidth)
-        return correlate(piece.theta[:, self.margin - reach : len(piece) - self.margin + reach], kernel)
+        return correlate(
+            piece.theta[:, self.margin - reach : len(piece) - self.margin + reach], kernel
+        )
 
 
 def row_weights(gram: FloatArray, v: FloatArray, rows: int | FloatArray) -> FloatArray:
@@ -224,13 +242,15 @@ def row_weights(gram: FloatArray, v: FloatArray, rows: int | FloatArray) -> Floa
     gram : (2, m, m)
         Gram matrices of the columns by joint, the torque last.
     v : (m,)
-        What makes a residual of the columns: the coefficients with their sign turned, and 1 for the torque.
+        What makes a residual of the columns: the coefficients with their sign turned, and 1 for
+        the torque.
     rows : int or (2,)
 
     Notes
     -----
-    A residual below rounding, 1e-12 of the torque, counts as that. The joint with the larger torque sets the measure:
-    a joint without a motor has none, and its load is of the size of the other's.
+    A residual below rounding, 1e-12 of the torque, counts as that. The joint with the larger
+    torque sets the measure: a joint without a motor has none, and its load is of the size of the
+    other's.
     """
     squares = np.einsum("x,axy,y->a", v, gram, v)
     return np.asarray(rows / np.maximum(squares, 1e-24 * float(gram[:, -1, -1].max()) + 1e-300))
@@ -239,8 +259,8 @@ def row_weights(gram: FloatArray, v: FloatArray, rows: int | FloatArray) -> Floa
 def _linearise_bilinear(X: FloatArray, model: Model, at: FloatArray) -> None:
     """Complete X, made at `at`, by the columns of the gains, and the torque by what the linearisation at `at` adds.
 
-    With Y the regressor at c0 and J the derivative there, τ = Y c0 + J (c - c0) is J c = τ + (J - Y) c0; J and Y
-    differ in the columns of gains alone.
+    With Y the regressor at c0 and J the derivative there, τ = Y c0 + J (c - c0) is J c = τ + (J -
+    Y) c0; J and Y differ in the columns of gains alone.
     """
     place, factor = model.compiled.place, gains(model, at)
     moved = []

@@ -1,12 +1,14 @@
 """Noise levels from the data: restricted maximum likelihood of variance components.
 
-The covariance of the whitened torque residual is V = Σ V_i, one component for the angle noise and one for the
-torque noise of each joint. With λ = V⁻¹e the derivative of the restricted likelihood by log σ_i² is
+The covariance of the whitened torque residual is V = Σ V_i, one component for the angle noise and
+one for the torque noise of each joint. With λ = V⁻¹e the derivative of the restricted likelihood
+by log σ_i² is
 
     ½ (λᵀ V_i λ − tr(V⁻¹ V_i) + tr(S⁻¹ Yᵀ V⁻¹ V_i V⁻¹ Y))
 
-whose traces, the degrees of freedom of a component, are taken with random signs (Hutchinson 1989). The average
-information ½ λᵀ V_i V⁻¹ V_j λ (Gilmour, Thompson & Cullis 1995) makes a Newton step of it.
+whose traces, the degrees of freedom of a component, are taken with random signs (Hutchinson 1989).
+The average information ½ λᵀ V_i V⁻¹ V_j λ (Gilmour, Thompson & Cullis 1995) makes a Newton step of
+it.
 
 =========  ==========================================  ==============
 symbol     name                                        shape
@@ -30,7 +32,8 @@ _DIFFERENCE = 6  # order of the difference that leaves only noise of a smooth si
 _PROBES = 8
 _LARGEST_STEP = 2.0  # in log σ²
 _SMALLEST = 1e-12  # relative to the signal: below it floating point is the noise
-_MOTORLESS = 1e-3  # of the other joint's torque: what bearings and cables exert on a joint without a motor, at least
+# of the other joint's torque: what bearings and cables exert on a joint without a motor, at least
+_MOTORLESS = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,11 +64,13 @@ def first_guess(theta: FloatArray, tau: FloatArray) -> NoiseLevels:
     Returns
     -------
     NoiseLevels
-        The differences' median size over 0.6745 √C(12, 6); their root mean square where most of them are zero.
+        The differences' median size over 0.6745 √C(12, 6); their root mean square where most of
+        them are zero.
 
     Notes
     -----
-    The torque of a joint without a motor is logged as zero, and is none exactly: its bearings rub, its cables pull.
+    The torque of a joint without a motor is logged as zero, and is none exactly: its bearings rub,
+    its cables pull.
     """
     rms = np.sqrt(np.mean(tau**2, axis=1))
     least = np.where(rms > 0, 0.0, _MOTORLESS * rms.max())
@@ -128,7 +133,12 @@ def variance_score(linear: Linearised, length: int, seed: int) -> VarianceScore:
     power = np.concatenate([np.sum(back**2, axis=1), np.sum(smeared**2, axis=1)])
     torques = linear.smeared(smeared)
     directions = np.stack(
-        [forward(H, _only(back, 0), first), forward(H, _only(back, 1), first), _only(torques, 0), _only(torques, 1)]
+        [
+            forward(H, _only(back, 0), first),
+            forward(H, _only(back, 1), first),
+            _only(torques, 0),
+            _only(torques, 1),
+        ]
     )
     whitened = linear.solve(_by_row(directions))
     joints = np.stack([_by_joint(row) for row in multipliers[:-1]])

@@ -1,4 +1,6 @@
-"""The paper's method: Páez-García et al. 2023, stage 1 (eq. 3), k7 (eq. 4), stage 2 (eq. 5) and the payload.
+"""The paper's method: Páez-García et al.
+
+2023, stage 1 (eq. 3), k7 (eq. 4), stage 2 (eq. 5) and the payload.
 
 ======  ========================================  ============  ==========
 symbol  name                                      shape         unit
@@ -11,14 +13,15 @@ P_r, q  system of stage 1 and its right side      (6, 6, ..., n), (6, ..., n)
 P_m, q  system of stage 2 and its right side      (5, 5, ..., n), (5, ..., n)
 ======  ========================================  ============  ==========
 
-Each equation is t² times a row of eq. (1), integrated twice from the window's start; t² removes the initial
-conditions. The angles enter linear terms as differences to their first value, which changes nothing (those
-terms vanish for a constant) and keeps digits.
+Each equation is t² times a row of eq. (1), integrated twice from the window's start; t² removes
+the initial conditions. The angles enter linear terms as differences to their first value, which
+changes nothing (those terms vanish for a constant) and keeps digits.
 
-Every series is (..., n) like the windows it is computed from, in the units of `algid.arm`, and NaN where the
-system is singular or less than ε has passed since the window's start. A series' estimate is the median over its
-settled samples, the last 0.2 s of each window; with several windows, the median of the windows' medians. An
-estimate that wanders by more than its own size is not to be trusted.
+Every series is (..., n) like the windows it is computed from, in the units of `algid.arm`, and NaN
+where the system is singular or less than ε has passed since the window's start. A series' estimate
+is the median over its settled samples, the last 0.2 s of each window; with several windows, the
+median of the windows' medians. An estimate that wanders by more than its own size is not to be
+trusted.
 """
 
 from __future__ import annotations
@@ -37,7 +40,9 @@ from algid.signals.segments import Segment, pieces
 
 @dataclass(frozen=True, eq=False)
 class IntegralColumns:
-    """What multiplies each unknown after t² and two integrations, each (..., n); and the torque's own integral.
+    """What multiplies each unknown after t² and two integrations, each (..., n).
+
+    And the torque's own integral.
 
     `inertia1` and `inertia2` multiply θ̈1 and θ̈2, `viscous1` and `viscous2` θ̇1 and θ̇2.
     """
@@ -55,7 +60,16 @@ class IntegralColumns:
 
     def first_joint(self) -> FloatArray:
         """The coefficients (6, ..., n) of x_r = [k5+k3, k1, k3, k6, k4, k2] in eq. (3)."""
-        return np.stack([self.inertia1, self.coupling1, self.inertia2, self.viscous1, self.gravity1, self.gravity12])
+        return np.stack(
+            [
+                self.inertia1,
+                self.coupling1,
+                self.inertia2,
+                self.viscous1,
+                self.gravity1,
+                self.gravity12,
+            ]
+        )
 
 
 def columns(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> IntegralColumns:
@@ -83,7 +97,8 @@ def columns(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) ->
         gravity1=nested_integral(t**2 * np.cos(theta[0]), dt, 2),
         gravity12=nested_integral(t**2 * np.cos(theta[0] + theta[1]), dt, 2),
         torque1=nested_integral(t**2 * tau[0], dt, 2),
-        coupling2=_of_derivative(c2 * omega1, t, dt) + nested_integral(t**2 * s2 * omega1 * (omega1 + omega2), dt, 2),
+        coupling2=_of_derivative(c2 * omega1, t, dt)
+        + nested_integral(t**2 * s2 * omega1 * (omega1 + omega2), dt, 2),
         viscous2=_of_derivative(moved[1], t, dt),
         torque2=nested_integral(t**2 * tau[1], dt, 2),
     )
@@ -120,7 +135,8 @@ def stack_rows(first: FloatArray, dt: float, rows: int) -> FloatArray:
     return stacked
 
 
-# A relative change of 1e-12, the rounding of nested sums, then moves the estimate by less than one percent.
+# A relative change of 1e-12, the rounding of nested sums, then moves the estimate by less than one
+# percent.
 LARGEST_CONDITION = 1e10
 
 
@@ -145,8 +161,8 @@ def solve_scaled(matrix: FloatArray, rhs: FloatArray) -> Solutions:
     Returns
     -------
     Solutions
-        The condition number is that of the scaled matrix in the 1-norm; past `LARGEST_CONDITION` the system
-        counts as singular and its solution is NaN.
+        The condition number is that of the scaled matrix in the 1-norm; past `LARGEST_CONDITION`
+        the system counts as singular and its solution is NaN.
     """
     p = np.moveaxis(matrix, (0, 1), (-2, -1))
     q = np.moveaxis(rhs, 0, -1)[..., None]
@@ -158,9 +174,13 @@ def solve_scaled(matrix: FloatArray, rhs: FloatArray) -> Solutions:
     try:
         inverse = _inverse_where(p, regular)
     except np.linalg.LinAlgError:  # LAPACK refuses a whole batch for one singular matrix
-        regular = np.asarray(np.linalg.slogdet(p).sign != 0)  # the same factors, the same zero pivots
+        regular = np.asarray(
+            np.linalg.slogdet(p).sign != 0
+        )  # the same factors, the same zero pivots
         inverse = _inverse_where(p, regular)
-    with np.errstate(over="ignore", invalid="ignore"):  # next to singular: caught by the condition number
+    with np.errstate(
+        over="ignore", invalid="ignore"
+    ):  # next to singular: caught by the condition number
         scaled = inverse @ (q * row)
         scaled += inverse @ (q * row - p @ scaled)
         condition = np.where(regular, _norm1(p) * _norm1(inverse), np.inf)
@@ -178,7 +198,9 @@ def _norm1(matrix: FloatArray) -> FloatArray:
 
 
 def _inverse_where(p: FloatArray, regular: NDArray[np.bool_]) -> FloatArray:
-    return np.linalg.inv(p if regular.all() else np.where(regular[..., None, None], p, np.eye(p.shape[-1])))
+    return np.linalg.inv(
+        p if regular.all() else np.where(regular[..., None, None], p, np.eye(p.shape[-1]))
+    )
 
 
 EPSILON = 0.2  # s: the estimates are arbitrary before (the paper's ε)
@@ -241,7 +263,10 @@ def _solved_late(first: FloatArray, dt: float) -> Solutions:
 
 
 def _single_unknown(coefficient: FloatArray, rhs: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Solve a x = b; a is a difference of integrals, and vanishes beside the largest it has been when singular."""
+    """Solve a x = b.
+
+    a is a difference of integrals, and vanishes beside the largest it has been when singular.
+    """
     largest = np.maximum.accumulate(np.abs(coefficient), axis=-1)
     size = np.abs(coefficient)
     condition = np.divide(largest, size, out=np.full_like(size, np.inf), where=size > 0)
@@ -249,7 +274,9 @@ def _single_unknown(coefficient: FloatArray, rhs: FloatArray) -> tuple[FloatArra
     return np.divide(rhs, coefficient, out=np.full_like(rhs, np.nan), where=regular), condition
 
 
-def stage2(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float, k: FloatArray, gravity: float) -> Stage2:
+def stage2(
+    theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float, k: FloatArray, gravity: float
+) -> Stage2:
     """Constants of the loaded arm, and the payload: P_m x_m = q_m of eq. (5) and four more integrals.
 
     Parameters
@@ -267,7 +294,9 @@ def stage2(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float, k: 
         NaN in the first ε of each window, and where a system is singular.
     """
     terms = columns(theta, omega, tau, dt)
-    unknown = np.stack([terms.inertia1, terms.coupling1, terms.inertia2, terms.gravity1, terms.gravity12])
+    unknown = np.stack(
+        [terms.inertia1, terms.coupling1, terms.inertia2, terms.gravity1, terms.gravity12]
+    )
     rest = terms.torque1 - k[5] * terms.viscous1
     solution = _solved_late(np.concatenate([unknown, rest[None]]), dt)
     l1, m_p = payload(solution.x, k, gravity)
@@ -333,7 +362,9 @@ def stage1_series(source: Iterable[Segment], window: float) -> Iterator[PaperSer
     return _windows(source, window, stage)
 
 
-def stage2_series(source: Iterable[Segment], window: float, k: FloatArray, gravity: float) -> Iterator[PaperSeries]:
+def stage2_series(
+    source: Iterable[Segment], window: float, k: FloatArray, gravity: float
+) -> Iterator[PaperSeries]:
     """`STAGE2_SERIES` of a log of the arm with payload.
 
     Parameters
@@ -358,7 +389,10 @@ def _windows(source: Iterable[Segment], window: float, stage: Stage) -> Iterator
     rows = max(round(window / first.dt), 8)
     for batch in _batches(pieces(chain([first], moving), rows)):
         dt = batch[0].dt
-        theta, tau = (np.stack([getattr(window, name) for window in batch], axis=1) for name in ("theta", "tau"))
+        theta, tau = (
+            np.stack([getattr(window, name) for window in batch], axis=1)
+            for name in ("theta", "tau")
+        )
         omega = np.stack([window.omega for window in batch if window.omega is not None], axis=1)
         values = stage(theta, omega, tau, dt)
         for index, piece in enumerate(batch):
@@ -366,7 +400,10 @@ def _windows(source: Iterable[Segment], window: float, stage: Stage) -> Iterator
 
 
 def _batches(windows: Iterable[Segment]) -> Iterator[list[Segment]]:
-    """Neighbouring windows of one length, as many as a block holds; windows too short to integrate are left out."""
+    """Neighbouring windows of one length, as many as a block holds.
+
+    Windows too short to integrate are left out.
+    """
     batch: list[Segment] = []
     for window in windows:
         if len(window) < 8:
@@ -394,12 +431,17 @@ class Summary:
         some = np.isfinite(settled).any(axis=1)
         if some.any():
             usable = settled[some]
-            quantile = np.nanquantile if np.isnan(usable).any() else np.quantile  # the former goes row by row
+            quantile = (
+                np.nanquantile if np.isnan(usable).any() else np.quantile
+            )  # the former goes row by row
             quartiles[:, some] = quantile(usable, [0.25, 0.5, 0.75], axis=1)
         self._quartiles.append(quartiles)
 
     def estimates(self) -> tuple[FloatArray, FloatArray]:
-        """Estimates (s,) and how far they wander (s,), half the distance of the quartiles; NaN where none."""
+        """Estimates (s,) and how far they wander (s,), half the distance of the quartiles.
+
+        NaN where none.
+        """
         if not self._quartiles:
             return np.full(self._size, np.nan), np.full(self._size, np.nan)
         low, middle, high = np.stack(self._quartiles, axis=-1)

@@ -8,8 +8,8 @@ c       coefficients of one log: columns, delay                         (q,)
 T       dc/dβ                                                           (q, Q)
 ======  ==============================================================  ========
 
-A loaded log obeys the same equations with the constants of `algid.arm.with_payload`, so that it informs about
-the arm as well as about its payload.
+A loaded log obeys the same equations with the constants of `algid.arm.with_payload`, so that it
+informs about the arm as well as about its payload.
 """
 
 from __future__ import annotations
@@ -25,9 +25,13 @@ from algid.physics.parameters import BODY, PAYLOAD
 
 PAYLOAD_PARAMETERS = tuple(one.name for one in (*PAYLOAD, *BODY))
 # which z adds to which k, and its part: eq. (5) against eq. (3), the moments as phasors
-_LOADED = {"k5": (0, "real"), "k3": (1, "real"), "k1": (2, "real"), "k4": (3, "real"), "k2": (4, "real")} | {
-    sine: ({"k1": 2, "k4": 3, "k2": 4}[name], "imag") for sine, name in SINES.items()
-}
+_LOADED = {
+    "k5": (0, "real"),
+    "k3": (1, "real"),
+    "k1": (2, "real"),
+    "k4": (3, "real"),
+    "k2": (4, "real"),
+} | {sine: ({"k1": 2, "k4": 3, "k2": 4}[name], "imag") for sine, name in SINES.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +73,12 @@ class Shared:
     def physical(self, beta: FloatArray) -> tuple[float, float, complex, float]:
         """m_p, l1, the payload's place x + i y, and its inertia."""
         value = dict(zip(self.names, map(float, beta), strict=True)) | self.lengths
-        return value["m_p"], value["l1"], complex(value["l2"], value.get("y_p", 0.0)), value.get("J_p", 0.0)
+        return (
+            value["m_p"],
+            value["l1"],
+            complex(value["l2"], value.get("y_p", 0.0)),
+            value.get("J_p", 0.0),
+        )
 
     def turn(self, beta: FloatArray) -> tuple[float, FloatArray]:
         """What has to be added to θ1, arg K2 - arg K1 in rad, and its derivative (q,) by the log's coefficients."""

@@ -1,9 +1,10 @@
 """Torque predicted on logs, and how good the prediction is.
 
-The motion passes a zero-phase Butterworth filter wide enough for what an arm does, and the model; then what the model
-gives and the measured torque pass a second, narrower one. To filter the motion so narrowly would be another motion:
-the model is not linear in it. Both filters run at `_PER_CUTOFF` samples a period of the first one's cutoff, to which a
-sharper filter without phase takes the log first; both ends of every stretch, where they ring, are dropped.
+The motion passes a zero-phase Butterworth filter wide enough for what an arm does, and the model;
+then what the model gives and the measured torque pass a second, narrower one. To filter the motion
+so narrowly would be another motion: the model is not linear in it. Both filters run at
+`_PER_CUTOFF` samples a period of the first one's cutoff, to which a sharper filter without phase
+takes the log first; both ends of every stretch, where they ring, are dropped.
 
 ======  ==============================================================  ===============  ======
 symbol  name                                                            shape            unit
@@ -30,7 +31,8 @@ from algid.signals.segments import Cutter, Segment
 
 _PIECE_SECONDS = 60.0
 _PER_CUTOFF = 12.5
-_SHARPER = 5.0  # cutoffs: bandwidth of the decimating filter, whose stop band begins before its images matter
+# cutoffs: bandwidth of the decimating filter, whose stop band begins before its images matter
+_SHARPER = 5.0
 _SLOPE = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / 12  # of fourth order (Fornberg 1988)
 _BEND = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / 12
 
@@ -80,12 +82,18 @@ class PredictionScore:
 
     @property
     def nrmse(self) -> FloatArray:
-        """RMSE over the torque's root mean square (2,); of a joint without torque over the other joint's."""
+        """RMSE over the torque's root mean square (2,).
+
+        Of a joint without torque over the other joint's.
+        """
         return np.sqrt(self.residual / np.maximum(self._of_drive(self.square), 1e-300))
 
     @property
     def r2(self) -> FloatArray:
-        """Share of the torque's variance that is predicted (2,); of a joint without torque, of the other joint's."""
+        """Share of the torque's variance that is predicted (2,).
+
+        Of a joint without torque, of the other joint's.
+        """
         spread = self.square - self.torque**2 / max(self.count, 1.0)
         return 1 - self.residual / np.maximum(self._of_drive(spread), 1e-300)
 
@@ -104,11 +112,16 @@ class PredictionSums:
         After how long a logged torque acts: hold and delay together.
     by : PredictionFilter
     at : (q,)
-        The coefficients that are to be scored, and no others, where the model is not linear in them.
+        The coefficients that are to be scored, and no others, where the model is not linear in
+        them.
     """
 
     def __init__(
-        self, model: Model, shift: Shift = 0.0, by: PredictionFilter | None = None, at: FloatArray | None = None
+        self,
+        model: Model,
+        shift: Shift = 0.0,
+        by: PredictionFilter | None = None,
+        at: FloatArray | None = None,
     ) -> None:
         self._model = model
         self._at = at
@@ -133,7 +146,9 @@ class PredictionSums:
         """How well the coefficients `c` (q,) predict the torque."""
         v = np.append(-c, 1.0)
         residual = np.maximum(np.einsum("x,axy,y->a", v, self._gram, v), 0.0)
-        return PredictionScore(float(self._count), residual, self._torque.copy(), self._gram[:, -1, -1].copy())
+        return PredictionScore(
+            float(self._count), residual, self._torque.copy(), self._gram[:, -1, -1].copy()
+        )
 
     def _add(self, piece: Segment) -> None:
         shift = seconds(self._shift, piece.dt)
@@ -150,7 +165,9 @@ def seconds(shift: Shift, dt: float) -> float:
     return shift(dt) if callable(shift) else shift
 
 
-def _filtered(model: Model, piece: Segment, shift: float, by: PredictionFilter, at: FloatArray | None) -> FloatArray:
+def _filtered(
+    model: Model, piece: Segment, shift: float, by: PredictionFilter, at: FloatArray | None
+) -> FloatArray:
     """X (2, q + 1, n) of a piece: see the module's table."""
     signals, dt = _decimated(piece, by)
     edge = round(by.dropped / dt)
@@ -179,7 +196,10 @@ def _decimated(piece: Segment, by: PredictionFilter) -> tuple[FloatArray, float]
 
 
 def motion_of(theta: FloatArray, dt: float) -> Motion:
-    """Motion with derivatives by five points; the two samples at each end repeat their neighbour's."""
+    """Motion with derivatives by five points.
+
+    The two samples at each end repeat their neighbour's.
+    """
     inner, n = theta.shape[1] - 4, theta.shape[1]
     omega, alpha = (
         sum(weight * theta[:, place : place + inner] for place, weight in enumerate(weights))
@@ -190,7 +210,11 @@ def motion_of(theta: FloatArray, dt: float) -> Motion:
 
 
 def score(
-    model: Model, c: FloatArray, segments: Iterable[Segment], shift: Shift = 0.0, by: PredictionFilter | None = None
+    model: Model,
+    c: FloatArray,
+    segments: Iterable[Segment],
+    shift: Shift = 0.0,
+    by: PredictionFilter | None = None,
 ) -> PredictionScore:
     """How well the coefficients `c` (q,) predict a log's torque; see `PredictionSums`."""
     sums = PredictionSums(model, shift, by, c)
@@ -205,18 +229,27 @@ def cross_validate(
 ) -> PredictionScore | None:
     """Score of each log predicted from all the others; None where a kind of log has only one.
 
-    The other logs' parameters follow from their quadratic likelihoods, without a further pass; only the
-    prediction reads the logs again. `shift` is what is known of the time after which a torque acts: a delay that
-    the fit estimates comes on top, each time as the other logs tell it.
+    The other logs' parameters follow from their quadratic likelihoods, without a further pass;
+    only the prediction reads the logs again. `shift` is what is known of the time after which a
+    torque acts: a delay that the fit estimates comes on top, each time as the other logs tell it.
     """
     sources = [*unloaded, *loaded]
     if len(sources) != len(fit.logs) or len(unloaded) == 1 or len(loaded) == 1:
         return None
     total = PredictionScore()
     columns = len(fit.shared.model.names)
-    without = left_out(fit.shared, fit.logs, fit.values, fit.prior) if fit.without is None else fit.without
+    without = (
+        left_out(fit.shared, fit.logs, fit.values, fit.prior)
+        if fit.without is None
+        else fit.without
+    )
     for place, (source, log) in enumerate(zip(sources, fit.logs, strict=True)):
         c = fit.shared.coefficients(without[place], log.loaded)
         delay = float(c[columns:].sum())
-        total += score(fit.shared.model, c[:columns], source(), lambda dt, delay=delay: seconds(shift, dt) + delay)  # type: ignore[misc]
+        total += score(
+            fit.shared.model,
+            c[:columns],
+            source(),
+            lambda dt, delay=delay: seconds(shift, dt) + delay,  # type: ignore[misc]
+        )
     return total

@@ -1,9 +1,10 @@
 """The refined estimator: errors-in-variables maximum likelihood over any number of logs.
 
-It starts from the weak estimate. On a training set, whole short logs or evenly spread pieces of long ones, it
-alternates Gauss-Newton steps for the shared parameters, for every piece's trajectory and for the noise levels.
-Where pieces were left out, one pass over everything at the trained values and one more step make the estimate
-efficient (Le Cam's one-step estimator): the start is already within its own error bars.
+It starts from the weak estimate. On a training set, whole short logs or evenly spread pieces of
+long ones, it alternates Gauss-Newton steps for the shared parameters, for every piece's trajectory
+and for the noise levels. Where pieces were left out, one pass over everything at the trained
+values and one more step make the estimate efficient (Le Cam's one-step estimator): the start is
+already within its own error bars.
 """
 
 from __future__ import annotations
@@ -49,7 +50,8 @@ class RefinedSettings:
     ----------
     model : Model
     hold : "foh" or "zoh"
-        Whether the torque moved evenly from sample to sample, or was held from each sample to the next.
+        Whether the torque moved evenly from sample to sample, or was held from each sample to the
+        next.
     delay : float, s
         After how long a logged torque acts; where the estimate of it starts with `estimate_delay`.
     estimate_delay : bool
@@ -91,7 +93,8 @@ def fit(
     Parameters
     ----------
     unloaded, loaded : sequences of callables
-        Each gives a fresh iterable of `Segment`, the stretches of one log in time; it is called several times.
+        Each gives a fresh iterable of `Segment`, the stretches of one log in time; it is called
+        several times.
     settings : RefinedSettings
     progress : callable
         Called with each step of the training and how many samples of how many it has gone over.
@@ -111,9 +114,13 @@ def fit(
     settings = settings or RefinedSettings()
     noise = settings.noise
     if noise is not None and not (np.all(noise.theta > 0) and np.all(noise.tau > 0)):
-        raise ValueError(f"known noise levels must be positive, got {noise.theta} rad and {noise.tau} N m")
+        raise ValueError(
+            f"known noise levels must be positive, got {noise.theta} rad and {noise.tau} N m"
+        )
     same = {name: getattr(settings, name) for name in ("model", "hold", "delay", "estimate_delay")}
-    start = weak_fit(unloaded, loaded, replace(settings.weak, **same), settings.lengths, settings.prior)
+    start = weak_fit(
+        unloaded, loaded, replace(settings.weak, **same), settings.lengths, settings.prior
+    )
     shared = start.shared
     settings, prior = replace(settings, prior=_anchored(start)), settings.prior
     logs = [*_opened(unloaded, False, shared, settings), *_opened(loaded, True, shared, settings)]
@@ -139,7 +146,16 @@ def fit(
     informations = [outcome.information for outcome in outcomes]
     samples = int(_count(outcomes))
     coloured = not whiteness.white
-    fitted = conclude("refined", shared, informations, beta, start.moved, prior, coloured=coloured, samples=samples)
+    fitted = conclude(
+        "refined",
+        shared,
+        informations,
+        beta,
+        start.moved,
+        prior,
+        coloured=coloured,
+        samples=samples,
+    )
     # No surer than the weak estimate: a joint at rest trembles in noise, which is no motion.
     pairs = zip(fitted.status, start.status, strict=True)
     return with_body(
@@ -189,7 +205,11 @@ def _opened(
 
 
 def _train(
-    shared: Shared, logs: Sequence[LogEvidence], beta: FloatArray, settings: RefinedSettings, progress: Progress | None
+    shared: Shared,
+    logs: Sequence[LogEvidence],
+    beta: FloatArray,
+    settings: RefinedSettings,
+    progress: Progress | None,
 ) -> tuple[FloatArray, list[Outcome], int, End]:
     """Parameters, the last pass over each log, steps taken, and how the alternation ended."""
     total = sum(log.trained for log in logs)
@@ -201,7 +221,9 @@ def _train(
             done += log.trained
             if progress is not None:
                 progress(f"fitting, step {iteration}", done, total)
-        better, S, _ = combine(shared, [outcome.information for outcome in outcomes], beta, settings.prior)
+        better, S, _ = combine(
+            shared, [outcome.information for outcome in outcomes], beta, settings.prior
+        )
         free = settings.noise is None and iteration <= _NOISE_STEPS
         improved = max(map(LogEvidence.improve_noise, logs, outcomes)) if free else 0.0
         moved = _distance(better - beta, S)
@@ -219,7 +241,9 @@ def _finish(
     """Passes over whole logs until the step is one that a single Gauss-Newton step can make."""
     for _ in range(_PASSES):
         outcomes = [log.run(shared.coefficients(beta, log.loaded)) for log in logs]
-        better, S, _ = combine(shared, [outcome.information for outcome in outcomes], beta, settings.prior)
+        better, S, _ = combine(
+            shared, [outcome.information for outcome in outcomes], beta, settings.prior
+        )
         share = sum(log.trained for log in logs)
         far = _distance(better - beta, S) * np.sqrt(share / max(share, _count(outcomes)))
         beta = better

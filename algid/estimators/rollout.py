@@ -1,7 +1,8 @@
 """The arm simulated forward from a log's states under its torques, and how far from its angles it comes.
 
-A start every so often, all of them at once: Runge-Kutta of fourth order, torques between samples on straight lines.
-Angles and velocities of the starts, and the angles to compare with, pass the motion's zero-phase filter.
+A start every so often, all of them at once: Runge-Kutta of fourth order, torques between samples
+on straight lines. Angles and velocities of the starts, and the angles to compare with, pass the
+motion's zero-phase filter.
 
 ======  =================================================  ===============  ======
 symbol  name                                               shape            unit
@@ -36,18 +37,26 @@ _LONGEST, _SHORTEST = 2e-3, 1.25e-4  # s of a step
 
 @dataclass(frozen=True, eq=False)
 class RolloutScore:
-    """By horizon (H,): starts; by horizon and joint (H, 2): squared errors, and squared distances moved, in rad²."""
+    """By horizon (H,): starts.
+
+    By horizon and joint (H, 2): squared errors, and squared distances moved, in rad².
+    """
 
     count: FloatArray = field(default_factory=lambda: np.zeros(len(HORIZONS)))
     error: FloatArray = field(default_factory=lambda: np.zeros((len(HORIZONS), 2)))
     moved: FloatArray = field(default_factory=lambda: np.zeros((len(HORIZONS), 2)))
 
     def __add__(self, other: RolloutScore) -> RolloutScore:
-        return RolloutScore(self.count + other.count, self.error + other.error, self.moved + other.moved)
+        return RolloutScore(
+            self.count + other.count, self.error + other.error, self.moved + other.moved
+        )
 
     @property
     def rmse(self) -> FloatArray:
-        """RMSE (H, 2) of the angles in rad; NaN without a start, infinite where the simulation runs away."""
+        """RMSE (H, 2) of the angles in rad.
+
+        NaN without a start, infinite where the simulation runs away.
+        """
         return self._root_mean(self.error)
 
     @property
@@ -56,7 +65,9 @@ class RolloutScore:
         return self._root_mean(self.moved)
 
     def _root_mean(self, squares: FloatArray) -> FloatArray:
-        return np.sqrt(np.where(self.count[:, None] > 0, squares / np.maximum(self.count, 1)[:, None], np.nan))
+        return np.sqrt(
+            np.where(self.count[:, None] > 0, squares / np.maximum(self.count, 1)[:, None], np.nan)
+        )
 
 
 def rollouts(
@@ -72,7 +83,10 @@ def rollouts(
     for segment in segments:
         cutter = cutter or Cutter(max(1, round(_PIECE_SECONDS / segment.dt)))
         starts += [_starts(model, c, piece, spacing, step, shift) for piece in cutter.push(segment)]
-    starts += [_starts(model, c, piece, spacing, step, shift) for piece in (cutter.finish() if cutter else ())]
+    starts += [
+        _starts(model, c, piece, spacing, step, shift)
+        for piece in (cutter.finish() if cutter else ())
+    ]
     if not sum(x.shape[1] for x, _, _ in starts):
         return total
     x, u, y = (np.concatenate(parts, axis=-1) for parts in zip(*starts, strict=True))
@@ -82,11 +96,16 @@ def rollouts(
         error = np.where(judged[:, None], found - y, 0.0)
         moved = np.where(judged[:, None], y - x[:2], 0.0)
         squares = np.where(np.isnan(error), np.inf, error) ** 2
-    return RolloutScore(judged.sum(axis=1).astype(np.float64), squares.sum(axis=2), (moved**2).sum(axis=2))
+    return RolloutScore(
+        judged.sum(axis=1).astype(np.float64), squares.sum(axis=2), (moved**2).sum(axis=2)
+    )
 
 
 def time_step(model: Model, c: FloatArray) -> float:
-    """Time step in s that the stiffest friction of either joint, at rest, leaves stable; it divides the horizons."""
+    """Time step in s that the stiffest friction of either joint, at rest, leaves stable.
+
+    It divides the horizons.
+    """
     around = np.linspace(0, 2 * np.pi, _POSES, endpoint=False)
     (outer, coupling), (_, inner) = inertia(model, c, np.stack([np.zeros_like(around), around]))
     slope = np.abs(damping(model, c))
@@ -101,7 +120,10 @@ def time_step(model: Model, c: FloatArray) -> float:
 def _starts(
     model: Model, c: FloatArray, piece: Segment, spacing: float, step: float, shift: Shift
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """x, u and y of the starts in a piece of a log; only starts with the first horizon ahead of them."""
+    """x, u and y of the starts in a piece of a log.
+
+    Only starts with the first horizon ahead of them.
+    """
     by, dt, n = PredictionFilter(), piece.dt, len(piece)
     halves = 2 * round(HORIZONS[-1] / step) + 1
     edge, first = round(by.dropped / dt), round(HORIZONS[0] / dt)
@@ -123,7 +145,9 @@ def _starts(
     return np.concatenate([motion.theta[:, at], motion.omega[:, at]]), u, y
 
 
-def _angles_at_horizons(model: Model, c: FloatArray, x: FloatArray, u: FloatArray, step: float) -> list[FloatArray]:
+def _angles_at_horizons(
+    model: Model, c: FloatArray, x: FloatArray, u: FloatArray, step: float
+) -> list[FloatArray]:
     """Angles (2, S) at each horizon, by the classical Runge-Kutta method of fourth order."""
 
     def rate(x: FloatArray, tau: FloatArray) -> FloatArray:
@@ -131,7 +155,9 @@ def _angles_at_horizons(model: Model, c: FloatArray, x: FloatArray, u: FloatArra
 
     found: list[FloatArray] = []
     ends = [round(horizon / step) for horizon in HORIZONS]
-    with np.errstate(all="ignore"):  # an arm far from the log's may run away: its error is infinite then
+    with np.errstate(
+        all="ignore"
+    ):  # an arm far from the log's may run away: its error is infinite then
         for number in range(ends[-1]):
             begin, middle, end = u[2 * number : 2 * number + 3]
             a = rate(x, begin)

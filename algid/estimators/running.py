@@ -1,6 +1,7 @@
 """What an estimator had found by each moment of its logs, taken in turn, and how sure it was.
 
-A fit's logs are quadratic likelihoods by stretch of time; those up to a moment add up as all of them do.
+A fit's logs are quadratic likelihoods by stretch of time; those up to a moment add up as all of
+them do.
 
 ======  =====================================================  =============
 symbol  name                                                   shape
@@ -56,8 +57,9 @@ def running(fit: Fit, durations: Sequence[float], moments: int = MOMENTS) -> Run
 
     Notes
     -----
-    The band is that of the information so far, wider by the factor that the fit's own intervals are wider than the
-    information of all logs has it: that of coloured residuals and of what differs from run to run.
+    The band is that of the information so far, wider by the factor that the fit's own intervals
+    are wider than the information of all logs has it: that of coloured residuals and of what
+    differs from run to run.
     """
     _, plain = _estimate(fit, fit.logs)
     known = np.isfinite(fit.std) & (plain > 0)
@@ -77,17 +79,24 @@ def running(fit: Fit, durations: Sequence[float], moments: int = MOMENTS) -> Run
             shares.append(end / log.S.shape[0])
             betas.append(beta)
             halves.append(fit.quantile * widening * std)
-    return Running(np.array(places, dtype=np.int32), np.array(shares), np.array(betas), np.array(halves))
+    return Running(
+        np.array(places, dtype=np.int32), np.array(shares), np.array(betas), np.array(halves)
+    )
 
 
 def _estimate(fit: Fit, logs: Sequence[LogInformation]) -> tuple[FloatArray, FloatArray]:
-    """Parameters (Q,) that some of the fit's logs tell, and their standard deviations (Q,); NaN where they are open."""
+    """Parameters (Q,) that some of the fit's logs tell, and their standard deviations (Q,).
+
+    NaN where they are open.
+    """
     beta, S, _ = combine(fit.shared, logs, fit.values, fit.prior)
     if not S.any():  # a joint at rest, and nothing else so far
         return np.full(beta.shape, np.nan), np.full(beta.shape, np.nan)
     known = examine(fit.names, beta, S, fit.moved)
     std = np.sqrt(np.maximum(np.diag(known.covariance), 0.0))
-    lost = np.array([status == "NOT_IDENTIFIABLE" for status in fit.status])  # the fit may know better than its sums
+    lost = np.array(
+        [status == "NOT_IDENTIFIABLE" for status in fit.status]
+    )  # the fit may know better than its sums
     determined = np.array(known.determined) & ~lost
     return np.where(determined, beta, np.nan), np.where(determined, std, np.nan)
 

@@ -1,17 +1,17 @@
 """Which terms the torque's model needs: weighed by prediction of what was not fitted, and by evidence.
 
-The normal equations of the weak form are gathered with the columns of every term, and every model without some of
-them is solved from the same Gram matrices. Moments over smooth windows are a residual filtered after the model, so
-that the held-out ones measure how well a model predicts.
+The normal equations of the weak form are gathered with the columns of every term, and every model
+without some of them is solved from the same Gram matrices. Moments over smooth windows are a
+residual filtered after the model, so that the held-out ones measure how well a model predicts.
 
-Terms are taken in where they lower the squared moments of folds (logs, or blocks of a log) that were left out of
-the fit, and where the evidence outweighs its price,
+Terms are taken in where they lower the squared moments of folds (logs, or blocks of a log) that
+were left out of the fit, and where the evidence outweighs its price,
 
     W > n (log N + 2 log T)
 
-with W their Wald statistic, n their coefficients, N the independent stretches of log (Schwarz 1978) and T the terms
-to choose from (Chen & Chen 2008, γ = 1). What makes a column, the width of friction and where a term that is not
-linear is linearised, is improved between the rounds.
+with W their Wald statistic, n their coefficients, N the independent stretches of log (Schwarz
+1978) and T the terms to choose from (Chen & Chen 2008, γ = 1). What makes a column, the width of
+friction and where a term that is not linear is linearised, is improved between the rounds.
 """
 
 from __future__ import annotations
@@ -26,13 +26,25 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.estimators.term_grams import CHANGE, Coefficients, Grams, Training, term_names
 from algid.estimators.weak import Source, WeakSettings
-from algid.model import CHOICES, EVERY_TERM, LARGEST_PHASE, PARAMETERS, SINES, TERMS, Model, without_delay
+from algid.model import (
+    CHOICES,
+    EVERY_TERM,
+    LARGEST_PHASE,
+    PARAMETERS,
+    SINES,
+    TERMS,
+    Model,
+    without_delay,
+)
 from algid.physics.motion import Widths
 
-CHOICE = tuple(name for name, term in EVERY_TERM.items() if name in CHOICES and term.timing != "lag")
+CHOICE = tuple(
+    name for name, term in EVERY_TERM.items() if name in CHOICES and term.timing != "lag"
+)
 """Terms that the logs choose from: a lag and a delay are the same to first order, and one column tells both."""
 _DELAY, _LAG = (
-    tuple(name for name, term in EVERY_TERM.items() if term.timing == timing) for timing in ("delay", "lag")
+    tuple(name for name, term in EVERY_TERM.items() if term.timing == timing)
+    for timing in ("delay", "lag")
 )
 # Where a joint has no motor, its gain is nothing and makes its equation vanish.
 _OF_BOTH_TORQUES = tuple(name for name in CHOICE if EVERY_TERM[name].gains)
@@ -40,7 +52,10 @@ FIRST_TERMS = tuple(name for name, term in TERMS.items() if term.usual)
 _WIDTHS = np.array([0.01, 0.02, 0.04, 0.08, 0.16, 0.32])  # rad/s
 _FADES = np.array([0.1, 0.3, 0.9])  # rad/s
 _NEAR = np.array([0.7, 0.84, 1.0, 1.2, 1.44])  # of a shape found before
-_SHAPED = {shape.name: {name for name, term in TERMS.items() if shape.name in term.shapes} for shape in fields(Widths)}
+_SHAPED = {
+    shape.name: {name for name, term in TERMS.items() if shape.name in term.shapes}
+    for shape in fields(Widths)
+}
 _RELINEARISED = {name for name in CHOICE if not EVERY_TERM[name].linear or EVERY_TERM[name].timing}
 _ROUNDS = 4
 _TOGETHER = 2  # terms that are tried at once
@@ -73,9 +88,10 @@ class TermTrial:
 class Selection:
     """The model chosen, whether a delay is estimated beside it, and who chose.
 
-    `trials` are those of the terms, and `held_out` is what was left out of the fit in turn; where the terms were
-    given there are none. `shapes` is the model of the most common terms, whose friction has the shape that logs give
-    it before any is chosen; `shrunk` says that none was chosen in the end, but every term shrunk.
+    `trials` are those of the terms, and `held_out` is what was left out of the fit in turn; where
+    the terms were given there are none. `shapes` is the model of the most common terms, whose
+    friction has the shape that logs give it before any is chosen; `shrunk` says that none was
+    chosen in the end, but every term shrunk.
     """
 
     model: Model
@@ -149,13 +165,22 @@ def select(
     ValueError
         If no log is long enough for a window.
     """
-    logs = [Training.of(source, kind) for kind, sources in ((False, unloaded), (True, loaded)) for source in sources]
+    logs = [
+        Training.of(source, kind)
+        for kind, sources in ((False, unloaded), (True, loaded))
+        for source in sources
+    ]
     if not all(log.driven for log in logs):
         candidates = [term for term in candidates if term not in _OF_BOTH_TORQUES]
     # At the constants, and at the shapes of friction, that a model of the most common terms gives.
-    look = _Look(tuple(logs), settings, {False: {}, True: {}}).shaped("coulomb_speed", _WIDTHS, FIRST_TERMS)
+    look = _Look(tuple(logs), settings, {False: {}, True: {}}).shaped(
+        "coulomb_speed", _WIDTHS, FIRST_TERMS
+    )
     at = look.grams(FIRST_TERMS).coefficients((*FIRST_TERMS, *_DELAY))
-    linear = {kind: {name: c for name, c in values.items() if name != CHANGE} for kind, values in at.items()}
+    linear = {
+        kind: {name: c for name, c in values.items() if name != CHANGE}
+        for kind, values in at.items()
+    }
     start = replace(look, at=linear)
     if _SHAPED["stribeck_speed"]:
         start = start.shaped("stribeck_speed", _FADES, (*FIRST_TERMS, *_SHAPED["stribeck_speed"]))
@@ -164,7 +189,9 @@ def select(
     searches: list[_Search] = []
     for _ in range(_ROUNDS):
         grams = look.grams(everything)
-        searches.append(_Search(grams, tuple(term for term in candidates if term not in fixed), fixed))
+        searches.append(
+            _Search(grams, tuple(term for term in candidates if term not in fixed), fixed)
+        )
         terms = searches[-1].run()
         if terms == before or not (_RELINEARISED | _SHAPED["coulomb_speed"]) & set(terms):
             break
@@ -175,12 +202,19 @@ def select(
     shapes = start.settings.model
     if not candidates:
         return Selection(model, delayed, shapes=shapes)
-    trials = tuple(searches[0 if term in _DELAY else -1].trial(term, terms, kept) for term in everything)
-    return _as_lag(start, look, terms, Selection(model, delayed, "logs", trials, grams.held_out, shapes))
+    trials = tuple(
+        searches[0 if term in _DELAY else -1].trial(term, terms, kept) for term in everything
+    )
+    return _as_lag(
+        start, look, terms, Selection(model, delayed, "logs", trials, grams.held_out, shapes)
+    )
 
 
 def _lowest(x: FloatArray, y: Sequence[float]) -> float:
-    """Where the parabola through the least value and its neighbours has its bottom; at an end, the end itself."""
+    """Where the parabola through the least value and its neighbours has its bottom.
+
+    At an end, the end itself.
+    """
     least = int(np.argmin(y))
     if least in (0, len(x) - 1):
         return float(x[least])
@@ -194,9 +228,13 @@ def _as_lag(start: _Look, look: _Look, terms: Sequence[str], chosen: Selection) 
         return chosen
     timely = replace(look, settings=replace(look.settings, delay=start.settings.delay))
     others = without_delay(terms)
-    if timely.grams(others).cost >= look.grams(others).cost:  # both with the torque's slope, the one shifted before
+    if (
+        timely.grams(others).cost >= look.grams(others).cost
+    ):  # both with the torque's slope, the one shifted before
         return chosen
-    trials = tuple(replace(trial, term=_LAG[0]) if trial.term in _DELAY else trial for trial in chosen.trials)
+    trials = tuple(
+        replace(trial, term=_LAG[0]) if trial.term in _DELAY else trial for trial in chosen.trials
+    )
     model = replace(chosen.model, terms=(*chosen.model.terms, *_LAG))
     return replace(chosen, model=model, delay=False, trials=trials)
 
@@ -219,7 +257,9 @@ class _Search:
 
     def gain(self, terms: Sequence[str], beside: Sequence[str]) -> float:
         """The share by which the held-out squares fall."""
-        return 1 - self.grams.held_out_squares([*beside, *terms]) / self.grams.held_out_squares(beside)
+        return 1 - self.grams.held_out_squares([*beside, *terms]) / self.grams.held_out_squares(
+            beside
+        )
 
     def agreed(self, terms: Sequence[str], beside: Sequence[str]) -> bool:
         """Whether what was left out, and physics, speak for `terms` too."""
@@ -230,8 +270,12 @@ class _Search:
         value = self.grams.coefficients([*among, *terms])[False]
         names = [name for term in terms for name in term_names(term) if name in value]
         ranges = ((value[name], PARAMETERS[name].plausible) for name in names)
-        turned = (np.arctan2(abs(value[name]), value[SINES[name]]) for name in names if name in SINES)
-        return all(low <= found <= high for found, (low, high) in ranges) and all(t <= LARGEST_PHASE for t in turned)
+        turned = (
+            np.arctan2(abs(value[name]), value[SINES[name]]) for name in names if name in SINES
+        )
+        return all(low <= found <= high for found, (low, high) in ranges) and all(
+            t <= LARGEST_PHASE for t in turned
+        )
 
     def run(self) -> list[str]:
         """The terms that stay."""
@@ -243,10 +287,18 @@ class _Search:
         return kept
 
     def _addition(self, kept: list[str]) -> list[str]:
-        left = [term for term in self.candidates if term not in kept and _need(term) in (None, *kept)]
+        left = [
+            term for term in self.candidates if term not in kept and _need(term) in (None, *kept)
+        ]
         for count in range(1, _TOGETHER + 1):
-            found = [(self.evidence(terms, kept), list(terms)) for terms in combinations(left, count)]
-            found = [(evidence, terms) for evidence, terms in found if evidence > 0 and self.agreed(terms, kept)]
+            found = [
+                (self.evidence(terms, kept), list(terms)) for terms in combinations(left, count)
+            ]
+            found = [
+                (evidence, terms)
+                for evidence, terms in found
+                if evidence > 0 and self.agreed(terms, kept)
+            ]
             if found:
                 return max(found)[1]
         return []
@@ -266,7 +318,9 @@ class _Search:
         """What became of a term, beside those that were kept."""
         beside = [other for other in kept if other != term and _need(other) != term]
         if term in asked:
-            return TermTrial(term, True, self.gain([term], beside), self.evidence([term], beside), "asked for")
+            return TermTrial(
+                term, True, self.gain([term], beside), self.evidence([term], beside), "asked for"
+            )
         if _need(term) not in (None, *beside):
             return TermTrial(term, False, 0.0, 0.0, f"left out: no meaning without {_need(term)}")
         gain, evidence = self.gain([term], beside), self.evidence([term], beside)

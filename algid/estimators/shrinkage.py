@@ -1,24 +1,28 @@
 """Terms of the torque shrunk toward what physics expects of them: an empirical-Bayes prior in physical scales.
 
-To choose terms is to set some of them to zero, and another half of the logs sets others to zero. Here every term
-stays, with a normal prior whose spread is estimated and never exceeds what a real arm may have (Efron & Morris 1973).
-All logs' scores disagree by more than white noise explains; the information is divided by that factor first.
+To choose terms is to set some of them to zero, and another half of the logs sets others to zero.
+Here every term stays, with a normal prior whose spread is estimated and never exceeds what a real
+arm may have (Efron & Morris 1973). All logs' scores disagree by more than white noise explains;
+the information is divided by that factor first.
 
     H = S / φ + Λ,   p = H⁻¹ (g / φ + Λ m),   Λ = diag(1 / τ²)
     τ_t² / s² = min(1, (Σ ((p - m)² + H⁻¹) / s² + u²) / (n + 1))      over the n coefficients of a term t
 
-As one more coefficient stands the usual spread, u = ½ of the largest one: without it a spread falls to nothing or stays
-open by chance, which would be a choice again.
+As one more coefficient stands the usual spread, u = ½ of the largest one: without it a spread
+falls to nothing or stays open by chance, which would be a choice again.
 
-======  ===================================================================  ==========  =================
+======  ===================================================================  ==========
+=================
 symbol  name                                                                 shape       unit
-======  ===================================================================  ==========  =================
+======  ===================================================================  ==========
+=================
 S, g    information and score of all logs                                    (Q, Q), Q   1 / (unit unit)
 p       shared parameters where prior and logs meet                          (Q,)        mixed
 m, s    the prior's mean, and the spread that physics allows, of a term      (m,)        its own
 τ       the spread that the logs tell, at most s                             (m,)        its own
 φ       overdispersion: variance of the scores over the information          scalar      1
-======  ===================================================================  ==========  =================
+======  ===================================================================  ==========
+=================
 """
 
 from __future__ import annotations
@@ -30,7 +34,14 @@ from typing import Literal
 import numpy as np
 
 from algid.arm import FloatArray, keep_arrays
-from algid.estimators.combine import LogInformation, Prior, combine, jackknife, long_run_variance, scaled_pinv
+from algid.estimators.combine import (
+    LogInformation,
+    Prior,
+    combine,
+    jackknife,
+    long_run_variance,
+    scaled_pinv,
+)
 from algid.estimators.parametrisation import Shared
 
 _STEPS = 200
@@ -44,7 +55,8 @@ _FEWEST = 3  # logs whose scatter tells an overdispersion
 class TermScale:
     """What the coefficients of a term may be: `size`, of the joint's torque (RMS), of k3, or in their own unit.
 
-    The sine part of a constant is measured by the constant itself. `usual` is what most arms have of `size`.
+    The sine part of a constant is measured by the constant itself. `usual` is what most arms have
+    of `size`.
     """
 
     size: float
@@ -60,7 +72,9 @@ SCALES = {
     "rotor": TermScale(1.0, "k3"),
     "load": TermScale(0.03),
     "gain": TermScale(0.03),  # what a torque constant may be off
-    "phases": TermScale(0.5, "cosine", 0.02),  # rad: a bent gripper; most arms have an encoder's error at most
+    "phases": TermScale(
+        0.5, "cosine", 0.02
+    ),  # rad: a bent gripper; most arms have an encoder's error at most
     "delay": TermScale(2e-3),  # s: a loop's, about half a sample
 }
 """The spread that physics allows each term of the torque."""
@@ -81,7 +95,9 @@ class Expected:
 
     def prior(self, share: FloatArray) -> Prior:
         """The normal prior with `share` (m,) of the largest spreads."""
-        return Prior(self.names, self.mean, np.diag((np.maximum(share, _LEAST) * self.spread) ** -2))
+        return Prior(
+            self.names, self.mean, np.diag((np.maximum(share, _LEAST) * self.spread) ** -2)
+        )
 
 
 def dispersion(shared: Shared, logs: Sequence[LogInformation], beta: FloatArray) -> float:
@@ -89,8 +105,8 @@ def dispersion(shared: Shared, logs: Sequence[LogInformation], beta: FloatArray)
 
     Notes
     -----
-    The larger of tr(S⁻¹ M) / q, M the long-run variance of the scores within logs, and tr(S⁻¹ Σ s sᵀ) n / (n - 1) / q
-    over the scores s of n logs of a kind, where there are `_FEWEST` or more.
+    The larger of tr(S⁻¹ M) / q, M the long-run variance of the scores within logs, and tr(S⁻¹ Σ s
+    sᵀ) n / (n - 1) / q over the scores s of n logs of a kind, where there are `_FEWEST` or more.
     """
     size = len(shared.names)
     S, within = np.zeros((size, size)), np.zeros((size, size))
@@ -167,7 +183,10 @@ def shrink(
         variance = np.diag(scaled_pinv(H))[places]
         square = ((beta[places] - expected.mean) ** 2 + variance) / expected.spread**2
         better = np.array(
-            [_share(square[terms == term], usual) for term, usual in zip(terms, expected.usual, strict=True)]
+            [
+                _share(square[terms == term], usual)
+                for term, usual in zip(terms, expected.usual, strict=True)
+            ]
         )
         change = float(np.max(np.abs(np.log(better / np.maximum(share, _LEAST))), initial=0.0))
         share = better
@@ -184,7 +203,10 @@ def _share(squares: FloatArray, usual: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Spread:
-    """Covariances (Q, Q) of p: by what is left out, by the logs' scores, by stretches; `freedom` is of the last."""
+    """Covariances (Q, Q) of p: by what is left out, by the logs' scores, by stretches.
+
+    `freedom` is of the last.
+    """
 
     jackknife: FloatArray | None
     scores: FloatArray
@@ -193,7 +215,11 @@ class Spread:
 
 
 def spread(
-    shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior, without: FloatArray
+    shared: Shared,
+    logs: Sequence[LogInformation],
+    beta: FloatArray,
+    prior: Prior,
+    without: FloatArray,
 ) -> Spread:
     """How far p may be from the truth.
 
@@ -209,9 +235,10 @@ def spread(
 
     Notes
     -----
-    All are H⁻¹ (meat + Λ) H⁻¹, Λ for what the prior's mean is off. The meat is, of n logs of a kind with scores s,
-    w n / (n - 1) Σ s sᵀ + (1 - w) S with w = (n - 1) / (n - 1 + `_PRIOR_LOGS`): the scatter of few scores is drawn
-    to the information; or the long-run variance of the stretches' scores; or what moves as logs are left out.
+    All are H⁻¹ (meat + Λ) H⁻¹, Λ for what the prior's mean is off. The meat is, of n logs of a
+    kind with scores s, w n / (n - 1) Σ s sᵀ + (1 - w) S with w = (n - 1) / (n - 1 +
+    `_PRIOR_LOGS`): the scatter of few scores is drawn to the information; or the long-run variance
+    of the stretches' scores; or what moves as logs are left out.
     """
     size = len(shared.names)
     precision = np.zeros((size, size))

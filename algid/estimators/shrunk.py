@@ -1,8 +1,9 @@
 """The arm's parameters where no likelihood of white noise holds: every term of the torque, shrunk to what logs tell.
 
-The windows of the weak form are gathered with the columns of all terms, linearised where they are not linear, and
-weighed by each joint's residual, log by log; `algid.estimators.shrinkage` finds parameters and spreads. A joint that
-stands is held by dry friction, which is any torque up to f there: its windows say nothing and are left out.
+The windows of the weak form are gathered with the columns of all terms, linearised where they are
+not linear, and weighed by each joint's residual, log by log; `algid.estimators.shrinkage` finds
+parameters and spreads. A joint that stands is held by dry friction, which is any torque up to f
+there: its windows say nothing and are left out.
 """
 
 from __future__ import annotations
@@ -41,10 +42,11 @@ def fit(
     Parameters
     ----------
     unloaded, loaded : sequences of callables
-        Each gives a fresh iterable of `Segment`, the stretches of one log in time; called a few times.
+        Each gives a fresh iterable of `Segment`, the stretches of one log in time; called a few
+        times.
     settings : WeakSettings
-        Window, bandwidth, hold and delay; its model's gravity and shapes of friction. With a delay that is not zero
-        none is estimated.
+        Window, bandwidth, hold and delay; its model's gravity and shapes of friction. With a delay
+        that is not zero none is estimated.
     lengths : mapping of "l1", "l2" to m, where known
     known : Prior
         What an earlier result knows of the arm and of its terms; unloaded logs are not needed then.
@@ -79,7 +81,9 @@ def offered(normals: Sequence[Normal], held: Sequence[str] = ()) -> tuple[str, .
 
 
 def _with_terms(settings: WeakSettings, terms: Sequence[str]) -> WeakSettings:
-    return replace(settings, model=replace(settings.model, terms=tuple(terms)), estimate_delay=False)
+    return replace(
+        settings, model=replace(settings.model, terms=tuple(terms)), estimate_delay=False
+    )
 
 
 @dataclass(frozen=True)
@@ -87,7 +91,9 @@ class _Logs:
     unloaded: tuple[Source, ...]
     loaded: tuple[Source, ...]
 
-    def normals(self, settings: WeakSettings, at: Mapping[bool, FloatArray]) -> list[tuple[bool, Normal]]:
+    def normals(
+        self, settings: WeakSettings, at: Mapping[bool, FloatArray]
+    ) -> list[tuple[bool, Normal]]:
         """Normal equations of each log that is long enough, and whether it is loaded."""
         found = []
         for kind, sources in ((False, self.unloaded), (True, self.loaded)):
@@ -99,18 +105,28 @@ class _Logs:
 
 
 def _found(
-    logs: _Logs, shared: Shared, settings: WeakSettings, known: Prior | None, held: Sequence[str], moved: FloatArray
+    logs: _Logs,
+    shared: Shared,
+    settings: WeakSettings,
+    known: Prior | None,
+    held: Sequence[str],
+    moved: FloatArray,
 ) -> Fit:
     base = settings.delay
     at: dict[bool, FloatArray] = {}
     normals = logs.normals(settings, at)
-    bare, burdened = ([normal for kind, normal in normals if kind is loaded] for loaded in (False, True))
+    bare, burdened = (
+        [normal for kind, normal in normals if kind is loaded] for loaded in (False, True)
+    )
     beta, _ = weak.first_estimate(shared, bare, burdened, known)
     first = bare + burdened
     share: FloatArray = np.ones(0)
     for number in range(_ROUNDS):
         if number:
-            at = {kind: shared.coefficients(beta, kind)[: len(settings.model.names)] for kind, _ in normals}
+            at = {
+                kind: shared.coefficients(beta, kind)[: len(settings.model.names)]
+                for kind, _ in normals
+            }
             if shared.delay:
                 base = float(beta[len(settings.model.names)])
                 settings = replace(settings, delay=base)
@@ -126,8 +142,13 @@ def _found(
     return concluded(shared, scaled, beta, joined(known, own), own, moved)
 
 
-def _weighed(shared: Shared, normal: Normal, loaded: bool, beta: FloatArray, base: float) -> LogInformation:
-    """A log's likelihood with the weights of its residual at `beta` (Q,); its columns tell the delay's change."""
+def _weighed(
+    shared: Shared, normal: Normal, loaded: bool, beta: FloatArray, base: float
+) -> LogInformation:
+    """A log's likelihood with the weights of its residual at `beta` (Q,).
+
+    Its columns tell the delay's change.
+    """
     c0 = shared.coefficients(beta, loaded)
     c = c0.copy()
     if shared.delay:
@@ -139,14 +160,22 @@ def _weighed(shared: Shared, normal: Normal, loaded: bool, beta: FloatArray, bas
 
 
 def expectation(
-    shared: Shared, normals: Sequence[Normal], settings: WeakSettings, beta: FloatArray, held: Sequence[str] = ()
+    shared: Shared,
+    normals: Sequence[Normal],
+    settings: WeakSettings,
+    beta: FloatArray,
+    held: Sequence[str] = (),
 ) -> Expected:
     """What physics expects of the terms of logs whose torque has the size that `normals` tell, save of those `held`."""
     squares = np.sum([normal.gram[:, :, -1, -1].sum(axis=0) for normal in normals], axis=0)
     torque = np.sqrt(squares / np.maximum(np.sum([normal.rows for normal in normals], axis=0), 1.0))
-    torque = np.where(torque > 0, torque, torque.max())  # a joint without a motor bears a load like the other's
+    torque = np.where(
+        torque > 0, torque, torque.max()
+    )  # a joint without a motor bears a load like the other's
     inertia = float(abs(beta[shared.names.index("k3")]))
-    late = 0.5 * normals[0].dt if settings.hold == "foh" else 0.0  # a torque held by a digital controller
+    late = (
+        0.5 * normals[0].dt if settings.hold == "foh" else 0.0
+    )  # a torque held by a digital controller
     rows = []
     for term in (*shared.model.terms, *(DELAYS if shared.delay else ())):
         scale = SCALES.get(term)
@@ -156,6 +185,8 @@ def expectation(
             cosine = abs(float(beta[shared.names.index(SINES[name])])) if name in SINES else 0.0
             own = float(torque[1 if name.endswith("2") else 0])
             unit = {"unit": 1.0, "k3": inertia, "torque": own, "cosine": cosine}[scale.of]
-            rows.append((name, term, late if term in DELAYS else 0.0, scale.size * unit, scale.usual))
+            rows.append(
+                (name, term, late if term in DELAYS else 0.0, scale.size * unit, scale.usual)
+            )
     names, terms, means, spreads, usual = zip(*rows, strict=True)
     return Expected(names, terms, np.array(means), np.array(spreads), np.array(usual))

@@ -67,17 +67,27 @@ def concluded(
 def _judged(
     names: Sequence[str], beta: FloatArray, H: FloatArray, shrunk: Sequence[str], moved: FloatArray
 ) -> tuple[tuple[Status, ...], tuple[str, ...]]:
-    """Each parameter's status, and sentences about what is open; a term is never open, since physics bounds it."""
+    """Each parameter's status, and sentences about what is open.
+
+    a term is never open, since physics bounds it.
+    """
     free = np.array([name not in shrunk for name in names])
     own = scaled_pinv(scaled_pinv(H)[np.ix_(free, free)])
     judged = examine([name for name in names if name not in shrunk], beta[free], own, moved)
     determined = iter(judged.determined)
-    statuses: list[Status] = ["OK" if not yes or next(determined) else "NOT_IDENTIFIABLE" for yes in free]
+    statuses: list[Status] = [
+        "OK" if not yes or next(determined) else "NOT_IDENTIFIABLE" for yes in free
+    ]
     return tuple(statuses), judged.sentences
 
 
-def _left_out(shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior) -> FloatArray:
-    """Parameters (n, Q) without each log, with the same spreads; without the only one of its kind, those of all."""
+def _left_out(
+    shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior
+) -> FloatArray:
+    """Parameters (n, Q) without each log, with the same spreads.
+
+    Without the only one of its kind, those of all.
+    """
     rows = []
     for place, log in enumerate(logs):
         rest = [*logs[:place], *logs[place + 1 :]]

@@ -7,9 +7,9 @@ p       coefficients of the columns, the delay, the loaded arm's k1 … k5    (P
 G       Gram matrices of a log by stretch, joints weighed, the torque last  (B, P + 1, P + 1)
 ======  ==================================================================  ====================
 
-Loaded logs share every coefficient with unloaded ones save k1 … k5, so that friction is one where both kinds tell
-it and no payload need be guessed. Joints weigh by the residual of all columns together, log by log, whatever the
-sub-model, so that sub-models compare.
+Loaded logs share every coefficient with unloaded ones save k1 … k5, so that friction is one where
+both kinds tell it and no payload need be guessed. Joints weigh by the residual of all columns
+together, log by log, whatever the sub-model, so that sub-models compare.
 """
 
 from __future__ import annotations
@@ -85,7 +85,9 @@ class Grams:
         If no log is long enough for a window.
     """
 
-    def __init__(self, logs: Sequence[Training], settings: WeakSettings, at: Mapping[bool, Coefficients]) -> None:
+    def __init__(
+        self, logs: Sequence[Training], settings: WeakSettings, at: Mapping[bool, Coefficients]
+    ) -> None:
         self.settings = settings = replace(settings, estimate_delay=True)
         self.names = (*settings.model.names, CHANGE)
         loads = loads_of(settings.model)
@@ -96,32 +98,48 @@ class Grams:
             if (normal := normal_equations(log.segments, settings, here)) is not None:
                 normals.append((log.loaded, normal))
         if not normals:
-            raise TooShortError("no log is long enough: expected at least a second of samples without a gap")
+            raise TooShortError(
+                "no log is long enough: expected at least a second of samples without a gap"
+            )
         self.kinds = {loaded for loaded, _ in normals}
         self._both = len(self.kinds) == 2
         self.size = len(self.names) + self._both * len(self._rigid)
         self._weigh(normals)
-        whole = all(sum(loaded is kind for loaded, _ in normals) >= _FEWEST_LOGS for kind in self.kinds)
+        whole = all(
+            sum(loaded is kind for loaded, _ in normals) >= _FEWEST_LOGS for kind in self.kinds
+        )
         self.held_out: Literal["logs", "blocks"] = "logs" if whole else "blocks"
         parts = 1 if whole else _FOLDS
         self._folds = np.array(
-            [part.sum(axis=0) for gram in self._logs for part in np.array_split(gram, parts) if len(part)]
+            [
+                part.sum(axis=0)
+                for gram in self._logs
+                for part in np.array_split(gram, parts)
+                if len(part)
+            ]
         )
         self._total = self._folds.sum(axis=0)
         self._squares: dict[tuple[int, ...], float] = {}
-        self._spreads: dict[tuple[int, ...], tuple[FloatArray, tuple[FloatArray, FloatArray], int]] = {}
+        self._spreads: dict[
+            tuple[int, ...], tuple[FloatArray, tuple[FloatArray, FloatArray], int]
+        ] = {}
 
     def _weigh(self, normals: Sequence[tuple[bool, Normal]]) -> None:
         weights: list[FloatArray] = [np.ones(2) for _ in normals]
         for _ in range(_REWEIGHTINGS):
             pairs = list(zip(normals, weights, strict=True))
             total = sum(
-                (self._wide(loaded, np.einsum("a,baxy->xy", w, normal.gram)[None]) for (loaded, normal), w in pairs),
+                (
+                    self._wide(loaded, np.einsum("a,baxy->xy", w, normal.gram)[None])
+                    for (loaded, normal), w in pairs
+                ),
                 np.zeros((1, self.size + 1, self.size + 1)),
             )
             p = _solved(total[0], np.arange(self.size))
             weights = [
-                row_weights(normal.gram.sum(axis=0), np.append(-p[self._places(loaded)], 1.0), normal.rows)
+                row_weights(
+                    normal.gram.sum(axis=0), np.append(-p[self._places(loaded)], 1.0), normal.rows
+                )
                 for loaded, normal in normals
             ]
         # Overlapping rows repeat each other: a window's worth of rows counts as two.
@@ -131,7 +149,8 @@ class Grams:
             for (loaded, normal), w in zip(normals, weights, strict=True)
         ]
         self.cost = -sum(
-            share * float(normal.rows @ np.log(w)) for (_, normal), w in zip(normals, weights, strict=True)
+            share * float(normal.rows @ np.log(w))
+            for (_, normal), w in zip(normals, weights, strict=True)
         )
 
     def _places(self, loaded: bool) -> IntArray:
@@ -153,7 +172,11 @@ class Grams:
         names = {name for term in terms for name in term_names(term)}
         names |= {name for term in ALWAYS for name in term.names}
         basic = [place for place, name in enumerate(self.names) if name in names]
-        loaded = [len(self.names) + row for row, place in enumerate(self._rigid) if self.names[place] in names]
+        loaded = [
+            len(self.names) + row
+            for row, place in enumerate(self._rigid)
+            if self.names[place] in names
+        ]
         return np.array([*basic, *(loaded if self._both else [])])
 
     def coefficients(self, terms: Iterable[str]) -> dict[bool, dict[str, float]]:
@@ -162,7 +185,10 @@ class Grams:
         A kind of which there is no log has those of the other.
         """
         p = _solved(self._total, self._columns(terms))
-        found = {kind: dict(zip(self.names, p[self._places(kind)].tolist(), strict=True)) for kind in self.kinds}
+        found = {
+            kind: dict(zip(self.names, p[self._places(kind)].tolist(), strict=True))
+            for kind in self.kinds
+        }
         return {kind: found.get(kind, next(iter(found.values()))) for kind in (False, True)}
 
     def held_out_squares(self, terms: Iterable[str]) -> float:
@@ -182,8 +208,8 @@ class Grams:
 
         Returns
         -------
-        The smaller of the Wald statistics bᵀ V⁻¹ b by the plain and by the sandwich covariance V, and the
-        independent stretches of log behind them.
+        The smaller of the Wald statistics bᵀ V⁻¹ b by the plain and by the sandwich covariance V,
+        and the independent stretches of log behind them.
         """
         columns = self._columns(among)
         key = tuple(columns.tolist())  # each sub-model is asked for by every term that it has
@@ -191,8 +217,12 @@ class Grams:
             self._spreads[key] = self._spread(columns)
         value, covariances, stretches = self._spreads[key]
         names = {name for term in terms for name in term_names(term)}
-        own = np.flatnonzero(np.isin(columns, [place for place, name in enumerate(self.names) if name in names]))
-        found = [float(value[own] @ scaled_pinv(S[np.ix_(own, own)]) @ value[own]) for S in covariances]
+        own = np.flatnonzero(
+            np.isin(columns, [place for place, name in enumerate(self.names) if name in names])
+        )
+        found = [
+            float(value[own] @ scaled_pinv(S[np.ix_(own, own)]) @ value[own]) for S in covariances
+        ]
         return min(found), float(stretches)
 
     def _spread(self, columns: IntArray) -> tuple[FloatArray, tuple[FloatArray, FloatArray], int]:
@@ -201,11 +231,17 @@ class Grams:
         value = inverse @ self._total[columns, -1]
         meat, stretches = np.zeros_like(inverse), 0
         for gram in self._logs:
-            variance, lags = long_run_variance(gram[:, columns, -1] - gram[:, columns[:, None], columns] @ value)
+            variance, lags = long_run_variance(
+                gram[:, columns, -1] - gram[:, columns[:, None], columns] @ value
+            )
             meat += variance
             stretches += len(gram) // (lags + 1)
         stretches = max(stretches, len(columns) + 2)
-        return value, (inverse, inverse @ meat @ inverse * (stretches / (stretches - len(columns)))), stretches
+        return (
+            value,
+            (inverse, inverse @ meat @ inverse * (stretches / (stretches - len(columns)))),
+            stretches,
+        )
 
 
 def _solved(gram: FloatArray, columns: IntArray) -> FloatArray:

@@ -1,16 +1,20 @@
 """The weak estimator: weighted least squares on the momentum form, in one pass over each log.
 
-Normal equations are kept by stretch and by joint, so that the joints' weights, the residual's size and the error bars
-follow from them without a second pass. See `algid.estimators.modulating_functions` for the equations.
+Normal equations are kept by stretch and by joint, so that the joints' weights, the residual's size
+and the error bars follow from them without a second pass. See
+`algid.estimators.modulating_functions` for the equations.
 
-======  ==============================================================  ======================  ======
+======  ==============================================================  ======================
+======
 symbol  name                                                            shape                   unit
-======  ==============================================================  ======================  ======
+======  ==============================================================  ======================
+======
 X       columns of the two equations over R windows, the torque last    (2, q + 1, R)           mixed
 gram    X Xᵀ by stretch of a window's length and joint                  (B, 2, q + 1, q + 1)    mixed
 c       coefficients of the columns                                     (q,)                    mixed
 beta    parameters that the logs share: the arm's, delay, payload       (Q,)                    mixed
-======  ==============================================================  ======================  ======
+======  ==============================================================  ======================
+======
 """
 
 from __future__ import annotations
@@ -23,7 +27,14 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.estimators.body import with_body
-from algid.estimators.combine import FEWEST_LOGS, BlockSums, LogInformation, Prior, combine, scaled_pinv
+from algid.estimators.combine import (
+    FEWEST_LOGS,
+    BlockSums,
+    LogInformation,
+    Prior,
+    combine,
+    scaled_pinv,
+)
 from algid.estimators.fit import Fit, conclude
 from algid.estimators.innovations import LAGS, ResidualSums, pooled, residual_sums
 from algid.estimators.modulating_functions import OVERLAP, Windows, row_weights
@@ -57,13 +68,14 @@ class WeakSettings:
     bandwidth : float, Hz, or None for the log's own velocities
         Of the zero-phase differentiator behind k1's column.
     hold : "foh" or "zoh"
-        Whether the torque moved evenly from sample to sample, or was held from each sample to the next.
+        Whether the torque moved evenly from sample to sample, or was held from each sample to the
+        next.
     delay : float, s
         After how long a logged torque acts; where the estimate of it starts with `estimate_delay`.
     estimate_delay : bool
     rest : (2,) float, rad/s
-        Speeds of the joints, RMS over a window, below which a joint stands: dry friction holds it then, and its window
-        is left out. None looks at every window.
+        Speeds of the joints, RMS over a window, below which a joint stands: dry friction holds it
+        then, and its window is left out. None looks at every window.
     """
 
     model: Model = field(default_factory=Model)
@@ -87,8 +99,8 @@ def fit(
     Parameters
     ----------
     unloaded, loaded : sequences of callables
-        Each gives a fresh iterable of `Segment`, the stretches of one log in time. It is called once, and a few
-        times more where a delay is estimated or the model is not linear.
+        Each gives a fresh iterable of `Segment`, the stretches of one log in time. It is called
+        once, and a few times more where a delay is estimated or the model is not linear.
     settings : WeakSettings
     lengths : dict
         Known link lengths "l1", "l2" in m.
@@ -106,7 +118,10 @@ def fit(
     iterated = [model.names.index(name) for name in model.iterated if name in model.names]
     at: list[FloatArray | None] = [None, None]
     for _ in range(_PASSES):
-        normals, loaded_normals = _normals(unloaded, settings, at[0]), _normals(loaded, settings, at[1])
+        normals, loaded_normals = (
+            _normals(unloaded, settings, at[0]),
+            _normals(loaded, settings, at[1]),
+        )
         beta, logs = first_estimate(shared, normals, loaded_normals, prior)
         base, change = settings.delay, 0.0
         if shared.delay:
@@ -115,23 +130,36 @@ def fit(
             settings = replace(settings, delay=base + change)
         before, at = at, [None, None] if model.linear else _linearisation(shared, beta, logs)
         settled = all(
-            new is None or (old is not None and bool(np.all(np.abs(new - old)[iterated] < _SETTLED)))
+            new is None
+            or (old is not None and bool(np.all(np.abs(new - old)[iterated] < _SETTLED)))
             for old, new in zip(before, at, strict=True)
         )
         every = normals + loaded_normals
         if settled and abs(change) < _DELAY_SETTLED * max(normal.dt for normal in every):
             break
     moved = np.max([normal.moved for normal in every], axis=0)
-    without = _left_out(shared, normals, loaded_normals, prior, base, beta) if len(every) >= FEWEST_LOGS else None
-    return with_body(conclude("weak", shared, logs, beta, moved, prior, coloured=True, without=without))
+    without = (
+        _left_out(shared, normals, loaded_normals, prior, base, beta)
+        if len(every) >= FEWEST_LOGS
+        else None
+    )
+    return with_body(
+        conclude("weak", shared, logs, beta, moved, prior, coloured=True, without=without)
+    )
 
 
 def _left_out(
-    shared: Shared, unloaded: list[Normal], loaded: list[Normal], prior: Prior | None, base: float, beta: FloatArray
+    shared: Shared,
+    unloaded: list[Normal],
+    loaded: list[Normal],
+    prior: Prior | None,
+    base: float,
+    beta: FloatArray,
 ) -> FloatArray:
     """Estimates (n, Q) without each log, every other one weighed anew.
 
-    `base` is the delay, in s, from which the passes tell a change; without the only log of its kind stands `beta`.
+    `base` is the delay, in s, from which the passes tell a change; without the only log of its
+    kind stands `beta`.
     """
     found = []
     for place in range(len(unloaded) + len(loaded)):
@@ -145,14 +173,21 @@ def _left_out(
     return np.array(found)
 
 
-def _linearisation(shared: Shared, beta: FloatArray, logs: Sequence[LogInformation]) -> list[FloatArray | None]:
+def _linearisation(
+    shared: Shared, beta: FloatArray, logs: Sequence[LogInformation]
+) -> list[FloatArray | None]:
     """Coefficients of the model's columns at which the next pass linearises unloaded and loaded logs."""
     count = len(shared.model.names)
-    found = [next((log.c0[:count] for log in logs if log.loaded is loaded), None) for loaded in (False, True)]
+    found = [
+        next((log.c0[:count] for log in logs if log.loaded is loaded), None)
+        for loaded in (False, True)
+    ]
     return [beta[:count] if found[0] is None else found[0], found[1]]
 
 
-def _normals(sources: Sequence[Source], settings: WeakSettings, at: FloatArray | None) -> list[Normal]:
+def _normals(
+    sources: Sequence[Source], settings: WeakSettings, at: FloatArray | None
+) -> list[Normal]:
     found = [normal_equations(source, settings, at) for source in sources]
     return [normal for normal in found if normal is not None]
 
@@ -176,7 +211,10 @@ def first_estimate(
         raise TooShortError(f"no loaded {too_short}")
     c, under_load = solve(loaded, loaded=True)
     together = LogInformation(
-        True, c, np.concatenate([log.S for log in under_load]), np.concatenate([log.g for log in under_load])
+        True,
+        c,
+        np.concatenate([log.S for log in under_load]),
+        np.concatenate([log.g for log in under_load]),
     )
     return first_payload(shared, arm, together), logs + under_load
 
@@ -199,8 +237,8 @@ def _from(
 class Normal:
     """Normal equations of one log: Gram matrices (B, 2, q + 1, q + 1) by stretch and joint, the torque last.
 
-    `samples` counts the log's samples, `rows` (2,) the windows of each joint, `dt` is in s, and `moved` (2,) is the
-    spread of each joint's angle in rad.
+    `samples` counts the log's samples, `rows` (2,) the windows of each joint, `dt` is in s, and
+    `moved` (2,) is the spread of each joint's angle in rad.
     """
 
     gram: FloatArray
@@ -210,11 +248,13 @@ class Normal:
     moved: FloatArray
 
 
-def normal_equations(source: Source, settings: WeakSettings, at: FloatArray | None = None) -> Normal | None:
+def normal_equations(
+    source: Source, settings: WeakSettings, at: FloatArray | None = None
+) -> Normal | None:
     """Normal equations of one log; None where it is too short for a window.
 
-    A log without a stretch of four windows gets windows of a quarter of its longest stretch. Terms that are not
-    linear are linearised at the coefficients `at` (q,).
+    A log without a stretch of four windows gets windows of a quarter of its longest stretch. Terms
+    that are not linear are linearised at the coefficients `at` (q,).
     """
 
     def gather(window: float) -> tuple[Normal | None, float]:
@@ -237,7 +277,9 @@ def normal_equations(source: Source, settings: WeakSettings, at: FloatArray | No
                 X = np.where(moving[:, None], X, 0.0)
             rows += moving.sum(axis=1)
             sums.add(grams(X, OVERLAP))
-        return (Normal(sums.values(), dt, samples, rows, high - low) if rows.any() else None), longest
+        return (
+            Normal(sums.values(), dt, samples, rows, high - low) if rows.any() else None
+        ), longest
 
     return _with_window(gather, settings.window)
 
@@ -317,7 +359,11 @@ def overlapping(
             piece = _prefixed(before, piece, windows.overlap + left_over)
         left_over = (len(piece) - 2 * windows.margin) % windows.step
         before = piece
-        yield replace(piece, tau=held_torque(piece.tau)) if settings.hold == "zoh" else piece, windows, fresh
+        yield (
+            replace(piece, tau=held_torque(piece.tau)) if settings.hold == "zoh" else piece,
+            windows,
+            fresh,
+        )
 
 
 def _prefixed(before: Segment, piece: Segment, overlap: int) -> Segment:
@@ -344,7 +390,9 @@ def grams(X: FloatArray, rows: int) -> FloatArray:
     return parts @ parts.swapaxes(-1, -2)
 
 
-def solve(normals: Sequence[Normal], loaded: bool = False) -> tuple[FloatArray, list[LogInformation]]:
+def solve(
+    normals: Sequence[Normal], loaded: bool = False
+) -> tuple[FloatArray, list[LogInformation]]:
     """Coefficients (q,) of logs that share them, and each log's likelihood there.
 
     The rows of a joint weigh by its own residual, log by log.
@@ -353,7 +401,11 @@ def solve(normals: Sequence[Normal], loaded: bool = False) -> tuple[FloatArray, 
     c: FloatArray = np.zeros(normals[0].gram.shape[-1] - 1)
     for _ in range(_REWEIGHTINGS):
         total = np.sum(
-            [np.einsum("a,axy->xy", w, n.gram.sum(axis=0)) for w, n in zip(weights, normals, strict=True)], axis=0
+            [
+                np.einsum("a,axy->xy", w, n.gram.sum(axis=0))
+                for w, n in zip(weights, normals, strict=True)
+            ],
+            axis=0,
         )
         c = scaled_pinv(total[:-1, :-1]) @ total[:-1, -1]
         weights = [row_weights(n.gram.sum(axis=0), np.append(-c, 1.0), n.rows) for n in normals]
@@ -361,15 +413,18 @@ def solve(normals: Sequence[Normal], loaded: bool = False) -> tuple[FloatArray, 
     for normal, w in zip(normals, weights, strict=True):
         # Overlapping rows repeat each other: a window's worth of rows counts as two.
         gram = np.einsum("a,baxy->bxy", w * (2.0 / OVERLAP), normal.gram)
-        logs.append(LogInformation(loaded, c, gram[:, :-1, :-1], gram[:, :-1, -1] - gram[:, :-1, :-1] @ c))
+        logs.append(
+            LogInformation(loaded, c, gram[:, :-1, :-1], gram[:, :-1, -1] - gram[:, :-1, :-1] @ c)
+        )
     return c, logs
 
 
 def first_payload(shared: Shared, arm: FloatArray, loaded: LogInformation) -> FloatArray:
     """Shared parameters (Q,) with the payload that fits the loaded logs best while the unloaded arm stays `arm` (q,).
 
-    Masses are tried in turn, with the link lengths that k2 and k4 of both arms tell for each (Table 2). `loaded` is
-    the sum over the loaded logs, linearised at the loaded arm's own coefficients.
+    Masses are tried in turn, with the link lengths that k2 and k4 of both arms tell for each
+    (Table 2). `loaded` is the sum over the loaded logs, linearised at the loaded arm's own
+    coefficients.
     """
     best: FloatArray | None = None
     best_value = -np.inf
@@ -377,7 +432,8 @@ def first_payload(shared: Shared, arm: FloatArray, loaded: LogInformation) -> Fl
     hold = Prior.of(shared.log_names, arm, scaled_pinv(loaded.total[0]) * 1e-4)
     for mass in _FIRST_MASSES:
         guess = {"m_p": mass} | {
-            length: _length_of(shared, loaded.c0 - arm, mass, name) for length, name in (("l1", "k4"), ("l2", "k2"))
+            length: _length_of(shared, loaded.c0 - arm, mass, name)
+            for length, name in (("l1", "k4"), ("l2", "k2"))
         }
         start = np.concatenate([arm, [guess[name] for name in shared.names[arm.size :]]])
         beta, _, value = combine(shared, [loaded], start, hold)

@@ -1,15 +1,15 @@
 """Errors in variables, linearised and whitened: the heart of the refined estimator.
 
-Angles and torques are both measured with noise: θ_m = θ + ε, τ_m = f(θ, θ̇, θ̈; c) + η. Linearised at a
-trajectory near the truth, the torque residual
+Angles and torques are both measured with noise: θ_m = θ + ε, τ_m = f(θ, θ̇, θ̈; c) + η. Linearised
+at a trajectory near the truth, the torque residual
 
     e = τ_m − f(θ0; c) − G (θ_m − θ0) = η − G ε + Y δc
 
-has the covariance Σ_τ + G Σ_θ Gᵀ. The noise η is white, or went through `held_torque`. The stencil makes G,
-hence that matrix, banded: one Cholesky factor L Lᵀ = V whitens everything. Minimising over the trajectory as well
-as over c, the Schur complement of the normal equations, is the same as weighting e by V⁻¹ (Woodbury), so
-S = (L⁻¹Y)ᵀ(L⁻¹Y) is the information on c and the innovations w = L⁻¹e are white with unit variance wherever the
-model holds.
+has the covariance Σ_τ + G Σ_θ Gᵀ. The noise η is white, or went through `held_torque`. The stencil
+makes G, hence that matrix, banded: one Cholesky factor L Lᵀ = V whitens everything. Minimising
+over the trajectory as well as over c, the Schur complement of the normal equations, is the same as
+weighting e by V⁻¹ (Woodbury), so S = (L⁻¹Y)ᵀ(L⁻¹Y) is the information on c and the innovations w =
+L⁻¹e are white with unit variance wherever the model holds.
 
 ======  ====================================================  =======================  ======
 symbol  name                                                  shape                    unit
@@ -55,8 +55,8 @@ class NoiseLevels:
 class Linearised:
     """One piece of log, linearised and whitened: see the module's table.
 
-    `factor` holds L as LAPACK's lower band; `first` is the angle sample of the first stencil's first point; `held`
-    tells whether F is `held_torque`.
+    `factor` holds L as LAPACK's lower band; `first` is the angle sample of the first stencil's
+    first point; `held` tells whether F is `held_torque`.
     """
 
     columns: FloatArray
@@ -109,11 +109,13 @@ def linearise(
         The trajectory, near the truth.
     piece : Segment of N samples
     stencil : Stencil
-        Its shift is when a logged torque acts. A lag of the torque is taken from that shift by the caller; what the
-        low-pass does beyond that is done here, to the torque and its derivatives by c, while H counts the shift alone.
+        Its shift is when a logged torque acts. A lag of the torque is taken from that shift by the
+        caller; what the low-pass does beyond that is done here, to the torque and its derivatives
+        by c, while H counts the shift alone.
     noise : NoiseLevels
     delay : bool
-        Whether the last column but the residual is the derivative of the torque by the stencil's shift.
+        Whether the last column but the residual is the derivative of the torque by the stencil's
+        shift.
 
     Raises
     ------
@@ -156,8 +158,9 @@ def low_passed(signal: FloatArray, dt: float, lag: float) -> FloatArray:
 
     Notes
     -----
-    The response is exp(s lag) / (1 + s lag), so that a slow signal passes unchanged and in time. Exact for a signal
-    that is straight between its samples. Both ends continue by point reflection.
+    The response is exp(s lag) / (1 + s lag), so that a slow signal passes unchanged and in time.
+    Exact for a signal that is straight between its samples. Both ends continue by point
+    reflection.
     """
     if abs(lag) < 1e-6 * dt:
         return signal.copy()
@@ -174,7 +177,9 @@ def low_passed(signal: FloatArray, dt: float, lag: float) -> FloatArray:
     passed = np.empty_like(extended)
     for place in np.ndindex(extended.shape[:-1]):
         origin = extended[place][0]
-        passed[place] = recursion(numerator, denominator, extended[place] - origin, np.zeros(1))[0] + origin
+        passed[place] = (
+            recursion(numerator, denominator, extended[place] - origin, np.zeros(1))[0] + origin
+        )
     whole = int(lag / dt)
     rest = lag / dt - whole
     start = reach + whole
@@ -186,7 +191,10 @@ def low_passed(signal: FloatArray, dt: float, lag: float) -> FloatArray:
         (rest + 1) * rest * (rest - 1) / 6,
     )
     return np.asarray(
-        sum(weight * passed[..., start + point : start + point + n] for point, weight in enumerate(weights, -1))
+        sum(
+            weight * passed[..., start + point : start + point + n]
+            for point, weight in enumerate(weights, -1)
+        )
     )
 
 
@@ -208,7 +216,10 @@ def along_stencil(P: FloatArray, weights: FloatArray) -> FloatArray:
 
 
 def forward(G: FloatArray, x: FloatArray, first: int) -> FloatArray:
-    """G x (2, n) in N m of angle changes x (2, N) in rad; `first` is the sample of the first stencil's first point."""
+    """G x (2, n) in N m of angle changes x (2, N) in rad.
+
+    `first` is the sample of the first stencil's first point.
+    """
     n = G.shape[-1]
     result = np.zeros((2, n))
     for point in range(POINTS):
@@ -262,15 +273,20 @@ def covariance_factor(H: FloatArray, *, held: bool = False) -> FloatArray:
     diagonal = band[:, :, 0].ravel().copy()
     factor, info = lapack.dpbtrf(band.reshape(2 * n, -1).T, lower=1, overwrite_ab=1)
     if info == 0:
-        # Whether a pivot of nothing but rounding comes out below zero depends on the processor's kernels.
+        # Whether a pivot of nothing but rounding comes out below zero depends on the processor's
+        # kernels.
         lost = np.flatnonzero(factor[0] ** 2 < _ROUNDING * diagonal)
         info = lost[0] + 1 if lost.size else 0
     if info != 0:
-        raise np.linalg.LinAlgError(f"the covariance of the torque residual is not positive definite (row {info})")
+        raise np.linalg.LinAlgError(
+            f"the covariance of the torque residual is not positive definite (row {info})"
+        )
     return factor
 
 
-def trajectory(piece: Segment, linear: Linearised, multiplier: FloatArray, noise: NoiseLevels) -> FloatArray:
+def trajectory(
+    piece: Segment, linear: Linearised, multiplier: FloatArray, noise: NoiseLevels
+) -> FloatArray:
     """Most likely angles θ_m + Σ_θ Gᵀ V⁻¹e.
 
     Parameters
@@ -285,4 +301,6 @@ def trajectory(piece: Segment, linear: Linearised, multiplier: FloatArray, noise
     (2, N), rad
     """
     y = np.ascontiguousarray(multiplier.reshape(-1, 2).T)
-    return piece.theta + noise.theta[:, None] * adjoint(linear.H, y, linear.first, piece.theta.shape[1])
+    return piece.theta + noise.theta[:, None] * adjoint(
+        linear.H, y, linear.first, piece.theta.shape[1]
+    )

@@ -54,7 +54,8 @@ def exported(result: Result, file: str, to: str, knowns: Knowns) -> tuple[str, t
     ResultError
         If the result lacks an estimate, or no arm is like it.
     SettingError
-        If what is known leaves no positive mass or inertia, is no positive number, or has no place in the format.
+        If what is known leaves no positive mass or inertia, is no positive number, or has no place
+        in the format.
     """
     takes = frozenset({"l2"}) if to == PAYLOAD else FORMATS[to].takes
     for name, value in knowns.given.items():

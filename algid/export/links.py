@@ -14,14 +14,14 @@ With s2 = k2 / g, h2 = k3 and l1 = g k1 / k2, Table 1 leaves
 
     s1 = k4 / g - m2 l1,   h1 = k5 - J1 - m2 l1²
 
-A link is possible where h m > s² (Wensing et al. 2018). How far it is from a uniform one is the Bregman divergence of
-its pseudo-inertia P = [[h, s], [s, m]] from that of a uniform link of the same length and the nearest mass (Lee and
-Park 2018):
+A link is possible where h m > s² (Wensing et al. 2018). How far it is from a uniform one is the
+Bregman divergence of its pseudo-inertia P = [[h, s], [s, m]] from that of a uniform link of the
+same length and the nearest mass (Lee and Park 2018):
 
     D = log(3 (h - l s + m l² / 3)² / (l² (h m - s²)))
 
-zero for uniform links only. Of a single link it is least at m = 3 h / l² - 3 s / l + 2 s² / h, at l = √(3 h / m), and
-at s = l h m / (h + m l² / 3).
+zero for uniform links only. Of a single link it is least at m = 3 h / l² - 3 s / l + 2 s² / h, at
+l = √(3 h / m), and at s = l h m / (h + m l² / 3).
 """
 
 from __future__ import annotations
@@ -41,7 +41,10 @@ _ENDS = 25.0  # how near the ends of the masses' range the search goes, in logit
 
 @dataclass(frozen=True)
 class Knowns:
-    """What the user knows: lengths in m, masses in kg, the rotor of joint 1 in kg m^2; None where not known."""
+    """What the user knows: lengths in m, masses in kg, the rotor of joint 1 in kg m^2.
+
+    None where not known.
+    """
 
     l1: float | None = None
     l2: float | None = None
@@ -70,7 +73,9 @@ class Link:
         return ALONG * self.inertia, self.inertia, self.inertia
 
 
-def links_of(k: Mapping[str, float], gravity: float, l1: float, knowns: Knowns, file: str) -> tuple[Link, Link]:
+def links_of(
+    k: Mapping[str, float], gravity: float, l1: float, knowns: Knowns, file: str
+) -> tuple[Link, Link]:
     """Two links that move as the constants `k` say under `gravity` in m/s^2, link 1 being `l1` m long.
 
     Raises
@@ -96,7 +101,9 @@ def links_of(k: Mapping[str, float], gravity: float, l1: float, knowns: Knowns, 
     return arm.first(m2), arm.second(m2)
 
 
-def _within(arm: _Free, m1: float, low: float, high: float, file: str, knowns: Knowns) -> tuple[float, float]:
+def _within(
+    arm: _Free, m1: float, low: float, high: float, file: str, knowns: Knowns
+) -> tuple[float, float]:
     """Masses of link 2 that leave a link 1 of `m1` kg possible: (h - m2 l1²) m1 > (s - m2 l1)²."""
     assert arm.s is not None
     middle = arm.s / arm.l1 - 0.5 * m1
@@ -112,12 +119,17 @@ def _within(arm: _Free, m1: float, low: float, high: float, file: str, knowns: K
 def _refusal(file: str, knowns: Knowns, why: str, name: str) -> str:
     others = " or ".join(f"--{other}" for other in knowns.given if other != name)
     flag = "--" + name
-    return f"{flag}: {file}: {why}; check {flag}{' or ' + others if others else ''}, or leave it out"
+    return (
+        f"{flag}: {file}: {why}; check {flag}{' or ' + others if others else ''}, or leave it out"
+    )
 
 
 @dataclass(frozen=True)
 class _Free:
-    """The arm but for its masses: see the module's table; `s` and `h` are link 1's moments at m2 = 0."""
+    """The arm but for its masses: see the module's table.
+
+    `s` and `h` are link 1's moments at m2 = 0.
+    """
 
     s2: float
     h2: float
@@ -147,7 +159,9 @@ class _Free:
             m2 = low + (high - low) * float(expit(logit))
             return _distance(self.first(m2)) + _distance(self.second(m2))
 
-        found = minimize_scalar(distance, bounds=(-_ENDS, _ENDS), method="bounded", options={"xatol": 1e-10})
+        found = minimize_scalar(
+            distance, bounds=(-_ENDS, _ENDS), method="bounded", options={"xatol": 1e-10}
+        )
         return low + (high - low) * float(expit(found.x))
 
 

@@ -1,8 +1,9 @@
 """A C99 file that needs nothing but the mathematical library, and a Python module that needs nothing but Python.
 
-Both are written out of the model's columns, in expressions that the two languages read alike: inertia, what is left of
-the torque at zero acceleration, and how terms act on the torque. In them q1, q2, w1, w2 are angles and velocities,
-s1 … c12 sines and cosines of θ1, θ2 and θ1 + θ2, t1 and t2 tanh(ω / ω_s); parameters have their names in capitals.
+Both are written out of the model's columns, in expressions that the two languages read alike:
+inertia, what is left of the torque at zero acceleration, and how terms act on the torque. In them
+q1, q2, w1, w2 are angles and velocities, s1 … c12 sines and cosines of θ1, θ2 and θ1 + θ2, t1 and
+t2 tanh(ω / ω_s); parameters have their names in capitals.
 """
 
 from __future__ import annotations
@@ -22,9 +23,16 @@ _FUNCTIONS = ("cos", "exp", "sin", "tanh")
 
 
 def c99(arm: Description) -> str:
-    """The arm's dynamics as C functions; without the bodies where ``ARM_DECLARATIONS_ONLY`` is defined."""
-    text = "\n".join(f" * {line}".rstrip() for line in header(arm, lacking(arm, HELD))).replace("*/", "* /")
-    constants = "".join(f"static const double {name} = {value!r};\n" for name, value in _constants(arm).items())
+    """The arm's dynamics as C functions.
+
+    Without the bodies where ``ARM_DECLARATIONS_ONLY`` is defined.
+    """
+    text = "\n".join(f" * {line}".rstrip() for line in header(arm, lacking(arm, HELD))).replace(
+        "*/", "* /"
+    )
+    constants = "".join(
+        f"static const double {name} = {value!r};\n" for name, value in _constants(arm).items()
+    )
     return _written(arm, _C, _C_BY_TERM, {"TEXT": text, "CONSTANTS": constants})
 
 
@@ -42,7 +50,9 @@ def _constants(arm: Description) -> dict[str, float]:
     model, value = arm.coefficients.model, arm.coefficients.value
     found = {name.upper(): value[name] for name in model.names if name != model.lag_name}
     shapes = {shape for term in model.terms for shape in TERMS[term].shapes}
-    return found | {s.name.upper(): getattr(model, s.name) for s in fields(Widths) if s.name in shapes}
+    return found | {
+        s.name.upper(): getattr(model, s.name) for s in fields(Widths) if s.name in shapes
+    }
 
 
 def _source(model: Model, weighted: Weighted) -> str:
@@ -52,17 +62,25 @@ def _source(model: Model, weighted: Weighted) -> str:
         for place, factor in pairs:
             size = [] if abs(factor) == 1 else [f"{abs(factor):g}"]
             part = " * ".join([*size, model.names[place].upper(), *(atom.name for atom in product)])
-            text += f" {'-' if factor < 0 else '+'} {part}" if text else f"{'-' if factor < 0 else ''}{part}"
+            text += (
+                f" {'-' if factor < 0 else '+'} {part}"
+                if text
+                else f"{'-' if factor < 0 else ''}{part}"
+            )
     return text
 
 
 def _definitions(expressions: list[Weighted], form: str) -> str:
     """Lines that define what the expressions hold, each in a language's `form`."""
-    atoms = sorted({atom for expression in expressions for product in expression for atom in product})
+    atoms = sorted(
+        {atom for expression in expressions for product in expression for atom in product}
+    )
     lines = [form.format(f"{atom.name} = {atom.source}") for atom in atoms if atom.source]
     bare = " ".join([*lines, *(atom.name for atom in atoms)])
     first = [form.format(f"q{n} = theta[{n - 1}]") for n in (1, 2) if re.search(rf"\bq{n}\b", bare)]
-    first += [form.format(f"w{n} = omega[{n - 1}]") for n in (1, 2) if re.search(rf"\bw{n}\b", bare)]
+    first += [
+        form.format(f"w{n} = omega[{n - 1}]") for n in (1, 2) if re.search(rf"\bw{n}\b", bare)
+    ]
     return "".join([*first, *lines])
 
 
@@ -81,7 +99,9 @@ class _Expressions:
     def inertia(self, places: list[int]) -> dict[tuple[int, int], Weighted]:
         """What multiplies the accelerations, of the columns at `places`."""
         compiled = self.model.compiled
-        return {entry: compiled.only(weighted, places) for entry, weighted in compiled.inertia.items()}
+        return {
+            entry: compiled.only(weighted, places) for entry, weighted in compiled.inertia.items()
+        }
 
     def rest(self, places: list[int]) -> list[Weighted]:
         """The torque at zero acceleration, of the columns at `places`."""
@@ -91,7 +111,11 @@ class _Expressions:
         """The load at rest: products without a velocity."""
         moving = re.compile(r"omega")
         return [
-            {p: pairs for p, pairs in weighted.items() if not any(moving.search("".join(a.slopes())) for a in p)}
+            {
+                p: pairs
+                for p, pairs in weighted.items()
+                if not any(moving.search("".join(a.slopes())) for a in p)
+            }
             for weighted in self.rest(places)
         ]
 
@@ -120,7 +144,9 @@ def _written(arm: Description, form: str, by_term: Mapping[str, str], parts: dic
         parts[f"GRAVITY{number}"] = _source(model, g[joint]) or "0.0"
         parts[f"N{number}"] = _source(model, n[joint]) or "0.0"
         parts[f"R{number}"] = _source(model, r[joint]) or "0.0"
-        factors = [f"(1 + {name.upper()})" for name, one in attributes(model, "gains") if one == joint]
+        factors = [
+            f"(1 + {name.upper()})" for name, one in attributes(model, "gains") if one == joint
+        ]
         parts[f"GAIN{number}"] = "".join(f"{factor} * " for factor in factors)
         parts[f"UNGAIN{number}"] = "".join(f" / {factor}" for factor in factors)
         extra = []
@@ -138,7 +164,9 @@ def _written(arm: Description, form: str, by_term: Mapping[str, str], parts: dic
         parts[f"SHARE{number}"] = " + ".join(shares) or "0.0"
     loaded = bool(attributes(model, "by_load"))
     parts["LOAD"] = Template(by_term["load"]).substitute(parts) if loaded else ""
-    parts["SOLVED"] = Template(by_term["solved with load" if loaded else "solved"]).substitute(parts)
+    parts["SOLVED"] = Template(by_term["solved with load" if loaded else "solved"]).substitute(
+        parts
+    )
     return Template(form).substitute(parts)
 
 

@@ -1,8 +1,8 @@
 """A URDF file read back as an arm, so that one from CAD is judged on the same logs as a result.
 
-Two joints about one direction move; what is fixed to a link counts to it. θ1 is the angle of the line from joint 1 to
-joint 2 over the horizontal, θ2 that of link 2's line: to the tip, which is the last frame fixed to it, or,
-without one, to its centre of mass.
+Two joints about one direction move; what is fixed to a link counts to it. θ1 is the angle of the
+line from joint 1 to joint 2 over the horizontal, θ2 that of link 2's line: to the tip, which is
+the last frame fixed to it, or, without one, to its centre of mass.
 """
 
 from __future__ import annotations
@@ -41,7 +41,9 @@ class _Body:
         second = rotation @ self.second @ rotation.T
         cross = np.outer(moment, shift)
         return _Body(
-            self.mass, moment + self.mass * shift, second + cross + cross.T + self.mass * np.outer(shift, shift)
+            self.mass,
+            moment + self.mass * shift,
+            second + cross + cross.T + self.mass * np.outer(shift, shift),
         )
 
     def __add__(self, other: _Body) -> _Body:
@@ -62,7 +64,9 @@ def read_urdf(path: Path) -> tuple[Predictor, tuple[str, ...]]:
     try:
         robot = ET.fromstring(read_text(path))
     except OSError as error:
-        raise ResultError(f"{path}: cannot read it ({error.strerror}); expected a URDF file") from error
+        raise ResultError(
+            f"{path}: cannot read it ({error.strerror}); expected a URDF file"
+        ) from error
     except (ET.ParseError, UnicodeDecodeError) as error:
         raise ResultError(f"{path}: not XML ({error}); expected a URDF file") from error
     try:
@@ -78,7 +82,9 @@ def read_urdf(path: Path) -> tuple[Predictor, tuple[str, ...]]:
 
     def coefficients(role: Role) -> FloatArray:
         if role == "loaded":
-            raise ResultError(f"{path}: a URDF file tells no payload; judge it on logs of the arm without one")
+            raise ResultError(
+                f"{path}: a URDF file tells no payload; judge it on logs of the arm without one"
+            )
         return c
 
     return Predictor(model, coefficients), tuple(f"{path}: {warning}" for warning in warnings)
@@ -91,8 +97,13 @@ class _Robot:
         self._links = {link.attrib["name"]: link for link in robot.findall("link")}
         self._joints = robot.findall("joint")
         self._moving = [joint for joint in self._joints if joint.attrib["type"] != "fixed"]
-        if len(self._moving) != 2 or {joint.attrib["type"] for joint in self._moving} - {"revolute", "continuous"}:
-            raise ValueError(f"found {counted(len(self._moving), 'moving joint')}, or not all of them turn")
+        if len(self._moving) != 2 or {joint.attrib["type"] for joint in self._moving} - {
+            "revolute",
+            "continuous",
+        }:
+            raise ValueError(
+                f"found {counted(len(self._moving), 'moving joint')}, or not all of them turn"
+            )
         inner = {joint.find("child").attrib["link"]: joint for joint in self._joints}  # type: ignore[union-attr]
         self._parent = inner
 
@@ -100,7 +111,9 @@ class _Robot:
         """The arm, its joints' Coulomb friction in N m, and what it does not take over."""
         first, second = self._moving
         base, place = self._frame(first)
-        if base in {self._child(first), self._child(second)} or self._frame(second)[0] != self._child(first):
+        if base in {self._child(first), self._child(second)} or self._frame(second)[
+            0
+        ] != self._child(first):
             first, second = second, first
             base, place = self._frame(first)
         if self._frame(second)[0] != self._child(first):
@@ -147,7 +160,9 @@ class _Robot:
         if inertial is not None:
             mass = float(inertial.find("mass").attrib["value"])  # type: ignore[union-attr]
             moments = inertial.find("inertia").attrib  # type: ignore[union-attr]
-            xx, yy, zz, xy, xz, yz = (float(moments[name]) for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
+            xx, yy, zz, xy, xz, yz = (
+                float(moments[name]) for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+            )
             inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
             second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
             body = _Body(mass, np.zeros(3), second).moved(*_origin(inertial))
@@ -179,7 +194,9 @@ class _Robot:
         centre = body.moment / body.mass
         beside = float(np.cross(about, line) @ centre)
         if abs(beside) > _BESIDE * length:
-            warnings.append(f"the centre of link {number} lies {abs(beside):.3g} m beside its line, which is left out")
+            warnings.append(
+                f"the centre of link {number} lies {abs(beside):.3g} m beside its line, which is left out"
+            )
         along = float(line @ centre)
         second = float(np.trace(body.second) - about @ body.second @ about)  # about the joint
         return length, (body.mass, along, second - body.mass * along**2)

@@ -1,7 +1,8 @@
 """URDF (ROS, MoveIt, Pinocchio, Drake), SDF (Gazebo) and MJCF (MuJoCo).
 
-The arm moves in the world's x-z plane: a turn about -y is counterclockwise there, so that the joints' angles are θ1
-and θ2 themselves and gravity pulls along -z. Without gravity it moves in the x-y plane about z.
+The arm moves in the world's x-z plane: a turn about -y is counterclockwise there, so that the
+joints' angles are θ1 and θ2 themselves and gravity pulls along -z. Without gravity it moves in the
+x-y plane about z.
 """
 
 from __future__ import annotations
@@ -27,7 +28,10 @@ class Joint:
 
 
 def urdf(arm: Description) -> str:
-    """The arm as a URDF robot; joint 1's rotor stays in link 1's inertia, which turns about the same axis."""
+    """The arm as a URDF robot.
+
+    Joint 1's rotor stays in link 1's inertia, which turns about the same axis.
+    """
     (first, second), joints, remarks = _rotorless(arm, "URDF")
 
     def joint(one: Joint, parent: str, child: str, at: float) -> str:
@@ -72,7 +76,9 @@ def sdf(arm: Description) -> str:
 
     def link(name: str, base: str, at: float, one: Link) -> str:
         xx, yy, zz = map(_numbers, one.tensor)
-        inertia = f"<ixx>{xx}</ixx><iyy>{yy}</iyy><izz>{zz}</izz><ixy>0</ixy><ixz>0</ixz><iyz>0</iyz>"
+        inertia = (
+            f"<ixx>{xx}</ixx><iyy>{yy}</iyy><izz>{zz}</izz><ixy>0</ixy><ixz>0</ixz><iyz>0</iyz>"
+        )
         return (
             f'    <link name="{name}">\n      <pose relative_to="{base}">{_numbers(at, 0, 0, 0, 0, 0)}</pose>\n'
             f"      <inertial>\n        <pose>{_numbers(one.centre, 0, 0, 0, 0, 0)}</pose>\n"
@@ -132,13 +138,19 @@ def _joints(arm: Description, *, rotors: bool) -> tuple[tuple[Joint, Joint], lis
     if "coulomb" in model.terms:
         remarks.insert(0, JUMP.format(width=model.coulomb_speed))
     names = ("k6", "k7", "f1", "f2", *(["j2"] if rotors else []))
-    remarks += [f"leaves out {name}, which is negative: {value[name]:.6g}" for name in names if value[name] < 0]
+    remarks += [
+        f"leaves out {name}, which is negative: {value[name]:.6g}"
+        for name in names
+        if value[name] < 0
+    ]
     kept = {name: max(value[name], 0.0) for name in names}
     first = Joint("joint1", kept["k6"], kept["f1"], arm.rotor1)
     return (first, Joint("joint2", kept["k7"], kept["f2"], kept.get("j2", 0.0))), remarks
 
 
-def _rotorless(arm: Description, form: str) -> tuple[tuple[Link, Link], tuple[Joint, Joint], list[str]]:
+def _rotorless(
+    arm: Description, form: str
+) -> tuple[tuple[Link, Link], tuple[Joint, Joint], list[str]]:
     """Links, joints and remarks for the format `form`, which has no rotors: joint 1's stays in link 1's inertia."""
     assert arm.links is not None
     joints, remarks = _joints(arm, rotors=False)

@@ -8,10 +8,11 @@ y       estimate, less the robot's mean               its own
 w       1 / std², what the estimate's interval says   its own
 ======  ============================================  =========
 
-A window is `SPAN` months long and ends with each month, so that a year holds twelve tests a parameter. The
-slope's error is the one that the intervals give, or the larger one that the scatter about the line shows; its t
-test alarms below `ALPHA`. With seven parameters that is 12 × 7 × 0.001 = 0.084 false alarms a robot-year where
-estimates scatter independently. Sums of a month's moments add up to a window's: the cost is O(N).
+A window is `SPAN` months long and ends with each month, so that a year holds twelve tests a
+parameter. The slope's error is the one that the intervals give, or the larger one that the scatter
+about the line shows; its t test alarms below `ALPHA`. With seven parameters that is 12 × 7 × 0.001
+= 0.084 false alarms a robot-year where estimates scatter independently. Sums of a month's moments
+add up to a window's: the cost is O(N).
 """
 
 from __future__ import annotations
@@ -42,12 +43,16 @@ def windows(jobs: pl.DataFrame, parameter: str) -> pl.DataFrame:
     Returns
     -------
     pl.DataFrame
-        robot, parameter, month, end (time of its last log), logs, mean, mean_std, slope, slope_std (of the parameter a
-        month; NaN where not tested), p, drift.
+        robot, parameter, month, end (time of its last log), logs, mean, mean_std, slope, slope_std
+        (of the parameter a month; NaN where not tested), p, drift.
     """
     import polars as pl
 
-    known = jobs.filter(pl.col("time").is_not_null() & (pl.col(f"{parameter}_std") > 0) & pl.col(parameter).is_finite())
+    known = jobs.filter(
+        pl.col("time").is_not_null()
+        & (pl.col(f"{parameter}_std") > 0)
+        & pl.col(parameter).is_finite()
+    )
     known = known.with_columns(pl.col(parameter).mean().over("robot").alias("centre"))
     w, t, y = 1 / pl.col(f"{parameter}_std") ** 2, pl.col("t"), pl.col(parameter) - pl.col("centre")
     months = known.group_by("robot", "month", maintain_order=False).agg(
@@ -74,7 +79,9 @@ def _regressed(summed: pl.DataFrame, parameter: str) -> pl.DataFrame:
 
     w, wt, wtt, wy, wty, wyy, n = (summed[name].to_numpy() for name in _SUMS)
     middle = wt / w
-    sloped = wtt - wt * middle > 1e-9 * w  # logs of one instant, or a single one, have a mean and no slope
+    sloped = (
+        wtt - wt * middle > 1e-9 * w
+    )  # logs of one instant, or a single one, have a mean and no slope
     spread = np.where(sloped, wtt - wt * middle, np.inf)
     rise = np.where(sloped, wty - wy * middle, 0.0)
     slope = rise / spread
@@ -85,7 +92,9 @@ def _regressed(summed: pl.DataFrame, parameter: str) -> pl.DataFrame:
     tested = (n >= FEWEST) & sloped
     p = np.full(n.size, np.nan)
     p[tested] = 2 * stdtr(freedom[tested], -np.abs(slope[tested]) / slope_std[tested])
-    return summed.select("robot", pl.lit(parameter).alias("parameter"), "month", "end").with_columns(
+    return summed.select(
+        "robot", pl.lit(parameter).alias("parameter"), "month", "end"
+    ).with_columns(
         logs=pl.Series(n.astype(np.int64)),
         mean=pl.Series(summed["centre"].to_numpy() + wy / w),
         mean_std=pl.Series(scale / np.sqrt(w)),

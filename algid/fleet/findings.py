@@ -42,23 +42,35 @@ def outliers(jobs: pl.DataFrame, parameter: str) -> pl.DataFrame:
 
 
 def mislabelled(jobs: pl.DataFrame) -> pl.DataFrame:
-    """Payloads that differ from ``label_payload`` (kg) by more than their intervals explain; columns as `outliers`.
+    """Payloads that differ from ``label_payload`` (kg) by more than their intervals explain.
 
-    Where a robot's payloads scatter about each other by more than their intervals say, that scatter counts. Medians
-    are the lower ones, so that of two logs the one that agrees with its label shows how well they can.
+    Columns as `outliers`.
+
+    Where a robot's payloads scatter about each other by more than their intervals say, that
+    scatter counts. Medians are the lower ones, so that of two logs the one that agrees with its
+    label shows how well they can.
     """
     import polars as pl
 
-    if not {"label_payload", "m_p", "m_p_std"} <= set(jobs.columns) or jobs["label_payload"].dtype != pl.Float64:
-        none = jobs.head(0).with_columns(m_p=pl.lit(np.nan), expected=pl.lit(np.nan), sigmas=pl.lit(np.nan))
+    if (
+        not {"label_payload", "m_p", "m_p_std"} <= set(jobs.columns)
+        or jobs["label_payload"].dtype != pl.Float64
+    ):
+        none = jobs.head(0).with_columns(
+            m_p=pl.lit(np.nan), expected=pl.lit(np.nan), sigmas=pl.lit(np.nan)
+        )
         return _as_findings(none, "payload", "m_p")
-    labelled = jobs.filter((pl.col("m_p_std") > 0) & pl.col("label_payload").is_not_null()).with_columns(
+    labelled = jobs.filter(
+        (pl.col("m_p_std") > 0) & pl.col("label_payload").is_not_null()
+    ).with_columns(
         pl.col("label_payload").alias("expected"),
         ((pl.col("m_p") - pl.col("label_payload")) / pl.col("m_p_std")).alias("sigmas"),
     )
     centred = (pl.col("sigmas") - _lower_median(pl.col("sigmas")).over("robot")).abs()
     scatter = (_MAD * _lower_median(centred).over("robot")).clip(lower_bound=1.0)
-    wrong = labelled.with_columns(pl.col("sigmas") / scatter).filter(pl.col("sigmas").abs() > MISLABELLED)
+    wrong = labelled.with_columns(pl.col("sigmas") / scatter).filter(
+        pl.col("sigmas").abs() > MISLABELLED
+    )
     return _as_findings(wrong, "payload", "m_p")
 
 

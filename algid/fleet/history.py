@@ -24,7 +24,9 @@ FEWEST_PEERS = 3  # logs of a robot, among which one can be known from the other
 
 
 def read_jobs(path: Path) -> pl.DataFrame:
-    """The finished jobs of ``jobs.parquet``; ``t`` is in months, ``month`` whole, both null without a time.
+    """The finished jobs of ``jobs.parquet``.
+
+    ``t`` is in months, ``month`` whole, both null without a time.
 
     Raises
     ------
@@ -38,23 +40,39 @@ def read_jobs(path: Path) -> pl.DataFrame:
         raise ResultError(f"{path}: {found}; expected jobs.parquet of algid batch")
     try:
         names = list(pl.read_parquet_schema(path))
-        wanted = [n for n in names if n in ("job", "robot", "time", "status", "label_payload", "m_p", "m_p_std")]
-        wanted += [n for p in PARAMETERS if p in names and f"{p}_std" in names for n in (p, f"{p}_std")]
+        wanted = [
+            n
+            for n in names
+            if n in ("job", "robot", "time", "status", "label_payload", "m_p", "m_p_std")
+        ]
+        wanted += [
+            n for p in PARAMETERS if p in names and f"{p}_std" in names for n in (p, f"{p}_std")
+        ]
         jobs = pl.read_parquet(path, columns=wanted)
     except (OSError, pl.exceptions.PolarsError) as error:
         reason = str(error).split("\n", maxsplit=1)[0]
-        raise ResultError(f"{path}: cannot read it ({reason}); expected jobs.parquet of algid batch") from error
+        raise ResultError(
+            f"{path}: cannot read it ({reason}); expected jobs.parquet of algid batch"
+        ) from error
     missing = {"job", "robot", "time", "status"} - set(names)
     if missing:
-        raise ResultError(f"{path}: no column {', '.join(sorted(missing))}; expected jobs.parquet of algid batch")
+        raise ResultError(
+            f"{path}: no column {', '.join(sorted(missing))}; expected jobs.parquet of algid batch"
+        )
     jobs = _typed(jobs, path)
-    months = (pl.col("time") - pl.col("time").min().over("robot")).dt.total_seconds() / (86400 * MONTH_DAYS)
+    months = (pl.col("time") - pl.col("time").min().over("robot")).dt.total_seconds() / (
+        86400 * MONTH_DAYS
+    )
     finished = jobs.filter(pl.col("status").is_in(["ok", "incomplete"]))
-    return finished.with_columns(months.alias("t")).with_columns(pl.col("t").floor().cast(pl.Int32).alias("month"))
+    return finished.with_columns(months.alias("t")).with_columns(
+        pl.col("t").floor().cast(pl.Int32).alias("month")
+    )
 
 
 def _typed(jobs: pl.DataFrame, path: Path) -> pl.DataFrame:
-    """The jobs with the types that algid batch writes; a number that is none, or beyond all bounds, is null.
+    """The jobs with the types that algid batch writes.
+
+    a number that is none, or beyond all bounds, is null.
 
     Raises
     ------
@@ -68,28 +86,48 @@ def _typed(jobs: pl.DataFrame, path: Path) -> pl.DataFrame:
         number = name not in ("job", "robot", "time", "status")
         if name == "time":
             fits, wanted = kind == pl.Datetime or kind == pl.Date, "times"
-            column = pl.col(name).cast(pl.Datetime("us", getattr(kind, "time_zone", None)), strict=False)
+            column = pl.col(name).cast(
+                pl.Datetime("us", getattr(kind, "time_zone", None)), strict=False
+            )
             zoned = getattr(kind, "time_zone", None) is not None
-            column = column.dt.convert_time_zone("UTC") if zoned else column.dt.replace_time_zone("UTC")
+            column = (
+                column.dt.convert_time_zone("UTC") if zoned else column.dt.replace_time_zone("UTC")
+            )
         elif number:
             labels = name == "label_payload"  # a manifest's, which may be words: then there is none
             fits, wanted = kind.is_numeric() or labels, "numbers"
-            column = pl.col(name).cast(pl.Float64, strict=False) if kind.is_numeric() else pl.lit(None, pl.Float64)
+            column = (
+                pl.col(name).cast(pl.Float64, strict=False)
+                if kind.is_numeric()
+                else pl.lit(None, pl.Float64)
+            )
             size = column.abs()
             low = 1 / LIMITS.largest_value if name.endswith("_std") else 0.0
-            column = pl.when((size <= LIMITS.largest_value) & (size >= low)).then(column).alias(name)
+            column = (
+                pl.when((size <= LIMITS.largest_value) & (size >= low)).then(column).alias(name)
+            )
         else:
             fits, wanted = kind == pl.String or isinstance(kind, pl.Categorical | pl.Enum), "text"
             column = pl.col(name).cast(pl.String)
         if kind == pl.Null:
-            none = pl.Datetime("us", "UTC") if name == "time" else pl.Float64() if number else pl.String()
+            none = (
+                pl.Datetime("us", "UTC")
+                if name == "time"
+                else pl.Float64()
+                if number
+                else pl.String()
+            )
             fits, column = True, pl.lit(None, none)
         if not fits:
-            raise ResultError(f"{path}: column {name}: expected {wanted}, found {kind}; run algid batch again")
+            raise ResultError(
+                f"{path}: column {name}: expected {wanted}, found {kind}; run algid batch again"
+            )
         columns.append(column.alias(name))
     typed = jobs.select(columns)
     if typed["job"].null_count():
-        raise ResultError(f"{path}: column job: expected a name in every row, found none; run algid batch again")
+        raise ResultError(
+            f"{path}: column job: expected a name in every row, found none; run algid batch again"
+        )
     return typed
 
 
@@ -152,12 +190,16 @@ class History:
     def as_dict(self) -> dict[str, Any]:
         """What was found, in JSON's own types."""
         frames = {"robots": self.roster, "drifts": self.drifts, "findings": self.findings}
-        rows = {name: json.loads(frame.fill_nan(None).write_json()) for name, frame in frames.items()}
+        rows = {
+            name: json.loads(frame.fill_nan(None).write_json()) for name, frame in frames.items()
+        }
         return {**rows, "untested": self.untested}
 
 
 def history_of(path: Path, progress: Progress | None = None) -> History:
-    """The history in ``jobs.parquet`` at `path`; `progress` hears how many parameters have been followed.
+    """The history in ``jobs.parquet`` at `path`.
+
+    `progress` hears how many parameters have been followed.
 
     Raises
     ------
@@ -170,7 +212,9 @@ def history_of(path: Path, progress: Progress | None = None) -> History:
     names = [name for name in PARAMETERS if name in finished.columns]
     jobs = finished.filter(pl.col("robot").is_not_null())
     if not finished.height or not names:
-        raise ResultError(f"{path}: no job has given parameters; see its column reason, and run algid batch again")
+        raise ResultError(
+            f"{path}: no job has given parameters; see its column reason, and run algid batch again"
+        )
     if not jobs.height:
         raise ResultError(
             f"{path}: none of {counted(finished.height, 'finished job')} has a robot; give each robot's logs a folder "
@@ -184,7 +228,9 @@ def history_of(path: Path, progress: Progress | None = None) -> History:
         standing_out.append(outliers(jobs, name))
     history = pl.concat(followed)
     findings = pl.concat(standing_out).sort("kind", "robot", "time", "parameter")
-    listed = jobs.sort("robot", "time", descending=[False, True], nulls_last=True).select("robot", "job")
+    listed = jobs.sort("robot", "time", descending=[False, True], nulls_last=True).select(
+        "robot", "job"
+    )
     return History(history, findings, _roster(jobs, history), finished.height - jobs.height, listed)
 
 

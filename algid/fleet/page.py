@@ -16,7 +16,17 @@ from algid.fleet.drift import ALPHA, SPAN
 from algid.fleet.history import History
 from algid.model import UNITS
 from algid.notices import Notice
-from algid.report.document import Column, Depth, Document, Drawn, ReadingAid, References, Section, Table, filled
+from algid.report.document import (
+    Column,
+    Depth,
+    Document,
+    Drawn,
+    ReadingAid,
+    References,
+    Section,
+    Table,
+    filled,
+)
 from algid.report.drawings import Course, sparklines
 from algid.report.figures.base import Figure, Panel, axis, label
 from algid.report.frame import page
@@ -46,7 +56,9 @@ def fleet_document(history: History, reports: Mapping[str, str] | None = None) -
 
     A long list of robots is left to the page.
     """
-    robots = robot_table(history).at(Depth.TERMINAL if history.robots <= MOST_ROBOTS else Depth.PAGE)
+    robots = robot_table(history).at(
+        Depth.TERMINAL if history.robots <= MOST_ROBOTS else Depth.PAGE
+    )
     drifts, findings = drift_table(history), finding_table(history)
     figures: list[Figure] = []
     groups: dict[str, list[tuple[str, str]]] = {}
@@ -59,13 +71,20 @@ def fleet_document(history: History, reports: Mapping[str, str] | None = None) -
         figures = _figures(history)
         if reports and history.jobs is not None:
             for (robot,), part in history.jobs.group_by("robot", maintain_order=True):
-                groups[str(robot)] = [(job, reports[job]) for job in part["job"].to_list() if job in reports]
+                groups[str(robot)] = [
+                    (job, reports[job]) for job in part["job"].to_list() if job in reports
+                ]
     return Document(
         title="Fleet",
         verdict=verdict(history),
         sections=(
             Section((robots, ReadingAid(READING), *filled(drifts, findings), *figures)),
-            Section((References(groups, MOST_ROWS),) if groups else (), "reports", "Reports", fold="closed"),
+            Section(
+                (References(groups, MOST_ROWS),) if groups else (),
+                "reports",
+                "Reports",
+                fold="closed",
+            ),
         ),
         kicker="a fleet's history",
         name="Fleet",
@@ -109,7 +128,11 @@ def _course(parameter: str, rows: pl.DataFrame, drifts: bool) -> Course:
     rows = rows.sort("month").drop_nulls(["mean", "mean_std"])
     t = rows["end"].dt.epoch("ms").to_numpy().astype(np.float64)
     mean, half = rows["mean"].to_numpy(), 1.96 * rows["mean_std"].to_numpy()
-    ends = f"{significant(mean[0])} to {significant(mean[-1])}" if mean.size > 1 else "".join(map(significant, mean))
+    ends = (
+        f"{significant(mean[0])} to {significant(mean[-1])}"
+        if mean.size > 1
+        else "".join(map(significant, mean))
+    )
     return Course(t, mean, half, f"{parameter} {ends}{', drifts' if drifts else ''}", drifts)
 
 
@@ -125,9 +148,13 @@ def verdict(history: History) -> Verdict:
         row = tested.sort("p", "robot", "parameter").row(0, named=True)
         slope, p = 100 * row["slope"] / abs(row["mean"]), significant(row["p"], 2)
         statement += f"; the clearest trend is {row['parameter']} of {visible(row['robot'])}, {slope:+.2g} % a month"
-        statement += f" (p = {p})" + ("" if row["drift"] else f", which does not pass p < {ALPHA:g}")
+        statement += f" (p = {p})" + (
+            "" if row["drift"] else f", which does not pass p < {ALPHA:g}"
+        )
     found = [Notice("DRIFTS", counted(drifts, "drift"))] * bool(drifts)
-    found += [Notice("STAND_OUT", counted(findings, "log stands out", "logs stand out"))] * bool(findings)
+    found += [Notice("STAND_OUT", counted(findings, "log stands out", "logs stand out"))] * bool(
+        findings
+    )
     return graded(statement, [*found, *(Notice("NOT_TESTED", why) for why in history.untested)])
 
 
@@ -136,7 +163,9 @@ def robot_table(history: History) -> Table:
     import polars as pl
 
     drifting = dict(history.drifts.group_by("robot").agg(pl.col("parameter").sort()).iter_rows())
-    standing_out = dict(history.findings.group_by("robot").agg(pl.col("job").n_unique()).iter_rows())
+    standing_out = dict(
+        history.findings.group_by("robot").agg(pl.col("job").n_unique()).iter_rows()
+    )
     columns = (
         Column("Robot", "name"),
         Column("Logs", "number"),
@@ -150,7 +179,10 @@ def robot_table(history: History) -> Table:
         (
             visible(row["robot"]),
             str(row["logs"]),
-            *(ABSENT if row[end] is None else row[end].date().isoformat() for end in ("first", "last")),
+            *(
+                ABSENT if row[end] is None else row[end].date().isoformat()
+                for end in ("first", "last")
+            ),
             joined(drifting.get(row["robot"], [])) or ("none" if row["tested"] else "not tested"),
             str(standing_out.get(row["robot"], 0)),
         )
@@ -236,7 +268,9 @@ def _figures(history: History) -> list[Figure]:
 def _panel(history: History, robot: str, parameter: str) -> Panel:
     import polars as pl
 
-    own = history.windows.filter((pl.col("robot") == robot) & (pl.col("parameter") == parameter)).sort("month")
+    own = history.windows.filter(
+        (pl.col("robot") == robot) & (pl.col("parameter") == parameter)
+    ).sort("month")
     trace = {
         "type": "scatter",
         "mode": "lines+markers",
@@ -246,6 +280,9 @@ def _panel(history: History, robot: str, parameter: str) -> Panel:
         "line": {"color": "@blue", "width": 1.4},
         "hovertemplate": "%{y:.6g}<extra></extra>",
     }
-    layout = {"xaxis": axis(type="date"), "yaxis": axis(f"{parameter}, {unit_text(UNITS[parameter])}")}
+    layout = {
+        "xaxis": axis(type="date"),
+        "yaxis": axis(f"{parameter}, {unit_text(UNITS[parameter])}"),
+    }
     says = f"{visible(robot)}, {parameter}, {counted(own.height, 'month')}"
     return Panel([trace], layout, says, f"{label(robot)}: {parameter}")

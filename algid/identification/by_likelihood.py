@@ -17,7 +17,14 @@ from algid.estimators.doubt import doubted
 from algid.estimators.fit import Fit
 from algid.estimators.innovations import ResidualSums, pooled
 from algid.estimators.prediction import PredictionSums
-from algid.estimators.selection import CHOICE, FIRST_TERMS, Selection, TermTrial, needs_shape, select
+from algid.estimators.selection import (
+    CHOICE,
+    FIRST_TERMS,
+    Selection,
+    TermTrial,
+    needs_shape,
+    select,
+)
 from algid.estimators.too_short import TooShortError
 from algid.identification.known import model_of
 from algid.identification.series import torque_coefficients
@@ -52,12 +59,22 @@ def choose_model(survey: Survey, settings: Settings, earlier: Result | None = No
     plain = Model(gravity=settings.gravity)
     if not settings.chooses and not needs_shape(settings.terms):
         return _given(plain, settings.terms)
-    candidates = (CHOICE if settings.delay == 0 else without_delay(CHOICE)) if settings.chooses else ()
+    candidates = (
+        (CHOICE if settings.delay == 0 else without_delay(CHOICE)) if settings.chooses else ()
+    )
     unloaded, loaded = _passes(survey, settings)
     try:
-        return select(unloaded, loaded, _weak_settings(settings, _given(plain, ())), candidates, settings.terms)
+        return select(
+            unloaded,
+            loaded,
+            _weak_settings(settings, _given(plain, ())),
+            candidates,
+            settings.terms,
+        )
     except TooShortError as error:
-        raise LogError(f"{', '.join(log.name for log in survey.logs)}: {error}; record longer") from error
+        raise LogError(
+            f"{', '.join(log.name for log in survey.logs)}: {error}; record longer"
+        ) from error
 
 
 def _given(model: Model, terms: Sequence[str]) -> Selection:
@@ -68,7 +85,9 @@ def _given(model: Model, terms: Sequence[str]) -> Selection:
 def run_fit(
     survey: Survey, settings: Settings, chosen: Selection, prior: Prior | None
 ) -> tuple[Fit, Predictions, Selection]:
-    """Fit the settings' estimator to logs; where its likelihood is refuted, every term shrunk: see `shrunk`.
+    """Fit the settings' estimator to logs.
+
+    Where its likelihood is refuted, every term shrunk: see `shrunk`.
 
     Parameters
     ----------
@@ -82,8 +101,8 @@ def run_fit(
 
     Returns
     -------
-    The fit, the sums that score its prediction of each log, where a pass of the estimator could gather them, and the
-    model that it has in the end.
+    The fit, the sums that score its prediction of each log, where a pass of the estimator could
+    gather them, and the model that it has in the end.
 
     Raises
     ------
@@ -92,8 +111,12 @@ def run_fit(
     """
     sums: dict[LogSource, PredictionSums] = {}
     ours = _weak_settings(settings, chosen)
-    scored = chosen.model.linear and not chosen.delay and chosen.model.lag_name is None  # depends on no estimate
-    unloaded, loaded = _passes(survey, settings, partial(_scored, chosen.model, settings, sums) if scored else None)
+    scored = (
+        chosen.model.linear and not chosen.delay and chosen.model.lag_name is None
+    )  # depends on no estimate
+    unloaded, loaded = _passes(
+        survey, settings, partial(_scored, chosen.model, settings, sums) if scored else None
+    )
     try:
         if settings.estimator == "weak":
             fit = weak.fit(unloaded, loaded, ours, settings.lengths, prior)
@@ -114,7 +137,9 @@ def run_fit(
                 fit, chosen = _shrunk(fit, unloaded, loaded, ours, settings, chosen, prior)
                 sums.clear()
     except TooShortError as error:
-        raise LogError(f"{', '.join(log.name for log in survey.logs)}: {error}; record longer") from error
+        raise LogError(
+            f"{', '.join(log.name for log in survey.logs)}: {error}; record longer"
+        ) from error
     fit = with_body(fit)
     return constrained(fit) if settings.constrain else fit, sums, chosen
 
@@ -140,7 +165,9 @@ def _shrunk(
     return fit, Selection(fit.shared.model, fit.shared.delay, chosen.chosen_by, trials, shrunk=True)
 
 
-def residual_of(survey: Survey, settings: Settings, chosen: Selection, fit: Fit) -> ResidualSums | None:
+def residual_of(
+    survey: Survey, settings: Settings, chosen: Selection, fit: Fit
+) -> ResidualSums | None:
     """Sums over the residual of the estimator whose fit it is: its innovations, or that of its windows.
 
     None where no log is long enough.
@@ -167,24 +194,33 @@ def with_doubt(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) 
     """
     if not (fit.refuted and settings.chooses):
         return fit
-    if any(bound.distance is not None and bound.distance > FAR_BEYOND for bound in broken_bounds(fit)):
+    if any(
+        bound.distance is not None and bound.distance > FAR_BEYOND for bound in broken_bounds(fit)
+    ):
         return fit
     unloaded, loaded = _passes(survey, settings)
-    common = _weak_settings(settings, replace(chosen, model=replace(chosen.model, terms=FIRST_TERMS)))
+    common = _weak_settings(
+        settings, replace(chosen, model=replace(chosen.model, terms=FIRST_TERMS))
+    )
     return doubted(fit, unloaded, loaded, common)
 
 
 def with_endogeneity(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) -> Fit:
     """The fit with how far instruments and least squares are apart on its logs."""
     unloaded, loaded = _passes(survey, settings)
-    return replace(fit, endogeneity=instruments.endogeneity(unloaded, loaded, _weak_settings(settings, chosen), fit))
+    return replace(
+        fit,
+        endogeneity=instruments.endogeneity(
+            unloaded, loaded, _weak_settings(settings, chosen), fit
+        ),
+    )
 
 
 def without_nothing(chosen: Selection, fit: Fit, settings: Settings) -> Selection:
     """The selection without the terms that the logs chose and whose coefficients the fit finds to be nothing.
 
-    A term may earn its place before the weak estimator by what differentiation leaves behind; the efficient fit then
-    finds each of its coefficients within `NOTHING` standard deviations of zero.
+    A term may earn its place before the weak estimator by what differentiation leaves behind; the
+    efficient fit then finds each of its coefficients within `NOTHING` standard deviations of zero.
     """
     if chosen.chosen_by != "logs" or chosen.shrunk:
         return chosen
@@ -221,7 +257,9 @@ def _weak_settings(settings: Settings, chosen: Selection) -> weak.WeakSettings:
 
 
 def _passes(
-    survey: Survey, settings: Settings, watched: Callable[[LogSource, Pass], Iterator[Segment]] | None = None
+    survey: Survey,
+    settings: Settings,
+    watched: Callable[[LogSource, Pass], Iterator[Segment]] | None = None,
 ) -> tuple[list[Pass], list[Pass]]:
     """A callable a log, unloaded and loaded, that gives a fresh pass, `watched` where someone looks on.
 
@@ -239,7 +277,11 @@ def _passes(
 
 
 def _scored(
-    model: Model, settings: Settings, sums: dict[LogSource, PredictionSums], log: LogSource, moving: Pass
+    model: Model,
+    settings: Settings,
+    sums: dict[LogSource, PredictionSums],
+    log: LogSource,
+    moving: Pass,
 ) -> Iterator[Segment]:
     """A pass that also gathers, once, what the prediction will be scored by."""
     if log in sums:

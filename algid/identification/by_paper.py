@@ -44,12 +44,15 @@ def run_paper(
     known: FloatArray | None = None,
     folder: Path | None = None,
 ) -> Identified:
-    """Stage 1 on `unloaded`, or the `known` constants (7,); stage 2 on `loaded`; series into `folder`.
+    """Stage 1 on `unloaded`, or the `known` constants (7,); stage 2 on `loaded`.
+
+    Series into `folder`.
 
     Raises
     ------
     LogError
-        If a log is shorter than the estimates need to settle, or lacks velocities that were asked for.
+        If a log is shorter than the estimates need to settle, or lacks velocities that were asked
+        for.
     """
     parameters: dict[str, Estimate] = {}
     rows: dict[str, float] = {}
@@ -63,13 +66,17 @@ def run_paper(
         if usable.all():
             rows |= unloaded_rows(k)
     if loaded is None or k is None or not np.isfinite(k).all():
-        return Identified(parameters, _weak(STAGE2_NAMES, loaded), _weak(("m_p", "l1"), loaded), rows)
+        return Identified(
+            parameters, _weak(STAGE2_NAMES, loaded), _weak(("m_p", "l1"), loaded), rows
+        )
     values, wander, usable = _estimate(survey, loaded, settings, k, folder)
     names = (*STAGE2_NAMES, "l1", "m_p")
     named = _named(names, {**UNITS, "l1": "m"}, values, usable)
     if np.any((values + FAR_BEYOND * wander)[[names.index("l1"), names.index("m_p")]] < 0):
         named = distrusted(named)
-    rows |= {name: estimate.estimate for name, estimate in named.items() if estimate.estimate is not None}
+    rows |= {
+        name: estimate.estimate for name, estimate in named.items() if estimate.estimate is not None
+    }
     return Identified(
         parameters,
         {name: named[name] for name in STAGE2_NAMES},
@@ -82,10 +89,20 @@ def _estimate(
     survey: Survey, log: LogSource, settings: Settings, k: FloatArray | None, folder: Path | None
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
     """Estimates from one log's series, how far they wander, and which can be used; writes the series on the way."""
-    window = settings.window if settings.window is not None and settings.estimator == "paper" else STAGE1_WINDOW
-    moving = with_velocities(survey, log, settings, luenberger=settings.luenberger or settings.estimator != "paper")
+    window = (
+        settings.window
+        if settings.window is not None and settings.estimator == "paper"
+        else STAGE1_WINDOW
+    )
+    moving = with_velocities(
+        survey, log, settings, luenberger=settings.luenberger or settings.estimator != "paper"
+    )
     names: Sequence[str] = STAGE1_SERIES if k is None else STAGE2_SERIES
-    series = stage1_series(moving, window) if k is None else stage2_series(moving, window, k, settings.gravity)
+    series = (
+        stage1_series(moving, window)
+        if k is None
+        else stage2_series(moving, window, k, settings.gravity)
+    )
     summary = Summary(len(names))
 
     def watched() -> Iterator[PaperSeries]:
@@ -102,7 +119,11 @@ def _estimate(
             {name: column for name, column in block.items() if name != "k5+k3"}
             for block in series_blocks(watched(), names)
         )
-        write_columns(folder / (STAGE1_FILE if k is None else STAGE2_FILE), columns, [survey.seen(log).first_ns])
+        write_columns(
+            folder / (STAGE1_FILE if k is None else STAGE2_FILE),
+            columns,
+            [survey.seen(log).first_ns],
+        )
     duration = survey.summary(log).duration
     if duration < SHORTEST - 1e-9:
         raise LogError(
@@ -137,4 +158,7 @@ def _weak(names: Sequence[str], loaded: LogSource | None) -> dict[str, Estimate]
     if loaded is None:
         return {}
     units = {**UNITS, "l1": "m"}
-    return {name: Estimate(estimate=None, unit=units[name], status=Status.WEAK_EXCITATION) for name in names}
+    return {
+        name: Estimate(estimate=None, unit=units[name], status=Status.WEAK_EXCITATION)
+        for name in names
+    }

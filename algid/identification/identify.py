@@ -17,7 +17,13 @@ from algid.identification.by_paper import run_paper
 from algid.identification.options import with_options
 from algid.identification.outcome import Identified
 from algid.identification.series import write_fit_series
-from algid.identification.source import LogLike, LogSource, open_sources, read_otherwise, with_twins_marked
+from algid.identification.source import (
+    LogLike,
+    LogSource,
+    open_sources,
+    read_otherwise,
+    with_twins_marked,
+)
 from algid.identification.summary import result_of
 from algid.identification.survey import Survey
 from algid.progress import Progress
@@ -29,7 +35,8 @@ if TYPE_CHECKING:
     from algid.identification.options import ProfileLike
     from algid.profile import Profile
 
-SERIES_SECONDS = 600.0  # the paper's convergence series is drawn beside other estimators up to this length of log
+# the paper's convergence series is drawn beside other estimators up to this length of log
+SERIES_SECONDS = 600.0
 
 
 @dataclass(frozen=True)
@@ -69,13 +76,14 @@ def identify(
     Parameters
     ----------
     unloaded, loaded : path, `Log`, pandas or polars frame, or dict of arrays; or several
-        Logs of the arm without and with the payload. The columns of frames and dicts are found by their names and by
-        `profile`, as those of a file.
+        Logs of the arm without and with the payload. The columns of frames and dicts are found by
+        their names and by `profile`, as those of a file.
     settings : Settings
     parameters : Result or path of one
         An arm identified before; then no unloaded log is needed.
     profile : Profile, path of one, or dict of what would stand in its file
-        What the logs' names, units and signs mean; where it is silent, what was said of the earlier result's logs.
+        What the logs' names, units and signs mean; where it is silent, what was said of the
+        earlier result's logs.
     out : Path
         Folder to write into; None writes nothing.
     name : str
@@ -91,22 +99,25 @@ def identify(
     shared_library : bool
         Put the pages' plotting library once beside the result folders instead of into each page.
     progress : callable
-        Called with the stage and how many samples of how many it has gone over, as the work goes on.
+        Called with the stage and how many samples of how many it has gone over, as the work goes
+        on.
     **options : of `Settings` and of `Profile`, by their names
-        ``estimator="weak"``, ``zero="hanging"``: over `settings` and `profile`, as flags are over a file.
-        `velocity` is that of `Settings`.
+        ``estimator="weak"``, ``zero="hanging"``: over `settings` and `profile`, as flags are over
+        a file. `velocity` is that of `Settings`.
 
     Returns
     -------
     Result
-        Each estimate with standard deviation, 95 % interval, unit and status; what is not identifiable says so.
+        Each estimate with standard deviation, 95 % interval, unit and status; what is not
+        identifiable says so.
 
     Raises
     ------
     AlgidError
         If a log cannot be used, or nothing can be written.
     SettingError
-        If a setting is not known or wrong, or logs are to be cross-validated of which there is one alone.
+        If a setting is not known or wrong, or logs are to be cross-validated of which there is one
+        alone.
     ValueError
         If there is neither an unloaded log nor `parameters`.
     """
@@ -115,7 +126,11 @@ def identify(
     settings, meaning = with_options(settings, profile, options)
     earlier = Earlier.of(parameters)
     meaning = meaning if earlier is None else reused(meaning, earlier.result)
-    if meaning is not None and "gravity" in meaning.model_fields_set and settings.gravity == Settings.gravity:
+    if (
+        meaning is not None
+        and "gravity" in meaning.model_fields_set
+        and settings.gravity == Settings.gravity
+    ):
         settings = replace(settings, gravity=meaning.gravity)
     sources = with_twins_marked(
         open_sources(unloaded, "unloaded", meaning, settings.gravity),
@@ -127,11 +142,15 @@ def identify(
         raise ValueError("an unloaded log is needed, or parameters and a loaded log")
     if settings.cross_validate and (len(survey.unloaded) == 1 or len(survey.loaded) == 1):
         kind = "unloaded" if len(survey.unloaded) == 1 else "loaded"
-        raise SettingError(f"--cross-validate: expected two {kind} logs or more, found one; give more, or leave it out")
+        raise SettingError(
+            f"--cross-validate: expected two {kind} logs or more, found one; give more, or leave it out"
+        )
     if out is None:
         return _identified(survey, settings, earlier, said)
     folder = result_folder(sources[0].name, out, name)
-    with whole_folder(folder, force, sweep=name is None) as temporary:  # a batch sweeps its whole output once
+    with whole_folder(
+        folder, force, sweep=name is None
+    ) as temporary:  # a batch sweeps its whole output once
         result = _identified(survey, settings, earlier, said, temporary, series=report)
         if command is not None:
             result = result.model_copy(update={"settings": result.settings | {"command": command}})
@@ -163,7 +182,8 @@ def _identified(
 ) -> Result:
     """The result with what the user `said` about its logs, and a warning where they were read otherwise than before.
 
-    Time series go into `folder`: the paper's always, those of a likelihood where `series` asks for them.
+    Time series go into `folder`: the paper's always, those of a likelihood where `series` asks for
+    them.
     """
     with one_blas_thread():
         if settings.estimator == "paper":
@@ -175,7 +195,9 @@ def _identified(
     return result.model_copy(update={"profile": said, "notices": [*otherwise, *result.notices]})
 
 
-def _by_the_paper(survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None) -> Identified:
+def _by_the_paper(
+    survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None
+) -> Identified:
     for logs in (survey.unloaded, survey.loaded):
         if len(logs) > 1:
             raise LogError(
@@ -187,12 +209,16 @@ def _by_the_paper(survey: Survey, settings: Settings, earlier: Earlier | None, f
         constants = [earlier.result.parameters.get(name) for name in CONSTANT_NAMES]
         values = [None if found is None else found.estimate for found in constants]
         if None in values:
-            raise ResultError(f"{earlier.file}: the result lacks a constant; identify the arm from a better log first")
+            raise ResultError(
+                f"{earlier.file}: the result lacks a constant; identify the arm from a better log first"
+            )
         known = np.array(values, dtype=np.float64)
     return run_paper(survey, *_firsts(survey), settings, known, folder)
 
 
-def _by_likelihood(survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None) -> Identified:
+def _by_likelihood(
+    survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None
+) -> Identified:
     from algid.identification.by_likelihood import (
         choose_model,
         residual_of,
@@ -223,22 +249,33 @@ def _by_likelihood(survey: Survey, settings: Settings, earlier: Earlier | None, 
     return outcome
 
 
-def _with_the_papers(outcome: Identified, survey: Survey, settings: Settings, folder: Path) -> Identified:
+def _with_the_papers(
+    outcome: Identified, survey: Survey, settings: Settings, folder: Path
+) -> Identified:
     """The paper's convergence series of the first log of each kind, and its route to the payload."""
     first, second = _firsts(survey)
     logs = [log for log in (first, second) if log is not None]
     durations = [survey.summary(log).duration for log in logs]
-    if first is None or settings.gravity == 0 or min(durations) < SHORTEST or max(durations) > SERIES_SECONDS:
+    if (
+        first is None
+        or settings.gravity == 0
+        or min(durations) < SHORTEST
+        or max(durations) > SERIES_SECONDS
+    ):
         return outcome
     survey.begin("series", logs)
-    return replace(outcome, paper_payload=run_paper(survey, first, second, settings, None, folder).payload)
+    return replace(
+        outcome, paper_payload=run_paper(survey, first, second, settings, None, folder).payload
+    )
 
 
 def _firsts(survey: Survey) -> tuple[LogSource | None, LogSource | None]:
     return next(iter(survey.unloaded), None), next(iter(survey.loaded), None)
 
 
-def _write_pages(folder: Path, result: Result, shared_library: bool, progress: Progress | None) -> None:
+def _write_pages(
+    folder: Path, result: Result, shared_library: bool, progress: Progress | None
+) -> None:
     from algid.report.markdown import markdown
     from algid.report.page import result_document, write_report
 

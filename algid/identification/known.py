@@ -22,7 +22,10 @@ FAR = 5.0  # standard deviations beyond which two statements contradict each oth
 
 
 def model_of(result: Result) -> Model:
-    """The torque's model behind a result; a result that names none was made with what its settings ask for."""
+    """The torque's model behind a result.
+
+    a result that names none was made with what its settings ask for.
+    """
     settings = Settings.of(result.settings)
     found = None if result.fit is None else result.fit.model
     if found is None:
@@ -38,7 +41,9 @@ def shift_of(result: Result) -> Callable[[float], float]:
 
 
 def prior_of(result: Result, model: Model, file: str | None = None) -> Prior:
-    """What an earlier result knows of the arm's `model`; where it is wrong, its `file` is named, or its log.
+    """What an earlier result knows of the arm's `model`.
+
+    Where it is wrong, its `file` is named, or its log.
 
     Raises
     ------
@@ -54,12 +59,16 @@ def prior_of(result: Result, model: Model, file: str | None = None) -> Prior:
     known = set(result.fit.covariance_names) & set(result.parameters)
     missing = [name for name in model.names if name not in known]
     if missing:
-        raise ResultError(f"{file}: the result has no {', '.join(missing)}; use the flags it was made with")
+        raise ResultError(
+            f"{file}: the result has no {', '.join(missing)}; use the flags it was made with"
+        )
     places = [result.fit.covariance_names.index(name) for name in model.names]
     covariance = np.array(result.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
     mean = np.array([result.parameters[name].estimate for name in model.names], dtype=np.float64)
     if not (np.isfinite(covariance).all() and np.isfinite(mean).all()):
-        raise ResultError(f"{file}: the result leaves constants undetermined; identify from more logs first")
+        raise ResultError(
+            f"{file}: the result leaves constants undetermined; identify from more logs first"
+        )
     return Prior.of(model.names, mean, covariance)
 
 
@@ -71,12 +80,18 @@ def torque_constants(result: Result, model: Model, role: Role, file: str) -> Flo
     ResultError
         If one of them has no estimate.
     """
-    values = {name: found.estimate for name, found in {**result.parameters, **result.payload}.items()}
+    values = {
+        name: found.estimate for name, found in {**result.parameters, **result.payload}.items()
+    }
     wanted = [*model.names, *((one.name for one in PAYLOAD) if role == "loaded" else ())]
-    values |= {name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None}
+    values |= {
+        name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None
+    }
     missing = next((name for name in wanted if values.get(name) is None), None)
     if missing is not None:
-        raise ResultError(f"{file}: the result has no {missing}; identify it from logs that tell it")
+        raise ResultError(
+            f"{file}: the result has no {missing}; identify it from logs that tell it"
+        )
     known = {name: float(value) for name, value in values.items() if value is not None}
     if role != "loaded":
         return np.array([known[name] for name in model.names])
@@ -95,7 +110,14 @@ def first_length(result: Result) -> tuple[float, float] | None:
     """l1 = g k1 / k2 and its standard deviation, in m; None where the result tells neither."""
     gravity = Settings.of(result.settings).gravity
     k1, k2 = (result.parameters.get(name) for name in ("k1", "k2"))
-    if not gravity or result.fit is None or k1 is None or k2 is None or not k1.estimate or not k2.estimate:
+    if (
+        not gravity
+        or result.fit is None
+        or k1 is None
+        or k2 is None
+        or not k1.estimate
+        or not k2.estimate
+    ):
         return None
     if not all(has_error_bar(result, name) for name in ("k1", "k2")):
         return None
@@ -107,7 +129,11 @@ def first_length(result: Result) -> tuple[float, float] | None:
 
 def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice, ...]:
     """Notices of given lengths far from what the result says of them: by itself, and by l1 = g k1 / k2."""
-    identified = {name: (found.estimate, found.std) for name, found in result.payload.items() if name in ("l1", "l2")}
+    identified = {
+        name: (found.estimate, found.std)
+        for name, found in result.payload.items()
+        if name in ("l1", "l2")
+    }
     by_constants = first_length(result)
     if by_constants is not None:
         identified["l1"] = by_constants
@@ -118,6 +144,12 @@ def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice
             continue
         distance = abs(given - estimate) / std
         if distance > FAR:
-            numbers = {"name": name, "given": given, "distance": distance, "estimate": estimate, "std": std}
+            numbers = {
+                "name": name,
+                "given": given,
+                "distance": distance,
+                "estimate": estimate,
+                "std": std,
+            }
             found.append(Notice("LENGTH_CONTRADICTED", numbers=numbers))
     return tuple(found)

@@ -70,7 +70,9 @@ def profile_of(given: ProfileLike | None) -> Profile | None:
     if isinstance(given, str | Path):
         return load_profile(Path(given))
     if not isinstance(given, Mapping):
-        raise SettingError(f"profile: expected a path, a dict or a Profile, found {type(given).__name__}")
+        raise SettingError(
+            f"profile: expected a path, a dict or a Profile, found {type(given).__name__}"
+        )
     return over(None, given)
 
 
@@ -78,7 +80,11 @@ def _refuse_unknown(options: Mapping[str, Any], known: list[str]) -> None:
     for name in options:
         if name not in known:
             near = get_close_matches(name, known, n=1)
-            mend = f"did you mean {near[0]}?" if near else f"known are {', '.join(dict.fromkeys(known))}"
+            mend = (
+                f"did you mean {near[0]}?"
+                if near
+                else f"known are {', '.join(dict.fromkeys(known))}"
+            )
             raise SettingError(f"{name}: no setting has this name; {mend}")
 
 

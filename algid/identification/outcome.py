@@ -30,7 +30,9 @@ from algid.table4 import UNITS as TABLE_UNITS
 
 NEVER_ZERO = ("k3", "k5", "l1", "l2")
 """Inertias and lengths: any other parameter of an arm may be zero."""
-NEAR_CONSTANT = 0.1  # of the torque's RMS: a residual this small passes, however little there was to explain
+NEAR_CONSTANT = (
+    0.1  # of the torque's RMS: a residual this small passes, however little there was to explain
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +51,9 @@ class Identified:
     notices: list[Notice] = field(default_factory=list)
 
 
-def outcome_of(fit: Fit, predictions: Predictions, survey: Survey, settings: Settings, chosen: Selection) -> Identified:
+def outcome_of(
+    fit: Fit, predictions: Predictions, survey: Survey, settings: Settings, chosen: Selection
+) -> Identified:
     """The fit as a result holds it."""
     # a constant that the model has no column for is not identifiable
     found = {name: unknown(UNITS[name]) for name in CONSTANT_NAMES}
@@ -60,7 +64,9 @@ def outcome_of(fit: Fit, predictions: Predictions, survey: Survey, settings: Set
     combined = {name: unknown(TABLE_UNITS[name]) for name in LOADED_ROWS if survey.loaded}
     for name in combined.keys() & rows.keys():
         status = "OK" if fit.converged else "NOT_CONVERGED"
-        combined[name] = estimate(rows[name], stds[name], fit.quantile * stds[name], TABLE_UNITS[name], status)
+        combined[name] = estimate(
+            rows[name], stds[name], fit.quantile * stds[name], TABLE_UNITS[name], status
+        )
     summary = fit_summary(fit, predictions, survey, settings, chosen)
     if is_implausible(summary):
         found, combined, payload = (distrusted(group) for group in (found, combined, payload))
@@ -82,16 +88,22 @@ def outcome_of(fit: Fit, predictions: Predictions, survey: Survey, settings: Set
 def is_implausible(summary: results.FitSummary) -> bool:
     """Whether physics or the torque contradict a fit.
 
-    Its estimates come from one solution: where one of them breaks a bound by more than chance explains, or a joint's
-    torque is predicted worse than its mean would, none can be trusted. A torque that hardly varies leaves R² nothing
-    to explain; there the residual has to be a tenth of the torque at least.
+    Its estimates come from one solution: where one of them breaks a bound by more than chance
+    explains, or a joint's torque is predicted worse than its mean would, none can be trusted. A
+    torque that hardly varies leaves R² nothing to explain; there the residual has to be a tenth of
+    the torque at least.
     """
-    if any(bound.distance_sigma is not None and bound.distance_sigma > FAR_BEYOND for bound in summary.broken_bounds):
+    if any(
+        bound.distance_sigma is not None and bound.distance_sigma > FAR_BEYOND
+        for bound in summary.broken_bounds
+    ):
         return True
     judged = summary.cross_validation or summary.residual
     if judged is None:
         return False
-    return any(r2 < 0 and nrmse > NEAR_CONSTANT for r2, nrmse in zip(judged.r2, judged.nrmse, strict=True))
+    return any(
+        r2 < 0 and nrmse > NEAR_CONSTANT for r2, nrmse in zip(judged.r2, judged.nrmse, strict=True)
+    )
 
 
 def distrusted(group: Mapping[str, Estimate]) -> dict[str, Estimate]:
@@ -103,9 +115,16 @@ def distrusted(group: Mapping[str, Estimate]) -> dict[str, Estimate]:
 
 
 def _estimates(
-    names: Sequence[str], values: FloatArray, stds: FloatArray, quantile: float, statuses: Sequence[str] = ()
+    names: Sequence[str],
+    values: FloatArray,
+    stds: FloatArray,
+    quantile: float,
+    statuses: Sequence[str] = (),
 ) -> dict[str, Estimate]:
-    """Estimates by name; without `statuses`, those whose deviation is infinite are not identifiable."""
+    """Estimates by name.
+
+    Without `statuses`, those whose deviation is infinite are not identifiable.
+    """
     statuses = statuses or ["OK" if np.isfinite(std) else "NOT_IDENTIFIABLE" for std in stds]
     return {
         name: estimate(value, std, quantile * std, UNITS[name], status)
@@ -114,11 +133,16 @@ def _estimates(
 
 
 def estimate(value: float, std: float, half: float, unit: str, status: str) -> Estimate:
-    """One estimate with `half` its interval; nothing but its unit where the logs do not determine it."""
+    """One estimate with `half` its interval.
+
+    Nothing but its unit where the logs do not determine it.
+    """
     if status == "NOT_IDENTIFIABLE":
         return unknown(unit)
     interval = (finite(value - half), finite(value + half))
-    return Estimate(estimate=finite(value), std=finite(std), ci95=interval, unit=unit, status=Status(status))
+    return Estimate(
+        estimate=finite(value), std=finite(std), ci95=interval, unit=unit, status=Status(status)
+    )
 
 
 def with_significance(group: Mapping[str, Estimate]) -> dict[str, Estimate]:
@@ -138,19 +162,31 @@ def _holds_zero(found: Estimate) -> bool:
 
 def unknown(unit: str) -> Estimate:
     """An estimate that the logs do not determine, its interval unbounded."""
-    return Estimate(estimate=None, std=None, ci95=(None, None), unit=unit, status=Status.NOT_IDENTIFIABLE)
+    return Estimate(
+        estimate=None, std=None, ci95=(None, None), unit=unit, status=Status.NOT_IDENTIFIABLE
+    )
 
 
-# of which constants each row of Table 4 is the sum; loaded ones hold the payload's share, and k6 is in none
-_ROWS = dict(zip(UNLOADED_ROWS, (("k5", "k3"), ("k1",), ("k3",), ("k6",), ("k4",), ("k2",)), strict=True))
+# of which constants each row of Table 4 is the sum; loaded ones hold the payload's share, and k6
+# is in none
+_ROWS = dict(
+    zip(UNLOADED_ROWS, (("k5", "k3"), ("k1",), ("k3",), ("k6",), ("k4",), ("k2",)), strict=True)
+)
 _LOADED = dict(zip(LOADED_ROWS, (sums for sums in _ROWS.values() if sums != ("k6",)), strict=True))
 
 
 def table_rows(fit: Fit) -> tuple[dict[str, float], dict[str, float]]:
-    """Table 4's rows and their standard deviations; none of a parameter that is not identifiable."""
+    """Table 4's rows and their standard deviations.
+
+    None of a parameter that is not identifiable.
+    """
     rows: dict[str, float] = {}
     stds: dict[str, float] = {}
-    lost = {name for name, status in zip(fit.names, fit.status, strict=True) if status == "NOT_IDENTIFIABLE"}
+    lost = {
+        name
+        for name, status in zip(fit.names, fit.status, strict=True)
+        if status == "NOT_IDENTIFIABLE"
+    }
     for loaded in (False, True) if fit.shared.payload else (False,):
         jacobian = fit.shared.jacobian(fit.values, loaded)
         coefficients = fit.shared.coefficients(fit.values, loaded)
@@ -179,11 +215,16 @@ def fit_summary(
         # as many coefficients were looked at as a log has (Bonferroni)
         p_value = min(1.0, len(fit.shared.log_names) * math.erfc(fit.endogeneity / math.sqrt(2)))
         far = fit.endogeneity > ENDOGENEOUS
-        endogeneity["largest"] = results.Endogeneity(statistic=fit.endogeneity, p_value=p_value, endogenous=far)
+        endogeneity["largest"] = results.Endogeneity(
+            statistic=fit.endogeneity, p_value=p_value, endogenous=far
+        )
     return results.FitSummary(
         noise=noise,
         covariance_names=list(fit.names),
-        covariance=[[finite(value) for value in row] for row in np.where(lost | lost[:, None], np.inf, fit.covariance)],
+        covariance=[
+            [finite(value) for value in row]
+            for row in np.where(lost | lost[:, None], np.inf, fit.covariance)
+        ],
         intervals=fit.intervals,
         iterations=fit.iterations,
         converged=fit.converged,
@@ -212,12 +253,17 @@ def fit_summary(
             if b.distance is None or b.distance > fit.quantile  # else its 95 % interval keeps it
         ],
         endogeneity=endogeneity,
-        by_log=[_estimates(fit.shared.log_names, own.values, own.std, fit.quantile) for own in own_estimates(fit)],
+        by_log=[
+            _estimates(fit.shared.log_names, own.values, own.std, fit.quantile)
+            for own in own_estimates(fit)
+        ],
         residual=prediction(residual),
         cross_validation=None if crossed is None else prediction(crossed),
         repeatability=None
         if repeated is None
-        else results.Repeatability(masses=repeated.masses.tolist(), std=repeated.std, ci95=repeated.ci95),
+        else results.Repeatability(
+            masses=repeated.masses.tolist(), std=repeated.std, ci95=repeated.ci95
+        ),
         torque_gain=_torque_gain(fit, settings.payload_mass),
     )
 
@@ -235,20 +281,27 @@ def _predicted(
             own += score(fit.shared.model, c, survey.segments(log), torque_shift(settings, fit))
     if not settings.cross_validate:
         return own, None
-    unloaded, loaded = ([partial(survey.segments, log) for log in kind] for kind in (survey.unloaded, survey.loaded))
+    unloaded, loaded = (
+        [partial(survey.segments, log) for log in kind] for kind in (survey.unloaded, survey.loaded)
+    )
     return own, cross_validate(fit, unloaded, loaded, settings.torque_shift)
 
 
 def _terms(fit: Fit, chosen: Selection) -> list[results.TermCriterion]:
     """What the logs said of each term they chose from, or of those that were given."""
     if not chosen.trials:
-        return [results.TermCriterion(term=w.term, delta_bic=w.delta_bic, kept=w.earned) for w in term_worths(fit)]
+        return [
+            results.TermCriterion(term=w.term, delta_bic=w.delta_bic, kept=w.earned)
+            for w in term_worths(fit)
+        ]
     return [
         results.TermCriterion(
             term=trial.term,
             kept=trial.kept,
             gain_heldout=finite(trial.prediction),
-            evidence=finite(0.5 * trial.evidence),  # a Wald statistic is twice a difference of log-likelihoods
+            evidence=finite(
+                0.5 * trial.evidence
+            ),  # a Wald statistic is twice a difference of log-likelihoods
             why=trial.reason,
         )
         for trial in chosen.trials
@@ -275,8 +328,14 @@ def prediction(found: PredictionScore) -> results.TorquePrediction | None:
     """As the result holds it; None where every log was too short to judge."""
     if found.count == 0:
         return None
-    rmse, nrmse, r2 = ([float(value) for value in pair] for pair in (found.rmse, found.nrmse, found.r2))
+    rmse, nrmse, r2 = (
+        [float(value) for value in pair] for pair in (found.rmse, found.nrmse, found.r2)
+    )
     by = PredictionFilter()
     return results.TorquePrediction(
-        rmse=(rmse[0], rmse[1]), nrmse=(nrmse[0], nrmse[1]), r2=(r2[0], r2[1]), filter=str(by), bandwidth=by.cutoff
+        rmse=(rmse[0], rmse[1]),
+        nrmse=(nrmse[0], nrmse[1]),
+        r2=(r2[0], r2[1]),
+        filter=str(by),
+        bandwidth=by.cutoff,
     )

@@ -18,7 +18,10 @@ FAR_APART = 5.0  # standard deviations past which two logs are not of one arm
 
 def exchanged(fit: Fit) -> bool:
     """Whether the unloaded arm bears more than the loaded one, and by far."""
-    return any(b.bound == "m_p >= 0" and b.distance is not None and b.distance > FAR_APART for b in broken_bounds(fit))
+    return any(
+        b.bound == "m_p >= 0" and b.distance is not None and b.distance > FAR_APART
+        for b in broken_bounds(fit)
+    )
 
 
 def fit_warnings(fit: Fit) -> Iterator[Notice]:
@@ -29,16 +32,27 @@ def fit_warnings(fit: Fit) -> Iterator[Notice]:
     yield from (Notice("OPEN_DIRECTION", sentence) for sentence in fit.unidentifiable)
     if fit.shared.model.gravity == 0:
         yield Notice("NO_GRAVITY")
-    if fit.endogeneity is not None and fit.endogeneity > ENDOGENEOUS and fit.estimator != "instruments":
+    if (
+        fit.endogeneity is not None
+        and fit.endogeneity > ENDOGENEOUS
+        and fit.estimator != "instruments"
+    ):
         instruments = Remedy({"estimator": "instruments"}, "to compare")
         yield Notice("ENDOGENEITY", numbers={"distance": fit.endogeneity}, remedies=(instruments,))
     yield from _of_gains(fit)
     if "m_p" in fit.names:
         yield from _of_payload(fit)
     given, by_constants = fit.shared.lengths.get("l1"), length_by_constants(fit)
-    if given is not None and by_constants is not None and abs(by_constants[0] - given) > FAR_APART * by_constants[1]:
+    if (
+        given is not None
+        and by_constants is not None
+        and abs(by_constants[0] - given) > FAR_APART * by_constants[1]
+    ):
         length, std = by_constants
-        yield Notice("LENGTH_MISMATCH", numbers={"length": length, "half": fit.quantile * std, "given": given})
+        yield Notice(
+            "LENGTH_MISMATCH",
+            numbers={"length": length, "half": fit.quantile * std, "given": given},
+        )
     if exchanged(fit):
         yield Notice("EXCHANGED_LOGS")
     apart = payload_distance(fit)
@@ -79,5 +93,7 @@ def fit_notes(fit: results.FitSummary) -> Iterator[Notice]:
         yield Notice("NO_TORQUE_GAIN", note=True)
     elif gain is not None and gain.ci95 is not None:
         numbers = {"gain": gain.estimate, "low": gain.ci95[0], "high": gain.ci95[1]}
-        gears = Remedy({"tau1.torque_constant": None, "tau2.torque_constant": None}, "set them, or gear_ratio")
+        gears = Remedy(
+            {"tau1.torque_constant": None, "tau2.torque_constant": None}, "set them, or gear_ratio"
+        )
         yield Notice("TORQUE_GAIN", numbers=numbers, remedies=(gears,), note=True)

@@ -31,13 +31,17 @@ LOWEST, HIGHEST = 4.0, 40.0  # Hz
 
 
 def torque_blocks(
-    survey: Survey, model: Model, coefficients: Mapping[str, FloatArray], shift: Callable[[float], float]
+    survey: Survey,
+    model: Model,
+    coefficients: Mapping[str, FloatArray],
+    shift: Callable[[float], float],
 ) -> Iterator[dict[str, FloatArray]]:
     """Motion, measured and predicted torque of every log; by role its coefficients.
 
     `shift` gives the time in s after which a logged torque acts, for the time between samples.
 
-    Angles are smoothed without phase; the prediction is NaN where the smoother reaches past a stretch's end.
+    Angles are smoothed without phase; the prediction is NaN where the smoother reaches past a
+    stretch's end.
     """
     for number, log in enumerate(survey.logs):
         for piece in pieces(survey.segments(log), PREDICTED_ROWS):
@@ -49,10 +53,15 @@ def torque_blocks(
 
 def _torques(piece: Segment, model: Model, c: FloatArray, shift: float) -> dict[str, FloatArray]:
     if len(piece) < 16:
-        return _prediction_columns(piece, np.full_like(piece.theta, np.nan), np.full_like(piece.theta, np.nan))
+        return _prediction_columns(
+            piece, np.full_like(piece.theta, np.nan), np.full_like(piece.theta, np.nan)
+        )
     bandwidth = _bandwidth(piece, model, c)
-    # the model is not linear in the motion: what noise forbids to show is taken from its torque, not from its motion
-    theta = smoothed(piece.theta, piece.dt, max(bandwidth, min(PredictionFilter().motion, 0.1 / piece.dt)))
+    # the model is not linear in the motion: what noise forbids to show is taken from its torque,
+    # not from its motion
+    theta = smoothed(
+        piece.theta, piece.dt, max(bandwidth, min(PredictionFilter().motion, 0.1 / piece.dt))
+    )
     omega = np.gradient(theta, piece.dt, axis=1)
     motion = Motion(theta, omega, np.gradient(omega, piece.dt, axis=1))
     predicted = smoothed(torque(model, c, motion), piece.dt, bandwidth)
@@ -63,20 +72,30 @@ def _torques(piece: Segment, model: Model, c: FloatArray, shift: float) -> dict[
     return _prediction_columns(piece, omega, predicted)
 
 
-def _prediction_columns(piece: Segment, omega: FloatArray, predicted: FloatArray) -> dict[str, FloatArray]:
+def _prediction_columns(
+    piece: Segment, omega: FloatArray, predicted: FloatArray
+) -> dict[str, FloatArray]:
     columns = {"theta": piece.theta, "omega": omega, "tau": piece.tau}
-    flat = {f"{name}{joint + 1}": value[joint] for name, value in columns.items() for joint in range(2)}
+    flat = {
+        f"{name}{joint + 1}": value[joint] for name, value in columns.items() for joint in range(2)
+    }
     return {"t": piece.t, **flat, "tau1_predicted": predicted[0], "tau2_predicted": predicted[1]}
 
 
 def _bandwidth(piece: Segment, model: Model, c: FloatArray) -> float:
     """Hz below which the angles' noise, twice differentiated, adds at most `NOISE_SHARE` of the torque.
 
-    White noise σ_θ sampled at dt has σ_θ √(2 dt B/5) (2π B)² of acceleration below B; inertia makes it torque.
+    White noise σ_θ sampled at dt has σ_θ √(2 dt B/5) (2π B)² of acceleration below B; inertia
+    makes it torque.
     """
     outstretched = np.abs(np.diag(inertia(model, c, np.zeros((2, 1)))[..., 0]))
     allowed = NOISE_SHARE * np.sqrt(np.mean(piece.tau**2, axis=1))
-    noise = outstretched * first_guess(piece.theta, piece.tau).theta * np.sqrt(0.4 * piece.dt) * (2 * np.pi) ** 2
+    noise = (
+        outstretched
+        * first_guess(piece.theta, piece.tau).theta
+        * np.sqrt(0.4 * piece.dt)
+        * (2 * np.pi) ** 2
+    )
     sharpest = (allowed / np.maximum(noise, 1e-300)) ** 0.4
     return float(np.clip(sharpest.min(), LOWEST, min(HIGHEST, 0.1 / piece.dt)))
 
@@ -85,7 +104,9 @@ START_KEY = b"start_ns"
 ROWS = 1 << 17
 
 
-def write_columns(path: Path, blocks: Iterable[Mapping[str, object]], start_ns: Sequence[int]) -> None:
+def write_columns(
+    path: Path, blocks: Iterable[Mapping[str, object]], start_ns: Sequence[int]
+) -> None:
     """Write blocks of flat columns as one Parquet file, with each log's first stamp in its metadata."""
     import pyarrow
     import pyarrow.parquet
@@ -97,15 +118,22 @@ def write_columns(path: Path, blocks: Iterable[Mapping[str, object]], start_ns: 
             if writer is None:
                 schema = table.schema.with_metadata({START_KEY: json.dumps(list(start_ns))})
                 # floats of an estimate hardly ever repeat: a dictionary would only cost time
-                writer = pyarrow.parquet.ParquetWriter(path, schema, compression="zstd", use_dictionary=False)
+                writer = pyarrow.parquet.ParquetWriter(
+                    path, schema, compression="zstd", use_dictionary=False
+                )
             writer.write_table(table.cast(writer.schema))
     finally:
         if writer is not None:
             writer.close()
 
 
-def series_blocks(series: Iterable[PaperSeries], names: Sequence[str]) -> Iterator[dict[str, FloatArray]]:
-    """Windows of estimates gathered into blocks of columns, `t` first; a window's values are (s, n)."""
+def series_blocks(
+    series: Iterable[PaperSeries], names: Sequence[str]
+) -> Iterator[dict[str, FloatArray]]:
+    """Windows of estimates gathered into blocks of columns, `t` first.
+
+    a window's values are (s, n).
+    """
     gathered: list[PaperSeries] = []
     for window in series:
         gathered.append(window)
@@ -118,7 +146,10 @@ def series_blocks(series: Iterable[PaperSeries], names: Sequence[str]) -> Iterat
 
 def _columns(windows: Sequence[PaperSeries], names: Sequence[str]) -> dict[str, FloatArray]:
     values = np.concatenate([window.values for window in windows], axis=1)
-    return {"t": np.concatenate([window.t for window in windows]), **dict(zip(names, values, strict=True))}
+    return {
+        "t": np.concatenate([window.t for window in windows]),
+        **dict(zip(names, values, strict=True)),
+    }
 
 
 def information_blocks(fit: Fit, durations: Sequence[float]) -> Iterator[dict[str, FloatArray]]:
@@ -160,8 +191,9 @@ WHITE_SPECTRUM, SPECTRUM, TORQUE_SPECTRUM, AUTOCORRELATION = (
 def innovation_rows(sums: ResidualSums, *, whitened: bool) -> Iterator[dict[str, object]]:
     """Spectrum and autocorrelation of a residual: a row a joint and a frequency (Hz) or a lag (s).
 
-    `low` and `high` hold 95 % of the values of white noise. A whitened residual has its spectrum in shares of white
-    noise; that of windows is in (N m)²/Hz and stands beside the torque's own through the same windows.
+    `low` and `high` hold 95 % of the values of white noise. A whitened residual has its spectrum
+    in shares of white noise; that of windows is in (N m)²/Hz and stands beside the torque's own
+    through the same windows.
     """
     kinds: list[tuple[str, FloatArray, FloatArray, FloatArray, FloatArray]] = []
     if whitened:
@@ -189,11 +221,13 @@ def innovation_rows(sums: ResidualSums, *, whitened: bool) -> Iterator[dict[str,
             }
 
 
-def write_fit_series(folder: Path, fit: Fit, survey: Survey, settings: Settings, residual: ResidualSums | None) -> None:
+def write_fit_series(
+    folder: Path, fit: Fit, survey: Survey, settings: Settings, residual: ResidualSums | None
+) -> None:
     """Write the time series of a fit, and what its `residual` looks like.
 
-    `torque.parquet`, `information.parquet`, `running.parquet` (not of a fit that was held within bounds or did not
-    converge) and, where there is a residual, `innovations.parquet`.
+    `torque.parquet`, `information.parquet`, `running.parquet` (not of a fit that was held within
+    bounds or did not converge) and, where there is a residual, `innovations.parquet`.
     """
     summaries = [survey.summary(log) for log in survey.logs]
     starts = [summary.start_ns for summary in summaries]
@@ -203,7 +237,9 @@ def write_fit_series(folder: Path, fit: Fit, survey: Survey, settings: Settings,
     torques = torque_blocks(survey, fit.shared.model, coefficients, torque_shift(settings, fit))
     write_columns(folder / "torque.parquet", torques, starts)
     durations = [summary.duration for summary in summaries]
-    every = len(fit.logs) == len(summaries)  # a log too short for a window is in no fit, and nobody tells which it is
+    every = len(fit.logs) == len(
+        summaries
+    )  # a log too short for a window is in no fit, and nobody tells which it is
     if every:
         write_columns(folder / "information.parquet", information_blocks(fit, durations), starts)
     if every and has_running(fit):
@@ -219,6 +255,9 @@ def torque_coefficients(fit: Fit, role: str) -> FloatArray:
 
 
 def torque_shift(settings: Settings, fit: Fit) -> Callable[[float], float]:
-    """Time in s after which a logged torque acts, for the time between samples; with the delay of the fit, if any."""
+    """Time in s after which a logged torque acts, for the time between samples.
+
+    With the delay of the fit, if any.
+    """
     found = float(fit.values[fit.names.index("delay")]) if "delay" in fit.names else None
     return partial(settings.torque_shift, found_delay=found)

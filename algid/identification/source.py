@@ -28,7 +28,8 @@ Role = Literal["unloaded", "loaded"]
 class Staged:
     """A log that was fetched from an object store: its copy on this machine, and its URL.
 
-    A copy that is not `whole` holds what the reader needs, and zeros elsewhere: the log's hash is not known then.
+    A copy that is not `whole` holds what the reader needs, and zeros elsewhere: the log's hash is
+    not known then.
     """
 
     path: Path
@@ -67,7 +68,12 @@ class LogSource:
 
 
 def open_source(
-    log: LogLike, role: Role, profile: Profile | None = None, gravity: float = 9.81, *, changing: bool = False
+    log: LogLike,
+    role: Role,
+    profile: Profile | None = None,
+    gravity: float = 9.81,
+    *,
+    changing: bool = False,
 ) -> LogSource:
     """Open a log from a file or from memory.
 
@@ -79,7 +85,8 @@ def open_source(
         What the log's names, units and signs mean.
     gravity : float, m/s^2, for the named checks
     changing : bool
-        Whether the payload may change: then the log is refused for no payload that its metadata name.
+        Whether the payload may change: then the log is refused for no payload that its metadata
+        name.
 
     Raises
     ------
@@ -94,7 +101,13 @@ def open_source(
         log = _in_radians(log)
         check_step(log.origin.path, log.stamp_ns)
         source = LogSource(
-            log.origin.path, role, log.origin, lambda: iter([log]), len(log), gravity, partial(_hash_of_arrays, log)
+            log.origin.path,
+            role,
+            log.origin,
+            lambda: iter([log]),
+            len(log),
+            gravity,
+            partial(_hash_of_arrays, log),
         )
     else:
         path = log.path if isinstance(log, Staged) else Path(log)
@@ -102,16 +115,26 @@ def open_source(
         name, whole = (log.url, log.whole) if isinstance(log, Staged) else (str(log), True)
         digest = cache(partial(sha256_of, path)) if whole else None
         source = LogSource(
-            name, role, reader.origin, lambda: ahead(_of_an_arm(reader.blocks())), reader.rows, gravity, digest
+            name,
+            role,
+            reader.origin,
+            lambda: ahead(_of_an_arm(reader.blocks())),
+            reader.rows,
+            gravity,
+            digest,
         )
     truth = source.origin.truth
     if truth is None or changing:
         return source
     if truth.schedule:
-        raise LogError(f"{source.name}: its metadata say that the payload changes; weigh it with algid track")
+        raise LogError(
+            f"{source.name}: its metadata say that the payload changes; weigh it with algid track"
+        )
     if (truth.payload > 0) != (role == "loaded"):
         found = f"a payload of {truth.payload:g} kg" if truth.payload > 0 else "no payload"
-        raise LogError(f"{source.name}: expected a log of the {role} arm, its metadata say {found}; swap the logs")
+        raise LogError(
+            f"{source.name}: expected a log of the {role} arm, its metadata say {found}; swap the logs"
+        )
     return source
 
 
@@ -128,11 +151,15 @@ def open_sources(
 ) -> list[LogSource]:
     """Sources of one log, several, or none: see `open_source`.
 
-    A log that is given twice, byte for byte, counts once, and the first of the two has a notice of the other. Only logs
-    that promise as many samples as another are hashed for it.
+    A log that is given twice, byte for byte, counts once, and the first of the two has a notice of
+    the other. Only logs that promise as many samples as another are hashed for it.
     """
     several = (
-        [] if logs is None else [logs] if isinstance(logs, str | Path | Log | Staged) or is_columns(logs) else logs
+        []
+        if logs is None
+        else [logs]
+        if isinstance(logs, str | Path | Log | Staged) or is_columns(logs)
+        else logs
     )
     sources = [open_source(log, role, profile, gravity) for log in several]
     lengths = Counter(source.promised for source in sources if source.digest)
@@ -153,7 +180,10 @@ def open_sources(
 
 
 def with_twins_marked(unloaded: list[LogSource], loaded: list[LogSource]) -> list[LogSource]:
-    """All logs, unloaded ones first; a loaded one that is also given as unloaded says so: its payload is nought."""
+    """All logs, unloaded ones first.
+
+    a loaded one that is also given as unloaded says so: its payload is nought.
+    """
     lengths = {source.promised for source in unloaded if source.digest}
     if not any(source.digest and source.promised in lengths for source in loaded):
         return [*unloaded, *loaded]
@@ -187,7 +217,9 @@ def sha256_of(path: Path) -> str:
     """SHA-256 of a file, or of a folder's files in the order of their names."""
     digest = hashlib.sha256()
     for file in sorted(path.iterdir()) if path.is_dir() else [path]:
-        if file.is_file() and file.stat().st_size:  # one of none is empty, or waits for ever, as /proc/kmsg does
+        if (
+            file.is_file() and file.stat().st_size
+        ):  # one of none is empty, or waits for ever, as /proc/kmsg does
             with file.open("rb") as opened:
                 while chunk := opened.read(1 << 20):
                     digest.update(chunk)

@@ -21,16 +21,23 @@ samples it lacks, accelerations are wrong by twice their share."""
 def result_of(outcome: Identified, settings: Settings, survey: Survey) -> Result:
     """The result of `outcome` on a survey's logs, the first log first."""
     truth = survey.logs[0].origin.truth
-    payload = next((log.origin.truth.payload if log.origin.truth else None for log in survey.loaded), None)
+    payload = next(
+        (log.origin.truth.payload if log.origin.truth else None for log in survey.loaded), None
+    )
     first, *others = [survey.summary(log) for log in survey.logs]
     noticed = [(log, notice) for log in survey.logs for notice in survey.seen(log).notices]
-    of_logs = [notice.of(PurePath(log.name).name) for log, notice in noticed]  # the paths stand among the logs
+    of_logs = [
+        notice.of(PurePath(log.name).name) for log, notice in noticed
+    ]  # the paths stand among the logs
     others_arms = [
         Notice("OTHER_ARM", numbers={"first": survey.logs[0].name}, logs=(log.name,))
         for log in survey.logs
         if truth and log.origin.truth and log.origin.truth.arm != truth.arm
     ]
-    if any(one.code in CONTRADICTED and one.code not in log.origin.reading.accepted for log, one in noticed):
+    if any(
+        one.code in CONTRADICTED and one.code not in log.origin.reading.accepted
+        for log, one in noticed
+    ):
         outcome = replace(
             outcome,
             parameters=distrusted(outcome.parameters),

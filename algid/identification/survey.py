@@ -33,8 +33,9 @@ class Seen:
 class Survey:
     """Goes over logs as often as an estimator asks, and keeps what the first pass over each shows.
 
-    Hashing and the named checks run beside the first pass; whoever wants to know how far a pass has come is called.
-    Logs of `MOST_KEPT` samples in all are read once and kept; longer ones are read again for each pass.
+    Hashing and the named checks run beside the first pass; whoever wants to know how far a pass
+    has come is called. Logs of `MOST_KEPT` samples in all are read once and kept; longer ones are
+    read again for each pass.
 
     Parameters
     ----------
@@ -70,7 +71,10 @@ class Survey:
         self._stage, self._over, self._words = stage, self.logs if logs is None else tuple(logs), ""
 
     def segments(self, log: LogSource) -> Iterator[Segment]:
-        """A fresh pass over a log: its uniform segments, from its start. Raises `LogError` where it is refused."""
+        """A fresh pass over a log: its uniform segments, from its start.
+
+        Raises `LogError` where it is refused.
+        """
         rows = 0
         if log in self._kept:
             self._tell(log, 0)
@@ -116,7 +120,10 @@ class Survey:
         )
 
     def _counted(self, log: LogSource) -> Iterator[Log]:
-        """The log's blocks, each counted; the first is examined, and refuses a log only where that is all of it."""
+        """The log's blocks, each counted.
+
+        The first is examined, and refuses a log only where that is all of it.
+        """
         if log.digest is not None and log not in self._digests:
             self._digests[log] = Beside(log.digest)
         rows, first_ns, last_ns = 0, 0, 0
@@ -140,22 +147,27 @@ class Survey:
         self._seen.setdefault(log, Seen(rows, first_ns, last_ns, tuple(notices)))
 
     def _tell(self, log: LogSource, rows: int) -> None:
-        """A pass over `log` has come as far as `rows` samples; 0 starts one. The first over a log reads it."""
+        """A pass over `log` has come as far as `rows` samples; 0 starts one.
+
+        The first over a log reads it.
+        """
         if self.progress is None:
             return
         words = self._stage if log in self._seen else "reading"
         if words != self._words or (rows == 0 and log in self._done):
             self._words, self._done = words, {}
         self._done[log] = rows
-        expected = [self._seen[one].rows if one in self._seen else one.promised for one in self._over]
+        expected = [
+            self._seen[one].rows if one in self._seen else one.promised for one in self._over
+        ]
         self.progress(words, sum(self._done.values()), sum(expected) if all(expected) else 0)
 
 
 def _with_end(blocks: Iterator[Log], promised: int) -> Iterator[tuple[Log, bool]]:
     """Each block, and whether it is the only one.
 
-    Where more than twice its samples are promised it is not, and need not wait for the second one: a reader
-    refuses a log of which it would have to drop half.
+    Where more than twice its samples are promised it is not, and need not wait for the second one:
+    a reader refuses a log of which it would have to drop half.
     """
     for first in islice(blocks, 1):
         waited = [] if promised > 2 * len(first) else list(islice(blocks, 1))

@@ -42,9 +42,14 @@ class Simulation:
 
 
 def predictor_of(result: Result, name: str) -> Predictor:
-    """The model of a result whose file is called `name`; its coefficients raise as `torque_constants`."""
+    """The model of a result whose file is called `name`.
+
+    Its coefficients raise as `torque_constants`.
+    """
     model = model_of(result)
-    return Predictor(model, lambda role: torque_constants(result, model, role, name), shift_of(result))
+    return Predictor(
+        model, lambda role: torque_constants(result, model, role, name), shift_of(result)
+    )
 
 
 def validate(known: Predictor, survey: Survey) -> Validation:
@@ -70,7 +75,9 @@ def simulate(known: Predictor, survey: Survey) -> Simulation:
     total = RolloutScore()
     for log in survey.logs:
         duration = survey.summary(log).duration
-        one = rollouts(known.model, known.coefficients(log.role), survey.segments(log), duration, known.shift)
+        one = rollouts(
+            known.model, known.coefficients(log.role), survey.segments(log), duration, known.shift
+        )
         found[log.name] = one
         total += one
     return Simulation(found, total)

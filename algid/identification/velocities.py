@@ -17,7 +17,9 @@ from algid.signals.observers import PAPER_POLES, LuenbergerObserver
 from algid.signals.segments import Segment, append
 
 
-def with_velocities(survey: Survey, log: LogSource, settings: Settings, *, luenberger: bool) -> Iterator[Segment]:
+def with_velocities(
+    survey: Survey, log: LogSource, settings: Settings, *, luenberger: bool
+) -> Iterator[Segment]:
     """Segments of a log with measured velocities, the paper's observer's, or the zero-phase differentiator's.
 
     Raises
@@ -51,7 +53,10 @@ def with_velocities(survey: Survey, log: LogSource, settings: Settings, *, luenb
 
 
 class _Differentiator:
-    """The zero-phase differentiator on one stretch that comes in parts; its ends go on by point reflection."""
+    """The zero-phase differentiator on one stretch that comes in parts.
+
+    Its ends go on by point reflection.
+    """
 
     def __init__(self, dt: float, bandwidth: float) -> None:
         self._kernel = differentiator(dt, bandwidth)
@@ -66,7 +71,9 @@ class _Differentiator:
             if len(self._waiting) <= self._reach:
                 return
             head = self._waiting.theta
-            self._angles = np.concatenate([2 * head[:, :1] - head[:, self._reach : 0 : -1], head], axis=1)
+            self._angles = np.concatenate(
+                [2 * head[:, :1] - head[:, self._reach : 0 : -1], head], axis=1
+            )
         else:
             self._angles = np.concatenate([self._angles, segment.theta], axis=1)
         yield from self._ready()
@@ -75,8 +82,14 @@ class _Differentiator:
         """Give out the rest, at the end of the stretch."""
         assert self._waiting is not None
         if self._angles is None:
-            slope = np.gradient(self._waiting.theta, self._waiting.dt, axis=1) if len(self._waiting) > 1 else None
-            yield replace(self._waiting, omega=np.zeros_like(self._waiting.theta) if slope is None else slope)
+            slope = (
+                np.gradient(self._waiting.theta, self._waiting.dt, axis=1)
+                if len(self._waiting) > 1
+                else None
+            )
+            yield replace(
+                self._waiting, omega=np.zeros_like(self._waiting.theta) if slope is None else slope
+            )
             return
         tail = self._angles[:, -self._reach - 1 :]
         self._angles = np.concatenate([self._angles, 2 * tail[:, -1:] - tail[:, -2::-1]], axis=1)

@@ -24,7 +24,9 @@ def torques_beside(log: Log, channel: str) -> list[Remedy]:
     except LogError:  # a log in memory, or a file that is gone
         return []
     used = set(log.origin.mapping.values())
-    return [remedy for source, remedy in _candidates(entries, channel) if source not in used][:_MOST]
+    return [remedy for source, remedy in _candidates(entries, channel) if source not in used][
+        :_MOST
+    ]
 
 
 def _candidates(entries: tuple[Entry, ...], channel: str) -> Iterator[tuple[str, Remedy]]:
@@ -34,7 +36,14 @@ def _candidates(entries: tuple[Entry, ...], channel: str) -> Iterator[tuple[str,
     amperes = {f"{channel}.unit": "A", f"{channel}.torque_constant": None}
     for pattern, unit in ((_TORQUE, {}), (_CURRENT, amperes)):
         for topic, field in places:
-            if pattern.search(field) and not _COMMANDED.search(field) and not field.endswith("(empty)"):
+            if (
+                pattern.search(field)
+                and not _COMMANDED.search(field)
+                and not field.endswith("(empty)")
+            ):
                 home = {f"{channel}.topic": topic} if topic else {}
                 source = f"{topic}: {field}" if topic else field
-                yield source, Remedy({**home, f"{channel}.source": field, **unit}, "the log also holds")
+                yield (
+                    source,
+                    Remedy({**home, f"{channel}.source": field, **unit}, "the log also holds"),
+                )

@@ -15,12 +15,18 @@ from algid.words import counted
 
 _DENORMAL = 1e-6
 _SPIKE = 30.0
-_DEAD, _DEAD_RUNS = 0.1, 20  # s, and in usual runs: a torque that keeps one value so long is not measured
+_DEAD, _DEAD_RUNS = (
+    0.1,
+    20,
+)  # s, and in usual runs: a torque that keeps one value so long is not measured
 _TURN = 2 * math.pi
 
 
 def efforts(log: Log) -> Iterator[Notice]:
-    """Torques that are zero, constant or clipped; that of a joint without a motor may be anything."""
+    """Torques that are zero, constant or clipped.
+
+    That of a joint without a motor may be anything.
+    """
     for joint, tau in enumerate(log.tau, start=1):
         if joint == log.origin.reading.passive:
             continue
@@ -49,7 +55,8 @@ def efforts(log: Log) -> Iterator[Notice]:
 def dead_efforts(log: Log) -> Iterator[Notice]:
     """Torques whose longest run of one value is far longer than their runs elsewhere.
 
-    A run at the largest or the smallest value is a limit's, and slow publishers repeat every value as often.
+    A run at the largest or the smallest value is a limit's, and slow publishers repeat every value
+    as often.
     """
     for name, tau in zip(("tau1", "tau2"), log.tau, strict=True):
         changes = np.flatnonzero(np.diff(tau))
@@ -78,23 +85,36 @@ def angles(log: Log) -> Iterator[Notice]:
         # at this rate the arm moves by far less than a turn between two samples
         if wraps and np.median(thinned(sizes)) < 0.5:
             text = f"{what} jumps by a turn {counted(wraps, 'time')}"
-            yield Notice("WRAPPED_ANGLE", text, refuse=True, remedies=(Remedy({f"{name}.unwrap": True}),))
+            yield Notice(
+                "WRAPPED_ANGLE", text, refuse=True, remedies=(Remedy({f"{name}.unwrap": True}),)
+            )
         if moving.size == steps.size:  # it never stands still
             continue
         runs, usual = np.diff(moving), float(np.quantile(thinned(sizes[moving]), 0.99))
         long_enough = max(10, round(0.02 / log.period))
         frozen = np.flatnonzero((runs > long_enough) & (sizes[moving[1:]] > 5 * usual))
         if frozen.size:
-            start, length = (int(moving[frozen[0]]) + 1) * log.period, int(runs[frozen[0]]) * log.period
-            yield Notice("STUCK_SENSOR", f"{what} freezes for {length:.3g} s from t = {start:.6g} s, then jumps")
+            start, length = (
+                (int(moving[frozen[0]]) + 1) * log.period,
+                int(runs[frozen[0]]) * log.period,
+            )
+            yield Notice(
+                "STUCK_SENSOR",
+                f"{what} freezes for {length:.3g} s from t = {start:.6g} s, then jumps",
+            )
 
 
 def degrees(log: Log, is_right: Callable[[], bool]) -> Iterator[Notice]:
     """Angles or velocities in degrees, by each other or by how far the angles turn.
 
-    A joint may turn as often as it will: `is_right` tells whether physics holds for the log as it was read.
+    A joint may turn as often as it will: `is_right` tells whether physics holds for the log as it
+    was read.
     """
-    ratios = (0.0, 0.0) if log.omega is None else tuple(_travelled_over_summed(log, row) for row in (0, 1))
+    ratios = (
+        (0.0, 0.0)
+        if log.omega is None
+        else tuple(_travelled_over_summed(log, row) for row in (0, 1))
+    )
     pairs = (("angles", "theta", 180 / math.pi), ("velocities", "omega", math.pi / 180))
     for joint, ratio in enumerate(ratios, start=1):
         for what, quantity, factor in pairs:
@@ -104,7 +124,9 @@ def degrees(log: Log, is_right: Callable[[], bool]) -> Iterator[Notice]:
     widest = np.abs(log.theta).max(axis=1)
     row = int(np.argmax(widest))
     if widest[row] > 12 * math.pi and not any(ratios) and not is_right():
-        yield _in_degrees(log, f"theta{row + 1}", f"angles reach {widest[row]:.4g}: few arms turn that far in rad")
+        yield _in_degrees(
+            log, f"theta{row + 1}", f"angles reach {widest[row]:.4g}: few arms turn that far in rad"
+        )
 
 
 def _travelled_over_summed(log: Log, row: int) -> float:
@@ -112,7 +134,9 @@ def _travelled_over_summed(log: Log, row: int) -> float:
     assert log.omega is not None
     width = max(1, len(log) // 200)
     travelled = np.abs(np.diff(log.theta[row, ::width]))
-    summed = np.add.reduceat(np.abs(log.omega[row]), np.arange(0, len(log), width))[: travelled.size]
+    summed = np.add.reduceat(np.abs(log.omega[row]), np.arange(0, len(log), width))[
+        : travelled.size
+    ]
     summed = summed / width * np.diff(log.t[::width])
     moving = travelled > 0.2 * travelled.max()
     total = float(np.sum(summed[moving]))
@@ -124,9 +148,13 @@ def _in_degrees(log: Log, name: str, text: str) -> Notice:
     if log.origin.reading.told(name):
         unit = log.origin.reading.channels[name].unit
         return Notice("DEGREES", f"{text}; they are taken for {unit} as told")
-    remedies = [Remedy({"angle_unit": "deg"} if name.startswith("theta") else {f"{name}.unit": "deg"})]
+    remedies = [
+        Remedy({"angle_unit": "deg"} if name.startswith("theta") else {f"{name}.unit": "deg"})
+    ]
     if name.startswith("theta"):
-        remedies.append(Remedy({f"{name}.gear_ratio": None}, "for the angle of a motor behind its gear"))
+        remedies.append(
+            Remedy({f"{name}.gear_ratio": None}, "for the angle of a motor behind its gear")
+        )
     remedies.append(Remedy({f"{name}.unit": "rad"}, "where it is right"))
     return Notice("DEGREES", text, refuse=True, remedies=tuple(remedies))
 
@@ -135,7 +163,9 @@ def spikes(log: Log) -> Iterator[Notice]:
     """Single samples thirty times further off the middle of their neighbours than noise and bends of the signal are."""
     if len(log) < 20:
         return
-    for name, values in zip(("theta1", "theta2", "tau1", "tau2"), (*log.theta, *log.tau), strict=True):
+    for name, values in zip(
+        ("theta1", "theta2", "tau1", "tau2"), (*log.theta, *log.tau), strict=True
+    ):
         off = values[1:-1] - (values[:-2] + values[2:]) / 2
         size = np.abs(off)
         limit = _SPIKE * max(robust_deviation(off), float(np.quantile(thinned(size), 0.9)))

@@ -16,7 +16,9 @@ from algid.notices import Notice
 
 
 def examine(log: Log, *, gravity: float = 9.81, whole: bool = True) -> tuple[Notice, ...]:
-    """Everything that the checks find in a log; conventions are not sought in one that a check refuses.
+    """Everything that the checks find in a log.
+
+    Conventions are not sought in one that a check refuses.
 
     Parameters
     ----------

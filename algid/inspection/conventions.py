@@ -1,6 +1,7 @@
 """The convention under which a log obeys physics, where it is not the one it was read by, and what sets it.
 
-`algid.estimators.convention_search` finds it; here it becomes words, and settings of a profile that change the reading.
+`algid.estimators.convention_search` finds it; here it becomes words, and settings of a profile
+that change the reading.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ from algid.notices import Remedy
 from algid.signals.segments import Segment, append, segments
 from algid.words import counted
 
-_SMALL = np.pi / 4  # rad: a zero this close, or a centre of mass off its link, is a phase and no other convention
+_SMALL = (
+    np.pi / 4
+)  # rad: a zero this close, or a centre of mass off its link, is a phase and no other convention
 _TOLD = 0.01  # rad: a zero closer than this is not worth a word
 _SAME = 1e-3  # of a scale or rad: as good as equal
 
@@ -54,7 +57,9 @@ class Mend:
 
 
 def judged(log: Log, *, gravity: bool = True) -> Judgement | None:
-    """Every convention tried on a log; None where it is too short or too slow to tell, or a torque is none.
+    """Every convention tried on a log.
+
+    None where it is too short or too slow to tell, or a torque is none.
 
     Parameters
     ----------
@@ -68,7 +73,9 @@ def judged(log: Log, *, gravity: bool = True) -> Judgement | None:
         else:
             stretches.append(segment)
     longest = max(stretches, key=len, default=None)
-    if longest is None or not np.all(np.mean(longest.tau**2, axis=1) > 0):  # a torque that is none tells nothing
+    if longest is None or not np.all(
+        np.mean(longest.tau**2, axis=1) > 0
+    ):  # a torque that is none tells nothing
         return None
     return judge(longest.theta, longest.tau, longest.dt, gravity=gravity)
 
@@ -79,7 +86,9 @@ def is_right(found: Judgement | None) -> bool:
 
 
 def mend(log: Log, found: Judgement | None) -> Mend | None:
-    """What sets a log right that physics contradicts as it was read; None where it is right, or the log does not tell.
+    """What sets a log right that physics contradicts as it was read.
+
+    None where it is right, or the log does not tell.
 
     Parameters
     ----------
@@ -89,7 +98,8 @@ def mend(log: Log, found: Judgement | None) -> Mend | None:
     if found is None or not found.alone or found.best.convention == AS_READ:
         return None
     convention = min(
-        (found.best.convention, found.best.convention.mirrored()), key=lambda one: len(list(_clauses(one)))
+        (found.best.convention, found.best.convention.mirrored()),
+        key=lambda one: len(list(_clauses(one))),
     )
     words = " and ".join(_clauses(convention))
     if convention.mirrored().zero == (0.0, 0.0) and replace(convention, zero=(0.0, 0.0)) == AS_READ:
@@ -149,8 +159,12 @@ def _settings(convention: Convention, log: Log) -> dict[str, Any]:
     found: dict[str, Any] = dict(_sources(convention, log))
     place = (1, 0) if convention.swapped else (0, 1)
     for joint in (0, 1):
-        theta, tau = found.setdefault(f"theta{joint + 1}", {}), found.setdefault(f"tau{joint + 1}", {})
-        # A channel that is swapped keeps what the profile says of its joint: names and units go with the joint.
+        theta, tau = (
+            found.setdefault(f"theta{joint + 1}", {}),
+            found.setdefault(f"tau{joint + 1}", {}),
+        )
+        # A channel that is swapped keeps what the profile says of its joint: names and units go
+        # with the joint.
         if convention.signs[joint] < 0 and convention.torque_signs[joint] < 0:
             signs = list(found.get("signs", reading.signs))
             signs[joint] = -signs[joint]
@@ -186,7 +200,11 @@ def _sources(convention: Convention, log: Log) -> Iterator[tuple[str, Any]]:
 
 def _own_sign(reading: Reading, name: str) -> int:
     """The sign that the profile gives a channel, beside that of its joint."""
-    return reading.channels[name].sign * reading.signs[int(name[-1]) - 1] if name in reading.channels else 1
+    return (
+        reading.channels[name].sign * reading.signs[int(name[-1]) - 1]
+        if name in reading.channels
+        else 1
+    )
 
 
 def _zeros(convention: Convention, reading: Reading, place: tuple[int, int]) -> dict[str, Any]:
@@ -195,15 +213,28 @@ def _zeros(convention: Convention, reading: Reading, place: tuple[int, int]) -> 
     own = [0.0 if channel is None else channel.offset for channel in channels]
     hanging = -pi / 2 if reading.zero == "hanging" else 0.0
     read = [own[0] + hanging, own[1] - (own[0] if reading.second_angle == "absolute" else 0.0)]
-    first, second = (convention.signs[joint] / convention.scale[joint] * read[place[joint]] for joint in (0, 1))
-    first, second = first + convention.zero[0], second - (first if convention.absolute else 0.0) + convention.zero[1]
-    if isclose(first, read[0], abs_tol=_SAME) and isclose(second, read[1], abs_tol=_SAME) and not convention.absolute:
+    first, second = (
+        convention.signs[joint] / convention.scale[joint] * read[place[joint]] for joint in (0, 1)
+    )
+    first, second = (
+        first + convention.zero[0],
+        second - (first if convention.absolute else 0.0) + convention.zero[1],
+    )
+    if (
+        isclose(first, read[0], abs_tol=_SAME)
+        and isclose(second, read[1], abs_tol=_SAME)
+        and not convention.absolute
+    ):
         return {}
     zeros = {"horizontal": first, "hanging": first + pi / 2}
-    zero = min(zeros, key=lambda name: (abs(remainder(zeros[name], 2 * pi)) > _SAME, name != reading.zero))
+    zero = min(
+        zeros, key=lambda name: (abs(remainder(zeros[name], 2 * pi)) > _SAME, name != reading.zero)
+    )
     offset = remainder(zeros[zero], 2 * pi)
     both = (offset, second + (offset if convention.absolute else 0.0))
-    added = [remainder(both[joint], 2 * pi) - (own[joint] - reading.offsets[joint]) for joint in (0, 1)]
+    added = [
+        remainder(both[joint], 2 * pi) - (own[joint] - reading.offsets[joint]) for joint in (0, 1)
+    ]
     offsets = [0.0 if abs(angle) < _SAME else float(f"{angle:.6g}") for angle in added]
     found: dict[str, Any] = {"zero": zero} if zero != reading.zero else {}
     return found | ({"offsets": offsets} if offsets != list(reading.offsets) else {})

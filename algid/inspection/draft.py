@@ -24,9 +24,7 @@ _HEAD = """\
 # end = 60.0                 # s since the first sample: leave out what comes after
 # accept = ["DEGREES"]       # codes of checks that may warn, but not refuse
 """
-_ENCODER = (
-    "# gear_ratio = 1.0  # turns of the encoder in one of the joint\n# counts = 4096.0  # encoder counts in one turn\n"
-)
+_ENCODER = "# gear_ratio = 1.0  # turns of the encoder in one of the joint\n# counts = 4096.0  # encoder counts in one turn\n"
 _UNITS = {
     "theta": f'# unit = "deg"  # rad, mrad, deg, rev, counts\n{_ENCODER}# unwrap = true  # where it jumps by a turn\n',
     "omega": f'# unit = "deg"  # a second; or rpm\n{_ENCODER}',
@@ -38,7 +36,9 @@ _ON_TOPICS = ("mcap", "rosbag2", "bag", "db3")
 
 
 def draft_profile(path: Path) -> str:
-    """The text of a profile for a log; for one that cannot be read yet, its names stand in comments.
+    """The text of a profile for a log.
+
+    For one that cannot be read yet, its names stand in comments.
 
     Raises
     ------
@@ -47,8 +47,13 @@ def draft_profile(path: Path) -> str:
     """
     log = look(path, lambda: open_log(path).origin)
     head = "" if log.found else f"# {_safe(log.refused or '')}\n"
-    entries = "".join(f"# in the log: {_safe(one.name)[:80]} ({_safe(one.type)[:60]})\n" for one in log.entries[:64])
-    return _HEAD + head + _source(log.found, log.format) + entries + _channels(log.found, log.format)
+    entries = "".join(
+        f"# in the log: {_safe(one.name)[:80]} ({_safe(one.type)[:60]})\n"
+        for one in log.entries[:64]
+    )
+    return (
+        _HEAD + head + _source(log.found, log.format) + entries + _channels(log.found, log.format)
+    )
 
 
 def _source(origin: Origin | None, kind: str) -> str:
@@ -60,11 +65,18 @@ def _source(origin: Origin | None, kind: str) -> str:
         else '# joints = ["shoulder", "elbow"]'
     )
     if kind in _ON_TOPICS:
-        topic = f"topic = {_quoted(reading.topics[0])}" if reading.topics else '# topic = "/joint_states"'
+        topic = (
+            f"topic = {_quoted(reading.topics[0])}"
+            if reading.topics
+            else '# topic = "/joint_states"'
+        )
         time = ('# time = "t"  # of tables', '# time_unit = "s"  # of tables: s, ms, us, ns')
         clock = "# clock = \"log\"  # the recorder's times, not the messages' own"
     else:
-        topic, clock = '# topic = "/joint_states"  # of bags', '# clock = "log"  # of bags: header or log'
+        topic, clock = (
+            '# topic = "/joint_states"  # of bags',
+            '# clock = "log"  # of bags: header or log',
+        )
         unit = f'time_unit = "{reading.time_unit}"' if reading.time_unit else '# time_unit = "s"'
         name = f"time = {_quoted(origin.mapping['t'])}" if origin else '# time = "t"'
         time = (name, f"{unit}  # s, ms, us, ns")
@@ -79,10 +91,16 @@ def _channels(origin: Origin | None, kind: str) -> str:
             topic, _, source = source.partition(": ")
         own = topic and origin is not None and topic != origin.reading.topics[0]
         lines = [
-            f"topic = {_quoted(topic)}" if own else '# topic = "/joint_states"  # where it is another',
+            f"topic = {_quoted(topic)}"
+            if own
+            else '# topic = "/joint_states"  # where it is another',
             f"source = {_quoted(source)}" if source else '# source = "NAME"',
         ]
-        text += f"\n[{name}]\n" + "\n".join(lines) + f"\n# sign = -1\n# offset = 0.0\n{_UNITS[name[:-1]]}"
+        text += (
+            f"\n[{name}]\n"
+            + "\n".join(lines)
+            + f"\n# sign = -1\n# offset = 0.0\n{_UNITS[name[:-1]]}"
+        )
     return text
 
 

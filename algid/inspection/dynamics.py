@@ -1,7 +1,8 @@
 """A rough look at a log's dynamics: whether it moves the arm enough, and its torque carries the arm's weight.
 
-The model of eq. (1) is fitted by least squares to smoothed signals, once with gravity as it is and once with
-gravity turned by a right angle. That is no identification; it tells a wrong sign or zero from a right one.
+The model of eq. (1) is fitted by least squares to smoothed signals, once with gravity as it is and
+once with gravity turned by a right angle. That is no identification; it tells a wrong sign or zero
+from a right one.
 """
 
 from __future__ import annotations
@@ -37,12 +38,13 @@ class DynamicFigures:
     weight1, weight2 : float, N m
         Gravity constants k4 and k2 of the fit.
     turn : float, deg
-        Direction that gravity has in the fit against the one that algid expects: 0 for a right zero, ±90 for
-        angles from the vertical, 180 for a flipped sign.
+        Direction that gravity has in the fit against the one that algid expects: 0 for a right
+        zero, ±90 for angles from the vertical, 180 for a flipped sign.
     gravity_share : float
         Share of the torques' variance that is lost without gravity.
     seen : float
-        How far gravity's columns stand out of all others, 0 to 1: below 0.1 its direction is not known.
+        How far gravity's columns stand out of all others, 0 to 1: below 0.1 its direction is not
+        known.
     inertia : float, kg m^2
         k3 + k5 of the fit.
     """
@@ -63,7 +65,10 @@ def dynamic_figures(log: Log) -> DynamicFigures | None:
     if smooth is None:
         return None
     theta, tau, dt = smooth
-    omega, alpha = np.gradient(theta, dt, axis=1), np.gradient(np.gradient(theta, dt, axis=1), dt, axis=1)
+    omega, alpha = (
+        np.gradient(theta, dt, axis=1),
+        np.gradient(np.gradient(theta, dt, axis=1), dt, axis=1),
+    )
     inner = slice(_EDGE, -_EDGE)
     theta, omega, alpha, tau = theta[:, inner], omega[:, inner], alpha[:, inner], tau[:, inner]
     rows = _rows(regressor(theta, omega, alpha))
@@ -100,16 +105,24 @@ def gravity_findings(figures: DynamicFigures) -> Iterator[Notice]:
     weightless = math.hypot(figures.weight1, figures.weight2) < _LEAST_PULL * abs(figures.inertia)
     if figures.seen > 0.15 and figures.gravity_share < 0.01 and weightless:
         level = Remedy({"gravity": 0}, "for a horizontal plane")
-        yield Notice("GRAVITY_COMPENSATED", numbers={"percent": 100 * figures.gravity_share}, remedies=(level,))
+        yield Notice(
+            "GRAVITY_COMPENSATED",
+            numbers={"percent": 100 * figures.gravity_share},
+            remedies=(level,),
+        )
     elif figures.seen < 0.015 or figures.gravity_share < 0.02:
         return  # the motion does not tell where gravity pulls
     elif abs(figures.turn) > 135:
         torques = Remedy(
-            {"tau1.sign": -1, "tau2.sign": -1}, "turn the torques round, or angles and velocities likewise"
+            {"tau1.sign": -1, "tau2.sign": -1},
+            "turn the torques round, or angles and velocities likewise",
         )
         yield Notice("FLIPPED_SIGN", numbers={"weight": figures.weight1}, remedies=(torques,))
     elif abs(figures.turn) > 45:
-        hanging, other = Remedy({"zero": "hanging"}), Remedy({"theta1.offset": None}, "another zero")
+        hanging, other = (
+            Remedy({"zero": "hanging"}),
+            Remedy({"theta1.offset": None}, "another zero"),
+        )
         yield Notice("WRONG_ZERO", numbers={"turn": figures.turn}, remedies=(hanging, other))
 
 

@@ -58,7 +58,8 @@ class ClockFigures:
 def signal_figures(values: FloatArray) -> SignalFigures:
     """Figures of a channel (N,).
 
-    The noise floor is the robust deviation of its third differences over √20: smooth motion has none.
+    The noise floor is the robust deviation of its third differences over √20: smooth motion has
+    none.
     """
     noise = robust_deviation(differences(values, 3)) / np.sqrt(20) if values.size > 3 else 0.0
     low, high = float(values.min()), float(values.max())
@@ -77,12 +78,17 @@ def robust_deviation(values: FloatArray) -> float:
 
 
 def grid_step(values: FloatArray) -> float:
-    """The step of an encoder or converter: the smallest difference, if all are multiples of it; else 0."""
+    """The step of an encoder or converter: the smallest difference, if all are multiples of it.
+
+    Else 0.
+    """
     levels = np.unique(values[:20_000])
     if levels.size <= 2:
         return 0.0
     steps = np.diff(levels)
-    smallest = float(steps[steps > 1e-9 * max(1e-300, float(np.abs(levels).max()))].min(initial=np.inf))
+    smallest = float(
+        steps[steps > 1e-9 * max(1e-300, float(np.abs(levels).max()))].min(initial=np.inf)
+    )
     if not np.isfinite(smallest):
         return 0.0
     ratios = steps / smallest
@@ -102,7 +108,10 @@ def saturated_share(values: FloatArray) -> float:
 
 
 def clock_figures(log: Log) -> ClockFigures:
-    """Figures of a log's stamps, two at least; gaps and jitter are those left once clusters are in their place."""
+    """Figures of a log's stamps, two at least.
+
+    Gaps and jitter are those left once clusters are in their place.
+    """
     period, stamp_ns = log.period, log.stamp_ns
     if near_stamps(stamp_ns, period):
         stamp_ns = np.concatenate([block.stamp_ns for block in spaced([log], period)])

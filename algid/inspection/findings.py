@@ -40,10 +40,18 @@ REFUSED = ("EFFORT_ZERO", "EFFORT_DENORMAL", "EFFORT_CONSTANT", "WRAPPED_ANGLE",
 
 
 def yielding(notice: Notice, accepted: Collection[str]) -> Notice:
-    """A refusal with what overrides it, or as a warning where its code is in `accepted`; else the same."""
+    """A refusal with what overrides it, or as a warning where its code is in `accepted`.
+
+    Else the same.
+    """
     if not notice.refuse:
         return notice
     if notice.code in accepted:
-        return replace(notice, refuse=False, remedies=(), text=f"{notice.text}; used nevertheless, as accept says")
+        return replace(
+            notice,
+            refuse=False,
+            remedies=(),
+            text=f"{notice.text}; used nevertheless, as accept says",
+        )
     override = Remedy({"accept": notice.code}, "to use it nevertheless")
     return replace(notice, remedies=(*notice.remedies, override))

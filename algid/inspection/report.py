@@ -1,4 +1,6 @@
-"""What a file holds, by name: columns, or topics with their types; also of a file that cannot be used.
+"""What a file holds, by name: columns, or topics with their types.
+
+Also of a file that cannot be used.
 
 The whole look at a log that `algid inspect` prints.
 """
@@ -72,7 +74,10 @@ CONTRADICTIONS = ("WRONG_CONVENTION", "FLIPPED_SIGN", "WRONG_ZERO")
 
 @dataclass(frozen=True)
 class Inspection:
-    """What a log is and is worth; everything below `refused` is empty for a log that cannot be read."""
+    """What a log is and is worth.
+
+    Everything below `refused` is empty for a log that cannot be read.
+    """
 
     path: str
     format: str
@@ -103,7 +108,9 @@ class Inspection:
 
 
 def inspect_log(path: Path, profile: Profile | None = None) -> Inspection:
-    """Look at a log without using it; a log that cannot be read gives what it holds, and the reason.
+    """Look at a log without using it.
+
+    a log that cannot be read gives what it holds, and the reason.
 
     Raises
     ------

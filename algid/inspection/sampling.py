@@ -53,16 +53,20 @@ def sampling(log: Log) -> Iterator[Notice]:
     if clock.jitter * clock.rate > 0.01:
         bend = max(float(np.sqrt(np.mean(np.diff(row, 2) ** 2))) for row in log.theta) / 8
         text = f"stamps jitter by {clock.jitter * 1e3:.3g} ms about {period}"
-        yield Notice("JITTER", f"{text}; resampling moves angles by {bend:.2g} rad at most, linearly")
+        yield Notice(
+            "JITTER", f"{text}; resampling moves angles by {bend:.2g} rad at most, linearly"
+        )
 
 
 def samples_a_period(log: Log) -> float:
-    """Samples in a period of the faster joint's motion; infinite where a step between samples is below 0.02 rad.
+    """Samples in a period of the faster joint's motion.
+
+    Infinite where a step between samples is below 0.02 rad.
 
     Notes
     -----
-    Of a sine with p samples a period, second differences are 2 sin(π/p) times first ones in size. Medians, so that
-    spikes and rest do not count; steps that small may be noise.
+    Of a sine with p samples a period, second differences are 2 sin(π/p) times first ones in size.
+    Medians, so that spikes and rest do not count; steps that small may be noise.
     """
     fewest = math.inf
     for theta in log.theta:
@@ -73,9 +77,12 @@ def samples_a_period(log: Log) -> float:
 
 
 def lost_steps(log: Log) -> int:
-    """How many steps both joints make in the time of one; 0 where noise or a slow motion does not tell.
+    """How many steps both joints make in the time of one.
 
-    A velocity that is twice the mean of its neighbours' is a lost sample's. Noise makes one that is nought as often.
+    0 where noise or a slow motion does not tell.
+
+    A velocity that is twice the mean of its neighbours' is a lost sample's. Noise makes one that
+    is nought as often.
     """
     count = len(log) - 3
     before, own, after = (
@@ -97,12 +104,15 @@ def lost_steps(log: Log) -> int:
 def rests(log: Log, whole: bool) -> Iterator[Notice]:
     """Rest before the motion and, where the log is `whole`, after it.
 
-    A joint that stiction holds bears a torque of which the motion tells nothing: gravity's constants take it. A posture
-    that a motor holds freely tells more of gravity than any motion. The log cannot tell which it is: the rest is named,
-    with the flags that leave it out, and stays.
+    A joint that stiction holds bears a torque of which the motion tells nothing: gravity's
+    constants take it. A posture that a motor holds freely tells more of gravity than any motion.
+    The log cannot tell which it is: the rest is named, with the flags that leave it out, and
+    stays.
     """
     figures = [signal_figures(theta) for theta in log.theta]
-    room = np.array([max(8 * one.noise, 2 * one.step, _STILL * (one.high - one.low)) for one in figures])
+    room = np.array(
+        [max(8 * one.noise, 2 * one.step, _STILL * (one.high - one.low)) for one in figures]
+    )
     few = max(4, round(0.02 / log.period))
     before = _still(log.t, log.theta, room, few)
     after = _still(log.duration - log.t[::-1], log.theta[:, ::-1], room, few) if whole else 0.0

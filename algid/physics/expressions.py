@@ -1,7 +1,8 @@
 """Sums of products of a motion's signals: derived, evaluated and written out as source text.
 
-An atom is a signal that is no product of others: ω1, cos θ2, tanh(ω1 / ω_s). It knows its value, its text in C and
-Python, and its derivatives. An expression is a sum of products of atoms with numbers before them.
+An atom is a signal that is no product of others: ω1, cos θ2, tanh(ω1 / ω_s). It knows its value,
+its text in C and Python, and its derivatives. An expression is a sum of products of atoms with
+numbers before them.
 
 ======  ==================================================  =========================
 symbol  name                                                shape
@@ -40,7 +41,8 @@ class Atom:
     source : str
         Its text, which C and Python read alike; "" for what every function is handed.
     slopes : callable
-        Its derivatives by the signals it depends on, by their names. Called late: cosines derive from sines, and back.
+        Its derivatives by the signals it depends on, by their names. Called late: cosines derive
+        from sines, and back.
     constant : callable or None
         Its value from the shape alone, for one that no motion changes.
     """
@@ -60,7 +62,10 @@ Product = tuple[Atom, ...]
 
 @dataclass(frozen=True, eq=False)
 class Expression:
-    """A sum of products, each with its factor; no product stands twice, and none with a factor of zero."""
+    """A sum of products, each with its factor.
+
+    No product stands twice, and none with a factor of zero.
+    """
 
     products: Mapping[Product, float]
 

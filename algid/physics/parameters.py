@@ -1,7 +1,7 @@
 """What a parameter is: its name, unit, meaning, scale, sign and plausible range, each once.
 
-A parameter's standard deviation is compared with its scale: the largest value among the parameters of that scale, and
-no less than the scale's `least`.
+A parameter's standard deviation is compared with its scale: the largest value among the parameters
+of that scale, and no less than the scale's `least`.
 """
 
 from __future__ import annotations
@@ -65,7 +65,11 @@ PAYLOAD = (
 )
 """What loaded logs tell beside the arm."""
 BODY = (
-    Parameter("y_p", "y_p", "m", "distance of the payload's centre of mass off link 2's line", LENGTH),
-    Parameter("J_p", "J_p", "kg m^2", "inertia of the payload about its centre of mass", INERTIA, "+"),
+    Parameter(
+        "y_p", "y_p", "m", "distance of the payload's centre of mass off link 2's line", LENGTH
+    ),
+    Parameter(
+        "J_p", "J_p", "kg m^2", "inertia of the payload about its centre of mass", INERTIA, "+"
+    ),
 )
 """What a payload that is no point at the tip has beside: both are nothing where the logs do not tell them."""

@@ -95,7 +95,13 @@ def _fading(joint: int) -> Atom:
 
     def slopes() -> Mapping[str, Expression]:
         w = (W1, W2)[joint]
-        return {f"omega{joint + 1}": expression(_FADINGS[joint]) * w * STRIBECK_RATE * STRIBECK_RATE * -2.0}
+        return {
+            f"omega{joint + 1}": expression(_FADINGS[joint])
+            * w
+            * STRIBECK_RATE
+            * STRIBECK_RATE
+            * -2.0
+        }
 
     def value(motion: Motion, shape: Widths) -> FloatArray:
         return np.exp(-((motion.omega[joint] / shape.stribeck_speed) ** 2))

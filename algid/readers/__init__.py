@@ -15,13 +15,16 @@ if TYPE_CHECKING:
 
 
 def open_log(path: str | Path | Columns, profile: Profile | None = None) -> TableReader:
-    """Open a log of any format, known from its content; its samples are read by `TableReader.blocks`.
+    """Open a log of any format, known from its content.
+
+    Its samples are read by `TableReader.blocks`.
 
     Parameters
     ----------
     path : str, Path or columns
-        A CSV (also compressed), Parquet, MCAP, Feather, NumPy, MATLAB or ROS 1 bag file, or a rosbag2 folder; or a
-        pandas or polars frame, or a dict of arrays, as `algid.readers.memory` takes them.
+        A CSV (also compressed), Parquet, MCAP, Feather, NumPy, MATLAB or ROS 1 bag file, or a
+        rosbag2 folder; or a pandas or polars frame, or a dict of arrays, as `algid.readers.memory`
+        takes them.
     profile : Profile, optional
         What the log's names, units and signs mean, where the log does not tell.
 
@@ -48,7 +51,8 @@ def read_log(path: str | Path | Columns, profile: Profile | None = None) -> Log:
     Parameters
     ----------
     path : str, Path or columns
-        A file of any format that algid reads, or a rosbag2 folder; or a pandas or polars frame, or a dict of arrays.
+        A file of any format that algid reads, or a rosbag2 folder; or a pandas or polars frame, or
+        a dict of arrays.
     profile : Profile, optional
         What the log's names, units and signs mean, where the log does not tell.
 

@@ -78,14 +78,20 @@ def open_content(
     except LogError as error:
         if not others:
             raise
-        raise LogError(f"{error}; the log also holds, of another length: {', '.join(others[:_MOST_TOLD])}") from error
+        raise LogError(
+            f"{error}; the log also holds, of another length: {', '.join(others[:_MOST_TOLD])}"
+        ) from error
     columns = of_numbers(path, columns, schema)
 
     def frames(columns: Columns, rows: int, most: int | None) -> Iterator[pl.DataFrame]:
-        numbers = [number(name, pl.col(source), schema[source]) for name, source in columns.sources.items()]
+        numbers = [
+            number(name, pl.col(source), schema[source]) for name, source in columns.sources.items()
+        ]
         end = content.rows if most is None else min(most, content.rows)
         for first in range(0, end, rows):
-            yield content.part(first, min(first + rows, end), set(columns.sources.values())).select(numbers)
+            yield content.part(first, min(first + rows, end), set(columns.sources.values())).select(
+                numbers
+            )
 
     return flat_reader(path, kind, columns, frames, profile, content.rows)
 
@@ -123,7 +129,9 @@ def contents_of(path: Path, kind: str) -> tuple[Content, tuple[str, ...]]:
         If the file is damaged, too large, or holds no arrays of one length.
     """
     if path.stat().st_size > LIMITS.whole_bytes:
-        raise LogError(f"{path}: a {kind} file of more than 1 GiB is not read as a whole; save it as Parquet")
+        raise LogError(
+            f"{path}: a {kind} file of more than 1 GiB is not read as a whole; save it as Parquet"
+        )
     others: tuple[str, ...] = ()
     with natively(path, kind):
         if kind == "jsonl":
@@ -141,7 +149,9 @@ def contents_of(path: Path, kind: str) -> tuple[Content, tuple[str, ...]]:
 def _npy(path: Path) -> dict[str, NDArray[Any]]:
     array = np.load(path, allow_pickle=False)
     if array.dtype.names is None:
-        raise LogError(f"{path}: an array without names; save it with np.savez(FILE, t=…, q=…, tau=…)")
+        raise LogError(
+            f"{path}: an array without names; save it with np.savez(FILE, t=…, q=…, tau=…)"
+        )
     return {name: array[name] for name in array.dtype.names}
 
 
@@ -149,7 +159,9 @@ def _npz(path: Path) -> dict[str, NDArray[Any]]:
     with zipfile.ZipFile(path) as archive:
         claimed = sum(entry.file_size for entry in archive.infolist())
     if claimed > LIMITS.whole_bytes:
-        raise LogError(f"{path}: the archive claims {counted(claimed, 'byte')} unpacked; save it as Parquet")
+        raise LogError(
+            f"{path}: the archive claims {counted(claimed, 'byte')} unpacked; save it as Parquet"
+        )
     with np.load(path, allow_pickle=False) as archive:
         return dict(archive)
 
@@ -175,7 +187,11 @@ def _hdf5(path: Path) -> dict[str, NDArray[Any]]:
     found: dict[str, Any] = {}
 
     def keep(name: str, one: Any) -> None:
-        if isinstance(one, h5py.Dataset) and not (one.is_virtual or one.external) and not name.startswith("#"):
+        if (
+            isinstance(one, h5py.Dataset)
+            and not (one.is_virtual or one.external)
+            and not name.startswith("#")
+        ):
             kinds = one.dtype.names or ()
             fields = {f"{name}/{field}": one.dtype[field] for field in kinds} or {name: one.dtype}
             if one.ndim <= 2 and all(kind.kind in "iuf" for kind in fields.values()):
@@ -185,7 +201,9 @@ def _hdf5(path: Path) -> dict[str, NDArray[Any]]:
         file.visititems(keep)
         claimed = sum(one.nbytes for one in found.values())
         if claimed > LIMITS.whole_bytes or len(found) > LIMITS.columns:
-            raise LogError(f"{path}: {counted(len(found), 'array')} of {counted(claimed, 'byte')}; save it as Parquet")
+            raise LogError(
+                f"{path}: {counted(len(found), 'array')} of {counted(claimed, 'byte')}; save it as Parquet"
+            )
         arrays: dict[str, NDArray[Any]] = {}
         for name, one in found.items():
             values = one[()]
@@ -211,7 +229,9 @@ def _leaves(content: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, NDAr
             yield f"{prefix}{name}", value
 
 
-def columns_of(path: str, arrays: Mapping[str, NDArray[Any]]) -> tuple[dict[str, NDArray[Any]], tuple[str, ...]]:
+def columns_of(
+    path: str, arrays: Mapping[str, NDArray[Any]]
+) -> tuple[dict[str, NDArray[Any]], tuple[str, ...]]:
     """Columns as long as the time, or as the longest array, and the arrays that are not, with their shapes.
 
     A nested name's last part stands for it where that is unique.
@@ -221,14 +241,22 @@ def columns_of(path: str, arrays: Mapping[str, NDArray[Any]]) -> tuple[dict[str,
     LogError
         If no array has two samples.
     """
-    numbers = {name: np.squeeze(array) for name, array in arrays.items() if array.dtype.kind in "iuf"}
+    numbers = {
+        name: np.squeeze(array) for name, array in arrays.items() if array.dtype.kind in "iuf"
+    }
     last = {name: name.rpartition(".")[2] for name in numbers}
     short = Counter(last.values())
-    numbers = {last[name] if short[last[name]] == 1 else name: array for name, array in numbers.items()}
-    clocks = [array.size for name, array in numbers.items() if name.lower() in TIMES and array.ndim == 1]
+    numbers = {
+        last[name] if short[last[name]] == 1 else name: array for name, array in numbers.items()
+    }
+    clocks = [
+        array.size for name, array in numbers.items() if name.lower() in TIMES and array.ndim == 1
+    ]
     rows = max(clocks or [max(array.shape, default=0) for array in numbers.values()], default=0)
     if rows < 2:
-        raise LogError(f"{path}: no arrays of two samples or more; found {', '.join(arrays) or 'nothing'}")
+        raise LogError(
+            f"{path}: no arrays of two samples or more; found {', '.join(arrays) or 'nothing'}"
+        )
     columns: dict[str, NDArray[Any]] = {}
     others: list[str] = []
     for name, array in numbers.items():

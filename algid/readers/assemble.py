@@ -27,11 +27,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class TableReader:
-    """An opened log of any format. What it is stands in `origin` at once; its samples come in blocks, in time order.
+    """An opened log of any format.
 
-    `tables` gives a fresh pass in tables of at most so many rows. Stamps strictly increase within and across blocks;
-    a block's notices are those found while reading it. Memory is bounded by the block's size wherever the format
-    allows it.
+    What it is stands in `origin` at once; its samples come in blocks, in time order.
+
+    `tables` gives a fresh pass in tables of at most so many rows. Stamps strictly increase within
+    and across blocks; a block's notices are those found while reading it. Memory is bounded by the
+    block's size wherever the format allows it.
     """
 
     origin: Origin
@@ -74,7 +76,9 @@ class TableReader:
                 yield self._log(gatherer, notices)
                 gatherer, notices = None, ()
             if gatherer is None:
-                gatherer = Gatherer(min(most, self.rows or len(table)), velocity=table.has_velocities)
+                gatherer = Gatherer(
+                    min(most, self.rows or len(table)), velocity=table.has_velocities
+                )
             room = gatherer.more(len(table))
             room.stamp_ns[:] = table.stamp_ns
             self.conversion.apply(table, room)
@@ -91,7 +95,9 @@ class TableReader:
         """Checked and sorted tables that are not empty, with what is to be said of each."""
         notices, total = self.notices, 0
         held: tuple[SampleTable, tuple[Notice, ...]] | None = None
-        for table in cut(self._finite(self._within(in_order(self.origin.path, self.tables(rows)))), rows):
+        for table in cut(
+            self._finite(self._within(in_order(self.origin.path, self.tables(rows)))), rows
+        ):
             notices += table.notices
             if len(table):
                 if held is not None:
@@ -102,12 +108,17 @@ class TableReader:
             said = held[1] + notices if held else notices
             worst = sorted(said, key=lambda notice: not notice.lossy)[:1]
             why = "".join(f" ({notice.text})" for notice in worst)
-            raise LogError(f"{self.origin.path}: {counted(total, 'sample')}; a log needs two at least{why}")
+            raise LogError(
+                f"{self.origin.path}: {counted(total, 'sample')}; a log needs two at least{why}"
+            )
         if held is not None:  # what the last tables tell, also where they are empty
             yield held[0], held[1] + notices
 
     def _within(self, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
-        """The rows between the `start` and the `end` that the reading says; the last table tells of the cut."""
+        """The rows between the `start` and the `end` that the reading says.
+
+        The last table tells of the cut.
+        """
         start, end = self.origin.reading.start, self.origin.reading.end
         if start is None and end is None:
             yield from tables
@@ -120,7 +131,9 @@ class TableReader:
             if first_ns is None and len(table):
                 first_ns = int(table.stamp_ns[0])
             since = table.stamp_ns - (first_ns or 0)
-            inside = (since >= 1e9 * (start or 0.0)) & (since <= 1e9 * (math.inf if end is None else end))
+            inside = (since >= 1e9 * (start or 0.0)) & (
+                since <= 1e9 * (math.inf if end is None else end)
+            )
             left_out += len(table) - int(np.count_nonzero(inside))
             held = table.take(inside)
         if held is not None:
@@ -129,7 +142,10 @@ class TableReader:
             yield held.noting(Notice("CUT", f"{text} left out, as told", note=True))
 
     def _finite(self, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
-        """Tables of finite numbers; where a user accepts others, their rows are left out and counted."""
+        """Tables of finite numbers.
+
+        Where a user accepts others, their rows are left out and counted.
+        """
         first, dropped = 0, 0
         held: SampleTable | None = None
         for table in tables:
@@ -138,7 +154,11 @@ class TableReader:
             held = table
             if "NOT_FINITE" in self.origin.reading.accepted:
                 good = np.all(
-                    [np.abs(values) < LIMITS.largest_value for values in self._measured(table).values()], axis=0
+                    [
+                        np.abs(values) < LIMITS.largest_value
+                        for values in self._measured(table).values()
+                    ],
+                    axis=0,
                 )
                 dropped += len(table) - int(np.count_nonzero(good))
                 held = table.take(good)
@@ -197,7 +217,8 @@ def reader_of(
     Raises
     ------
     LogError
-        If a torque is in amperes without a torque constant, or an angle in counts without counts a turn.
+        If a torque is in amperes without a torque constant, or an angle in counts without counts a
+        turn.
     """
     if profile is None:
         from algid.profile import Profile

@@ -10,7 +10,15 @@ from algid.errors import LogError
 from algid.log import Reading
 from algid.notices import Notice
 from algid.readers.joints import reading_of
-from algid.readers.names import COMMANDED, CURRENTS, ChannelChoice, choose, on_motor_side, other_joints, take_apart
+from algid.readers.names import (
+    COMMANDED,
+    CURRENTS,
+    ChannelChoice,
+    choose,
+    on_motor_side,
+    other_joints,
+    take_apart,
+)
 from algid.readers.table import CHANNELS, JOINT_CHANNELS, VELOCITIES
 from algid.units import CURRENT, TORQUE, unit_of
 
@@ -22,8 +30,9 @@ if TYPE_CHECKING:
 class Columns:
     """By canonical channel its column; the units that names state; the unit of time, where known.
 
-    `time_stated`: a name or a profile states the unit of time; otherwise it is only taken to be so. `others` has by
-    joint the column of its angle, of the joints that are not read; `reading` says which are and who said so.
+    `time_stated`: a name or a profile states the unit of time; otherwise it is only taken to be
+    so. `others` has by joint the column of its angle, of the joints that are not read; `reading`
+    says which are and who said so.
     """
 
     sources: Mapping[str, str]
@@ -40,7 +49,11 @@ class Columns:
 
 
 def assign(
-    path: str, available: Sequence[str], profile: Profile, stated: Mapping[str, str], written: Collection[str] = ()
+    path: str,
+    available: Sequence[str],
+    profile: Profile,
+    stated: Mapping[str, str],
+    written: Collection[str] = (),
 ) -> Columns:
     """Choose the columns of a flat log: those a profile names, the rest by their names.
 
@@ -58,7 +71,8 @@ def assign(
     Raises
     ------
     LogError
-        If a column is missing, or stands there for more joints than two; if a unit is no unit of a joint's signal.
+        If a column is missing, or stands there for more joints than two; if a unit is no unit of a
+        joint's signal.
     """
     gone = [name for name in written if name not in available]
     if gone:
@@ -95,7 +109,9 @@ def assign(
     if all(sources[name] == name for name in ("t", *JOINT_CHANNELS)):
         units.setdefault("t", "s")  # algid's own names mean algid's own units
     others = other_joints(available, [sources["theta1"], sources["theta2"]])
-    return Columns(sources, units, of_time or units.get("t"), tuple(said), of_time is not None, reading, others)
+    return Columns(
+        sources, units, of_time or units.get("t"), tuple(said), of_time is not None, reading, others
+    )
 
 
 def _sources(
@@ -118,7 +134,8 @@ def _sources(
         ) from error
     sources = {**choice.columns, **named}
     if profile.passive and f"tau{3 - profile.passive}" in sources:
-        # a joint without a motor needs no torque of its own: what stands in its place is not looked at
+        # a joint without a motor needs no torque of its own: what stands in its place is not
+        # looked at
         sources.setdefault(f"tau{profile.passive}", sources[f"tau{3 - profile.passive}"])
     if not (profile.velocity and sources.keys() >= set(VELOCITIES)):
         sources = {name: column for name, column in sources.items() if name not in VELOCITIES}
@@ -133,7 +150,9 @@ def _sources(
 def _naming(channels: Sequence[str]) -> tuple[str, str]:
     """Flags that name the columns of channels, and lines of a profile."""
     flags = [f"--set {'time' if name == 't' else name + '.source'}=NAME" for name in channels]
-    lines = ['time = "NAME"' if name == "t" else f'source = "NAME" of [{name}]' for name in channels]
+    lines = [
+        'time = "NAME"' if name == "t" else f'source = "NAME" of [{name}]' for name in channels
+    ]
     return " ".join(flags), "; ".join(lines)
 
 
@@ -155,17 +174,20 @@ def _of_foreign_units(
                 f"{path}: {states} is in {foreign[name]!r}, which is no unit of a joint; say its "
                 f'unit if that is wrong: --set {name}.unit="{usual}" (profile: unit = "{usual}" of [{name}])'
             )
-        yield Notice("FOREIGN_UNIT", f"{states} states the unit {foreign[name]!r}, and is taken for {given} as told")
+        yield Notice(
+            "FOREIGN_UNIT",
+            f"{states} states the unit {foreign[name]!r}, and is taken for {given} as told",
+        )
 
 
-def _of_motors(path: str, sources: Mapping[str, str], currents: Sequence[str], profile: Profile) -> Iterator[Notice]:
+def _of_motors(
+    path: str, sources: Mapping[str, str], currents: Sequence[str], profile: Profile
+) -> Iterator[Notice]:
     """What to say of motors' signals; beside joints' they are refused unless the user gives the gear."""
     for name in currents:
         given = profile.channel(name).unit
         if given in TORQUE:
-            text = (
-                f"{sources[name]!r} for {name} is a current by its name, and is taken for a torque in {given} as told"
-            )
+            text = f"{sources[name]!r} for {name} is a current by its name, and is taken for a torque in {given} as told"
             yield Notice("CURRENT_AS_TORQUE", text)
     motors = [name for name in JOINT_CHANNELS if on_motor_side(sources[name])]
     geared = [name for name in CHANNELS if "gear_ratio" in profile.channel(name).model_fields_set]
@@ -173,15 +195,26 @@ def _of_motors(path: str, sources: Mapping[str, str], currents: Sequence[str], p
     if not open_ones:
         return
     named = ", ".join(f"{name} ({sources[name]})" for name in open_ones)
-    flags, lines = " ".join(f"--set {name}.gear_ratio=N" for name in open_ones), ", ".join(open_ones)
+    flags, lines = (
+        " ".join(f"--set {name}.gear_ratio=N" for name in open_ones),
+        ", ".join(open_ones),
+    )
     mend = f"turns of the motor in one of the joint, 1 for a direct drive: {flags} (profile: gear_ratio of {lines})"
     if len(motors) < len(JOINT_CHANNELS):
-        raise LogError(f"{path}: {named}: signals of motors beside those of joints; tell the gear, {mend}")
-    yield Notice("MOTOR_SIDE", f"{named}: signals of motors, taken for those of joints; tell the gear, {mend}")
+        raise LogError(
+            f"{path}: {named}: signals of motors beside those of joints; tell the gear, {mend}"
+        )
+    yield Notice(
+        "MOTOR_SIDE",
+        f"{named}: signals of motors, taken for those of joints; tell the gear, {mend}",
+    )
 
 
 def _of_other_units(
-    sources: Mapping[str, str], units: Mapping[str, str], beside: Mapping[str, str], profile: Profile
+    sources: Mapping[str, str],
+    units: Mapping[str, str],
+    beside: Mapping[str, str],
+    profile: Profile,
 ) -> Iterator[Notice]:
     """What to say where a file states another unit than the user does, or another beside a name than in it."""
     for name, unit in units.items():
@@ -191,7 +224,5 @@ def _of_other_units(
             text = f"the file states the unit {unit} for {name} ({sources[name]!r}), which is taken for {given} as told"
             yield Notice("OTHER_UNIT", text)
         elif given is None and other not in (None, unit):
-            text = (
-                f"the file states the unit {other} beside {name}; its name, {sources[name]!r}, says {unit}, which holds"
-            )
+            text = f"the file states the unit {other} beside {name}; its name, {sources[name]!r}, says {unit}, which holds"
             yield Notice("OTHER_UNIT", text)

@@ -28,7 +28,10 @@ ROWS = 1 << 16
 
 @dataclass(frozen=True, eq=False)
 class Room:
-    """Samples to be filled in: stamps (N,) in ns; angles, torques and, where recorded, velocities (2, N)."""
+    """Samples to be filled in: stamps (N,) in ns.
+
+    Angles, torques and, where recorded, velocities (2, N).
+    """
 
     stamp_ns: IntArray
     theta: FloatArray
@@ -48,7 +51,9 @@ class Room:
     def part(self, first: int, last: int) -> Room:
         """Samples `first` to `last` - 1 as views."""
         omega = None if self.omega is None else self.omega[:, first:last]
-        return Room(self.stamp_ns[first:last], self.theta[:, first:last], self.tau[:, first:last], omega)
+        return Room(
+            self.stamp_ns[first:last], self.theta[:, first:last], self.tau[:, first:last], omega
+        )
 
 
 class Gatherer:
@@ -73,7 +78,9 @@ class Gatherer:
         first, self._used = self._used, self._used + rows
         if self._used > len(self._room):
             old = self._room.part(0, first)
-            self._room = Room.empty(max(self._used, 2 * len(self._room)), velocity=old.omega is not None)
+            self._room = Room.empty(
+                max(self._used, 2 * len(self._room)), velocity=old.omega is not None
+            )
             new = self._room.part(0, first)
             new.stamp_ns[:], new.theta[:], new.tau[:] = old.stamp_ns, old.theta, old.tau
             if old.omega is not None and new.omega is not None:
@@ -89,8 +96,8 @@ class Gatherer:
 class Conversion:
     """Value · factor + offset for each channel of a table, then the zero and the reference of the angles.
 
-    A second motor at the base does the work τ_m1 θ̇1 + τ_m2 (θ̇1 + θ̇2): joint 1 has the sum of both torques.
-    The torque of the `passive` joint, which has no motor, is nought.
+    A second motor at the base does the work τ_m1 θ̇1 + τ_m2 (θ̇1 + θ̇2): joint 1 has the sum of
+    both torques. The torque of the `passive` joint, which has no motor, is nought.
     """
 
     channels: Mapping[str, ChannelReading]
@@ -131,7 +138,9 @@ class Conversion:
 def channel_readings(
     path: str, mapping: Mapping[str, str], profile: Profile, stated: Mapping[str, str]
 ) -> dict[str, ChannelReading]:
-    """How each channel in `mapping` is to be read; `stated` are units that the file's own names state.
+    """How each channel in `mapping` is to be read.
+
+    `stated` are units that the file's own names state.
 
     Raises
     ------
@@ -146,13 +155,17 @@ def channel_readings(
         if name == f"tau{profile.passive}":
             found[name] = ChannelReading("none: no motor", "N m", "profile", 0.0)
             continue
-        factor = channel.sign * profile.signs[joint] * _factor(path, name, mapping[name], channel, unit)
+        factor = (
+            channel.sign * profile.signs[joint] * _factor(path, name, mapping[name], channel, unit)
+        )
         offset = channel.offset + (profile.offsets[joint] if name.startswith("theta") else 0.0)
         found[name] = ChannelReading(mapping[name], unit, told, factor, offset)
     return found
 
 
-def _factor(path: str, name: str, source: str, channel: Angle | Velocity | Torque, unit: str) -> float:
+def _factor(
+    path: str, name: str, source: str, channel: Angle | Velocity | Torque, unit: str
+) -> float:
     """What a value in `unit` at the channel's own side of the gear is in SI units at the joint."""
     known = (*TORQUE, *CURRENT) if name.startswith("tau") else (*VELOCITY, "counts")
     if unit not in known:
@@ -177,4 +190,8 @@ def _factor(path: str, name: str, source: str, channel: Angle | Velocity | Torqu
             mend = f"--set {name}.counts=… (profile: counts of [{name}])"
             raise LogError(f"{path}: {name} in encoder counts needs counts a turn: {mend}")
         return 2 * math.pi / float(counts) / channel.gear_ratio
-    return TORQUE[unit] * channel.gear_ratio if name.startswith("tau") else VELOCITY[unit] / channel.gear_ratio
+    return (
+        TORQUE[unit] * channel.gear_ratio
+        if name.startswith("tau")
+        else VELOCITY[unit] / channel.gear_ratio
+    )

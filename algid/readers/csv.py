@@ -49,13 +49,19 @@ def open_csv(path: Path, profile: Profile, kind: str = "csv") -> TableReader:
     try:
         companion = loads(read_whole(beside)) if beside.is_file() else NO_COMPANION
     except (OSError, ValueError) as error:
-        raise LogError(f"{beside}: the truth beside the log cannot be read ({error}); remove it") from error
+        raise LogError(
+            f"{beside}: the truth beside the log cannot be read ({error}); remove it"
+        ) from error
     columns = assign(str(path), dialect.columns, profile, dialect.units, companion.sums)
     if columns.sources["t"] in dialect.dates:
         columns = columns.dated()
     # rows to expect of plain text: from the length of its first lines, and a tenth more
-    rows = int(1.1 * path.stat().st_size * head.count(b"\n") / len(head)) + 16 if kind == "csv" else 0
-    return flat_reader(str(path), "csv", columns, partial(_frames, path, kind, dialect), profile, rows, companion)
+    rows = (
+        int(1.1 * path.stat().st_size * head.count(b"\n") / len(head)) + 16 if kind == "csv" else 0
+    )
+    return flat_reader(
+        str(path), "csv", columns, partial(_frames, path, kind, dialect), profile, rows, companion
+    )
 
 
 def counted_rows(path: Path, kind: str, dialect: Dialect) -> int:
@@ -82,7 +88,9 @@ def _frames(
     import polars as pl
 
     done = 0
-    told = most is not None  # of rows without a value, and of quotes that are left open, the whole pass tells
+    told = (
+        most is not None
+    )  # of rows without a value, and of quotes that are left open, the whole pass tells
     if not told and len(dialect.columns) > len(columns.sources):
         _check_quotes(path, kind, dialect)
     try:
@@ -93,8 +101,12 @@ def _frames(
                     f"{path}: row {row} has more cells than the header's {len(dialect.columns)}; mend that row"
                 )
             done += frame.height
-            frame.drop_in_place(_EXCESS)  # in place: `drop` would queue behind the parsing of the next rows
-            if any(frame.null_count().row(0)):  # empty lines, which are no rows, or rows without a value
+            frame.drop_in_place(
+                _EXCESS
+            )  # in place: `drop` would queue behind the parsing of the next rows
+            if any(
+                frame.null_count().row(0)
+            ):  # empty lines, which are no rows, or rows without a value
                 if not told and (lost := _without_values(path, kind, dialect, columns)):
                     yield frame.clear(lost)
                 told = True
@@ -104,9 +116,13 @@ def _frames(
                 return
     except pl.exceptions.PolarsError as error:
         reason = str(error).split("\n", maxsplit=1)[0]
-        found = re.search(r"could not parse `(.*?)` as dtype `\w+` at column '(\d+)'", reason, re.DOTALL)
+        found = re.search(
+            r"could not parse `(.*?)` as dtype `\w+` at column '(\d+)'", reason, re.DOTALL
+        )
         if found is None:
-            raise LogError(f"{path}: the table cannot be read past row {done}: {reason[:200]}") from error
+            raise LogError(
+                f"{path}: the table cannot be read past row {done}: {reason[:200]}"
+            ) from error
         raise LogError(
             f"{path}: column {dialect.columns[int(found[2])]!r}, past row {done}: expected a number, found "
             f"{found[1][:40]!r}; mend the file or name another column"
@@ -114,7 +130,9 @@ def _frames(
 
 
 def _lines(path: Path, kind: str, dialect: Dialect) -> Iterator[tuple[int, bytes]]:
-    """The lines under the header that are no comments, with their numbers; those between quotes are lines too.
+    """The lines under the header that are no comments, with their numbers.
+
+    Those between quotes are lines too.
 
     Raises
     ------
@@ -126,7 +144,9 @@ def _lines(path: Path, kind: str, dialect: Dialect) -> Iterator[tuple[int, bytes
     for piece in chain(_small(pieces(path, kind)), [b"\n"]):
         *lines, rest = (rest + piece).split(b"\n")
         if len(rest) > LIMITS.line_bytes:
-            raise LogError(f"{path}: a line of more than 65,000 characters; expected rows of numbers")
+            raise LogError(
+                f"{path}: a line of more than 65,000 characters; expected rows of numbers"
+            )
         for line in lines:
             number += 1
             if number > dialect.skip and not line.startswith(comment):
@@ -191,14 +211,17 @@ def _parsed(
         skip = 0
 
 
-def _scan(dialect: Dialect, columns: Columns, most: int | None, source: Path | io.BytesIO, skip: int) -> pl.LazyFrame:
+def _scan(
+    dialect: Dialect, columns: Columns, most: int | None, source: Path | io.BytesIO, skip: int
+) -> pl.LazyFrame:
     """The columns' numbers, and whether a row has cells beyond the header's."""
     import polars as pl
 
     whole = dialect.whole & {columns.sources["t"]}
     plain = set() if dialect.padded else set(columns.sources.values()) - dialect.dates
     types = [
-        pl.String if column not in plain else pl.Int64 if column in whole else pl.Float64 for column in dialect.columns
+        pl.String if column not in plain else pl.Int64 if column in whole else pl.Float64
+        for column in dialect.columns
     ]
     frame = pl.scan_csv(
         source,
@@ -226,13 +249,23 @@ def _number(dialect: Dialect, columns: Columns, name: str) -> pl.Expr:
     if column in dialect.dates and name != "t":
         return pl.lit(None, pl.Float64)
     if column in dialect.dates:
-        text = cell.str.strip_chars().str.replace(" ", "T", literal=True).str.replace(r"Z$", "+00:00")
-        zoned = pl.when(text.str.contains(r"[+-]\d{2}:?\d{2}$")).then(text).otherwise(text + "+00:00")
-        ns = zoned.str.to_datetime("%Y-%m-%dT%H:%M:%S%.f%z", time_unit="ns", strict=True).dt.timestamp("ns")
-        within = text.str.slice(0, 4).is_between(pl.lit("1678"), pl.lit("2261"))  # others wrap round
+        text = (
+            cell.str.strip_chars().str.replace(" ", "T", literal=True).str.replace(r"Z$", "+00:00")
+        )
+        zoned = (
+            pl.when(text.str.contains(r"[+-]\d{2}:?\d{2}$")).then(text).otherwise(text + "+00:00")
+        )
+        ns = zoned.str.to_datetime(
+            "%Y-%m-%dT%H:%M:%S%.f%z", time_unit="ns", strict=True
+        ).dt.timestamp("ns")
+        within = text.str.slice(0, 4).is_between(
+            pl.lit("1678"), pl.lit("2261")
+        )  # others wrap round
         return pl.when(within).then(ns).otherwise(beyond(text))
     if not dialect.padded:
         return cell
     text = cell.str.strip_chars()
     text = pl.when(text != "").then(text)
-    return (text.str.replace(",", ".", literal=True) if dialect.decimal_comma else text).cast(pl.Float64)
+    return (text.str.replace(",", ".", literal=True) if dialect.decimal_comma else text).cast(
+        pl.Float64
+    )

@@ -17,7 +17,9 @@ from algid.words import counted
 
 COMMENTS = ("#", "%", "//")
 _SEPARATORS = (";", "\t", ",", "|")
-_NUMBER = re.compile(r"^[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?$|^[+-]?(nan|inf|infinity)$", re.IGNORECASE)
+_NUMBER = re.compile(
+    r"^[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?$|^[+-]?(nan|inf|infinity)$", re.IGNORECASE
+)
 _WHOLE = re.compile(r"^[+-]?\d{1,19}$")
 _DATE = re.compile(r"^\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}")
 
@@ -67,8 +69,14 @@ def detect(path: Path, head: bytes) -> Dialect:
         If there is no header, no data under it, or the text is not UTF-8.
     """
     lines = _lines(path, head)
-    comment = next((sign for sign in COMMENTS if any(line.startswith(sign) for line in lines)), None)
-    data = [(number, line) for number, line in enumerate(lines) if line.strip() and not _comment(line, comment)]
+    comment = next(
+        (sign for sign in COMMENTS if any(line.startswith(sign) for line in lines)), None
+    )
+    data = [
+        (number, line)
+        for number, line in enumerate(lines)
+        if line.strip() and not _comment(line, comment)
+    ]
     if not data:
         raise LogError(f"{path}: no table in the text; expected a header and rows of numbers")
     data = _below_titles(data)
@@ -87,7 +95,9 @@ def detect(path: Path, head: bytes) -> Dialect:
     if len(data) <= first_row:
         raise LogError(f"{path}: a header and no rows below it; expected rows of numbers")
     number, row = data[first_row]
-    found = _checked(path, columns, separator, number, comment, [line for _, line in data[first_row:]], row)
+    found = _checked(
+        path, columns, separator, number, comment, [line for _, line in data[first_row:]], row
+    )
     return replace(found, units={**in_text(above, columns), **units})
 
 
@@ -98,7 +108,9 @@ def _below_titles(data: list[tuple[int, str]]) -> list[tuple[int, str]]:
             table = [split(line, separator) for _, line in data[first : first + 5]]
             rows = table[2:] if len(table) > 2 and _units(table[0], table[1]) else table[1:]
             # the last line may break off
-            same = len(table[0]) > 1 and all(len(row) == len(table[0]) for row in table[: max(2, len(table) - 1)])
+            same = len(table[0]) > 1 and all(
+                len(row) == len(table[0]) for row in table[: max(2, len(table) - 1)]
+            )
             if same and rows and _numeric(rows[0]) and not _numeric(table[0]):
                 return data[first:]
     return data
@@ -107,7 +119,9 @@ def _below_titles(data: list[tuple[int, str]]) -> list[tuple[int, str]]:
 def _numeric(cells: Sequence[str]) -> bool:
     """Whether half of the cells hold numbers, dates or nothing, and one a number."""
     numbers = sum(map(_is_number, cells))
-    return numbers > 0 and 2 * (numbers + sum(not cell or bool(_DATE.match(cell)) for cell in cells)) >= len(cells)
+    return numbers > 0 and 2 * (
+        numbers + sum(not cell or bool(_DATE.match(cell)) for cell in cells)
+    ) >= len(cells)
 
 
 def _is_number(cell: str) -> bool:
@@ -129,7 +143,11 @@ def _units(columns: Sequence[str], cells: Sequence[str]) -> dict[str, str]:
 def kinds(path: Path, head: bytes, found: Dialect) -> dict[str, str]:
     """By column "Int64", "Float64" or "String", as far as the first lines tell."""
     lines = _lines(path, head)[found.skip :]
-    rows = [split(line, found.separator) for line in lines if line.strip() and not _comment(line, found.comment)]
+    rows = [
+        split(line, found.separator)
+        for line in lines
+        if line.strip() and not _comment(line, found.comment)
+    ]
     table = zip(*(cells for cells in rows if len(cells) == len(found.columns)), strict=True)
     numbers = [all(not cell or _is_number(cell) for cell in cells) for cells in table]
     return {
@@ -142,7 +160,11 @@ def split(line: str, separator: str) -> list[str]:
     """Cells of a line, blanks and quotes stripped."""
     if '"' not in line:
         return [cell.strip() for cell in line.split(separator)] if separator else line.split()
-    cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True), []) if separator else line.split()
+    cells = (
+        next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
+        if separator
+        else line.split()
+    )
     return [cell.strip().strip('"').strip() for cell in cells]
 
 
@@ -154,10 +176,16 @@ def _lines(path: Path, head: bytes) -> list[str]:
     if max(map(len, lines[:-1] or lines)) >= LIMITS.line_bytes - 4 or (
         len(lines) == 1 and len(head) >= LIMITS.line_bytes
     ):
-        raise LogError(f"{path}: a line of more than 65,000 characters; expected a table of a few columns")
-    lone = next((number for number, line in enumerate(lines, start=1) if "\r" in line.rstrip("\r")), None)
+        raise LogError(
+            f"{path}: a line of more than 65,000 characters; expected a table of a few columns"
+        )
+    lone = next(
+        (number for number, line in enumerate(lines, start=1) if "\r" in line.rstrip("\r")), None
+    )
     if lone is not None:
-        raise LogError(f"{path}: line {lone} holds carriage returns alone, without line feeds; save it with line feeds")
+        raise LogError(
+            f"{path}: line {lone} holds carriage returns alone, without line feeds; save it with line feeds"
+        )
     return lines if len(head) < LIMITS.line_bytes else lines[:-1]
 
 
@@ -173,10 +201,14 @@ def _separator(path: Path, header: str, rows: list[str]) -> str:
     for separator in (*_SEPARATORS, ""):
         if len(split(header, separator)) > 4:
             return separator
-    raise LogError(f"{path}: {header[:60]!r} has one column; expected columns split by , ; | tab or blanks")
+    raise LogError(
+        f"{path}: {header[:60]!r} has one column; expected columns split by , ; | tab or blanks"
+    )
 
 
-def _commented_header(path: Path, before: list[str], comment: str | None, cells: list[str], separator: str) -> str:
+def _commented_header(
+    path: Path, before: list[str], comment: str | None, cells: list[str], separator: str
+) -> str:
     for line in reversed(before):
         text = line.removeprefix(comment or "").strip()
         names = split(text, separator)
@@ -198,7 +230,9 @@ def _checked(
     first: str,
 ) -> Dialect:
     if len(columns) > LIMITS.columns:
-        raise LogError(f"{path}: {counted(len(columns), 'column')}; expected {LIMITS.columns} at most")
+        raise LogError(
+            f"{path}: {counted(len(columns), 'column')}; expected {LIMITS.columns} at most"
+        )
     cells = split(first, separator)
     if len(cells) != len(columns):
         raise LogError(
@@ -208,9 +242,23 @@ def _checked(
     repeated = sorted(name for name, count in Counter(columns).items() if name and count > 1)
     if repeated:
         raise LogError(f"{path}: the column {repeated[0]!r} stands in the header twice; rename one")
-    comma = separator != "," and any("," in cell and _is_number(cell) for row in rows for cell in split(row, separator))
-    padded = bool(separator) and any(re.search(rf"[ \t]{re.escape(separator)}|[ ]$", row.rstrip("\r")) for row in rows)
-    table = [cells for cells in (split(row, separator) for row in rows) if len(cells) == len(columns)]
-    whole = frozenset(column for column, *cells in zip(columns, *table, strict=True) if all(map(_WHOLE.match, cells)))
-    dates = frozenset(column for column, *cells in zip(columns, *table, strict=True) if all(map(_DATE.match, cells)))
+    comma = separator != "," and any(
+        "," in cell and _is_number(cell) for row in rows for cell in split(row, separator)
+    )
+    padded = bool(separator) and any(
+        re.search(rf"[ \t]{re.escape(separator)}|[ ]$", row.rstrip("\r")) for row in rows
+    )
+    table = [
+        cells for cells in (split(row, separator) for row in rows) if len(cells) == len(columns)
+    ]
+    whole = frozenset(
+        column
+        for column, *cells in zip(columns, *table, strict=True)
+        if all(map(_WHOLE.match, cells))
+    )
+    dates = frozenset(
+        column
+        for column, *cells in zip(columns, *table, strict=True)
+        if all(map(_DATE.match, cells))
+    )
     return Dialect(columns, separator, comma, skip, comment, whole, padded, dates=dates)

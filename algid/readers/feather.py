@@ -38,14 +38,18 @@ def open_feather(path: Path, profile: Profile) -> TableReader:
     file = opened(path)
     kinds = file.kinds()
     found = cells(kinds, file.width)
-    other = [name for name in file.schema.names if name not in kinds]  # of types that hold no numbers
+    other = [
+        name for name in file.schema.names if name not in kinds
+    ]  # of types that hold no numbers
     roots = {name: cell.meta.root_names()[0] for name, (cell, _) in found.items()}
     units = units_of_schema(file.schema, roots)
     columns = assign(str(path), [*found, *other], profile, units)
     for name, source in columns.sources.items():
         if source in other:
             kind = file.schema.field(source).type
-            raise LogError(f"{path}: column {source!r} for {name} holds {str(kind)[:80]}; expected numbers")
+            raise LogError(
+                f"{path}: column {source!r} for {name} holds {str(kind)[:80]}; expected numbers"
+            )
     types: dict[str, pl.DataType] = {name: kind for name, (_, kind) in found.items()}
     columns = of_numbers(str(path), columns, types | dict.fromkeys(other, pl.Null()))
 
@@ -53,7 +57,9 @@ def open_feather(path: Path, profile: Profile) -> TableReader:
         numbers = [number(name, *found[source]) for name, source in columns.sources.items()]
         left = most
         for frame in file.frames({roots[source] for source in columns.sources.values()}, rows):
-            yield from (frame if left is None else frame.head(left)).select(numbers).iter_slices(rows)
+            yield from (
+                (frame if left is None else frame.head(left)).select(numbers).iter_slices(rows)
+            )
             left = None if left is None else left - frame.height
             if left is not None and left <= 0:
                 return
@@ -135,7 +141,9 @@ def opened(path: Path) -> Feather:
         for field in schema:
             str(field.name), str(field.type)  # what is no UTF-8 tells here
     if len(schema) > LIMITS.columns:
-        raise LogError(f"{path}: {counted(len(schema), 'column')}; expected {LIMITS.columns} at most")
+        raise LogError(
+            f"{path}: {counted(len(schema), 'column')}; expected {LIMITS.columns} at most"
+        )
     twice = [name for name, count in Counter(schema.names).items() if count > 1]
     if twice:
         raise LogError(f"{path}: the column {twice[0][:80]!r} stands in the file twice; rename one")

@@ -1,11 +1,11 @@
 """What of a Parquet file's structures no library tells without harm: Thrift's compact protocol, read by hand.
 
-Its footer (FileMetaData): whether it names encrypted columns, its row groups and where their pages lie. And a page's
-header (PageHeader): its size, and its checksum, which polars does not look at.
+Its footer (FileMetaData): whether it names encrypted columns, its row groups and where their pages
+lie. And a page's header (PageHeader): its size, and its checksum, which polars does not look at.
 
-By hand: pyarrow ends the process (`std::terminate` in pyarrow 26) when it is asked for a column that is encrypted, or
-whose statistics contradict its type, and has no way to ask beforehand. The footer of a million rows of 7 columns takes
-a millisecond.
+By hand: pyarrow ends the process (`std::terminate` in pyarrow 26) when it is asked for a column
+that is encrypted, or whose statistics contradict its type, and has no way to ask beforehand. The
+footer of a million rows of 7 columns takes a millisecond.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ from dataclasses import dataclass, field
 
 from algid.limits import LIMITS
 
-_STOP, _TRUE, _FALSE, _BYTE, _SHORT, _INT, _LONG, _DOUBLE, _BINARY, _LIST, _SET, _MAP, _STRUCT = range(13)
+_STOP, _TRUE, _FALSE, _BYTE, _SHORT, _INT, _LONG, _DOUBLE, _BINARY, _LIST, _SET, _MAP, _STRUCT = (
+    range(13)
+)
 _ENCRYPTION = {(8,), (4, 1, 8), (4, 1, 9)}
 """Fields: the file's encryption; of each row group's columns how they are encrypted, and their metadata so."""
 _GROUP, _PAGES = (4,), (4, 1, 3)
@@ -102,8 +104,8 @@ class PageHeader:
 def page_header(head: bytes) -> PageHeader:
     """The header (PageHeader) that `head` begins with.
 
-    A loop of its own: there is a header for every 20,000 values, and a reader as general as the footer's takes a third
-    of the time in which polars decodes them.
+    A loop of its own: there is a header for every 20,000 values, and a reader as general as the
+    footer's takes a third of the time in which polars decodes them.
 
     Raises
     ------
@@ -199,7 +201,9 @@ class _Reader:
         elif kind == _BINARY:
             size = self.varint()  # which moves on by itself
             if path == _PATH:
-                self._columns().path.append(self.data[self.place : self.place + size].decode(errors="replace"))
+                self._columns().path.append(
+                    self.data[self.place : self.place + size].decode(errors="replace")
+                )
             self.place += size
         elif kind == _DOUBLE:
             self.place += 8

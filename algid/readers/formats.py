@@ -1,7 +1,8 @@
 """The formats of logs, one entry each: what tells a file of it, how it is opened, and what it holds by name.
 
-A format is known from a file's content: names lie, first bytes do not. Whatever must know the formats reads this table:
-opening and inspecting a log, the logs of a folder, the guide. Adding one is a module and an entry.
+A format is known from a file's content: names lie, first bytes do not. Whatever must know the
+formats reads this table: opening and inspecting a log, the logs of a folder, the guide. Adding one
+is a module and an entry.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ _MOST_SHOWN = 64
 class Entry:
     """A column or a topic: its name, its type, and how many samples it has where that is known.
 
-    A topic's `rate` is that of its messages in Hz, its `joints` are those that its messages name, its `fields` paths of
-    their numbers.
+    A topic's `rate` is that of its messages in Hz, its `joints` are those that its messages name,
+    its `fields` paths of their numbers.
     """
 
     name: str
@@ -97,7 +98,9 @@ def _is_packed_text(magic: bytes, name: str) -> Callable[[Path, bytes], bool]:
             text = "an MCAP file compressed as a whole, which cannot be read by parts"
             raise LogError(f"{path}: {text}; unpack it first: {unpack} {path.name}")
         if not (inside and looks_like_text(inside)):
-            raise LogError(f"{path}: compressed, but not a table of text; unpack it and name what is inside")
+            raise LogError(
+                f"{path}: compressed, but not a table of text; unpack it and name what is inside"
+            )
         return True
 
     return fits
@@ -235,17 +238,25 @@ def _feather_entries(path: Path) -> Entries:
     return tuple(Entry(field.name, str(field.type)[:80], feather.rows) for field in feather.schema)
 
 
-def _table(name: str, title: str, suffixes: tuple[str, ...], fits: Callable[[Path, bytes], bool]) -> FileFormat:
+def _table(
+    name: str, title: str, suffixes: tuple[str, ...], fits: Callable[[Path, bytes], bool]
+) -> FileFormat:
     """A format that is read as a whole."""
-    return FileFormat(name, title, suffixes, fits, partial(_open_arrays, name), partial(_array_entries, name))
+    return FileFormat(
+        name, title, suffixes, fits, partial(_open_arrays, name), partial(_array_entries, name)
+    )
 
 
 def _csv(name: str, title: str, suffix: str, fits: Callable[[Path, bytes], bool]) -> FileFormat:
-    return FileFormat(name, title, (suffix,), fits, partial(_open_csv, name), partial(_csv_entries, name))
+    return FileFormat(
+        name, title, (suffix,), fits, partial(_open_csv, name), partial(_csv_entries, name)
+    )
 
 
 def _bag(name: str, title: str, suffix: str, magic: bytes) -> FileFormat:
-    return FileFormat(name, title, (suffix,), begins(magic), partial(_open_bag, name), partial(_bag_entries, name))
+    return FileFormat(
+        name, title, (suffix,), begins(magic), partial(_open_bag, name), partial(_bag_entries, name)
+    )
 
 
 FORMATS: tuple[FileFormat, ...] = (
@@ -253,9 +264,16 @@ FORMATS: tuple[FileFormat, ...] = (
     FileFormat("rosbag2", "rosbag2 folder", (), _is_bag_folder, _open_folder, _folder_entries),
     _bag("db3", "rosbag2 SQLite file", ".db3", b"SQLite format 3\x00"),
     _bag("bag", "ROS 1 bag", ".bag", b"#ROSBAG V"),
-    FileFormat("parquet", "Parquet", (".parquet",), begins(b"PAR1"), _open_parquet, _parquet_entries),
     FileFormat(
-        "feather", "Feather (Arrow)", (".feather", ".arrow"), begins(b"ARROW1"), _open_feather, _feather_entries
+        "parquet", "Parquet", (".parquet",), begins(b"PAR1"), _open_parquet, _parquet_entries
+    ),
+    FileFormat(
+        "feather",
+        "Feather (Arrow)",
+        (".feather", ".arrow"),
+        begins(b"ARROW1"),
+        _open_feather,
+        _feather_entries,
     ),
     _table("npz", "NumPy archive", (".npz",), _is_npz),
     _table("npy", "NumPy structured array", (".npy",), begins(b"\x93NUMPY")),
@@ -285,7 +303,9 @@ def format_of(path: Path) -> FileFormat:
             return form
     if not head:
         raise LogError(f"{path}: the file is empty; expected a log in MCAP, Parquet or CSV")
-    raise LogError(f"{path}: unknown format, it begins with {head[:8]!r}; expected a log in MCAP, Parquet or CSV")
+    raise LogError(
+        f"{path}: unknown format, it begins with {head[:8]!r}; expected a log in MCAP, Parquet or CSV"
+    )
 
 
 def _head(path: Path) -> bytes:
@@ -296,19 +316,31 @@ def _head(path: Path) -> bytes:
     LogError
         If there is no such file, or it cannot be read.
     """
-    if any(0xD800 <= ord(letter) <= 0xDFFF for letter in str(path)):  # bytes that polars and results cannot name
+    if any(
+        0xD800 <= ord(letter) <= 0xDFFF for letter in str(path)
+    ):  # bytes that polars and results cannot name
         raise LogError(f"{str(path)!r}: the name is not valid UTF-8; rename the log")
     try:
         if path.is_dir():
-            if (path / "metadata.yaml").is_file() or any(path.glob("*.mcap")) or any(path.glob("*.db3")):
+            if (
+                (path / "metadata.yaml").is_file()
+                or any(path.glob("*.mcap"))
+                or any(path.glob("*.db3"))
+            ):
                 return b""
-            raise LogError(f"{path}: a folder without metadata.yaml or *.mcap; expected a log file or a rosbag2 folder")
+            raise LogError(
+                f"{path}: a folder without metadata.yaml or *.mcap; expected a log file or a rosbag2 folder"
+            )
         if not path.is_file():
             found = "it is no regular file" if path.exists() else "there is no such file"
-            raise LogError(f"{path}: {found}; expected a log in MCAP, Parquet or CSV; check the name")
+            raise LogError(
+                f"{path}: {found}; expected a log in MCAP, Parquet or CSV; check the name"
+            )
         return read_start(path, LIMITS.head_bytes)
     except (OSError, ValueError) as error:
-        raise LogError(f"{str(path)!r}: the log cannot be read ({error}); check the name and rights") from error
+        raise LogError(
+            f"{str(path)!r}: the log cannot be read ({error}); check the name and rights"
+        ) from error
 
 
 def sniff(path: Path) -> str:

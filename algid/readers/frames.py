@@ -72,7 +72,9 @@ def flat_reader(
     )
 
 
-def cells(schema: Mapping[str, pl.DataType], width: Callable[[str], int]) -> dict[str, tuple[pl.Expr, pl.DataType]]:
+def cells(
+    schema: Mapping[str, pl.DataType], width: Callable[[str], int]
+) -> dict[str, tuple[pl.Expr, pl.DataType]]:
     """By name every cell of a row and its type: a column, or a place in a list column, ``q[0]``, ``q[1]``.
 
     Parameters
@@ -93,12 +95,17 @@ def cells(schema: Mapping[str, pl.DataType], width: Callable[[str], int]) -> dic
         size = width(column) if isinstance(kind, pl.List) else kind.size
         lists = cell.list if isinstance(kind, pl.List) else cell.arr
         for place in range(min(size, LIMITS.list_cells)):
-            found[f"{column}[{place}]"] = lists.get(place, null_on_oob=True), cast("pl.DataType", kind.inner)
+            found[f"{column}[{place}]"] = (
+                lists.get(place, null_on_oob=True),
+                cast("pl.DataType", kind.inner),
+            )
     return found
 
 
 def of_numbers(path: str, columns: Columns, kinds: Mapping[str, pl.DataType]) -> Columns:
-    """The columns once their types, given by column, hold numbers; the time may hold dates, or durations.
+    """The columns once their types, given by column, hold numbers.
+
+    The time may hold dates, or durations.
 
     Raises
     ------
@@ -109,7 +116,10 @@ def of_numbers(path: str, columns: Columns, kinds: Mapping[str, pl.DataType]) ->
 
     for name, source in columns.sources.items():
         kind = kinds[source]
-        if not (kind.is_numeric() or (name == "t" and isinstance(kind, (pl.Datetime, pl.Duration, pl.Time)))):
+        if not (
+            kind.is_numeric()
+            or (name == "t" and isinstance(kind, (pl.Datetime, pl.Duration, pl.Time)))
+        ):
             raise LogError(f"{path}: column {source!r} for {name} holds {kind}; expected numbers")
     others = {joint: name for joint, name in columns.others.items() if kinds[name].is_numeric()}
     columns = replace(columns, others=others)
@@ -117,7 +127,10 @@ def of_numbers(path: str, columns: Columns, kinds: Mapping[str, pl.DataType]) ->
 
 
 def number(name: str, cell: pl.Expr, kind: pl.DataType) -> pl.Expr:
-    """A cell as the float64 of a channel; as "t" a whole number as int64, a date in ns since 1970, a duration in ns."""
+    """A cell as the float64 of a channel.
+
+    As "t" a whole number as int64, a date in ns since 1970, a duration in ns.
+    """
     import polars as pl
 
     if name != "t":
@@ -126,10 +139,17 @@ def number(name: str, cell: pl.Expr, kind: pl.DataType) -> pl.Expr:
         factor = NANOSECONDS[kind.time_unit or "us"]
         units = cell.to_physical()
         most = int(LIMITS.largest_time_ns) // factor
-        return pl.when(units.is_between(-most, most)).then(units * factor).otherwise(beyond(units)).alias(name)
+        return (
+            pl.when(units.is_between(-most, most))
+            .then(units * factor)
+            .otherwise(beyond(units))
+            .alias(name)
+        )
     if kind == pl.UInt64:
         return pl.when(cell < 1 << 63).then(cell).otherwise(beyond(cell)).cast(pl.Int64).alias(name)
-    return cell.cast(pl.Int64 if kind.is_integer() or kind.is_temporal() else pl.Float64).alias(name)
+    return cell.cast(pl.Int64 if kind.is_integer() or kind.is_temporal() else pl.Float64).alias(
+        name
+    )
 
 
 def beyond(cell: pl.Expr) -> pl.Expr:
@@ -148,9 +168,9 @@ _SLOWEST_NS = 200_000_000
 def time_unit(times: NDArray[Any]) -> str:
     """The unit of a time column (N,) nobody named one for: "s", "ms", "us" or "ns".
 
-    Times since 1970 tell by their size, where that makes a median step of 20 µs to 10 s. Times since the start of a
-    log tell by their median step, for logs between 20 Hz and 20 kHz: below 0.2 it is seconds, below 50 ms, below
-    50,000 µs, else ns.
+    Times since 1970 tell by their size, where that makes a median step of 20 µs to 10 s. Times
+    since the start of a log tell by their median step, for logs between 20 Hz and 20 kHz: below
+    0.2 it is seconds, below 50 ms, below 50,000 µs, else ns.
     """
     first, step = abs(float(times[0])), _median_step(times)
     for unit, low, high in _EPOCH:
@@ -182,7 +202,10 @@ def to_nanoseconds(times: NDArray[Any], unit: str) -> IntArray:
     whole = np.issubdtype(times.dtype, np.integer)
     if not (whole or np.all(np.isfinite(times))):
         raise ValueError("a time that is not finite")
-    if times.size and max(abs(times.min().item()), abs(times.max().item())) * factor > LIMITS.largest_time_ns:
+    if (
+        times.size
+        and max(abs(times.min().item()), abs(times.max().item())) * factor > LIMITS.largest_time_ns
+    ):
         raise ValueError("a time beyond 292 years")
     if whole:
         whole_ns = times.astype(np.int64, copy=False)
@@ -213,11 +236,17 @@ def tables(
                 raise LogError(f"{path}: a time is not finite; expected a number in every row")
             unit = time_unit(times)
             if unit != "s":
-                notices.append(Notice("TIME_UNIT", f"times are taken for {unit}, from their size and their steps"))
+                notices.append(
+                    Notice(
+                        "TIME_UNIT", f"times are taken for {unit}, from their size and their steps"
+                    )
+                )
         try:
             stamps = to_nanoseconds(times, unit or "s")
         except ValueError as error:
-            raise LogError(f"{path}: {error} in column {columns.sources['t']!r}, past row {done}") from error
+            raise LogError(
+                f"{path}: {error} in column {columns.sources['t']!r}, past row {done}"
+            ) from error
         if unit and not (done or columns.time_stated):
             notices += _slow(columns.sources["t"], stamps, unit)
         channels = {name: frame[name].to_numpy() for name in frame.columns if name != "t"}
@@ -244,7 +273,9 @@ def _slow(column: str, stamps: IntArray, unit: str) -> list[Notice]:
     return [Notice("SLOW_CLOCK", text)]
 
 
-def _complete(path: str, frames: Iterator[pl.DataFrame]) -> Iterator[tuple[pl.DataFrame, tuple[Notice, ...]]]:
+def _complete(
+    path: str, frames: Iterator[pl.DataFrame]
+) -> Iterator[tuple[pl.DataFrame, tuple[Notice, ...]]]:
     """Frames without nulls: rows that lack a value are dropped and counted; the last row may break off."""
     rows, lost, held = 0, 0, None
     for frame in frames:

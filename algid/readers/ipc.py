@@ -1,8 +1,8 @@
 """What the messages of an Arrow file (Feather) claim, known before any library unpacks them.
 
-pyarrow reserves what a packed buffer says that it holds, and has no way to ask beforehand. A message is a flatbuffer
-behind its length, and its body behind that (Arrow's columnar format, "Encapsulated message format"); a packed buffer
-begins with the bytes that it unpacks to.
+pyarrow reserves what a packed buffer says that it holds, and has no way to ask beforehand. A
+message is a flatbuffer behind its length, and its body behind that (Arrow's columnar format,
+"Encapsulated message format"); a packed buffer begins with the bytes that it unpacks to.
 """
 
 from __future__ import annotations
@@ -55,8 +55,14 @@ def _rows(stream: BinaryIO, size: int) -> int:
             rows += message.rows if kind == _BATCHES else 0
             buffers += message.buffers
             unpacked += message.unpacked
-            if message.unpacked > LIMITS.whole_bytes or unpacked > most or buffers > LIMITS.message_indexes:
-                raise ValueError(f"it claims {counted(unpacked, 'byte')} in {counted(buffers, 'buffer')}")
+            if (
+                message.unpacked > LIMITS.whole_bytes
+                or unpacked > most
+                or buffers > LIMITS.message_indexes
+            ):
+                raise ValueError(
+                    f"it claims {counted(unpacked, 'byte')} in {counted(buffers, 'buffer')}"
+                )
     return rows
 
 
@@ -83,7 +89,12 @@ class _Message:
 def _message(stream: BinaryIO, size: int, kind: int, block: tuple[int, ...]) -> _Message:
     """What a message claims that stands in a block: its offset, and the lengths of its head and its body."""
     place, length, body = block
-    if not (place > 0 and 8 <= length <= LIMITS.record_bytes and body >= 0 and place + length + body <= size):
+    if not (
+        place > 0
+        and 8 <= length <= LIMITS.record_bytes
+        and body >= 0
+        and place + length + body <= size
+    ):
         raise ValueError(f"it lists a message at byte {place}")
     stream.seek(place)
     head = stream.read(length)
@@ -93,7 +104,9 @@ def _message(stream: BinaryIO, size: int, kind: int, block: tuple[int, ...]) -> 
     if message.number(3, "<q") != body or message.number(1, "<B") != kind:
         raise ValueError(f"what stands at byte {place} is not the message that is listed")
     batch = message.table(2)
-    return _claimed(batch.table(1) if kind == _DICTIONARIES else batch, stream, place + length, body)
+    return _claimed(
+        batch.table(1) if kind == _DICTIONARIES else batch, stream, place + length, body
+    )
 
 
 def _claimed(batch: _Table, stream: BinaryIO, start: int, size: int) -> _Message:

@@ -1,4 +1,7 @@
-"""Which of two joints is the first along the arm, known from their names; and whether those not read are held still."""
+"""Which of two joints is the first along the arm, known from their names.
+
+And whether those not read are held still.
+"""
 
 from __future__ import annotations
 
@@ -20,20 +23,46 @@ if TYPE_CHECKING:
 
 _FROM_BASE_TO_TIP = (
     ("base", "root", "waist"),
-    ("shoulder", "upperarm", "upper_arm", "hip", "thigh", "proximal", "inner", "boom", "first", "primary", "pan"),
-    ("elbow", "forearm", "lowerarm", "lower_arm", "fore_arm", "knee", "shank", "distal", "outer", "stick", "second"),
+    (
+        "shoulder",
+        "upperarm",
+        "upper_arm",
+        "hip",
+        "thigh",
+        "proximal",
+        "inner",
+        "boom",
+        "first",
+        "primary",
+        "pan",
+    ),
+    (
+        "elbow",
+        "forearm",
+        "lowerarm",
+        "lower_arm",
+        "fore_arm",
+        "knee",
+        "shank",
+        "distal",
+        "outer",
+        "stick",
+        "second",
+    ),
     ("wrist", "ankle", "hand", "foot", "tip", "bucket", "third"),
 )
 _ALSO_SECOND = ("secondary", "tilt")
-_RANKS = {word: rank for rank, words in enumerate(_FROM_BASE_TO_TIP) for word in words} | dict.fromkeys(_ALSO_SECOND, 2)
+_RANKS = {
+    word: rank for rank, words in enumerate(_FROM_BASE_TO_TIP) for word in words
+} | dict.fromkeys(_ALSO_SECOND, 2)
 _LETTERS = {"a": 1, "b": 2, "i": 1, "ii": 2, "one": 1, "two": 2}
 
 
 def along_the_arm(names: Sequence[str]) -> tuple[tuple[str, str], Literal["names", "order"]]:
     """The two joints from the base outwards, and whether their names say so or only their order in the log.
 
-    Names tell by the one number in which they differ, by a place on an arm or leg (shoulder before elbow, base
-    before anything), or by the letters a and b.
+    Names tell by the one number in which they differ, by a place on an arm or leg (shoulder before
+    elbow, base before anything), or by the letters a and b.
     """
     first, second = names
     ranks = _ranks(first, second)
@@ -42,7 +71,9 @@ def along_the_arm(names: Sequence[str]) -> tuple[tuple[str, str], Literal["names
     return ((first, second) if ranks[0] < ranks[1] else (second, first)), "names"
 
 
-def order_notice(names: Sequence[str], chosen: tuple[str, str], told: Literal["names", "order"]) -> tuple[Notice, ...]:
+def order_notice(
+    names: Sequence[str], chosen: tuple[str, str], told: Literal["names", "order"]
+) -> tuple[Notice, ...]:
     """What to say of the order: nothing where names and log agree."""
     first, second = chosen
     if told == "order":
@@ -97,17 +128,24 @@ Tables = Callable[[Mapping[str, str]], Iterator[SampleTable]]
 """Tables of a topic's fields, whose paths are given by the columns' names."""
 
 
-def moving_joints(positions: Mapping[str, str], tables: Tables, unit: float = 1.0) -> tuple[Notice, ...]:
+def moving_joints(
+    positions: Mapping[str, str], tables: Tables, unit: float = 1.0
+) -> tuple[Notice, ...]:
     """Say which of the other joints of a topic or table move, and how far, in its first table.
 
-    Where they move, the two-link model lacks their torque. `positions` has by joint the path of its position, in
-    `unit` rad.
+    Where they move, the two-link model lacks their torque. `positions` has by joint the path of
+    its position, in `unit` rad.
     """
-    joints = {f"joint {number}": joint for number, joint in enumerate(positions)}  # no name of which is a stamp's
+    joints = {
+        f"joint {number}": joint for number, joint in enumerate(positions)
+    }  # no name of which is a stamp's
     if not joints:
         return ()
     try:
-        table = next((one for one in tables({name: positions[joints[name]] for name in joints}) if len(one)), None)
+        table = next(
+            (one for one in tables({name: positions[joints[name]] for name in joints}) if len(one)),
+            None,
+        )
     except LogError:  # the joints that are read tell of what is wrong
         return ()
     if table is None:

@@ -41,20 +41,26 @@ def frame_of_lines(path: Path) -> pl.DataFrame:
     except pl.exceptions.PolarsError as error:
         reason = str(error).split("\n", maxsplit=1)[0][:200]
         place = _wrong_line(path)
-        raise LogError(f"{path}: {place}expected a JSON object in every line ({reason}); mend or cut it") from error
+        raise LogError(
+            f"{path}: {place}expected a JSON object in every line ({reason}); mend or cut it"
+        ) from error
     cells = []
     for name, kind in frame.schema.items():
         for path_of, cell in _numbers(name, pl.col(name), kind, frame):
             cells.append(cell.alias(path_of))
             if len(cells) > LIMITS.columns:
-                raise LogError(f"{path}: more than {LIMITS.columns} columns; expected a log of an arm")
+                raise LogError(
+                    f"{path}: more than {LIMITS.columns} columns; expected a log of an arm"
+                )
     return frame.select(cells)
 
 
 def _wrong_line(path: Path) -> str:
     """Which line is no JSON object, in words; nothing where all are."""
     with path.open("rb") as stream:
-        for number, line in enumerate(iter(lambda: stream.readline(LIMITS.json_bytes), b""), start=1):
+        for number, line in enumerate(
+            iter(lambda: stream.readline(LIMITS.json_bytes), b""), start=1
+        ):
             try:
                 if line.strip() and not isinstance(json.loads(line), dict):
                     return f"line {number}: "
@@ -63,7 +69,9 @@ def _wrong_line(path: Path) -> str:
     return ""
 
 
-def _numbers(name: str, cell: pl.Expr, kind: pl.DataType, frame: pl.DataFrame) -> Iterator[tuple[str, pl.Expr]]:
+def _numbers(
+    name: str, cell: pl.Expr, kind: pl.DataType, frame: pl.DataFrame
+) -> Iterator[tuple[str, pl.Expr]]:
     """Every cell below a column, with its path."""
     import polars as pl
 
@@ -75,6 +83,8 @@ def _numbers(name: str, cell: pl.Expr, kind: pl.DataType, frame: pl.DataFrame) -
         size = frame.select(cell.list.len().max()).item() or 0
         for place in range(min(size, LIMITS.list_cells)):
             inner = cast("pl.DataType", kind.inner)
-            yield from _numbers(f"{name}[{place}]", cell.list.get(place, null_on_oob=True), inner, frame)
+            yield from _numbers(
+                f"{name}[{place}]", cell.list.get(place, null_on_oob=True), inner, frame
+            )
     else:
         yield name, cell

@@ -1,6 +1,7 @@
 """The structure of a MATLAB file of version 5 to 7, walked before SciPy reads it.
 
-SciPy takes an element's type for a place in a table without a look, and ends the process at one that is none.
+SciPy takes an element's type for a place in a table without a look, and ends the process at one
+that is none.
 """
 
 from __future__ import annotations
@@ -30,7 +31,10 @@ def check_elements(path: Path) -> None:
         If it is so.
     """
     try:
-        with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        with (
+            path.open("rb") as stream,
+            mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as content,
+        ):
             order = "<" if content[126:128] == b"IM" else ">"
             (version,) = struct.unpack_from(f"{order}H", content, 124)
             if version >> 8 != _HDF5:
@@ -53,7 +57,9 @@ class _Walk:
             self._found += 1
             kind, size = self._tag.unpack_from(content, place)
             start = place + self._tag.size
-            if kind >> 16:  # a small element: its size stands beside its type, and its four bytes in the tag
+            if (
+                kind >> 16
+            ):  # a small element: its size stands beside its type, and its four bytes in the tag
                 kind, size, start = kind & 0xFFFF, min(4, kind >> 16), place + 4
             if kind not in _TYPES or start + size > end:
                 raise ValueError(f"what stands at byte {place} is no element")
@@ -64,8 +70,14 @@ class _Walk:
             elif kind == _PACKED:
                 inside = self._inside(content, start, start + size)
                 self.elements(inside, 0, len(inside), depth + 1)
-            size += 0 if kind == _PACKED else -size % 8  # but for packed ones, elements are padded to 8 bytes
-            place = max(place + self._tag.size, start + size) if start > place + 4 else place + self._tag.size
+            size += (
+                0 if kind == _PACKED else -size % 8
+            )  # but for packed ones, elements are padded to 8 bytes
+            place = (
+                max(place + self._tag.size, start + size)
+                if start > place + 4
+                else place + self._tag.size
+            )
 
     def _inside(self, content: bytearray | mmap.mmap, start: int, end: int) -> bytearray:
         """What the packed bytes between two places hold; pages of the file are let go as they are read."""

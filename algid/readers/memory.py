@@ -28,7 +28,9 @@ Columns = Any
 
 def is_columns(given: object) -> TypeGuard[Columns]:
     """Whether columns are given: a mapping, or what hands over its columns as Arrow's, as frames do."""
-    return isinstance(given, Mapping) or any(hasattr(given, name) for name in ("__arrow_c_stream__", "__dataframe__"))
+    return isinstance(given, Mapping) or any(
+        hasattr(given, name) for name in ("__arrow_c_stream__", "__dataframe__")
+    )
 
 
 def open_columns(given: Columns, profile: Profile) -> TableReader:
@@ -37,8 +39,8 @@ def open_columns(given: Columns, profile: Profile) -> TableReader:
     Parameters
     ----------
     given : frame, table or mapping
-        A mapping may hold matrices too, (N, 2) or (2, N); an index of a pandas frame counts as a column if it has a
-        name.
+        A mapping may hold matrices too, (N, 2) or (2, N); an index of a pandas frame counts as a
+        column if it has a name.
     profile : Profile
 
     Raises
@@ -47,7 +49,9 @@ def open_columns(given: Columns, profile: Profile) -> TableReader:
         If the columns cannot be taken over, a channel is missing, or one is not of numbers.
     """
     if isinstance(given, Mapping):
-        columns, others = columns_of(NAME, {str(name): _array(name, values) for name, values in given.items()})
+        columns, others = columns_of(
+            NAME, {str(name): _array(name, values) for name, values in given.items()}
+        )
         content = Content(columns, len(next(iter(columns.values()), ())))
         return open_content(NAME, "arrays", _checked(content), profile, others=others)
     frame, units = _frame(given)
@@ -58,7 +62,9 @@ def _array(name: object, values: object) -> np.ndarray[Any, Any]:
     try:
         return np.asarray(values)
     except Exception as error:  # whatever the values' own library raises
-        raise LogError(f"{NAME}: {name!r} is no array ({error}); give numbers of one shape") from error
+        raise LogError(
+            f"{NAME}: {name!r} is no array ({error}); give numbers of one shape"
+        ) from error
 
 
 def _checked(content: Content) -> Content:
@@ -84,7 +90,9 @@ def _frame(given: Columns) -> tuple[pl.DataFrame, dict[str, str]]:
             frame = cast("pl.DataFrame", pl.from_arrow(table))
         except Exception as error:  # whatever the frame's own library raises
             reason = str(error).split("\n", maxsplit=1)[0][:200]
-            raise LogError(f"{NAME}: the frame cannot be taken over ({reason}); give columns of numbers") from error
+            raise LogError(
+                f"{NAME}: the frame cannot be taken over ({reason}); give columns of numbers"
+            ) from error
         units = units_of_schema(table.schema, {name: name for name in table.column_names})
 
     def width(column: str) -> int:

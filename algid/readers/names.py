@@ -1,8 +1,8 @@
 """Which column is which: the names that labs, drivers and plotting tools give to angles and torques.
 
-A name is taken apart into a stem, a joint and a unit, ``pos_meas1 [deg]`` → ``pos_meas``, 1, ``deg``. The
-stems of each quantity are ranked: measured before unspecified before filtered, commanded torque last and
-commanded angles never.
+A name is taken apart into a stem, a joint and a unit, ``pos_meas1 [deg]`` → ``pos_meas``, 1,
+``deg``. The stems of each quantity are ranked: measured before unspecified before filtered,
+commanded torque last and commanded angles never.
 """
 
 from __future__ import annotations
@@ -19,39 +19,164 @@ from algid.words import counted
 
 STEMS: dict[str, tuple[str, ...]] = {
     "theta": (
-        *("theta", "theta_meas", "pos_meas", "q_meas", "position_measured", "measured_position", "actual_q"),
-        *("position", "pos", "q", "angle", "joint_position", "joint_pos", "joint_angle", "jointposition"),
-        *("positions", "angles", "ang", "phi", "pos_filt", "q_filt", "position_filtered", "theta_filt"),
+        *(
+            "theta",
+            "theta_meas",
+            "pos_meas",
+            "q_meas",
+            "position_measured",
+            "measured_position",
+            "actual_q",
+        ),
+        *(
+            "position",
+            "pos",
+            "q",
+            "angle",
+            "joint_position",
+            "joint_pos",
+            "joint_angle",
+            "jointposition",
+        ),
+        *(
+            "positions",
+            "angles",
+            "ang",
+            "phi",
+            "pos_filt",
+            "q_filt",
+            "position_filtered",
+            "theta_filt",
+        ),
         *("observation_position", "observation_state"),
     ),
     "omega": (
         *("omega", "vel_meas", "dq_meas", "velocity_measured", "measured_velocity", "actual_qd"),
         *("velocity", "vel", "dq", "qd", "qdot", "q_dot", "dtheta", "thetadot", "theta_dot"),
-        *("joint_velocity", "joint_vel", "velocities", "speed", "vel_filt", "dq_filt", "velocity_filtered"),
+        *(
+            "joint_velocity",
+            "joint_vel",
+            "velocities",
+            "speed",
+            "vel_filt",
+            "dq_filt",
+            "velocity_filtered",
+        ),
         "observation_velocity",
     ),
     "tau": (
-        *("tau", "tau_meas", "tau_j", "tau_est", "torque_measured", "measured_torque", "actual_tau", "actual_torque"),
-        *("torque", "trq", "effort", "joint_torque", "joint_effort", "torques", "efforts", "tau_filt"),
-        *("torque_filtered", "tau_con", "tau_cmd", "tau_des", "tau_d", "tau_j_d", "torque_cmd", "target_torque"),
+        *(
+            "tau",
+            "tau_meas",
+            "tau_j",
+            "tau_est",
+            "torque_measured",
+            "measured_torque",
+            "actual_tau",
+            "actual_torque",
+        ),
+        *(
+            "torque",
+            "trq",
+            "effort",
+            "joint_torque",
+            "joint_effort",
+            "torques",
+            "efforts",
+            "tau_filt",
+        ),
+        *(
+            "torque_filtered",
+            "tau_con",
+            "tau_cmd",
+            "tau_des",
+            "tau_d",
+            "tau_j_d",
+            "torque_cmd",
+            "target_torque",
+        ),
         *("motor_torque", "observation_effort", "observation_torque"),
         *("actual_current", "current", "currents", "motor_current", "joint_current", "i_q", "iq"),
     ),
 }
-COMMANDED = frozenset({"tau_con", "tau_cmd", "tau_des", "tau_d", "tau_j_d", "torque_cmd", "target_torque"})
-CURRENTS = frozenset({"actual_current", "current", "currents", "motor_current", "joint_current", "i_q", "iq"})
+COMMANDED = frozenset(
+    {"tau_con", "tau_cmd", "tau_des", "tau_d", "tau_j_d", "torque_cmd", "target_torque"}
+)
+CURRENTS = frozenset(
+    {"actual_current", "current", "currents", "motor_current", "joint_current", "i_q", "iq"}
+)
 TIMES = (
-    *("stamp_ns", "t", "time", "timestamp", "stamp", "__time", "_time", "time_s", "time_ms", "time_us", "time_ns"),
-    *("timestamp_s", "timestamp_ms", "timestamp_us", "timestamp_ns", "t_s", "t_ms", "t_us", "t_ns", "time_sec"),
-    *("seconds", "secs", "sec", "elapsed", "elapsed_time", "log_time", "header.stamp", "header/stamp"),
+    *(
+        "stamp_ns",
+        "t",
+        "time",
+        "timestamp",
+        "stamp",
+        "__time",
+        "_time",
+        "time_s",
+        "time_ms",
+        "time_us",
+        "time_ns",
+    ),
+    *(
+        "timestamp_s",
+        "timestamp_ms",
+        "timestamp_us",
+        "timestamp_ns",
+        "t_s",
+        "t_ms",
+        "t_us",
+        "t_ns",
+        "time_sec",
+    ),
+    *(
+        "seconds",
+        "secs",
+        "sec",
+        "elapsed",
+        "elapsed_time",
+        "log_time",
+        "header.stamp",
+        "header/stamp",
+    ),
     *("milliseconds", "millis", "microseconds", "micros", "nanoseconds", "nanos"),
 )
 _NO_JOINTS = frozenset(
-    {"cmd", "command", "commanded", "ref", "reference", "des", "desired", "target", "goal", "set", "setpoint", "error"}
-    | {"err", "raw", "max", "min", "limit", "old", "new", "filt", "filtered", "meas", "measured", "actual", "est"}
+    {
+        "cmd",
+        "command",
+        "commanded",
+        "ref",
+        "reference",
+        "des",
+        "desired",
+        "target",
+        "goal",
+        "set",
+        "setpoint",
+        "error",
+    }
+    | {
+        "err",
+        "raw",
+        "max",
+        "min",
+        "limit",
+        "old",
+        "new",
+        "filt",
+        "filtered",
+        "meas",
+        "measured",
+        "actual",
+        "est",
+    }
 )
 """Words before or behind a stem that name no joint."""
-_STEMS = sorted({stem for known in STEMS.values() for stem in known}, key=lambda stem: (-len(stem), stem))
+_STEMS = sorted(
+    {stem for known in STEMS.values() for stem in known}, key=lambda stem: (-len(stem), stem)
+)
 """The stems of every quantity, the longest first."""
 _MOTOR_SIDE = frozenset({"motor", "rotor", "drive"})
 _BRACKET_UNIT = re.compile(r"^(.*\S)\s*[\[(]\s*([^\[\]()]*[^\[\]()\d\s][^\[\]()]*)\s*[\])]$")
@@ -94,7 +219,8 @@ class Name:
 class ChannelChoice:
     """Columns chosen for a log: by canonical channel its column and, where the name tells, its unit.
 
-    `joints` are the joints' own names, where they have any; `foreign` units that names state and algid does not know.
+    `joints` are the joints' own names, where they have any; `foreign` units that names state and
+    algid does not know.
     """
 
     columns: dict[str, str]
@@ -151,8 +277,8 @@ def choose(
     columns : iterable of str
         Every column of the file.
     joints : pair of str, optional
-        The two joints to take where a log has more: numbers, or names as in ``/joint_states/elbow/position`` or
-        ``elbow_pos``.
+        The two joints to take where a log has more: numbers, or names as in
+        ``/joint_states/elbow/position`` or ``elbow_pos``.
     named : collection of str
         Canonical channels whose columns are given: what is chosen for them need not be plain.
     passive : 1, 2 or None
@@ -161,8 +287,8 @@ def choose(
     Raises
     ------
     LookupError
-        If a quantity stands there for more than two joints and `joints` does not choose, if there are no such
-        joints, or if two columns have one name but for its writing.
+        If a quantity stands there for more than two joints and `joints` does not choose, if there
+        are no such joints, or if two columns have one name but for its writing.
     """
     parts = {column: take_apart(column) for column in columns}
     chosen = _pairs(parts, joints)
@@ -178,10 +304,22 @@ def choose(
         if joints or (own and along_the_arm(own)[1] == "names"):
             chosen, parts = found, {**parts, **worded}
         if joints and "theta1" not in {*chosen, *named}:
-            names = [name.own for name in {**parts, **worded}.values() if name.joint and name.stem in _STEMS]
-            there = ", ".join(list(dict.fromkeys(names))[:16]) or "none that can be told by their names"
-            raise LookupError(f"no columns of the joints {', '.join(joints)}; joints there are: {there}")
-    if passive and "tau1" not in chosen and (torque := _only_torque(parts, chosen.get(f"theta{3 - passive}"))):
+            names = [
+                name.own
+                for name in {**parts, **worded}.values()
+                if name.joint and name.stem in _STEMS
+            ]
+            there = (
+                ", ".join(list(dict.fromkeys(names))[:16]) or "none that can be told by their names"
+            )
+            raise LookupError(
+                f"no columns of the joints {', '.join(joints)}; joints there are: {there}"
+            )
+    if (
+        passive
+        and "tau1" not in chosen
+        and (torque := _only_torque(parts, chosen.get(f"theta{3 - passive}")))
+    ):
         chosen[f"tau{3 - passive}"] = torque
     if time := _time(parts):
         chosen["t"] = time
@@ -191,12 +329,19 @@ def choose(
         if channel in named or joint is None:
             continue
         twin = next(
-            (one for one, other in parts.items() if one != column and (other.stem, other.joint) == (stem, joint)), None
+            (
+                one
+                for one, other in parts.items()
+                if one != column and (other.stem, other.joint) == (stem, joint)
+            ),
+            None,
         )
         if twin is not None:  # another column of the same name but for its writing or its unit
             raise LookupError(f"{column!r} and {twin!r} are both {stem} of joint {joint}")
     units = {channel: unit for channel, column in chosen.items() if (unit := parts[column].unit)}
-    foreign = {channel: unit for channel, column in chosen.items() if (unit := parts[column].foreign)}
+    foreign = {
+        channel: unit for channel, column in chosen.items() if (unit := parts[column].foreign)
+    }
     return ChannelChoice(chosen, units, _named_joints(chosen, parts), foreign)
 
 
@@ -205,11 +350,17 @@ def _pairs(parts: dict[str, Name], joints: tuple[str, str] | None) -> dict[str, 
     chosen: dict[str, str] = {}
     for quantity in ("theta", "tau", "omega"):
         for stem in STEMS[quantity]:
-            of_stem = {name.joint: column for column, name in parts.items() if name.stem == stem and name.joint}
+            of_stem = {
+                name.joint: column
+                for column, name in parts.items()
+                if name.stem == stem and name.joint
+            }
             pair = _two(of_stem, joints)
             if len(of_stem) > 2 and not joints:
                 there = ", ".join(list(of_stem)[:8])
-                raise LookupError(f"{stem!r} stands there for {counted(len(of_stem), 'joint')}: {there}")
+                raise LookupError(
+                    f"{stem!r} stands there for {counted(len(of_stem), 'joint')}: {there}"
+                )
             if pair:
                 chosen |= {f"{quantity}1": pair[0], f"{quantity}2": pair[1]}
                 break
@@ -219,8 +370,15 @@ def _pairs(parts: dict[str, Name], joints: tuple[str, str] | None) -> dict[str, 
 def _two(by_joint: dict[str, str], joints: tuple[str, str] | None) -> tuple[str, str] | None:
     """The columns of the two joints given, else of the two there are, from the base outwards where their names tell."""
     if joints:
-        found = [[key for key in by_joint if joint.lower() in (key, key.rpartition("/")[2])] for joint in joints]
-        return (by_joint[found[0][0]], by_joint[found[1][0]]) if all(len(keys) == 1 for keys in found) else None
+        found = [
+            [key for key in by_joint if joint.lower() in (key, key.rpartition("/")[2])]
+            for joint in joints
+        ]
+        return (
+            (by_joint[found[0][0]], by_joint[found[1][0]])
+            if all(len(keys) == 1 for keys in found)
+            else None
+        )
     if len(by_joint) != 2:
         return None
     short = {key.rpartition("/")[2]: column for key, column in by_joint.items()}
@@ -251,7 +409,11 @@ def _worded(parts: dict[str, Name]) -> dict[str, Name]:
             continue
         text = re.sub(r"\W+", "_", name.stem).strip("_")
         for stem in _STEMS:
-            joint = text.removesuffix(f"_{stem}") if text.endswith(f"_{stem}") else text.removeprefix(f"{stem}_")
+            joint = (
+                text.removesuffix(f"_{stem}")
+                if text.endswith(f"_{stem}")
+                else text.removeprefix(f"{stem}_")
+            )
             if joint != text:
                 words = [word for word in joint.split("_") if word not in ("joint", "axis")]
                 if words and _NO_JOINTS.isdisjoint(words):
@@ -275,18 +437,31 @@ def _of_states(parts: dict[str, Name]) -> dict[str, Name]:
 
 
 def _named_joints(chosen: dict[str, str], parts: dict[str, Name]) -> tuple[str, str] | None:
-    """The joints' own names as they stand in the log; None where they are numbers, or none was found."""
+    """The joints' own names as they stand in the log.
+
+    None where they are numbers, or none was found.
+    """
     places = list(parts)
-    pair = sorted((chosen[name] for name in ("theta1", "theta2") if name in chosen), key=places.index)
+    pair = sorted(
+        (chosen[name] for name in ("theta1", "theta2") if name in chosen), key=places.index
+    )
     names = [parts[column].own for column in pair]
-    return (names[0], names[1]) if len(names) == 2 and not all(name.isdecimal() for name in names) else None
+    return (
+        (names[0], names[1])
+        if len(names) == 2 and not all(name.isdecimal() for name in names)
+        else None
+    )
 
 
 def _only_torque(parts: dict[str, Name], angle: str | None) -> str | None:
     """The torque of the joint whose angle is given, or the only torque there is, where the other joint has none."""
     for stem in STEMS["tau"]:
         found = [column for column, name in parts.items() if name.stem == stem]
-        own = [column for column in found if angle in parts and parts[column].joint == parts[angle].joint]
+        own = [
+            column
+            for column in found
+            if angle in parts and parts[column].joint == parts[angle].joint
+        ]
         if len(own or found) == 1:
             return (own or found)[0]
     return None
@@ -294,12 +469,15 @@ def _only_torque(parts: dict[str, Name], angle: str | None) -> str | None:
 
 def _of_one_pair(chosen: dict[str, str], parts: dict[str, Name]) -> dict[str, str]:
     """Only quantities of the joints that the angles have: torques of other joints are not theirs."""
-    pair = [parts[chosen[f"theta{joint}"]].joint for joint in (1, 2)] if "theta1" in chosen else None
+    pair = (
+        [parts[chosen[f"theta{joint}"]].joint for joint in (1, 2)] if "theta1" in chosen else None
+    )
     kept = {}
     for channel, column in chosen.items():
         joint = parts[column].joint
         theirs = pair[int(channel[-1]) - 1] if pair and channel != "t" else joint
-        # drivers mix counting from zero and from one between quantities: the order is what counts then
+        # drivers mix counting from zero and from one between quantities: the order is what counts
+        # then
         if joint in (None, theirs) or {joint, theirs} <= {"0", "1", "2"}:
             kept[channel] = column
     return kept
@@ -310,5 +488,7 @@ def _time(parts: dict[str, Name]) -> str | None:
     for name in TIMES:
         if name in plain:
             return plain[name]
-    bare = {part.stem: column for column, part in reversed(list(parts.items())) if part.joint is None}
+    bare = {
+        part.stem: column for column, part in reversed(list(parts.items())) if part.joint is None
+    }
     return next((bare[name] for name in TIMES if name in bare), None)

@@ -30,4 +30,6 @@ def natively(path: Path, kind: str) -> Iterator[None]:
         raise
     except (Exception, PanicException) as error:
         reason = str(error).split("\n", maxsplit=1)[0][:_LONGEST]
-        raise LogError(f"{path}: the {kind} file cannot be read ({type(error).__name__}: {reason})") from error
+        raise LogError(
+            f"{path}: the {kind} file cannot be read ({type(error).__name__}: {reason})"
+        ) from error

@@ -29,7 +29,9 @@ if TYPE_CHECKING:
     from algid.profile import Profile
 
 _NO_UNIT = ("", "-", "1", "none", "null", "unknown", "dimensionless")
-_NO_SUMS = Notice("NO_CHECKSUM", "the file has no sums of its values, as algid's have: changes would go unseen")
+_NO_SUMS = Notice(
+    "NO_CHECKSUM", "the file has no sums of its values, as algid's have: changes would go unseen"
+)
 
 
 def open_parquet(path: Path, profile: Profile) -> TableReader:
@@ -46,7 +48,9 @@ def open_parquet(path: Path, profile: Profile) -> TableReader:
 
     schema = schema_of(path)
     if len(schema) > LIMITS.columns:
-        raise LogError(f"{path}: {counted(len(schema), 'column')}; expected {LIMITS.columns} at most")
+        raise LogError(
+            f"{path}: {counted(len(schema), 'column')}; expected {LIMITS.columns} at most"
+        )
 
     def width(column: str) -> int:
         _check_pages(path, {column}, most=1)
@@ -59,7 +63,9 @@ def open_parquet(path: Path, profile: Profile) -> TableReader:
             text = (metadata.metadata or {}).get(KEY.encode())
             companion = NO_COMPANION if text is None else loads(text)
         except ValueError as error:
-            raise LogError(f"{path}: the truth in the file's metadata cannot be read ({error})") from error
+            raise LogError(
+                f"{path}: the truth in the file's metadata cannot be read ({error})"
+            ) from error
         found = cells(schema, width)
         rows = counted_rows(path)
     roots = {name: cell.meta.root_names()[0] for name, (cell, _) in found.items()}
@@ -86,7 +92,9 @@ def schema_of(path: Path) -> dict[str, pl.DataType]:
     import polars as pl
 
     if _footer(path).encrypted:
-        raise LogError(f"{path}: the Parquet file holds encrypted columns; write it anew without encryption")
+        raise LogError(
+            f"{path}: the Parquet file holds encrypted columns; write it anew without encryption"
+        )
     with _readable(path):
         return dict(pl.scan_parquet(path, glob=False).collect_schema())
 
@@ -109,26 +117,38 @@ def counted_rows(path: Path) -> int:
     size = path.stat().st_size
     inside = all(0 < pages.first <= pages.end <= size for pages, _ in columns)
     if not inside:  # polars panics at these, which takes it seconds
-        raise LogError(f"{path}: the Parquet footer claims pages beyond the end of the file; copy the file again")
+        raise LogError(
+            f"{path}: the Parquet footer claims pages beyond the end of the file; copy the file again"
+        )
     if not agree:
-        raise LogError(f"{path}: the Parquet footer contradicts itself about its rows; copy the file again")
+        raise LogError(
+            f"{path}: the Parquet footer contradicts itself about its rows; copy the file again"
+        )
     return footer.rows
 
 
 def units_of_schema(schema: pa.Schema, roots: Mapping[str, str]) -> dict[str, str]:
-    """By name the unit that an Arrow schema's metadata state; `roots` are the fields that the names belong to."""
+    """By name the unit that an Arrow schema's metadata state.
+
+    `roots` are the fields that the names belong to.
+    """
     found = in_metadata(_decoded(schema.metadata), list(roots))
     times = Counter(schema.names)
     for name, root in roots.items():
         own = _decoded(schema.field(root).metadata) if times[root] == 1 else {}
-        unit = next((value for key, value in own.items() if key.lower() in ("unit", "units")), "").strip()
+        unit = next(
+            (value for key, value in own.items() if key.lower() in ("unit", "units")), ""
+        ).strip()
         if unit.lower() not in _NO_UNIT:
             found[name] = unit[: LIMITS.unit_letters]
     return found
 
 
 def _decoded(metadata: Mapping[bytes, bytes] | None) -> dict[str, str]:
-    return {key.decode(errors="replace"): value.decode(errors="replace") for key, value in (metadata or {}).items()}
+    return {
+        key.decode(errors="replace"): value.decode(errors="replace")
+        for key, value in (metadata or {}).items()
+    }
 
 
 @contextmanager
@@ -137,7 +157,13 @@ def _readable(path: Path) -> Iterator[None]:
     import polars as pl
     import pyarrow as pa
 
-    raised = (pl.exceptions.PolarsError, pl.exceptions.PanicException, pa.ArrowException, OSError, ValueError)
+    raised = (
+        pl.exceptions.PolarsError,
+        pl.exceptions.PanicException,
+        pa.ArrowException,
+        OSError,
+        ValueError,
+    )
     try:
         yield
     except raised as error:
@@ -146,7 +172,9 @@ def _readable(path: Path) -> Iterator[None]:
 
 def _damaged(path: Path, error: BaseException) -> LogError:
     reason = str(error).split("\n", maxsplit=1)[0][:200]
-    return LogError(f"{path}: the Parquet file is damaged or not one that can be read ({reason}); copy it again")
+    return LogError(
+        f"{path}: the Parquet file is damaged or not one that can be read ({reason}); copy it again"
+    )
 
 
 def _footer(path: Path) -> Footer:
@@ -158,7 +186,9 @@ def _footer(path: Path) -> Footer:
         stream.seek(max(0, size - 8 - length))
         footer = stream.read(min(length, LIMITS.parquet_footer_bytes))
     if tail[4:] != b"PAR1":
-        raise LogError(f"{path}: the Parquet file is cut off: its footer is missing, so nothing can be read of it")
+        raise LogError(
+            f"{path}: the Parquet file is cut off: its footer is missing, so nothing can be read of it"
+        )
     if length + 12 > size or length > LIMITS.parquet_footer_bytes:
         raise LogError(
             f"{path}: the Parquet footer claims {counted(length, 'byte')} of a file of {size}; copy the file again"
@@ -166,7 +196,9 @@ def _footer(path: Path) -> Footer:
     try:
         return _parsed(footer)
     except FooterError as error:
-        raise LogError(f"{path}: the Parquet footer is damaged ({error}); copy the file again") from error
+        raise LogError(
+            f"{path}: the Parquet footer is damaged ({error}); copy the file again"
+        ) from error
 
 
 _parsed = lru_cache(maxsize=2)(parsed)
@@ -200,19 +232,27 @@ class _Groups:
         frame = pl.scan_parquet(self.path, glob=False)
         frame = frame if most is None else frame.head(most)
         numbers = [number(name, *self.cells[source]) for name, source in columns.sources.items()]
-        middle = (len(numbers) // 2 + 1) // 2 * 2  # both joints in one lot: they may share a list column
+        middle = (
+            (len(numbers) // 2 + 1) // 2 * 2
+        )  # both joints in one lot: they may share a list column
         with _readable(self.path):
-            # both begin here and run while the frames are being used; a joint that is looked at alone leaves one lot
+            # both begin here and run while the frames are being used; a joint that is looked at
+            # alone leaves one lot
             lots = [frame.select(lot) for lot in (numbers[:middle], numbers[middle:]) if lot]
-            for first, *rest in zip(*(lot.collect_batches(chunk_size=rows) for lot in lots), strict=True):
+            for first, *rest in zip(
+                *(lot.collect_batches(chunk_size=rows) for lot in lots), strict=True
+            ):
                 yield first.hstack(rest[0]) if rest else first
 
 
-def _check_pages(path: Path, roots: Collection[str], summed: Collection[str] = (), most: int | None = None) -> None:
+def _check_pages(
+    path: Path, roots: Collection[str], summed: Collection[str] = (), most: int | None = None
+) -> None:
     """Refuse pages of columns among `roots` that claim values which cannot be, or whose checksum is wrong.
 
-    At the first polars would end the process, and at the second it does not look. The values of `summed` columns are
-    verified as they are read. Where only the first `most` rows are read, the pages that hold them.
+    At the first polars would end the process, and at the second it does not look. The values of
+    `summed` columns are verified as they are read. Where only the first `most` rows are read, the
+    pages that hold them.
     """
     left = float("inf") if most is None else most
     with path.open("rb") as stream:
@@ -225,22 +265,31 @@ def _check_pages(path: Path, roots: Collection[str], summed: Collection[str] = (
                 return
 
 
-def _check_column(path: Path, stream: BinaryIO, pages: Pages, most: float, *, checksums: bool) -> None:
+def _check_column(
+    path: Path, stream: BinaryIO, pages: Pages, most: float, *, checksums: bool
+) -> None:
     place, seen = pages.first, 0
     # the rows of a page of lists are not stated
     while place < pages.end and (seen < most or len(pages.path) > 1):
         stream.seek(place)
         try:
             header = page_header(stream.read(min(LIMITS.parquet_header_bytes, pages.end - place)))
-        except FooterError:  # old writers count the bytes otherwise; polars tells of what is damaged
+        except (
+            FooterError
+        ):  # old writers count the bytes otherwise; polars tells of what is damaged
             return
         largest = header.unpacked if header.dictionary else pages.values
         if not (0 <= header.values <= largest and header.packed >= 0 and header.unpacked >= 0):
-            raise _damaged(path, FooterError(f"a page at byte {place} claims {counted(header.values, 'value')}"))
+            raise _damaged(
+                path,
+                FooterError(f"a page at byte {place} claims {counted(header.values, 'value')}"),
+            )
         place += header.length
         seen += 0 if header.dictionary else header.values
         if checksums and header.crc is not None:
             stream.seek(place)
             if zlib.crc32(stream.read(header.packed)) != header.crc:
-                raise _damaged(path, FooterError(f"the checksum of a page at byte {place} is wrong"))
+                raise _damaged(
+                    path, FooterError(f"the checksum of a page at byte {place} is wrong")
+                )
         place += header.packed

@@ -1,7 +1,8 @@
 """Units that a file states beside its columns' names: in lines above a table, in a schema's metadata.
 
-A statement is a name and a unit, ``tau1 in mNm``, ``angles: deg``, ``tau1, tau2 [N m]``; the name is a column's, its
-stem's (``tau``), or a word for the quantity (``torques``). What names no column, or no unit, is ordinary text.
+A statement is a name and a unit, ``tau1 in mNm``, ``angles: deg``, ``tau1, tau2 [N m]``; the name
+is a column's, its stem's (``tau``), or a word for the quantity (``torques``). What names no
+column, or no unit, is ordinary text.
 """
 
 from __future__ import annotations
@@ -30,11 +31,18 @@ _WORDS = {
     "tau": {*STEMS["tau"], "motor_torques", "joint_torques"},
     "t": {*TIMES, "times", "timestamps", "stamps"},
 }
-_UNITS: dict[str, Mapping[str, float]] = {"theta": ANGLE, "tau": {**TORQUE, **CURRENT}, "t": NANOSECONDS}
+_UNITS: dict[str, Mapping[str, float]] = {
+    "theta": ANGLE,
+    "tau": {**TORQUE, **CURRENT},
+    "t": NANOSECONDS,
+}
 
 
 def in_text(lines: Iterable[str], columns: Sequence[str]) -> dict[str, str]:
-    """By column the unit that one of the `lines` states; the first statement that names it holds."""
+    """By column the unit that one of the `lines` states.
+
+    The first statement that names it holds.
+    """
     return _in_text(lines, _Named(columns))
 
 
@@ -44,7 +52,9 @@ def _in_text(lines: Iterable[str], columns: _Named) -> dict[str, str]:
     for line in islice(lines, LIMITS.stated_lines):
         text = " ".join(line[: LIMITS.stated_letters].split())
         listed = _UNITS_LINE.match(text)
-        for stated, unit in _listed(listed["list"], columns) if listed else _statements(text, columns):
+        for stated, unit in (
+            _listed(listed["list"], columns) if listed else _statements(text, columns)
+        ):
             statements += 1
             if statements > LIMITS.unit_statements:
                 return found
@@ -86,14 +96,24 @@ Stated = Iterator[tuple[Sequence[str], str]]
 
 
 def _statements(line: str, columns: _Named) -> Stated:
-    """Columns and units; of several names before one unit those that can have it: ``t, q1, tau1 in mNm``."""
+    """Columns and units.
+
+    Of several names before one unit those that can have it: ``t, q1, tau1 in mNm``.
+    """
     for found in _STATEMENT.finditer(line):
         unit = found["unit"].rstrip(".")
         if _is_unit(unit):
             *others, last = re.split(r" ?(?:,|&|\band\b) ?", found["names"])
             yield columns.of(last), unit
             for name in others:
-                yield [one for one in columns.of(name) if unit_of(unit) in _UNITS.get(_quantity(one) or "", {})], unit
+                yield (
+                    [
+                        one
+                        for one in columns.of(name)
+                        if unit_of(unit) in _UNITS.get(_quantity(one) or "", {})
+                    ],
+                    unit,
+                )
 
 
 def _listed(text: str, columns: _Named) -> Stated:
@@ -123,7 +143,12 @@ class _Named:
         for column in columns:
             part, quantity = take_apart(column), _quantity(column)
             current = part.stem in CURRENTS
-            for key in {column.lower(), (part.stem, part.joint), (part.stem,), (quantity, current, "")}:
+            for key in {
+                column.lower(),
+                (part.stem, part.joint),
+                (part.stem,),
+                (quantity, current, ""),
+            }:
                 self._columns.setdefault(key, []).append(column)
 
     def of(self, name: str) -> Sequence[str]:
@@ -136,13 +161,21 @@ class _Named:
             return self._columns.get((part.stem, part.joint), [])
         if (part.stem,) in self._columns:
             return self._columns[(part.stem,)]
-        meant = (one for one, words in _WORDS.items() if part.stem in words or f"{part.stem}s" in words)
+        meant = (
+            one for one, words in _WORDS.items() if part.stem in words or f"{part.stem}s" in words
+        )
         quantity = next(meant, None)
-        return [] if quantity is None else self._columns.get((quantity, part.stem in CURRENTS, ""), [])
+        return (
+            [] if quantity is None else self._columns.get((quantity, part.stem in CURRENTS, ""), [])
+        )
 
     def of_quantity(self, quantity: str) -> Sequence[str]:
         """The columns of a quantity, measured or as a current."""
-        return [one for current in (False, True) for one in self._columns.get((quantity, current, ""), [])]
+        return [
+            one
+            for current in (False, True)
+            for one in self._columns.get((quantity, current, ""), [])
+        ]
 
 
 def _quantity(column: str) -> str | None:

@@ -44,14 +44,19 @@ class SampleTable:
 
     def noting(self, *notices: Notice) -> SampleTable:
         """The table with more notices."""
-        return SampleTable(self.stamp_ns, self.columns, (*self.notices, *notices)) if notices else self
+        return (
+            SampleTable(self.stamp_ns, self.columns, (*self.notices, *notices)) if notices else self
+        )
 
 
 def stack(tables: Sequence[SampleTable]) -> SampleTable:
     """One table out of several with the same channels, in their order."""
     if len(tables) == 1:
         return tables[0]
-    columns = {name: np.concatenate([table.columns[name] for table in tables]) for name in tables[0].columns}
+    columns = {
+        name: np.concatenate([table.columns[name] for table in tables])
+        for name in tables[0].columns
+    }
     notices = tuple(notice for table in tables for notice in table.notices)
     return SampleTable(np.concatenate([table.stamp_ns for table in tables]), columns, notices)
 

@@ -55,7 +55,11 @@ def pieces(path: Path, name: str, size: int = _PIECE) -> Iterator[bytes]:
                 return
             stream = gzip.GzipFile(fileobj=raw)
             total = 0
-            for part in _gathered(_zstd(raw), size) if name == "csv.zst" else iter(lambda: stream.read(size), b""):
+            for part in (
+                _gathered(_zstd(raw), size)
+                if name == "csv.zst"
+                else iter(lambda: stream.read(size), b"")
+            ):
                 total += len(part)
                 if total > most:
                     raise LogError(
@@ -64,7 +68,9 @@ def pieces(path: Path, name: str, size: int = _PIECE) -> Iterator[bytes]:
                     )
                 yield part
     except (OSError, EOFError, zlib.error) as error:
-        raise LogError(f"{path}: the compressed data are damaged or cut off ({error}); copy it again") from error
+        raise LogError(
+            f"{path}: the compressed data are damaged or cut off ({error}); copy it again"
+        ) from error
 
 
 def _zstd(raw: BinaryIO) -> Iterator[bytes]:
@@ -107,7 +113,9 @@ def _gathered(parts: Iterator[bytes], size: int) -> Iterator[bytes]:
 
 
 def whole_lines(path: Path, name: str) -> Iterator[bytes]:
-    """As `pieces`, in pieces that end with a line; behind the head, which tells the dialect, without empty lines.
+    """As `pieces`, in pieces that end with a line.
+
+    Behind the head, which tells the dialect, without empty lines.
 
     Raises
     ------
@@ -121,7 +129,9 @@ def whole_lines(path: Path, name: str) -> Iterator[bytes]:
         end = text.rfind(b"\n") + 1
         rest = text[end:]
         if len(rest) > LIMITS.line_bytes:
-            raise LogError(f"{path}: a line of more than 65,000 characters; expected rows of numbers")
+            raise LogError(
+                f"{path}: a line of more than 65,000 characters; expected rows of numbers"
+            )
         if end:
             yield text[:end]
     if rest:

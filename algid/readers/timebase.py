@@ -30,13 +30,15 @@ _GAP = 3.0
 
 
 def in_order(path: str, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
-    """Tables with strictly increasing stamps, within and across; the last one tells what was mended.
+    """Tables with strictly increasing stamps, within and across.
+
+    The last one tells what was mended.
 
     Raises
     ------
     LogError
-        If time goes backwards by more than `HORIZON` rows or in a quarter of the rows, or stands still in half of
-        them.
+        If time goes backwards by more than `HORIZON` rows or in a quarter of the rows, or stands
+        still in half of them.
     """
     pending: SampleTable | None = None
     late = repeated = 0
@@ -116,8 +118,8 @@ def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, int, int]:
 def _set_back(table: SampleTable) -> int | None:
     """The row behind which the clock was set back, if it was.
 
-    Samples that merely come late fill the hole that they left, or come twice. Where a clock is set back, a row of other
-    samples lies in time that was recorded already.
+    Samples that merely come late fill the hole that they left, or come twice. Where a clock is set
+    back, a row of other samples lies in time that was recorded already.
     """
     stamps = table.stamp_ns
     highest = np.maximum.accumulate(stamps)
@@ -128,7 +130,9 @@ def _set_back(table: SampleTable) -> int | None:
     for run in runs:
         if run.size < _RUN:
             continue
-        before = np.arange(max(0, run[0] - HORIZON - run.size), run[0])  # in time order but for late ones among them
+        before = np.arange(
+            max(0, run[0] - HORIZON - run.size), run[0]
+        )  # in time order but for late ones among them
         before = before[np.argsort(stamps[before], kind="stable")]
         after = np.clip(np.searchsorted(stamps[before], stamps[run]), 0, before.size - 1)
         nearest = before[after]
@@ -136,7 +140,9 @@ def _set_back(table: SampleTable) -> int | None:
         nearer = np.abs(stamps[left] - stamps[run]) < np.abs(stamps[nearest] - stamps[run])
         nearest = np.where(nearer, left, nearest)
         crowded = np.abs(stamps[nearest] - stamps[run]) <= period / 2
-        again = np.all([values[nearest] == values[run] for values in table.columns.values()], axis=0)
+        again = np.all(
+            [values[nearest] == values[run] for values in table.columns.values()], axis=0
+        )
         if np.count_nonzero(crowded & ~again) > run.size / 2:
             return int(run[0]) - 1
     return None
@@ -167,7 +173,10 @@ class Series:
     def at(self, stamps: IntArray) -> dict[str, FloatArray]:
         """The channels at the stamps (N,), linear between samples."""
         start = self.table.stamp_ns[0]
-        own, wanted = (self.table.stamp_ns - start).astype(np.float64), (stamps - start).astype(np.float64)
+        own, wanted = (
+            (self.table.stamp_ns - start).astype(np.float64),
+            (stamps - start).astype(np.float64),
+        )
         return {name: np.interp(wanted, own, values) for name, values in self.table.columns.items()}
 
     def error(self) -> str:
@@ -179,7 +188,9 @@ class Series:
         return ", ".join(costs)
 
 
-def whole_topic(path: str, topic: str, channels: Collection[str], tables: Iterator[SampleTable]) -> Series:
+def whole_topic(
+    path: str, topic: str, channels: Collection[str], tables: Iterator[SampleTable]
+) -> Series:
     """A topic of a file as a whole, in time order; its tables hold the `channels`.
 
     Raises
@@ -200,13 +211,17 @@ def whole_topic(path: str, topic: str, channels: Collection[str], tables: Iterat
 def aligned(main: Iterator[SampleTable], others: Sequence[Series]) -> Iterator[SampleTable]:
     """The main topic's tables with the other topics' channels, where all cover it.
 
-    The last table tells how many were dropped and what the interpolation costs, in the log's own units.
+    The last table tells how many were dropped and what the interpolation costs, in the log's own
+    units.
     """
     lost, held = 0, None
     for table in main:
         if held is not None:
             yield held
-        covered = np.all([np.ones(len(table), np.bool_), *(other.covers(table.stamp_ns) for other in others)], axis=0)
+        covered = np.all(
+            [np.ones(len(table), np.bool_), *(other.covers(table.stamp_ns) for other in others)],
+            axis=0,
+        )
         lost += len(table) - int(np.count_nonzero(covered))
         kept = table if covered.all() else table.take(covered)
         columns = dict(kept.columns)
@@ -222,7 +237,9 @@ def aligned(main: Iterator[SampleTable], others: Sequence[Series]) -> Iterator[S
         for other in others
     ]
     if lost:
-        text = f"{counted(lost, 'sample was', 'samples were')} dropped, where another topic has none"
+        text = (
+            f"{counted(lost, 'sample was', 'samples were')} dropped, where another topic has none"
+        )
         said.append(Notice("NOT_COVERED", text, lossy=True))
     if held is not None:
         yield held.noting(*said, *(notice for other in others for notice in other.table.notices))

@@ -1,7 +1,7 @@
 """The arm itself: a drawing to scale, and a player that moves it through a log or a plan.
 
-The drawing is inline SVG and stands without JavaScript at the motion's start; ``assets/arm.js`` moves it. While it
-plays, the document hears an event ``arm-time`` whose detail is the time in s.
+The drawing is inline SVG and stands without JavaScript at the motion's start; ``assets/arm.js``
+moves it. While it plays, the document hears an event ``arm-time`` whose detail is the time in s.
 """
 
 from __future__ import annotations
@@ -66,7 +66,11 @@ def arm_of(result: Result, torque: TorqueLog | None) -> ArmDrawing | None:
         return None
     mass = result.payload["m_p"].estimate if "m_p" in result.payload else None
     payload = "" if mass is None else f"payload of {significant(mass, 3)} kg"
-    unknown = "" if l2 is not None else " Link 2's length is not known: it is drawn as long as link 1 (give --l2)."
+    unknown = (
+        ""
+        if l2 is not None
+        else " Link 2's length is not known: it is drawn as long as link 1 (give --l2)."
+    )
     reading = f"{READING} l1 is {significant(l1, 3)} m.{unknown}"
     return ArmDrawing(l1, l1 if l2 is None else l2, *motion, reading, payload)
 
@@ -79,8 +83,14 @@ def _length(result: Result, name: str) -> float | None:
 
 
 def _coupling_length(result: Result) -> float | None:
-    """l1 = g k1 / k2 (Table 1), in m; None where gravity does not act or the constants are no arm's."""
-    k1, k2 = (result.parameters[name].estimate if name in result.parameters else None for name in ("k1", "k2"))
+    """l1 = g k1 / k2 (Table 1), in m.
+
+    None where gravity does not act or the constants are no arm's.
+    """
+    k1, k2 = (
+        result.parameters[name].estimate if name in result.parameters else None
+        for name in ("k1", "k2")
+    )
     gravity = result.settings.get("gravity")
     if not k1 or not k2 or not isinstance(gravity, int | float):
         return None
@@ -107,8 +117,13 @@ def arm_html(arm: ArmDrawing) -> str:
     tip = elbow + arm.l2 * np.stack([np.cos(both), np.sin(both)])
     left, top, width, height = _frame(arm, elbow, tip)
     says = f"Arm of {significant(arm.l1, 3)} m and {significant(arm.l2, 3)} m links"
-    frames = dict(zip(("t", "theta1", "theta2"), np.round([t, *theta], DIGITS).tolist(), strict=True))
-    levels = [("level", 0.0), *([] if arm.height is None or not np.isfinite(arm.height) else [("limit", -arm.height)])]
+    frames = dict(
+        zip(("t", "theta1", "theta2"), np.round([t, *theta], DIGITS).tolist(), strict=True)
+    )
+    levels = [
+        ("level", 0.0),
+        *([] if arm.height is None or not np.isfinite(arm.height) else [("limit", -arm.height)]),
+    ]
     ground = "".join(
         f'<line class="{kind}" x1="{left:.5g}" y1="{y:.5g}" x2="{left + width:.5g}" y2="{y:.5g}"/>'
         for kind, y in levels
@@ -137,8 +152,13 @@ def _frames(arm: ArmDrawing) -> tuple[FloatArray, FloatArray]:
     return t, np.stack([np.interp(t, arm.t, row) for row in arm.theta])
 
 
-def _frame(arm: ArmDrawing, elbow: FloatArray, tip: FloatArray) -> tuple[float, float, float, float]:
-    """Left, top, width and height that hold the arm all along its motion; at least as wide as the arm is long."""
+def _frame(
+    arm: ArmDrawing, elbow: FloatArray, tip: FloatArray
+) -> tuple[float, float, float, float]:
+    """Left, top, width and height that hold the arm all along its motion.
+
+    At least as wide as the arm is long.
+    """
     reach = arm.l1 + arm.l2
     points = np.concatenate([np.zeros((2, 1)), elbow, tip], axis=1)
     if arm.height is not None and np.isfinite(arm.height):

@@ -36,7 +36,9 @@ def brief(result: Result, place: str = "") -> list[str]:
 
 
 def _wrapped(text: str, first: str = "", rest: str = "") -> list[str]:
-    return textwrap.wrap(text, WIDTH, initial_indent=first, subsequent_indent=rest, break_on_hyphens=False)
+    return textwrap.wrap(
+        text, WIDTH, initial_indent=first, subsequent_indent=rest, break_on_hyphens=False
+    )
 
 
 def _reasons(judged: Verdict, room: int) -> Iterator[str]:
@@ -53,19 +55,30 @@ def _reasons(judged: Verdict, room: int) -> Iterator[str]:
     left = judged.reasons[shown:]
     if left:
         codes = ", ".join(dict.fromkeys(one.code for one in left))
-        yield textwrap.shorten(f" • {counted(len(left), 'more reason')}, with -v: {codes}", WIDTH, placeholder=" …")
+        yield textwrap.shorten(
+            f" • {counted(len(left), 'more reason')}, with -v: {codes}", WIDTH, placeholder=" …"
+        )
 
 
 def _estimates(result: Result) -> Iterator[str]:
     """The arm's constants and the payload: estimate, half the 95 % interval, unit, error where it is known, meaning."""
     errors = _errors(result)
-    for name, found in {**{k: v for k, v in result.parameters.items() if k in ARM}, **result.payload}.items():
-        number = f"{resolved(found.estimate, found.std)} ± {_half(found)}" if found.estimate is not None else ABSENT
+    for name, found in {
+        **{k: v for k, v in result.parameters.items() if k in ARM},
+        **result.payload,
+    }.items():
+        number = (
+            f"{resolved(found.estimate, found.std)} ± {_half(found)}"
+            if found.estimate is not None
+            else ABSENT
+        )
         error = f"{errors[name]:>8}" if errors else ""
         words = PARAMETERS[name].meaning.partition(", ")[0] if name in PARAMETERS else ""
         status = "" if found.status is Status.OK else found.status.value
         line = f"{visible(name):<4}{number:>19} {unit_text(found.unit):<10}{error} "
-        fits = len(line) + len(words) <= WIDTH or not errors  # beside errors there is no room for a second line
+        fits = (
+            len(line) + len(words) <= WIDTH or not errors
+        )  # beside errors there is no room for a second line
         yield from _wrapped(f"{line}{status or (words if fits else '')}", rest=" " * len(line))
 
 
@@ -92,7 +105,10 @@ def _terms(result: Result) -> list[str]:
     others = {name: found for name, found in result.parameters.items() if name not in ARM}
     if not terms and not others:
         return ["Terms kept: none"] if result.fit is not None else []
-    numbers = [f"{name} {resolved(found.estimate, found.std)} ± {_half(found)}" for name, found in others.items()]
+    numbers = [
+        f"{name} {resolved(found.estimate, found.std)} ± {_half(found)}"
+        for name, found in others.items()
+    ]
     return _at_most(2, f"Terms kept: {', '.join(terms) or 'delay'} ({', '.join(numbers)})")
 
 
@@ -107,9 +123,15 @@ def _prediction(result: Result) -> list[str]:
     if found is None:
         return []
     band = "" if found.bandwidth is None else f" below {found.bandwidth:g} Hz"
-    return [f"R² of the torque{band}: joint 1 {share_text(found.r2[0])}, joint 2 {share_text(found.r2[1])}"]
+    return [
+        f"R² of the torque{band}: joint 1 {share_text(found.r2[0])}, joint 2 {share_text(found.r2[1])}"
+    ]
 
 
 def _notes(notes: Iterable[Notice]) -> list[str]:
     codes = [one.code for one in notes]
-    return _at_most(1, f"Data notes ({len(codes)}): {', '.join(dict.fromkeys(codes))}") if codes else []
+    return (
+        _at_most(1, f"Data notes ({len(codes)}): {', '.join(dict.fromkeys(codes))}")
+        if codes
+        else []
+    )

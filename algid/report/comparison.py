@@ -18,8 +18,8 @@ from algid.words import counted
 class Comparison:
     """Results side by side: the estimates, how far each lies from the first one's, and what was set otherwise.
 
-    `sigma` holds, by parameter, the distance of each result from the first in combined standard deviations;
-    None where either has no estimate or no standard deviation.
+    `sigma` holds, by parameter, the distance of each result from the first in combined standard
+    deviations; None where either has no estimate or no standard deviation.
     """
 
     labels: tuple[str, ...]
@@ -30,7 +30,9 @@ class Comparison:
     @property
     def largest_sigma(self) -> float | None:
         """The largest distance, None where there is none."""
-        distances = [abs(distance) for row in self.sigma.values() for distance in row if distance is not None]
+        distances = [
+            abs(distance) for row in self.sigma.values() for distance in row if distance is not None
+        ]
         return max(distances, default=None)
 
 
@@ -51,13 +53,22 @@ def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> C
         raise ValueError(f"a comparison needs at least two results, got {len(results)}")
     if labels is not None and len(labels) != len(results):
         raise ValueError(f"labels must name {counted(len(results), 'result')}, got {len(labels)}")
-    shown = [visible(label) for label in labels] if labels else [file_name(r.log.path) for r in results]
+    shown = (
+        [visible(label) for label in labels] if labels else [file_name(r.log.path) for r in results]
+    )
     if len(set(shown)) < len(shown):
         shown = [f"{number} {label}" for number, label in enumerate(shown, start=1)]
     first, others = results[0].estimates, [result.estimates for result in results[1:]]
-    names = dict.fromkeys(name for result in results for name in result.estimates)  # in the order met
-    sigma = {name: tuple(distance_sigma(first.get(name), other.get(name)) for other in others) for name in names}
-    return Comparison(tuple(shown), sigma, _estimates(results, shown, sigma), _settings(results, shown))
+    names = dict.fromkeys(
+        name for result in results for name in result.estimates
+    )  # in the order met
+    sigma = {
+        name: tuple(distance_sigma(first.get(name), other.get(name)) for other in others)
+        for name in names
+    }
+    return Comparison(
+        tuple(shown), sigma, _estimates(results, shown, sigma), _settings(results, shown)
+    )
 
 
 def comparison_json(found: Comparison, results: Sequence[Result]) -> str:
@@ -91,10 +102,16 @@ def distance_sigma(first: Estimate | None, other: Estimate | None) -> float | No
     return (other.estimate - first.estimate) / combined if combined > 0 else None
 
 
-def _estimates(results: Sequence[Result], labels: list[str], sigma: dict[str, tuple[float | None, ...]]) -> Table:
+def _estimates(
+    results: Sequence[Result], labels: list[str], sigma: dict[str, tuple[float | None, ...]]
+) -> Table:
     columns = [Column("Parameter", "name"), Column("Unit", "text"), Column(labels[0], "number")]
     for label in labels[1:]:
-        columns += [Column(label, "number"), Column("Δ %", "number", rank=1), Column("Δ/σ", "number")]
+        columns += [
+            Column(label, "number"),
+            Column("Δ %", "number", rank=1),
+            Column("Δ/σ", "number"),
+        ]
     rows = []
     for name, distances in sigma.items():
         first, *others = (result.estimates.get(name) for result in results)
@@ -102,7 +119,12 @@ def _estimates(results: Sequence[Result], labels: list[str], sigma: dict[str, tu
         cells = [visible(name), unit, with_std(first)]
         for other, distance in zip(others, distances, strict=True):
             change = ABSENT
-            if first is not None and other is not None and first.estimate and other.estimate is not None:
+            if (
+                first is not None
+                and other is not None
+                and first.estimate
+                and other.estimate is not None
+            ):
                 change = f"{100 * (other.estimate - first.estimate) / abs(first.estimate):+.3g}"
             cells += [with_std(other), change, ABSENT if distance is None else f"{distance:+.1f}"]
         rows.append(tuple(cells))
@@ -123,14 +145,20 @@ def _settings(results: Sequence[Result], labels: list[str]) -> Table:
     """What was set otherwise, and how the first log of each kind was read otherwise."""
     every: list[dict[str, str]] = []
     for result in results:
-        settings = {**flat_settings(result.settings), "estimator": result.estimator, "algid": result.version}
+        settings = {
+            **flat_settings(result.settings),
+            "estimator": result.estimator,
+            "algid": result.version,
+        }
         for role, log in {log.role: log for log in reversed(result.logs)}.items():
             reading = {} if log.reading is None else flat_settings(asdict(log.reading))
             settings |= {f"{role} log: {name}": value for name, value in reading.items()}
         every.append(settings)
     names = dict.fromkeys(name for settings in every for name in settings)
     differing = [name for name in names if len({settings.get(name) for settings in every}) > 1]
-    rows = tuple((visible(n), *(visible(settings.get(n, ABSENT)) for settings in every)) for n in differing)
+    rows = tuple(
+        (visible(n), *(visible(settings.get(n, ABSENT)) for settings in every)) for n in differing
+    )
     columns = (Column("Setting", "name"), *(Column(label, "text") for label in labels))
     note = "" if rows else "Every setting is the same, and every log was read the same way."
     return Table("Settings that differ", columns, rows, note)

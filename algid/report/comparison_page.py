@@ -12,7 +12,17 @@ from algid.arm import FloatArray
 from algid.files import whole_file
 from algid.report.comparison import Comparison
 from algid.report.document import Document, Section
-from algid.report.figures.base import Figure, Layout, Legend, Panel, Trace, axis, label, packed, stretch
+from algid.report.figures.base import (
+    Figure,
+    Layout,
+    Legend,
+    Panel,
+    Trace,
+    axis,
+    label,
+    packed,
+    stretch,
+)
 from algid.report.frame import page
 from algid.results import Estimate, Result
 from algid.text import joined, significant, visible
@@ -38,7 +48,9 @@ def write_comparison(found: Comparison, results: Sequence[Result], folder: Path)
 def comparison_document(found: Comparison, results: Sequence[Result]) -> Document:
     """The report of a comparison."""
     names, count = found.labels, counted(len(results), "result")
-    figures = [figure for figure in (_intervals(found, results), _distances(found)) if figure.panels]
+    figures = [
+        figure for figure in (_intervals(found, results), _distances(found)) if figure.panels
+    ]
     return Document(
         title="Comparison",
         verdict=verdict(found),
@@ -77,7 +89,9 @@ def _legend(found: Comparison, first: int = 0) -> tuple[Legend, ...]:
     )
 
 
-def _dots(found: Comparison, place: int, x: FloatArray, y: FloatArray, size: int, number: str) -> Trace:
+def _dots(
+    found: Comparison, place: int, x: FloatArray, y: FloatArray, size: int, number: str
+) -> Trace:
     """The dots of one result; `number` is how a value is written."""
     name = label(found.labels[place])
     return {
@@ -103,19 +117,32 @@ def _share(found: Estimate | None, middle: float) -> tuple[float, float] | None:
 
 def _intervals(found: Comparison, results: Sequence[Result]) -> Figure:
     """A forest plot: every result's interval in percent of the first one's estimate."""
-    middles = {name: results[0].estimates[name].estimate for name in found.sigma if name in results[0].estimates}
+    middles = {
+        name: results[0].estimates[name].estimate
+        for name in found.sigma
+        if name in results[0].estimates
+    }
     known = {name: middle for name, middle in middles.items() if middle}
     apart = 0.6 / len(results)
     traces: list[Trace] = []
     widest = [0.0]
     for place, result in enumerate(results):
-        rows = [(at, _share(result.estimates.get(name), middle)) for at, (name, middle) in enumerate(known.items())]
+        rows = [
+            (at, _share(result.estimates.get(name), middle))
+            for at, (name, middle) in enumerate(known.items())
+        ]
         shown = [(at, *share) for at, share in rows if share is not None]
         x, half = (np.array([row[column] for row in shown]) for column in (1, 2))
         y = np.array([row[0] for row in shown]) + (place - (len(results) - 1) / 2) * apart
         widest += [float(value) for value in np.abs(x) + half]
         dots = _dots(found, place, x, y, 7, "+.3g} %")
-        bar = {"type": "data", "array": half.tolist(), "color": dots["marker"]["color"], "thickness": 2, "width": 0}
+        bar = {
+            "type": "data",
+            "array": half.tolist(),
+            "color": dots["marker"]["color"],
+            "thickness": 2,
+            "width": 0,
+        }
         traces.append({**dots, "error_x": bar})
     reach = 1.1 * float(np.quantile(widest, 0.9))
     layout = {
@@ -123,21 +150,35 @@ def _intervals(found: Comparison, results: Sequence[Result]) -> Figure:
         "yaxis": _names(list(known)),
         "hovermode": "closest",
     }
-    says = f"95 % intervals of {counted(len(known), 'parameter')}, {counted(len(results), 'result')}"
-    panels = (Panel(traces, layout, says, height=FRAME + (ROW + 8 * (len(results) - 2)) * len(known)),) if known else ()
+    says = (
+        f"95 % intervals of {counted(len(known), 'parameter')}, {counted(len(results), 'result')}"
+    )
+    panels = (
+        (Panel(traces, layout, says, height=FRAME + (ROW + 8 * (len(results) - 2)) * len(known)),)
+        if known
+        else ()
+    )
     reading = "Read: intervals of one row that overlap agree; one that stands apart has changed or was made otherwise."
-    return Figure("intervals", "Estimates with their 95 % intervals", panels, reading, _legend(found))
+    return Figure(
+        "intervals", "Estimates with their 95 % intervals", panels, reading, _legend(found)
+    )
 
 
 def _distances(found: Comparison) -> Figure:
     """How far each result is from the first, in combined standard deviations."""
-    names = [name for name, row in found.sigma.items() if any(distance is not None for distance in row)]
+    names = [
+        name for name, row in found.sigma.items() if any(distance is not None for distance in row)
+    ]
     traces: list[Trace] = []
     for place in range(1, len(found.labels)):
         pairs = [(found.sigma[name][place - 1], at) for at, name in enumerate(names)]
-        shown = np.array([(distance, at) for distance, at in pairs if distance is not None]).reshape(-1, 2)
+        shown = np.array(
+            [(distance, at) for distance, at in pairs if distance is not None]
+        ).reshape(-1, 2)
         traces.append(_dots(found, place, shown[:, 0], shown[:, 1], 8, "+.2f} σ"))
-    sizes = [abs(distance) for row in found.sigma.values() for distance in row if distance is not None]
+    sizes = [
+        abs(distance) for row in found.sigma.values() for distance in row if distance is not None
+    ]
     reach = max(1.1 * max(sizes, default=0.0), 4.0)
     inside = sum(size <= CHANCE for size in sizes)
     layout = {
@@ -148,12 +189,24 @@ def _distances(found: Comparison) -> Figure:
     }
     largest = significant(max(sizes, default=0.0), 2)
     note = f"{inside} of {counted(len(sizes), 'difference')} within ± {CHANCE:g} σ, the largest at {largest} σ."
-    panels = (Panel(traces, layout, f"Distances in σ. {note}", height=FRAME + ROW * len(names)),) if names else ()
-    legend = (*_legend(found, 1), Legend("", f"± {CHANCE:g} σ, 95 % by chance", "@blue/0.25", "area"))
-    return Figure("distances", f"Distances from {found.labels[0]}", panels, f"Read: {READING}.", legend, note)
+    panels = (
+        (Panel(traces, layout, f"Distances in σ. {note}", height=FRAME + ROW * len(names)),)
+        if names
+        else ()
+    )
+    legend = (
+        *_legend(found, 1),
+        Legend("", f"± {CHANCE:g} σ, 95 % by chance", "@blue/0.25", "area"),
+    )
+    return Figure(
+        "distances", f"Distances from {found.labels[0]}", panels, f"Read: {READING}.", legend, note
+    )
 
 
 def _names(names: Sequence[str]) -> Layout:
     """An axis of names from the top down."""
-    ticks: Layout = {"tickvals": list(range(len(names))), "ticktext": [label(name) for name in names]}
+    ticks: Layout = {
+        "tickvals": list(range(len(names))),
+        "ticktext": [label(name) for name in names],
+    }
     return axis(range=[len(names) - 0.4, -0.6], zeroline=False, fixedrange=True, **ticks)

@@ -1,7 +1,8 @@
 """What a report says, whatever shows it: a verdict, then sections of tables, figures and words.
 
-The reports of an identification, a track, a fleet, a design and a comparison are one `Document` each. Terminal,
-Markdown and page set it, each in one way for all of them; they choose nothing but how deep they go (`Depth`).
+The reports of an identification, a track, a fleet, a design and a comparison are one `Document`
+each. Terminal, Markdown and page set it, each in one way for all of them; they choose nothing but
+how deep they go (`Depth`).
 """
 
 from __future__ import annotations
@@ -35,7 +36,9 @@ class Depth(IntEnum):
 
 @dataclass(frozen=True)
 class Column:
-    """Heading of a column and what it holds; a narrow terminal does without it, the highest `rank` first.
+    """Heading of a column and what it holds.
+
+    a narrow terminal does without it, the highest `rank` first.
 
     A doubtful status belongs to a result that failed: not even OK is shown as good.
     """
@@ -47,7 +50,10 @@ class Column:
 
 @dataclass(frozen=True)
 class Drawn:
-    """A column of drawings by the name of their row, after the column `after`, or last; `small` ones share a line."""
+    """A column of drawings by the name of their row, after the column `after`, or last.
+
+    `small` ones share a line.
+    """
 
     heading: str
     rows: Mapping[str, str]
@@ -82,15 +88,25 @@ class Table:
 
     def without_empty(self) -> Table:
         """The table less the columns that hold nothing."""
-        return self.only([i for i in range(len(self.columns)) if any(row[i] not in (ABSENT, "") for row in self.rows)])
+        return self.only(
+            [
+                i
+                for i in range(len(self.columns))
+                if any(row[i] not in (ABSENT, "") for row in self.rows)
+            ]
+        )
 
     def without(self, headings: Collection[str]) -> Table:
         """The table less the columns of those headings."""
-        return self.only([place for place, column in enumerate(self.columns) if column.heading not in headings])
+        return self.only(
+            [place for place, column in enumerate(self.columns) if column.heading not in headings]
+        )
 
     def doubted(self) -> Table:
         """The table as part of a result that failed."""
-        kinds = [replace(c, kind="doubtful status") if c.kind == "status" else c for c in self.columns]
+        kinds = [
+            replace(c, kind="doubtful status") if c.kind == "status" else c for c in self.columns
+        ]
         return replace(self, columns=tuple(kinds))
 
     def narrower(self) -> Table | None:
@@ -126,7 +142,10 @@ class Bullets:
 
 @dataclass(frozen=True)
 class References:
-    """Links by what they belong to: pairs of words and place; beyond `most`, the rest is counted."""
+    """Links by what they belong to: pairs of words and place.
+
+    Beyond `most`, the rest is counted.
+    """
 
     groups: Mapping[str, Sequence[tuple[str, str]]]
     most: int

@@ -1,7 +1,7 @@
 """Drawings so small that one stands in each row of a table: inline SVG on one scale a column.
 
-A forest plot beside estimates, bars either side of zero beside what each of several things changes, and courses over
-time.
+A forest plot beside estimates, bars either side of zero beside what each of several things
+changes, and courses over time.
 """
 
 from __future__ import annotations
@@ -63,15 +63,25 @@ def forest(
     shares = {name: share for name, found in group.items() if (share := _share(found)) is not None}
     limit = _limit(list(shares.values()))
     rows = {
-        name: _row(name, group[name], share, limit, (truth or {}).get(name), (logs or {}).get(name, ()))
+        name: _row(
+            name, group[name], share, limit, (truth or {}).get(name), (logs or {}).get(name, ())
+        )
         for name, share in shares.items()
     }
     return Forest(rows, limit)
 
 
 def _share(found: Estimate) -> float | None:
-    """Half the interval in percent of the estimate's size; infinite about zero, None where there is none."""
-    if found.estimate is None or found.ci95 is None or found.ci95[0] is None or found.ci95[1] is None:
+    """Half the interval in percent of the estimate's size.
+
+    Infinite about zero, None where there is none.
+    """
+    if (
+        found.estimate is None
+        or found.ci95 is None
+        or found.ci95[0] is None
+        or found.ci95[1] is None
+    ):
         return None
     half = (found.ci95[1] - found.ci95[0]) / 2
     return 100 * half / abs(found.estimate) if found.estimate else math.inf
@@ -89,7 +99,14 @@ def _limit(shares: Sequence[float]) -> float:
     return next(step * power for step in STEPS if step * power >= least * (1 - 1e-9))
 
 
-def _row(name: str, found: Estimate, share: float, limit: float, truth: float | None, logs: Sequence[float]) -> str:
+def _row(
+    name: str,
+    found: Estimate,
+    share: float,
+    limit: float,
+    truth: float | None,
+    logs: Sequence[float],
+) -> str:
     size = abs(found.estimate or 0.0)
 
     def place(value: float) -> float:
@@ -150,7 +167,9 @@ def _bar(name: str, value: float, scale: float) -> str:
 
 SPARK_WIDTH, SPARK_HEIGHT = 78.0, 24.0
 SPARK_EDGE = 3.0
-USUAL = 0.9  # quantile of a column's rows that its scale holds: a wild one leaves the frame, and the others their shape
+# quantile of a column's rows that its scale holds: a wild one leaves the frame, and the others
+# their shape
+USUAL = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +201,10 @@ def sparklines(courses: Mapping[str, Course]) -> dict[str, str]:
     first = min(float(course.t[0]) for course in shown.values())
     last = max(float(course.t[-1]) for course in shown.values())
     marked = [course.reach for course in shown.values() if course.marked]
-    scale = max([float(np.quantile([course.reach for course in shown.values()], USUAL)), *marked]) or 1.0
+    scale = (
+        max([float(np.quantile([course.reach for course in shown.values()], USUAL)), *marked])
+        or 1.0
+    )
     return {name: _course(name, course, (first, last), scale) for name, course in shown.items()}
 
 
@@ -194,7 +216,9 @@ def _course(name: str, course: Course, span: tuple[float, float], scale: float) 
     y, low, high = np.clip(middle - changes / scale * (middle - SPARK_EDGE), 0.0, SPARK_HEIGHT)
     band = _points([*zip(x, high, strict=True), *zip(x[::-1], low[::-1], strict=True)])
     if x.size == 1:  # a lone value has its band as a bar
-        band = _points([(x[0] - 1, high[0]), (x[0] + 1, high[0]), (x[0] + 1, low[0]), (x[0] - 1, low[0])])
+        band = _points(
+            [(x[0] - 1, high[0]), (x[0] + 1, high[0]), (x[0] + 1, low[0]), (x[0] - 1, low[0])]
+        )
     drawing = (
         f"<title>{escaped(course.says)}</title>"
         f'<polygon class="band" points="{band}"/>'

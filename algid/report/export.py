@@ -1,17 +1,21 @@
 """A result as a ROS 2 log, which Foxglove and PlotJuggler open beside the original.
 
-==========================  ==========================  ==================================================
+==========================  ==========================
+==================================================
 topic                       message                     holds
-==========================  ==========================  ==================================================
+==========================  ==========================
+==================================================
 /algid/measured             sensor_msgs/msg/JointState  position θ, rad; velocity ω, rad/s; effort τ, N m
 /algid/predicted            sensor_msgs/msg/JointState  effort: torque that the model predicts, N m
 /algid/residual             sensor_msgs/msg/JointState  effort: measured less predicted torque, N m
 /algid/estimates            algid_msgs/msg/Estimates    the paper's series, a field each, and condition
 /algid/loaded               algid_msgs/msg/Estimates    the same of the loaded log
-==========================  ==========================  ==================================================
+==========================  ==========================
+==================================================
 
-Angles and torques are those of the log, velocities those that the estimator used: one file is enough in Foxglove.
-Several logs keep a topic each: the second one's are `/algid/log2/predicted` and so on.
+Angles and torques are those of the log, velocities those that the estimator used: one file is
+enough in Foxglove. Several logs keep a topic each: the second one's are `/algid/log2/predicted`
+and so on.
 
 ROS 2 messages in CDR, little endian: the two that an exported log needs.
 """
@@ -48,8 +52,8 @@ ROWS = 1 << 14
 def export_mcap(folder: Path, progress: Progress | None = None) -> Path:
     """Write `estimates.mcap` into the result folder `folder`, telling how far it has come.
 
-    The messages bear the log's own stamps where each Parquet file tells its logs' first ones, in ns, as a
-    JSON list in its metadata ``start_ns``; otherwise time counts from zero.
+    The messages bear the log's own stamps where each Parquet file tells its logs' first ones, in
+    ns, as a JSON list in its metadata ``start_ns``; otherwise time counts from zero.
 
     Raises
     ------
@@ -93,7 +97,9 @@ def _write_torques(writer: Writer, path: Path, logs: int, progress: Progress | N
         stamps = _stamps(block["t"], starts[log] if log < len(starts) else 0)
         place = "/algid" if log == 0 else f"/algid/log{log + 1}"
         names = ("theta{}", "omega{}", "tau{}", "tau{}_predicted")
-        theta, omega, tau, predicted = ((block[name.format(1)], block[name.format(2)]) for name in names)
+        theta, omega, tau, predicted = (
+            (block[name.format(1)], block[name.format(2)]) for name in names
+        )
         residual = (tau[0] - predicted[0], tau[1] - predicted[1])
         for name, message, signals in (
             ("measured", whole, (theta, omega, tau)),
@@ -112,12 +118,17 @@ def _write_torques(writer: Writer, path: Path, logs: int, progress: Progress | N
 
 
 def write_series(writer: Writer, path: Path, topic: str) -> None:
-    """Write a Parquet series, a message a row and a field a column but ``t``; nothing where there is no file."""
+    """Write a Parquet series, a message a row and a field a column but ``t``.
+
+    Nothing where there is no file.
+    """
     if not path.is_file():
         return
     [start] = start_stamps(path, 1)
     names = [name for name in columns_of(path) if name != "t"]
-    schema = writer.register_schema(ESTIMATES, "ros2msg", estimates_schema(field_names(names)).encode())
+    schema = writer.register_schema(
+        ESTIMATES, "ros2msg", estimates_schema(field_names(names)).encode()
+    )
     channel = writer.register_channel(topic, "cdr", schema)
     for block in blocks(path, ["t", *names], ROWS):
         rows = np.stack([block[name] for name in names], axis=1).tolist()
@@ -126,7 +137,10 @@ def write_series(writer: Writer, path: Path, topic: str) -> None:
 
 
 def _stamps(t: FloatArray, start: int) -> list[int]:
-    """Stamps in ns; they are whole nanoseconds, which float64 seconds resolve for a hundred days."""
+    """Stamps in ns.
+
+    They are whole nanoseconds, which float64 seconds resolve for a hundred days.
+    """
     stamps: list[int] = (start + np.rint(t * 1e9).astype(np.int64)).tolist()
     return stamps
 
@@ -146,7 +160,9 @@ def estimates_schema(names: list[str]) -> str:
 
 def field_names(columns: list[str]) -> list[str]:
     """Columns as ROS field names: ``k5+k3+z1+z2`` is ``k5_k3_z1_z2``."""
-    return ["".join(c if c.isalnum() else "_" for c in column).lower().strip("_") for column in columns]
+    return [
+        "".join(c if c.isalnum() else "_" for c in column).lower().strip("_") for column in columns
+    ]
 
 
 class JointStates:
@@ -166,7 +182,9 @@ class JointStates:
         body += struct.pack("<I", 2)
         _align(body, 8)
         self._constant = bytes(body[8:])
-        self._values = struct.Struct("<dd2s6xdd2s6xdd" if whole else "<dd")  # each pair but the first tells its length
+        self._values = struct.Struct(
+            "<dd2s6xdd2s6xdd" if whole else "<dd"
+        )  # each pair but the first tells its length
         self._whole = whole
 
     def message(self, stamp_ns: int, values: Sequence[float]) -> bytes:
@@ -178,7 +196,9 @@ class JointStates:
 def numbers_message(stamp_ns: int, values: list[float]) -> bytes:
     """One message of `estimates_schema`."""
     empty_frame = struct.pack("<I", 1) + b"\x00" + b"\x00" * 3
-    return _ENCAPSULATION + _stamp(stamp_ns) + empty_frame + struct.pack(f"<{len(values)}d", *values)
+    return (
+        _ENCAPSULATION + _stamp(stamp_ns) + empty_frame + struct.pack(f"<{len(values)}d", *values)
+    )
 
 
 def _stamp(stamp_ns: int) -> bytes:

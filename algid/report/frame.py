@@ -1,7 +1,8 @@
 """A document as a page: one file that opens offline, with the plotting library and the scripts that draw its figures.
 
-Nothing but this package's own scripts runs: the page's Content-Security-Policy names them by their hashes, or by a
-nonce for the library beside the page, so that a name out of a log could not run even if it slipped past the escaping.
+Nothing but this package's own scripts runs: the page's Content-Security-Policy names them by their
+hashes, or by a nonce for the library beside the page, so that a name out of a log could not run
+even if it slipped past the escaping.
 """
 
 from __future__ import annotations
@@ -38,12 +39,20 @@ _AXIS: dict[str, Any] = {
 
 TEMPLATE: dict[str, Any] = {
     "layout": {
-        "font": {"family": "system-ui, -apple-system, Segoe UI, Roboto, sans-serif", "size": 12, "color": "@ink"},
+        "font": {
+            "family": "system-ui, -apple-system, Segoe UI, Roboto, sans-serif",
+            "size": 12,
+            "color": "@ink",
+        },
         "paper_bgcolor": "@page",
         "plot_bgcolor": "@page",
         "margin": {"l": 58, "r": 12, "t": 22, "b": 40},
         "showlegend": False,
-        "hoverlabel": {"bgcolor": "@card", "bordercolor": "@line", "font": {"color": "@ink", "size": 12}},
+        "hoverlabel": {
+            "bgcolor": "@card",
+            "bordercolor": "@line",
+            "font": {"color": "@ink", "size": 12},
+        },
         "modebar": {"bgcolor": "@page/0", "color": "@muted", "activecolor": "@ink"},
         "xaxis": _AXIS,
         "yaxis": _AXIS,
@@ -57,7 +66,8 @@ TEMPLATE: dict[str, Any] = {
 def page(document: Document, shared_library: bool = False) -> str:
     """The text of `document`'s page.
 
-    It carries the plotting library, packed; with `shared_library` it asks for the one beside the folder.
+    It carries the plotting library, packed; with `shared_library` it asks for the one beside the
+    folder.
     """
     body = "\n".join(
         [
@@ -75,11 +85,16 @@ def page(document: Document, shared_library: bool = False) -> str:
     moves = any(isinstance(one, ArmDrawing) for one in document.content())
     running = [_asset(name) for name in ("report.js", *(["arm.js"] if moves else []))]
     if shared_library:
-        nonce = hashlib.sha256((body + data).encode()).hexdigest()  # nobody who writes the body can foretell it
+        nonce = hashlib.sha256(
+            (body + data).encode()
+        ).hexdigest()  # nobody who writes the body can foretell it
         source, tag = f"'nonce-{nonce}'", f'<script nonce="{nonce}" src="../{LIBRARY}"></script>'
     else:
         own = library()
-        source, tag = _hash(own.script), f'<script type="text/plain" id="library">{own.packed}</script>'
+        source, tag = (
+            _hash(own.script),
+            f'<script type="text/plain" id="library">{own.packed}</script>',
+        )
     elements = "\n".join(f"<script>{script}</script>" for script in running)
     policy = (
         f"default-src 'none'; script-src {' '.join([source, *map(_hash, running)])}; style-src 'unsafe-inline'; "
@@ -136,8 +151,8 @@ class Library:
 def library() -> Library:
     """The library that this installation has, which a page carries packed and unpacks itself.
 
-    A build with npm at hand leaves plotly's bundle for figures with two axes among the assets; without it the whole
-    library comes out of the package `plotly`.
+    A build with npm at hand leaves plotly's bundle for figures with two axes among the assets;
+    without it the whole library comes out of the package `plotly`.
     """
     asset = resources.files("algid.report") / "assets" / BUNDLE
     if asset.is_file():

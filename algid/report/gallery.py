@@ -32,7 +32,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Gallery:
-    """What the figures need of `torque.parquet`, where it can be read; the figures, those of the paper apart."""
+    """What the figures need of `torque.parquet`, where it can be read.
+
+    The figures, those of the paper apart.
+    """
 
     torque: TorqueLog | None
     figures: list[Figure | Missing]
@@ -51,7 +54,9 @@ def gallery(folder: Path, result: Result, progress: Progress | None = None) -> G
         folder / f"{name}.parquet"
         for name in ("estimates", "loaded", "torque", "innovations", "running", "information")
     )
-    found = _try("torque", f"{TORQUE}, residual, coverage", torques, lambda: read_torque(torques, progress))
+    found = _try(
+        "torque", f"{TORQUE}, residual, coverage", torques, lambda: read_torque(torques, progress)
+    )
     read = None if isinstance(found, Missing) else found
     figures: list[Figure | Missing] = []
     if isinstance(found, Missing):
@@ -69,7 +74,9 @@ def gallery(folder: Path, result: Result, progress: Progress | None = None) -> G
     figures.append(inertia(result, read))
     paper = [_try("convergence", CONVERGENCE, estimates, lambda: convergence(estimates, result))]
     if loaded.is_file():
-        paper.append(_try("loaded", LOADED, loaded, lambda: convergence(loaded, result, loaded=True)))
+        paper.append(
+            _try("loaded", LOADED, loaded, lambda: convergence(loaded, result, loaded=True))
+        )
     return Gallery(read, figures, paper)
 
 
@@ -83,11 +90,17 @@ def drawable(result: Result) -> Result:
         return found.model_copy(update={"estimate": None, "std": None, "ci95": None})
 
     groups = ("parameters", "loaded", "payload", "paper_payload")
-    changed = {group: {name: kept(e) for name, e in getattr(result, group).items()} for group in groups}
+    changed = {
+        group: {name: kept(e) for name, e in getattr(result, group).items()} for group in groups
+    }
     if result.fit is None:
         return result.model_copy(update=changed)
-    covariance = [[None if v is None or abs(v) > LARGEST else v for v in row] for row in result.fit.covariance]
-    return result.model_copy(update={**changed, "fit": result.fit.model_copy(update={"covariance": covariance})})
+    covariance = [
+        [None if v is None or abs(v) > LARGEST else v for v in row] for row in result.fit.covariance
+    ]
+    return result.model_copy(
+        update={**changed, "fit": result.fit.model_copy(update={"covariance": covariance})}
+    )
 
 
 def _try(key: str, title: str, file: Path, make: Callable[[], T]) -> T | Missing:

@@ -6,14 +6,25 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from algid.notices import Notice
 from algid.report.arm import ArmDrawing, arm_html
-from algid.report.document import Bullets, Column, Content, Document, Drawn, ReadingAid, References, Section, Table
+from algid.report.document import (
+    Bullets,
+    Column,
+    Content,
+    Document,
+    Drawn,
+    ReadingAid,
+    References,
+    Section,
+    Table,
+)
 from algid.report.figures.base import Figure, Missing, Panel
 from algid.report.text import escaped
 from algid.results import Status
 from algid.verdict import MOST_REASONS, Verdict
 from algid.words import counted
 
-CARDED = 3  # columns; a row of a wider table stands as a card on a phone, so that no column is out of sight
+# columns; a row of a wider table stands as a card on a phone, so that no column is out of sight
+CARDED = 3
 ANSWERS = ("yes", "no", "none")
 LONG_CELL = 40  # beyond, a cell breaks into lines
 KEYS = "Arrow keys move, plus and minus zoom, 0 resets."
@@ -21,7 +32,10 @@ SIGNS = {"good": "✓", "reservations": "!", "failed": "✕"}
 
 
 def banner(judged: Verdict) -> str:
-    """The verdict in its colour: headline, the first reasons, what to run first; the rest is folded away."""
+    """The verdict in its colour: headline, the first reasons, what to run first.
+
+    The rest is folded away.
+    """
     first, rest = judged.reasons[:MOST_REASONS], judged.reasons[MOST_REASONS:]
     shown = f"<ul>{_listed(_sentences(first))}</ul>" if first else ""
     if judged.command:
@@ -52,7 +66,10 @@ def _listed(sentences: tuple[str, ...]) -> str:
 
 def contents(document: Document) -> str:
     """The page's contents: the numbers first, then its sections, and the figures of those without a heading."""
-    links = [("numbers", "Numbers"), *(link for section in document.sections for link in _links(section))]
+    links = [
+        ("numbers", "Numbers"),
+        *(link for section in document.sections for link in _links(section)),
+    ]
     listed = "".join(f'<li><a href="#{key}">{escaped(title)}</a></li>' for key, title in links)
     return f'<nav aria-label="Contents"><details open><summary>Contents</summary><ul>{listed}</ul></details></nav>'
 
@@ -61,7 +78,11 @@ def _links(section: Section) -> Iterator[tuple[str, str]]:
     if section.key and section.content:
         yield section.key, section.title
     elif not section.key:
-        yield from ((one.key, one.title) for one in section.content if isinstance(one, Figure | Missing | ArmDrawing))
+        yield from (
+            (one.key, one.title)
+            for one in section.content
+            if isinstance(one, Figure | Missing | ArmDrawing)
+        )
 
 
 def section_html(section: Section) -> str:
@@ -91,7 +112,11 @@ def content_html(content: Content) -> str:
         case ReadingAid(text):
             return f'<p class="reading">{escaped(text)}</p>'
         case Bullets(sentences, otherwise):
-            return f"<ul>{_listed(sentences)}</ul>" if sentences else f'<p class="note">{escaped(otherwise)}</p>'
+            return (
+                f"<ul>{_listed(sentences)}</ul>"
+                if sentences
+                else f'<p class="note">{escaped(otherwise)}</p>'
+            )
         case References():
             return references_html(content)
 
@@ -100,7 +125,10 @@ def references_html(references: References) -> str:
     """The links of each group, as many as are shown."""
     groups = []
     for name, links in references.groups.items():
-        shown = [f'<a href="{escaped(place)}">{escaped(words)}</a>' for words, place in links[: references.most]]
+        shown = [
+            f'<a href="{escaped(place)}">{escaped(words)}</a>'
+            for words, place in links[: references.most]
+        ]
         more = f" and {len(links) - references.most:,} more" if len(links) > references.most else ""
         groups.append(f"<dt>{escaped(name)}</dt><dd>{', '.join(shown) + more or 'none'}</dd>")
     return f"<dl>{''.join(groups)}</dl>"
@@ -118,7 +146,8 @@ def table_html(table: Table) -> str:
     slots += [one for one in table.drawn if one not in slots]
     head = "".join(map(_heading, slots))
     body = "".join(
-        f"<tr{_doubtful(table, row)}>{''.join(_cell(table, slot, row) for slot in slots)}</tr>\n" for row in table.rows
+        f"<tr{_doubtful(table, row)}>{''.join(_cell(table, slot, row) for slot in slots)}</tr>\n"
+        for row in table.rows
     )
     note = f'<p class="note">{escaped(table.note)}</p>' if table.note else ""
     cards = " cards" if len(slots) > CARDED else ""
@@ -170,7 +199,9 @@ def figure_html(figure: Figure | Missing) -> str:
     head = f'<h2 id="{figure.key}">{escaped(figure.title)}</h2>\n'
     if isinstance(figure, Missing):
         return f'{head}<p class="missing">Not shown: {escaped(figure.why)}.</p>\n'
-    panels = "".join(_panel(panel, panel_id(figure, place)) for place, panel in enumerate(figure.panels))
+    panels = "".join(
+        _panel(panel, panel_id(figure, place)) for place, panel in enumerate(figure.panels)
+    )
     note = f'<p class="note">{escaped(figure.note)}</p>' if figure.note else ""
     columns = " two" if figure.columns == 2 else ""
     return (
@@ -198,7 +229,8 @@ def _views(figure: Figure) -> str:
     if not figure.views:
         return ""
     options = "".join(
-        f'<option value="{low:.9g},{high:.9g}">{escaped(name)}</option>' for name, low, high in figure.views
+        f'<option value="{low:.9g},{high:.9g}">{escaped(name)}</option>'
+        for name, low, high in figure.views
     )
     return (
         f'<label class="views">Show <select data-figure="{figure.key}"><option value="">all logs</option>{options}'

@@ -27,16 +27,26 @@ def markdown(document: Document) -> str:
     ]
     folded = document.tables(Depth.FOLDED)
     if folded:
-        lines += ["<details><summary>Logs and provenance</summary>", "", *map(markdown_table, folded), "</details>"]
+        lines += [
+            "<details><summary>Logs and provenance</summary>",
+            "",
+            *map(markdown_table, folded),
+            "</details>",
+        ]
     return "\n".join(lines) + "\n"
 
 
 def markdown_table(table: Table) -> str:
     """One table with its title and note."""
-    cells = [[escaped(cell) for cell in row] for row in ([column.heading for column in table.columns], *table.rows)]
+    cells = [
+        [escaped(cell) for cell in row]
+        for row in ([column.heading for column in table.columns], *table.rows)
+    ]
     cells.insert(1, ["--:" if column.kind == "number" else ":--" for column in table.columns])
     note = ["", escaped(table.note)] if table.note else []
-    return "\n".join([f"**{escaped(table.title)}**", "", *(f"| {' | '.join(row)} |" for row in cells), *note, ""])
+    return "\n".join(
+        [f"**{escaped(table.title)}**", "", *(f"| {' | '.join(row)} |" for row in cells), *note, ""]
+    )
 
 
 def escaped(text: str) -> str:

@@ -36,7 +36,9 @@ TERMS_READING = (
 )
 
 
-def write_report(folder: Path, shared_library: bool = False, progress: Progress | None = None) -> Path:
+def write_report(
+    folder: Path, shared_library: bool = False, progress: Progress | None = None
+) -> Path:
     """Write `report.html` into the result folder `folder`, from what it holds.
 
     Parameters
@@ -45,8 +47,8 @@ def write_report(folder: Path, shared_library: bool = False, progress: Progress 
         Holds `result.json` and, as far as they are known, `estimates.parquet`, `loaded.parquet`,
         `torque.parquet` and `information.parquet`; the page says what is absent.
     shared_library : bool
-        Whether the plotting library stands once beside the folder, for a folder of many results, instead
-        of inside the page.
+        Whether the plotting library stands once beside the folder, for a folder of many results,
+        instead of inside the page.
     progress : callable
         Called as samples of the torque are read.
 
@@ -59,7 +61,9 @@ def write_report(folder: Path, shared_library: bool = False, progress: Progress 
     """
     result = read_result(folder)
     script = folder.parent / LIBRARY
-    if shared_library and not (script.is_file() and script.stat().st_size == len(library().script.encode())):
+    if shared_library and not (
+        script.is_file() and script.stat().st_size == len(library().script.encode())
+    ):
         _write(script, library().script)
     return _write(folder / "report.html", page_html(folder, result, shared_library, progress))
 
@@ -75,8 +79,13 @@ def _write(path: Path, text: str) -> Path:
     return path
 
 
-def page_html(folder: Path, result: Result, shared_library: bool = False, progress: Progress | None = None) -> str:
-    """The text of the page of `result`; with `shared_library` it asks for the library beside the folder."""
+def page_html(
+    folder: Path, result: Result, shared_library: bool = False, progress: Progress | None = None
+) -> str:
+    """The text of the page of `result`.
+
+    With `shared_library` it asks for the library beside the folder.
+    """
     return page(result_document(result, gallery(folder, result, progress)), shared_library)
 
 
@@ -90,7 +99,9 @@ def result_document(result: Result, shown: Gallery | None = None) -> Document:
     figures, convergence = ([], []) if shown is None else (shown.figures, shown.paper)
     data = (*quality_tables(torque, result), *log_tables(result.logs))
     noted = tuple(one.sentence for one in result.verdict.notes)
-    notes = Bullets(noted, "What the readers and the estimator warn of stands at the top of the page.")
+    notes = Bullets(
+        noted, "What the readers and the estimator warn of stands at the top of the page."
+    )
     opened: Fold = "open" if result.estimator == "paper" or _truth(result) else "closed"
     sections = (
         Section(
@@ -101,16 +112,27 @@ def result_document(result: Result, shown: Gallery | None = None) -> Document:
             beside=arm_of(result, torque),
         ),
         Section(tuple(figures[:1])),
-        Section(tuple(terms if shown is None else _with_gains(terms, result)), "terms", "What the model lacks"),
+        Section(
+            tuple(terms if shown is None else _with_gains(terms, result)),
+            "terms",
+            "What the model lacks",
+        ),
         Section(tuple(figures[1:])),
         Section(fit_tables(result), "fit", "What the estimator knows of the logs"),
         Section((notes, *data), "data", "Data quality"),
-        Section((settings_table(result.settings), result_provenance(result)), "settings", "Settings and provenance"),
+        Section(
+            (settings_table(result.settings), result_provenance(result)),
+            "settings",
+            "Settings and provenance",
+        ),
         # open where the paper is the matter, folded where a real log is
         Section((*paper, *convergence), "paper", "The paper's tables and convergence", fold=opened),
     )
     name = file_name(result.log.path)
-    seconds, samples = sum(log.duration for log in result.logs), sum(log.rows for log in result.logs)
+    seconds, samples = (
+        sum(log.duration for log in result.logs),
+        sum(log.rows for log in result.logs),
+    )
     return Document(
         title=f"Identification of {name}",
         verdict=result.verdict,
@@ -125,23 +147,35 @@ def result_document(result: Result, shown: Gallery | None = None) -> Document:
 
 
 def _with_intervals(tables: Sequence[Table], result: Result) -> list[Table]:
-    """The first tables of estimates with their forest plot, less what it tells; the last one says what is drawn."""
+    """The first tables of estimates with their forest plot, less what it tells.
+
+    The last one says what is drawn.
+    """
     logs, truth = _own(result), _truth(result)
     drawn = forest({**result.parameters, **result.payload}, truth, logs)
     shown = [table.without(TOLD_ELSEWHERE) for table in tables]
     if not shown or not drawn.rows:
         return shown
-    marks = [f"Drawn: the 95 % interval on a scale of ± {significant(drawn.limit, 1)} % of the estimate"]
+    marks = [
+        f"Drawn: the 95 % interval on a scale of ± {significant(drawn.limit, 1)} % of the estimate"
+    ]
     marks += ["grey dots: each unloaded log's own estimate"] if logs else []
     marks += ["ring: the truth"] if truth else []
     shown[-1] = replace(shown[-1], note="; ".join(marks) + ".")
-    return [replace(table, drawn=(Drawn(drawn.heading, drawn.rows, after="Unit"),)) for table in shown]
+    return [
+        replace(table, drawn=(Drawn(drawn.heading, drawn.rows, after="Unit"),)) for table in shown
+    ]
 
 
 def _own(result: Result) -> dict[str, list[float]]:
-    """Each unloaded log's own estimates by name, of several logs; a loaded one's hold its payload's share."""
+    """Each unloaded log's own estimates by name, of several logs.
+
+    a loaded one's hold its payload's share.
+    """
     found = [] if result.fit is None else result.fit.by_log
-    if len(found) != len(result.logs):  # a log too short to be fitted has none, and which it is nobody tells
+    if len(found) != len(
+        result.logs
+    ):  # a log too short to be fitted has none, and which it is nobody tells
         return {}
     own = [one for one, log in zip(found, result.logs, strict=True) if log.role == "unloaded"]
     values = {
@@ -153,7 +187,9 @@ def _own(result: Result) -> dict[str, list[float]]:
 
 def _truth(result: Result) -> dict[str, float]:
     """What a synthetic log was made with, by parameter."""
-    return {row.parameter: row.truth for row in result.table4 if row.truth is not None} | result.truth
+    return {
+        row.parameter: row.truth for row in result.table4 if row.truth is not None
+    } | result.truth
 
 
 def _with_gains(terms: Sequence[Table], result: Result) -> list[Table | ReadingAid]:

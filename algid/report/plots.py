@@ -25,12 +25,16 @@ WIDTH = 7.1  # inches: two columns of a journal
 INCHES = 1 / 96  # of a page's pixel
 POINTS = 0.75  # of a page's pixel
 DPI = 200
-MISSING = "--save-plots: expected matplotlib, found none; install it with: pip install 'algid[plots]'"
+MISSING = (
+    "--save-plots: expected matplotlib, found none; install it with: pip install 'algid[plots]'"
+)
 STYLE: Any = {"font.size": 8, "axes.titlesize": 8, "pdf.fonttype": 42}
 DASHES: dict[str, Any] = {"dash": "--", "dot": ":", "solid": "-"}
 
 
-def save_plots(figures: Sequence[Figure | Missing], folder: Path, prefix: str, form: Form = "pdf") -> list[Path]:
+def save_plots(
+    figures: Sequence[Figure | Missing], folder: Path, prefix: str, form: Form = "pdf"
+) -> list[Path]:
     """Write each figure that there is as `folder`/`prefix`-KEY.`form`.
 
     Raises
@@ -61,14 +65,19 @@ def _save(figure: Figure, stream: Any, form: Form) -> None:
     columns = min(figure.columns, len(figure.panels))
     rows = -(-len(figure.panels) // columns)
     tallest = max(panel.height for panel in figure.panels)
-    sheet = Sheet(figsize=(WIDTH, 0.4 + rows * tallest * INCHES * (0.75 if columns > 1 else 1.0)), layout="constrained")
+    sheet = Sheet(
+        figsize=(WIDTH, 0.4 + rows * tallest * INCHES * (0.75 if columns > 1 else 1.0)),
+        layout="constrained",
+    )
     colours = Colours()
     cells = sheet.add_gridspec(rows, columns)
     for place, panel in enumerate(figure.panels):
         _panel(sheet, cells[place // columns, place % columns], panel, colours)
     marks = [_mark(entry, colours) for entry in figure.legend]
     if marks:
-        sheet.legend(handles=marks, loc="outside upper left", ncols=min(len(marks), 3), frameon=False)
+        sheet.legend(
+            handles=marks, loc="outside upper left", ncols=min(len(marks), 3), frameon=False
+        )
     metadata = {"CreationDate": None} if form == "pdf" else {"Software": None}
     sheet.savefig(stream, format=form, dpi=DPI, metadata=metadata)
 
@@ -77,7 +86,9 @@ class Colours:
     """The page's colours by day."""
 
     def __init__(self) -> None:
-        style = (resources.files("algid.report") / "assets" / "report.css").read_text(encoding="utf-8")
+        style = (resources.files("algid.report") / "assets" / "report.css").read_text(
+            encoding="utf-8"
+        )
         light = style.partition("@media")[0]
         self._known = dict(re.findall(r"--([\w-]+): (#\w{6})", light))
 
@@ -94,15 +105,27 @@ def _mark(entry: Legend, colours: Colours) -> Any:
     colour, opacity = colours(entry.colour)
     if entry.mark == "area":
         return Patch(facecolor=colour, alpha=opacity, label=_text(entry.words))
-    return Line2D([], [], color=colour, alpha=opacity, linestyle=DASHES.get(entry.mark, "-"), label=_text(entry.words))
+    return Line2D(
+        [],
+        [],
+        color=colour,
+        alpha=opacity,
+        linestyle=DASHES.get(entry.mark, "-"),
+        label=_text(entry.words),
+    )
 
 
 def _panel(sheet: Any, cell: Any, panel: Panel, colours: Colours) -> None:
     layout = panel.layout
     lower = layout.get("yaxis2", {})
     if "domain" in lower:  # the residual below the torque
-        heights = [layout["yaxis"]["domain"][1] - layout["yaxis"]["domain"][0], lower["domain"][1] - lower["domain"][0]]
-        top, bottom = cell.subgridspec(2, 1, height_ratios=heights, hspace=0.08).subplots(sharex=True)
+        heights = [
+            layout["yaxis"]["domain"][1] - layout["yaxis"]["domain"][0],
+            lower["domain"][1] - lower["domain"][0],
+        ]
+        top, bottom = cell.subgridspec(2, 1, height_ratios=heights, hspace=0.08).subplots(
+            sharex=True
+        )
         axes = {"y": top, "y2": bottom}
         top.tick_params(labelbottom=False)
     else:
@@ -122,7 +145,14 @@ def _panel(sheet: Any, cell: Any, panel: Panel, colours: Colours) -> None:
         for one in {id(top): top, id(bottom): bottom}.values():
             _shape(one, shape, colours)
     for note in layout.get("annotations", ()):
-        top.text(note["x"], 1.0, _text(note["text"]), transform=top.get_xaxis_transform(), va="bottom", size=6)
+        top.text(
+            note["x"],
+            1.0,
+            _text(note["text"]),
+            transform=top.get_xaxis_transform(),
+            va="bottom",
+            size=6,
+        )
     _axes(bottom, layout.get("xaxis", {}), "x")
     _axes(top, layout["yaxis"], "y")
     if "domain" in lower:
@@ -140,7 +170,9 @@ def _text(words: str) -> str:
 def _values(packed: Any) -> Any:
     """What stands behind a typed array, a list of numbers, of dates or of names."""
     if isinstance(packed, Mapping):
-        return np.frombuffer(base64.b64decode(packed["bdata"]), dtype=f"<{packed['dtype']}").astype(np.float64)
+        return np.frombuffer(base64.b64decode(packed["bdata"]), dtype=f"<{packed['dtype']}").astype(
+            np.float64
+        )
     if packed and isinstance(packed[0], str):
         try:
             return np.array(packed, dtype="datetime64[ms]")
@@ -163,19 +195,33 @@ def _trace(axes: Axes, trace: Trace, before: Trace | None, colours: Colours) -> 
         steps = "steps-post" if line.get("shape") == "hv" else "default"
         dash = DASHES[line.get("dash", "solid")]
         width = POINTS * line.get("width", 1.4)
-        axes.plot(x, y, color=colour, alpha=opacity, linewidth=width, linestyle=dash, drawstyle=steps)
+        axes.plot(
+            x, y, color=colour, alpha=opacity, linewidth=width, linestyle=dash, drawstyle=steps
+        )
     if "markers" in trace["mode"]:
         marker = trace.get("marker", {})
         colour, opacity = colours(marker.get("color", line.get("color", "@blue")))
         alpha = opacity * marker.get("opacity", 1.0)
-        axes.plot(x, y, "o", color=colour, alpha=alpha, markersize=POINTS * marker.get("size", 6), markeredgewidth=0)
+        axes.plot(
+            x,
+            y,
+            "o",
+            color=colour,
+            alpha=alpha,
+            markersize=POINTS * marker.get("size", 6),
+            markeredgewidth=0,
+        )
     for way in ("x", "y"):
         if error := trace.get(f"error_{way}"):
             ends: dict[str, Any] = {f"{way}err": np.asarray(error["array"])}
-            axes.errorbar(x, y, **ends, fmt="none", ecolor=colours(error["color"])[0], elinewidth=1.2)
+            axes.errorbar(
+                x, y, **ends, fmt="none", ecolor=colours(error["color"])[0], elinewidth=1.2
+            )
 
 
-def _filled(axes: Axes, x: Any, y: Any, fill: str, before: Trace | None, colour: tuple[str, float]) -> None:
+def _filled(
+    axes: Axes, x: Any, y: Any, fill: str, before: Trace | None, colour: tuple[str, float]
+) -> None:
     face: dict[str, Any] = {"color": colour[0], "alpha": colour[1], "linewidth": 0}
     if fill == "toself":
         for part in np.split(np.arange(x.size), np.flatnonzero(np.isnan(y))):

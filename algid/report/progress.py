@@ -14,7 +14,9 @@ BESIDE = 60  # columns that words, counts and the time left take beside the bar
 
 @contextmanager
 def progress(unit: str, quiet: bool = False) -> Iterator[Progress | None]:
-    """Show a bar while the block runs; give what the block is to tell its progress to, None where nobody looks.
+    """Show a bar while the block runs.
+
+    Give what the block is to tell its progress to, None where nobody looks.
 
     What is done of each stage is counted in `unit`. The bar is gone once the block has ended.
     """
@@ -27,14 +29,26 @@ def progress(unit: str, quiet: bool = False) -> Iterator[Progress | None]:
     console = Console(stderr=True)
     width = min(max(console.width - BESIDE, 4), WIDEST)
     counts = TextColumn("{task.fields[counts]}", markup=False)
-    parts = (TextColumn("{task.description}", markup=False), BarColumn(width), counts, TimeRemainingColumn())
+    parts = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(width),
+        counts,
+        TimeRemainingColumn(),
+    )
     with Progress(*parts, console=console, transient=True, redirect_stdout=False) as bar:
 
         def shown(stage: str, done: int, total: int) -> None:
             known = total if total >= done else 0
-            counts = f"{done:,} of {known:,} {unit}" if known else f"{done:,} {unit}" if done else ""
+            counts = (
+                f"{done:,} of {known:,} {unit}" if known else f"{done:,} {unit}" if done else ""
+            )
             task = next(iter(bar.tasks), None)
-            if task and task.description == stage and task.completed <= done and task.total == (known or None):
+            if (
+                task
+                and task.description == stage
+                and task.completed <= done
+                and task.total == (known or None)
+            ):
                 bar.update(task.id, completed=done, counts=counts)
                 return
             if task:

@@ -69,11 +69,15 @@ def blocks(path: Path, names: Sequence[str], rows: int = ROWS) -> Iterator[Block
         for batch in file.iter_batches(batch_size=rows, columns=list(names)):
             block = {}
             for name in names:
-                values = np.asarray(batch.column(name).to_numpy(zero_copy_only=False), dtype=np.float64)
+                values = np.asarray(
+                    batch.column(name).to_numpy(zero_copy_only=False), dtype=np.float64
+                )
                 beyond = np.isfinite(values) & (np.abs(values) > LARGEST)
                 block[name] = np.where(beyond, np.nan, values) if beyond.any() else values
             if "log" in block and not np.all(np.isfinite(block["log"])):
-                raise ResultError(f"{path}: column 'log': expected whole numbers; identify again with this version")
+                raise ResultError(
+                    f"{path}: column 'log': expected whole numbers; identify again with this version"
+                )
             yield block
 
 
@@ -89,7 +93,9 @@ def table_of(path: Path, names: Sequence[str]) -> dict[str, list[Any]]:
 
     _check_columns(path, names)
     with _reading(path):
-        found: dict[str, list[Any]] = pyarrow.parquet.read_table(path, columns=list(names)).to_pydict()
+        found: dict[str, list[Any]] = pyarrow.parquet.read_table(
+            path, columns=list(names)
+        ).to_pydict()
         return found
 
 
@@ -102,7 +108,9 @@ def _check_columns(path: Path, names: Sequence[str], *, numbers: bool = False) -
     present = list(kinds)
     absent = [name for name in names if name not in present]
     if absent:
-        raise ResultError(f"{path}: expected a column {absent[0]!r}, found none; identify again with this version")
+        raise ResultError(
+            f"{path}: expected a column {absent[0]!r}, found none; identify again with this version"
+        )
     of_numbers = (types.is_integer, types.is_floating, types.is_null, types.is_boolean)
     for name in names if numbers else ():
         if not any(fits(kinds[name]) for fits in of_numbers):
@@ -135,8 +143,8 @@ GOLDEN = 0.6180339887498949
 class MinMax:
     """Keeps the smallest and the largest sample of every `size` ones, each where it lies.
 
-    Blocks are fed in order; the outcome does not depend on how the series is cut into blocks. A stretch
-    without any finite sample keeps one NaN, so that the line breaks there.
+    Blocks are fed in order; the outcome does not depend on how the series is cut into blocks. A
+    stretch without any finite sample keeps one NaN, so that the line breaks there.
     """
 
     def __init__(self, size: int) -> None:
@@ -156,7 +164,9 @@ class MinMax:
         whole = x.size - x.size % self._size
         self._rest = x[whole:].copy(), y[whole:].copy()
         if whole:
-            self._kept.append(_extremes(x[:whole].reshape(-1, self._size), y[:whole].reshape(-1, self._size)))
+            self._kept.append(
+                _extremes(x[:whole].reshape(-1, self._size), y[:whole].reshape(-1, self._size))
+            )
 
     def result(self) -> tuple[FloatArray, FloatArray]:
         """The reduced `x` and `y`, at most two samples for every `size`."""
@@ -212,8 +222,8 @@ class Share:
 class Thinned:
     """One sample of every `step` ones of several series (rows, n), counted across blocks.
 
-    Which one moves by the golden ratio from stretch to stretch: spread evenly, and never in step with a
-    periodic motion.
+    Which one moves by the golden ratio from stretch to stretch: spread evenly, and never in step
+    with a periodic motion.
     """
 
     def __init__(self, step: int) -> None:
@@ -225,7 +235,9 @@ class Thinned:
         """Take the next block (rows, n)."""
         last = self._seen + block.shape[-1]
         stretch = np.arange(self._seen // self._step, -(-last // self._step))
-        place = stretch * self._step + np.floor(np.mod(stretch * GOLDEN, 1.0) * self._step).astype(np.int64)
+        place = stretch * self._step + np.floor(np.mod(stretch * GOLDEN, 1.0) * self._step).astype(
+            np.int64
+        )
         inside = place[(place >= self._seen) & (place < last)]
         self._kept.append(block[:, inside - self._seen])
         self._seen = last

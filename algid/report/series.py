@@ -43,8 +43,9 @@ Series = tuple[FloatArray, FloatArray]
 class SeriesLog:
     """Series by name: `lines` by their extremes, `samples` for their size, `middles` their running medians.
 
-    `singular` is the share of samples that have no estimate, after ε, because the system was singular;
-    `condition` is the condition number, infinite ones left out. `start`, `end` and `window` are in s.
+    `singular` is the share of samples that have no estimate, after ε, because the system was
+    singular; `condition` is the condition number, infinite ones left out. `start`, `end` and
+    `window` are in s.
     """
 
     start: float
@@ -69,10 +70,19 @@ class SeriesLog:
 
 
 def read_series(path: Path, settings: Mapping[str, Any]) -> SeriesLog:
-    """Read `path`: a column ``t``, a column a series, perhaps ``condition``. Raises `ResultError`."""
+    """Read `path`: a column ``t``, a column a series, perhaps ``condition``.
+
+    Raises `ResultError`.
+    """
     columns = columns_of(path)
-    gathering = _SeriesGathering([name for name in columns if name not in NOT_SERIES], row_count(path), settings)
-    wanted = ["t", *gathering.names, *(name for name in ("condition", "k7_condition") if name in columns)]
+    gathering = _SeriesGathering(
+        [name for name in columns if name not in NOT_SERIES], row_count(path), settings
+    )
+    wanted = [
+        "t",
+        *gathering.names,
+        *(name for name in ("condition", "k7_condition") if name in columns),
+    ]
     for block in blocks(path, wanted):
         gathering.take(block)
     return gathering.result("condition" in columns)
@@ -99,17 +109,24 @@ class _SeriesGathering:
         self._start = float(t[0]) if self._start is None else self._start
         self._end = float(t[-1])
         since = t - self._start
-        # stamps are multiples of the period but for rounding, which must not move a window's first sample
+        # stamps are multiples of the period but for rounding, which must not move a window's first
+        # sample
         late = np.mod(since + 1e-9, self._window) >= EPSILON
         for name in self.names:
             self._lines[name].feed(t, block[name])
             conditions = ["condition", *(["k7_condition"] if name == "k7" else [])]
-            known = [~(block[condition] <= LARGEST_CONDITION) for condition in conditions if condition in block]
+            known = [
+                ~(block[condition] <= LARGEST_CONDITION)
+                for condition in conditions
+                if condition in block
+            ]
             # everywhere where the file does not tell
             ill = np.logical_or.reduce(known) if known else np.ones(t.size, dtype=bool)
             self._singular[name].feed(t, late & np.isnan(block[name]) & ill)
         if "condition" in block:
-            self._condition.feed(t, np.where(np.isfinite(block["condition"]), block["condition"], np.nan))
+            self._condition.feed(
+                t, np.where(np.isfinite(block["condition"]), block["condition"], np.nan)
+            )
         self._samples.feed(np.stack([t, *(block[name] for name in self.names)]))
 
     def result(self, with_condition: bool) -> SeriesLog:
@@ -141,7 +158,18 @@ def _medians(x: FloatArray, y: FloatArray) -> Series:
     return x[:whole:size], middle
 
 
-COLUMNS = ("log", "t", "theta1", "theta2", "omega1", "omega2", "tau1", "tau2", "tau1_predicted", "tau2_predicted")
+COLUMNS = (
+    "log",
+    "t",
+    "theta1",
+    "theta2",
+    "omega1",
+    "omega2",
+    "tau1",
+    "tau2",
+    "tau1_predicted",
+    "tau2_predicted",
+)
 SERIES = (*COLUMNS[2:], "residual1", "residual2")
 POINTS = 2_400  # a series; twice what the page is wide
 DOTS = 2_000
@@ -169,10 +197,10 @@ class LogRange:
 class TorqueLog:
     """Reduced series by log and name, samples of the motion, extremes.
 
-    `motion` is (4, m): θ1, θ2, θ̇1, θ̇2; `extremes` maps a column to its smallest and largest value;
-    `rms` and `residual_rms` are in N m a joint.
-    `worst` gives the log and the time in s of each joint's largest residual; `reduced` tells whether a
-    series holds fewer samples than the log.
+    `motion` is (4, m): θ1, θ2, θ̇1, θ̇2; `extremes` maps a column to its smallest and largest
+    value; `rms` and `residual_rms` are in N m a joint. `worst` gives the log and the time in s of
+    each joint's largest residual; `reduced` tells whether a series holds fewer samples than the
+    log.
     """
 
     ranges: dict[int, LogRange]
@@ -187,7 +215,10 @@ class TorqueLog:
 
 
 def read_torque(path: Path, progress: Progress | None = None) -> TorqueLog:
-    """Read `path`, telling how far. Raises `ResultError` where it cannot be read or lacks a column."""
+    """Read `path`, telling how far.
+
+    Raises `ResultError` where it cannot be read or lacks a column.
+    """
     total = row_count(path)
     gathering = _Gathering(total)
     for log, block in by_log(blocks(path, COLUMNS)):
@@ -218,7 +249,9 @@ class _Gathering:
         reducers = self.reducers.setdefault(log, {name: MinMax(self.size) for name in SERIES})
         for name, reducer in reducers.items():
             reducer.feed(block["t"], block[name])
-        self.motion.feed(np.stack([block[name] for name in ("theta1", "theta2", "omega1", "omega2")]))
+        self.motion.feed(
+            np.stack([block[name] for name in ("theta1", "theta2", "omega1", "omega2")])
+        )
         for name in SERIES:
             low, high = float(np.fmin.reduce(block[name])), float(np.fmax.reduce(block[name]))
             old = self.extremes.get(name, (low, high))
@@ -252,7 +285,10 @@ class _Gathering:
         return TorqueLog(
             ranges=self.ranges,
             series={
-                log: {name: broken_at_gaps(*reducer.result(), longest[log]) for name, reducer in reducers.items()}
+                log: {
+                    name: broken_at_gaps(*reducer.result(), longest[log])
+                    for name, reducer in reducers.items()
+                }
                 for log, reducers in self.reducers.items()
             },
             motion=self.motion.result(4),

@@ -12,7 +12,17 @@ from algid.report.document import Column, Depth, Table, filled
 from algid.report.series import TorqueLog
 from algid.results import Estimate, FitSummary, LogSummary, Result, Table4Row
 from algid.results.verdict import replaced_estimator
-from algid.text import ABSENT, digits_of, file_name, interval, percent, resolved, significant, unit_text, visible
+from algid.text import (
+    ABSENT,
+    digits_of,
+    file_name,
+    interval,
+    percent,
+    resolved,
+    significant,
+    unit_text,
+    visible,
+)
 from algid.words import counted
 
 LONGEST_VALUE = 4_000  # characters: a command that names many logs is there to be copied
@@ -27,7 +37,10 @@ def fit_tables(result: Result) -> tuple[Table, ...]:
     noise = Table(
         "Noise that the logs carry",
         (Column("Signal", "name"), Column("Noise, std", "number"), Column("Unit", "text")),
-        tuple((visible(name), significant(std, 3), units.get(name, ABSENT)) for name, std in fit.noise.items()),
+        tuple(
+            (visible(name), significant(std, 3), units.get(name, ABSENT))
+            for name, std in fit.noise.items()
+        ),
     )
     how = {
         "likelihood": "the likelihood, which takes it to be white",
@@ -43,7 +56,12 @@ def fit_tables(result: Result) -> tuple[Table, ...]:
             Column("Lag-one correlation", "number"),
         ),
         tuple(
-            (visible(name), "yes" if test.white else "no", significant(test.p_value, 2), f"{test.lag1_correlation:.3f}")
+            (
+                visible(name),
+                "yes" if test.white else "no",
+                significant(test.p_value, 2),
+                f"{test.lag1_correlation:.3f}",
+            )
             for name, test in fit.whiteness.items()
         ),
         f"The intervals rest on {how[fit.intervals]}.",
@@ -51,7 +69,10 @@ def fit_tables(result: Result) -> tuple[Table, ...]:
     bounds = Table(
         "Physical bounds that are broken",
         (Column("Bound", "name"), Column("Value", "number"), Column("Broken by, σ", "number")),
-        tuple((visible(b.bound), significant(b.value, 4), significant(b.distance_sigma, 2)) for b in fit.broken_bounds),
+        tuple(
+            (visible(b.bound), significant(b.value, 4), significant(b.distance_sigma, 2))
+            for b in fit.broken_bounds
+        ),
     )
     shown = filled(noise, whiteness.without_empty(), bounds.without_empty())
     return tuple(table.at(Depth.MARKDOWN) for table in shown)
@@ -103,23 +124,39 @@ def log_tables(logs: list[LogSummary]) -> tuple[Table, Table]:
         Column("Rate, Hz", "number"),
     )
     rows = tuple(
-        (file_name(log.path), log.role, visible(log.format), f"{log.rows:,}", f"{log.duration:.6g}", f"{log.rate:.6g}")
+        (
+            file_name(log.path),
+            log.role,
+            visible(log.format),
+            f"{log.rows:,}",
+            f"{log.duration:.6g}",
+            f"{log.rate:.6g}",
+        )
         for log in logs
     )
     channels = tuple(
         (visible(signal), visible(source), file_name(log.path) if place else "all logs")
         for place, log in enumerate(logs)
-        if not place or log.mapping != logs[0].mapping  # named only where its channels differ from the first one's
+        if not place
+        or log.mapping
+        != logs[0].mapping  # named only where its channels differ from the first one's
         for signal, source in log.mapping.items()
     )
     heads = (Column("Signal", "name"), Column("Taken from", "text"), Column("Log", "text"))
-    return Table("Logs", columns, rows, depth=Depth.FOLDED), Table("Channels", heads, channels, depth=Depth.PAGE)
+    return Table("Logs", columns, rows, depth=Depth.FOLDED), Table(
+        "Channels", heads, channels, depth=Depth.PAGE
+    )
 
 
 def settings_table(settings: Mapping[str, Any]) -> Table:
     """The settings, nested ones by their dotted names."""
-    rows = tuple((visible(name), visible(value, LONGEST_VALUE)) for name, value in flat_settings(settings).items())
-    return Table("Settings", (Column("Setting", "name"), Column("Value", "text")), rows, depth=Depth.PAGE)
+    rows = tuple(
+        (visible(name), visible(value, LONGEST_VALUE))
+        for name, value in flat_settings(settings).items()
+    )
+    return Table(
+        "Settings", (Column("Setting", "name"), Column("Value", "text")), rows, depth=Depth.PAGE
+    )
 
 
 def flat_settings(settings: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
@@ -149,14 +186,19 @@ def setting_text(value: object) -> str:
 def provenance_table(rows: Sequence[tuple[str, str]]) -> Table:
     """What made a result, from what: `rows` of names and values, made visible here."""
     shown = tuple((visible(name), visible(value)) for name, value in rows)
-    return Table("Provenance", (Column("What", "name"), Column("Value", "text")), shown, depth=Depth.FOLDED)
+    return Table(
+        "Provenance", (Column("What", "name"), Column("Value", "text")), shown, depth=Depth.FOLDED
+    )
 
 
 def result_provenance(result: Result) -> Table:
     """What made the result, from what."""
     asked = replaced_estimator(result)
     estimator = result.estimator if asked is None else f"{result.estimator}, in place of {asked}"
-    hashes = [(f"sha256 of {file_name(log.path)}", log.sha256 or "unknown, fetched in part") for log in result.logs]
+    hashes = [
+        (f"sha256 of {file_name(log.path)}", log.sha256 or "unknown, fetched in part")
+        for log in result.logs
+    ]
     paths = [(f"path of {file_name(log.path)}", log.path) for log in result.logs]
     return provenance_table([("algid", result.version), ("estimator", estimator), *hashes, *paths])
 
@@ -205,7 +247,9 @@ ESTIMATE_COLUMNS = (
     Column("Paper %", "number", rank=4),
 )
 TABLE4_COLUMNS = tuple(
-    column for column in ESTIMATE_COLUMNS if column.kind != "status" and "interval" not in column.heading
+    column
+    for column in ESTIMATE_COLUMNS
+    if column.kind != "status" and "interval" not in column.heading
 )
 PREDICTION_COLUMNS = (
     Column("Torque predicted", "name"),
@@ -225,13 +269,20 @@ def estimate_tables(result: Result) -> tuple[Table, ...]:
         "Loaded arm": result.loaded,
     }
     tables = [
-        Table(title, ESTIMATE_COLUMNS, tuple(_estimate_row(name, found, result) for name, found in group.items()))
+        Table(
+            title,
+            ESTIMATE_COLUMNS,
+            tuple(_estimate_row(name, found, result) for name, found in group.items()),
+        )
         for title, group in groups.items()
     ]
     if any(row.truth is not None for row in result.table4):
         known = [row for row in result.table4 if row.estimate is not None or row.truth is not None]
         rows = tuple(
-            (*_number(row.parameter, row.estimate, row.std, row.unit), *_against(row, row.estimate, row.std))
+            (
+                *_number(row.parameter, row.estimate, row.std, row.unit),
+                *_against(row, row.estimate, row.std),
+            )
             for row in known
         )
         note = "Names and order of the paper's Table 4; Paper % is the error it reports."
@@ -245,8 +296,8 @@ def estimate_tables(result: Result) -> tuple[Table, ...]:
 def _estimate_row(name: str, found: Estimate, result: Result) -> tuple[str, ...]:
     """An estimate with what is known against it.
 
-    Truth and errors are Table 4's where it has the parameter, else (k5, k7, l1, l2) the truth alone; where Table 4
-    holds another estimate of the same name, the error is this one's own.
+    Truth and errors are Table 4's where it has the parameter, else (k5, k7, l1, l2) the truth
+    alone; where Table 4 holds another estimate of the same name, the error is this one's own.
     """
     known = next((row for row in result.table4 if row.parameter == name), None)
     if known is None and name in result.truth:
@@ -266,10 +317,18 @@ def _estimate_row(name: str, found: Estimate, result: Result) -> tuple[str, ...]
 
 def _number(name: str, value: float | None, std: float | None, unit: str) -> tuple[str, ...]:
     """Name, number, standard deviation, the same in percent, unit."""
-    return visible(name), resolved(value, std), significant(std, 2), percent(std, value), unit_text(unit)
+    return (
+        visible(name),
+        resolved(value, std),
+        significant(std, 2),
+        percent(std, value),
+        unit_text(unit),
+    )
 
 
-def _against(known: Table4Row | None, value: float | None, std: float | None) -> tuple[str, str, str]:
+def _against(
+    known: Table4Row | None, value: float | None, std: float | None
+) -> tuple[str, str, str]:
     """The truth, the error against it, and the paper's."""
     if known is None:
         return ABSENT, ABSENT, ABSENT
@@ -282,7 +341,11 @@ def _against(known: Table4Row | None, value: float | None, std: float | None) ->
 
 def _prediction(fit: FitSummary | None) -> Table:
     """How well the model predicts the torque: of the logs used, and of each log by the others."""
-    pairs = [("logs used", fit.residual), ("each log by the others", fit.cross_validation)] if fit else []
+    pairs = (
+        [("logs used", fit.residual), ("each log by the others", fit.cross_validation)]
+        if fit
+        else []
+    )
     rows = tuple(
         (
             where,

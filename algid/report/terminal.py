@@ -1,4 +1,7 @@
-"""A document on the terminal. Foreign text never passes as markup; colours follow the console (`NO_COLOR`)."""
+"""A document on the terminal.
+
+Foreign text never passes as markup; colours follow the console (`NO_COLOR`).
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,11 @@ if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
 LONGEST_WORD = 24  # columns; what is longer, like a path, breaks where it must
-GRADE_STYLES: dict[Grade, str] = {"good": "bold green", "reservations": "bold yellow", "failed": "bold red"}
+GRADE_STYLES: dict[Grade, str] = {
+    "good": "bold green",
+    "reservations": "bold yellow",
+    "failed": "bold red",
+}
 
 
 def print_document(document: Document, console: Console) -> None:
@@ -32,7 +39,9 @@ def print_verdict(judged: Verdict, console: Console, most: int | None = None) ->
     from rich.table import Table as RichTable
     from rich.text import Text
 
-    console.print(Text.assemble((judged.word, GRADE_STYLES[judged.grade]), f": {visible(judged.headline)}."))
+    console.print(
+        Text.assemble((judged.word, GRADE_STYLES[judged.grade]), f": {visible(judged.headline)}.")
+    )
     points = RichTable.grid(padding=(0, 1))
     points.add_column()
     points.add_column(overflow="fold")
@@ -48,15 +57,23 @@ def print_verdict(judged: Verdict, console: Console, most: int | None = None) ->
 
 
 def print_table(table: Table, console: Console) -> None:
-    """Print one table, less the columns that the console has no room for; no digit is ever cut off."""
+    """Print one table, less the columns that the console has no room for.
+
+    No digit is ever cut off.
+    """
     from rich.cells import cell_len
     from rich.measure import Measurement
     from rich.text import Text
 
     while True:
-        columns = [(column.heading, *cells) for column, *cells in zip(table.columns, *table.rows, strict=True)]
+        columns = [
+            (column.heading, *cells)
+            for column, *cells in zip(table.columns, *table.rows, strict=True)
+        ]
         widths = [max(map(cell_len, column)) for column in columns]
-        wanted = Measurement.get(console, console.options.update(width=10_000), rich_table(table, widths)).maximum
+        wanted = Measurement.get(
+            console, console.options.update(width=10_000), rich_table(table, widths)
+        ).maximum
         room = sum(widths) - max(wanted - console.width, 0)
         narrowed = _narrowed(widths, list(map(_least, table.columns, columns)), room)
         fewer = table.narrower()
@@ -104,7 +121,9 @@ def rich_table(table: Table, widths: Sequence[int]) -> RichTable:
     )
     for column, width in zip(table.columns, widths, strict=True):
         right = column.kind == "number"
-        made.add_column(Text(column.heading), justify="right" if right else "left", overflow="fold", width=width)
+        made.add_column(
+            Text(column.heading), justify="right" if right else "left", overflow="fold", width=width
+        )
     for row in table.rows:
         cells = zip(table.columns, row, strict=True)
         made.add_row(*(Text(cell, _style(column.kind, cell)) for column, cell in cells))

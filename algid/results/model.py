@@ -1,9 +1,10 @@
 """What an identification found: the one source of every table, file and page that shows it.
 
-A `Result` is written as `result.json` (schema version 3; 1 and 2 are still read) and read back; JSON Schema comes
-from the models. Its verdict is made of the rest whenever it is asked for, and written for whoever reads the file.
-Numbers that do not exist (NaN) are null; an unbounded interval is ``[null, null]``. Nothing in a result depends
-on when it was made, so that the same log and settings give the same bytes.
+A `Result` is written as `result.json` (schema version 3; 1 and 2 are still read) and read back;
+JSON Schema comes from the models. Its verdict is made of the rest whenever it is asked for, and
+written for whoever reads the file. Numbers that do not exist (NaN) are null; an unbounded interval
+is ``[null, null]``. Nothing in a result depends on when it was made, so that the same log and
+settings give the same bytes.
 """
 
 from __future__ import annotations
@@ -34,8 +35,8 @@ class Status(StrEnum):
     """How far an estimate can be trusted.
 
     NOT_SIGNIFICANT: the interval holds zero, which the parameter may be.
-    IMPLAUSIBLE: the estimates together break a bound of physics by more than three standard deviations, or predict
-    the torque worse than a constant does.
+    IMPLAUSIBLE: the estimates together break a bound of physics by more than three standard
+    deviations, or predict the torque worse than a constant does.
     """
 
     OK = "OK"
@@ -67,7 +68,10 @@ class Estimate(_Model):
 
 
 class Table4Row(_Model):
-    """A row of the paper's Table 4, in its names and order; truth and errors where they are known."""
+    """A row of the paper's Table 4, in its names and order.
+
+    Truth and errors where they are known.
+    """
 
     parameter: str
     unit: str
@@ -81,8 +85,8 @@ class Table4Row(_Model):
 class LogSummary(_Model):
     """A log that was used: first stamp in ns, duration in s, rate in Hz, each signal's channel, how it was read.
 
-    `sha256` is null where only what was needed of a log was fetched from an object store. `reading` is null in
-    results of schema version 1.
+    `sha256` is null where only what was needed of a log was fetched from an object store.
+    `reading` is null in results of schema version 1.
     """
 
     path: str
@@ -108,8 +112,9 @@ class WhitenessTest(_Model):
 class TermCriterion(_Model):
     """Whether an optional term of the model earned its place: change of the criterion, negative is better.
 
-    Where the terms were chosen automatically, `gain_heldout` is by how much the term lowers the squared error of
-    torque that was held out, as a share, `evidence` the log of the odds for it, and `why` says what decided.
+    Where the terms were chosen automatically, `gain_heldout` is by how much the term lowers the
+    squared error of torque that was held out, as a share, `evidence` the log of the odds for it,
+    and `why` says what decided.
     """
 
     term: str
@@ -123,7 +128,8 @@ class TermCriterion(_Model):
 class Endogeneity(_Model):
     """Whether the regressors correlate with the error: the statistic of Durbin, Wu and Hausman, and its p-value.
 
-    By "largest" stands the coefficient at which instruments and least squares are furthest apart, in deviations.
+    By "largest" stands the coefficient at which instruments and least squares are furthest apart,
+    in deviations.
     """
 
     statistic: float
@@ -134,8 +140,9 @@ class Endogeneity(_Model):
 class TorqueModel(_Model):
     """The torque's terms beside eq. (1), the speeds in rad/s that shape friction, and who chose the terms.
 
-    `held_out` says what was left out of the fit to try each term: whole logs, or blocks of them. `shrunk` names the
-    coefficients of terms that were not chosen: each is what the logs and what physics expects of it agree on.
+    `held_out` says what was left out of the fit to try each term: whole logs, or blocks of them.
+    `shrunk` names the coefficients of terms that were not chosen: each is what the logs and what
+    physics expects of it agree on.
     """
 
     terms: list[str]
@@ -178,10 +185,11 @@ class Repeatability(_Model):
 class FitSummary(_Model):
     """What a statistical estimator knows beside the estimates.
 
-    `noise` holds the standard deviations theta1, theta2 (rad), tau1, tau2 (N m); `covariance` belongs to
-    `covariance_names`; `intervals` says what the intervals rest on (white noise, blocks of the logs, or the larger of
-    those and of the jackknife over logs); `by_log` is what each log tells by itself; `unidentifiable` says in words
-    which directions the logs do not determine; `endogeneity` goes by joint.
+    `noise` holds the standard deviations theta1, theta2 (rad), tau1, tau2 (N m); `covariance`
+    belongs to `covariance_names`; `intervals` says what the intervals rest on (white noise, blocks
+    of the logs, or the larger of those and of the jackknife over logs); `by_log` is what each log
+    tells by itself; `unidentifiable` says in words which directions the logs do not determine;
+    `endogeneity` goes by joint.
     """
 
     noise: dict[str, float]
@@ -206,7 +214,9 @@ class FitSummary(_Model):
     def _covariance_is_square(self) -> FitSummary:
         size = len(self.covariance_names)
         if [len(row) for row in self.covariance] != [size] * size:
-            raise ValueError(f"covariance should have {counted(size, 'row')} of {counted(size, 'number')}")
+            raise ValueError(
+                f"covariance should have {counted(size, 'row')} of {counted(size, 'number')}"
+            )
         return self
 
 
@@ -228,8 +238,8 @@ class Result(_Model):
     fit : FitSummary
         What a statistical estimator knows beside the estimates.
     settings, profile : dict
-        How it was identified, and what the user said about the logs in a profile's words. How each log was read in
-        the end stands in its `reading`.
+        How it was identified, and what the user said about the logs in a profile's words. How each
+        log was read in the end stands in its `reading`.
     log, more_logs : LogSummary, list of LogSummary
         The first log that was used, and the others.
     data_lost : bool
@@ -260,7 +270,11 @@ class Result(_Model):
     @model_validator(mode="before")
     @classmethod
     def _verdict_is_made_anew(cls, content: Any) -> Any:
-        return {k: v for k, v in content.items() if k != "verdict"} if isinstance(content, dict) else content
+        return (
+            {k: v for k, v in content.items() if k != "verdict"}
+            if isinstance(content, dict)
+            else content
+        )
 
     @computed_field  # type: ignore[prop-decorator]
     @property
@@ -297,7 +311,10 @@ class Result(_Model):
 
     @property
     def covariance(self) -> Any:
-        """Covariance of the parameters `fit.covariance_names` (Q, Q), numpy; None without error bars."""
+        """Covariance of the parameters `fit.covariance_names` (Q, Q), numpy.
+
+        None without error bars.
+        """
         if self.fit is None:
             return None
         import numpy as np
@@ -335,7 +352,9 @@ class Result(_Model):
             visible(judged.sentence, 1000),
         ]
         for row in rows:
-            name, value, std, unit, status = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+            name, value, std, unit, status = (
+                cell.ljust(width) for cell, width in zip(row, widths, strict=True)
+            )
             numbers = (cell.strip().rjust(len(cell)) for cell in (value, std))
             lines.append("  ".join((name, *numbers, unit, status)).rstrip())
         return "\n".join(lines)
@@ -346,7 +365,9 @@ class Result(_Model):
         """For notebooks."""
         from algid.results.notebook import html_of
 
-        return html_of(self, f"{self.estimator} estimate from {ascii(self.log.path)[1:-1]}{self._others}")
+        return html_of(
+            self, f"{self.estimator} estimate from {ascii(self.log.path)[1:-1]}{self._others}"
+        )
 
     @property
     def _others(self) -> str:
@@ -355,7 +376,13 @@ class Result(_Model):
     def _rows(self) -> Iterator[tuple[str, str, str, str, str]]:
         for name, found in self.estimates.items():
             value = "-" if found.estimate is None else f"{found.estimate:.6g}"
-            yield name, value, "-" if found.std is None else f"{found.std:.2g}", found.unit, found.status.value
+            yield (
+                name,
+                value,
+                "-" if found.std is None else f"{found.std:.2g}",
+                found.unit,
+                found.status.value,
+            )
 
 
 def result_schema() -> dict[str, Any]:
@@ -365,11 +392,17 @@ def result_schema() -> dict[str, Any]:
 
 def result_json(result: Result) -> str:
     """The text of `result.json`."""
-    return json.dumps(result.model_dump(mode="json"), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return (
+        json.dumps(result.model_dump(mode="json"), indent=2, ensure_ascii=False, allow_nan=False)
+        + "\n"
+    )
 
 
 def write_result(result: Result, path: Path) -> None:
-    """Write `result` to `path`, whole or not at all. Raises `OutputError` where that is not possible."""
+    """Write `result` to `path`, whole or not at all.
+
+    Raises `OutputError` where that is not possible.
+    """
     with whole_file(path) as temporary:
         temporary.write_text(result_json(result), encoding="utf-8")
 
@@ -397,9 +430,13 @@ def read_result(path: str | Path) -> Result:
     try:
         content = json.loads(read_text(file))
     except OSError as error:
-        raise ResultError(f"{file}: cannot read it ({error.strerror}); expected a result of algid identify") from error
+        raise ResultError(
+            f"{file}: cannot read it ({error.strerror}); expected a result of algid identify"
+        ) from error
     except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise ResultError(f"{file}: not JSON ({error}); expected a result of algid identify") from error
+        raise ResultError(
+            f"{file}: not JSON ({error}); expected a result of algid identify"
+        ) from error
     found = content.get("schema_version") if isinstance(content, dict) else None
     if found not in READABLE:
         known = " or ".join(map(str, READABLE))
@@ -413,14 +450,19 @@ def read_result(path: str | Path) -> Result:
         result = Result.model_validate(_current(content))
         _check(result)
     except ValidationError as error:
-        raise ResultError(f"{file}: {first_misfit(error)}; identify again with this version") from error
+        raise ResultError(
+            f"{file}: {first_misfit(error)}; identify again with this version"
+        ) from error
     except SettingError as error:
         raise ResultError(f"{file}: {error}; identify again with this version") from error
     return result
 
 
 def misfit_of_numbers(content: Any) -> str | None:
-    """Where a document of JSON's types holds a number that is none, or beyond all bounds; None nowhere."""
+    """Where a document of JSON's types holds a number that is none, or beyond all bounds.
+
+    None nowhere.
+    """
     largest = LIMITS.largest_value**2  # of a covariance
     left: list[tuple[str, Any]] = [("", content)]
     while left:
@@ -429,7 +471,9 @@ def misfit_of_numbers(content: Any) -> str | None:
             left += [(f"{place}.{key}"[-200:], inner) for key, inner in value.items()]
         elif isinstance(value, list):
             left += [(f"{place}.{number}"[-200:], inner) for number, inner in enumerate(value)]
-        elif isinstance(value, int | float) and not -largest <= value <= largest:  # also where it is no number
+        elif (
+            isinstance(value, int | float) and not -largest <= value <= largest
+        ):  # also where it is no number
             return f"{place.lstrip('.')}: expected a number below {largest:g} in size"
     return None
 
@@ -440,7 +484,8 @@ def _check(result: Result) -> None:
     Raises
     ------
     SettingError
-        If settings, terms, error bars, the covariance or a log's figures are such as no identification gives.
+        If settings, terms, error bars, the covariance or a log's figures are such as no
+        identification gives.
     """
     from algid.model import TERMS
     from algid.settings import Settings
@@ -448,21 +493,29 @@ def _check(result: Result) -> None:
     Settings.of(result.settings)
     for log in result.logs:
         if min(log.rows, log.duration, log.rate) < 0 or abs(log.start_ns) >= 1 << 63:
-            raise SettingError(f"{log.path!r:.60}: rows, duration and rate may not be negative, nor the start 2^63 ns")
+            raise SettingError(
+                f"{log.path!r:.60}: rows, duration and rate may not be negative, nor the start 2^63 ns"
+            )
     fit = result.fit
     tables = [result.estimates, result.paper_payload, *(fit.by_log if fit is not None else ())]
     for name, one in (pair for table in tables for pair in table.items()):
         _check_size(f"{name!r:.60}: estimate", one.estimate)
         if max(abs(one.estimate or 0.0), one.std or 0.0) > LIMITS.largest_value:
-            raise SettingError(f"{name!r:.60}: expected a number below {LIMITS.largest_value:g} in size")
+            raise SettingError(
+                f"{name!r:.60}: expected a number below {LIMITS.largest_value:g} in size"
+            )
         _check_size(f"{name!r:.60}: std", one.std, positive=True)
     if fit is None:
         return
     for name, level in fit.noise.items():
         _check_size(f"fit.noise.{name:.60}", level, positive=True)
-    unknown = [term for term in (fit.model.terms if fit.model is not None else ()) if term not in TERMS]
+    unknown = [
+        term for term in (fit.model.terms if fit.model is not None else ()) if term not in TERMS
+    ]
     if unknown:
-        raise SettingError(f"fit.model.terms: expected some of {', '.join(TERMS)}, found {unknown[0]!r:.60}")
+        raise SettingError(
+            f"fit.model.terms: expected some of {', '.join(TERMS)}, found {unknown[0]!r:.60}"
+        )
     if len(set(fit.covariance_names)) < len(fit.covariance_names):
         raise SettingError("fit.covariance_names: expected each once")
     for place, row in enumerate(fit.covariance):
@@ -471,7 +524,9 @@ def _check(result: Result) -> None:
 
 def _check_size(place: str, value: float | None, *, positive: bool = False) -> None:
     """Raises `SettingError` where a number is not 0 and so small that it cannot be divided by, or is negative."""
-    if value is not None and (0 < abs(value) < 1 / LIMITS.largest_value or (positive and value < 0)):
+    if value is not None and (
+        0 < abs(value) < 1 / LIMITS.largest_value or (positive and value < 0)
+    ):
         least = f"{1 / LIMITS.largest_value:g}"
         what = f"0, or {least} or more" if positive else f"0, or {least} or more in size"
         raise SettingError(f"{place}: expected {what}, found {value:g}")
@@ -481,12 +536,22 @@ def _current(content: dict[str, Any]) -> dict[str, Any]:
     """The content of a result of an earlier schema as this one has it: sentences become notices without numbers."""
     if content["schema_version"] == SCHEMA_VERSION:
         return content
-    kept = {name: value for name, value in content.items() if name not in ("warnings", "notes", "causes")}
+    kept = {
+        name: value
+        for name, value in content.items()
+        if name not in ("warnings", "notes", "causes")
+    }
     causes = [
-        Notice("EARLIER_CAUSE", one["cause"], remedies=(from_flags(one["flags"]),) if one.get("flags") else ())
+        Notice(
+            "EARLIER_CAUSE",
+            one["cause"],
+            remedies=(from_flags(one["flags"]),) if one.get("flags") else (),
+        )
         for one in content.get("causes", [])
     ]
     said = [
-        Notice("EARLIER", text, note=key == "notes") for key in ("warnings", "notes") for text in content.get(key, [])
+        Notice("EARLIER", text, note=key == "notes")
+        for key in ("warnings", "notes")
+        for text in content.get(key, [])
     ]
     return kept | {"schema_version": SCHEMA_VERSION, "notices": [*causes, *said]}

@@ -12,7 +12,15 @@ from algid.verdict import MOST_REASONS
 if TYPE_CHECKING:
     from algid.results.model import Estimate, Result
 
-_HEADING = ("Parameter", "Meaning", "Estimate", "± std", "95 % interval, the line at zero", "Unit", "Status")
+_HEADING = (
+    "Parameter",
+    "Meaning",
+    "Estimate",
+    "± std",
+    "95 % interval, the line at zero",
+    "Unit",
+    "Status",
+)
 _WIDTH, _HEIGHT = 120, 12
 """Of a bar, in pixels."""
 

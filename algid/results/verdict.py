@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 LEAST_R2 = 0.9  # below, a tenth of the torque's power is not the model's
 WORST_R2 = 0.5  # below, most of it is not: wrong angles, signs or units, or not this arm
 LEAST_USABLE = 0.5  # share of the parameters that must have an estimate
-LARGEST_SPREAD = 0.1  # a standard deviation beyond a tenth of the estimate says little more than its size
+LARGEST_SPREAD = (
+    0.1  # a standard deviation beyond a tenth of the estimate says little more than its size
+)
 FAR_FROM_TRUTH = 4.0  # σ; by chance one estimate in 16,000
 
 LONGEST_COMMAND = 4_000  # characters: a command is there to be copied
@@ -68,7 +70,9 @@ def _command(result: Result, reasons: Sequence[Notice]) -> str | None:
 def again(result: Result, flags: Sequence[str]) -> str:
     """The command that identifies again with `flags`, over the result that is there."""
     logs = [log.path for log in result.logs if log.role == "unloaded"]
-    loaded = [word for log in result.logs if log.role == "loaded" for word in ("--loaded", log.path)]
+    loaded = [
+        word for log in result.logs if log.role == "loaded" for word in ("--loaded", log.path)
+    ]
     made = result.settings.get("command")
     words = shlex.split(made) if isinstance(made, str) else ["algid", "identify", *logs, *loaded]
     force = [] if "--force" in words else ["--force"]
@@ -91,7 +95,11 @@ def _contradiction(fit: FitSummary | None) -> str:
     poor = next(_unexplained(fit, 0.0), None)
     if poor is not None and (worst is None or not worst.distance_sigma):
         return poor.text
-    return "physics forbids these estimates" if worst is None else f"the estimates break {_beyond(worst)}"
+    return (
+        "physics forbids these estimates"
+        if worst is None
+        else f"the estimates break {_beyond(worst)}"
+    )
 
 
 def _beyond(bound: Bound) -> str:
@@ -112,7 +120,9 @@ def _failure(result: Result) -> str | None:
         return _contradiction(result.fit)
     usable, count = sum(found.usable for found in result.estimates.values()), len(result.estimates)
     if not usable:
-        words = sorted({STATUS_WORDS.get(found.status, "absent") for found in result.estimates.values()})
+        words = sorted(
+            {STATUS_WORDS.get(found.status, "absent") for found in result.estimates.values()}
+        )
         return f"no parameter could be identified ({joined(words)})"
     if usable < LEAST_USABLE * count:
         return f"only {usable} of {counted(count, 'parameter')} could be identified"
@@ -122,13 +132,17 @@ def _failure(result: Result) -> str | None:
 
 def _identified(result: Result) -> str:
     """How many parameters are identified, and by which estimator where it is not the one that was asked for."""
-    identified = sum(found.status == "OK" and found.estimate is not None for found in result.estimates.values())
+    identified = sum(
+        found.status == "OK" and found.estimate is not None for found in result.estimates.values()
+    )
     count = len(result.estimates)
     have = f"{'all' if identified == count else f'{identified} of'} {counted(count, 'parameter')} are identified"
     asked = replaced_estimator(result)
     if asked is None:
         return have
-    return f"{have} by the {visible(result.estimator)} estimator in place of the {visible(asked)} one"
+    return (
+        f"{have} by the {visible(result.estimator)} estimator in place of the {visible(asked)} one"
+    )
 
 
 def replaced_estimator(result: Result) -> str | None:
@@ -140,21 +154,37 @@ def replaced_estimator(result: Result) -> str | None:
 def _praise(result: Result) -> list[str]:
     count = len(result.estimates)
     praise = [f"all {counted(count, 'parameter')} are identified"]
-    spreads = {name: _spread(found) for name, found in result.estimates.items() if found.std is not None}
+    spreads = {
+        name: _spread(found) for name, found in result.estimates.items() if found.std is not None
+    }
     if spreads:
         worst = max(spreads, key=lambda name: spreads[name])
-        praise[0] += f", the least certain, {visible(worst)}, to ±{significant(196 * spreads[worst], 2)} % (95 %)"
+        praise[0] += (
+            f", the least certain, {visible(worst)}, to ±{significant(196 * spreads[worst], 2)} % (95 %)"
+        )
     else:
-        praise[0] += f", without error bars, which the {visible(result.estimator)} estimator does not give"
+        praise[0] += (
+            f", without error bars, which the {visible(result.estimator)} estimator does not give"
+        )
     prediction = _prediction(result.fit)
     if prediction is not None:
         one, two = map(share_text, prediction.r2)
-        where = "of the torque of both joints" if one == two else f"of joint 1's torque and {two} of joint 2's"
+        where = (
+            "of the torque of both joints"
+            if one == two
+            else f"of joint 1's torque and {two} of joint 2's"
+        )
         praise.append(f"the model explains {one} {where}{band_text(prediction)}")
-    errors = {row.parameter: abs(row.error_percent) for row in result.table4 if row.error_percent is not None}
+    errors = {
+        row.parameter: abs(row.error_percent)
+        for row in result.table4
+        if row.error_percent is not None
+    }
     if errors:
         worst = max(errors, key=lambda name: errors[name])
-        praise.append(f"the largest error against the truth is {significant(errors[worst], 2)} % ({visible(worst)})")
+        praise.append(
+            f"the largest error against the truth is {significant(errors[worst], 2)} % ({visible(worst)})"
+        )
     return praise
 
 
@@ -164,7 +194,10 @@ def share_text(share: float) -> str:
 
 
 def band_text(prediction: TorquePrediction) -> str:
-    """The bandwidth in which a prediction is scored, behind a noun; empty where an old result does not say it."""
+    """The bandwidth in which a prediction is scored, behind a noun.
+
+    Empty where an old result does not say it.
+    """
     return "" if prediction.bandwidth is None else f" below {prediction.bandwidth:g} Hz"
 
 
@@ -182,7 +215,9 @@ def _prediction(fit: FitSummary | None) -> TorquePrediction | None:
 def _reasons(result: Result, *, failed: bool) -> Iterator[Notice]:
     """What makes a result doubtful, the weightiest first: causes, statuses, fit, then what was noticed."""
     warnings = [one for one in result.notices if not one.note]
-    causes = sorted((one for one in warnings if one.code in CAUSES), key=lambda one: CAUSES.index(one.code))
+    causes = sorted(
+        (one for one in warnings if one.code in CAUSES), key=lambda one: CAUSES.index(one.code)
+    )
     unexplained = next(_unexplained(result.fit, WORST_R2), None)
     if failed and not causes and (is_implausible(result) or unexplained is not None):
         yield Notice("UNKNOWN_CAUSE")
@@ -206,8 +241,16 @@ def _of_statuses(estimates: dict[str, Estimate]) -> Iterator[Notice]:
         names = [visible(name) for name, found in estimates.items() if found.status == status]
         if names:
             yield Notice(status, numbers={"names": names})
-    wide = {name: _spread(found) for name, found in estimates.items() if found.status == "OK" and found.estimate}
-    shown = [f"{visible(n)} (±{significant(196 * s, 2)} %)" for n, s in wide.items() if s > LARGEST_SPREAD]
+    wide = {
+        name: _spread(found)
+        for name, found in estimates.items()
+        if found.status == "OK" and found.estimate
+    }
+    shown = [
+        f"{visible(n)} (±{significant(196 * s, 2)} %)"
+        for n, s in wide.items()
+        if s > LARGEST_SPREAD
+    ]
     if shown:
         yield Notice("WIDE_INTERVAL", numbers={"names": shown})
 
@@ -217,7 +260,11 @@ def _of_fit(fit: FitSummary, *, failed: bool) -> Iterator[Notice]:
     headline = _worst_bound(fit) if failed else None
     for bound in fit.broken_bounds:
         if bound != headline:
-            far = "an unknown distance" if bound.distance_sigma is None else _distance(bound.distance_sigma)
+            far = (
+                "an unknown distance"
+                if bound.distance_sigma is None
+                else _distance(bound.distance_sigma)
+            )
             numbers = {"bound": visible(bound.bound), "value": bound.value, "distance": far}
             yield Notice("BROKEN_BOUND", numbers=numbers)
     coloured = [visible(name) for name, test in fit.whiteness.items() if not test.white]

@@ -8,8 +8,9 @@ x       angles                                          (2, N)       rad
 n       torque samples whose stencil lies in the angles  scalar       1
 ======  ==============================================  ===========  ============
 
-The weights are exact for polynomials through the stencil's points (Fornberg 1988, Math. Comp. 51). Nine
-points follow an arm that turns 25 times a second in logs of 1 kHz; seven biased its constants by half a σ.
+The weights are exact for polynomials through the stencil's points (Fornberg 1988, Math. Comp. 51).
+Nine points follow an arm that turns 25 times a second in logs of 1 kHz; seven biased its constants
+by half a σ.
 
 Cumulative integrals of uniformly sampled signals, fourth order in the sample time.
 """
@@ -95,12 +96,14 @@ def held_torque(tau: FloatArray) -> FloatArray:
 
     Returns
     -------
-    (..., N) float64, N m, half a sample after the stamps of `tau`; its first and last value are those of `tau`
+    (..., N) float64, N m, half a sample after the stamps of `tau`; its first and last value are
+    those of `tau`
 
     Notes
     -----
-    Under a held torque u the angles obey θ[n+1] − 2 θ[n] + θ[n−1] = dt²/2 (u[n] + u[n−1]) per unit of inertia;
-    under a smooth one a, dt² (a + dt²/12 a″). Hence a = u + dt²/24 u″ half a sample later, with an error O(dt⁴).
+    Under a held torque u the angles obey θ[n+1] − 2 θ[n] + θ[n−1] = dt²/2 (u[n] + u[n−1]) per unit
+    of inertia; under a smooth one a, dt² (a + dt²/12 a″). Hence a = u + dt²/24 u″ half a sample
+    later, with an error O(dt⁴).
     """
     result = tau.copy()
     result[..., 1:-1] = HELD[0] * tau[..., :-2] + HELD[1] * tau[..., 1:-1] + HELD[2] * tau[..., 2:]
@@ -109,7 +112,8 @@ def held_torque(tau: FloatArray) -> FloatArray:
 
 FEWEST_SAMPLES = 4
 
-# Integral over one sample of the cubic through four neighbours: at the edges and in between, times dt / 24.
+# Integral over one sample of the cubic through four neighbours: at the edges and in between, times
+# dt / 24.
 _EDGE = np.array([9.0, 19.0, -5.0, 1.0]) / 24
 _INNER = np.array([-1.0, 13.0, 13.0, -1.0]) / 24
 
@@ -126,8 +130,8 @@ def integral(signal: FloatArray, dt: float) -> FloatArray:
     Returns
     -------
     (..., N) float64, unit u s
-        Zero at the first sample. Error O(dt^4) for smooth signals: each step integrates the cubic through the
-        four samples around it.
+        Zero at the first sample. Error O(dt^4) for smooth signals: each step integrates the cubic
+        through the four samples around it.
 
     Raises
     ------
@@ -135,7 +139,9 @@ def integral(signal: FloatArray, dt: float) -> FloatArray:
         If the signal has fewer than four samples.
     """
     if signal.shape[-1] < FEWEST_SAMPLES:
-        raise ValueError(f"the signal needs at least {FEWEST_SAMPLES} samples, got {signal.shape[-1]}")
+        raise ValueError(
+            f"the signal needs at least {FEWEST_SAMPLES} samples, got {signal.shape[-1]}"
+        )
     steps = np.empty_like(signal)
     steps[..., 0] = 0
     steps[..., 1] = signal[..., :4] @ _EDGE

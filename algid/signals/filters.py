@@ -1,7 +1,10 @@
-"""Filters: zero-phase ones by matrix products, recursive ones by banded substitution; no loop over samples.
+"""Filters: zero-phase ones by matrix products, recursive ones by banded substitution.
 
-The differentiator is the ideal one below its bandwidth, cut by a Kaiser window (Oppenheim & Schafer, Discrete-
-Time Signal Processing, sec. 7.5), and exact for angles that are polynomials of sixth degree in time.
+No loop over samples.
+
+The differentiator is the ideal one below its bandwidth, cut by a Kaiser window (Oppenheim &
+Schafer, Discrete- Time Signal Processing, sec. 7.5), and exact for angles that are polynomials of
+sixth degree in time.
 """
 
 from __future__ import annotations
@@ -17,7 +20,9 @@ from algid.compiled import lapack
 _KAISER_BETA = 7.0  # stop band at -70 dB
 _PERIODS = 2.5  # half length of a kernel in periods of its bandwidth
 _LEAST = 3  # half length that three odd moments ask for, however slowly a log was sampled
-_SETTLED = 1.0  # periods of a Butterworth cutoff, times its order, after which it forgets to some 1e-4
+_SETTLED = (
+    1.0  # periods of a Butterworth cutoff, times its order, after which it forgets to some 1e-4
+)
 _ROWS = 32  # outputs a matrix product makes at once
 
 
@@ -35,11 +40,14 @@ def differentiator(dt: float, bandwidth: float) -> FloatArray:
     slope = np.where(n == 0, 0.0, (np.sinc(x) - np.cos(np.pi * x)) / safe)
     kernel = slope * taper
     kernel /= kernel @ n * dt
-    # The window leaves a ripple of some tenths of a percent; the odd moments take it out where motion lives.
+    # The window leaves a ripple of some tenths of a percent; the odd moments take it out where
+    # motion lives.
     s = n / n[-1]
     odd = np.stack([s, s**3, s**5])
     wanted = np.array([1 / (n[-1] * dt), 0.0, 0.0])
-    return _shared(kernel + np.linalg.solve((odd * taper) @ odd.T, wanted - odd @ kernel) @ (odd * taper))
+    return _shared(
+        kernel + np.linalg.solve((odd * taper) @ odd.T, wanted - odd @ kernel) @ (odd * taper)
+    )
 
 
 @lru_cache(maxsize=16)
@@ -85,7 +93,10 @@ def correlate(x: FloatArray, kernel: FloatArray, step: int = 1) -> FloatArray:
 
 
 def smoothed(x: FloatArray, dt: float, bandwidth: float) -> FloatArray:
-    """Signals (m, N) without what lies above `bandwidth` Hz; both ends continue by point reflection."""
+    """Signals (m, N) without what lies above `bandwidth` Hz.
+
+    Both ends continue by point reflection.
+    """
     kernel = smoother(dt, bandwidth)
     reach = min(kernel.size // 2, x.shape[1] - 1)
     kernel = kernel[kernel.size // 2 - reach : kernel.size // 2 + reach + 1]
@@ -95,11 +106,10 @@ def smoothed(x: FloatArray, dt: float, bandwidth: float) -> FloatArray:
 def butterworth(x: FloatArray, dt: float, cutoff: float, order: int) -> FloatArray:
     """Signals (m, N) after a digital Butterworth filter of `order` and `cutoff` Hz, forwards and backwards.
 
-    The filter is the bilinear transform of the analogue one, in sections of second order (Oppenheim & Schafer,
-    Discrete-Time Signal Processing, sec. 6.3 and 7.1). Both ends continue by point reflection, over
-    `_SETTLED` × `order` periods of the cutoff. The sections start at rest around the first sample: constants are
-    kept exactly.
-    N must be above 1.
+    The filter is the bilinear transform of the analogue one, in sections of second order
+    (Oppenheim & Schafer, Discrete-Time Signal Processing, sec. 6.3 and 7.1). Both ends continue by
+    point reflection, over `_SETTLED` × `order` periods of the cutoff. The sections start at rest
+    around the first sample: constants are kept exactly. N must be above 1.
     """
     reach = min(math.ceil(_SETTLED * order / (cutoff * dt)), x.shape[1] - 1)
     y = _reflected(x, reach)
@@ -120,7 +130,9 @@ def _sections(cutoff: float, order: int) -> list[tuple[FloatArray, FloatArray]]:
         damping = 2 * np.sin(np.pi * (2 * pair + 1) / (2 * order)) * warped
         scale = 1 + damping + warped**2
         numerator = warped**2 / scale * np.array([1.0, 2.0, 1.0])
-        denominator = np.array([1.0, 2 * (warped**2 - 1) / scale, (1 - damping + warped**2) / scale])
+        denominator = np.array(
+            [1.0, 2 * (warped**2 - 1) / scale, (1 - damping + warped**2) / scale]
+        )
         sections.append((numerator, denominator))
     if order % 2:
         numerator = warped / (1 + warped) * np.array([1.0, 1.0, 0.0])
@@ -150,9 +162,10 @@ def recursion(
 ) -> tuple[FloatArray, FloatArray]:
     """A signal x (n,) after the filter Σ b_k z^-k / Σ a_k z^-k, b and a (m + 1,), a_0 = 1, and the state it leaves.
 
-    The recursion Σ a_k y[i - k] = Σ b_k x[i - k] is one triangular banded system. `state` (m,) is what the samples
-    before add to its right side; zeros are a filter at rest. (`scipy.signal.lfilter` does the same; its package takes
-    a second to import, which a short log does not take to identify.)
+    The recursion Σ a_k y[i - k] = Σ b_k x[i - k] is one triangular banded system. `state` (m,) is
+    what the samples before add to its right side; zeros are a filter at rest.
+    (`scipy.signal.lfilter` does the same; its package takes a second to import, which a short log
+    does not take to identify.)
     """
     driven = np.convolve(numerator, x)
     driven[: state.size] += state

@@ -1,4 +1,6 @@
-"""Joint velocities from measured angles: the derivative observer of Páez-García et al. 2023, eq. (6).
+"""Joint velocities from measured angles: the derivative observer of Páez-García et al.
+
+2023, eq. (6).
 
 ======  =============================================  ===============  ==========
 symbol  name                                           shape            unit
@@ -9,10 +11,11 @@ x       state [θ1, θ̇1, θ̈1, θ2, θ̇2, θ̈2]              (6, N)        
 y       measured angles θ1, θ2                         (2, N)           rad
 =====   =============================================  ===============  ==========
 
-The paper states its model as "θ̈ = 0"; its A has θ⃛ = 0, which is what is built here. It does not state L,
-which pole placement leaves open for two outputs: here the first three poles belong to joint 1 and the last three
-to joint 2, so that L is unique and no joint's angle disturbs the other's velocity. (The least sensitive gain, as
-`scipy.signal.place_poles` seeks it, is not reached for the paper's poles: its iteration does not settle.)
+The paper states its model as "θ̈ = 0"; its A has θ⃛ = 0, which is what is built here. It does not
+state L, which pole placement leaves open for two outputs: here the first three poles belong to
+joint 1 and the last three to joint 2, so that L is unique and no joint's angle disturbs the
+other's velocity. (The least sensitive gain, as `scipy.signal.place_poles` seeks it, is not reached
+for the paper's poles: its iteration does not settle.)
 """
 
 from __future__ import annotations
@@ -36,7 +39,8 @@ def observer_gain(poles: tuple[complex, ...]) -> FloatArray:
     Raises
     ------
     ValueError
-        If there are not six poles, one does not decay, or the three of a joint are not real or conjugate.
+        If there are not six poles, one does not decay, or the three of a joint are not real or
+        conjugate.
     """
     if len(poles) != 6 or any(np.real(pole) >= 0 for pole in poles):
         raise ValueError(f"poles must be six with negative real part, got {poles}")
@@ -52,8 +56,8 @@ def observer_gain(poles: tuple[complex, ...]) -> FloatArray:
 class LuenbergerObserver:
     """The observer x̂' = (A − L C) x̂ + L y, discretised exactly for angles that are linear between samples.
 
-    It carries its state from call to call, so that a long log may pass through in pieces. From the angle to the
-    velocity each joint's three poles p make the transfer function
+    It carries its state from call to call, so that a long log may pass through in pieces. From the
+    angle to the velocity each joint's three poles p make the transfer function
 
         (l2 s + l3) s / (s³ + l1 s² + l2 s + l3),    s³ + l1 s² + l2 s + l3 = Π (s − p)
 
@@ -68,7 +72,9 @@ class LuenbergerObserver:
     def __init__(self, dt: float, poles: tuple[complex, ...] = PAPER_POLES) -> None:
         gain = observer_gain(poles)
         joints = (slice(0, 3), slice(3, 6))
-        self._filters = [_differentiator(gain[own, joint], poles[own], dt) for joint, own in enumerate(joints)]
+        self._filters = [
+            _differentiator(gain[own, joint], poles[own], dt) for joint, own in enumerate(joints)
+        ]
         self.reset()
 
     def reset(self) -> None:
@@ -79,22 +85,27 @@ class LuenbergerObserver:
     def velocities(self, theta: FloatArray) -> FloatArray:
         """Observed joint velocities (2, N) in rad/s of the angles `theta` (2, N) in rad.
 
-        The first call, and the first one after `reset`, starts at rest at the first angles; any other takes
-        `theta` as following the last sample of the call before.
+        The first call, and the first one after `reset`, starts at rest at the first angles; any
+        other takes `theta` as following the last sample of the call before.
         """
         if self._rest is None:
             self._rest = theta[:, 0].copy()
         found = np.empty_like(theta)
         for joint, (numerator, denominator) in enumerate(self._filters):
             moved = theta[joint] - self._rest[joint]
-            found[joint], self._states[joint] = recursion(numerator, denominator, moved, self._states[joint])
+            found[joint], self._states[joint] = recursion(
+                numerator, denominator, moved, self._states[joint]
+            )
         return found
 
 
-def _differentiator(gain: FloatArray, poles: tuple[complex, ...], dt: float) -> tuple[FloatArray, FloatArray]:
+def _differentiator(
+    gain: FloatArray, poles: tuple[complex, ...], dt: float
+) -> tuple[FloatArray, FloatArray]:
     """Numerator and denominator (4,) in z⁻¹ of a joint's velocity, for angles that are linear between samples.
 
-    The numerator is what makes the response to one sample, a triangle of ± dt around it (a first-order hold).
+    The numerator is what makes the response to one sample, a triangle of ± dt around it (a
+    first-order hold).
     """
     from scipy.linalg import expm
 

@@ -1,9 +1,9 @@
 """Uniform stretches of a log: what every estimator works on.
 
-A log is cut where samples are missing for long and put on a uniform time base where its stamps jitter, by the
-cubic through the four recorded samples around each instant, once samples that stand all but on top of one another
-are where they belong (`algid.signals.spacing`). What comes out does not depend on the blocks in
-which the log was read.
+A log is cut where samples are missing for long and put on a uniform time base where its stamps
+jitter, by the cubic through the four recorded samples around each instant, once samples that stand
+all but on top of one another are where they belong (`algid.signals.spacing`). What comes out does
+not depend on the blocks in which the log was read.
 """
 
 from __future__ import annotations
@@ -73,8 +73,8 @@ class Segment:
 def segments(blocks: Iterable[Log]) -> Iterator[Segment]:
     """Uniform segments of the log that comes in `blocks`, in time order.
 
-    The period is the mean over the log's first samples, gaps left out. A gap of more than `LONGEST_GAP` periods
-    starts a new stretch; shorter ones are filled by interpolation.
+    The period is the mean over the log's first samples, gaps left out. A gap of more than
+    `LONGEST_GAP` periods starts a new stretch; shorter ones are filled by interpolation.
     """
     source = (block for block in blocks if len(block))
     first: list[Log] = []
@@ -179,7 +179,10 @@ def _cubic(t: FloatArray, grid: FloatArray) -> list[tuple[IntArray, FloatArray]]
     found = []
     for node in range(4):
         others = [other for other in range(4) if other != node]
-        weight = np.prod([(grid - nodes[:, other]) / (nodes[:, node] - nodes[:, other]) for other in others], axis=0)
+        weight = np.prod(
+            [(grid - nodes[:, other]) / (nodes[:, node] - nodes[:, other]) for other in others],
+            axis=0,
+        )
         found.append((corner + node, weight))
     return found
 
@@ -199,11 +202,13 @@ def spread_pieces(usable: Iterable[Segment], count: int) -> tuple[list[Segment],
     ----------
     usable : iterable of `Segment`
     count : int
-        How many are kept of a long log, up to twice as many. What was cut from a block does not hold it.
+        How many are kept of a long log, up to twice as many. What was cut from a block does not
+        hold it.
 
     Returns
     -------
-    The pieces, and whether they are all there were. Where some were left out none continues the one before.
+    The pieces, and whether they are all there were. Where some were left out none continues the
+    one before.
     """
     kept: list[Segment] = []
     stride = 1
@@ -212,17 +217,28 @@ def spread_pieces(usable: Iterable[Segment], count: int) -> tuple[list[Segment],
             continue
         omega = None if piece.omega is None else piece.omega.copy()
         continues = piece.continues and stride == 1
-        kept.append(replace(piece, theta=piece.theta.copy(), tau=piece.tau.copy(), omega=omega, continues=continues))
+        kept.append(
+            replace(
+                piece,
+                theta=piece.theta.copy(),
+                tau=piece.tau.copy(),
+                omega=omega,
+                continues=continues,
+            )
+        )
         if len(kept) > 2 * count:
             kept, stride = [replace(other, continues=False) for other in kept[::2]], 2 * stride
     return kept, stride == 1
 
 
 class Cutter:
-    """Cuts each stretch into pieces of `rows` samples; a rest shorter than half a piece joins the last one.
+    """Cuts each stretch into pieces of `rows` samples.
 
-    The pieces do not depend on how the stretches came in. Their length is below 1.5 `rows`; a stretch shorter
-    than half a piece is a piece of its own. Pieces are views wherever they lie within one segment.
+    a rest shorter than half a piece joins the last one.
+
+    The pieces do not depend on how the stretches came in. Their length is below 1.5 `rows`; a
+    stretch shorter than half a piece is a piece of its own. Pieces are views wherever they lie
+    within one segment.
     """
 
     def __init__(self, rows: int) -> None:

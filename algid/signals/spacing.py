@@ -1,11 +1,11 @@
 """Samples that stand all but on top of one another, put where they belong before anything is interpolated.
 
-Receipt times come in clusters: a sample is sent twice, or is late and arrives with its successor, or a buffer is
-emptied at once. Two nodes a microsecond apart make any polynomial through them steep by their noise over that
-microsecond. A cluster is a run of samples each nearer to the one before than `NEAR` periods. Where as many periods
-lack samples before a cluster as it has samples, and the angles move on through it as they did over those periods,
-its samples are late: each goes back to its own period. Otherwise they are one instant, and their mean stands for
-them.
+Receipt times come in clusters: a sample is sent twice, or is late and arrives with its successor,
+or a buffer is emptied at once. Two nodes a microsecond apart make any polynomial through them
+steep by their noise over that microsecond. A cluster is a run of samples each nearer to the one
+before than `NEAR` periods. Where as many periods lack samples before a cluster as it has samples,
+and the angles move on through it as they did over those periods, its samples are late: each goes
+back to its own period. Otherwise they are one instant, and their mean stands for them.
 
 =======  ====================================  =========
 name     meaning                               shape
@@ -33,7 +33,8 @@ NEAR = 0.3
 def spaced(blocks: Iterable[Log], period: float) -> Iterator[Log]:
     """The log that comes in `blocks`, without samples nearer than `NEAR` of a `period` in s.
 
-    What comes out does not depend on how the blocks were cut. Blocks without clusters pass as they are.
+    What comes out does not depend on how the blocks were cut. Blocks without clusters pass as they
+    are.
     """
     near_ns = NEAR * period * 1e9
     held: Log | None = None  # the last cluster, which may go on in the next block
@@ -66,7 +67,8 @@ def spaced(blocks: Iterable[Log], period: float) -> Iterator[Log]:
 def _bridged(settled: list[Log]) -> Iterator[Log]:
     """What is settled, without a crumb of a block: the last cluster of a block with `BRIDGE` samples of the next.
 
-    Whether samples lie on the grid is judged a block at a time, and a crumb of one sample lies on it by chance.
+    Whether samples lie on the grid is judged a block at a time, and a crumb of one sample lies on
+    it by chance.
     """
     if len(settled) < 2:
         yield from settled
@@ -83,20 +85,29 @@ def near_stamps(stamp_ns: IntArray, period: float) -> int:
 
 
 def _settled(log: Log, before: Log | None, period: float) -> Log:
-    """Whole clusters with every sample in its place; `before` is the sample before the first of them."""
+    """Whole clusters with every sample in its place.
+
+    `before` is the sample before the first of them.
+    """
     far = np.diff(log.stamp_ns) >= NEAR * period * 1e9
     if np.all(far):
         return log
     first = np.concatenate([[0], np.flatnonzero(far) + 1])
     size = np.diff(first, append=len(log))
-    if before is None and size[0] > 1:  # nothing tells whether the log's first samples are late: the last one is not
+    if (
+        before is None and size[0] > 1
+    ):  # nothing tells whether the log's first samples are late: the last one is not
         return _settled(log.part(int(size[0]) - 1, len(log)), None, period)
     known = log if before is None else join([before, log])
     shift = len(known) - len(log)
     stamps, kept = log.stamp_ns.copy(), np.isin(np.arange(len(log)), first)
     for start, own in zip(first[size > 1].tolist(), size[size > 1].tolist(), strict=True):
-        if start + shift > 0 and _late(around := known.part(start + shift - 1, start + shift + own), period):
-            regular = around.stamp_ns[0] + np.rint(np.arange(1, own + 1) * period * 1e9).astype(np.int64)
+        if start + shift > 0 and _late(
+            around := known.part(start + shift - 1, start + shift + own), period
+        ):
+            regular = around.stamp_ns[0] + np.rint(np.arange(1, own + 1) * period * 1e9).astype(
+                np.int64
+            )
             stamps[start : start + own] = np.minimum(regular, stamps[start : start + own])
             kept[start : start + own] = True
     return _merged(replace(log, stamp_ns=stamps), np.flatnonzero(kept))
@@ -105,14 +116,19 @@ def _settled(log: Log, before: Log | None, period: float) -> Log:
 def _late(cluster: Log, period: float) -> bool:
     """Whether a cluster, here after the sample before it, belongs to the periods between the two.
 
-    As many periods have to lack samples as it has, and its angles (2, m + 1) to lie nearer to a line at equal steps
-    than to a line at their times (m + 1,).
+    As many periods have to lack samples as it has, and its angles (2, m + 1) to lie nearer to a
+    line at equal steps than to a line at their times (m + 1,).
     """
-    times, theta = (cluster.stamp_ns - cluster.stamp_ns[0]) * 1e-9, cluster.theta - cluster.theta[:, :1]
+    times, theta = (
+        (cluster.stamp_ns - cluster.stamp_ns[0]) * 1e-9,
+        cluster.theta - cluster.theta[:, :1],
+    )
     if round(times[-1] / period) != len(cluster) - 1:
         return False
     even = np.arange(times.size) / (times.size - 1)
-    off = [float(np.sum((theta - theta[:, -1:] * place) ** 2)) for place in (even, times / times[-1])]
+    off = [
+        float(np.sum((theta - theta[:, -1:] * place) ** 2)) for place in (even, times / times[-1])
+    ]
     return off[0] <= off[1]
 
 
@@ -127,7 +143,8 @@ def _merged(log: Log, starts: IntArray) -> Log:
     return replace(
         log,
         # floor, since rounding to even would depend on where the block begins
-        stamp_ns=origin_ns + np.floor(mean((log.stamp_ns - origin_ns).astype(np.float64)) + 0.5).astype(np.int64),
+        stamp_ns=origin_ns
+        + np.floor(mean((log.stamp_ns - origin_ns).astype(np.float64)) + 0.5).astype(np.int64),
         theta=mean(log.theta),
         tau=mean(log.tau),
         omega=None if log.omega is None else mean(log.omega),

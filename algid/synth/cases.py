@@ -1,6 +1,7 @@
 """Arms to simulate: the cases of the paper (Tables 3 and 4) and TOML files of the same form.
 
-A case holds the arm, the payload, the torque that drives it and, for the paper's own, the errors of Table 4.
+A case holds the arm, the payload, the torque that drives it and, for the paper's own, the errors
+of Table 4.
 """
 
 from __future__ import annotations
@@ -131,7 +132,11 @@ class _CaseFile(_Table):
 
 def case_names() -> list[str]:
     """Names of the cases that ship with algid."""
-    return sorted(entry.name.removesuffix(".toml") for entry in _folder().iterdir() if entry.name.endswith(".toml"))
+    return sorted(
+        entry.name.removesuffix(".toml")
+        for entry in _folder().iterdir()
+        if entry.name.endswith(".toml")
+    )
 
 
 def load_case(name: str) -> Case:

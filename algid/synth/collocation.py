@@ -6,8 +6,9 @@ With Q, which integrates from the window's start to each node, the velocities W 
 
     W = ω₀ + Q α(θ₀ + Q W, W)      by      (I − Q ∂α/∂ω − Q² ∂α/∂θ) δ = ω₀ + Q α − W,   W ← W + δ
 
-the simplified Newton method of implicit Runge-Kutta methods (Hairer and Wanner, Solving Ordinary Differential
-Equations II, IV.8). The method has order 2s, and between the nodes its polynomial, so that a sample costs no step.
+the simplified Newton method of implicit Runge-Kutta methods (Hairer and Wanner, Solving Ordinary
+Differential Equations II, IV.8). The method has order 2s, and between the nodes its polynomial, so
+that a sample costs no step.
 
 ======  =======================================================  ==========
 symbol  name                                                     shape
@@ -108,8 +109,8 @@ def integrate(
     Parameters
     ----------
     accelerate_at : callable
-        Takes times (M,) in s, and gives what maps angles (n, M) in rad and velocities (n, M) in rad/s at these times
-        to accelerations (n, M) in rad/s².
+        Takes times (M,) in s, and gives what maps angles (n, M) in rad and velocities (n, M) in
+        rad/s at these times to accelerations (n, M) in rad/s².
     start : (2n,) float64
     t : (N,) float64, s, increasing
     corners : (C,) float64, s, increasing
@@ -127,12 +128,16 @@ def integrate(
     ArithmeticError
         If the motion grows without bound.
     """
-    breaks = np.append([] if corners is None else corners[(corners > t[0]) & (corners < t[-1])], t[-1])
+    breaks = np.append(
+        [] if corners is None else corners[(corners > t[0]) & (corners < t[-1])], t[-1]
+    )
     states = np.empty((start.size, t.size))
     states[:, 0] = state = start
     longest, done, now = LONGEST, 1, float(t[0])
     while done < t.size:
-        with np.errstate(over="ignore", invalid="ignore"):  # a window that is too long may leave all bounds
+        with np.errstate(
+            over="ignore", invalid="ignore"
+        ):  # a window that is too long may leave all bounds
             # the breaks ahead within its length, at most so many, or its own end before the first
             ahead = breaks[np.searchsorted(breaks, now, side="right") :][:MOST_PIECES]
             within = ahead[ahead <= now + longest]
@@ -156,7 +161,10 @@ def integrate(
 def _solved(
     accelerate_at: Callable[[FloatArray], Acceleration], state: FloatArray, edges: FloatArray
 ) -> tuple[Window | None, int]:
-    """The window between `edges` (P + 1,), and how many turns it took; None where it is too long."""
+    """The window between `edges` (P + 1,), and how many turns it took.
+
+    None where it is too long.
+    """
     n = state.size // 2
     half = 0.5 * np.diff(edges)
     times = (edges[:-1] + half)[:, None] + half[:, None] * _X

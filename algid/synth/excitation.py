@@ -1,7 +1,7 @@
 """Torques that drive a simulated arm.
 
-A torque maps times (M,) in s to (2, M) N m. Smooth torques are plain callables; a sampled one also tells
-where it is not smooth, so that the integrator can step onto those instants.
+A torque maps times (M,) in s to (2, M) N m. Smooth torques are plain callables; a sampled one also
+tells where it is not smooth, so that the integrator can step onto those instants.
 """
 
 from __future__ import annotations
@@ -29,14 +29,19 @@ class MultiSine:
     def __call__(self, t: FloatArray) -> FloatArray:
         """Torque (2, M) in N m at the times `t` (M,) in s."""
         joints = zip(self.amplitude, self.frequency, self.phase, strict=True)
-        return np.stack([np.sin(2 * np.pi * np.multiply.outer(t, f) + np.array(p)) @ np.array(a) for a, f, p in joints])
+        return np.stack(
+            [
+                np.sin(2 * np.pi * np.multiply.outer(t, f) + np.array(p)) @ np.array(a)
+                for a, f, p in joints
+            ]
+        )
 
 
 def wide_multi_sine(arm: Arm, seed: int = 0) -> MultiSine:
     """Six harmonics from 0.3 to 8 Hz with random phases, strong enough to swing any arm well about.
 
-    Each joint's amplitudes scale with what its gravity, its friction at 4 rad/s and its inertia at 40 rad/s²
-    ask for.
+    Each joint's amplitudes scale with what its gravity, its friction at 4 rad/s and its inertia at
+    40 rad/s² ask for.
     """
     k1, k2, k3, k4, k5, k6, k7 = arm.constants()
     need = (k4 + k2 + 4 * k6 + 40 * (k5 + k3 + 2 * k1), k2 + 4 * k7 + 40 * k3)

@@ -2,8 +2,9 @@
 
     τ = τ_ff(t) + M(θ) (ω_c² (θ_d − θ) + 2 ω_c (θ̇_d − θ̇))
 
-The plan's torque is that of the arm as it was believed to be; what the true arm needs beside it, the controller adds.
-M is the inertia of the arm without payload. The controller sees the true state: its sensors' noise is not fed back.
+The plan's torque is that of the arm as it was believed to be; what the true arm needs beside it,
+the controller adds. M is the inertia of the arm without payload. The controller sees the true
+state: its sensors' noise is not fed back.
 
 ======  ==========================================  ==========
 symbol  name                                        unit
@@ -70,14 +71,25 @@ def read_plan(path: Path) -> Reference:
     missing = next((name for name in COLUMNS if name not in names), None)
     if missing is not None or values.ndim != 2 or values.shape[1] < 2:
         found = f"no column {missing}" if missing is not None else "no motion"
-        raise SettingError(f"{file}: expected {', '.join(COLUMNS)}, found {found}; give what algid design wrote")
+        raise SettingError(
+            f"{file}: expected {', '.join(COLUMNS)}, found {found}; give what algid design wrote"
+        )
     column = dict(zip(names, values, strict=True))
-    pairs = {name: np.stack([column[f"{name}1"], column[f"{name}2"]]) for name in ("theta", "omega", "tau")}
+    pairs = {
+        name: np.stack([column[f"{name}1"], column[f"{name}2"]])
+        for name in ("theta", "omega", "tau")
+    }
     loaded = [column.get(name) for name in LOADED_COLUMNS]
-    with_load = pairs["tau"] if loaded[0] is None or loaded[1] is None else np.stack([loaded[0], loaded[1]])
+    with_load = (
+        pairs["tau"] if loaded[0] is None or loaded[1] is None else np.stack([loaded[0], loaded[1]])
+    )
     if not np.all(np.isfinite(values)) or np.any(np.diff(column["t"]) <= 0):
-        raise SettingError(f"{file}: expected finite numbers at increasing times; write the design anew")
-    return Reference(column["t"] - column["t"][0], pairs["theta"], pairs["omega"], pairs["tau"], with_load)
+        raise SettingError(
+            f"{file}: expected finite numbers at increasing times; write the design anew"
+        )
+    return Reference(
+        column["t"] - column["t"][0], pairs["theta"], pairs["omega"], pairs["tau"], with_load
+    )
 
 
 def follow(
@@ -102,7 +114,9 @@ def follow(
 
     every = max(1, round(plan.t.size / max(plan.duration * _KNOTS, 1)))
     kept = np.unique(np.append(np.arange(0, plan.t.size, every), plan.t.size - 1))
-    wanted = np.concatenate([plan.theta, plan.omega, plan.loaded_tau if loaded else plan.tau])[:, kept]
+    wanted = np.concatenate([plan.theta, plan.omega, plan.loaded_tau if loaded else plan.tau])[
+        :, kept
+    ]
     spline = make_interp_spline(plan.t[kept], wanted.T, k=min(5, kept.size - 1))
     end = plan.duration
 

@@ -54,8 +54,13 @@ def held(torque: Torque, rate: float, duration: float, hold: Hold) -> SampledTor
     return SampledTorque(t, torque(t), hold)
 
 
-def synthesise(case: Case, torque: Torque, recording: Recording, progress: Progress | None = None) -> tuple[Log, Log]:
-    """The unloaded and the loaded log of a case, each with noise of its own; `progress` hears how far each is."""
+def synthesise(
+    case: Case, torque: Torque, recording: Recording, progress: Progress | None = None
+) -> tuple[Log, Log]:
+    """The unloaded and the loaded log of a case, each with noise of its own.
+
+    `progress` hears how far each is.
+    """
     initial = np.array(recording.initial)
     logs: list[Log] = []
     for payload in (0.0, case.payload):
@@ -63,12 +68,18 @@ def synthesise(case: Case, torque: Torque, recording: Recording, progress: Progr
         sensors = replace(recording.sensors, seed=recording.sensors.seed + len(logs))
         k = case.constants(payload)
         t = sample_times(recording.rate, recording.duration, sensors)
-        motion = simulate(k, torque, t, initial[:2], initial[2:], _counted(progress, role, recording))
-        logs.append(record(motion, sensors, Truth(case.arm, payload, case.name), f"{case.name}-{role}"))
+        motion = simulate(
+            k, torque, t, initial[:2], initial[2:], _counted(progress, role, recording)
+        )
+        logs.append(
+            record(motion, sensors, Truth(case.arm, payload, case.name), f"{case.name}-{role}")
+        )
     return logs[0], logs[1]
 
 
-def rehearse(case: Case, plan: Reference, recording: Recording, progress: Progress | None = None) -> list[Log]:
+def rehearse(
+    case: Case, plan: Reference, recording: Recording, progress: Progress | None = None
+) -> list[Log]:
     """The unloaded and, with a payload, the loaded log of a case whose controller follows a plan from its start."""
     logs: list[Log] = []
     unloaded = case.constants(0.0)
@@ -78,7 +89,9 @@ def rehearse(case: Case, plan: Reference, recording: Recording, progress: Progre
         sensors = replace(recording.sensors, seed=recording.sensors.seed + bool(payload))
         t = sample_times(recording.rate, recording.duration, sensors)
         motion = follow(k, plan, t, unloaded, bool(payload), _counted(progress, role, recording))
-        logs.append(record(motion, sensors, Truth(case.arm, payload, case.name), f"{case.name}-{role}"))
+        logs.append(
+            record(motion, sensors, Truth(case.arm, payload, case.name), f"{case.name}-{role}")
+        )
     return logs
 
 
@@ -91,8 +104,8 @@ def with_schedule(
 ) -> Log:
     """A log during which the payload changes: pairs of time in s, increasing, and payload in kg from then on.
 
-    Before the first time the arm is unloaded. An object is grasped and let go at the tip's own velocity, so that the
-    motion has no step. The truth that the log bears names the schedule.
+    Before the first time the arm is unloaded. An object is grasped and let go at the tip's own
+    velocity, so that the motion has no step. The truth that the log bears names the schedule.
 
     Raises
     ------
@@ -102,30 +115,45 @@ def with_schedule(
     times = [time for time, _ in schedule]
     ordered = all(a < b for a, b in pairwise(times))
     if not (ordered and all(0 <= mass < np.inf and np.isfinite(time) for time, mass in schedule)):
-        raise ValueError(f"schedule must hold increasing times and payloads of 0 or more, got {list(schedule)}")
+        raise ValueError(
+            f"schedule must hold increasing times and payloads of 0 or more, got {list(schedule)}"
+        )
     t = sample_times(recording.rate, recording.duration, recording.sensors)
     state = np.array(recording.initial)
     parts = []
     starts = [0.0, *times]
-    for start, end, mass in zip(starts, [*times, np.inf], [0.0, *(mass for _, mass in schedule)], strict=True):
+    for start, end, mass in zip(
+        starts, [*times, np.inf], [0.0, *(mass for _, mass in schedule)], strict=True
+    ):
         own = t[(t >= start) & (t < end)]
         close = min(end, t[-1])
         if not own.size or close <= start:
             continue
         k = case.constants(mass)
         every = np.unique(np.concatenate([[start], own, [close]]))
-        motion = simulate(k, torque, every, state[:2], state[2:], _counted(progress, "schedule", recording))
+        motion = simulate(
+            k, torque, every, state[:2], state[2:], _counted(progress, "schedule", recording)
+        )
         state = np.concatenate([motion.theta[:, -1], motion.omega[:, -1]])
         kept = np.isin(every, own)
-        parts.append(SimulatedMotion(own, motion.theta[:, kept], motion.omega[:, kept], motion.tau[:, kept]))
+        parts.append(
+            SimulatedMotion(own, motion.theta[:, kept], motion.omega[:, kept], motion.tau[:, kept])
+        )
     whole = SimulatedMotion(
-        *(np.concatenate([getattr(p, n) for p in parts], axis=-1) for n in ("t", "theta", "omega", "tau"))
+        *(
+            np.concatenate([getattr(p, n) for p in parts], axis=-1)
+            for n in ("t", "theta", "omega", "tau")
+        )
     )
-    truth = Truth(case.arm, 0.0, case.name, tuple((float(time), float(mass)) for time, mass in schedule))
+    truth = Truth(
+        case.arm, 0.0, case.name, tuple((float(time), float(mass)) for time, mass in schedule)
+    )
     return record(whole, recording.sensors, truth, f"{case.name}-schedule")
 
 
-def _counted(progress: Progress | None, stage: str, recording: Recording) -> Callable[[float], None] | None:
+def _counted(
+    progress: Progress | None, stage: str, recording: Recording
+) -> Callable[[float], None] | None:
     """Tells a time that the simulation has come to in samples."""
     if progress is None:
         return None

@@ -50,7 +50,9 @@ def sample_times(rate: float, duration: float, sensors: Sensors) -> FloatArray:
     """
     count = round(rate * duration) + 1
     if count < 2:
-        raise ValueError(f"rate and duration must give at least two samples, got {rate} Hz for {duration} s")
+        raise ValueError(
+            f"rate and duration must give at least two samples, got {rate} Hz for {duration} s"
+        )
     rng = np.random.default_rng([sensors.seed, 1])
     t = np.arange(count) / rate
     if sensors.jitter > 0:

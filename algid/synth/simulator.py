@@ -99,12 +99,15 @@ def steered(
     Parameters
     ----------
     controller : callable
-        Takes times (M,) s, and gives what maps angles (2, M) rad and velocities (2, M) rad/s to torques (2, M) N m.
+        Takes times (M,) s, and gives what maps angles (2, M) rad and velocities (2, M) rad/s to
+        torques (2, M) N m.
     corners : (C,) float64, s, increasing
         Times at which a derivative of the torque jumps.
     """
     states = _moved(k, controller, t, np.concatenate([theta0, np.zeros(2)]), corners, reached)
-    return SimulatedMotion(t=t, theta=states[:2], omega=states[2:], tau=controller(t)(states[:2], states[2:]))
+    return SimulatedMotion(
+        t=t, theta=states[:2], omega=states[2:], tau=controller(t)(states[:2], states[2:])
+    )
 
 
 def _moved(

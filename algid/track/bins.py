@@ -1,8 +1,8 @@
 """What short cells of a log tell of the payload: sums over whitened rows that are linear in it.
 
-Errors in variables are whitened as in `algid.estimators.whitening`, so that the rows' noise is white whatever the
-angles' noise does to neighbouring torques. With the payload's column g = Y d, d what one kilogram at the tip adds
-to the constants (Table 2), a row reads e = g m_p + noise.
+Errors in variables are whitened as in `algid.estimators.whitening`, so that the rows' noise is
+white whatever the angles' noise does to neighbouring torques. With the payload's column g = Y d, d
+what one kilogram at the tip adds to the constants (Table 2), a row reads e = g m_p + noise.
 
 ======  ==========================================  =========
 symbol  name                                        shape
@@ -39,7 +39,13 @@ from algid.signals.segments import Segment, pieces
 CELL = 0.02  # s
 _PIECE_SAMPLES = 16384
 _SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
-_PAYLOAD_OF = {"k5": 0, "k3": 1, "k1": 2, "k4": 3, "k2": 4}  # which of z1 … z5 adds to which constant
+_PAYLOAD_OF = {
+    "k5": 0,
+    "k3": 1,
+    "k1": 2,
+    "k4": 3,
+    "k2": 4,
+}  # which of z1 … z5 adds to which constant
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,12 +79,17 @@ class IdentifiedArm:
 
     def added(self, z: FloatArray) -> FloatArray:
         """Payload constants z (5,) as changes of the coefficients (q,)."""
-        return np.array([z[_PAYLOAD_OF[name]] if name in _PAYLOAD_OF else 0.0 for name in self.model.names])
+        return np.array(
+            [z[_PAYLOAD_OF[name]] if name in _PAYLOAD_OF else 0.0 for name in self.model.names]
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Sums by cell: see the table above; `start` and `end` (C,) are times in s, `rows` (C,) counts."""
+    """Sums by cell: see the table above.
+
+    `start` and `end` (C,) are times in s, `rows` (C,) counts.
+    """
 
     start: FloatArray
     end: FloatArray
@@ -115,10 +126,17 @@ class Cells:
 
 def joined(parts: Sequence[Cells]) -> Cells:
     """Cells one after another."""
-    return Cells(*(np.concatenate([getattr(part, name) for part in parts]) for name in Cells.__dataclass_fields__))
+    return Cells(
+        *(
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in Cells.__dataclass_fields__
+        )
+    )
 
 
-def cells_of(segments: Iterable[Segment], arm: IdentifiedArm, mass: float, settle: int = 1) -> list[Cells]:
+def cells_of(
+    segments: Iterable[Segment], arm: IdentifiedArm, mass: float, settle: int = 1
+) -> list[Cells]:
     """Cells of each piece of a log, linearised at a payload of `mass` kg and, `settle` times, at its trajectory."""
     c, found = arm.k + mass * arm.unit, []
     for piece in pieces(segments, _PIECE_SAMPLES):
@@ -135,7 +153,9 @@ def cells_of(segments: Iterable[Segment], arm: IdentifiedArm, mass: float, settl
     return found
 
 
-def _sums(linear: Linearised, piece: Segment, stencil: Stencil, arm: IdentifiedArm, mass: float) -> Cells:
+def _sums(
+    linear: Linearised, piece: Segment, stencil: Stencil, arm: IdentifiedArm, mass: float
+) -> Cells:
     Y, e = linear.columns[:-1], linear.columns[-1]
     g = arm.unit @ Y
     e = e + mass * g
@@ -179,11 +199,16 @@ def arm_of(
     model = model_of(result)
     prior = prior_of(result, model)
     fitted = result.fit.covariance_names
-    names = [*prior.names, *(n for n, given in (("l1", l1), ("l2", l2)) if given is None and n in fitted)]
+    names = [
+        *prior.names,
+        *(n for n, given in (("l1", l1), ("l2", l2)) if given is None and n in fitted),
+    ]
     places = [fitted.index(name) for name in names]
     rows = [(*prior.names, "l1", "l2").index(name) for name in names]
     covariance = np.zeros((len(prior.names) + 2,) * 2)
-    covariance[np.ix_(rows, rows)] = np.array(result.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
+    covariance[np.ix_(rows, rows)] = np.array(result.fit.covariance, dtype=np.float64)[
+        np.ix_(places, places)
+    ]
     noise = [result.fit.noise.get(name, 0.0) for name in ("theta1", "theta2", "tau1", "tau2")]
     known = IdentifiedArm(
         model,
@@ -202,14 +227,21 @@ def arm_of(
 def _body(result: Result) -> tuple[float, float]:
     """Offset and radius of gyration in m of the payload behind a result: objects are taken to be shaped like it."""
     y, J, m_p = (
-        float(result.payload[name].estimate or 0.0) if name in result.payload else 0.0 for name in ("y_p", "J_p", "m_p")
+        float(result.payload[name].estimate or 0.0) if name in result.payload else 0.0
+        for name in ("y_p", "J_p", "m_p")
     )
     return y, float(np.sqrt(max(J, 0.0) / m_p)) if m_p > 0 else 0.0
 
 
 def _length(result: Result, name: str, given: float | None) -> float:
-    known = [given, result.settings.get(name), result.payload[name].estimate if name in result.payload else None]
+    known = [
+        given,
+        result.settings.get(name),
+        result.payload[name].estimate if name in result.payload else None,
+    ]
     found = next((value for value in known if value is not None), None)
     if found is None:
-        raise ResultError(f"{result.log.path}: its result has no {name}; give the link's length with --{name}")
+        raise ResultError(
+            f"{result.log.path}: its result has no {name}; give the link's length with --{name}"
+        )
     return float(found)

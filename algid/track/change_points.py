@@ -1,17 +1,17 @@
 """Where a log's stretches of constant payload begin and end.
 
-The best cut into stretches comes by pruned dynamic programming. A stretch from cell a to b costs −(ΣB)²/ΣA, twice its
-log likelihood ratio against nothing; each cut costs a penalty. Cuts that can never be the last one again are dropped
-(Killick, Fearnhead & Eckley 2012).
+The best cut into stretches comes by pruned dynamic programming. A stretch from cell a to b costs
+−(ΣB)²/ΣA, twice its log likelihood ratio against nothing; each cut costs a penalty. Cuts that can
+never be the last one again are dropped (Killick, Fearnhead & Eckley 2012).
 
-A penalty holds for white rows; what the arm's model lacks makes neighbouring cells err alike. Masses of neighbouring
-blocks of cells differ by 1/A + 1/A' in variance where rows are white. Slow errors (friction that the model lacks,
-play, a gear's ripple) make long blocks differ by far more; the largest excess over block lengths up to a second is
-what intervals and changes have to stand up to. Medians are taken, so that a few changes of payload do not pass for
-errors.
+A penalty holds for white rows; what the arm's model lacks makes neighbouring cells err alike.
+Masses of neighbouring blocks of cells differ by 1/A + 1/A' in variance where rows are white. Slow
+errors (friction that the model lacks, play, a gear's ripple) make long blocks differ by far more;
+the largest excess over block lengths up to a second is what intervals and changes have to stand up
+to. Medians are taken, so that a few changes of payload do not pass for errors.
 
-A grasp jolts the cells it falls among: no stencil follows the jump of the acceleration. It is one change, wherever its
-jolt would put one; cells within `GUARD` of it tell neither mass.
+A grasp jolts the cells it falls among: no stencil follows the jump of the acceleration. It is one
+change, wherever its jolt would put one; cells within `GUARD` of it tell neither mass.
 """
 
 from __future__ import annotations
@@ -31,9 +31,11 @@ _SPREAD = 2.33  # standard deviation of the median of n squares over _MEDIAN, ti
 _SURE = 4.0  # of those standard deviations: white rows pass once in 30,000 spans
 
 GUARD = 3  # cells left out on both sides of a change, which lies somewhere among them
-UNLIKELY = 25.0  # of a change's place: squares beyond those of the best one, noise of the cells left out included
+# of a change's place: squares beyond those of the best one, noise of the cells left out included
+UNLIKELY = 25.0
 REACH = 15  # cells: how far a jolt may have put a change from its place
-CALM = 2  # cells more on both sides of a change's surest ends, over which the smoothed trajectory settles
+# cells more on both sides of a change's surest ends, over which the smoothed trajectory settles
+CALM = 2
 NARROW = 20  # cells: changes this close may be one with its jolt
 
 SHORTEST = 10  # cells: no object is carried for less than 0.2 s
@@ -43,7 +45,10 @@ MOST_ROUNDS = 6
 
 @dataclass(frozen=True)
 class Edges:
-    """Cells at which stretches begin, and the last one's end; the cells between which each change surely lies."""
+    """Cells at which stretches begin, and the last one's end.
+
+    The cells between which each change surely lies.
+    """
 
     places: list[int]
     spans: list[tuple[int, int]]
@@ -52,19 +57,24 @@ class Edges:
 def edges(cells: Cells, arm: IdentifiedArm) -> Edges:
     """The changes of payload among `cells`.
 
-    What a change would explain counts as an error at first, and no longer once the change is found: errors are
-    estimated again from what the stretches leave, until the changes stay.
+    What a change would explain counts as an error at first, and no longer once the change is
+    found: errors are estimated again from what the stretches leave, until the changes stay.
     """
     places: list[int] = [0, len(cells)]
     spans: list[tuple[int, int]] = []
     masses: FloatArray = np.zeros(len(cells))
     exact = np.zeros((arm.k.size + 2,) * 2)
     for _ in range(MOST_ROUNDS):
-        calm = np.ones(len(cells))  # cells around changes: their jolts are no errors of the arm's model
+        calm = np.ones(
+            len(cells)
+        )  # cells around changes: their jolts are no errors of the arm's model
         for low, high in spans:
             calm[max(low - GUARD - CALM, 0) : high + GUARD + CALM] = 0.0
-        still = replace(cells, A=calm * cells.A, B=calm * cells.B, S=calm[:, None] * cells.S, E=calm * cells.E)
-        # a change must stand up to slow errors whatever their reason, wrong constants of the arm included
+        still = replace(
+            cells, A=calm * cells.A, B=calm * cells.B, S=calm[:, None] * cells.S, E=calm * cells.E
+        )
+        # a change must stand up to slow errors whatever their reason, wrong constants of the arm
+        # included
         penalty = PENALTY * variance(still, masses, arm, exact)
         before = places
         places = [0, *cuts(cells.A, cells.B, penalty, SHORTEST), len(cells)]
@@ -72,7 +82,9 @@ def edges(cells: Cells, arm: IdentifiedArm) -> Edges:
         if places == before:
             break
         starts = places[:-1]
-        own = np.add.reduceat(cells.B, starts) / np.maximum(np.add.reduceat(cells.A, starts), 1e-300)
+        own = np.add.reduceat(cells.B, starts) / np.maximum(
+            np.add.reduceat(cells.A, starts), 1e-300
+        )
         masses = np.repeat(own, np.diff(places))
     return Edges(places, spans)
 
@@ -80,19 +92,25 @@ def edges(cells: Cells, arm: IdentifiedArm) -> Edges:
 def variance(cells: Cells, masses: FloatArray, arm: IdentifiedArm, covariance: FloatArray) -> float:
     """Variance of the rows about `masses` (C,), of the constants' errors freed, one at least.
 
-    Rows scatter about masses that hold for a few cells, and err alike over longer blocks: the larger of both.
+    Rows scatter about masses that hold for a few cells, and err alike over longer blocks: the
+    larger of both.
     """
     groups = len(cells) // SHORTEST
     A, B, E, rows = (
-        x[: groups * SHORTEST].reshape(groups, -1).sum(axis=1) for x in (cells.A, cells.B, cells.E, cells.rows)
+        x[: groups * SHORTEST].reshape(groups, -1).sum(axis=1)
+        for x in (cells.A, cells.B, cells.E, cells.rows)
     )
-    rough = float(np.median((E - B**2 / np.maximum(A, 1e-300)) / rows))  # groups that hold a change are few
+    rough = float(
+        np.median((E - B**2 / np.maximum(A, 1e-300)) / rows)
+    )  # groups that hold a change are few
     T = cells.sensitivity(arm, masses)
     return max(1.0, rough, excess(cells.A, cells.B - cells.A * masses, T, covariance))
 
 
 def excess(A: FloatArray, B: FloatArray, T: FloatArray, covariance: FloatArray) -> float:
-    """Variance of the masses of neighbouring blocks over what white rows would give; 1 where they pass for white.
+    """Variance of the masses of neighbouring blocks over what white rows would give.
+
+    1 where they pass for white.
 
     Parameters
     ----------
@@ -114,7 +132,9 @@ def excess(A: FloatArray, B: FloatArray, T: FloatArray, covariance: FloatArray) 
         if information.size <= FEWEST:
             continue
         J = np.diff(shift / information[:, None], axis=0)
-        white = 1 / information[1:] + 1 / information[:-1] + np.einsum("cx,xy,cy->c", J, covariance, J)
+        white = (
+            1 / information[1:] + 1 / information[:-1] + np.einsum("cx,xy,cy->c", J, covariance, J)
+        )
         ratio = float(np.median(np.diff(score / information) ** 2 / white)) / _MEDIAN
         if ratio > 1 + _SURE * _SPREAD / np.sqrt(information.size - 1):
             found = max(found, ratio)
@@ -135,7 +155,8 @@ def cuts(A: FloatArray, B: FloatArray, penalty: float, shortest: int) -> list[in
     last = np.zeros(count + 1, dtype=np.int64)
     best = np.full(count + 1, np.inf)
     best[0] = -penalty
-    # Of each start that may serve: the start, a, b and best there, and until which end it may. A start that a cut at
+    # Of each start that may serve: the start, a, b and best there, and until which end it may. A
+    # start that a cut at
     # `end` would serve as well is of no more use where that cut may stand: `shortest` later.
     start, until = np.empty(count + 1, dtype=np.int64), np.empty(count + 1, dtype=np.int64)
     sums = np.empty((3, count + 1))
@@ -172,7 +193,10 @@ def fused(places: list[int], cells: Cells, penalty: float) -> list[int]:
         first, left, right, last = places[place - 1 : place + 3]
         close = right - left <= NARROW
         one = left + int(np.argmin(_costs(cells, first, left, right, last))) if close else left
-        if close and _gain(cells.part(first, last), left - first, right - first, one - first) < penalty:
+        if (
+            close
+            and _gain(cells.part(first, last), left - first, right - first, one - first) < penalty
+        ):
             places = [*places[:place], one, *places[place + 2 :]]
         else:
             place += 1
@@ -196,7 +220,10 @@ def _needed(places: list[int], cells: Cells, penalty: float) -> list[int]:
     def worth(first: int, cut: int, last: int) -> float:
         """Squared difference of the masses on both sides of a cut over its variance."""
         sides = (cells.part(first + GUARD, cut - GUARD), cells.part(cut + GUARD, last - GUARD))
-        A, B = np.maximum([side.A.sum() for side in sides], 1e-300), np.array([side.B.sum() for side in sides])
+        A, B = (
+            np.maximum([side.A.sum() for side in sides], 1e-300),
+            np.array([side.B.sum() for side in sides]),
+        )
         return float(np.diff(B / A)[0] ** 2 / np.sum(1 / A))
 
     while len(places) > 2:
@@ -226,10 +253,16 @@ def placed(places: list[int], cells: Cells) -> tuple[list[int], list[tuple[int, 
 
 def _costs(cells: Cells, first: int, low: int, high: int, last: int) -> FloatArray:
     """How badly the cells away from a change at `low` to `high` fit the masses on both sides of it."""
-    before, after = (_misfit(cells.part(first, last), *ends) for ends in ((0, low - first), (high - first, None)))
+    before, after = (
+        _misfit(cells.part(first, last), *ends) for ends in ((0, low - first), (high - first, None))
+    )
     left, right = (np.concatenate([[0.0], np.cumsum(misfit)]) for misfit in (before, after))
     change = np.arange(low, high + 1) - first
-    return np.asarray(left[np.maximum(change - GUARD, 0)] + right[-1] - right[np.minimum(change + GUARD, last - first)])
+    return np.asarray(
+        left[np.maximum(change - GUARD, 0)]
+        + right[-1]
+        - right[np.minimum(change + GUARD, last - first)]
+    )
 
 
 def _misfit(cells: Cells, start: int, stop: int | None) -> FloatArray:

@@ -7,7 +7,19 @@ from itertools import pairwise
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.report.figures.base import Figure, Layout, Legend, Panel, Trace, axis, level, line, packed, stretch, times
+from algid.report.figures.base import (
+    Figure,
+    Layout,
+    Legend,
+    Panel,
+    Trace,
+    axis,
+    level,
+    line,
+    packed,
+    stretch,
+    times,
+)
 from algid.report.reduce import MinMax, broken_at_gaps, bucket_size
 from algid.text import joined
 from algid.track.bins import CELL
@@ -29,7 +41,10 @@ def figures(result: TrackResult) -> list[Figure]:
 def _payload(result: TrackResult) -> Figure:
     found = result.track
     hover = "m_p %{y:.5g} kg at %{x:.3f} s<extra></extra>"
-    traces = [*_band(found), line(*_curve(found, found.m_p), "@blue", "m_p(t)", "curve", width=1.2, hover=hover)]
+    traces = [
+        *_band(found),
+        line(*_curve(found, found.m_p), "@blue", "m_p(t)", "curve", width=1.2, hover=hover),
+    ]
     ends = np.array([end for one in found.stretches for end in (one.start, one.end)])
     masses = np.repeat([one.m_p for one in found.stretches], 2)
     traces.append(_steps(ends, masses, "@green", "stretch", "solid", 2.6))
@@ -54,7 +69,9 @@ def _payload(result: TrackResult) -> Figure:
         "A band that opens wide tells that the arm moved too little; double-click shows all of it."
     )
     words = joined([mass_text(one) for one in found.stretches[:6]])
-    panel = Panel(traces, layout, f"Payload over time; stretches of {words} kg", height=380, sync=SYNC)
+    panel = Panel(
+        traces, layout, f"Payload over time; stretches of {words} kg", height=380, sync=SYNC
+    )
     return Figure("payload", "Payload in time", (panel,), reading, tuple(legend))
 
 
@@ -73,7 +90,13 @@ def _left(result: TrackResult) -> Figure:
         "payload explains. Changes are left out: a grasp jolts the arm."
     )
     middle = float(np.median(found.left))
-    panel = Panel([trace], layout, f"Residual over the sensors' noise; median {middle:.2f}", height=240, sync=SYNC)
+    panel = Panel(
+        [trace],
+        layout,
+        f"Residual over the sensors' noise; median {middle:.2f}",
+        height=240,
+        sync=SYNC,
+    )
     legend = (
         Legend("", f"RMS of each {CELL:g} s, over the sensors' noise", "@orange"),
         Legend("", "noise alone", "@ink", "dash"),
@@ -133,9 +156,23 @@ def _band(found: Track) -> list[Trace]:
         x = found.t[starts]
         xs += [x, x[::-1], x[:1], x[:1]]
         ys += [high, low[::-1], high[:1], np.full(1, np.nan)]
-    area = {"mode": "lines", "fill": "toself", "fillcolor": "@blue/0.25", "line": {"width": 0, "color": "@blue/0.25"}}
+    area = {
+        "mode": "lines",
+        "fill": "toself",
+        "fillcolor": "@blue/0.25",
+        "line": {"width": 0, "color": "@blue/0.25"},
+    }
     drawn = {"x": times(np.concatenate(xs)), "y": packed(np.concatenate(ys))}
-    return [{"type": "scatter", **area, **drawn, "name": "band", "legendgroup": "band", "hoverinfo": "skip"}]
+    return [
+        {
+            "type": "scatter",
+            **area,
+            **drawn,
+            "name": "band",
+            "legendgroup": "band",
+            "hoverinfo": "skip",
+        }
+    ]
 
 
 def _true_steps(result: TrackResult) -> tuple[FloatArray, FloatArray]:
@@ -146,6 +183,8 @@ def _true_steps(result: TrackResult) -> tuple[FloatArray, FloatArray]:
 
 
 def _steps(x: FloatArray, y: FloatArray, colour: str, name: str, dash: str, width: float) -> Trace:
-    trace = line(x, y, colour, name, name, width=width, hover=f"{name} %{{y:.6g}} kg<extra></extra>")
+    trace = line(
+        x, y, colour, name, name, width=width, hover=f"{name} %{{y:.6g}} kg<extra></extra>"
+    )
     trace["line"] |= {"dash": dash}
     return trace

@@ -1,6 +1,7 @@
 """The report of a track: what it contains, and its folder's files.
 
-``track.json``, ``track.parquet``, ``stretches.parquet``, the pages `report.html` and `report.md`, and ``track.mcap``.
+``track.json``, ``track.parquet``, ``stretches.parquet``, the pages `report.html` and `report.md`,
+and ``track.mcap``.
 """
 
 from __future__ import annotations
@@ -19,7 +20,13 @@ from algid.text import file_name, significant
 from algid.track.figures import figures
 from algid.track.payload import QUANTILE
 from algid.track.result import TrackResult, track_json
-from algid.track.tables import change_table, quality_tables, stretch_table, track_provenance, verdict
+from algid.track.tables import (
+    change_table,
+    quality_tables,
+    stretch_table,
+    track_provenance,
+    verdict,
+)
 from algid.words import counted
 
 
@@ -27,11 +34,17 @@ def track_document(result: TrackResult) -> Document:
     """The report of a track."""
     name = file_name(result.log.path)
     seconds, rate = significant(result.log.duration, 4), significant(result.log.rate, 4)
-    warnings = Bullets(tuple(one.sentence for one in result.notices), "The readers gave no warning.")
+    warnings = Bullets(
+        tuple(one.sentence for one in result.notices), "The readers gave no warning."
+    )
     sections = (
         Section((stretch_table(result), *figures(result), *filled(change_table(result)))),
         Section((warnings, *quality_tables(result)), "data", "Data quality"),
-        Section((settings_table(result.settings), track_provenance(result)), "settings", "Settings and provenance"),
+        Section(
+            (settings_table(result.settings), track_provenance(result)),
+            "settings",
+            "Settings and provenance",
+        ),
     )
     return Document(
         title=f"Payload in time of {name}",
@@ -62,7 +75,10 @@ def write_track(result: TrackResult, folder: Path, mcap: bool = False) -> None:
 
 
 def write_pages(result: TrackResult, folder: Path, mcap: bool = False) -> list[Path]:
-    """Write the pages of a track into its `folder`, `track.mcap` where asked. Raises `OutputError`."""
+    """Write the pages of a track into its `folder`, `track.mcap` where asked.
+
+    Raises `OutputError`.
+    """
     document = track_document(result)
     pages = {"report.html": page(document), "report.md": markdown(document)}
     for name, text in pages.items():
@@ -98,7 +114,9 @@ def _write_curve(result: TrackResult, path: Path) -> None:
     )
     with whole_file(path) as temporary:
         table = curve.to_arrow()
-        pq.write_table(table.replace_schema_metadata({START_KEY: f"[{result.log.start_ns}]"}), temporary)
+        pq.write_table(
+            table.replace_schema_metadata({START_KEY: f"[{result.log.start_ns}]"}), temporary
+        )
 
 
 def _write_stretches(result: TrackResult, path: Path) -> None:
@@ -109,7 +127,9 @@ def _write_stretches(result: TrackResult, path: Path) -> None:
         (s.start, s.end, s.m_p, s.std, *s.ci95, status.value)
         for s, status in zip(stretches, result.statuses, strict=True)
     ]
-    frame = pl.DataFrame(rows, schema=["start", "end", "m_p", "m_p_std", "low", "high", "status"], orient="row")
+    frame = pl.DataFrame(
+        rows, schema=["start", "end", "m_p", "m_p_std", "low", "high", "status"], orient="row"
+    )
     with whole_file(path) as temporary:
         frame.write_parquet(temporary)
 

@@ -4,8 +4,8 @@ The variance of a mass is what its rows leave open and what the arm's own uncert
 
     var m_p = s² / A + Jᵀ Σ J,    J = T / A
 
-with Σ the covariance of constants and link lengths, T the cells' sensitivity to them and s² the rows' variance
-where it exceeds one, slow errors (`algid.track.change_points`) included.
+with Σ the covariance of constants and link lengths, T the cells' sensitivity to them and s² the
+rows' variance where it exceeds one, slow errors (`algid.track.change_points`) included.
 """
 
 from __future__ import annotations
@@ -53,11 +53,12 @@ class Track:
     """Stretches, and m_p(t) with its standard deviation and the stretch that each instant lies in, each (C,).
 
     Times at which the payload may be changing have no m_p(t).
-    `left` (C,) is the RMS of what arm and payload leave of the torque, over the sensors' noise. `changes` (n, 3)
-    are each change's time in s, and the times between which it surely lies. `colour` is the rows' variance over
-    that of sensor noise, slow errors included: above one, the arm's model lacks something. `explained` is the share
-    of the torque's power, noise aside, that arm and payload explain. `holes` (h, 2) are the times from and to which
-    the log has no samples. `tip_equivalent` is the mass in kg that at the tip would weigh on joint 2 as link 2 does.
+    `left` (C,) is the RMS of what arm and payload leave of the torque, over the sensors' noise.
+    `changes` (n, 3) are each change's time in s, and the times between which it surely lies.
+    `colour` is the rows' variance over that of sensor noise, slow errors included: above one, the
+    arm's model lacks something. `explained` is the share of the torque's power, noise aside, that
+    arm and payload explain. `holes` (h, 2) are the times from and to which the log has no samples.
+    `tip_equivalent` is the mass in kg that at the tip would weigh on joint 2 as link 2 does.
     """
 
     stretches: list[Stretch]
@@ -95,13 +96,17 @@ def track(source: Pass, arm: IdentifiedArm, covariance: FloatArray) -> Track:
     cells = joined(parts)
     found = edges(cells, arm)
     for _ in range(ROUNDS):
-        cells = joined(_settled(source, arm, [cells.part(*ends) for ends in pairwise(found.places)]))
+        cells = joined(
+            _settled(source, arm, [cells.part(*ends) for ends in pairwise(found.places)])
+        )
         found = edges(cells, arm)
     # whitening remembers: what a stretch is weighed by starts behind the jolt at its beginning
     return _weigh(cells, found, _settled(source, arm, _inner_parts(cells, found)), arm, covariance)
 
 
-def _weigh(cells: Cells, found: Edges, inner: Sequence[Cells], arm: IdentifiedArm, covariance: FloatArray) -> Track:
+def _weigh(
+    cells: Cells, found: Edges, inner: Sequence[Cells], arm: IdentifiedArm, covariance: FloatArray
+) -> Track:
     """The track whose stretches are `found` among `cells`, each weighed by its `inner` ones."""
     counts, calm = [len(part) for part in inner], joined(inner)
     masses = np.repeat([part.mass for part in inner], counts)
@@ -141,7 +146,9 @@ def _settled(source: Pass, arm: IdentifiedArm, rough: Sequence[Cells]) -> list[C
     return found
 
 
-def _by_stretch(log: Iterable[Segment], arm: IdentifiedArm, rough: Sequence[Cells]) -> Iterator[tuple[int, Segment]]:
+def _by_stretch(
+    log: Iterable[Segment], arm: IdentifiedArm, rough: Sequence[Cells]
+) -> Iterator[tuple[int, Segment]]:
     """The log's segments cut at the stretches' ends, each with its stretch's number."""
     for segment in log:
         end = segment.start + len(segment) * segment.dt
@@ -153,7 +160,9 @@ def _by_stretch(log: Iterable[Segment], arm: IdentifiedArm, rough: Sequence[Cell
 
 
 def cut_to(segment: Segment, start: float, end: float, shift: float) -> Segment | None:
-    """The samples that give the torques from `start` to `end` s, their stencils' included; None where it has none.
+    """The samples that give the torques from `start` to `end` s, their stencils' included.
+
+    None where it has none.
 
     `shift` is the time in s after which a logged torque acts.
     """
@@ -165,7 +174,10 @@ def cut_to(segment: Segment, start: float, end: float, shift: float) -> Segment 
 
 
 def _inner_parts(cells: Cells, found: Edges) -> list[Cells]:
-    """Each stretch's cells, less those around the changes at its ends; at least some of its middle."""
+    """Each stretch's cells, less those around the changes at its ends.
+
+    At least some of its middle.
+    """
     begins = [found.places[0], *(high + GUARD + CALM for _, high in found.spans)]
     ends = [*(low - GUARD - CALM for low, _ in found.spans), found.places[-1]]
     parts = []
@@ -177,8 +189,12 @@ def _inner_parts(cells: Cells, found: Edges) -> list[Cells]:
     return parts
 
 
-def _band(cells: Cells, arm: IdentifiedArm, covariance: FloatArray, colour: float) -> tuple[float, FloatArray]:
-    """The standard deviation of a stretch's mass; times, masses and their standard deviations (3, C) along it.
+def _band(
+    cells: Cells, arm: IdentifiedArm, covariance: FloatArray, colour: float
+) -> tuple[float, FloatArray]:
+    """The standard deviation of a stretch's mass.
+
+    times, masses and their standard deviations (3, C) along it.
 
     Along the stretch each cell's mass comes from its neighbourhood within the stretch.
     """

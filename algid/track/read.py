@@ -32,7 +32,8 @@ def read_track(folder: Path) -> TrackResult:
     Raises
     ------
     ResultError
-        If its files are missing, damaged, or of a version that did not keep all that its pages show.
+        If its files are missing, damaged, or of a version that did not keep all that its pages
+        show.
     """
     path = folder / FILE
     again = "run algid track again with this version"
@@ -48,11 +49,15 @@ def read_track(folder: Path) -> TrackResult:
         raise ResultError(f"{path}: {first_misfit(error)}; {again}") from error
     except (ValueError, RecursionError) as error:
         reason = str(error).partition("\n")[0]
-        raise ResultError(f"{path}: not JSON ({reason}); expected a track of algid track") from error
+        raise ResultError(
+            f"{path}: not JSON ({reason}); expected a track of algid track"
+        ) from error
     curve = list(blocks(folder / CURVE, COLUMNS))
     if not curve:
         raise ResultError(f"{folder / CURVE}: it holds no rows; {again}")
-    return _result(found, {name: np.concatenate([part[name] for part in curve]) for name in COLUMNS})
+    return _result(
+        found, {name: np.concatenate([part[name] for part in curve]) for name in COLUMNS}
+    )
 
 
 class _Stretch(BaseModel):

@@ -29,8 +29,8 @@ class StretchStatus(StrEnum):
 class TrackResult:
     """A track, and what it came from.
 
-    `arm` names the result of the arm and `arm_sha256` its file. `start_ns` is the log's first stamp. `schedule` is the
-    truth of a synthetic log: times in s and kg.
+    `arm` names the result of the arm and `arm_sha256` its file. `start_ns` is the log's first
+    stamp. `schedule` is the truth of a synthetic log: times in s and kg.
     """
 
     track: Track
@@ -88,7 +88,10 @@ def track_json(result: TrackResult) -> str:
         "schema_version": SCHEMA_VERSION,
         "version": result.version,
         "stretches": stretches,
-        "changes": [dict(zip(("t", "from", "to"), row, strict=True)) for row in result.track.changes.tolist()],
+        "changes": [
+            dict(zip(("t", "from", "to"), row, strict=True))
+            for row in result.track.changes.tolist()
+        ],
         "explained": result.track.explained,
         "excess": result.track.colour,
         "bare": result.track.tip_equivalent,

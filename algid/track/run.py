@@ -45,7 +45,8 @@ def track_log(
     l1, l2 : float, m
         Link lengths; the result's by default.
     profile : Profile
-        What the log's names, units and signs mean; where it is silent, what was said of the result's logs.
+        What the log's names, units and signs mean; where it is silent, what was said of the
+        result's logs.
     settings : mapping
         What else the result should tell of the call.
 
@@ -57,7 +58,9 @@ def track_log(
         If the result cannot be read, or leaves a constant or a link length open.
     """
     result = read_result(parameters)
-    source = open_source(log, "loaded", reused(profile, result), result.settings.get("gravity", 9.81), changing=True)
+    source = open_source(
+        log, "loaded", reused(profile, result), result.settings.get("gravity", 9.81), changing=True
+    )
     survey = Survey([source])
     first = next(survey.segments(source), None)
     if first is None:
@@ -71,7 +74,9 @@ def track_log(
     otherwise = read_otherwise([survey.summary(source)], result, str(parameters))
     truth, notices = source.origin.truth, survey.seen(source).notices
     judged = result.verdict
-    doubt = Notice("ARM_DOUBTFUL", numbers={"grade": judged.word.lower(), "headline": judged.headline})
+    doubt = Notice(
+        "ARM_DOUBTFUL", numbers={"grade": judged.word.lower(), "headline": judged.headline}
+    )
     file = parameters / "result.json" if parameters.is_dir() else parameters
     return TrackResult(
         track=found,

@@ -35,7 +35,9 @@ COLUMNS = (
 def stretch_table(result: TrackResult) -> Table:
     """The stretches, their masses and intervals."""
     rows = []
-    for place, (stretch, status) in enumerate(zip(result.track.stretches, result.statuses, strict=True), start=1):
+    for place, (stretch, status) in enumerate(
+        zip(result.track.stretches, result.statuses, strict=True), start=1
+    ):
         low, high = (fixed(end, stretch.std) for end in stretch.ci95)
         truth = result.truth(stretch)
         rows.append(
@@ -90,13 +92,18 @@ def quality_tables(result: TrackResult) -> tuple[Table, ...]:
     """What the track leaves of the torque, the log, its channels, and where it has no samples."""
     fit = (
         ("torque explained by arm and payload, noise aside", share_text(result.track.explained)),
-        ("slow errors and noise over the sensors' noise", significant(math.sqrt(result.track.colour), 3)),
+        (
+            "slow errors and noise over the sensors' noise",
+            significant(math.sqrt(result.track.colour), 3),
+        ),
     )
     log, channels = log_tables([result.log])
     holes = tuple((f"{start:.3f}", f"{end:.3f}") for start, end in result.track.holes.tolist())
     ends = (Column("From, s", "name"), Column("To, s", "number"))
     return (
-        Table("Fit", (Column("What", "name"), Column("Value", "number")), fit, depth=Depth.MARKDOWN),
+        Table(
+            "Fit", (Column("What", "name"), Column("Value", "number")), fit, depth=Depth.MARKDOWN
+        ),
         log.without(["Arm"]),
         channels.without(["Log"]),
         *filled(Table("Times without samples", ends, holes, depth=Depth.PAGE)),
@@ -111,7 +118,10 @@ def track_provenance(result: TrackResult) -> Table:
             ("arm's result", result.arm),
             ("sha256 of the arm's result", result.arm_sha256),
             ("path of the log", result.log.path),
-            (f"sha256 of {file_name(result.log.path)}", result.log.sha256 or "unknown, fetched in part"),
+            (
+                f"sha256 of {file_name(result.log.path)}",
+                result.log.sha256 or "unknown, fetched in part",
+            ),
         ]
     )
 
@@ -128,13 +138,19 @@ def half_text(stretch: Stretch) -> str:
 
 def fixed(value: float, std: float) -> str:
     """`value` with as many decimals as its standard deviation resolves, so that a column lines up."""
-    decimals = 3 if not (math.isfinite(std) and std > 0) else min(max(1 - math.floor(math.log10(std)), 0), 9)
+    decimals = (
+        3
+        if not (math.isfinite(std) and std > 0)
+        else min(max(1 - math.floor(math.log10(std)), 0), 9)
+    )
     text = f"{value:.{decimals}f}"
     return text.removeprefix("-") if float(text) == 0 else text
 
 
 COLOURED = 4.0  # of the rows' variance: intervals twice as wide as the sensors' noise asks for
-STRANGE = 1e4  # of the rows' variance: a real arm with friction reaches 6e3, another arm 5e4 and more
+STRANGE = (
+    1e4  # of the rows' variance: a real arm with friction reaches 6e3, another arm 5e4 and more
+)
 ALL_BUT = 0.99  # explained of the torque, beyond which such errors are those of very quiet sensors
 MOST_NAMED = 4
 
@@ -147,7 +163,9 @@ STATUS_CODES = {
 def verdict(result: TrackResult) -> Verdict:
     """Judge a track by its stretches, what it explains of the torque, and the arm's own result."""
     notes = [one for one in result.notices if one.note]
-    return graded(_weighed(result), list(_reasons(result)), notes, failure=_failure(result), things="masses")
+    return graded(
+        _weighed(result), list(_reasons(result)), notes, failure=_failure(result), things="masses"
+    )
 
 
 def _weighed(result: TrackResult) -> str:
@@ -157,7 +175,9 @@ def _weighed(result: TrackResult) -> str:
     widest = max(stretches, key=lambda stretch: stretch.std)
     times = [f"{moment:.2f}" for moment in changes[:, 0]]
     when = f" at {joined(times)} s" if len(times) <= MOST_NAMED else ""
-    how_often = "once" if len(times) == 1 else "twice" if len(times) == 2 else counted(len(times), "time")
+    how_often = (
+        "once" if len(times) == 1 else "twice" if len(times) == 2 else counted(len(times), "time")
+    )
     masses = [mass_text(stretch) for stretch in stretches]
     what = (
         f"weighing {joined(masses)} kg"
@@ -170,7 +190,9 @@ def _weighed(result: TrackResult) -> str:
 def _failure(result: TrackResult) -> str | None:
     if result.track.explained < WORST_R2:
         share = f"{max(100 * result.track.explained, 0):.0f} %"
-        return f"arm and payload explain only {share} of the torque: is it this arm, in these units?"
+        return (
+            f"arm and payload explain only {share} of the torque: is it this arm, in these units?"
+        )
     if result.track.colour > STRANGE and result.track.explained < ALL_BUT:
         times = f"{significant(float(result.track.colour) ** 0.5, 2)} times"
         return f"arm and payload miss the torque by {times} its sensors' noise: is it this arm, in these units?"
@@ -187,13 +209,19 @@ def _failure(result: TrackResult) -> str | None:
 
 def _reasons(result: TrackResult) -> Iterator[Notice]:
     for status, code in STATUS_CODES.items():
-        numbers = [str(place) for place, found in enumerate(result.statuses, start=1) if found is status]
+        numbers = [
+            str(place) for place, found in enumerate(result.statuses, start=1) if found is status
+        ]
         if numbers:
             yield Notice(code, numbers={"numbers": numbers})
     if result.track.explained < LEAST_R2:
-        yield Notice("TORQUE_UNEXPLAINED", numbers={"percent": max(100 * result.track.explained, 0.0)})
+        yield Notice(
+            "TORQUE_UNEXPLAINED", numbers={"percent": max(100 * result.track.explained, 0.0)}
+        )
     if result.track.colour > COLOURED:
-        yield Notice("TORQUE_ERRORS", numbers={"times": significant(float(result.track.colour) ** 0.5, 2)})
+        yield Notice(
+            "TORQUE_ERRORS", numbers={"times": significant(float(result.track.colour) ** 0.5, 2)}
+        )
     if result.data_lost and not any(one.lossy for one in result.notices):
         yield Notice("DATA_LOST")
     yield from (one for one in result.notices if not one.note)

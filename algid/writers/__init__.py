@@ -11,7 +11,11 @@ FORMATS = ("mcap", "parquet", "csv")
 
 
 def write_log(
-    path: str | Path, log: Log | Iterable[Log], *, truth: Truth | None = None, kind: str | None = None
+    path: str | Path,
+    log: Log | Iterable[Log],
+    *,
+    truth: Truth | None = None,
+    kind: str | None = None,
 ) -> None:
     """Write a log, or the blocks of one, whole or not at all.
 

@@ -13,8 +13,8 @@ from algid.writers.blocks import as_blocks, columns, exact_in_seconds, summed
 def write(path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None) -> None:
     """Write a log, or the blocks of one: t in s, angles, torques, velocities where recorded.
 
-    Stamps too far from zero for float64 seconds get a column ``stamp_ns`` as well. The sidecar is written
-    only with a truth.
+    Stamps too far from zero for float64 seconds get a column ``stamp_ns`` as well. The sidecar is
+    written only with a truth.
 
     Raises
     ------
@@ -41,7 +41,9 @@ def write(path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None) -
 def _beside(path: Path, companion: Companion | None) -> None:
     beside = path.with_name(path.name + ".truth.json")
     if companion is None:
-        beside.unlink(missing_ok=True)  # what an older file of this name left there is not this log's truth
+        beside.unlink(
+            missing_ok=True
+        )  # what an older file of this name left there is not this log's truth
         return
     with whole_file(beside) as temporary:
         temporary.write_text(companion.dumps() + "\n", encoding="utf-8")

@@ -1,7 +1,7 @@
 """MCAP logs as a ROS 2 recorder writes them: sensor_msgs/msg/JointState on /joint_states, CDR, zstd chunks.
 
-All messages of a block are laid out at once as rows of one structured array, since only the stamp and the
-numbers differ between them.
+All messages of a block are laid out at once as rows of one structured array, since only the stamp
+and the numbers differ between them.
 """
 
 from __future__ import annotations
@@ -32,7 +32,9 @@ _QOS = """\
 """
 
 
-def write(path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None, chunk_size: int = _CHUNK) -> None:
+def write(
+    path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None, chunk_size: int = _CHUNK
+) -> None:
     """Write a log, or the blocks of one; the truth goes into the metadata record "algid".
 
     A chunk closes at `chunk_size` bytes.
@@ -85,7 +87,11 @@ def payloads(block: Log) -> Iterator[bytes]:
     for number, joint in enumerate(JOINTS, start=1):
         rows[f"length{number}"] = len(joint) + 1
         rows[f"joint{number}"] = joint.encode()
-    for name, values in (("position", block.theta), ("velocity", block.omega), ("effort", block.tau)):
+    for name, values in (
+        ("position", block.theta),
+        ("velocity", block.omega),
+        ("effort", block.tau),
+    ):
         if values is not None:
             rows[f"{name}_count"] = 2
             rows[name] = values.T

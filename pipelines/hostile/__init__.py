@@ -1,7 +1,8 @@
 """Structure-aware hostile logs: files that are well formed down to the place where they lie.
 
-Each comes with the log that a reader must find in it unless it says otherwise, or with none where any answer is right
-that is one: the file then is a sound one with another content, or holds no log at all.
+Each comes with the log that a reader must find in it unless it says otherwise, or with none where
+any answer is right that is one: the file then is a sound one with another content, or holds no log
+at all.
 """
 
 from __future__ import annotations

@@ -50,7 +50,21 @@ ROW: dict[str, Any] = {
     "payload": 0.5,
 }
 NAMES = (
-    *("a", "b", "a-loaded", "a_unloaded", "x.json", "x.json~", "jobs", "d.algid", ".h", "result", "a b", "é", "ä" * 90),
+    *(
+        "a",
+        "b",
+        "a-loaded",
+        "a_unloaded",
+        "x.json",
+        "x.json~",
+        "jobs",
+        "d.algid",
+        ".h",
+        "result",
+        "a b",
+        "é",
+        "ä" * 90,
+    ),
     *(
         "bad\nname",
         "a\\b",
@@ -67,7 +81,19 @@ NAMES = (
     ),
 )
 """Names of files and folders; those of `TEXTS` that the system takes come along."""
-ENDS = ("", ".csv", ".csv", ".mcap", ".parquet", ".csv.gz", ".CSV", ".toml", ".npz", ".algid", ".json")
+ENDS = (
+    "",
+    ".csv",
+    ".csv",
+    ".mcap",
+    ".parquet",
+    ".csv.gz",
+    ".CSV",
+    ".toml",
+    ".npz",
+    ".algid",
+    ".json",
+)
 
 
 def record(draw: random.Random) -> bytes:
@@ -80,7 +106,8 @@ def record(draw: random.Random) -> bytes:
 def manifest(draw: random.Random, folder: Path) -> Path:
     """Write a manifest into a folder."""
     rows = [
-        changed(ROW, draw) if draw.random() < 0.7 else {**ROW, "name": f"r{n}"} for n in range(draw.choice((1, 2, 9)))
+        changed(ROW, draw) if draw.random() < 0.7 else {**ROW, "name": f"r{n}"}
+        for n in range(draw.choice((1, 2, 9)))
     ]
     rows = [row if isinstance(row, dict) else {"name": row} for row in rows]
     is_toml = draw.random() < 0.5
@@ -93,14 +120,21 @@ def manifest(draw: random.Random, folder: Path) -> Path:
 
 def _toml(rows: list[dict[Any, Any]]) -> str:
     return "\n".join(
-        "[[job]]\n" + "\n".join(f"{json.dumps(str(key))} = {_toml_value(value)}" for key, value in row.items())
+        "[[job]]\n"
+        + "\n".join(f"{json.dumps(str(key))} = {_toml_value(value)}" for key, value in row.items())
         for row in rows
     )
 
 
 def _toml_value(value: Any) -> str:
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{json.dumps(str(key))} = {_toml_value(one)}" for key, one in value.items()) + "}"
+        return (
+            "{"
+            + ", ".join(
+                f"{json.dumps(str(key))} = {_toml_value(one)}" for key, one in value.items()
+            )
+            + "}"
+        )
     if isinstance(value, list):
         return "[" + ", ".join(map(_toml_value, value)) + "]"
     if isinstance(value, float):
@@ -130,9 +164,16 @@ def grow(draw: random.Random, folder: Path) -> None:
         name = draw.choice((draw.choice(NAMES), draw.choice(TEXTS))) + draw.choice(ENDS)
         path = Path(f"{where}/{name}")
         makers: tuple[Callable[[Path], object], ...] = (
-            *(Path.mkdir, Path.mkdir, os.mkfifo, lambda p: (p.mkdir(), (p / "metadata.yaml").touch())),
+            *(
+                Path.mkdir,
+                Path.mkdir,
+                os.mkfifo,
+                lambda p: (p.mkdir(), (p / "metadata.yaml").touch()),
+            ),
             lambda p: p.symlink_to(draw.choice(places)),
-            lambda p: p.symlink_to(draw.choice(("/dev/zero", "/", "/etc", ".", "..", p.name, "absent"))),
+            lambda p: p.symlink_to(
+                draw.choice(("/dev/zero", "/", "/etc", ".", "..", p.name, "absent"))
+            ),
             *([lambda p: p.write_text("t,theta1\n0,1\n")] * 6),
         )
         with suppress(OSError, ValueError):  # the system does not take every name
@@ -156,4 +197,6 @@ def furnish_output(draw: random.Random, out: Path) -> None:
             with suppress(OSError):
                 path.parent.mkdir(exist_ok=True)
                 if not os.path.lexists(path):
-                    path.write_bytes(record(draw) if draw.random() < 0.7 else json.dumps(anything(draw)).encode())
+                    path.write_bytes(
+                        record(draw) if draw.random() < 0.7 else json.dumps(anything(draw)).encode()
+                    )

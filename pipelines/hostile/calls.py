@@ -26,7 +26,19 @@ from pipelines.mutations import damage
 UNLOADED, LOADED = "case1-unloaded.csv", "case1-loaded.csv"
 RESULTS = ("full.algid", "weak.algid", "paper.algid")
 NOISE = ("--position-noise", "1e-3", "--torque-noise", "1e-2")
-DESIGN = ("--range", "1.2", "--speed", "3", "--torque", "1.5", "--duration", "1", "--rate", "50", *NOISE)
+DESIGN = (
+    "--range",
+    "1.2",
+    "--speed",
+    "3",
+    "--torque",
+    "1.5",
+    "--duration",
+    "1",
+    "--rate",
+    "50",
+    *NOISE,
+)
 QUICK = ("--estimator", "weak", "--model", "plain", "--no-report")
 CALLS: dict[str, tuple[str, ...]] = {
     "inspect": (UNLOADED,),
@@ -35,7 +47,17 @@ CALLS: dict[str, tuple[str, ...]] = {
     "validate": ("full.algid", UNLOADED),
     "export": ("full.algid", "--to", "urdf", "-o", "out/arm.urdf"),
     "fleet": ("results", "-o", "out"),
-    "track": (LOADED, "--parameters", "full.algid", "--l1", "0.1626", "--l2", "0.1232", "-o", "out"),
+    "track": (
+        LOADED,
+        "--parameters",
+        "full.algid",
+        "--l1",
+        "0.1626",
+        "--l2",
+        "0.1232",
+        "-o",
+        "out",
+    ),
     "check": ("full.algid", "--max-error", "50"),
     "report": ("weak.algid",),
     "compare": ("full.algid", "weak.algid", "-o", "out"),
@@ -43,7 +65,15 @@ CALLS: dict[str, tuple[str, ...]] = {
     "convert": (UNLOADED, "out/copy.mcap"),
     "guide": (),
 }
-NEVER = {"--help", "--watch", "--scheduler", "--version", "--install-completion", "--show-completion", "--save-plots"}
+NEVER = {
+    "--help",
+    "--watch",
+    "--scheduler",
+    "--version",
+    "--install-completion",
+    "--show-completion",
+    "--save-plots",
+}
 """Options that wait for ever by intent, talk to a cluster, or need another package."""
 SLOW = {("identify", "--estimator"), ("identify", "--model"), ("identify", "--cross-validate")}
 """Flags that choose honest work of more than a second."""
@@ -61,7 +91,15 @@ class Call:
 def draw_call(seed: int, place: Path) -> Call:
     """The call of that seed; the files that it needs are put into `place`."""
     draw = random.Random(seed)
-    makers: tuple[Callable[[random.Random, Path], Call], ...] = (flags, flags, flags, toml, result, result, series)
+    makers: tuple[Callable[[random.Random, Path], Call], ...] = (
+        flags,
+        flags,
+        flags,
+        toml,
+        result,
+        result,
+        series,
+    )
     return draw.choice(makers)(draw, place)
 
 
@@ -73,14 +111,20 @@ def options(command: str) -> tuple[Any, ...]:
     """A command's options, as typer reads them."""
     group = typer.main.get_command(gathered([command, "guide" if command != "guide" else "check"]))
     every = group.commands[command].params  # type: ignore[attr-defined]
-    return tuple(one for one in every if one.param_type_name == "option" and one.opts[-1] not in NEVER)
+    return tuple(
+        one for one in every if one.param_type_name == "option" and one.opts[-1] not in NEVER
+    )
 
 
 def flags(draw: random.Random, _place: Path) -> Call:
     """A sound call with one to three flags of any value."""
     command = draw.choice([name for name in COMMANDS if name in CALLS])
     given = [*CALLS[command]]  # no argument of a process holds a NUL, nor half a character
-    chosen = [draw.choice(options(command)) for _ in range(draw.choice((1, 1, 2, 3)))] if options(command) else []
+    chosen = (
+        [draw.choice(options(command)) for _ in range(draw.choice((1, 1, 2, 3)))]
+        if options(command)
+        else []
+    )
     for option in chosen:
         if (command, option.opts[-1]) in SLOW and draw.random() < 0.8:
             continue
@@ -105,9 +149,21 @@ def _given(option: Any, draw: random.Random) -> list[str]:
     elif kind is int:
         known = [str(draw.choice(values.WHOLE[:-1])) for _ in range(4)]
     elif kind in (Path, list[Path]):
-        known = [*RESULTS, UNLOADED, LOADED, "results", "out", "absent", "/dev/zero", "/dev/full", "."]
+        known = [
+            *RESULTS,
+            UNLOADED,
+            LOADED,
+            "results",
+            "out",
+            "absent",
+            "/dev/zero",
+            "/dev/full",
+            ".",
+        ]
     elif kind is datetime:
-        known = [f"{draw.choice((1, 1600, 1677, 1969, 1970, 2026, 2262, 2300, 9999)):04d}-01-01T00:00:00"]
+        known = [
+            f"{draw.choice((1, 1600, 1677, 1969, 1970, 2026, 2262, 2300, 9999)):04d}-01-01T00:00:00"
+        ]
     else:
         known = _words(draw)
     value = draw.choice(known) if draw.random() < 0.85 else values.text(draw)
@@ -117,9 +173,31 @@ def _given(option: Any, draw: random.Random) -> list[str]:
 def _words(draw: random.Random) -> list[str]:
     """What an option of text may hold: numbers in every arrangement that some option has."""
     one, two, three, four = (repr(values.number(draw)) for _ in range(4))
-    key = draw.choice(("tau1.sign", "theta1.unit", "theta1.offset", "gravity", "start", "accept", "a.b.c", "signs"))
-    arranged = (f"{one}", f"{one},{two}", f"{one}:{two},{three}:{four}", f"{one},{two},{three},{four}")
-    return [*arranged, f"{one}={two},{three}={four}", f"{key}={values.text(draw)}", f"{key}={one}", values.text(draw)]
+    key = draw.choice(
+        (
+            "tau1.sign",
+            "theta1.unit",
+            "theta1.offset",
+            "gravity",
+            "start",
+            "accept",
+            "a.b.c",
+            "signs",
+        )
+    )
+    arranged = (
+        f"{one}",
+        f"{one},{two}",
+        f"{one}:{two},{three}:{four}",
+        f"{one},{two},{three},{four}",
+    )
+    return [
+        *arranged,
+        f"{one}={two},{three}={four}",
+        f"{key}={values.text(draw)}",
+        f"{key}={one}",
+        values.text(draw),
+    ]
 
 
 # TOML
@@ -148,10 +226,17 @@ def toml(draw: random.Random, place: Path) -> Call:
 
 def as_toml(content: dict[str, Any]) -> str:
     """A document in TOML; what TOML cannot say is said as it would be in JSON."""
-    lines = [f"{_key(key)} = {_inline(value)}" for key, value in content.items() if not isinstance(value, dict)]
+    lines = [
+        f"{_key(key)} = {_inline(value)}"
+        for key, value in content.items()
+        if not isinstance(value, dict)
+    ]
     for key, value in content.items():
         if isinstance(value, dict):
-            lines += [f"[{_key(key)}]", *(f"{_key(inner)} = {_inline(one)}" for inner, one in value.items())]
+            lines += [
+                f"[{_key(key)}]",
+                *(f"{_key(inner)} = {_inline(one)}" for inner, one in value.items()),
+            ]
     return "\n".join(lines) + "\n"
 
 
@@ -175,7 +260,11 @@ def _inline(value: Any) -> str:
 def result(draw: random.Random, place: Path) -> Call:
     """A command on a result whose result.json, or a track whose track.json, is changed."""
     source = draw.choice((*RESULTS, RESULTS[0], "case1-loaded.track"))
-    folder, name = ("hostile.track", "track.json") if source.endswith(".track") else ("hostile.algid", "result.json")
+    folder, name = (
+        ("hostile.track", "track.json")
+        if source.endswith(".track")
+        else ("hostile.algid", "result.json")
+    )
     _copied(place / source, place / folder)
     content = json.loads((place / source / name).read_text())
     written = json.dumps(values.changed(content, draw)).encode()
@@ -221,7 +310,10 @@ def _reading(folder: str, draw: random.Random) -> tuple[str, ...]:
         ("check", folder, "--against", "paper"),
         ("validate", folder, UNLOADED, *form),
         ("validate", folder, UNLOADED, "--loaded", LOADED, "--simulate"),
-        *(("export", folder, "--to", to, "-o", "out/arm.x") for to in ("urdf", "mjcf", "sdf", "python", "c", "yaml")),
+        *(
+            ("export", folder, "--to", to, "-o", "out/arm.x")
+            for to in ("urdf", "mjcf", "sdf", "python", "c", "yaml")
+        ),
         ("identify", LOADED, "--parameters", folder, "-o", "out", *QUICK),
         (*track, "--l1", "0.1626", "--l2", "0.1232"),
         track,
@@ -244,11 +336,29 @@ def series(draw: random.Random, place: Path) -> Call:
     if kind == "jobs":
         _copied(place / "results", place / "hostile")
         file = place / "hostile" / "jobs.parquet"
-        arguments: tuple[str, ...] = ("fleet", "hostile", "-o", "out", "--format", draw.choice(("table", "json")))
+        arguments: tuple[str, ...] = (
+            "fleet",
+            "hostile",
+            "-o",
+            "out",
+            "--format",
+            draw.choice(("table", "json")),
+        )
     elif kind == "design":
         _copied(place / "case1.design", place / "hostile.design")
         file = place / "hostile.design" / draw.choice(("trajectory.csv", "design.json"))
-        arguments = ("synth", "case1", "--motion", "hostile.design", "-o", "out", "--duration", "0.5", "--rate", "50")
+        arguments = (
+            "synth",
+            "case1",
+            "--motion",
+            "hostile.design",
+            "-o",
+            "out",
+            "--duration",
+            "0.5",
+            "--rate",
+            "50",
+        )
     else:
         base = "full.algid" if kind == "result" else "case1-loaded.track"
         folder = f"hostile{Path(base).suffix}"
@@ -260,8 +370,26 @@ def series(draw: random.Random, place: Path) -> Call:
 
 
 TYPES: tuple[Any, ...] = (
-    *(pl.String, pl.Int64, pl.UInt8, pl.Float32, pl.Float64, pl.Boolean, pl.Date, pl.Datetime("ns"), pl.Datetime("ms")),
-    *(pl.Duration, pl.Time, pl.Binary, pl.Categorical, pl.Null, pl.List(pl.Float64), pl.Struct({"a": pl.Int64})),
+    *(
+        pl.String,
+        pl.Int64,
+        pl.UInt8,
+        pl.Float32,
+        pl.Float64,
+        pl.Boolean,
+        pl.Date,
+        pl.Datetime("ns"),
+        pl.Datetime("ms"),
+    ),
+    *(
+        pl.Duration,
+        pl.Time,
+        pl.Binary,
+        pl.Categorical,
+        pl.Null,
+        pl.List(pl.Float64),
+        pl.Struct({"a": pl.Int64}),
+    ),
     *(pl.Datetime("us", "Europe/Rome"), pl.Int128, pl.Decimal(38, 4)),
 )
 
@@ -285,14 +413,18 @@ def _spoil(file: Path, draw: random.Random) -> str:
     return "; ".join(notes)
 
 
-def _spoilt_column(frame: pl.DataFrame, column: str, draw: random.Random) -> tuple[pl.DataFrame, str]:
+def _spoilt_column(
+    frame: pl.DataFrame, column: str, draw: random.Random
+) -> tuple[pl.DataFrame, str]:
     kind = draw.randrange(8)
     if kind == 0:
         return frame.drop(column), "dropped"
     if kind == 1:
         return frame.with_columns(pl.lit(None).alias(column)), "null"
     if kind == 2:
-        return frame.rename({column: column + values.text(draw)[:50].replace("\ud800", "x")}), "renamed"
+        return frame.rename(
+            {column: column + values.text(draw)[:50].replace("\ud800", "x")}
+        ), "renamed"
     if kind == 3:
         return frame.head(draw.choice((0, 1, 2))), "cut"
     if kind == 4:

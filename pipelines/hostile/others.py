@@ -36,13 +36,21 @@ def other_files(folder: Path, log: Log) -> list[Path]:
     savemat(folder / "clean.mat", columns)
     savemat(folder / "clean.packed.mat", {"run": columns}, do_compression=True)
     names = ("clean.npz", "clean.packed.npz", "clean.npy", "clean.mat", "clean.packed.mat")
-    return [*paths, *(folder / name for name in names), _bag(folder / "clean.bag", log), _db3(folder / "clean", log)]
+    return [
+        *paths,
+        *(folder / name for name in names),
+        _bag(folder / "clean.bag", log),
+        _db3(folder / "clean", log),
+    ]
 
 
 def _feather(path: Path, columns: dict[str, Any], packing: str | None) -> None:
     table = pa.table({**columns, "note": pa.array(["x"] * len(columns["t"])).dictionary_encode()})
     options = pa.ipc.IpcWriteOptions(compression=packing)
-    with pa.OSFile(str(path), "wb") as sink, pa.ipc.new_file(sink, table.schema, options=options) as file:
+    with (
+        pa.OSFile(str(path), "wb") as sink,
+        pa.ipc.new_file(sink, table.schema, options=options) as file,
+    ):
         file.write_table(table, max_chunksize=100)
 
 
@@ -54,7 +62,9 @@ def _bag(path: Path, log: Log) -> Path:
     with Writer(path) as writer:
         channel = writer.add_connection(_TOPIC, _TYPE, typestore=store)
         for row, stamp in enumerate(log.stamp_ns.tolist()):
-            writer.write(channel, stamp, store.serialize_ros1(_message(store, log, row, seq=row), _TYPE))
+            writer.write(
+                channel, stamp, store.serialize_ros1(_message(store, log, row, seq=row), _TYPE)
+            )
     return path
 
 
@@ -72,7 +82,9 @@ def _db3(folder: Path, log: Log) -> Path:
 
 
 def _message(store: Any, log: Log, row: int, **counts: int) -> Any:
-    time, header, state = (store.types[name] for name in ("builtin_interfaces/msg/Time", "std_msgs/msg/Header", _TYPE))
+    time, header, state = (
+        store.types[name] for name in ("builtin_interfaces/msg/Time", "std_msgs/msg/Header", _TYPE)
+    )
     sec, nanosec = divmod(int(log.stamp_ns[row]), 10**9)
     return state(
         header=header(**counts, stamp=time(sec=sec, nanosec=nanosec), frame_id=""),

@@ -49,7 +49,14 @@ PROFILE = {
     "start": 0.0,
     "end": 10.0,
     "accept": ["DEGREES"],
-    "theta1": {"source": "theta1", "unit": "rad", "sign": 1, "offset": 0.0, "gear_ratio": 1.0, "unwrap": False},
+    "theta1": {
+        "source": "theta1",
+        "unit": "rad",
+        "sign": 1,
+        "offset": 0.0,
+        "gear_ratio": 1.0,
+        "unwrap": False,
+    },
     "tau2": {"source": "tau2", "unit": "N m", "sign": 1, "torque_constant": 1.0, "gear_ratio": 1.0},
 }
 LIMITS = {
@@ -65,9 +72,27 @@ LIMITS = {
 TOLERANCES = {"max_error_percent": {"k1": 50.0, "k4": 50.0}}
 MANIFEST = {
     "defaults": {"robot": "r1"},
-    "jobs": [{"name": "a", "logs": ["case1-unloaded.csv"], "loaded": ["case1-loaded.csv"], "payload": 0.3515}],
+    "jobs": [
+        {
+            "name": "a",
+            "logs": ["case1-unloaded.csv"],
+            "loaded": ["case1-loaded.csv"],
+            "payload": 0.3515,
+        }
+    ],
 }
-_SHORT = ("--duration", "3", "--rate", "100", "--torque", "wide", "--position-noise", "1e-4", "--torque-noise", "1e-2")
+_SHORT = (
+    "--duration",
+    "3",
+    "--rate",
+    "100",
+    "--torque",
+    "wide",
+    "--position-noise",
+    "1e-4",
+    "--torque-noise",
+    "1e-2",
+)
 
 
 def called_once() -> Callable[[Sequence[str]], Any]:
@@ -106,7 +131,20 @@ def furnish(place: Path) -> None:
         ("synth", "case1", "-o", at, "--format", "mcap", *_SHORT),
         ("identify", log, "--loaded", loaded, "-o", at, "--name", "full", "-q"),
         ("identify", log, "-o", at, "--name", "weak", "--no-report", *weak),
-        ("identify", log, "--loaded", loaded, "-o", at, "--name", "paper", "--estimator", "paper", "-q", "--no-report"),
+        (
+            "identify",
+            log,
+            "--loaded",
+            loaded,
+            "-o",
+            at,
+            "--name",
+            "paper",
+            "--estimator",
+            "paper",
+            "-q",
+            "--no-report",
+        ),
         (
             "track",
             loaded,
@@ -121,7 +159,20 @@ def furnish(place: Path) -> None:
             "-q",
         ),
         (
-            *("design", "case1", "-o", at, "--range", "1.2", "--speed", "3", "--torque", "1.5", "--duration", "2"),
+            *(
+                "design",
+                "case1",
+                "-o",
+                at,
+                "--range",
+                "1.2",
+                "--speed",
+                "3",
+                "--torque",
+                "1.5",
+                "--duration",
+                "2",
+            ),
             *("--rate", "50", "--position-noise", "1e-3", "--torque-noise", "1e-2", "-q"),
         ),
         ("batch", log, "-o", str(place / "results"), "--workers", "1", "--no-report", *weak),

@@ -22,7 +22,22 @@ from pipelines.mutations import clean_log
 MAGIC = b"\x89MCAP0\r\n"
 SCHEMA, CHANNEL, MESSAGE, CHUNK, INDEX, DATA_END = 3, 4, 5, 6, 7, 15
 TOPIC = "/joint_states"
-NUMBERS = (0, 1, 21, 22, 39, 255, 65535, 1 << 24, 1 << 28, 1 << 31, 1 << 40, (1 << 63) - 1, 1 << 63, (1 << 64) - 1)
+NUMBERS = (
+    0,
+    1,
+    21,
+    22,
+    39,
+    255,
+    65535,
+    1 << 24,
+    1 << 28,
+    1 << 31,
+    1 << 40,
+    (1 << 63) - 1,
+    1 << 63,
+    (1 << 64) - 1,
+)
 _CHANCE = 0.5
 
 
@@ -60,7 +75,9 @@ def written(draw: random.Random) -> bytes:
         chunk_size=draw.choice((1, 2000, 8000, 1 << 20)),
         compression=draw.choice(list(CompressionType)),
         use_chunking=draw.random() < 0.8,
-        index_types=draw.choice((IndexType.ALL, IndexType.NONE, IndexType.CHUNK, IndexType.MESSAGE)),
+        index_types=draw.choice(
+            (IndexType.ALL, IndexType.NONE, IndexType.CHUNK, IndexType.MESSAGE)
+        ),
         use_statistics=draw.random() < 0.8,
         enable_crcs=draw.random() < 0.8,
         repeat_channels=draw.random() < 0.8,
@@ -99,7 +116,9 @@ def lying(draw: random.Random) -> Hostile:
     return Hostile(".mcap", MAGIC + body + tail, kind, log_of_records() if strict else None)
 
 
-def _within(chunk: Record, edit: Callable[[list[Record], random.Random], bool], draw: random.Random) -> bool:
+def _within(
+    chunk: Record, edit: Callable[[list[Record], random.Random], bool], draw: random.Random
+) -> bool:
     """Edit the records of a chunk, and pack it anew with a checksum that is right, wrong or none."""
     start, end, _, crc, name_length = struct.unpack_from("<QQQII", chunk.body)
     name = chunk.body[32 : 32 + name_length]
@@ -121,24 +140,41 @@ def _within(chunk: Record, edit: Callable[[list[Record], random.Random], bool], 
     crc = draw.choice((zlib.crc32(content), zlib.crc32(content), crc, 0))
     size = draw.choice((len(content), len(content), len(content), *NUMBERS))
     packed = zstandard.compress(content)
-    chunk.body = struct.pack("<QQQII", start, end, size, crc, 4) + b"zstd" + struct.pack("<Q", len(packed)) + packed
+    chunk.body = (
+        struct.pack("<QQQII", start, end, size, crc, 4)
+        + b"zstd"
+        + struct.pack("<Q", len(packed))
+        + packed
+    )
     chunk.claims = len(chunk.body)
     return strict
 
 
 def _lengths(records: list[Record], draw: random.Random) -> bool:
     record = draw.choice(records)
-    record.claims = draw.choice((*NUMBERS, record.claims + draw.randrange(-40, 40), record.claims * 2))
+    record.claims = draw.choice(
+        (*NUMBERS, record.claims + draw.randrange(-40, 40), record.claims * 2)
+    )
     return record.code not in (1, 9, 10, 12, 13)
 
 
 def _redefined(records: list[Record], draw: random.Random) -> bool:
     text = draw.choice((b"/other", TOPIC.encode(), b""))
-    body = struct.pack("<HHI", draw.choice((1, 2, 3, 0)), draw.choice((1, 2, 9, 0)), len(text)) + text
+    body = (
+        struct.pack("<HHI", draw.choice((1, 2, 3, 0)), draw.choice((1, 2, 9, 0)), len(text)) + text
+    )
     body += struct.pack("<I", 3) + draw.choice((b"cdr", b"jso")) + struct.pack("<I", 0)
     if draw.random() < _CHANCE:
-        name, data = JOINT_STATE.encode(), draw.choice((b"float64[] effort", b"", JOINT_STATE_DEFINITION.encode()))
-        body = struct.pack("<HI", draw.choice((1, 2, 7)), len(name)) + name + struct.pack("<I", 7) + b"ros2msg"
+        name, data = (
+            JOINT_STATE.encode(),
+            draw.choice((b"float64[] effort", b"", JOINT_STATE_DEFINITION.encode())),
+        )
+        body = (
+            struct.pack("<HI", draw.choice((1, 2, 7)), len(name))
+            + name
+            + struct.pack("<I", 7)
+            + b"ros2msg"
+        )
         body += struct.pack("<I", len(data)) + data
         records.insert(draw.randrange(len(records)), Record(SCHEMA, body))
     else:
@@ -153,7 +189,8 @@ def _repeated(records: list[Record], draw: random.Random) -> bool:
 
 def _garbage(records: list[Record], draw: random.Random) -> bool:
     record = Record(
-        draw.choice((0, 2, 5, 6, 7, 8, 15, 16, 77, 137, 255)), draw.randbytes(draw.choice((0, 1, 22, 100, 5000)))
+        draw.choice((0, 2, 5, 6, 7, 8, 15, 16, 77, 137, 255)),
+        draw.randbytes(draw.choice((0, 1, 22, 100, 5000))),
     )
     record.claims = draw.choice((record.claims, *NUMBERS))
     records.insert(draw.randrange(len(records)), record)
@@ -179,7 +216,9 @@ def _numbers(records: list[Record], draw: random.Random) -> bool:
             len(record.body) - width + 1
         )
         number = draw.choice(NUMBERS) & (1 << 8 * width) - 1
-        record.body = record.body[:place] + number.to_bytes(width, "little") + record.body[place + width :]
+        record.body = (
+            record.body[:place] + number.to_bytes(width, "little") + record.body[place + width :]
+        )
     return False
 
 
@@ -198,10 +237,23 @@ def _many(records: list[Record], draw: random.Random) -> bool:
     return False
 
 
-_EDITS = (_lengths, _lengths, _lengths, _redefined, _repeated, _garbage, _dropped, _moved, _numbers, _many)
+_EDITS = (
+    _lengths,
+    _lengths,
+    _lengths,
+    _redefined,
+    _repeated,
+    _garbage,
+    _dropped,
+    _moved,
+    _numbers,
+    _many,
+)
 
 
-def with_schemas(topics: list[tuple[str, str, str, str, bytes, list[bytes]]], *, joints: bool) -> bytes:
+def with_schemas(
+    topics: list[tuple[str, str, str, str, bytes, list[bytes]]], *, joints: bool
+) -> bytes:
     """A file with topics (name, message encoding, type, schema encoding, schema, messages), and the joints beside."""
     stream = BytesIO()
     writer = Writer(stream, chunk_size=1 << 16)
@@ -209,13 +261,17 @@ def with_schemas(topics: list[tuple[str, str, str, str, bytes, list[bytes]]], *,
     log = log_of_records()
     if joints:
         channel = writer.register_channel(
-            TOPIC, "cdr", writer.register_schema(JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode())
+            TOPIC,
+            "cdr",
+            writer.register_schema(JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode()),
         )
         for stamp, payload in zip(log.stamp_ns.tolist(), payloads(replace(log)), strict=True):
             writer.add_message(channel, stamp, payload, stamp)
     for topic, encoding, name, kind, data, messages in topics:
         channel = writer.register_channel(topic, encoding, writer.register_schema(name, kind, data))
         for row, message in enumerate(messages):
-            writer.add_message(channel, int(log.stamp_ns[0]) + row * 10**6, message, int(log.stamp_ns[0]))
+            writer.add_message(
+                channel, int(log.stamp_ns[0]) + row * 10**6, message, int(log.stamp_ns[0])
+            )
     writer.finish()  # type: ignore[no-untyped-call]
     return stream.getvalue()

@@ -54,10 +54,13 @@ def _topic(draw: random.Random, number: int) -> Topic:
 def _payloads(draw: random.Random) -> list[bytes]:
     head = draw.choice((b"\0\1\0\0", b"\0\0\0\0", b"\0\7\0\0", b"", b"\0"))
     size = draw.choice((0, 1, 8, 200, 5000, 100_000))
-    filled = draw.choice((bytes(size), b"\xff" * size, struct.pack("<I", 2) * (size // 4), draw.randbytes(size)))
+    filled = draw.choice(
+        (bytes(size), b"\xff" * size, struct.pack("<I", 2) * (size // 4), draw.randbytes(size))
+    )
     count = struct.pack("<I", draw.choice(NUMBERS) & 0xFFFFFFFF)
     return [
-        head + draw.choice((b"", count)) + filled[: draw.randrange(size + 1)] for _ in range(draw.choice((1, 3, 60)))
+        head + draw.choice((b"", count)) + filled[: draw.randrange(size + 1)]
+        for _ in range(draw.choice((1, 3, 60)))
     ]
 
 
@@ -66,9 +69,22 @@ def _msg(draw: random.Random) -> tuple[str, str, str, bytes, list[bytes]]:
         lines = []
         for number in range(draw.choice((0, 1, 4, 4, 4, 3000))):
             bracket = f"[{draw.choice(_LENGTHS)}]" if draw.random() < 0.4 else ""
-            lines.append(f"{draw.choice(_TYPES)}{bracket} {draw.choice(('effort', 'position', 'name', f'f{number}'))}")
+            lines.append(
+                f"{draw.choice(_TYPES)}{bracket} {draw.choice(('effort', 'position', 'name', f'f{number}'))}"
+            )
         lines.append(
-            draw.choice(("", "# effort", "int8 X=1", "=" * 5000, "\0\0", "float64 \u202e", '"' * 3000, "a" * 70_000))
+            draw.choice(
+                (
+                    "",
+                    "# effort",
+                    "int8 X=1",
+                    "=" * 5000,
+                    "\0\0",
+                    "float64 \u202e",
+                    '"' * 3000,
+                    "a" * 70_000,
+                )
+            )
         )
         return "\n".join(lines)
 
@@ -80,7 +96,13 @@ def _msg(draw: random.Random) -> tuple[str, str, str, bytes, list[bytes]]:
         f"MSG: std_msgs/Header\n{fields()}",
     ]
     text = line.join(parts[: draw.randrange(1, 5)])
-    return "cdr", "a/msg/T", "ros2msg", text.encode() + draw.choice((b"", b"\xff\xfe")), _payloads(draw)
+    return (
+        "cdr",
+        "a/msg/T",
+        "ros2msg",
+        text.encode() + draw.choice((b"", b"\xff\xfe")),
+        _payloads(draw),
+    )
 
 
 def _idl(draw: random.Random) -> tuple[str, str, str, bytes, list[bytes]]:
@@ -125,10 +147,18 @@ def _idl(draw: random.Random) -> tuple[str, str, str, bytes, list[bytes]]:
     )
     member = " ".join(draw.choice(words) for _ in range(draw.choice((3, 30, 3000))))
     sound = draw.choice(
-        ("sequence<double> effort;", "double x[3];", "T effort;", "sequence<T> effort;", "string effort;")
+        (
+            "sequence<double> effort;",
+            "double x[3];",
+            "T effort;",
+            "sequence<T> effort;",
+            "string effort;",
+        )
     )
     text = f"module a {{ module msg {{ struct T {{ {sound} {draw.choice((member, '', member))} }}; }}; }};"
-    nested = draw.choice(('"', "/* ", "module a {", "sequence<", "(", "@a(", '"\\')) * draw.choice((100, 100_000))
+    nested = draw.choice(('"', "/* ", "module a {", "sequence<", "(", "@a(", '"\\')) * draw.choice(
+        (100, 100_000)
+    )
     return (
         "cdr",
         "a/msg/T",
@@ -139,19 +169,28 @@ def _idl(draw: random.Random) -> tuple[str, str, str, bytes, list[bytes]]:
 
 
 def _protobuf(draw: random.Random) -> tuple[str, str, str, bytes, list[bytes]]:
-    file = descriptor_pb2.FileDescriptorProto(name="a.proto", package=draw.choice(("a", "")), syntax="proto3")
+    file = descriptor_pb2.FileDescriptorProto(
+        name="a.proto", package=draw.choice(("a", "")), syntax="proto3"
+    )
     for name in ("T", "U"):
         message = file.message_type.add(name=name)
         for number in range(1, draw.choice((1, 3, 10, 2000))):
             kind = draw.choice((1, 2, 3, 5, 9, 11, 11, 12, 14, 17, 10))
             target = draw.choice((".a.T", ".a.U", ".T", ".gone", "")) if kind == 11 else ""
             field = draw.choice((f"f{number}", "effort", "position", "name", ""))
-            message.field.add(name=field, number=number, type=kind, label=draw.choice((1, 3)), type_name=target)
-    data = descriptor_pb2.FileDescriptorSet(file=[file] * draw.choice((0, 1, 1, 1, 2))).SerializeToString()
+            message.field.add(
+                name=field, number=number, type=kind, label=draw.choice((1, 3)), type_name=target
+            )
+    data = descriptor_pb2.FileDescriptorSet(
+        file=[file] * draw.choice((0, 1, 1, 1, 2))
+    ).SerializeToString()
     cut = data[: draw.randrange(len(data) + 1)]
-    data = draw.choice((data, data, data, cut, draw.randbytes(200), b"\x0a\xff\xff\xff\xff\x0f effort"))
+    data = draw.choice(
+        (data, data, data, cut, draw.randbytes(200), b"\x0a\xff\xff\xff\xff\x0f effort")
+    )
     entry = b"".join(
-        bytes([draw.randrange(256)]) + draw.randbytes(draw.randrange(9)) for _ in range(draw.choice((1, 9, 2000)))
+        bytes([draw.randrange(256)]) + draw.randbytes(draw.randrange(9))
+        for _ in range(draw.choice((1, 9, 2000)))
     )
     deep = b"\x0a\x80\x80\x01" * 5000
     return (
@@ -165,14 +204,40 @@ def _protobuf(draw: random.Random) -> tuple[str, str, str, bytes, list[bytes]]:
 
 def _json(draw: random.Random) -> tuple[str, str, str, bytes, list[bytes]]:
     number = draw.choice(
-        ("1", "1.5", "NaN", "Infinity", "-1e999", "9" * 30, "9" * 400, "9" * 5000, "true", "null", '"x"', "[]", "{}")
+        (
+            "1",
+            "1.5",
+            "NaN",
+            "Infinity",
+            "-1e999",
+            "9" * 30,
+            "9" * 400,
+            "9" * 5000,
+            "true",
+            "null",
+            '"x"',
+            "[]",
+            "{}",
+        )
     )
-    names = draw.choice((["a", "b"], ["a", "a"], ["1", "1"], ["1", "2"], [], ["a"] * 3000, [""], [None], [1, 2]))
-    stamp = draw.choice(('{"sec": 1, "nanosec": %s}', '{"sec": %s, "nanosec": 5}', "[%s]", "%s")) % number
-    values = draw.choice((f"[1.0, {number}]", f"[{number}, 2]", f"[{number}]", number, "[" * 3000, '{"a": 1, "b": 2}'))
+    names = draw.choice(
+        (["a", "b"], ["a", "a"], ["1", "1"], ["1", "2"], [], ["a"] * 3000, [""], [None], [1, 2])
+    )
+    stamp = (
+        draw.choice(('{"sec": 1, "nanosec": %s}', '{"sec": %s, "nanosec": 5}', "[%s]", "%s"))
+        % number
+    )
+    values = draw.choice(
+        (
+            f"[1.0, {number}]",
+            f"[{number}, 2]",
+            f"[{number}]",
+            number,
+            "[" * 3000,
+            '{"a": 1, "b": 2}',
+        )
+    )
     text = f'{{"header": {{"stamp": {stamp}}}, "name": {json.dumps(names)}, "position": {values}, "effort": {values}}}'
-    plain = (
-        '{"header": {"stamp": {"sec": %d, "nanosec": 5}}, "name": ["a", "b"], "position": [1, 2], "effort": [3, 4.5]}'
-    )
+    plain = '{"header": {"stamp": {"sec": %d, "nanosec": 5}}, "name": ["a", "b"], "position": [1, 2], "effort": [3, 4.5]}'
     rows = [(plain % row).encode() for row in range(draw.choice((0, 5, 90)))]
     return "json", "a", "jsonschema", b"{}", [*rows, text.encode(), *rows[:1]]

@@ -30,7 +30,15 @@ _EXACT = (
     pa.uint16(),
     pa.float16(),
 )
-_OTHER = (pa.string(), pa.bool_(), pa.date32(), pa.timestamp("ns"), pa.decimal128(20, 4), pa.binary(), pa.time64("us"))
+_OTHER = (
+    pa.string(),
+    pa.bool_(),
+    pa.date32(),
+    pa.timestamp("ns"),
+    pa.decimal128(20, 4),
+    pa.binary(),
+    pa.time64("us"),
+)
 _ENCODINGS = (None, "PLAIN", "BYTE_STREAM_SPLIT", "DELTA_BINARY_PACKED")
 
 
@@ -55,28 +63,43 @@ def parquet(draw: random.Random) -> Hostile:
         kind = draw.choice(_EXACT if draw.random() < 0.9 else _OTHER)
         strict &= kind in _EXACT
         array = pa.array(values).cast(kind) if kind in _EXACT else pa.array([None] * len(log), kind)
-        columns[name] = draw.choice((array, array, array, array.dictionary_encode() if kind not in _EXACT else array))
+        columns[name] = draw.choice(
+            (array, array, array, array.dictionary_encode() if kind not in _EXACT else array)
+        )
     if draw.random() < 0.2:
         holes = draw.sample(range(len(log)), 3)
-        columns["tau2"] = pa.array([None if row in holes else float(row) for row in range(len(log))])
+        columns["tau2"] = pa.array(
+            [None if row in holes else float(row) for row in range(len(log))]
+        )
         strict = False
     columns |= {"note": pa.array(["x"] * len(log))} if draw.random() < 0.3 else {}
     if draw.random() < 0.2:
         columns["extra"] = pa.array(
-            [[1.0, 2.0]] * len(log), draw.choice((pa.list_(pa.float64()), pa.list_(pa.float64(), 2)))
+            [[1.0, 2.0]] * len(log),
+            draw.choice((pa.list_(pa.float64()), pa.list_(pa.float64(), 2))),
         )
     encoding, summed = draw.choice(_ENCODINGS), draw.random() < 0.6
     stream = BytesIO()
-    options: dict[str, Any] = {"write_page_checksum": summed, "data_page_version": draw.choice(("1.0", "2.0"))}
+    options: dict[str, Any] = {
+        "write_page_checksum": summed,
+        "data_page_version": draw.choice(("1.0", "2.0")),
+    }
     options |= {
         "compression": draw.choice(("none", "snappy", "gzip", "zstd", "lz4", "brotli")),
         "version": draw.choice(("1.0", "2.6")),
     }
-    options |= {"row_group_size": draw.choice((1, 7, 100, 1000)), "data_page_size": draw.choice((64, 1 << 20))}
+    options |= {
+        "row_group_size": draw.choice((1, 7, 100, 1000)),
+        "data_page_size": draw.choice((64, 1 << 20)),
+    }
     table = pa.table(columns)
     try:
         pq.write_table(
-            table, stream, use_dictionary=encoding is None, column_encoding=encoding and {"theta1": encoding}, **options
+            table,
+            stream,
+            use_dictionary=encoding is None,
+            column_encoding=encoding and {"theta1": encoding},
+            **options,
         )
     except (pa.ArrowException, OSError, ValueError):  # an encoding that the type does not have
         stream = BytesIO()
@@ -100,7 +123,11 @@ def csv(draw: random.Random) -> Hostile:
     separator = draw.choice((",", ";", "\t", "|", " ", ", "))
     comma = separator.strip() != "," and draw.random() < 0.3
     names = draw.choice(
-        (("t", *_COLUMNS), ("time", "q1", "q2", "tau1", "tau2"), ("time [s]", "pos1", "pos2", "effort1", "effort2"))
+        (
+            ("t", *_COLUMNS),
+            ("time", "q1", "q2", "tau1", "tau2"),
+            ("time [s]", "pos1", "pos2", "effort1", "effort2"),
+        )
     )
     quote = draw.choice(("", "", '"'))
     rows = [separator.join(f"{quote}{name}{quote}" for name in names)]
@@ -111,9 +138,14 @@ def csv(draw: random.Random) -> Hostile:
     for _ in range(draw.choice((0, 1, 1, 2))):
         whole &= _spoilt(rows, separator, draw)
     end = draw.choice(("\n", "\n", "\r\n", "\r"))
-    text = draw.choice(("", "", "# a log" + end, end)) + end.join(rows) + draw.choice((end, "", end * 50))
+    text = (
+        draw.choice(("", "", "# a log" + end, end))
+        + end.join(rows)
+        + draw.choice((end, "", end * 50))
+    )
     content = text.encode(
-        draw.choice(("utf-8", "utf-8", "utf-8-sig", "utf-16", "utf-16-be", "latin-1", "utf-32")), "replace"
+        draw.choice(("utf-8", "utf-8", "utf-8-sig", "utf-16", "utf-16-be", "latin-1", "utf-32")),
+        "replace",
     )
     suffix = draw.choice((".csv", ".csv", ".csv.gz", ".csv.zst"))
     if suffix != ".csv":
@@ -129,7 +161,9 @@ def _spoilt(rows: list[str], separator: str, draw: random.Random) -> bool:
     cell = draw.randrange(1, 5)
     kind = draw.randrange(8)
     if kind == 0:
-        cells[cell] = draw.choice(("nan", "NaN", "", "x", "1e999", "--", '"', "0x1F", "1_000", "9" * 400))
+        cells[cell] = draw.choice(
+            ("nan", "NaN", "", "x", "1e999", "--", '"', "0x1F", "1_000", "9" * 400)
+        )
     elif kind == 1:
         del cells[cell:]
     elif kind == 2:
@@ -141,7 +175,13 @@ def _spoilt(rows: list[str], separator: str, draw: random.Random) -> bool:
         return False
     elif kind == 5:
         rows[0] = draw.choice(
-            (rows[0] + separator + "note", separator.join(["t"] * 5), "", '"' + rows[0], rows[0] + "\ru")
+            (
+                rows[0] + separator + "note",
+                separator.join(["t"] * 5),
+                "",
+                '"' + rows[0],
+                rows[0] + "\ru",
+            )
         )
         return False
     elif kind == 6:

@@ -8,15 +8,96 @@ from typing import Any
 
 HUGE = (1e308, -1e308, 1e300, 1e154, 1e30, 1e12, 1e9, -1e9)
 TINY = (0.0, -0.0, 5e-324, 1e-308, 1e-154, 1e-12, -1e-12)
-NUMBERS: tuple[float, ...] = (*HUGE, *TINY, float("inf"), float("-inf"), float("nan"), 1.0, -1.0, 0.5, 2.0, 1000.0)
+NUMBERS: tuple[float, ...] = (
+    *HUGE,
+    *TINY,
+    float("inf"),
+    float("-inf"),
+    float("nan"),
+    1.0,
+    -1.0,
+    0.5,
+    2.0,
+    1000.0,
+)
 WHOLE = (0, 1, -1, 2, 7, 255, 10**4, 2**31, -(2**31), 2**63, -(2**63) - 1, 10**25, 10**400)
 TEXTS = (
-    *("", " ", "a", "k1", "m_p", "nan", "OK", "SINGULAR", "true", "0", "-1", "1e999", ",", ",,", "=", "a=b", "1,2"),
-    *("../../evil", "/etc/passwd", "..", ".", "~", "a/b", "a\\b", "-", "--", "x" * 300, "x" * 5000, "a.b" * 200),
-    *("\x1b[31mred\x1b]0;t\x07", "line\nfeed", "tab\tnul\0", "\u202eltr", "θ–名", "\ud800", "\U000e0041", "é" * 130),
-    *("<script>alert(1)</script>", "[bold]x[/bold]", "[/]", "%s%n", "{0.__class__}", "'; drop", "$(touch evil)"),
-    *("2026-01-01", "0001-01-01", "9999-12-31T23:59:59", "2026-02-30", "12:00", "1e3", "0x10", "1_000", "٣"),
-    *("coulomb", "stribeck", "delay,lag", "auto", "plain", "gain", "estimate", "deg", "A", "shoulder,elbow", "FOO"),
+    *(
+        "",
+        " ",
+        "a",
+        "k1",
+        "m_p",
+        "nan",
+        "OK",
+        "SINGULAR",
+        "true",
+        "0",
+        "-1",
+        "1e999",
+        ",",
+        ",,",
+        "=",
+        "a=b",
+        "1,2",
+    ),
+    *(
+        "../../evil",
+        "/etc/passwd",
+        "..",
+        ".",
+        "~",
+        "a/b",
+        "a\\b",
+        "-",
+        "--",
+        "x" * 300,
+        "x" * 5000,
+        "a.b" * 200,
+    ),
+    *(
+        "\x1b[31mred\x1b]0;t\x07",
+        "line\nfeed",
+        "tab\tnul\0",
+        "\u202eltr",
+        "θ–名",
+        "\ud800",
+        "\U000e0041",
+        "é" * 130,
+    ),
+    *(
+        "<script>alert(1)</script>",
+        "[bold]x[/bold]",
+        "[/]",
+        "%s%n",
+        "{0.__class__}",
+        "'; drop",
+        "$(touch evil)",
+    ),
+    *(
+        "2026-01-01",
+        "0001-01-01",
+        "9999-12-31T23:59:59",
+        "2026-02-30",
+        "12:00",
+        "1e3",
+        "0x10",
+        "1_000",
+        "٣",
+    ),
+    *(
+        "coulomb",
+        "stribeck",
+        "delay,lag",
+        "auto",
+        "plain",
+        "gain",
+        "estimate",
+        "deg",
+        "A",
+        "shoulder,elbow",
+        "FOO",
+    ),
 )
 
 
@@ -35,9 +116,17 @@ def anything(draw: random.Random) -> Any:
     for _ in range(draw.choice((3, 60, 200))):
         deep = [deep] if draw.random() < 0.5 else {"a": deep}
     makers = (
-        *(lambda: number(draw), lambda: number(draw), lambda: draw.choice(WHOLE), lambda: text(draw)),
+        *(
+            lambda: number(draw),
+            lambda: number(draw),
+            lambda: draw.choice(WHOLE),
+            lambda: text(draw),
+        ),
         *(lambda: None, lambda: draw.random() < 0.5, list, dict, lambda: deep),
-        *(lambda: [number(draw)] * draw.choice((1, 2, 7, 3000)), lambda: [text(draw)] * draw.choice((1, 2, 500))),
+        *(
+            lambda: [number(draw)] * draw.choice((1, 2, 7, 3000)),
+            lambda: [text(draw)] * draw.choice((1, 2, 500)),
+        ),
         lambda: {text(draw): number(draw) for _ in range(draw.choice((1, 3, 300)))},
     )
     return draw.choice(makers)()
@@ -45,7 +134,13 @@ def anything(draw: random.Random) -> Any:
 
 def places(content: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     """Where the values of a document stand."""
-    inner = content.items() if isinstance(content, dict) else enumerate(content) if isinstance(content, list) else ()
+    inner = (
+        content.items()
+        if isinstance(content, dict)
+        else enumerate(content)
+        if isinstance(content, list)
+        else ()
+    )
     found = [path] if path else []
     for key, value in list(inner)[:60]:
         found += places(value, (*path, key))
@@ -82,6 +177,8 @@ def _change(holder: Any, key: Any, draw: random.Random) -> None:
     elif kind == 4 and isinstance(old, str):
         holder[key] = draw.choice((old.upper(), old + text(draw), old[:1], old * 200))
     elif isinstance(old, (int, float)) and not isinstance(old, bool) and kind < 9:
-        holder[key] = draw.choice((number(draw), -old, old * 10.0 ** draw.choice((-30, -3, 3, 30)), str(old)))
+        holder[key] = draw.choice(
+            (number(draw), -old, old * 10.0 ** draw.choice((-30, -3, 3, 30)), str(old))
+        )
     else:
         holder[key] = anything(draw)

@@ -26,7 +26,9 @@ Table = Callable[[pl.DataFrame], pl.DataFrame]
 
 def write_refusals(folder: Path) -> dict[str, str]:
     """Write logs; by the name of each one's job, a pattern that its reason holds."""
-    log, loaded = algid.synthesise("case1", duration=2.0, excitation="wide", sensors=Sensors(1e-4, 1e-3))
+    log, loaded = algid.synthesise(
+        "case1", duration=2.0, excitation="wide", sensors=Sensors(1e-4, 1e-3)
+    )
     log, loaded = replace(log, omega=None), replace(loaded, omega=None)
     said: dict[str, str] = {}
     for write in (_texts, _tables, _mcaps, _cut_short, _folders):
@@ -70,17 +72,25 @@ def _texts(folder: Path, _log: Log) -> dict[str, str]:
 
 def _tables(folder: Path, log: Log) -> dict[str, str]:
     write_log(folder / "whole.parquet", log)
-    whole = pl.read_parquet(folder / "whole.parquet").select("t", "theta1", "theta2", "tau1", "tau2")
+    whole = pl.read_parquet(folder / "whole.parquet").select(
+        "t", "theta1", "theta2", "tau1", "tau2"
+    )
     (folder / "whole.parquet").unlink()
     row = pl.int_range(pl.len())
     changes: dict[str, tuple[Table, str]] = {
         "missing-column": (lambda t: t.drop("tau2"), "no column for .*tau2"),
         "nulls": (lambda t: t.with_columns(theta1=pl.when(row % 2 == 0).then("theta1")), "."),
-        "infinite": (lambda t: t.with_columns(tau1=pl.when(row == 7).then(float("inf")).otherwise("tau1")), "finite"),
+        "infinite": (
+            lambda t: t.with_columns(tau1=pl.when(row == 7).then(float("inf")).otherwise("tau1")),
+            "finite",
+        ),
         "text": (lambda t: t.with_columns(theta2=pl.lit("abc")), "."),
         "lists": (lambda t: t.with_columns(theta2=pl.concat_list("theta2", "theta1")), "."),
         "still": (lambda t: t.with_columns(t=pl.lit(0.5)), "increasing stamps|stand"),
-        "backwards": (lambda t: t.with_columns(t=-pl.col("t").cast(pl.Float64)), "increasing stamps|back"),
+        "backwards": (
+            lambda t: t.with_columns(t=-pl.col("t").cast(pl.Float64)),
+            "increasing stamps|back",
+        ),
         "short": (lambda t: t.head(40), "."),
         "no-rows": (lambda t: t.head(0), "."),
         "no-torque": (lambda t: t.with_columns(tau1=pl.lit(0.0), tau2=pl.lit(0.0)), "."),
@@ -99,7 +109,9 @@ def _mcaps(folder: Path, log: Log) -> dict[str, str]:
     def states(**fields: Any) -> list[tuple[str, int, bytes]]:
         return [("/joint_states", stamp, joint_state(stamp, **fields).done()) for stamp in stamps]
 
-    def of(text: str, encoding: str = "ros2msg", data: bytes = b"\0\1\0\0" + bytes(64)) -> dict[str, Any]:
+    def of(
+        text: str, encoding: str = "ros2msg", data: bytes = b"\0\1\0\0" + bytes(64)
+    ) -> dict[str, Any]:
         return {
             "messages": [("/joint_states", stamp, data) for stamp in stamps],
             "schemas": {"/joint_states": (JOINT_STATE, encoding, text.encode())},
@@ -108,10 +120,16 @@ def _mcaps(folder: Path, log: Log) -> dict[str, str]:
     gripper = joint_state(0, ["grip"], [1.0], (), [1.0]).done()
     four, two = ("a", "b", "c", "d"), (0.1, 0.2)
     files: dict[str, tuple[dict[str, Any], str]] = {
-        "no-joints": ({"messages": [("/grip", stamp, gripper) for stamp in stamps]}, "no topic holds"),
+        "no-joints": (
+            {"messages": [("/grip", stamp, gripper) for stamp in stamps]},
+            "no topic holds",
+        ),
         "no-messages": ({"messages": []}, "."),
         "no-effort": ({"messages": states(position=two)}, "."),
-        "four-joints": ({"messages": states(names=four, position=two * 2, effort=two * 2)}, "joints"),
+        "four-joints": (
+            {"messages": states(names=four, position=two * 2, effort=two * 2)},
+            "joints",
+        ),
         "short-lists": ({"messages": states(position=two, effort=(1.0,))}, "."),
         "nan": ({"messages": states(position=(np.nan, 0.1), effort=two)}, "."),
         "two-topics": (
@@ -129,10 +147,20 @@ def _mcaps(folder: Path, log: Log) -> dict[str, str]:
         "deep-definition": (of("sensor_msgs/JointState inner\n"), "."),
         "bad-idl": (of("module {", "ros2idl"), "."),
         "unknown-schema": (of("x", "omgidl"), "."),
-        "bad-cdr": ({"messages": [("/joint_states", stamp, b"\0\1\0\0\xff\xff\xff\xff") for stamp in stamps]}, "."),
+        "bad-cdr": (
+            {
+                "messages": [
+                    ("/joint_states", stamp, b"\0\1\0\0\xff\xff\xff\xff") for stamp in stamps
+                ]
+            },
+            ".",
+        ),
         "short-cdr": ({"messages": [("/joint_states", stamp, b"\0") for stamp in stamps]}, "."),
         "bad-json": (of("{}", "jsonschema", b"{nothing") | {"encoding": "json"}, "."),
-        "bad-protobuf": (of("no descriptors", "protobuf", b"\xff" * 9) | {"encoding": "protobuf"}, "."),
+        "bad-protobuf": (
+            of("no descriptors", "protobuf", b"\xff" * 9) | {"encoding": "protobuf"},
+            ".",
+        ),
         "unknown-encoding": (of("x", "x") | {"encoding": "flatbuffer"}, "."),
     }
     for name, (options, _) in files.items():
@@ -149,7 +177,9 @@ def _cut_short(folder: Path, log: Log) -> dict[str, str]:
         for path in folder.glob("whole.*"):
             path.unlink()
         (folder / f"start-of-{kind}.{kind}").write_bytes(content[:200])
-        (folder / f"hole-in-{kind}.{kind}").write_bytes(content[:100] + bytes(len(content) - 200) + content[-100:])
+        (folder / f"hole-in-{kind}.{kind}").write_bytes(
+            content[:100] + bytes(len(content) - 200) + content[-100:]
+        )
         said |= {f"start-of-{kind}": ".", f"hole-in-{kind}": "."}
     return said
 

@@ -66,7 +66,10 @@ class Client:
         return self.threads
 
     def drive(self, answers: list[Future[Any]], ending: Callable[[Remote], None]) -> list[int]:
-        """Let `ending` end tasks as they come, until all answers are there; how many calls each task held."""
+        """Let `ending` end tasks as they come, until all answers are there.
+
+        How many calls each task held.
+        """
         sizes, end = [], time.monotonic() + 30
         while not all(answer.done() for answer in answers):
             assert time.monotonic() < end
@@ -94,10 +97,19 @@ def _submit(cluster: _Cluster, count: int) -> list[Future[Any]]:
     return [cluster.submit(calls.add, number, 1) for number in range(count)]
 
 
-def test_short_calls_travel_together_and_the_last_ones_are_shared_out(client: Client, cluster: _Cluster) -> None:
+def test_short_calls_travel_together_and_the_last_ones_are_shared_out(
+    client: Client, cluster: _Cluster
+) -> None:
     answers = _submit(cluster, 64)
-    assert [len(task.calls) for task in client.tasks] == [1, 1, 1, 1]  # how long they take is not known yet
-    sizes = client.drive(answers, lambda task: task.end(seconds=len(task.calls) * TASK_SECONDS / 10))
+    assert [len(task.calls) for task in client.tasks] == [
+        1,
+        1,
+        1,
+        1,
+    ]  # how long they take is not known yet
+    sizes = client.drive(
+        answers, lambda task: task.end(seconds=len(task.calls) * TASK_SECONDS / 10)
+    )
     assert [answer.result() for answer in answers] == list(range(1, 65))
     assert max(sizes) == 10
     assert sizes[-4:] == [1, 1, 1, 1]
@@ -108,7 +120,9 @@ def test_short_calls_travel_together_and_the_last_ones_are_shared_out(client: Cl
 def test_long_calls_travel_alone_and_short_ones_not_without_bound(
     client: Client, cluster: _Cluster, seconds: float, most: int
 ) -> None:
-    sizes = client.drive(_submit(cluster, 400), lambda task: task.end(seconds=len(task.calls) * seconds))
+    sizes = client.drive(
+        _submit(cluster, 400), lambda task: task.end(seconds=len(task.calls) * seconds)
+    )
     assert max(sizes) == most
 
 
@@ -162,7 +176,10 @@ def _lost() -> None:
     ("fault", "reason"),
     [
         (lambda client: client.tasks[0].end(_lost), "it is gone, or has lost the jobs in hand"),
-        (lambda client: client.tasks[0].end(lambda: "box: algid 0.0.1 stands there"), "algid 0.0.1 stands there"),
+        (
+            lambda client: client.tasks[0].end(lambda: "box: algid 0.0.1 stands there"),
+            "algid 0.0.1 stands there",
+        ),
         (lambda client: setattr(client, "status", "closed"), "it is gone; start dask scheduler"),
         (lambda client: client.threads.clear(), "no workers for 0.05 s; start dask worker"),
     ],
@@ -182,7 +199,9 @@ def test_a_fault_of_the_cluster_ends_every_call_and_is_none_of_theirs(
     cluster.end()
 
 
-def test_an_answer_that_was_lost_on_its_way_is_waited_for(client: Client, cluster: _Cluster) -> None:
+def test_an_answer_that_was_lost_on_its_way_is_waited_for(
+    client: Client, cluster: _Cluster
+) -> None:
     from distributed import TimeoutError as DaskTimeoutError
 
     answer = cluster.submit(calls.add, 1, 1)
@@ -215,13 +234,21 @@ def test_a_worker_that_does_not_fit_says_why(tmp_path: Path) -> None:
     for root, mark, said in (
         (ROOT, "mark", "None"),
         (ROOT, "absent", "it does not see /there; choose a place with -o that all machines see"),
-        (tmp_path / "other", "mark", f"algid 0.0.1 stands there; install algid {algid.__version__}"),
+        (
+            tmp_path / "other",
+            "mark",
+            f"algid 0.0.1 stands there; install algid {algid.__version__}",
+        ),
         (tmp_path / "none", "mark", "algid is not installed there"),
     ):
-        misfit = cloudpickle.dumps(misfit_of(algid.__version__, str(tmp_path / mark), "/there")).hex()
+        misfit = cloudpickle.dumps(
+            misfit_of(algid.__version__, str(tmp_path / mark), "/there")
+        ).hex()
         command = [sys.executable, "-c", code, misfit]
         env = {**os.environ, "PYTHONPATH": str(root)}
-        done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=root, env=env)
+        done = subprocess.run(
+            command, capture_output=True, text=True, check=True, cwd=root, env=env
+        )
         assert said in done.stdout
 
 
@@ -246,7 +273,9 @@ main()
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("logs")
-    unloaded, _ = algid.synthesise("case1", duration=2.0, excitation="wide", sensors=Sensors(1e-4, 1e-3))
+    unloaded, _ = algid.synthesise(
+        "case1", duration=2.0, excitation="wide", sensors=Sensors(1e-4, 1e-3)
+    )
     for number in range(JOBS):
         algid.write_log(folder / f"logs/d{number:02d}.mcap", unloaded)
     return folder
@@ -258,7 +287,9 @@ def _start(folder: Path, out: Path, dask: Dask, patience: float = 60.0) -> subpr
     command = [sys.executable, "-c", PATIENT, str(patience), "batch", "logs", "-o", place]
     command += ["--no-report", "--scheduler", dask.address]
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
-    return subprocess.Popen(command, env=env, cwd=folder, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    return subprocess.Popen(
+        command, env=env, cwd=folder, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
 
 
 def _wait_for_records(out: Path, count: int) -> None:
@@ -290,12 +321,16 @@ def test_a_lost_scheduler_is_told_and_costs_no_job(logs: Path, tmp_path: Path, d
     told, errors = _start(logs, out, dask).communicate(timeout=120)
     assert f"{JOBS} ok" in told
     assert errors == ""
-    assert sorted(path.parent.name for path in out.rglob("result.json")) == [f"d{n:02d}.algid" for n in range(JOBS)]
+    assert sorted(path.parent.name for path in out.rglob("result.json")) == [
+        f"d{n:02d}.algid" for n in range(JOBS)
+    ]
     assert not list(ROOT.glob("out*"))
 
 
 @pytest.mark.slow
-def test_the_only_worker_s_end_is_told_and_another_takes_its_place(logs: Path, tmp_path: Path, dask: Dask) -> None:
+def test_the_only_worker_s_end_is_told_and_another_takes_its_place(
+    logs: Path, tmp_path: Path, dask: Dask
+) -> None:
     out = tmp_path / "out"
     victim = dask.worker()
     first = _start(logs, out, dask, patience=3.0)

@@ -33,7 +33,14 @@ def _touch(folder: Path, *names: str) -> None:
 
 
 def test_unloaded_and_loaded_logs_pair_up(tmp_path: Path) -> None:
-    _touch(tmp_path, "r1/a-unloaded.mcap", "r1/a-loaded.csv.zst", "b_loaded.parquet", "plain.csv", "notes.txt")
+    _touch(
+        tmp_path,
+        "r1/a-unloaded.mcap",
+        "r1/a-loaded.csv.zst",
+        "b_loaded.parquet",
+        "plain.csv",
+        "notes.txt",
+    )
     found = jobs_of([str(tmp_path)], str(tmp_path / "out"))
     assert [(job.name, len(job.logs), len(job.loaded), job.robot) for job in found] == [
         ("b", 0, 1, None),
@@ -57,8 +64,14 @@ def test_a_glob_and_a_file_name_jobs_by_their_stems(tmp_path: Path) -> None:
 
 
 def test_a_folder_is_searched_for_every_format_that_is_read(tmp_path: Path) -> None:
-    _touch(tmp_path, *(f"log{number}{suffix.upper()}" for number, suffix in enumerate(SUFFIXES)), "readme.md")
-    assert [job.name for job in jobs_of([str(tmp_path)], "out")] == sorted(f"log{one}" for one in range(len(SUFFIXES)))
+    _touch(
+        tmp_path,
+        *(f"log{number}{suffix.upper()}" for number, suffix in enumerate(SUFFIXES)),
+        "readme.md",
+    )
+    assert [job.name for job in jobs_of([str(tmp_path)], "out")] == sorted(
+        f"log{one}" for one in range(len(SUFFIXES))
+    )
     assert {".npz", ".mat", ".feather", ".bag", ".db3"} < set(SUFFIXES)
 
 
@@ -66,20 +79,30 @@ def test_two_logs_of_one_name_fail_alone(tmp_path: Path) -> None:
     _touch(tmp_path, "a.mcap", "a.csv", "a.parquet", "b.csv", "c-loaded.csv", "c_loaded.mcap")
     first, second, third = jobs_of([str(tmp_path)], "out")
     names = ", ".join(str(tmp_path / name) for name in ("a.csv", "a.mcap", "a.parquet"))
-    assert first.trouble == f"a: two jobs of one name ({names}); rename a log, or name the jobs in a manifest"
+    assert (
+        first.trouble
+        == f"a: two jobs of one name ({names}); rename a log, or name the jobs in a manifest"
+    )
     assert (second.name, second.trouble) == ("b", None)
     assert third.trouble is not None
     assert third.trouble.startswith("c: two jobs of one name")
 
 
-@pytest.mark.parametrize("name", ["bad\nname", "a\\b", "\x1b[2J", "caf\udce9", "a\u202eb", "x" * 201, "\x7f"])
-def test_a_log_of_an_odd_name_fails_alone_and_is_told_in_visible_letters(tmp_path: Path, name: str) -> None:
+@pytest.mark.parametrize(
+    "name", ["bad\nname", "a\\b", "\x1b[2J", "caf\udce9", "a\u202eb", "x" * 201, "\x7f"]
+)
+def test_a_log_of_an_odd_name_fails_alone_and_is_told_in_visible_letters(
+    tmp_path: Path, name: str
+) -> None:
     _touch(tmp_path, "good.csv", f"{name}.csv")
     odd, good = sorted(jobs_of([str(tmp_path)], "out"), key=lambda job: job.trouble is None)
     assert (good.name, good.trouble) == ("good", None)
     assert name_fault(odd.name) is None
     assert odd.trouble is not None
-    assert "a log's name becomes a folder's: expected parts of 1 to 200 printable characters" in odd.trouble
+    assert (
+        "a log's name becomes a folder's: expected parts of 1 to 200 printable characters"
+        in odd.trouble
+    )
     assert odd.logs == (f"{tmp_path}/{name}.csv",)
     assert all(path.encode() for path in kept(odd).logs)
     assert jobs_of([str(tmp_path)], "out") == jobs_of([str(tmp_path)], "out")
@@ -96,12 +119,26 @@ def test_each_folder_is_looked_through_once_whatever_links_lead_there(tmp_path: 
     (tmp_path / "logs/itself.csv").symlink_to(tmp_path / "logs/itself.csv")
     names = ["a", "far0/c", "itself", "z/b"]
     assert [job.name for job in jobs_of([str(tmp_path / "logs")], "out")] == names
-    assert [job.name for job in jobs_of([f"{tmp_path}/logs/**/*.csv"], "out")] == ["a", "b", "c", "itself"]
+    assert [job.name for job in jobs_of([f"{tmp_path}/logs/**/*.csv"], "out")] == [
+        "a",
+        "b",
+        "c",
+        "itself",
+    ]
 
 
-def test_a_pattern_of_two_stars_goes_through_folders_and_not_through_results(tmp_path: Path) -> None:
+def test_a_pattern_of_two_stars_goes_through_folders_and_not_through_results(
+    tmp_path: Path,
+) -> None:
     _touch(
-        tmp_path, "x/a.mcap", "x/y/b.mcap", "x/y/c.csv", "b.algid/d.mcap", "x/bag/metadata.yaml", ".h/e.mcap", "f.txt"
+        tmp_path,
+        "x/a.mcap",
+        "x/y/b.mcap",
+        "x/y/c.csv",
+        "b.algid/d.mcap",
+        "x/bag/metadata.yaml",
+        ".h/e.mcap",
+        "f.txt",
     )
     for pattern, names in (
         ("**/*.mcap", ["a", "b"]),
@@ -151,7 +188,9 @@ def test_folders_may_be_nested_as_deep_as_the_system_takes_them(
         sweep(open_store(str(tmp_path)))
         assert open_store(str(tmp_path)).names("")[-1] == "good.csv"
     finally:
-        subprocess.run(["rm", "-rf", tmp_path / names[0]], check=True)  # shutil.rmtree ends at a thousand
+        subprocess.run(
+            ["rm", "-rf", tmp_path / names[0]], check=True
+        )  # shutil.rmtree ends at a thousand
     assert found.pop("good") is None
     ((name, told),) = found.items()
     if trouble is None:
@@ -192,8 +231,14 @@ def test_manifests_in_csv_and_toml_say_the_same(tmp_path: Path) -> None:
         ("name,logs\n../x,a.csv\n", "row 1: a job's name becomes a folder's"),
         ("name,logs\nx,\n", "row 1: expected a name and logs"),
         ("name,logs,time\nx,a.csv,yesterday\n", "row 1: time: expected ISO 8601"),
-        ("name,logs,time\nx,a.csv,0001-01-01T00:00+23:59\n", "row 1: time: expected ISO 8601.* from 1970 to 2261"),
-        ("name,logs,time\nx,a.csv,9999-12-31T23:59-23:59\n", "row 1: time: expected ISO 8601.* from 1970 to 2261"),
+        (
+            "name,logs,time\nx,a.csv,0001-01-01T00:00+23:59\n",
+            "row 1: time: expected ISO 8601.* from 1970 to 2261",
+        ),
+        (
+            "name,logs,time\nx,a.csv,9999-12-31T23:59-23:59\n",
+            "row 1: time: expected ISO 8601.* from 1970 to 2261",
+        ),
         ("name,logs,time\nx,a.csv,1969-12-31T23:59:59Z\n", "row 1: time: expected ISO 8601"),
         ("name,logs\na.algid/b,a.csv\n", "row 1: a job's name .* no folder that ends in .algid"),
         ("name,logs\njobs.parquet/b,a.csv\n", "row 1: a job's name .* none that is jobs.parquet"),
@@ -206,7 +251,10 @@ def test_manifests_in_csv_and_toml_say_the_same(tmp_path: Path) -> None:
         ("name,logs\nx,a,b,c\n", "a row has more cells"),
         ("name,logs\nx,a.csv;;b.csv\n", "row 1: logs: expected paths, found 'a.csv;;b.csv'"),
         ("name,logs\ny,a.csv\nx,a\0.csv\n", "row 2: logs: expected paths, found"),
-        ("name,logs\n" + "x" * 140_000 + ",a.csv\n", "the manifest cannot be read \\(field larger than"),
+        (
+            "name,logs\n" + "x" * 140_000 + ",a.csv\n",
+            "the manifest cannot be read \\(field larger than",
+        ),
     ],
 )
 def test_a_bad_manifest_is_refused_by_its_place(tmp_path: Path, text: str, told: str) -> None:
@@ -221,16 +269,31 @@ def test_a_bad_manifest_is_refused_by_its_place(tmp_path: Path, text: str, told:
         ("", r"expected tables \[\[job\]\] alone, found nothing"),
         ("job = 1", r"expected tables \[\[job\]\] alone, found job"),
         ("job = [1]", r"expected tables \[\[job\]\] alone, found job"),
-        ("more = 1\n[[job]]\nname = 'x'\nlogs = 'a.csv'", r"expected tables \[\[job\]\] alone, found more, job"),
+        (
+            "more = 1\n[[job]]\nname = 'x'\nlogs = 'a.csv'",
+            r"expected tables \[\[job\]\] alone, found more, job",
+        ),
         ("[[job]]\nlogs = 'a.csv'", "job 1: expected a name and logs, found logs"),
         ("[[job]]\nname = 'x'\nlogs = 5", "job 1: logs: expected paths, found 5"),
-        ("[[job]]\nname = 'x'\nlogs = ['a.csv', 5]", r"job 1: logs: expected paths, found \['a.csv', 5\]"),
-        ("[[job]]\nname = 'x'\nlogs = ['a.csv', ' ']", r"job 1: logs: expected paths, found \['a.csv', ' '\]"),
+        (
+            "[[job]]\nname = 'x'\nlogs = ['a.csv', 5]",
+            r"job 1: logs: expected paths, found \['a.csv', 5\]",
+        ),
+        (
+            "[[job]]\nname = 'x'\nlogs = ['a.csv', ' ']",
+            r"job 1: logs: expected paths, found \['a.csv', ' '\]",
+        ),
         ("[[job]]\nname = 'x'\nloaded = \"a\\u0000.csv\"", "job 1: loaded: expected paths"),
         ("[[job]]\nname = 'x'\nlogs = 'a.csv'\ntime = 07:32:00", "job 1: time: expected ISO 8601"),
-        ("a = " + "[" * 5000 + "]" * 5000, r"the manifest cannot be read \(maximum recursion depth"),
+        (
+            "a = " + "[" * 5000 + "]" * 5000,
+            r"the manifest cannot be read \(maximum recursion depth",
+        ),
         ("[[job", "the manifest cannot be read"),
-        (f"{JOB}payload = 1{'0' * 400}", "job 1: payload: expected text, a date, true, .* 64 bits, found another int"),
+        (
+            f"{JOB}payload = 1{'0' * 400}",
+            "job 1: payload: expected text, a date, true, .* 64 bits, found another int",
+        ),
         (f"{JOB}payload = 1{'0' * 5000}", "the manifest cannot be read"),
         (
             f"{JOB}payload = 0x1{'0' * 5000}",
@@ -242,22 +305,30 @@ def test_a_bad_manifest_is_refused_by_its_place(tmp_path: Path, text: str, told:
         (f"{JOB}time = 9999-12-31T23:59:59-23:59", "job 1: time: expected ISO 8601"),
     ],
 )
-def test_a_bad_manifest_in_toml_is_refused_by_its_place(tmp_path: Path, text: str, told: str) -> None:
+def test_a_bad_manifest_in_toml_is_refused_by_its_place(
+    tmp_path: Path, text: str, told: str
+) -> None:
     (tmp_path / "m.toml").write_text(text)
     with pytest.raises(SettingError, match=rf"^{tmp_path}/m\.toml: {told}"):
         jobs_of([str(tmp_path / "m.toml")], "out")
 
 
 def test_a_manifest_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(SettingError, match=r"m\.toml: the manifest cannot be read .*No such file.*mend it$"):
+    with pytest.raises(
+        SettingError, match=r"m\.toml: the manifest cannot be read .*No such file.*mend it$"
+    ):
         jobs_of([str(tmp_path / "m.toml")], "out")
     (tmp_path / "m.csv").write_bytes(b"name,logs\nx,\xff.csv\n")
-    with pytest.raises(SettingError, match=r"m\.csv: the manifest cannot be read .*utf-8.*mend it$"):
+    with pytest.raises(
+        SettingError, match=r"m\.csv: the manifest cannot be read .*utf-8.*mend it$"
+    ):
         jobs_of([str(tmp_path / "m.csv")], "out")
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
-def test_a_csv_file_is_a_manifest_by_its_columns_whatever_ends_its_lines(tmp_path: Path, end: str) -> None:
+def test_a_csv_file_is_a_manifest_by_its_columns_whatever_ends_its_lines(
+    tmp_path: Path, end: str
+) -> None:
     path = tmp_path / "m.csv"
     for header, expected in (
         *(("name,logs", True), ("loaded,payload,name", True), ("\ufeffname,loaded", True)),
@@ -297,7 +368,9 @@ def test_a_label_that_reads_like_a_finite_number_is_one(value: float) -> None:
     assert type(found) is (float if math.isfinite(value) else str)
 
 
-@pytest.mark.parametrize("name", ["", "/a", "a/", "a//b", "../a", "a/..", ".a", "a\\b", "a\nb", "a\x7f", "ä" * 101])
+@pytest.mark.parametrize(
+    "name", ["", "/a", "a/", "a//b", "../a", "a/..", ".a", "a\\b", "a\nb", "a\x7f", "ä" * 101]
+)
 def test_a_name_that_could_leave_the_folder_of_results_is_refused(name: str) -> None:
     with pytest.raises(SettingError, match=r"^here: a job's name becomes a folder's"):
         checked_name(name, "here")
@@ -308,7 +381,9 @@ def test_a_name_may_hold_slashes_and_any_printable_character() -> None:
         assert checked_name(name, "here") == name
 
 
-def test_a_folder_where_nobody_may_look_fails_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_where_nobody_may_look_fails_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     _touch(tmp_path, "a.csv", "locked/b.csv")
     scan = os.scandir
 
@@ -319,17 +394,32 @@ def test_a_folder_where_nobody_may_look_fails_alone(tmp_path: Path, monkeypatch:
 
     monkeypatch.setattr(os, "scandir", refused)
     locked, good = jobs_of([str(tmp_path)], "out")
-    assert locked.trouble == f"{tmp_path}/locked: cannot look there (Permission denied); check its rights"
+    assert (
+        locked.trouble
+        == f"{tmp_path}/locked: cannot look there (Permission denied); check its rights"
+    )
     assert (good.name, good.trouble) == ("a", None)
-    with pytest.raises(SettingError, match=rf"^{tmp_path}/locked: cannot look there \(.*denied: .*\); check its name"):
+    with pytest.raises(
+        SettingError,
+        match=rf"^{tmp_path}/locked: cannot look there \(.*denied: .*\); check its name",
+    ):
         jobs_of([str(tmp_path / "locked")], "out")
     for source in ("x" * 5000, "a\0b"):
-        with pytest.raises(SettingError, match=r": cannot look there \(.*\); check its name|no such file"):
+        with pytest.raises(
+            SettingError, match=r": cannot look there \(.*\); check its name|no such file"
+        ):
             jobs_of([source], "out")
 
 
 def test_a_bag_is_one_log_and_its_folder_no_place_to_look_in(tmp_path: Path) -> None:
-    _touch(tmp_path, "run-loaded/metadata.yaml", "run-loaded/0.mcap", "plain/0.mcap", "x.MCAP", "y.csv.gz")
+    _touch(
+        tmp_path,
+        "run-loaded/metadata.yaml",
+        "run-loaded/0.mcap",
+        "plain/0.mcap",
+        "x.MCAP",
+        "y.csv.gz",
+    )
     found = jobs_of([str(tmp_path)], "out")
     assert [(job.name, job.logs, job.loaded) for job in found] == [
         ("plain/0", (str(tmp_path / "plain/0.mcap"),), ()),
@@ -349,11 +439,16 @@ def test_the_table_of_results_is_no_log_where_results_go_and_one_elsewhere(tmp_p
 
 def test_a_source_that_is_given_twice_counts_once(tmp_path: Path) -> None:
     _touch(tmp_path, "a.csv", "b.csv")
-    assert [job.name for job in jobs_of([str(tmp_path), str(tmp_path / "a.csv")], "out")] == ["a", "b"]
+    assert [job.name for job in jobs_of([str(tmp_path), str(tmp_path / "a.csv")], "out")] == [
+        "a",
+        "b",
+    ]
     _touch(tmp_path, "other/a.csv")
     both, other = jobs_of([str(tmp_path / "*.csv"), str(tmp_path / "other/a.csv")], "out")
     assert both.trouble is not None
-    assert both.trouble.startswith(f"a: two jobs of one name ({tmp_path}/a.csv, {tmp_path}/other/a.csv)")
+    assert both.trouble.startswith(
+        f"a: two jobs of one name ({tmp_path}/a.csv, {tmp_path}/other/a.csv)"
+    )
     assert (other.name, other.trouble) == ("b", None)
 
 
@@ -369,7 +464,9 @@ def test_a_source_that_is_given_twice_counts_once(tmp_path: Path) -> None:
         ("a-Loaded", "a-Loaded", False),
     ],
 )
-def test_a_role_is_the_last_word_of_a_name(tmp_path: Path, stem: str, name: str, *, loaded: bool) -> None:
+def test_a_role_is_the_last_word_of_a_name(
+    tmp_path: Path, stem: str, name: str, *, loaded: bool
+) -> None:
     _touch(tmp_path, f"{stem}.csv")
     (job,) = jobs_of([str(tmp_path)], "out")
     assert (job.name, bool(job.loaded)) == (name, loaded)

@@ -38,7 +38,9 @@ def served() -> Iterator[Served]:
 
 @pytest.fixture(scope="module")
 def log() -> Log:
-    unloaded, _ = algid.synthesise("case1", duration=2.0, excitation="wide", sensors=Sensors(1e-4, 1e-3))
+    unloaded, _ = algid.synthesise(
+        "case1", duration=2.0, excitation="wide", sensors=Sensors(1e-4, 1e-3)
+    )
     return replace(unloaded, omega=None)
 
 
@@ -50,7 +52,9 @@ def _put(served: Served, path: Path) -> str:
 
 def _told(result: Result) -> str:
     """All of a result but the log's path and hash."""
-    return result.model_copy(update={"log": result.log.model_copy(update={"path": "", "sha256": ""})}).model_dump_json()
+    return result.model_copy(
+        update={"log": result.log.model_copy(update={"path": "", "sha256": ""})}
+    ).model_dump_json()
 
 
 def _same(copy: Staged, path: Path, profile: Profile | None = None) -> bool:
@@ -59,11 +63,15 @@ def _same(copy: Staged, path: Path, profile: Profile | None = None) -> bool:
 
 
 @pytest.mark.slow
-def test_of_a_log_with_cameras_the_joints_chunks_are_fetched(served: Served, log: Log, tmp_path: Path) -> None:
+def test_of_a_log_with_cameras_the_joints_chunks_are_fetched(
+    served: Served, log: Log, tmp_path: Path
+) -> None:
     path = tmp_path / "cameras.mcap"
     with_cameras(path, log, images=32)
     with opened(path) as (_, found):
-        joints = next(number for number, one in found.channels.items() if one.topic == "/joint_states")
+        joints = next(
+            number for number, one in found.channels.items() if one.topic == "/joint_states"
+        )
         chunks = [span for span in found.spans if span.channels and joints in span.channels]
     needed = sum(span.length + span.index_length for span in chunks)
     assert needed < 0.012 * path.stat().st_size
@@ -78,9 +86,14 @@ def test_of_a_log_with_cameras_the_joints_chunks_are_fetched(served: Served, log
     assert _same(copy, path)
 
 
-def test_a_log_of_joints_alone_is_fetched_whole_and_hashed(served: Served, log: Log, tmp_path: Path) -> None:
+def test_a_log_of_joints_alone_is_fetched_whole_and_hashed(
+    served: Served, log: Log, tmp_path: Path
+) -> None:
     path = tmp_path / "joints.mcap"
-    algid.write_log(path, replace(log, theta=log.theta + np.random.default_rng(0).normal(0, 1e-3, log.theta.shape)))
+    algid.write_log(
+        path,
+        replace(log, theta=log.theta + np.random.default_rng(0).normal(0, 1e-3, log.theta.shape)),
+    )
     for size in (1 << 30, 0):  # below the size where parts are worth a request, and above it
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr("algid.batch.fetch.SMALL", size)
@@ -94,11 +107,17 @@ def _large(rows: int = 40000) -> Iterator[tuple[str, int, bytes]]:
     noise = np.random.default_rng(1)
     for row in range(rows):
         values = noise.normal(size=2).tolist()
-        yield "/joint_states", row * 10**6, joint_state(row * 10**6, position=values, effort=values).done()
+        yield (
+            "/joint_states",
+            row * 10**6,
+            joint_state(row * 10**6, position=values, effort=values).done(),
+        )
 
 
 @pytest.mark.parametrize("fault", ["cut off", "without index", "crooked index"])
-def test_an_mcap_file_without_a_sound_summary_is_fetched_whole(served: Served, tmp_path: Path, fault: str) -> None:
+def test_an_mcap_file_without_a_sound_summary_is_fetched_whole(
+    served: Served, tmp_path: Path, fault: str
+) -> None:
     path = tmp_path / "log.mcap"
     options: dict[str, Any] = NO_INDEX if fault == "without index" else {}
     write_mcap(path, _large(), **options)
@@ -116,7 +135,9 @@ def test_an_mcap_file_without_a_sound_summary_is_fetched_whole(served: Served, t
 
 
 @pytest.mark.parametrize("name", ["algid", "foreign"])
-def test_of_parquet_the_columns_that_are_read_are_fetched(served: Served, log: Log, tmp_path: Path, name: str) -> None:
+def test_of_parquet_the_columns_that_are_read_are_fetched(
+    served: Served, log: Log, tmp_path: Path, name: str
+) -> None:
     path = tmp_path / f"{name}.parquet"
     algid.write_log(path, log)
     if name == "foreign":
@@ -124,7 +145,11 @@ def test_of_parquet_the_columns_that_are_read_are_fetched(served: Served, log: L
         ballast = np.random.default_rng(2).normal(size=(frame.height, 96))
         frame = frame.hstack(pl.DataFrame(ballast, schema=[f"other{n}" for n in range(96)]))
         frame.write_parquet(path, row_group_size=500)
-    profile = Profile(theta1=Angle(source="arm.theta1"), theta2=Angle(source="theta2")) if name == "foreign" else None
+    profile = (
+        Profile(theta1=Angle(source="arm.theta1"), theta2=Angle(source="theta2"))
+        if name == "foreign"
+        else None
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("algid.batch.fetch.SMALL", 0)
         copy = staged(_put(served, path), tmp_path / "copy", profile)
@@ -160,5 +185,9 @@ def test_ranges_that_lie_near_each_other_become_one() -> None:
 
 def test_what_is_had_is_not_fetched_again() -> None:
     held = [(10, 20), (30, 40)]
-    assert list(without([(0, 5), (12, 18), (15, 35), (38, 50)], held)) == [(0, 5), (20, 30), (40, 50)]
+    assert list(without([(0, 5), (12, 18), (15, 35), (38, 50)], held)) == [
+        (0, 5),
+        (20, 30),
+        (40, 50),
+    ]
     assert list(without([(5, 45), (50, 50)], held)) == [(5, 10), (20, 30), (40, 45)]

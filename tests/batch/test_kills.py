@@ -31,7 +31,9 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("logs")
-    exact, _ = algid.synthesise("case1", duration=2.0, excitation="wide", sensors=Sensors(1e-4, 1e-3))
+    exact, _ = algid.synthesise(
+        "case1", duration=2.0, excitation="wide", sensors=Sensors(1e-4, 1e-3)
+    )
     rng = np.random.default_rng(0)
     for number in range(JOBS):
         noisy = replace(exact, theta=exact.theta + rng.normal(0, 1e-3, exact.theta.shape))
@@ -72,7 +74,9 @@ if __name__ == "__main__":
 """
 
 
-def _start(logs: Path, out: Path, *flags: str, program: Sequence[str] = ("-m", "algid")) -> subprocess.Popen[str]:
+def _start(
+    logs: Path, out: Path, *flags: str, program: Sequence[str] = ("-m", "algid")
+) -> subprocess.Popen[str]:
     where = flags or ("--workers", "2")
     quick = ("--no-report", "--estimator", "weak", "--model", "plain")
     command = [sys.executable, *program, "batch", str(logs), "-o", str(out), *quick, *where]
@@ -87,9 +91,15 @@ def _start(logs: Path, out: Path, *flags: str, program: Sequence[str] = ("-m", "
 
 
 def _digest(out: Path) -> dict[str, str]:
-    files = {str(p.relative_to(out)): hashlib.sha256(p.read_bytes()).hexdigest() for p in out.rglob("result.json")}
+    files = {
+        str(p.relative_to(out)): hashlib.sha256(p.read_bytes()).hexdigest()
+        for p in out.rglob("result.json")
+    }
     left = [str(p) for p in out.rglob(".*") if p.name != ".jobs"]
-    return files | {"left": str(left), "jobs": pl.read_parquet(out / "jobs.parquet").drop("seconds").write_json()}
+    return files | {
+        "left": str(left),
+        "jobs": pl.read_parquet(out / "jobs.parquet").drop("seconds").write_json(),
+    }
 
 
 def _wait_for_records(out: Path, count: int) -> None:
@@ -142,8 +152,13 @@ def test_a_job_past_its_time_fails_until_its_log_changes(tmp_path: Path) -> None
     running = _start(log.parent, out, "--workers", "1", "--timeout", "0.5", program=[str(script)])
     told, errors = running.communicate(timeout=120)
     assert (running.returncode, errors) == (1, "")
-    assert told.startswith("hangs: failed: it took longer than 0.5 s; raise --timeout, and run it again with --retry-")
-    for text, ran in (("t,theta1,theta2,tau1,tau2\n", 0), ("t,theta1,theta2,tau1,tau3\n", 1)):  # equally long
+    assert told.startswith(
+        "hangs: failed: it took longer than 0.5 s; raise --timeout, and run it again with --retry-"
+    )
+    for text, ran in (
+        ("t,theta1,theta2,tau1,tau2\n", 0),
+        ("t,theta1,theta2,tau1,tau3\n", 1),
+    ):  # equally long
         if log.read_text() != text:
             log.write_text(text)
         told, _ = _start(log.parent, out, "--workers", "1").communicate()

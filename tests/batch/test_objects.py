@@ -27,7 +27,18 @@ from tests.batch.test_run import Here
 from tests.objects import Served, s3
 from tests.processes import Outcome
 
-ODD = ("run%41.csv", "runA.csv", "a b.csv", 'q".csv', "<x>.csv", "[y].csv", "ü µ.csv", "q?.csv", "h#.csv", "100%.csv")
+ODD = (
+    "run%41.csv",
+    "runA.csv",
+    "a b.csv",
+    'q".csv',
+    "<x>.csv",
+    "[y].csv",
+    "ü µ.csv",
+    "q?.csv",
+    "h#.csv",
+    "100%.csv",
+)
 KEY, SECRET = "AKIAEXAMPLE", "sEcReT%2FwIth%2BsLash"
 USER = f"{KEY}:{SECRET}@"
 
@@ -50,10 +61,14 @@ def served(server: Served) -> Iterator[Served]:
 @pytest.fixture(scope="module")
 def log() -> bytes:
     """A second at 200 Hz as CSV."""
-    unloaded, _ = algid.synthesise("case1", rate=200.0, duration=1.0, excitation="wide", sensors=Sensors(1e-4, 1e-3))
+    unloaded, _ = algid.synthesise(
+        "case1", rate=200.0, duration=1.0, excitation="wide", sensors=Sensors(1e-4, 1e-3)
+    )
     columns = {"t": unloaded.stamp_ns * 1e-9}
     columns |= {
-        f"{name}{n + 1}": row[n] for name, row in (("theta", unloaded.theta), ("tau", unloaded.tau)) for n in (0, 1)
+        f"{name}{n + 1}": row[n]
+        for name, row in (("theta", unloaded.theta), ("tau", unloaded.tau))
+        for n in (0, 1)
     }
     return pl.DataFrame(columns).write_csv().encode()
 
@@ -64,7 +79,9 @@ RECIPE = Recipe("", Settings(estimator="weak", model="plain"), lambda _file: Non
 def _run(served: Served, place: str | None = None, user: str = "", **recipe: Any) -> Ended:
     out = served.url("out", user) if place is None else place
     jobs = jobs_of([served.url("logs", user)], out)
-    return Batch(open_store(out), replace(RECIPE, out=out, **recipe), Here(), 1, lambda _progress: None).run(jobs)
+    return Batch(
+        open_store(out), replace(RECIPE, out=out, **recipe), Here(), 1, lambda _progress: None
+    ).run(jobs)
 
 
 def _ends(ended: Ended) -> dict[str, End]:
@@ -110,8 +127,14 @@ def test_a_hash_sign_in_a_url_is_refused_and_no_host_is_asked(served: Served) ->
         ("s3://KEY:with@sign@lab/a", "s3://lab/a"),
         ("s3:/KEY:SECRET@lab/a: no such file", "s3:/lab/a: no such file"),  # as a path writes it
         ("s3://KEY@lab/a and gs://anonymous@lab/b", "s3://lab/a and gs://lab/b"),
-        ("az://box:PASSWORD@account.dfs.core.windows.net/a", "az://box@account.dfs.core.windows.net/a"),
-        ("az://account/box/a?client_secret=SECRET&tenant_id=4", "az://account/box/a?client_secret=&tenant_id=4"),
+        (
+            "az://box:PASSWORD@account.dfs.core.windows.net/a",
+            "az://box@account.dfs.core.windows.net/a",
+        ),
+        (
+            "az://account/box/a?client_secret=SECRET&tenant_id=4",
+            "az://account/box/a?client_secret=&tenant_id=4",
+        ),
         ("s3://lab/a@b.csv, folder/a@b.csv", "s3://lab/a@b.csv, folder/a@b.csv"),
     ],
 )
@@ -120,7 +143,9 @@ def test_credentials_are_left_out_of_every_message(text: str, kept: str) -> None
     assert str(AlgidError(text)) == kept
 
 
-def test_credentials_in_a_url_open_everything_below_it_and_are_kept_nowhere(served: Served, log: bytes) -> None:
+def test_credentials_in_a_url_open_everything_below_it_and_are_kept_nowhere(
+    served: Served, log: bytes
+) -> None:
     store = open_store(served.url("logs"))
     store.write("r1/a.csv", log)
     store.write("bad.csv", b"junk")
@@ -130,11 +155,15 @@ def test_credentials_in_a_url_open_everything_below_it_and_are_kept_nowhere(serv
     out = open_store(served.url("out"))
     names = [*out.names(""), ".jobs/bad.json", ".jobs/r1/a.json"]
     assert "r1/a.algid/report.html" in names
-    text = json.dumps(pl.read_parquet(io.BytesIO(out.read("jobs.parquet") or b"")).to_dicts(), default=str)
+    text = json.dumps(
+        pl.read_parquet(io.BytesIO(out.read("jobs.parquet") or b"")).to_dicts(), default=str
+    )
     for content in (text, *((out.read(name) or b"").decode("latin-1") for name in names)):
         assert KEY not in content
         assert SECRET not in content
-    assert _run(served, user="OTHER:KEYS@", report=True).ran == 0  # who may read it is no part of what it is
+    assert (
+        _run(served, user="OTHER:KEYS@", report=True).ran == 0
+    )  # who may read it is no part of what it is
 
 
 @pytest.mark.parametrize(
@@ -149,7 +178,10 @@ def test_credentials_in_a_url_open_everything_below_it_and_are_kept_nowhere(serv
 )
 def test_credentials_are_not_printed(served: Served, source: str, out: str, code: int) -> None:
     open_store(served.url("logs")).write("bad.csv", b"junk")
-    urls = (f"s3://{USER}{place}{served.query}".replace("@lab/", f"@{served.bucket}/") for place in (source, out))
+    urls = (
+        f"s3://{USER}{place}{served.query}".replace("@lab/", f"@{served.bucket}/")
+        for place in (source, out)
+    )
     done = Outcome("batch", next(urls), "-o", next(urls), "--workers", "1")
     assert done.code == code, done.err
     assert done.out or done.err
@@ -166,7 +198,9 @@ def test_a_bucket_that_is_not_there_is_named(served: Served) -> None:
 
 
 @pytest.mark.parametrize("method", ["HEAD", "GET"])
-def test_an_object_that_may_not_be_read_fails_alone(served: Served, log: bytes, method: str) -> None:
+def test_an_object_that_may_not_be_read_fails_alone(
+    served: Served, log: bytes, method: str
+) -> None:
     for name in ("a", "b", "c"):
         open_store(served.url("logs")).write(f"{name}.csv", log)
     served.denied = lambda asked, path: path.endswith("/b.csv") and asked in ("GET", method)
@@ -175,10 +209,14 @@ def test_an_object_that_may_not_be_read_fails_alone(served: Served, log: bytes, 
     assert "it cannot be read" in ended.records[1].reason
     assert "ACCESS_DENIED" in ended.records[1].reason
     served.denied = lambda _method, _path: False
-    assert (_run(served).ran, _ends(_run(served))["b"]) == ((1, End.OK) if method == "HEAD" else (0, End.FAILED))
+    assert (_run(served).ran, _ends(_run(served))["b"]) == (
+        (1, End.OK) if method == "HEAD" else (0, End.FAILED)
+    )
 
 
-def test_a_log_that_cannot_be_looked_at_for_a_while_loses_no_result(served: Served, log: bytes) -> None:
+def test_a_log_that_cannot_be_looked_at_for_a_while_loses_no_result(
+    served: Served, log: bytes
+) -> None:
     for name in ("a", "b"):
         open_store(served.url("logs")).write(f"{name}.csv", log)
     _run(served)
@@ -216,18 +254,29 @@ def test_a_result_that_may_not_be_written_says_so(served: Served, log: bytes) ->
 
 
 @pytest.mark.parametrize("place", ["", "logs/r 1/out"])
-def test_what_a_batch_wrote_below_its_source_is_no_log(served: Served, log: bytes, place: str) -> None:
+def test_what_a_batch_wrote_below_its_source_is_no_log(
+    served: Served, log: bytes, place: str
+) -> None:
     open_store(served.url("logs")).write("r 1/a.csv", log)
     open_store(served.url("logs")).write("jobs.parquet", b"a log of that name")
     out = served.url(place)
     for _ in range(2):
         jobs = jobs_of([served.url("")], out)
         assert [job.name for job in jobs] == ["logs/jobs", "logs/r 1/a"]
-        Batch(open_store(out), replace(RECIPE, out=out, report=True), Here(), 1, lambda _progress: None).run(jobs)
+        Batch(
+            open_store(out),
+            replace(RECIPE, out=out, report=True),
+            Here(),
+            1,
+            lambda _progress: None,
+        ).run(jobs)
 
 
 def test_a_store_that_is_away_for_a_while_does_not_end_a_watched_prefix(
-    served: Served, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    served: Served,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr("algid.batch.run.LOOK_EVERY", 0.0)
     open_store(served.url("logs")).write("bad.csv", b"junk")
@@ -257,7 +306,11 @@ def _folder(place: Path, *names: str) -> Path:
 
 def test_a_new_result_leaves_nothing_of_the_old_one(served: Served, tmp_path: Path) -> None:
     store = open_store(served.url("out"))
-    put_folder(store, "a.algid", _folder(tmp_path / "old", "result.json", "report.html", "figures/one.parquet"))
+    put_folder(
+        store,
+        "a.algid",
+        _folder(tmp_path / "old", "result.json", "report.html", "figures/one.parquet"),
+    )
     new = _folder(tmp_path / "new", "result.json", "report.md")
     served.denied = lambda method, path: method != "DELETE" and path.endswith("report.md")
     with pytest.raises(OutputError, match=r"a\.algid/report\.md: cannot write there"):
@@ -272,7 +325,9 @@ def test_a_new_result_leaves_nothing_of_the_old_one(served: Served, tmp_path: Pa
 
 
 @pytest.mark.parametrize("kind", ["folder", "objects"])
-def test_a_log_that_fails_once_changed_keeps_no_result(served: Served, log: bytes, tmp_path: Path, kind: str) -> None:
+def test_a_log_that_fails_once_changed_keeps_no_result(
+    served: Served, log: bytes, tmp_path: Path, kind: str
+) -> None:
     place = served.url("out") if kind == "objects" else str(tmp_path / "out")
     logs = open_store(served.url("logs"))
     for name in ("a", "b"):
@@ -280,14 +335,18 @@ def test_a_log_that_fails_once_changed_keeps_no_result(served: Served, log: byte
     _run(served, place)
     logs.write("a.csv", b"junk")
     assert _ends(_run(served, place)) == {"a": End.FAILED, "b": End.OK}
-    assert [name for name in open_store(place).names("") if ".algid/" in name] == ["b.algid/result.json"]
+    assert [name for name in open_store(place).names("") if ".algid/" in name] == [
+        "b.algid/result.json"
+    ]
 
 
 def _settings_fail(_file: str | None) -> None:
     raise algid.errors.SettingError("no such profile")
 
 
-def test_a_job_that_fails_for_its_settings_keeps_the_result_of_its_log(served: Served, log: bytes) -> None:
+def test_a_job_that_fails_for_its_settings_keeps_the_result_of_its_log(
+    served: Served, log: bytes
+) -> None:
     open_store(served.url("logs")).write("a.csv", log)
     _run(served)
     assert _ends(_run(served, profile=_settings_fail)) == {"a": End.FAILED}
@@ -320,11 +379,15 @@ def test_an_object_replaced_while_it_is_read_fails(
     first, second = (one.tobytes() for one in arrays)
     open_store(served.url("logs")).write("a.csv", first)
     served.after = _replacing(served, "a.csv", second if kind == "as long" else second[:100], at)
-    with pytest.raises(LogError, match=r"logs/a\.csv.*: it was replaced while it was read; run again"):
+    with pytest.raises(
+        LogError, match=r"logs/a\.csv.*: it was replaced while it was read; run again"
+    ):
         staged(served.url("logs/a.csv"), tmp_path)
 
 
-def test_a_replaced_object_fails_its_job_and_is_done_by_the_next_run(served: Served, log: bytes) -> None:
+def test_a_replaced_object_fails_its_job_and_is_done_by_the_next_run(
+    served: Served, log: bytes
+) -> None:
     for name in ("a", "b"):
         open_store(served.url("logs")).write(f"{name}.csv", log)
     served.after = _replacing(served, "a.csv", log + log.splitlines()[-1] + b"\n", 1)

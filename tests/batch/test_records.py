@@ -55,7 +55,13 @@ RECIPE = Recipe("", Settings(), lambda _file: None)
 
 
 def _batch(out: Path, executor: Executor | None = None) -> Batch:
-    return Batch(open_store(str(out)), replace(RECIPE, out=str(out)), executor or Failing(), 1, lambda _: None)
+    return Batch(
+        open_store(str(out)),
+        replace(RECIPE, out=str(out)),
+        executor or Failing(),
+        1,
+        lambda _: None,
+    )
 
 
 def _run(logs: Path, out: Path, executor: Executor | None = None) -> Ended:
@@ -71,9 +77,17 @@ def logs(tmp_path: Path) -> Path:
 
 
 def _sound() -> dict[str, Any]:
-    job = Job("other", ("x.csv",), robot="r", time="2026-01-31T12:00:00+01:00", labels={"payload": 0.5, "site": "Ulm"})
+    job = Job(
+        "other",
+        ("x.csv",),
+        robot="r",
+        time="2026-01-31T12:00:00+01:00",
+        labels={"payload": 0.5, "site": "Ulm"},
+    )
     estimates = {"k1": (1.0, 0.1, "OK"), "k5+k3+z1": (None, None, "WEAK_EXCITATION")}
-    record = JobRecord(job, End.OK, "", "b", (Input("x.csv", 1, 2),), {"a": [1]}, "0.1", estimates=estimates)
+    record = JobRecord(
+        job, End.OK, "", "b", (Input("x.csv", 1, 2),), {"a": [1]}, "0.1", estimates=estimates
+    )
     return asdict(record)
 
 
@@ -101,19 +115,27 @@ WRONG: dict[str, Any] = {
     "an estimate that is infinite": lambda r: r.update(estimates={"k1": [float("inf"), 2.0, "OK"]}),
     "an estimate in another column": lambda r: r.update(estimates={"job": [1.0, 2.0, "OK"]}),
     "an estimate in another's column": lambda r: r.update(estimates={"k1_std": [1.0, 2.0, "OK"]}),
-    "an estimate in a label's column": lambda r: r.update(estimates={"label_site": [1.0, 2.0, "OK"]}),
+    "an estimate in a label's column": lambda r: r.update(
+        estimates={"label_site": [1.0, 2.0, "OK"]}
+    ),
     "half a letter": lambda r: r.update(reason="\ud800"),
-    "more labels than a table has columns": lambda r: r["job"].update(labels={str(n): n for n in range(5000)}),
+    "more labels than a table has columns": lambda r: r["job"].update(
+        labels={str(n): n for n in range(5000)}
+    ),
 }
 
 
 @pytest.mark.parametrize("change", WRONG.values(), ids=WRONG)
-def test_a_record_that_is_none_counts_as_none_and_is_told(logs: Path, change: Callable[[Any], Any]) -> None:
+def test_a_record_that_is_none_counts_as_none_and_is_told(
+    logs: Path, change: Callable[[Any], Any]
+) -> None:
     out = logs.parent / "out"
     record = _sound()
     (out / ".jobs").mkdir(parents=True)
     (out / ".jobs/other.json").write_text(
-        json.dumps(record if (changed := change(record)) is None else changed), encoding="utf-8", errors="surrogatepass"
+        json.dumps(record if (changed := change(record)) is None else changed),
+        encoding="utf-8",
+        errors="surrogatepass",
     )
     batch = _batch(out)
     assert list(batch.unreadable) == [".jobs/other.json"]
@@ -172,18 +194,32 @@ def test_what_else_lies_among_the_records_does_no_harm(logs: Path, kind: str) ->
 
 
 def test_no_job_takes_another_ones_place(tmp_path: Path) -> None:
-    names = ["x", "x.json/y", "x.json~/y", "x.json~~/y", "x.json", "x.json~", "x.json/y.json/z", "é/x", "x.jobs/y"]
+    names = [
+        "x",
+        "x.json/y",
+        "x.json~/y",
+        "x.json~~/y",
+        "x.json",
+        "x.json~",
+        "x.json/y.json/z",
+        "é/x",
+        "x.jobs/y",
+    ]
     store = open_store(str(tmp_path))
     for name in names:
         write_record(store, replace(_record(name), reason=name))
     known = read_records(store)
     assert known.unreadable == {}
-    assert {name: record.reason for name, record in known.records.items()} == {name: name for name in names}
+    assert {name: record.reason for name, record in known.records.items()} == {
+        name: name for name in names
+    }
     assert len({record_name(name) for name in names}) == len(names)
 
 
 def _record(name: str, **more: Any) -> JobRecord:
-    return JobRecord(Job(name, ("x.csv",), **more), End.OK, "", "b", (Input("x.csv", 1, 2),), {}, "0.1")
+    return JobRecord(
+        Job(name, ("x.csv",), **more), End.OK, "", "b", (Input("x.csv", 1, 2),), {}, "0.1"
+    )
 
 
 def test_a_link_in_the_output_is_not_followed(logs: Path) -> None:
@@ -203,7 +239,8 @@ def test_a_link_in_the_output_is_not_followed(logs: Path) -> None:
     sweep(open_store(str(out)))
     reasons = {record.job.name: record.reason for record in _run(logs, out, Real()).records}
     assert (
-        reasons["r1/c"] == f"{out}/r1: a link, which is not followed; make it a folder, or choose another one with -o"
+        reasons["r1/c"]
+        == f"{out}/r1: a link, which is not followed; make it a folder, or choose another one with -o"
     )
     assert "no rows below it" in reasons["a"]
     assert [path.name for path in elsewhere.iterdir()] == [".c.algid.algid-0123abcd"]
@@ -211,7 +248,9 @@ def test_a_link_in_the_output_is_not_followed(logs: Path) -> None:
 
 @pytest.mark.parametrize("place", [".jobs", "jobs.parquet"])
 @pytest.mark.parametrize("kind", ["link", "file", "folder"])
-def test_an_output_where_no_record_can_be_kept_is_refused_before_any_work(logs: Path, place: str, kind: str) -> None:
+def test_an_output_where_no_record_can_be_kept_is_refused_before_any_work(
+    logs: Path, place: str, kind: str
+) -> None:
     out = logs.parent / "out"
     out.mkdir()
     if kind == "link":
@@ -226,7 +265,8 @@ def test_an_output_where_no_record_can_be_kept_is_refused_before_any_work(logs: 
         return
     executor = Failing()
     with pytest.raises(
-        OutputError, match=rf"{place}: (a link, which is not followed|expected a (file|folder) of algid)"
+        OutputError,
+        match=rf"{place}: (a link, which is not followed|expected a (file|folder) of algid)",
     ):
         _run(logs, out, executor)
     assert executor.ran == []
@@ -234,11 +274,16 @@ def test_an_output_where_no_record_can_be_kept_is_refused_before_any_work(logs: 
 
 @pytest.mark.parametrize("year", ["1970-01-01T00:00:00+00:00", "2261-12-31T23:59:59", "2026-01-31"])
 def test_odd_times_of_logs_stand_in_the_table(tmp_path: Path, year: str) -> None:
-    (tmp_path / "m.toml").write_text(f"[[job]]\nname = 'x'\nlogs = 'x.csv'\ntime = '{year}'\npayload = {2**63 - 1}\n")
+    (tmp_path / "m.toml").write_text(
+        f"[[job]]\nname = 'x'\nlogs = 'x.csv'\ntime = '{year}'\npayload = {2**63 - 1}\n"
+    )
     (job,) = read_manifest(tmp_path / "m.toml")
     far = Input(str(tmp_path / "x.csv"), 1, 10**22)  # a file's time of change may be any
     record = replace(_record("x"), job=job, inputs=(far,))
-    write_jobs(open_store(str(tmp_path)), [record, replace(record, start_ns=2**63 - 1, job=replace(job, time=None))])
+    write_jobs(
+        open_store(str(tmp_path)),
+        [record, replace(record, start_ns=2**63 - 1, job=replace(job, time=None))],
+    )
     table = pl.read_parquet(tmp_path / "jobs.parquet")
     assert [str(time)[:4] for time in table["time"]] == [year[:4], "2262"]
     assert table["changed"].to_list() == [[None], [None]]

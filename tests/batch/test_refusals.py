@@ -18,8 +18,22 @@ def test_every_refusal_fails_its_own_job_and_no_worker(tmp_path: Path) -> None:
     logs, out = tmp_path / "logs", tmp_path / "out"
     logs.mkdir()
     said = write_refusals(logs)
-    command = [sys.executable, "-m", "algid", "batch", str(logs), "-o", str(out), "--workers", "2", "--timeout", "120"]
-    done = subprocess.run([*command, "--no-report"], capture_output=True, text=True, timeout=580, check=False)
+    command = [
+        sys.executable,
+        "-m",
+        "algid",
+        "batch",
+        str(logs),
+        "-o",
+        str(out),
+        "--workers",
+        "2",
+        "--timeout",
+        "120",
+    ]
+    done = subprocess.run(
+        [*command, "--no-report"], capture_output=True, text=True, timeout=580, check=False
+    )
     assert (done.returncode, done.stderr) == (1, "")
     table = pl.read_parquet(out / "jobs.parquet")
     assert set(table["job"]) == set(said)

@@ -51,7 +51,9 @@ class Here(Executor):
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("logs")
-    unloaded, loaded = algid.synthesise("case1", duration=2.0, excitation="wide", sensors=Sensors(1e-4, 1e-3))
+    unloaded, loaded = algid.synthesise(
+        "case1", duration=2.0, excitation="wide", sensors=Sensors(1e-4, 1e-3)
+    )
     for name in ("r1/a", "r1/b"):
         (folder / name).parent.mkdir(exist_ok=True)
         algid.write_log(folder / f"{name}-unloaded.parquet", unloaded)
@@ -70,16 +72,23 @@ WEAK = Settings(estimator="weak", model="plain")
 RECIPE = Recipe("", WEAK, lambda _file: None, report=False)
 
 
-def _run(logs: Path, executor: Executor | None = None, recipe: Recipe = RECIPE, **more: bool) -> Ended:
+def _run(
+    logs: Path, executor: Executor | None = None, recipe: Recipe = RECIPE, **more: bool
+) -> Ended:
     out = logs.parent / "out"
     store = open_store(str(out))
-    batch = Batch(store, replace(recipe, out=str(out)), executor or Here(), 1, lambda _progress: None)
+    batch = Batch(
+        store, replace(recipe, out=str(out)), executor or Here(), 1, lambda _progress: None
+    )
     return batch.run(jobs_of([str(logs)], str(out)), **more)
 
 
 def _digest(out: Path) -> dict[str, str]:
     """Hashes of all results; jobs.parquet without its durations."""
-    files = {str(p.relative_to(out)): hashlib.sha256(p.read_bytes()).hexdigest() for p in out.rglob("result.json")}
+    files = {
+        str(p.relative_to(out)): hashlib.sha256(p.read_bytes()).hexdigest()
+        for p in out.rglob("result.json")
+    }
     return files | {"jobs": pl.read_parquet(out / "jobs.parquet").drop("seconds").write_json()}
 
 
@@ -95,11 +104,15 @@ def test_a_bad_log_fails_alone_and_the_table_has_a_row_a_job(logs: Path) -> None
     assert row["m_p_std"] == result.payload["m_p"].std
     assert row["sha256"] == [log.sha256 for log in result.logs]
     assert row["size"] == [Path(log.path).stat().st_size for log in result.logs]
-    assert row["changed"][0].timestamp() == pytest.approx(Path(result.log.path).stat().st_mtime, abs=1e-5)
+    assert row["changed"][0].timestamp() == pytest.approx(
+        Path(result.log.path).stat().st_mtime, abs=1e-5
+    )
     assert "no column for t, theta1" in str(table["reason"][0])
 
 
-def test_the_table_names_the_estimator_whose_numbers_are_reported(logs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_table_names_the_estimator_whose_numbers_are_reported(
+    logs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def handed_back(*args: Any, **more: Any) -> Any:
         return identify(*args, **more).model_copy(update={"estimator": "weak"})
 
@@ -123,7 +136,9 @@ def test_changed_logs_settings_and_lost_results_run_again(logs: Path) -> None:
     _run(logs)
     executor = Here()
     unloaded = logs / "r1/a-unloaded.parquet"
-    shutil.copy2(unloaded, logs / "r1/b-unloaded.parquet")  # the same bytes with another time of change
+    shutil.copy2(
+        unloaded, logs / "r1/b-unloaded.parquet"
+    )  # the same bytes with another time of change
     _run(logs, executor)
     assert executor.ran == []
     shutil.rmtree(logs.parent / "out/r1/b.algid")
@@ -186,11 +201,15 @@ def test_an_interrupted_batch_ends_as_an_undisturbed_one(logs: Path) -> None:
     assert not list((logs.parent / "out").rglob(".b.algid*"))
 
 
-def test_a_full_disk_stops_the_batch_and_keeps_what_is_finished(logs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_stops_the_batch_and_keeps_what_is_finished(
+    logs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
 
     def full(*args: Any, **more: Any) -> Any:
         if more["name"] == "a":
-            raise OutputError("r1/a: cannot write") from OSError(errno.ENOSPC, "No space left on device")
+            raise OutputError("r1/a: cannot write") from OSError(
+                errno.ENOSPC, "No space left on device"
+            )
         return identify(*args, **more)
 
     monkeypatch.setattr("algid.batch.job.identify", full)
@@ -204,13 +223,19 @@ def test_a_full_disk_stops_the_batch_and_keeps_what_is_finished(logs: Path, monk
 def test_a_stopped_batch_hands_out_no_more_jobs(logs: Path) -> None:
     out = logs.parent / "out"
     store = open_store(str(out))
-    batch = Batch(store, replace(RECIPE, out=str(out)), Here(), 1, lambda _progress: batch.stop.set())
+    batch = Batch(
+        store, replace(RECIPE, out=str(out)), Here(), 1, lambda _progress: batch.stop.set()
+    )
     ended = batch.run(jobs_of([str(logs)], str(out)))
     assert (ended.ran, ended.left) == (1, 2)
 
 
 def test_two_batches_on_one_folder(tmp_path: Path) -> None:
-    with locked(str(tmp_path)), pytest.raises(OutputError, match="another batch is at work"), locked(str(tmp_path)):
+    with (
+        locked(str(tmp_path)),
+        pytest.raises(OutputError, match="another batch is at work"),
+        locked(str(tmp_path)),
+    ):
         pass
     with locked(str(tmp_path)):
         pass
@@ -229,7 +254,9 @@ def test_a_growing_log_is_left_alone(tmp_path: Path) -> None:
 def test_a_result_that_must_not_be_used_is_a_failure_with_its_first_reason_and_stays_to_be_looked_at(
     logs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    failed = Verdict("failed", "no sense; do not use these numbers", (Notice("X", "X: the torque is none"),))
+    failed = Verdict(
+        "failed", "no sense; do not use these numbers", (Notice("X", "X: the torque is none"),)
+    )
     with monkeypatch.context() as patch:
         patch.setattr(Result, "verdict", property(lambda _result: failed))
         ended = _run(logs)
@@ -246,4 +273,7 @@ def test_a_result_that_must_not_be_used_is_a_failure_with_its_first_reason_and_s
     shutil.rmtree(logs.parent / "out/r1/a.algid")
     _run(logs, again)
     assert again.ran == ["r1/a"]
-    assert pl.read_parquet(logs.parent / "out/jobs.parquet")["verdict"].to_list()[1] in ("good", "reservations")
+    assert pl.read_parquet(logs.parent / "out/jobs.parquet")["verdict"].to_list()[1] in (
+        "good",
+        "reservations",
+    )

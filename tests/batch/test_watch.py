@@ -19,13 +19,16 @@ from algid.synth.sensors import Sensors
 PATIENCE = 60.0
 
 pytestmark = pytest.mark.slow
-HASTY = "from algid.batch import run; run.LOOK_EVERY = 1.0; from algid.cli import main; main()"  # s, instead of 2
+# s, instead of 2
+HASTY = "from algid.batch import run; run.LOOK_EVERY = 1.0; from algid.cli import main; main()"
 
 
 @pytest.fixture(scope="module")
 def content(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     path = tmp_path_factory.mktemp("made") / "log.csv"
-    unloaded, _ = algid.synthesise("case1", duration=2.0, excitation="wide", sensors=Sensors(1e-4, 1e-3))
+    unloaded, _ = algid.synthesise(
+        "case1", duration=2.0, excitation="wide", sensors=Sensors(1e-4, 1e-3)
+    )
     algid.write_log(path, unloaded)
     path.with_name("log.csv.truth.json").unlink(missing_ok=True)
     return path.read_bytes()
@@ -40,7 +43,18 @@ def _until(condition: Callable[[], object], running: subprocess.Popen[str]) -> N
 
 
 def _watching(logs: Path, out: Path) -> subprocess.Popen[str]:
-    command = [sys.executable, "-c", HASTY, "batch", str(logs), "-o", str(out), "--watch", "--workers", "1"]
+    command = [
+        sys.executable,
+        "-c",
+        HASTY,
+        "batch",
+        str(logs),
+        "-o",
+        str(out),
+        "--watch",
+        "--workers",
+        "1",
+    ]
     return subprocess.Popen(
         [*command, "--no-report", "--estimator", "weak", "--model", "plain"],
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
@@ -50,7 +64,9 @@ def _watching(logs: Path, out: Path) -> subprocess.Popen[str]:
     )
 
 
-def test_settled_logs_are_taken_as_they_arrive_until_sigterm(content: bytes, tmp_path: Path) -> None:
+def test_settled_logs_are_taken_as_they_arrive_until_sigterm(
+    content: bytes, tmp_path: Path
+) -> None:
     logs, out = tmp_path / "logs", tmp_path / "out"
     logs.mkdir()
     (logs / "a.csv").write_bytes(content)
@@ -81,7 +97,9 @@ def test_settled_logs_are_taken_as_they_arrive_until_sigterm(content: bytes, tmp
     assert running.returncode == 0
     assert "jobs.parquet" in told
     table = pl.read_parquet(out / "jobs.parquet")
-    assert dict(zip(table["job"], table["status"], strict=True)) == dict.fromkeys(("a", "b", "growing"), "ok")
+    assert dict(zip(table["job"], table["status"], strict=True)) == dict.fromkeys(
+        ("a", "b", "growing"), "ok"
+    )
 
 
 def test_ctrl_c_ends_the_watch_without_a_traceback(tmp_path: Path) -> None:

@@ -72,15 +72,24 @@ def test_arguments_that_cannot_travel_fail_their_own_call(workers: Workers) -> N
 
 @pytest.mark.slow
 def test_a_call_past_its_time_fails_alone_and_its_worker_is_replaced() -> None:
-    with Workers(1, timeout=3.0) as executor:  # the first call waits for the process, not within its time
+    with Workers(
+        1, timeout=3.0
+    ) as executor:  # the first call waits for the process, not within its time
         futures = [executor.submit(calls.spin), executor.submit(calls.add, 1, 1)]
-        with pytest.raises(CallFailedError, match="longer than 3 s; raise --timeout, and run it again with --retry-f"):
+        with pytest.raises(
+            CallFailedError,
+            match="longer than 3 s; raise --timeout, and run it again with --retry-f",
+        ):
             futures[0].result(timeout=60)
         assert futures[1].result(timeout=60) == 2
 
 
-@pytest.mark.skipif(sys.gettrace() is not None, reason="a traced call is not interrupted as a call is")
-def test_a_call_that_goes_on_on_a_cluster_is_interrupted_or_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.skipif(
+    sys.gettrace() is not None, reason="a traced call is not interrupted as a call is"
+)
+def test_a_call_that_goes_on_on_a_cluster_is_interrupted_or_given_up(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     assert pickle.loads(answered_within(pickle.dumps((calls.add, (1, 1), {})), 60.0)) == (True, 2)
     spinning = pickle.dumps((calls.spin, (), {}))
     assert pickle.loads(answered_within(spinning, 0.2)) == (False, TOO_LONG.format(0.2))
@@ -95,7 +104,11 @@ def test_workers_that_are_ended_at_once_leave_no_process_and_no_folder(tmp_path:
     executor = Workers(2)
     folder = Path(executor.submit(calls.temporary_file).result(timeout=60)).parent
     told = tmp_path / "pid"
-    running = [executor.submit(calls.linger, str(told)), executor.submit(calls.spin), executor.submit(calls.add, 1, 1)]
+    running = [
+        executor.submit(calls.linger, str(told)),
+        executor.submit(calls.spin),
+        executor.submit(calls.add, 1, 1),
+    ]
     _wait_until(lambda: told.exists() and told.read_text() != "")
     assert folder.is_dir()
     pids = executor.pids
@@ -160,11 +173,15 @@ def _wait_until(condition: object) -> None:
         time.sleep(0.02)
 
 
-@pytest.mark.parametrize("address", [".", "", "x", "inproc://a", "tcp://127.0.0.1:99999", "tcp://a:0", "tcp://a b:1"])
+@pytest.mark.parametrize(
+    "address", [".", "", "x", "inproc://a", "tcp://127.0.0.1:99999", "tcp://a:0", "tcp://a b:1"]
+)
 def test_what_is_no_address_of_a_scheduler_is_refused_at_once(address: str) -> None:
     pytest.importorskip("distributed", reason="distributed is absent")
     with (
-        pytest.raises(SettingError, match=r"^--scheduler: expected an address like tcp://HOST:8786, found '"),
+        pytest.raises(
+            SettingError, match=r"^--scheduler: expected an address like tcp://HOST:8786, found '"
+        ),
         cluster(address, "out"),
     ):
         pass
@@ -193,7 +210,9 @@ def test_a_scheduler_that_does_not_answer_as_one_gets_one_line(kind: str) -> Non
                 check=False,
             )
     assert (done.returncode, done.stdout) == (2, "")
-    assert re.fullmatch(r"algid: --scheduler t\w\w://127.0.0.1:\d+: no scheduler answers \(.+\); .*\n", done.stderr)
+    assert re.fullmatch(
+        r"algid: --scheduler t\w\w://127.0.0.1:\d+: no scheduler answers \(.+\); .*\n", done.stderr
+    )
 
 
 def _greet_as_another(server: socket.socket) -> None:

@@ -31,7 +31,9 @@ class Done:
     @property
     def boxed(self) -> str:
         """What stands in typer's box about a wrong call, as one line."""
-        return " ".join(line.strip("│").strip() for line in self.err.splitlines() if line.startswith("│"))
+        return " ".join(
+            line.strip("│").strip() for line in self.err.splitlines() if line.startswith("│")
+        )
 
 
 def call(*arguments: str | Path) -> Done:

@@ -25,11 +25,23 @@ def test_a_refused_log_is_identified_where_its_code_is_accepted(code: str, tmp_p
     assert sorted(one.name for one in tmp_path.iterdir()) == ["arm.parquet"]
 
     taken = Outcome(
-        "identify", path, "-o", tmp_path, "--no-report", "--model", "plain", "--estimator", "weak", "--accept", code
+        "identify",
+        path,
+        "-o",
+        tmp_path,
+        "--no-report",
+        "--model",
+        "plain",
+        "--estimator",
+        "weak",
+        "--accept",
+        code,
     )
     assert taken.code in (0, 3), taken.err
     result = json.loads((tmp_path / "arm.algid" / "result.json").read_text())
-    assert [one["logs"] for one in result["notices"] if one["code"] == code] == [["arm.parquet"]], result["notices"]
+    assert [one["logs"] for one in result["notices"] if one["code"] == code] == [["arm.parquet"]], (
+        result["notices"]
+    )
     assert "Traceback" not in taken.err
     assert code in taken.out
     assert result["parameters"]

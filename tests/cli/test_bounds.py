@@ -39,12 +39,24 @@ def refused(*arguments: str) -> str:
     [
         (("--rate", "1e12"), "less than or equal to 1000000"),
         (("--duration", "1e9"), "less than or equal to 1000000"),
-        (("--duration", "1e6", "--rate", "1e6"), "1e+06 s at --rate 1e+06 Hz are 1e+12 samples; expected at most"),
-        (("--start-time", "0001-01-01"), "--start-time: expected a date from 1970 to 2037, found 0001-01-01T00:00:00"),
+        (
+            ("--duration", "1e6", "--rate", "1e6"),
+            "1e+06 s at --rate 1e+06 Hz are 1e+12 samples; expected at most",
+        ),
+        (
+            ("--start-time", "0001-01-01"),
+            "--start-time: expected a date from 1970 to 2037, found 0001-01-01T00:00:00",
+        ),
         (("--start-time", "1600-01-01"), "expected a date from 1970 to 2037"),
         (("--start-time", "2300-01-01"), "expected a date from 1970 to 2037"),
-        (("--initial", "1e9,0,0,0"), "--initial: expected angles within 1e+06 rad and 10000 rad/s, found '1e9,0,0,0'"),
-        (("--initial", "0,0,0,1e5"), "--initial: expected angles within 1e+06 rad and 10000 rad/s, found '0,0,0,1e5'"),
+        (
+            ("--initial", "1e9,0,0,0"),
+            "--initial: expected angles within 1e+06 rad and 10000 rad/s, found '1e9,0,0,0'",
+        ),
+        (
+            ("--initial", "0,0,0,1e5"),
+            "--initial: expected angles within 1e+06 rad and 10000 rad/s, found '0,0,0,1e5'",
+        ),
         (("--payload-schedule", "1=1e300"), "expected increasing times and payloads of 0 or more"),
         (("--position-noise", "1e308"), "less than or equal to 1000"),
     ],
@@ -74,25 +86,35 @@ def test_dates_that_stamps_can_hold_are_taken(year: str, tmp_path: Path) -> None
 def test_an_arm_that_none_is_like_is_refused_with_its_line(line: str, told: str) -> None:
     name = line.split()[0]
     values = {"m1": "1", "m2": "1", "l1": "0.3", "l2": "0.3"} | {name: line.split()[2]}
-    Path("arm.toml").write_text("[arm]\n" + "".join(f"{key} = {value}\n" for key, value in values.items()))
-    for command in (("synth", "arm.toml"), ("design", "arm.toml", "--range", "1", "--speed", "3", "--torque", "2")):
+    Path("arm.toml").write_text(
+        "[arm]\n" + "".join(f"{key} = {value}\n" for key, value in values.items())
+    )
+    for command in (
+        ("synth", "arm.toml"),
+        ("design", "arm.toml", "--range", "1", "--speed", "3", "--torque", "2"),
+    ):
         assert told in refused(*command, "-o", "out")
 
 
 @pytest.mark.parametrize(
-    "line", ["duration = 2e-30", "rate = 1e9", "runs = [9999, 1]", "speed = 1e300", "torque = 1e-200"]
+    "line",
+    ["duration = 2e-30", "rate = 1e9", "runs = [9999, 1]", "speed = 1e300", "torque = 1e-200"],
 )
 def test_a_limit_that_none_is_like_is_refused_in_a_file_as_in_a_flag(line: str) -> None:
     limits = {"range": "1.2", "speed": "3", "torque": "1.5"} | dict([line.split(" = ")])
     Path("limits.toml").write_text("".join(f"{key} = {value}\n" for key, value in limits.items()))
-    assert line.split()[0] in refused("design", "case1", "--limits", "limits.toml", "-o", "out", *NOISE)
+    assert line.split()[0] in refused(
+        "design", "case1", "--limits", "limits.toml", "-o", "out", *NOISE
+    )
 
 
 def test_a_name_that_is_too_long_is_called_that() -> None:
     name = "x" * 300
     long = "cannot write there (File name too long); give a shorter name"
     assert long in refused("synth", "case1", "-o", name, "--duration", "0.1")
-    assert long in refused("design", "case1", "--range", "1", "--speed", "3", "--torque", "2", *NOISE, "-o", name)
+    assert long in refused(
+        "design", "case1", "--range", "1", "--speed", "3", "--torque", "2", *NOISE, "-o", name
+    )
 
 
 def test_a_code_that_there_is_not_is_refused_and_all_that_there_are_are_taken() -> None:

@@ -21,9 +21,13 @@ from tests.processes import Outcome
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("logs")
-    made = Outcome("synth", "case1", "-o", folder, "--torque", "wide", "--duration", "2", "--format", "csv")
+    made = Outcome(
+        "synth", "case1", "-o", folder, "--torque", "wide", "--duration", "2", "--format", "csv"
+    )
     assert made.code == 0, made.err
-    assert made.out.split() == [str(folder / f"case1-{role}.csv") for role in ("unloaded", "loaded")]
+    assert made.out.split() == [
+        str(folder / f"case1-{role}.csv") for role in ("unloaded", "loaded")
+    ]
     return folder
 
 
@@ -55,20 +59,45 @@ def test_synth_identify_check(logs: Path, tmp_path: Path) -> None:
 
 def test_export_writes_beside_the_result_what_report_would(logs: Path, tmp_path: Path) -> None:
     found = Outcome(
-        "identify", logs / "case1-unloaded.csv", "-o", tmp_path, "-q", "--export", "mcap", "--model", "plain"
+        "identify",
+        logs / "case1-unloaded.csv",
+        "-o",
+        tmp_path,
+        "-q",
+        "--export",
+        "mcap",
+        "--model",
+        "plain",
     )
     assert (found.code, found.out, found.err) == (0, "", "")
     exported = tmp_path / "case1-unloaded.algid" / "estimates.mcap"
     ours = exported.read_bytes()
     Outcome("report", exported.parent, "--export", "mcap")
     assert exported.read_bytes() == ours
-    without = Outcome("identify", logs / "case1-unloaded.csv", "-o", tmp_path / "x", "--export", "mcap", "--no-report")
+    without = Outcome(
+        "identify",
+        logs / "case1-unloaded.csv",
+        "-o",
+        tmp_path / "x",
+        "--export",
+        "mcap",
+        "--no-report",
+    )
     assert (without.code, without.err.count("\n")) == (2, 1)
     assert "leave --no-report out" in without.err
 
 
 def test_verbose_tells_on_stderr_what_was_read_and_how(logs: Path, tmp_path: Path) -> None:
-    found = Outcome("identify", logs / "case1-unloaded.csv", "-o", tmp_path, "--no-report", "--format", "json", "-v")
+    found = Outcome(
+        "identify",
+        logs / "case1-unloaded.csv",
+        "-o",
+        tmp_path,
+        "--no-report",
+        "--format",
+        "json",
+        "-v",
+    )
     assert found.code == 0, found.err
     assert json.loads(found.out)["estimator"] == "refined"
     assert "2,001 samples" in found.err
@@ -95,7 +124,16 @@ def test_help_leaves_out_what_the_function_raises(command: str) -> None:
 
 def test_help_of_synth_names_its_options() -> None:
     shown = Outcome("synth", "--help").out
-    for option in ("--format", "--rate", "--duration", "--torque", "--initial", "--encoder-bits", "--jitter", "--drop"):
+    for option in (
+        "--format",
+        "--rate",
+        "--duration",
+        "--torque",
+        "--initial",
+        "--encoder-bits",
+        "--jitter",
+        "--drop",
+    ):
         assert option in shown
 
 
@@ -109,7 +147,10 @@ def broken(folder: Path, logs: Path, name: str, change: str) -> Path:
         table = table.with_columns(pl.lit("abc").alias("theta2"))
     elif change == "infinite":
         table = table.with_columns(
-            pl.when(pl.int_range(pl.len()) == 7).then(float("inf")).otherwise(pl.col("tau1")).alias("tau1")
+            pl.when(pl.int_range(pl.len()) == 7)
+            .then(float("inf"))
+            .otherwise(pl.col("tau1"))
+            .alias("tau1")
         )
     elif change == "time stands still":
         table = table.with_columns(pl.lit(0.5).alias("t"))
@@ -135,7 +176,9 @@ def broken(folder: Path, logs: Path, name: str, change: str) -> Path:
         "zero torque",
     ],
 )
-def test_bad_logs_get_one_line_and_nothing_is_written(change: str, logs: Path, tmp_path: Path) -> None:
+def test_bad_logs_get_one_line_and_nothing_is_written(
+    change: str, logs: Path, tmp_path: Path
+) -> None:
     path = broken(tmp_path, logs, "bad", change)
     out = tmp_path / "out"
     found = Outcome("identify", path, "-o", out, "--estimator", "paper")
@@ -185,15 +228,23 @@ def test_swapped_logs_are_told(logs: Path, tmp_path: Path) -> None:
 def test_weak_excitation_ends_with_three(tmp_path: Path) -> None:
     still = ("--torque", "none", "--position-noise", "1e-4", "--torque-noise", "1e-3")
     Outcome("synth", "case1", "-o", tmp_path, "--duration", "2", *still)
-    found = Outcome("identify", tmp_path / "case1-unloaded.mcap", "-o", tmp_path, "--estimator", "paper")
+    found = Outcome(
+        "identify", tmp_path / "case1-unloaded.mcap", "-o", tmp_path, "--estimator", "paper"
+    )
     assert found.code == 3
     assert "WEAK_EXCITATION" in found.out
 
 
 def test_a_failed_result_ends_with_three_and_says_what_to_run(logs: Path, tmp_path: Path) -> None:
-    table = pl.read_csv(logs / "case1-unloaded.csv").with_columns(-pl.col("theta2")).drop("omega1", "omega2")
+    table = (
+        pl.read_csv(logs / "case1-unloaded.csv")
+        .with_columns(-pl.col("theta2"))
+        .drop("omega1", "omega2")
+    )
     table.write_csv(tmp_path / "wrong.csv")
-    found = Outcome("identify", tmp_path / "wrong.csv", "-o", tmp_path, "--estimator", "weak", "--no-report")
+    found = Outcome(
+        "identify", tmp_path / "wrong.csv", "-o", tmp_path, "--estimator", "weak", "--no-report"
+    )
     assert found.code == 3
     lines = found.out.splitlines()
     assert lines[0].startswith("Failed: ")
@@ -217,7 +268,15 @@ def test_synth_overwrites_nothing_unless_forced(tmp_path: Path) -> None:
 
 
 def test_identify_says_where_it_wrote_and_takes_a_name(logs: Path, tmp_path: Path) -> None:
-    call = ("identify", logs / "case1-unloaded.csv", "-o", tmp_path, "--name", "monday", "--no-report")
+    call = (
+        "identify",
+        logs / "case1-unloaded.csv",
+        "-o",
+        tmp_path,
+        "--name",
+        "monday",
+        "--no-report",
+    )
     found = Outcome(*call, "--estimator", "weak")
     assert found.code == 0, found.err
     *notes, last = found.err.splitlines()
@@ -227,14 +286,27 @@ def test_identify_says_where_it_wrote_and_takes_a_name(logs: Path, tmp_path: Pat
 
 
 def test_how_a_log_was_read_is_reused_and_compared(logs: Path, tmp_path: Path) -> None:
-    """θ1 of the log counts from hanging: said once, for the arm; its later logs are read the same way."""
+    """θ1 of the log counts from hanging: said once, for the arm.
+
+    Its later logs are read the same way.
+    """
     hanging = {
         role: pl.read_csv(logs / f"case1-{role}.csv").with_columns(pl.col("theta1") + math.pi / 2)
         for role in ("unloaded", "loaded")
     }
     for role, table in hanging.items():
         table.drop("omega1", "omega2").write_csv(tmp_path / f"{role}.csv")
-    quick = ("-o", tmp_path, "--estimator", "weak", "--model", "plain", "--no-report", "--format", "json")
+    quick = (
+        "-o",
+        tmp_path,
+        "--estimator",
+        "weak",
+        "--model",
+        "plain",
+        "--no-report",
+        "--format",
+        "json",
+    )
     arm = Outcome("identify", tmp_path / "unloaded.csv", *quick, "--zero", "hanging")
     assert arm.code == 0, arm.err
     content = json.loads(arm.out)
@@ -244,15 +316,30 @@ def test_how_a_log_was_read_is_reused_and_compared(logs: Path, tmp_path: Path) -
     alike = Outcome("identify", *known, tmp_path / "loaded.csv", *quick)
     assert json.loads(alike.out)["log"]["reading"]["zero"] == "hanging"
     assert json.loads(alike.out)["payload"]["m_p"]["estimate"] == pytest.approx(0.3515, rel=0.02)
-    other = Outcome("identify", *known, tmp_path / "loaded.csv", *quick, "--zero", "horizontal", "--name", "other")
-    (warning,) = [one["text"] for one in json.loads(other.out)["notices"] if one["code"] == "READ_OTHERWISE"]
+    other = Outcome(
+        "identify",
+        *known,
+        tmp_path / "loaded.csv",
+        *quick,
+        "--zero",
+        "horizontal",
+        "--name",
+        "other",
+    )
+    (warning,) = [
+        one["text"] for one in json.loads(other.out)["notices"] if one["code"] == "READ_OTHERWISE"
+    ]
     assert "zero horizontal instead of hanging" in warning
     good = Outcome("validate", tmp_path / "unloaded.algid", tmp_path / "unloaded.csv")
     assert min(map(float, re.findall(r"R² (\S+?)[;\s]", good.out))) > 0.999
     assert good.err == ""
-    wrong = Outcome("validate", tmp_path / "unloaded.algid", tmp_path / "unloaded.csv", "--zero", "horizontal")
+    wrong = Outcome(
+        "validate", tmp_path / "unloaded.algid", tmp_path / "unloaded.csv", "--zero", "horizontal"
+    )
     assert "zero horizontal instead of hanging" in wrong.err
-    compared = Outcome("compare", tmp_path / "loaded.algid", tmp_path / "other.algid", "--format", "json")
+    compared = Outcome(
+        "compare", tmp_path / "loaded.algid", tmp_path / "other.algid", "--format", "json"
+    )
     assert json.loads(compared.out)["settings"]["loaded log: zero"] == ["hanging", "horizontal"]
 
 
@@ -274,8 +361,21 @@ def test_validate_predicts_another_log(tmp_path: Path) -> None:
             "synth", "case1", "-o", tmp_path / name, "--torque", "wide", "--duration", "4", "--seed", str(seed),
             "--position-noise", "1e-4", "--torque-noise", "1e-2",
         )  # fmt: skip
-    logs = [[tmp_path / name / f"case1-{role}.mcap" for role in ("unloaded", "loaded")] for name in ("one", "two")]
-    Outcome("identify", logs[0][0], "--loaded", logs[0][1], "-o", tmp_path, "--no-report", "--model", "plain")
+    logs = [
+        [tmp_path / name / f"case1-{role}.mcap" for role in ("unloaded", "loaded")]
+        for name in ("one", "two")
+    ]
+    Outcome(
+        "identify",
+        logs[0][0],
+        "--loaded",
+        logs[0][1],
+        "-o",
+        tmp_path,
+        "--no-report",
+        "--model",
+        "plain",
+    )
     folder = tmp_path / "case1-unloaded.algid"
     good = Outcome("validate", folder, logs[1][0], "--loaded", logs[1][1], "--max-nrmse", "0.3")
     assert good.code == 0, good.err + good.out
@@ -315,13 +415,27 @@ def test_a_stop_gets_one_line_and_leaves_nothing_half_written(
     long = long.with_columns(t=pl.int_range(pl.len()) * 1e-3)
     long.write_csv(tmp_path / "long.csv")
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "algid", "identify", str(tmp_path / "long.csv"), "-o", str(out)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
+    command = [
+        sys.executable,
+        "-m",
+        "algid",
+        "identify",
+        str(tmp_path / "long.csv"),
+        "-o",
+        str(out),
+    ]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as running:
         while not (out.exists() and list(out.iterdir())) and running.poll() is None:
             time.sleep(0.01)
         running.send_signal(sent)
         printed, told = running.communicate()
-    assert (running.returncode, printed, told) == (code, "", "algid: stopped; nothing half-written is left\n")
+    assert (running.returncode, printed, told) == (
+        code,
+        "",
+        "algid: stopped; nothing half-written is left\n",
+    )
     assert list(out.iterdir()) == []
 
 
@@ -331,12 +445,22 @@ def test_results_that_fit_no_arm_get_one_line(logs: Path, tmp_path: Path) -> Non
     content = json.loads((tmp_path / "case1-unloaded.algid" / "result.json").read_text())
     crooked = {**content, "fit": {**content["fit"], "covariance": [[1.0]]}}
     empty = {**content, "parameters": {}}
-    lost = {**content, "parameters": {**content["parameters"], "k3": {**content["parameters"]["k3"], "estimate": None}}}
+    lost = {
+        **content,
+        "parameters": {
+            **content["parameters"],
+            "k3": {**content["parameters"]["k3"], "estimate": None},
+        },
+    }
     texts = [json.dumps(crooked), json.dumps(empty), "[" * 100_000]
-    for text, said in zip(texts, ("covariance should have", "the result has no k1", "not JSON"), strict=True):
+    for text, said in zip(
+        texts, ("covariance should have", "the result has no k1", "not JSON"), strict=True
+    ):
         path = tmp_path / "result.json"
         path.write_text(text)
-        found = Outcome("identify", "--parameters", path, logs / "case1-loaded.csv", "-o", tmp_path / "out")
+        found = Outcome(
+            "identify", "--parameters", path, logs / "case1-loaded.csv", "-o", tmp_path / "out"
+        )
         assert (found.code, found.err.count("\n")) == (2, 1), found.err
         assert said in found.err
     path.write_text(json.dumps(lost))
@@ -345,9 +469,15 @@ def test_results_that_fit_no_arm_get_one_line(logs: Path, tmp_path: Path) -> Non
         ("identify", "--parameters", path),
         ("identify", "--estimator", "paper", "--parameters", path),
     ):
-        wrong = Outcome(*call, logs / f"case1-{'unloaded' if call[0] == 'validate' else 'loaded'}.csv", cwd=tmp_path)
+        wrong = Outcome(
+            *call,
+            logs / f"case1-{'unloaded' if call[0] == 'validate' else 'loaded'}.csv",
+            cwd=tmp_path,
+        )
         assert (wrong.code, wrong.out) == (2, "")
-        assert wrong.err.startswith(f"algid: {path}: the result "), wrong.err  # the file at fault, not its log
+        assert wrong.err.startswith(f"algid: {path}: the result "), (
+            wrong.err
+        )  # the file at fault, not its log
 
 
 def test_the_many_options_of_identify_stand_in_panels() -> None:
@@ -355,5 +485,13 @@ def test_the_many_options_of_identify_stand_in_panels() -> None:
     panels = ["Output", "What the log means", "Method", "The arm's model"]
     places = [shown.index(f"─ {panel} ─") for panel in panels]
     ends = sorted([*places, len(shown)])
-    for option, panel in (("--quiet", 0), ("--export", 0), ("--angle-unit", 1), ("--estimator", 2), ("--gravity", 3)):
-        assert places[panel] < shown.index(option, places[panel]) < ends[ends.index(places[panel]) + 1], option
+    for option, panel in (
+        ("--quiet", 0),
+        ("--export", 0),
+        ("--angle-unit", 1),
+        ("--estimator", 2),
+        ("--gravity", 3),
+    ):
+        assert (
+            places[panel] < shown.index(option, places[panel]) < ends[ends.index(places[panel]) + 1]
+        ), option

@@ -15,7 +15,19 @@ from algid.inspection import findings
 from tests.cli.commands import app
 
 FREE = {
-    *("topic", "joints", "start", "end", "name", "poles", "out", "sources", "scheduler", "memory_limit", "initial"),
+    *(
+        "topic",
+        "joints",
+        "start",
+        "end",
+        "name",
+        "poles",
+        "out",
+        "sources",
+        "scheduler",
+        "memory_limit",
+        "initial",
+    ),
     *("payload_schedule", "span", "speed", "acceleration", "runs", "wanted"),
 }
 """Options of text that is the user's own."""
@@ -36,8 +48,16 @@ def choices() -> Iterator[Any]:
     for name, command in commands():
         for option in command.params:
             kind = option.type_descriptor.annotation
-            text = kind in (str, list[str]) and option.name not in FREE and (name, option.name) != ("design", "torque")
-            if text or get_origin(kind) is Literal or (isinstance(kind, type) and issubclass(kind, Enum)):
+            text = (
+                kind in (str, list[str])
+                and option.name not in FREE
+                and (name, option.name) != ("design", "torque")
+            )
+            if (
+                text
+                or get_origin(kind) is Literal
+                or (isinstance(kind, type) and issubclass(kind, Enum))
+            ):
                 yield pytest.param(command, option, id=f"{name} {option.name}")
 
 
@@ -47,7 +67,9 @@ def completed(command: Any, option: Any, begun: str) -> list[str]:
 
 
 @pytest.mark.parametrize(("command", "option"), list(choices()))
-def test_every_choice_completes(command: Any, option: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_every_choice_completes(
+    command: Any, option: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.chdir(tmp_path)
     found = completed(command, option, "")
     assert found
@@ -85,4 +107,7 @@ def test_cases_and_files_complete(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
 
 
 def test_the_checks_that_refuse_are_those_of_the_table() -> None:
-    assert tuple(re.findall(r"^([A-Z_]+) +yes ", findings.__doc__ or "", re.MULTILINE)) == findings.REFUSED
+    assert (
+        tuple(re.findall(r"^([A-Z_]+) +yes ", findings.__doc__ or "", re.MULTILINE))
+        == findings.REFUSED
+    )

@@ -39,7 +39,12 @@ BAD, DEAD = record("c", End.FAILED, "no\x1b[31m torque"), record("d", End.KILLED
     [
         (Ended([GOOD, GOOD], 2, 0), False, 0, ["2 ok; 2 run now, 0 left; out/jobs.parquet"]),
         (Ended([], 0, 0), False, 0, ["nothing done; 0 run now, 0 left; out/jobs.parquet"]),
-        (Ended([GOOD, PART], 1, 0), False, 3, ["1 ok, 1 incomplete; 1 run now, 0 left; out/jobs.parquet"]),
+        (
+            Ended([GOOD, PART], 1, 0),
+            False,
+            3,
+            ["1 ok, 1 incomplete; 1 run now, 0 left; out/jobs.parquet"],
+        ),
         (
             Ended([GOOD, PART, BAD, DEAD], 4, 0),
             False,
@@ -51,9 +56,24 @@ BAD, DEAD = record("c", End.FAILED, "no\x1b[31m torque"), record("d", End.KILLED
             ],
         ),
         (Ended([GOOD], 1, 3), False, 1, ["1 ok; 1 run now, 3 left; out/jobs.parquet"]),
-        (Ended([GOOD, PART], 2, 3), True, 130, ["1 ok, 1 incomplete; 2 run now, 3 left; out/jobs.parquet"]),
-        (Ended([GOOD], 1, 3, "out: the disk is full"), True, 1, ["1 ok; 1 run now, 3 left; out/jobs.parquet"]),
-        (Ended([GOOD], 1, 0, "out: the disk is full"), False, 1, ["1 ok; 1 run now, 0 left; out/jobs.parquet"]),
+        (
+            Ended([GOOD, PART], 2, 3),
+            True,
+            130,
+            ["1 ok, 1 incomplete; 2 run now, 3 left; out/jobs.parquet"],
+        ),
+        (
+            Ended([GOOD], 1, 3, "out: the disk is full"),
+            True,
+            1,
+            ["1 ok; 1 run now, 3 left; out/jobs.parquet"],
+        ),
+        (
+            Ended([GOOD], 1, 0, "out: the disk is full"),
+            False,
+            1,
+            ["1 ok; 1 run now, 0 left; out/jobs.parquet"],
+        ),
     ],
 )
 def test_a_batch_says_what_became_of_its_jobs(
@@ -106,7 +126,14 @@ class Watched:
 def test_a_watch_complains_once_and_retries_what_failed_once(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    looks: list[Any] = [SettingError("logs: gone"), SettingError("logs: gone"), ["a"], SettingError("twice"), [], ["b"]]
+    looks: list[Any] = [
+        SettingError("logs: gone"),
+        SettingError("logs: gone"),
+        ["a"],
+        SettingError("twice"),
+        [],
+        ["b"],
+    ]
 
     def jobs_of(*_: object) -> Any:
         found = looks.pop(0)
@@ -115,7 +142,9 @@ def test_a_watch_complains_once_and_retries_what_failed_once(
         return found
 
     monkeypatch.setattr("algid.batch.discover.jobs_of", jobs_of)
-    monkeypatch.setattr("algid.batch.run.Settling", lambda: SimpleNamespace(settled=lambda jobs: jobs))
+    monkeypatch.setattr(
+        "algid.batch.run.Settling", lambda: SimpleNamespace(settled=lambda jobs: jobs)
+    )
     running: Any = Watched(6)
     ended = command._watch(running, ["logs"], "out", "logs", True)
     assert running.heard == [([], False), (["a"], True), (["b"], False)]
@@ -138,17 +167,32 @@ def test_results_are_named_by_what_tells_them_apart(tmp_path: Path) -> None:
 
 
 def synthetic(folder: Path, *flags: str, role: str = "unloaded") -> pl.DataFrame:
-    done = call("synth", "case1", "-o", folder, "--format", "csv", "--rate", "200", "--duration", "0.5", *flags)
+    done = call(
+        "synth",
+        "case1",
+        "-o",
+        folder,
+        "--format",
+        "csv",
+        "--rate",
+        "200",
+        "--duration",
+        "0.5",
+        *flags,
+    )
     assert done.code == 0, done.err
     return pl.read_csv(folder / f"case1-{role}.csv")
 
 
 def test_velocities_are_in_a_log_only_where_its_angles_are_exact(tmp_path: Path) -> None:
     exact = synthetic(tmp_path / "exact")
-    assert exact.columns == ["t", "theta1", "theta2", "omega1", "omega2", "tau1", "tau2"] or {"omega1"} < {
-        *exact.columns
-    }
-    for name, flags in {"noise": ("--position-noise", "1e-4"), "encoder": ("--encoder-bits", "12")}.items():
+    assert exact.columns == ["t", "theta1", "theta2", "omega1", "omega2", "tau1", "tau2"] or {
+        "omega1"
+    } < {*exact.columns}
+    for name, flags in {
+        "noise": ("--position-noise", "1e-4"),
+        "encoder": ("--encoder-bits", "12"),
+    }.items():
         assert "omega1" not in synthetic(tmp_path / name, *flags).columns
     step = 2 * math.pi / 2**12
     for name in ("theta1", "theta2"):
@@ -158,8 +202,13 @@ def test_velocities_are_in_a_log_only_where_its_angles_are_exact(tmp_path: Path)
 
 
 def test_a_drive_holds_or_ramps_the_torque(tmp_path: Path) -> None:
-    """The log holds what was commanded at its stamps, whatever the drive does between; the motion differs."""
-    logs = {hold: synthetic(tmp_path / hold, "--torque-hold", hold) for hold in ("exact", "zoh", "foh")}
+    """The log holds what was commanded at its stamps, whatever the drive does between.
+
+    The motion differs.
+    """
+    logs = {
+        hold: synthetic(tmp_path / hold, "--torque-hold", hold) for hold in ("exact", "zoh", "foh")
+    }
     moved = {hold: log["theta1"].to_numpy() for hold, log in logs.items()}
     torque = {hold: log["tau1"].to_numpy() for hold, log in logs.items()}
     assert torque["foh"] == pytest.approx(torque["exact"], abs=1e-12)
@@ -171,7 +220,12 @@ def test_a_drive_holds_or_ramps_the_torque(tmp_path: Path) -> None:
 def test_a_start_and_a_schedule_are_taken(tmp_path: Path) -> None:
     began = synthetic(tmp_path / "began", "--initial", "-1,0.25,0.5,-0.75")
     first = began.row(0, named=True)
-    assert [first[name] for name in ("theta1", "theta2", "omega1", "omega2")] == [-1, 0.25, 0.5, -0.75]
+    assert [first[name] for name in ("theta1", "theta2", "omega1", "omega2")] == [
+        -1,
+        0.25,
+        0.5,
+        -0.75,
+    ]
     bare = synthetic(tmp_path / "bare")
     picked = synthetic(tmp_path / "picked", "--payload-schedule", "0.2=0.3,0.4=0", role="schedule")
     written = sorted(path.name for path in (tmp_path / "picked").iterdir())
@@ -180,7 +234,16 @@ def test_a_start_and_a_schedule_are_taken(tmp_path: Path) -> None:
     assert apart[:41].max() < 1e-9  # until it is grasped at 0.2 s
     assert apart[60] > 1e-6
     mine = (tmp_path / "picked" / "case1-schedule.csv").read_bytes()
-    again = call("synth", "case1", "-o", tmp_path / "picked", "--format", "csv", "--payload-schedule", "0.2=0.3")
+    again = call(
+        "synth",
+        "case1",
+        "-o",
+        tmp_path / "picked",
+        "--format",
+        "csv",
+        "--payload-schedule",
+        "0.2=0.3",
+    )
     assert (again.code, again.out) == (2, "")
     assert "case1-schedule.csv: exists already" in again.err
     assert (tmp_path / "picked" / "case1-schedule.csv").read_bytes() == mine
@@ -202,7 +265,17 @@ def prior() -> Any:
 def test_noise_is_the_flags_then_a_logs_then_the_results(tmp_path: Path) -> None:
     by_flags = _noise(prior(), 1e-3, 2e-2, None)
     assert (by_flags.theta.tolist(), by_flags.tau.tolist()) == ([1e-3, 1e-3], [2e-2, 2e-2])
-    synthetic(tmp_path, "--position-noise", "1e-3", "--torque-noise", "2e-2", "--rate", "1000", "--duration", "2")
+    synthetic(
+        tmp_path,
+        "--position-noise",
+        "1e-3",
+        "--torque-noise",
+        "2e-2",
+        "--rate",
+        "1000",
+        "--duration",
+        "2",
+    )
     log = tmp_path / "case1-unloaded.csv"
     measured = _noise(prior(), None, None, log)
     # a first guess from differences: to a fifth or so
@@ -211,9 +284,13 @@ def test_noise_is_the_flags_then_a_logs_then_the_results(tmp_path: Path) -> None
     mixed = _noise(prior(), 5e-3, None, log)
     assert mixed.theta.tolist() == [5e-3, 5e-3]
     assert mixed.tau.tolist() == measured.tau.tolist()
-    known = SimpleNamespace(source="arm", noise=NoiseLevels(np.full(2, 3e-4), np.array([0.1, np.nan])))
+    known = SimpleNamespace(
+        source="arm", noise=NoiseLevels(np.full(2, 3e-4), np.array([0.1, np.nan]))
+    )
     assert _noise(known, None, 0.2, None).theta.tolist() == [3e-4, 3e-4]  # type: ignore[arg-type]
-    with pytest.raises(SettingError, match=r"^--torque-noise: arm does not tell how noisy the sensors are; give it"):
+    with pytest.raises(
+        SettingError, match=r"^--torque-noise: arm does not tell how noisy the sensors are; give it"
+    ):
         _noise(known, None, None, None)  # type: ignore[arg-type]
 
 

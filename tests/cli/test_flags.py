@@ -66,7 +66,9 @@ def options(*kinds: Any) -> Iterator[Any]:
 @pytest.mark.parametrize(("command", "option"), [*options(float)])
 def test_a_number_is_finite_and_within_its_bounds(command: str, option: Any) -> None:
     flag, info = option.opts[-1], option.type_descriptor.parameter_info
-    assert "valid number" in refused(command, f"{flag}=much") or "valid float" in refused(command, f"{flag}=much")
+    assert "valid number" in refused(command, f"{flag}=much") or "valid float" in refused(
+        command, f"{flag}=much"
+    )
     for text in ("nan", "inf", "-inf"):
         told = refused(command, f"{flag}={text}")
         if told.startswith("Invalid value"):  # a bound is told before
@@ -76,9 +78,13 @@ def test_a_number_is_finite_and_within_its_bounds(command: str, option: Any) -> 
             assert told == f"{flag}: expected a finite number, found {text}"
     if info.min is not None:
         least = f"{info.min:.12f}".rstrip("0").rstrip(".")
-        assert f"greater than or equal to {least}" in refused(command, f"{flag}={info.min - 1e-3:.17g}")
+        assert f"greater than or equal to {least}" in refused(
+            command, f"{flag}={info.min - 1e-3:.17g}"
+        )
     if info.max is not None:
-        assert f"less than or equal to {info.max:.15g}" in refused(command, f"{flag}={1.001 * info.max:.17g}")
+        assert f"less than or equal to {info.max:.15g}" in refused(
+            command, f"{flag}={1.001 * info.max:.17g}"
+        )
 
 
 @pytest.mark.parametrize(("command", "option"), [*options(int)])
@@ -99,7 +105,9 @@ def choices() -> Iterator[Any]:
             if get_origin(kind) is Literal:
                 yield pytest.param(name, option, list(get_args(kind)), id=f"{name} {option.name}")
             elif isinstance(kind, type) and issubclass(kind, Enum):
-                yield pytest.param(name, option, [one.value for one in kind], id=f"{name} {option.name}")
+                yield pytest.param(
+                    name, option, [one.value for one in kind], id=f"{name} {option.name}"
+                )
 
 
 @pytest.mark.parametrize(("command", "option", "known"), [*choices()])
@@ -117,11 +125,15 @@ def test_a_choice_that_there_is_not_is_told_with_those_that_there_are(
 def test_a_date_that_is_none_is_told_with_its_forms(command: str, option: Any) -> None:
     for text in ("soon", "2026-02-30", "12:00"):
         told = refused(command, f"{option.opts[-1]}={text}")
-        assert told.startswith(f"Invalid value for '{option.opts[-1]}': Input should be a valid datetime")
+        assert told.startswith(
+            f"Invalid value for '{option.opts[-1]}': Input should be a valid datetime"
+        )
 
 
 ANGLES = "'rad', 'mrad', 'deg', 'rev' or 'counts'"
-TORQUES = "'N m', 'mN m', 'N cm', 'kN m', 'kgf m', 'kgf cm', 'lbf ft', 'lbf in', 'ozf in', 'A' or 'mA'"
+TORQUES = (
+    "'N m', 'mN m', 'N cm', 'kN m', 'kgf m', 'kgf cm', 'lbf ft', 'lbf in', 'ozf in', 'A' or 'mA'"
+)
 OF_A_LOG = [
     ("--joints", "one", "--joints: expected two names like shoulder,elbow, found 'one'"),
     ("--joints", "a,b,c", "--joints: expected two names like shoulder,elbow, found 'a,b,c'"),
@@ -136,7 +148,11 @@ OF_A_LOG = [
         "N",
         f"--torque-unit (profile: tau1.unit): expected {TORQUES}, found 'N' (and 1 more)",
     ),
-    ("--zero", "sideways", "--zero (profile: zero): expected 'horizontal' or 'hanging', found 'sideways'"),
+    (
+        "--zero",
+        "sideways",
+        "--zero (profile: zero): expected 'horizontal' or 'hanging', found 'sideways'",
+    ),
     ("--zero", "", "--zero (profile: zero): expected 'horizontal' or 'hanging', found ''"),
     (
         "--second-angle",
@@ -154,16 +170,26 @@ OF_A_LOG = [
     ("--set", "zero", "--set zero: expected KEY=VALUE like tau1.sign=-1"),
     ("--set", "=1", "--set =1: expected KEY=VALUE like tau1.sign=-1"),
     ("--set", "tau1.sign=2", "--set (profile: tau1.sign): expected 1 or -1, found 2"),
-    ("--set", "tau1.colour=red", "--set (profile: tau1.colour): extra inputs are not permitted, found 'red'"),
+    (
+        "--set",
+        "tau1.colour=red",
+        "--set (profile: tau1.colour): extra inputs are not permitted, found 'red'",
+    ),
     ("--set", "no such=1", "--set (profile: no such): extra inputs are not permitted, found '1'"),
-    ("--profile", "absent.toml", "absent.toml: cannot read it (No such file or directory); check the name"),
+    (
+        "--profile",
+        "absent.toml",
+        "absent.toml: cannot read it (No such file or directory); check the name",
+    ),
 ]
 UNCHECKED = {"topic", "accept", "name", "scheduler", "out"}
 """Text that means what it says: names, which a log or a folder has or has not."""
 
 
 @pytest.mark.parametrize(("flag", "text", "line"), OF_A_LOG)
-def test_what_a_log_cannot_mean_is_told_alike_by_every_command(flag: str, text: str, line: str) -> None:
+def test_what_a_log_cannot_mean_is_told_alike_by_every_command(
+    flag: str, text: str, line: str
+) -> None:
     for command in READERS:
         assert refused(command, f"{flag}={text}") == line, command
 
@@ -185,7 +211,9 @@ OF_SETTINGS = [
 
 
 @pytest.mark.parametrize(("flag", "text", "line"), OF_SETTINGS)
-def test_a_setting_without_a_meaning_is_told_alike_by_identify_and_batch(flag: str, text: str, line: str) -> None:
+def test_a_setting_without_a_meaning_is_told_alike_by_identify_and_batch(
+    flag: str, text: str, line: str
+) -> None:
     for command in ("identify", "batch"):
         assert refused(command, f"{flag}={text}") == line, command
 
@@ -260,12 +288,16 @@ OWN = [
 
 
 @pytest.mark.parametrize(("command", "flags", "line"), OWN)
-def test_what_a_command_cannot_do_is_one_line(command: str, flags: tuple[str, ...], line: str) -> None:
+def test_what_a_command_cannot_do_is_one_line(
+    command: str, flags: tuple[str, ...], line: str
+) -> None:
     assert refused(command, *flags) == line
 
 
 def test_no_option_of_text_is_left_untried() -> None:
-    tried = {flag for flag, *_ in (*OF_A_LOG, *OF_SETTINGS)} | {flag for _, flags, _ in OWN for flag in flags[::2]}
+    tried = {flag for flag, *_ in (*OF_A_LOG, *OF_SETTINGS)} | {
+        flag for _, flags, _ in OWN for flag in flags[::2]
+    }
     for param in options(str, list):
         _, option = param.values
         assert option.opts[-1] in tried or option.name in UNCHECKED | {"loaded"}, param.id

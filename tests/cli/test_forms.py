@@ -23,7 +23,16 @@ def run(*arguments: str | Path, code: int = 0) -> str:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("forms")
-    noisy = ("--torque", "wide", "--duration", "2", "--position-noise", "1e-3", "--torque-noise", "1e-2")
+    noisy = (
+        "--torque",
+        "wide",
+        "--duration",
+        "2",
+        "--position-noise",
+        "1e-3",
+        "--torque-noise",
+        "1e-2",
+    )
     run("synth", "case1", "-o", place, *noisy, "--start-time", "2026-01-31T12:00:00")
     run("identify", place / "case1-unloaded.mcap", "-o", place, "--no-report", "-q")
     return place

@@ -27,7 +27,12 @@ from pipelines.hostile.values import anything, changed
         (0, "", "\u202e", "escape"),
         (2, "", "out of words\n", "lines"),
         (2, "", "algid: while reading x: not enough memory (MemoryError: x)\n", "memory"),
-        (2, "", "algid: while reading x: a library cannot take it (PanicError: x); look at the file\n", "library"),
+        (
+            2,
+            "",
+            "algid: while reading x: a library cannot take it (PanicError: x); look at the file\n",
+            "library",
+        ),
     ],
 )
 def test_the_judge_sees_every_bad_end(code: int, out: str, err: str, kind: str) -> None:
@@ -53,4 +58,11 @@ def test_calls_and_documents_are_the_same_for_the_same_seed() -> None:
         others = {as_toml(changed(content, random.Random(seed))) for seed in range(20)}
         assert len(others) > 10
         assert as_toml(content) == before  # what is drawn leaves the sound one as it is
-    assert {type(anything(random.Random(seed))) for seed in range(200)} >= {dict, list, str, float, int, bool}
+    assert {type(anything(random.Random(seed))) for seed in range(200)} >= {
+        dict,
+        list,
+        str,
+        float,
+        int,
+        bool,
+    }

@@ -36,8 +36,13 @@ def raising(error: BaseException) -> Callable[..., Any]:
 
 
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Callable[..., Any]:
-    """Runs a command in this process as the console script does; gives its exit code and standard error."""
+def run(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> Callable[..., Any]:
+    """Runs a command in this process as the console script does.
+
+    Gives its exit code and standard error.
+    """
     (tmp_path / "log.csv").write_text("t,theta1\n0,1\n")
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("ALGID_TRACEBACK", raising=False)
@@ -83,14 +88,22 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
     ],
 )
 def test_what_a_library_raises_names_the_file_and_the_stage(
-    raised: BaseException, code: int, line: str, run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+    raised: BaseException,
+    code: int,
+    line: str,
+    run: Callable[..., Any],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("algid.inspection.report.format_of", raising(raised))
     assert run("inspect", "log.csv") == (code, f"algid: {line}\n")
 
 
-def test_a_fault_of_algid_is_called_one(run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("algid.inspection.report.format_of", lambda _path: None)  # then algid's own line fails
+def test_a_fault_of_algid_is_called_one(
+    run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "algid.inspection.report.format_of", lambda _path: None
+    )  # then algid's own line fails
     line = (
         "algid: internal error: while opening log.csv: AttributeError: 'NoneType' object has no attribute 'name'; "
         "this is a fault of algid: report it, see where with ALGID_TRACEBACK=1\n"
@@ -117,8 +130,14 @@ def test_an_end_that_is_meant_keeps_its_meaning(
 def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("result")
     noisy = ("--position-noise", "1e-3", "--torque-noise", "1e-2")
-    assert Outcome("synth", "case1", "-o", folder, "--torque", "wide", "--duration", "4", *noisy).code == 0
-    assert Outcome("identify", folder / "case1-unloaded.mcap", "-o", folder, "--no-report", "-q").code == 0
+    assert (
+        Outcome("synth", "case1", "-o", folder, "--torque", "wide", "--duration", "4", *noisy).code
+        == 0
+    )
+    assert (
+        Outcome("identify", folder / "case1-unloaded.mcap", "-o", folder, "--no-report", "-q").code
+        == 0
+    )
     return folder / "case1-unloaded.algid"
 
 
@@ -140,7 +159,11 @@ def test_a_full_standard_output_is_one_line_of_every_command(result: Path, tmp_p
     for arguments in calls:
         with Path("/dev/full").open("wb") as full, (tmp_path / "err").open("wb") as err:
             code = begin(*arguments, stdout=full.fileno(), stderr=err.fileno())()
-        told = [line for line in (tmp_path / "err").read_text().splitlines() if not line.startswith(("wrote", "note"))]
+        told = [
+            line
+            for line in (tmp_path / "err").read_text().splitlines()
+            if not line.startswith(("wrote", "note"))
+        ]
         assert code == 2, arguments
         assert told == [
             "algid: standard output: cannot write (No space left on device); send it elsewhere, or make room"
@@ -200,10 +223,14 @@ def test_an_escape_is_jsons() -> None:
     assert printable("θ ± 1\n\tok") == "θ ± 1\n\tok"
 
 
-def test_a_terminals_own_colours_pass_and_a_texts_do_not(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_terminals_own_colours_pass_and_a_texts_do_not(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     from rich.text import Text
 
-    console(force_terminal=True, color_system="standard").print(Text("bad \x1b]0;title\x07", "bold"))
+    console(force_terminal=True, color_system="standard").print(
+        Text("bad \x1b]0;title\x07", "bold")
+    )
     shown = capsys.readouterr().out
     assert shown.startswith("\x1b[1mbad ")
     assert "\x1b]0" not in shown
@@ -215,8 +242,18 @@ def test_no_command_prints_but_through_the_one_place() -> None:
     found = []
     for path in folder.glob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
-            name = getattr(node.func, "attr", getattr(node.func, "id", "")) if isinstance(node, ast.Call) else ""
+            name = (
+                getattr(node.func, "attr", getattr(node.func, "id", ""))
+                if isinstance(node, ast.Call)
+                else ""
+            )
             if name in ("print", "echo", "secho", "Console") and path.name != "output.py":
                 found.append((path.name, ast.unparse(node)))
-    allowed = ("console", "terminal.print", "print('algid: it runs on", "print(f'\\r\\x1b", "print('\\r\\x1b")
+    allowed = (
+        "console",
+        "terminal.print",
+        "print('algid: it runs on",
+        "print(f'\\r\\x1b",
+        "print('\\r\\x1b",
+    )
     assert [one for one in found if not one[1].startswith(allowed)] == []

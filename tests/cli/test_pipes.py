@@ -79,7 +79,12 @@ def test_an_option_that_names_a_pipe_is_refused(command: str, option: str, place
         "identify": [log, "-o", str(place / "again")],
         "inspect": [log],
         "synth": ["case1", "-o", str(place / "synth"), "--duration", "2"],
-        "track": [log, "-o", str(place / "track"), *([] if option == "--parameters" else ["--parameters", result])],
+        "track": [
+            log,
+            "-o",
+            str(place / "track"),
+            *([] if option == "--parameters" else ["--parameters", result]),
+        ],
         "validate": [result, log],
     }
     refused([command, *arguments[command], option, str(place / "pipe")])
@@ -128,7 +133,9 @@ def refused(arguments: list[str]) -> None:
     assert "no regular file" in text or (arguments[0] == "batch" and "found none" in text), text
 
 
-def test_a_pipe_among_a_batchs_logs_fails_alone(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_pipe_among_a_batchs_logs_fails_alone(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(place)
     with soon():
         done = CliRunner().invoke(app, ["batch", "pipe.csv", "-o", "batch"])
@@ -137,7 +144,9 @@ def test_a_pipe_among_a_batchs_logs_fails_alone(place: Path, monkeypatch: pytest
 
 
 @pytest.mark.parametrize("command", [["report"], ["report", "--export", "mcap"]], ids=" ".join)
-def test_a_series_of_a_result_that_is_a_pipe_is_absent(command: list[str], place: Path, tmp_path: Path) -> None:
+def test_a_series_of_a_result_that_is_a_pipe_is_absent(
+    command: list[str], place: Path, tmp_path: Path
+) -> None:
     folder = tmp_path / "x.algid"
     copytree(place / "case1-unloaded.algid", folder)
     for series in folder.glob("*.parquet"):

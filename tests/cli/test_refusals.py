@@ -13,15 +13,25 @@ from tests.cli.commands import call
 
 @pytest.mark.parametrize(
     ("text", "size"),
-    [("2GB", 2 * 10**9), ("2 gb", 2 * 10**9), ("1.5GiB", 3 * 2**29), ("600MiB", 600 * 2**20), ("536870912", 2**29)],
+    [
+        ("2GB", 2 * 10**9),
+        ("2 gb", 2 * 10**9),
+        ("1.5GiB", 3 * 2**29),
+        ("600MiB", 600 * 2**20),
+        ("536870912", 2**29),
+    ],
 )
 def test_memory_is_read_in_the_units_of_memory(text: str, size: int) -> None:
     assert _bytes(text) == size
 
 
-@pytest.mark.parametrize("text", ["", "GB", "2XB", "1e3GB", "511MiB", "-2GB", "inf", "nan", "1" + "0" * 400 + "GB"])
+@pytest.mark.parametrize(
+    "text", ["", "GB", "2XB", "1e3GB", "511MiB", "-2GB", "inf", "nan", "1" + "0" * 400 + "GB"]
+)
 def test_no_memory_and_too_little_is_refused(text: str) -> None:
-    with pytest.raises(SettingError, match=r"--memory-limit: expected at least 512MiB, like 2GB, found"):
+    with pytest.raises(
+        SettingError, match=r"--memory-limit: expected at least 512MiB, like 2GB, found"
+    ):
         _bytes(text)
 
 
@@ -33,12 +43,36 @@ def test_no_memory_and_too_little_is_refused(text: str) -> None:
             "--scheduler: workers and their memory are the cluster's; set them where it is started",
         ),
         (
-            ["batch", "logs", "-o", "out", "--scheduler", "tcp://127.0.0.1:1", "--memory-limit", "2GB"],
+            [
+                "batch",
+                "logs",
+                "-o",
+                "out",
+                "--scheduler",
+                "tcp://127.0.0.1:1",
+                "--memory-limit",
+                "2GB",
+            ],
             "--scheduler: workers and their memory are the cluster's; set them where it is started",
         ),
-        (["batch", "absent", "-o", "out"], "absent: there is no such file, folder or match; check the name"),
+        (
+            ["batch", "absent", "-o", "out"],
+            "absent: there is no such file, folder or match; check the name",
+        ),
         (["synth", "case9"], "case9"),
-        (["identify", "log.csv", "--estimator", "paper", "--loaded", "a.csv", "--loaded", "b.csv"], "log.csv"),
+        (
+            [
+                "identify",
+                "log.csv",
+                "--estimator",
+                "paper",
+                "--loaded",
+                "a.csv",
+                "--loaded",
+                "b.csv",
+            ],
+            "log.csv",
+        ),
         (["validate", "absent.algid", "log.csv"], "absent.algid"),
         (["check", "absent.algid"], "absent.algid"),
         (["track", "log.csv", "--parameters", "absent.algid"], "absent.algid"),

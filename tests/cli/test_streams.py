@@ -18,8 +18,14 @@ ALGID = [sys.executable, "-m", "algid"]
 def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("result")
     noisy = ("--position-noise", "1e-3", "--torque-noise", "1e-2")
-    assert Outcome("synth", "case1", "-o", folder, "--torque", "wide", "--duration", "4", *noisy).code == 0
-    assert Outcome("identify", folder / "case1-unloaded.mcap", "-o", folder, "--no-report", "-q").code == 0
+    assert (
+        Outcome("synth", "case1", "-o", folder, "--torque", "wide", "--duration", "4", *noisy).code
+        == 0
+    )
+    assert (
+        Outcome("identify", folder / "case1-unloaded.mcap", "-o", folder, "--no-report", "-q").code
+        == 0
+    )
     return folder / "case1-unloaded.algid"
 
 
@@ -29,7 +35,11 @@ def test_a_reader_that_leaves_is_no_error(result: Path, errors_too: bool, tmp_pa
     os.close(reading)  # as head does once it has seen enough
     with (tmp_path / "errors").open("w+b") as stream:
         errors = writing if errors_too else stream.fileno()
-        for arguments in (["compare", result, result], ["check", result, "--max-error", "50"], ["--help"]):
+        for arguments in (
+            ["compare", result, result],
+            ["check", result, "--max-error", "50"],
+            ["--help"],
+        ):
             assert begin(*arguments, stdout=writing, stderr=errors)() == 0, arguments
         done = subprocess.run([*ALGID, "--help"], stdout=writing, stderr=errors, check=False)
         assert done.returncode == 0
@@ -40,7 +50,9 @@ def test_a_reader_that_leaves_is_no_error(result: Path, errors_too: bool, tmp_pa
 def test_a_failure_is_one_for_a_reader_that_leaves_too(result: Path) -> None:
     reading, writing = os.pipe()
     os.close(reading)
-    done = subprocess.run([*ALGID, "check", result, "--max-error", "1e-9"], stdout=writing, check=False)
+    done = subprocess.run(
+        [*ALGID, "check", result, "--max-error", "1e-9"], stdout=writing, check=False
+    )
     os.close(writing)
     assert done.returncode == 1
 
@@ -49,12 +61,18 @@ def test_a_failure_is_one_for_a_reader_that_leaves_too(result: Path) -> None:
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
 def test_terminals_without_greek_are_spelled_to(result: Path, encoding: str) -> None:
     env = {**os.environ, "PYTHONIOENCODING": encoding, "COLUMNS": "80"}
-    done = subprocess.run([*ALGID, "compare", result, result], capture_output=True, env=env, check=False)
+    done = subprocess.run(
+        [*ALGID, "compare", result, result], capture_output=True, env=env, check=False
+    )
     assert (done.returncode, done.stderr) == (0, b"")
     assert "/sigma" in done.stdout.decode(encoding)
-    helped = subprocess.run([*ALGID, "identify", "--help"], capture_output=True, env=env, check=False)
+    helped = subprocess.run(
+        [*ALGID, "identify", "--help"], capture_output=True, env=env, check=False
+    )
     assert (helped.returncode, helped.stderr) == (0, b"")
-    refused = subprocess.run([*ALGID, "identify", "θ–名.csv"], capture_output=True, env=env, check=False)
+    refused = subprocess.run(
+        [*ALGID, "identify", "θ–名.csv"], capture_output=True, env=env, check=False
+    )
     assert refused.returncode == 2
     assert refused.stderr.decode(encoding).startswith("algid: theta-\\u540d.csv: ")
 

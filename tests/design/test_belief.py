@@ -27,7 +27,9 @@ def test_the_covariance_is_the_inverse_of_the_information_held_at_unknown_sizes(
     np.testing.assert_allclose(np.diag(C), 1 / (np.diag(S) + held), rtol=1e-12)
     np.testing.assert_allclose(asked().relative(S)[2], UNKNOWN, rtol=1e-12)  # nothing is told of it
     assert asked().largest(S) == pytest.approx(UNKNOWN)
-    assert asked(wanted=np.array([1, 1, 0])).largest(S) == pytest.approx(np.sqrt(1 / 25.0), rel=1e-6)
+    assert asked(wanted=np.array([1, 1, 0])).largest(S) == pytest.approx(
+        np.sqrt(1 / 25.0), rel=1e-6
+    )
 
 
 def test_relative_bounds_of_correlated_parameters_are_those_of_cramer_and_rao() -> None:
@@ -37,7 +39,9 @@ def test_relative_bounds_of_correlated_parameters_are_those_of_cramer_and_rao() 
     np.testing.assert_allclose(asked().relative(S), np.sqrt(np.diag(covariance)) / SIZES, rtol=1e-3)
     np.testing.assert_allclose(asked().covariance(S), asked().covariance(S).T, rtol=1e-10)
     # D-optimality's volume and A-optimality's sum are those of the same matrix
-    assert np.linalg.slogdet(asked().covariance(S))[1] == pytest.approx(-np.linalg.slogdet(S)[1], rel=1e-3)
+    assert np.linalg.slogdet(asked().covariance(S))[1] == pytest.approx(
+        -np.linalg.slogdet(S)[1], rel=1e-3
+    )
     relative = np.sum(asked().relative(S) ** 2)
     assert relative == pytest.approx(np.trace(covariance / np.outer(SIZES, SIZES)), rel=1e-3)
 
@@ -86,7 +90,9 @@ def belief(box: bool) -> Belief:
 def test_drawn_arms_scatter_as_believed(box: bool) -> None:
     one = belief(box)
     drawn = one.draws(4000, seed=3)
-    std = np.sqrt(np.diag(one.spread @ one.spread.T) / (3 if box else 1))  # a uniform number has variance a third
+    std = np.sqrt(
+        np.diag(one.spread @ one.spread.T) / (3 if box else 1)
+    )  # a uniform number has variance a third
     np.testing.assert_allclose(one.std, std, rtol=1e-12)
     np.testing.assert_allclose(drawn.mean(axis=0), one.mean, atol=5 * std.max() / np.sqrt(4000))
     np.testing.assert_allclose(drawn.std(axis=0), std, atol=5 * std.max() / np.sqrt(8000))
@@ -131,7 +137,9 @@ def test_what_is_asked_for_is_what_the_prior_knows_or_what_is_named() -> None:
     np.testing.assert_array_equal(named.size, np.abs(one.mean))
     vague = Belief(one.shared, one.mean, 6 * one.spread, True)
     found = asked_for(vague, None, "it")
-    np.testing.assert_array_equal(np.flatnonzero(~found.known), [7])  # of k4, 4 ± 1.73, it is two deviations sure
+    np.testing.assert_array_equal(
+        np.flatnonzero(~found.known), [7]
+    )  # of k4, 4 ± 1.73, it is two deviations sure
     np.testing.assert_array_equal(found.wanted, found.known)
     assert found.size[3] == 4.0
     with pytest.raises(SettingError) as refused:

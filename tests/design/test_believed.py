@@ -23,7 +23,9 @@ CASE = Case("mine", ARM, 0.5, None, {})
 PAYLOAD = {"m_p": 0.5, "l1": 0.4, "l2": 0.3}
 
 
-def believed(result: Result, folder: Path, loaded: bool | None = None, **knowns: Any) -> BelievedArm:
+def believed(
+    result: Result, folder: Path, loaded: bool | None = None, **knowns: Any
+) -> BelievedArm:
     file = folder / "arm.json"
     file.write_text(result_json(result), encoding="utf-8")
     return prior_of(str(file), loaded, KnownBefore(**knowns))
@@ -39,14 +41,18 @@ def test_the_spread_of_a_case_is_what_each_mass_and_friction_moves() -> None:
     link2 = [0.4 * 0.15, g * 0.15, 0.01 + 0.15**2, g * 0.4, 0.4**2, 0, 0, 0, 0, 0]
     friction1, friction2, payload = 0.5 * np.eye(10)[5], 0.25 * np.eye(10)[6], 0.5 * np.eye(10)[7]
     lengths = 0.4 * np.eye(10)[8] + 0.3 * np.eye(10)[9]
-    np.testing.assert_allclose(belief.mean, np.sum([link1, link2, friction1, friction2, payload, lengths], axis=0))
+    np.testing.assert_allclose(
+        belief.mean, np.sum([link1, link2, friction1, friction2, payload, lengths], axis=0)
+    )
     expected = 0.1 * np.array([link1, link2, friction1, friction2, payload]).T
     np.testing.assert_allclose(belief.spread, expected, atol=1e-14)
     assert belief.box
     np.testing.assert_array_equal(prior.lengths, [0.4, 0.3])
     assert (prior.noise, prior.doubts, prior.source) == (None, (), "mine")
     usual = of_case(CASE, "mine", None, KnownBefore()).belief.spread
-    np.testing.assert_allclose(usual, 2 * belief.spread, atol=1e-14)  # a fifth where nothing is told
+    np.testing.assert_allclose(
+        usual, 2 * belief.spread, atol=1e-14
+    )  # a fifth where nothing is told
 
 
 def test_what_the_user_knows_beats_the_case() -> None:
@@ -62,7 +68,13 @@ def test_what_the_user_knows_beats_the_case() -> None:
 
 @pytest.mark.parametrize(
     ("payload", "loaded", "carried"),
-    [(0.5, None, True), (0.0, None, False), (0.5, False, False), (0.5, True, True), (0.0, False, False)],
+    [
+        (0.5, None, True),
+        (0.0, None, False),
+        (0.5, False, False),
+        (0.5, True, True),
+        (0.0, False, False),
+    ],
 )
 def test_there_are_loaded_runs_if_asked_for_or_a_payload_is_known(
     payload: float, loaded: bool | None, carried: bool
@@ -83,9 +95,13 @@ def test_a_results_covariance_is_believed_whole(tmp_path: Path) -> None:
     assert result.fit is not None
     C = np.array(result.fit.covariance)
     C[0, 3] = C[3, 0] = 0.8 * np.sqrt(C[0, 0] * C[3, 3])
-    result = result.model_copy(update={"fit": result.fit.model_copy(update={"covariance": C.tolist()})})
+    result = result.model_copy(
+        update={"fit": result.fit.model_copy(update={"covariance": C.tolist()})}
+    )
     prior = believed(result, tmp_path)
-    np.testing.assert_allclose(prior.belief.spread @ prior.belief.spread.T, C, rtol=1e-9, atol=1e-12 * C.max())
+    np.testing.assert_allclose(
+        prior.belief.spread @ prior.belief.spread.T, C, rtol=1e-9, atol=1e-12 * C.max()
+    )
     assert not prior.belief.box
     np.testing.assert_allclose(prior.lengths, [0.4, 0.3])
     assert prior.noise is None  # the made-up result tells none
@@ -99,10 +115,15 @@ def test_noise_of_a_result_is_taken_where_all_of_it_is_there(tmp_path: Path) -> 
         ({"theta1": 1e-3, "theta2": 0.0, "tau1": 0.1, "tau2": 0.2}, False),
         ({"theta1": 1e-3, "tau1": 0.1, "tau2": 0.2}, False),
     ):
-        prior = believed(result.model_copy(update={"fit": result.fit.model_copy(update={"noise": noise})}), tmp_path)
+        prior = believed(
+            result.model_copy(update={"fit": result.fit.model_copy(update={"noise": noise})}),
+            tmp_path,
+        )
         assert (prior.noise is not None) == known
         if prior.noise is not None:
-            np.testing.assert_array_equal([prior.noise.theta, prior.noise.tau], [[1e-3, 2e-3], [0.1, 0.2]])
+            np.testing.assert_array_equal(
+                [prior.noise.theta, prior.noise.tau], [[1e-3, 2e-3], [0.1, 0.2]]
+            )
 
 
 def test_a_payload_that_is_given_is_as_wrong_as_told(tmp_path: Path) -> None:
@@ -169,4 +190,6 @@ def test_lengths_that_the_result_was_told_are_not_estimated(tmp_path: Path) -> N
     np.testing.assert_array_equal(prior.lengths, [0.4, 0.3])
     other = believed(told, tmp_path, l2=0.31)
     np.testing.assert_array_equal(other.lengths, [0.4, 0.31])
-    assert believed(result_of(values_of(ODD)), tmp_path).lengths.tolist() == pytest.approx([np.nan] * 2, nan_ok=True)
+    assert believed(result_of(values_of(ODD)), tmp_path).lengths.tolist() == pytest.approx(
+        [np.nan] * 2, nan_ok=True
+    )

@@ -34,7 +34,18 @@ FLAGS: dict[str, str | float | None] = {
     "acceleration": "40",
     "tip_height": -0.27,
 }
-LIMITS = ["--range", "1.2", "--speed", "3", "--torque", "1.9,0.95", "--acceleration", "40", "--tip-height", "-0.27"]
+LIMITS = [
+    "--range",
+    "1.2",
+    "--speed",
+    "3",
+    "--torque",
+    "1.9,0.95",
+    "--acceleration",
+    "40",
+    "--tip-height",
+    "-0.27",
+]
 SENSORS = ["--position-noise", "1e-3", "--torque-noise", "1e-2"]
 DURATION = 2.0
 
@@ -79,7 +90,9 @@ def test_no_limit_breaks_for_any_arm_that_is_believed_possible(design: Design) -
 
 
 def test_limits_are_used_up_to_the_margin(design: Design) -> None:
-    assert max(used for _, used in design.binding) == pytest.approx(1 - design.campaign.margin, rel=1e-3)
+    assert max(used for _, used in design.binding) == pytest.approx(
+        1 - design.campaign.margin, rel=1e-3
+    )
 
 
 def test_the_motion_is_at_rest_at_both_ends_and_as_long_as_asked(design: Design) -> None:
@@ -93,13 +106,17 @@ def random_bounds(count: int) -> FloatArray:
     kept_limits = asked.limits.within(asked.margin)
     loads = [asked.belief.load(loaded) for loaded in (False, True)]
     rest = resting(kept_limits, asked.belief.shared.model, loads)
-    problem = PositionProblem(asked.experiment, asked.belief, kept_limits, asked.asked, DURATION, rest)
+    problem = PositionProblem(
+        asked.experiment, asked.belief, kept_limits, asked.asked, DURATION, rest
+    )
     rng = np.random.default_rng(5)
     bounds = []
     for _ in range(count):
         x = kept(problem, problem.random(rng), 100.0, 0.999)
         slopes = problem.slopes(x, 100.0)
-        bounds.append(asked.asked.largest(Information(asked.experiment, asked.belief.mean, slopes).S))
+        bounds.append(
+            asked.asked.largest(Information(asked.experiment, asked.belief.mean, slopes).S)
+        )
     return np.array(bounds)
 
 
@@ -145,7 +162,19 @@ def run(*arguments: str) -> tuple[int, str]:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("designs")
-    code, text = run("case1", *LIMITS, *SENSORS, "--duration", "2", "--rate", "500", "--joints", "a,b", "-o", str(out))
+    code, text = run(
+        "case1",
+        *LIMITS,
+        *SENSORS,
+        "--duration",
+        "2",
+        "--rate",
+        "500",
+        "--joints",
+        "a,b",
+        "-o",
+        str(out),
+    )
     assert code == 0, text
     return out / "case1.design"
 
@@ -159,7 +188,9 @@ def test_the_folder_holds_the_trajectory_in_every_form(folder: Path) -> None:
         np.testing.assert_allclose(log.theta[0], table["theta1"], atol=1e-12)
         np.testing.assert_allclose(log.tau[1], table["tau2"], atol=1e-12)
         assert log.omega is not None
-    motion = [table.select(f"{name}1", f"{name}2").to_numpy().T for name in ("theta", "omega", "alpha")]
+    motion = [
+        table.select(f"{name}1", f"{name}2").to_numpy().T for name in ("theta", "omega", "alpha")
+    ]
     k = prior_of("case1", None, KnownBefore()).belief.load(True).c
     loaded = table.select("loaded_tau1", "loaded_tau2").to_numpy().T
     np.testing.assert_allclose(inverse_dynamics(k, *motion), loaded, atol=1e-9)
@@ -171,13 +202,22 @@ def test_the_joint_trajectory_is_what_a_controller_takes(folder: Path) -> None:
     message = YAML(typ="safe").load((folder / "joint_trajectory.yaml").read_text(encoding="utf-8"))
     assert message["joint_names"] == ["a", "b"]
     table = pl.read_csv(folder / "trajectory.csv")
-    times = [p["time_from_start"]["sec"] + 1e-9 * p["time_from_start"]["nanosec"] for p in message["points"]]
+    times = [
+        p["time_from_start"]["sec"] + 1e-9 * p["time_from_start"]["nanosec"]
+        for p in message["points"]
+    ]
     assert np.all(np.diff(times) > 0)
     assert times[-1] == 2.0
     rows = np.round(np.array(times) * 500).astype(int)
-    for field, name in (("positions", "theta"), ("velocities", "omega"), ("accelerations", "alpha")):
+    for field, name in (
+        ("positions", "theta"),
+        ("velocities", "omega"),
+        ("accelerations", "alpha"),
+    ):
         values = np.array([point[field] for point in message["points"]])
-        np.testing.assert_allclose(values, table[rows].select(f"{name}1", f"{name}2").to_numpy(), atol=1e-8)
+        np.testing.assert_allclose(
+            values, table[rows].select(f"{name}1", f"{name}2").to_numpy(), atol=1e-8
+        )
 
 
 def test_the_report_states_every_parameter_and_runs_its_own_scripts_only(folder: Path) -> None:
@@ -187,11 +227,23 @@ def test_the_report_states_every_parameter_and_runs_its_own_scripts_only(folder:
     assert '<svg viewBox="' in text
     policy = text.split('http-equiv="Content-Security-Policy" content="')[1].split('"')[0]
     assert policy.count("'sha256-") == 3
-    assert content["largest_relative_bound"] == max(row["relative"] for row in content["parameters"].values())
+    assert content["largest_relative_bound"] == max(
+        row["relative"] for row in content["parameters"].values()
+    )
 
 
 def test_the_campaign_can_be_rehearsed(folder: Path, tmp_path: Path) -> None:
-    arguments = ["synth", "case1", "--motion", str(folder), "--rate", "500", "-o", str(tmp_path), *SENSORS]
+    arguments = [
+        "synth",
+        "case1",
+        "--motion",
+        str(folder),
+        "--rate",
+        "500",
+        "-o",
+        str(tmp_path),
+        *SENSORS,
+    ]
     done = CliRunner().invoke(app, arguments)
     assert done.exit_code == 0, done.output
     plan_of = pl.read_csv(folder / "trajectory.csv")
@@ -208,7 +260,9 @@ def test_an_open_loop_is_written_as_a_log_whose_torque_synth_replays(tmp_path: P
         patch.setattr("algid.design.torque.GENERATIONS", 3)
         patch.setattr("algid.design.torque.POPULATION", 8)
         limits = ["--range", "1.5", "--speed", "9", "--torque", "1.9,0"]  # joint 2 has no drive
-        code, text = run("case1", *limits, *SENSORS, "--drive", "torque", "--duration", "2", "-o", str(tmp_path))
+        code, text = run(
+            "case1", *limits, *SENSORS, "--drive", "torque", "--duration", "2", "-o", str(tmp_path)
+        )
     assert code in (0, 3), text
     assert "velocity of joint 2 at the end" in text
     folder = tmp_path / "case1.design"
@@ -228,8 +282,14 @@ REFUSED = [
         ["case1", *SENSORS, *LIMITS, "--range=-0.2:0.2,-0.1:0.1", "--torque", "0.2,0.2"],
         "--torque: the loaded arm asks for",
     ),
-    (["case1", *SENSORS, *LIMITS, "--tip-height", "0.1"], "--tip-height: within the range the tip rises no higher"),
-    (["case1", *SENSORS, *LIMITS, "--tip-height", "5"], "--tip-height: expected less than the arm's reach"),
+    (
+        ["case1", *SENSORS, *LIMITS, "--tip-height", "0.1"],
+        "--tip-height: within the range the tip rises no higher",
+    ),
+    (
+        ["case1", *SENSORS, *LIMITS, "--tip-height", "5"],
+        "--tip-height: expected less than the arm's reach",
+    ),
     (["case1", *SENSORS, *LIMITS, "--for", "k9"], "--for k9: expected some of k1"),
     (["case1", *SENSORS, *LIMITS, "--runs", "1,0", "--for", "m_p"], "there are no loaded runs"),
     (["case1", *SENSORS, *LIMITS, "--runs", "0,0"], "--runs: expected numbers of runs"),
@@ -239,7 +299,9 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("arguments", "words"), REFUSED, ids=[words for _, words in REFUSED])
-def test_what_makes_no_sense_is_refused_in_one_line(arguments: list[str], words: str, tmp_path: Path) -> None:
+def test_what_makes_no_sense_is_refused_in_one_line(
+    arguments: list[str], words: str, tmp_path: Path
+) -> None:
     code, text = run(*arguments, "-o", str(tmp_path))
     assert code == 2
     assert words in text
@@ -249,7 +311,10 @@ def test_what_makes_no_sense_is_refused_in_one_line(arguments: list[str], words:
 
 def test_limits_of_a_file_are_beaten_by_flags(tmp_path: Path) -> None:
     file = tmp_path / "limits.toml"
-    file.write_text("range = [[-2.5, -0.5], [-1, 1]]\nspeed = 2\ntorque = [3, inf]\nruns = [2, 1]\n", encoding="utf-8")
+    file.write_text(
+        "range = [[-2.5, -0.5], [-1, 1]]\nspeed = 2\ntorque = [3, inf]\nruns = [2, 1]\n",
+        encoding="utf-8",
+    )
     asked = request(file, {"speed": "4,5", "torque": None})
     limits = limits_of(asked, np.array([0.2, 0.2]))
     np.testing.assert_array_equal(limits.low, [-2.5, -1])
@@ -270,6 +335,8 @@ def test_an_arm_of_lengths_and_masses_has_uniform_links(tmp_path: Path) -> None:
     assert value["k5"] == pytest.approx(2.0 * 0.4**2 / 3 + 1.0 * 0.4**2)
     assert "m_p" not in value
     asked = asked_for(belief, None, "arm")
-    assert not asked.wanted[belief.shared.names.index("k6")]  # no friction is known, so none is asked for
+    assert not asked.wanted[
+        belief.shared.names.index("k6")
+    ]  # no friction is known, so none is asked for
     with pytest.raises(SettingError, match="cannot tell it from zero"):
         asked_for(belief, ["k6"], "arm")

@@ -85,7 +85,9 @@ BASE = ["t", "theta1", "theta2", "omega1", "omega2", "alpha1", "alpha2", "tau1",
         ((False, True), "torque", ["loaded_theta1", "loaded_theta2", "loaded_tau1", "loaded_tau2"]),
     ],
 )
-def test_a_trajectory_has_the_columns_that_its_runs_need(loaded: tuple[bool, ...], drive: str, more: list[str]) -> None:
+def test_a_trajectory_has_the_columns_that_its_runs_need(
+    loaded: tuple[bool, ...], drive: str, more: list[str]
+) -> None:
     one = made_up(loaded=loaded, drive=drive)
     columns = trajectory(one)
     assert list(columns) == BASE + more
@@ -109,7 +111,11 @@ def test_points_of_the_joint_trajectory_come_fifty_times_a_second_and_at_the_end
     for point, place in zip(message["points"], places, strict=True):
         told = point["time_from_start"]
         assert (told["sec"], told["nanosec"]) == divmod(round(place / 120 * 1e9), 10**9)
-        for name, values in (("positions", "theta"), ("velocities", "omega"), ("accelerations", "alpha")):
+        for name, values in (
+            ("positions", "theta"),
+            ("velocities", "omega"),
+            ("accelerations", "alpha"),
+        ):
             expected = getattr(made_up().motion, values)[:, place]
             np.testing.assert_allclose(point[name], expected, atol=0.5001e-9)
 
@@ -128,13 +134,20 @@ def test_a_zero_of_a_joint_trajectory_has_no_sign_and_few_samples_are_all_taken(
 
 def test_the_json_holds_what_decides_and_what_is_predicted() -> None:
     one = made_up()
-    origin = Provenance("arm.algid", "algid design arm.algid", ("a", "b"), (Notice("DOUBT", "something"),))
+    origin = Provenance(
+        "arm.algid", "algid design arm.algid", ("a", "b"), (Notice("DOUBT", "something"),)
+    )
     text = design_json(one, origin)
     assert text.endswith("}\n")
     content = json.loads(text)
     assert content["version"] == __version__
     assert (content["prior"], content["command"]) == ("arm.algid", "algid design arm.algid")
-    assert (content["drive"], content["duration"], content["rate"], content["seed"]) == ("position", 0.5, RATE, 3)
+    assert (content["drive"], content["duration"], content["rate"], content["seed"]) == (
+        "position",
+        0.5,
+        RATE,
+        3,
+    )
     assert content["runs"] == {"unloaded": 2, "loaded": 1}
     assert content["interrupted"] is True
     assert content["noise"] == {"theta1": 1e-3, "theta2": 2e-3, "tau1": 1e-2, "tau2": 3e-2}
@@ -147,12 +160,15 @@ def test_the_json_holds_what_decides_and_what_is_predicted() -> None:
         "tip_height": None,
         "margin": 0.1,
     }
-    assert [(row["limit"], row["joint"], row["loaded"], row["share"]) for row in content["used"]] == [
+    assert [
+        (row["limit"], row["joint"], row["loaded"], row["share"]) for row in content["used"]
+    ] == [
         ("speed", 1, None, 0.9),
         ("torque", 1, True, 0.7),
         ("range", 2, None, 0.5),
     ]
-    # a share of the distance from the middle, 1, to the lower end, -1; of the speed; of the torque, the other way
+    # a share of the distance from the middle, 1, to the lower end, -1; of the speed; of the
+    # torque, the other way
     expected = [(2.0, 1.8), (-5.0, -3.5), (-1.0, 0.0)]
     np.testing.assert_allclose([(row["allowed"], row["most"]) for row in content["used"]], expected)
     assert content["start"] == one.motion.theta[:, 0].tolist()
@@ -161,7 +177,9 @@ def test_the_json_holds_what_decides_and_what_is_predicted() -> None:
     assert "something" in [reason["text"] for reason in content["verdict"]["reasons"]]
     k4, k7 = content["parameters"]["k4"], content["parameters"]["k7"]
     assert (k4["believed"], k4["unit"], k4["asked"]) == (4.0, "N m", True)
-    np.testing.assert_allclose([k4["believed_std"], k4["std"], k4["relative"], k4["worst_std"]], [0.4, 3.2, 0.8, 0.1])
+    np.testing.assert_allclose(
+        [k4["believed_std"], k4["std"], k4["relative"], k4["worst_std"]], [0.4, 3.2, 0.8, 0.1]
+    )
     assert k4["information_by_second"] == [0.25, 0.1235]
     assert (k7["relative"], k7["asked"]) == (None, False)  # what is zero has no relative error
     assert content["largest_relative_bound"] == pytest.approx(0.8)
@@ -173,7 +191,11 @@ def test_a_design_names_what_stays_open_and_what_binds_first() -> None:
     assert replace(one, std=0.499 * one.campaign.asked.size).open_parameters == []
     assert len(replace(one, std=0.501 * one.campaign.asked.size).open_parameters) == 6
     assert one.largest == pytest.approx(0.8)
-    assert [(row.limit, used) for row, used in one.binding] == [("speed", 0.9), ("torque", 0.7), ("range", 0.5)]
+    assert [(row.limit, used) for row, used in one.binding] == [
+        ("speed", 0.9),
+        ("torque", 0.7),
+        ("range", 0.5),
+    ]
     assert one.names == ("k1", "k2", "k3", "k4", "k5", "k6", "k7")
     assert made_up(loaded=(True,)).motion is not None
 
@@ -182,11 +204,15 @@ def test_a_height_stands_in_the_json_where_there_is_one() -> None:
     one = made_up()
     limited = replace(one.campaign, limits=replace(one.campaign.limits, height=-0.3))
     usage = Usage((Row("tip-height", None, upper=False),), np.array([[0.25]]))
-    content = json.loads(design_json(replace(one, campaign=limited, usage=usage), Provenance("a", "b")))
+    content = json.loads(
+        design_json(replace(one, campaign=limited, usage=usage), Provenance("a", "b"))
+    )
     assert content["limits"]["tip_height"] == -0.3
     (used,) = content["used"]
     assert (used["limit"], used["joint"], used["allowed"]) == ("tip-height", None, -0.3)
-    assert used["most"] == pytest.approx(0.7 - 0.25 * 1.0)  # a quarter of the metre below the stretched arm's tip
+    assert used["most"] == pytest.approx(
+        0.7 - 0.25 * 1.0
+    )  # a quarter of the metre below the stretched arm's tip
 
 
 def test_points_are_a_fiftieth_of_a_second_apart_whatever_the_rate() -> None:

@@ -18,7 +18,9 @@ from algid.signals.differences import POINTS, Stencil
 RATE = 40.0
 FAMILY = Fourier(1.5)
 SHARED = Shared(Model(("coulomb",), coulomb_speed=0.5), payload=True, lengths={"l1": 0.4})
-BETA = np.array([0.05, 1.0, 0.03, 4.0, 0.2, 0.3, 0.2, 0.25, 0.15, 0.5, 0.3])  # k1 … k7, f1, f2, m_p, l2
+BETA = np.array(
+    [0.05, 1.0, 0.03, 4.0, 0.2, 0.3, 0.2, 0.25, 0.15, 0.5, 0.3]
+)  # k1 … k7, f1, f2, m_p, l2
 
 
 def motion(seed: int = 1) -> Motion:
@@ -26,7 +28,9 @@ def motion(seed: int = 1) -> Motion:
     return FAMILY.motion(x, FAMILY.basis(middles(FAMILY.duration, RATE)))
 
 
-def torque_by_hand(beta: FloatArray, q: FloatArray, v: FloatArray, a: FloatArray, loaded: bool) -> FloatArray:
+def torque_by_hand(
+    beta: FloatArray, q: FloatArray, v: FloatArray, a: FloatArray, loaded: bool
+) -> FloatArray:
     """The torque of two links with Coulomb friction and a point mass at the tip, from Lagrange's equations."""
     k1, k2, k3, k4, k5, k6, k7, f1, f2, m, l2 = beta
     g, l1, m = 9.81, 0.4, m * loaded
@@ -34,11 +38,16 @@ def torque_by_hand(beta: FloatArray, q: FloatArray, v: FloatArray, a: FloatArray
     both = q[0] + q[1]
     weight2 = (k2 + m * g * l2) * np.cos(both)
     spin = v[0] + v[1]
-    # d/dt of the momenta of the angle in space (joint 2) and of joint 1, less the kinetic energy's slope
-    second = outer * (a[0] + a[1]) + mixed * (np.cos(q[1]) * a[0] + np.sin(q[1]) * v[0] ** 2) + weight2
+    # d/dt of the momenta of the angle in space (joint 2) and of joint 1, less the kinetic energy's
+    # slope
+    second = (
+        outer * (a[0] + a[1]) + mixed * (np.cos(q[1]) * a[0] + np.sin(q[1]) * v[0] ** 2) + weight2
+    )
     turned = mixed * (np.cos(q[1]) * (a[0] + a[1]) - np.sin(q[1]) * spin**2)
     first = inner * a[0] + turned + (k4 + m * g * l1) * np.cos(q[0])
-    friction = np.stack([k6 * v[0] + f1 * np.tanh(v[0] / 0.5), k7 * v[1] + f2 * np.tanh(v[1] / 0.5)])
+    friction = np.stack(
+        [k6 * v[0] + f1 * np.tanh(v[0] / 0.5), k7 * v[1] + f2 * np.tanh(v[1] / 0.5)]
+    )
     return np.stack([first + second, second]) + friction
 
 
@@ -57,7 +66,10 @@ def by_hand(noise: NoiseLevels, runs: tuple[int, int], one: Motion, rate: float)
     n, weights = one.theta.shape[1], Stencil(1 / RATE).weights
     total = np.zeros((BETA.size, BETA.size))
     for loaded in (False, True):
-        J = slopes_by(lambda b, loaded=loaded: torque_by_hand(b, one.theta, one.omega, one.alpha, loaded), BETA)
+        J = slopes_by(
+            lambda b, loaded=loaded: torque_by_hand(b, one.theta, one.omega, one.alpha, loaded),
+            BETA,
+        )
         G = np.zeros((2 * n, 2 * (n + POINTS - 1)))
         signals = [one.theta, one.omega, one.alpha]
         for order in range(3):
@@ -71,8 +83,13 @@ def by_hand(noise: NoiseLevels, runs: tuple[int, int], one: Motion, rate: float)
                 for sample in range(n):
                     for row in range(2):
                         place = joint * (n + POINTS - 1) + sample
-                        G[row * n + sample, place : place + POINTS] += slope[row, sample] * weights[order]
-        V = np.diag(np.repeat(noise.tau**2, n)) + (G * np.repeat(noise.theta**2, n + POINTS - 1)) @ G.T
+                        G[row * n + sample, place : place + POINTS] += (
+                            slope[row, sample] * weights[order]
+                        )
+        V = (
+            np.diag(np.repeat(noise.tau**2, n))
+            + (G * np.repeat(noise.theta**2, n + POINTS - 1)) @ G.T
+        )
         total += runs[loaded] * (rate / RATE) * J.T @ np.linalg.solve(V, J)
     return total
 
@@ -87,22 +104,30 @@ def test_information_is_that_of_the_whole_covariance(sigma: float, runs: tuple[i
     S = Information(experiment, BETA, Slopes(SHARED.model, one, RATE)).S
     expected = by_hand(noise, runs, one, 1000.0)
     scale = np.sqrt(np.diag(expected))
-    np.testing.assert_allclose(S / np.outer(scale, scale), expected / np.outer(scale, scale), rtol=0, atol=1e-6)
+    np.testing.assert_allclose(
+        S / np.outer(scale, scale), expected / np.outer(scale, scale), rtol=0, atol=1e-6
+    )
     np.testing.assert_allclose(S, S.T, rtol=1e-9, atol=1e-9 * np.abs(S).max())
 
 
 def test_without_noise_of_the_angles_each_sample_adds_its_own() -> None:
     noise = NoiseLevels(np.full(2, 1e-12), np.array([0.02, 0.05]))
     one = motion()
-    J = slopes_by(lambda b: torque_by_hand(b, one.theta, one.omega, one.alpha, False), BETA).reshape(2, -1, BETA.size)
-    information = Information(Experiment(SHARED, (2, 0), noise, RATE), BETA, Slopes(SHARED.model, one, RATE))
+    J = slopes_by(
+        lambda b: torque_by_hand(b, one.theta, one.omega, one.alpha, False), BETA
+    ).reshape(2, -1, BETA.size)
+    information = Information(
+        Experiment(SHARED, (2, 0), noise, RATE), BETA, Slopes(SHARED.model, one, RATE)
+    )
     parts = information.parts(25)
     assert parts.shape[0] == 3  # 60 samples: two of 25 and one of 10
     for place, part in enumerate(parts):
         own = J[:, 25 * place : 25 * (place + 1)] / noise.tau[:, None, None]
         expected = 2 * np.einsum("anq,anr->qr", own, own)
         np.testing.assert_allclose(part, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
-    np.testing.assert_allclose(parts.sum(axis=0), information.S, rtol=0, atol=1e-9 * np.abs(information.S).max())
+    np.testing.assert_allclose(
+        parts.sum(axis=0), information.S, rtol=0, atol=1e-9 * np.abs(information.S).max()
+    )
 
 
 def test_noise_takes_information_away_and_none_adds_any() -> None:
@@ -110,7 +135,11 @@ def test_noise_takes_information_away_and_none_adds_any() -> None:
     found = []
     for sigma in (1e-5, 1e-3, 1e-2):
         noise = NoiseLevels(np.full(2, sigma), np.full(2, 0.02))
-        found.append(Information(Experiment(SHARED, (1, 1), noise, RATE), BETA, Slopes(SHARED.model, one, RATE)).S)
+        found.append(
+            Information(
+                Experiment(SHARED, (1, 1), noise, RATE), BETA, Slopes(SHARED.model, one, RATE)
+            ).S
+        )
     scale = np.sqrt(np.diag(found[0]))
     for more, less in pairwise(found):
         lost = np.linalg.eigvalsh((more - less) / np.outer(scale, scale))
@@ -128,12 +157,18 @@ def test_kinds_that_move_differently_each_tell_their_own() -> None:
         np.testing.assert_allclose(found.S, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
     # every other sample weighs twice as much
     thin = informations(experiment, {True: motion(2)}, BETA, 2, RATE)[0]
-    kept = Motion(*(signal[:, ::2] for signal in (both[True].theta, both[True].omega, both[True].alpha)))
-    whole = Information(Experiment(SHARED, (0, 3), noise, RATE), BETA, Slopes(SHARED.model, kept, RATE / 2))
+    kept = Motion(
+        *(signal[:, ::2] for signal in (both[True].theta, both[True].omega, both[True].alpha))
+    )
+    whole = Information(
+        Experiment(SHARED, (0, 3), noise, RATE), BETA, Slopes(SHARED.model, kept, RATE / 2)
+    )
     np.testing.assert_array_equal(thin.S, whole.S)
     quiet = NoiseLevels(np.full(2, 1e-12), np.full(2, 0.02))
     alone = Experiment(SHARED, (0, 1), quiet, RATE)
-    once, half = (Information(alone, BETA, Slopes(SHARED.model, kept, rate)).S for rate in (RATE, RATE / 2))
+    once, half = (
+        Information(alone, BETA, Slopes(SHARED.model, kept, rate)).S for rate in (RATE, RATE / 2)
+    )
     np.testing.assert_allclose(half, 2 * once, rtol=1e-9, atol=1e-12 * half.max())
 
 

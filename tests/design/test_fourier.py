@@ -18,7 +18,9 @@ def by_sympy(wave: str) -> list[Callable[..., FloatArray]]:
     s = t / rise
     window = s**4 * (35 - 84 * s + 70 * s**2 - 20 * s**3)
     expression = window * getattr(sp, wave)(omega * t) / omega
-    return [sp.lambdify((t, omega, rise), sp.diff(expression, t, order), "numpy") for order in range(3)]
+    return [
+        sp.lambdify((t, omega, rise), sp.diff(expression, t, order), "numpy") for order in range(3)
+    ]
 
 
 @pytest.mark.parametrize("duration", [1.5, 12.0])
@@ -31,15 +33,24 @@ def test_waves_and_their_derivatives_are_those_of_sympy(duration: float) -> None
     omega = family.harmonics[:, None]
     count = family.harmonics.size
     for half, wave in ((slice(0, count), "sin"), (slice(count, None), "cos")):
-        # towards the end the window is mirrored, and so are the waves: whole periods fit, a sine is odd
+        # towards the end the window is mirrored, and so are the waves: whole periods fit, a sine
+        # is odd
         odd = -1 if wave == "sin" else 1
         for order, function in enumerate(by_sympy(wave)):
             expected = function(t, omega, rise)
-            np.testing.assert_allclose(early[order, half], expected, atol=1e-11 * np.abs(expected).max())
+            np.testing.assert_allclose(
+                early[order, half], expected, atol=1e-11 * np.abs(expected).max()
+            )
             mirrored = odd * (-1) ** order * expected
-            np.testing.assert_allclose(late[order, half], mirrored, atol=1e-9 * np.abs(expected).max())
-            turned = omega * whole + order * np.pi / 2  # each derivative is a quarter of a period ahead
-            np.testing.assert_allclose(flat[order, half], getattr(np, wave)(turned) * omega ** (order - 1.0), atol=1e-9)
+            np.testing.assert_allclose(
+                late[order, half], mirrored, atol=1e-9 * np.abs(expected).max()
+            )
+            turned = (
+                omega * whole + order * np.pi / 2
+            )  # each derivative is a quarter of a period ahead
+            np.testing.assert_allclose(
+                flat[order, half], getattr(np, wave)(turned) * omega ** (order - 1.0), atol=1e-9
+            )
 
 
 def test_a_motion_is_its_centre_and_its_waves() -> None:
@@ -55,7 +66,9 @@ def test_a_motion_is_its_centre_and_its_waves() -> None:
 
 
 @pytest.mark.parametrize("duration", [0.5, 4.0, 60.0])
-def test_the_window_rises_and_falls_alike_with_a_jerk_that_vanishes_at_its_ends(duration: float) -> None:
+def test_the_window_rises_and_falls_alike_with_a_jerk_that_vanishes_at_its_ends(
+    duration: float,
+) -> None:
     family = Fourier(duration)
     t = np.linspace(0, duration, 2001)
     value, slope, bend = family.window(t)
@@ -65,7 +78,8 @@ def test_the_window_rises_and_falls_alike_with_a_jerk_that_vanishes_at_its_ends(
     np.testing.assert_allclose(bend, bend[::-1], atol=1e-6 / duration**2)
     rise = min(0.1 * duration, 1.0)
     np.testing.assert_array_equal(value[(t > rise) & (t < duration - rise)], 1.0)
-    # angle, velocity and acceleration, and the jerk as the acceleration's slope, vanish where the window meets 0 and 1
+    # angle, velocity and acceleration, and the jerk as the acceleration's slope, vanish where the
+    # window meets 0 and 1
     for edge, level in ((0.0, 0.0), (rise, 1.0), (duration - rise, 1.0), (duration, 0.0)):
         at = family.window(np.array([edge]))[:, 0]
         np.testing.assert_allclose(at, [level, 0, 0], atol=1e-9)
@@ -80,10 +94,15 @@ def test_the_window_rises_and_falls_alike_with_a_jerk_that_vanishes_at_its_ends(
         (0.5, range(1, 6)),  # five at least, whatever their frequency
         (4.0, range(1, 9)),  # up to 2 Hz
         (10.0, range(1, 21)),
-        (60.0, [1, 7, 14, 20, 26, 32, 39, 45, 51, 57, 64, 70, 76, 82, 89, 95, 101, 107, 114, 120]),  # twenty at most
+        (
+            60.0,
+            [1, 7, 14, 20, 26, 32, 39, 45, 51, 57, 64, 70, 76, 82, 89, 95, 101, 107, 114, 120],
+        ),  # twenty at most
     ],
 )
-def test_harmonics_reach_two_hertz_and_are_no_more_than_twenty(duration: float, numbers: list[int]) -> None:
+def test_harmonics_reach_two_hertz_and_are_no_more_than_twenty(
+    duration: float, numbers: list[int]
+) -> None:
     family = Fourier(duration)
     np.testing.assert_allclose(family.harmonics * duration / (2 * np.pi), list(numbers), rtol=1e-12)
     assert family.size == 2 + 4 * len(list(numbers))
@@ -100,7 +119,9 @@ def test_the_gradient_is_the_transpose_of_the_motion() -> None:
     np.testing.assert_allclose(
         family.gradient(weights, basis) @ x, np.einsum("bcn,cn->b", weights, signals), rtol=1e-10
     )
-    np.testing.assert_allclose(family.gradient(weights[2], basis), family.gradient(weights, basis)[2], rtol=1e-12)
+    np.testing.assert_allclose(
+        family.gradient(weights[2], basis), family.gradient(weights, basis)[2], rtol=1e-12
+    )
 
 
 def test_middles_are_in_the_middle_of_equal_samples() -> None:

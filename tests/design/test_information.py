@@ -46,14 +46,22 @@ def test_error_bars_are_those_of_an_independent_bound(case: str) -> None:
 
     def truth(loaded: bool) -> Truth:
         k = belief.shared.coefficients(belief.mean, loaded)
-        return Truth(t, motion.theta, motion.omega, inverse_dynamics(k, motion.theta, motion.omega, motion.alpha))
+        return Truth(
+            t,
+            motion.theta,
+            motion.omega,
+            inverse_dynamics(k, motion.theta, motion.omega, motion.alpha),
+        )
 
     expected = joint_bound(truth(False), truth(True), belief.mean, 9.81, 1e-3, 1e-2)
     asked = Asked(np.abs(belief.mean), *(np.ones(belief.mean.size, bool),) * 2)
     for coarse in (50.0, 100.0):
         slopes = Slopes(belief.shared.model, motion_at(x, middles(FAMILY.duration, coarse)), coarse)
-        std = np.sqrt(np.diag(asked.covariance(Information(experiment(belief), belief.mean, slopes).S)))
-        # the other bound has no initial state and treats the ends otherwise: a few samples in two thousand
+        std = np.sqrt(
+            np.diag(asked.covariance(Information(experiment(belief), belief.mean, slopes).S))
+        )
+        # the other bound has no initial state and treats the ends otherwise: a few samples in two
+        # thousand
         np.testing.assert_allclose(std, expected, rtol=0.02)
 
 
@@ -125,20 +133,27 @@ def test_usage_derivatives_are_those_of_differences() -> None:
         step = np.zeros_like(x)
         step[place] = 1e-5
         slope = np.sum(share * (used(x + step) - used(x - step)), axis=1) / 2e-5
-        np.testing.assert_allclose(gradient[:, place], slope, rtol=1e-4, atol=1e-4 * np.abs(slope).max())
+        np.testing.assert_allclose(
+            gradient[:, place], slope, rtol=1e-4, atol=1e-4 * np.abs(slope).max()
+        )
 
 
 def test_no_arm_of_a_box_asks_for_more_torque_than_the_largest_told() -> None:
     belief = belief_of("case2")
     motion = motion_at(drawn(5), middles(FAMILY.duration, 50.0))
     Y = Slopes(belief.shared.model, motion, 50.0).Y
-    corners = np.array(np.meshgrid(*[[-1, 1]] * belief.spread.shape[1])).reshape(belief.spread.shape[1], -1)
+    corners = np.array(np.meshgrid(*[[-1, 1]] * belief.spread.shape[1])).reshape(
+        belief.spread.shape[1], -1
+    )
     for loaded in (False, True):
         load = belief.load(loaded)
         torque, more, _ = load.largest(Y)
-        arms = [belief.shared.coefficients(belief.mean + belief.spread @ u, loaded) for u in corners.T]
+        arms = [
+            belief.shared.coefficients(belief.mean + belief.spread @ u, loaded) for u in corners.T
+        ]
         worst = np.max([np.abs(np.einsum("aqn,q->an", Y, c)) for c in arms], axis=0)
-        # reached at a corner, so that the bound is no larger than it must be; its corners are rounded by 1e-6
+        # reached at a corner, so that the bound is no larger than it must be; its corners are
+        # rounded by 1e-6
         np.testing.assert_allclose(np.abs(torque) + more, worst, rtol=0, atol=1e-5 * worst.max())
 
 
@@ -152,14 +167,20 @@ def test_a_motion_is_at_rest_at_both_ends_and_its_derivatives_are_its_own(durati
     t, h = np.linspace(0.02, 0.98, 301) * duration, 1e-5
     ahead, here, behind = (family.motion(x, family.basis(t + step)) for step in (h, 0.0, -h))
     scale = np.abs(here.alpha).max()
-    np.testing.assert_allclose((ahead.theta - behind.theta) / (2 * h), here.omega, atol=1e-6 * scale)
-    np.testing.assert_allclose((ahead.omega - behind.omega) / (2 * h), here.alpha, atol=1e-5 * scale)
+    np.testing.assert_allclose(
+        (ahead.theta - behind.theta) / (2 * h), here.omega, atol=1e-6 * scale
+    )
+    np.testing.assert_allclose(
+        (ahead.omega - behind.omega) / (2 * h), here.alpha, atol=1e-5 * scale
+    )
 
 
 @pytest.mark.parametrize("box", [True, False])
 def test_an_arm_that_asks_for_no_torque_has_no_largest_torque_and_no_slope(box: bool) -> None:
     belief = replace(belief_of("case1"), box=box)
-    torque, more, slope = belief.load(False).largest(np.zeros((2, 7, 3)))  # at rest in a horizontal plane
+    torque, more, slope = belief.load(False).largest(
+        np.zeros((2, 7, 3))
+    )  # at rest in a horizontal plane
     np.testing.assert_array_equal(torque, 0.0)
     assert np.all(more < 1e-90)
     np.testing.assert_array_equal(slope, 0.0)

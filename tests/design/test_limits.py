@@ -35,8 +35,16 @@ TIGHT = replace(
 K = np.array([0.05, 1.0, 0.03, 4.0, 0.2, 0.3, 0.2])
 
 
-def at(theta: tuple[float, float], omega: tuple[float, float] = (0, 0), alpha: tuple[float, float] = (0, 0)) -> Slopes:
-    return Slopes(Model(), Motion(*(np.array(pair, dtype=float)[:, None] for pair in (theta, omega, alpha))), 1.0)
+def at(
+    theta: tuple[float, float],
+    omega: tuple[float, float] = (0, 0),
+    alpha: tuple[float, float] = (0, 0),
+) -> Slopes:
+    return Slopes(
+        Model(),
+        Motion(*(np.array(pair, dtype=float)[:, None] for pair in (theta, omega, alpha))),
+        1.0,
+    )
 
 
 def load(spread: FloatArray, *, box: bool, loaded: bool = False) -> Load:
@@ -52,7 +60,10 @@ def test_limits_that_are_not_there_have_no_rows() -> None:
 
 def test_usages_by_hand() -> None:
     used = usage(TIGHT, at((-0.5, 2.0), (1.0, -3.0), (-5.0, 4.0)), (), derivatives=False)
-    found = {(row.limit, row.joint, row.upper): float(most) for row, most in zip(used.rows, used.most, strict=True)}
+    found = {
+        (row.limit, row.joint, row.upper): float(most)
+        for row, most in zip(used.rows, used.most, strict=True)
+    }
     height = 0.4 * np.sin(-0.5) + 0.3 * np.sin(1.5)
     expected = {
         ("range", 0): 0.5,  # half way from the middle, -1, to the upper end, 0
@@ -65,7 +76,9 @@ def test_usages_by_hand() -> None:
     for (limit, joint), share in expected.items():
         assert found.pop((limit, joint, True)) == pytest.approx(share, rel=1e-12)
         assert found.pop((limit, joint, False)) == pytest.approx(-share, rel=1e-12)
-    assert found == {("tip-height", None, False): pytest.approx((0.7 - height) / (0.7 + 0.3), rel=1e-12)}
+    assert found == {
+        ("tip-height", None, False): pytest.approx((0.7 - height) / (0.7 + 0.3), rel=1e-12)
+    }
     assert used.by_motion is None
     assert TIGHT.height_of(np.array([-0.5, 2.0])) == pytest.approx(height)
 
@@ -76,13 +89,19 @@ def test_the_torque_is_that_of_the_worst_arm_on_either_side(box: bool) -> None:
     spread[3, 0], spread[5, 1] = 0.4, 0.1  # k4 and k6, each by its own
     slopes = at((0.0, 0.0), (2.0, 0.0), (0.0, 0.0))
     used = usage(TIGHT, slopes, [load(spread, box=box, loaded=True)], derivatives=False)
-    torque = {(row.joint, row.upper): float(most) for row, most in zip(used.rows, used.most, strict=True) if row.loaded}
+    torque = {
+        (row.joint, row.upper): float(most)
+        for row, most in zip(used.rows, used.most, strict=True)
+        if row.loaded
+    }
     mean = 4.0 + 1.0 + 0.3 * 2.0  # k4 + k2 + k6 ω
     more = 0.4 + 0.1 * 2.0 if box else SURE * np.hypot(0.4, 0.1 * 2.0)
     # corners are rounded by a millionth of the largest torque, of as many arms
     assert torque[0, True] == pytest.approx((mean + more) / 5.0, abs=1e-4)
     assert torque[0, False] == pytest.approx((-mean + more) / 5.0, abs=1e-4)
-    assert torque[1, True] == pytest.approx(1.0 / 2.5, abs=1e-4)  # k2, and Coriolis without sin θ2 is nothing
+    assert torque[1, True] == pytest.approx(
+        1.0 / 2.5, abs=1e-4
+    )  # k2, and Coriolis without sin θ2 is nothing
 
 
 def test_a_margin_is_taken_off_each_side() -> None:
@@ -105,7 +124,9 @@ def test_a_margin_is_taken_off_each_side() -> None:
 
 def test_the_middle_of_the_range_is_where_a_motion_rests_if_it_is_easy() -> None:
     strong = replace(TIGHT, torque=np.array([50.0, 25.0]), height=-np.inf)
-    np.testing.assert_allclose(resting(strong, Model(), [load(np.zeros((7, 1)), box=True)]), [-1.0, 1.0])
+    np.testing.assert_allclose(
+        resting(strong, Model(), [load(np.zeros((7, 1)), box=True)]), [-1.0, 1.0]
+    )
     np.testing.assert_allclose(resting(replace(FREE, speed=np.ones(2)), Model(), []), HANGING)
 
 
@@ -113,17 +134,29 @@ def test_a_weak_arm_rests_where_it_needs_least() -> None:
     loads = [load(0.05 * np.diag(K), box=True)]
     weak = replace(TIGHT, torque=np.array([3.0, 2.5]), height=-np.inf)
     rest = resting(weak, Model(), loads)
-    grid = np.stack(np.meshgrid(np.linspace(-2, 0, 41), np.linspace(-1, 3, 41), indexing="ij")).reshape(2, -1)
+    grid = np.stack(
+        np.meshgrid(np.linspace(-2, 0, 41), np.linspace(-1, 3, 41), indexing="ij")
+    ).reshape(2, -1)
     weight2 = 1.05 * np.abs(np.cos(grid.sum(axis=0))) * K[1]
     mean1 = K[3] * np.cos(grid[0]) + K[1] * np.cos(grid.sum(axis=0))
-    weight1 = np.abs(mean1) + 0.05 * (K[3] * np.abs(np.cos(grid[0])) + K[1] * np.abs(np.cos(grid.sum(axis=0))))
-    worst = np.max([weight1 / 3.0, weight2 / 2.5, np.abs(grid[0] + 1), np.abs(grid[1] - 1) / 2], axis=0)
+    weight1 = np.abs(mean1) + 0.05 * (
+        K[3] * np.abs(np.cos(grid[0])) + K[1] * np.abs(np.cos(grid.sum(axis=0)))
+    )
+    worst = np.max(
+        [weight1 / 3.0, weight2 / 2.5, np.abs(grid[0] + 1), np.abs(grid[1] - 1) / 2], axis=0
+    )
     np.testing.assert_allclose(rest, grid[:, np.argmin(worst)])
     assert worst.min() < 1 < worst[grid.shape[1] // 2] / 0.7  # the middle would not have done
 
 
 def test_what_no_posture_keeps_is_named_with_what_it_misses() -> None:
-    high = replace(TIGHT, height=0.5, torque=np.full(2, np.inf), low=np.array([-2.0, -0.1]), high=np.array([-0.5, 0.1]))
+    high = replace(
+        TIGHT,
+        height=0.5,
+        torque=np.full(2, np.inf),
+        low=np.array([-2.0, -0.1]),
+        high=np.array([-0.5, 0.1]),
+    )
     with pytest.raises(SettingError) as refused:
         resting(high, Model(), [])
     best = 0.4 * np.sin(-0.5) + 0.3 * np.sin(-0.4)
@@ -135,7 +168,9 @@ def test_what_no_posture_keeps_is_named_with_what_it_misses() -> None:
     for loaded, words in ((False, ""), (True, "loaded ")):
         with pytest.raises(SettingError) as refused:
             resting(
-                replace(flat, torque=np.array([3.0, 9.0])), Model(), [load(np.zeros((7, 1)), box=True, loaded=loaded)]
+                replace(flat, torque=np.array([3.0, 9.0])),
+                Model(),
+                [load(np.zeros((7, 1)), box=True, loaded=loaded)],
             )
         least = 4 * np.cos(0.1) + np.cos(0.2)
         assert str(refused.value) == (
@@ -143,14 +178,19 @@ def test_what_no_posture_keeps_is_named_with_what_it_misses() -> None:
             "(margin included); raise it, or move --range to where gravity pulls less"
         )
     with pytest.raises(
-        SettingError, match=r"^--torque: the arm asks for 0\.98 N m at joint 2 even at rest, .* 0\.5 N m"
+        SettingError,
+        match=r"^--torque: the arm asks for 0\.98 N m at joint 2 even at rest, .* 0\.5 N m",
     ):
-        resting(replace(flat, torque=np.array([9.0, 0.5])), Model(), [load(np.zeros((7, 1)), box=True)])
+        resting(
+            replace(flat, torque=np.array([9.0, 0.5])), Model(), [load(np.zeros((7, 1)), box=True)]
+        )
 
 
 @pytest.mark.parametrize(("limit", "central"), [(5.0 / 0.69, True), (5.0 / 0.71, False)])
 def test_the_middle_will_do_up_to_seven_tenths_of_a_limit(limit: float, central: bool) -> None:
     """Outstretched, the middle of this range, the arm asks for k4 + k2 = 5 N m."""
-    around = replace(FREE, low=np.full(2, -1.0), high=np.full(2, 1.0), torque=np.array([limit, np.inf]))
+    around = replace(
+        FREE, low=np.full(2, -1.0), high=np.full(2, 1.0), torque=np.array([limit, np.inf])
+    )
     rest = resting(around, Model(), [load(np.zeros((7, 1)), box=True)])
     assert (np.abs(rest).max() < 1e-12) == central

@@ -10,7 +10,17 @@ from scipy.special import logsumexp
 
 from algid.arm import FloatArray
 from algid.design import optimise as module
-from algid.design.optimise import FIRST, KEPT, LATER, STARTS, Evaluation, Stage, kept, optimise, soft_maximum
+from algid.design.optimise import (
+    FIRST,
+    KEPT,
+    LATER,
+    STARTS,
+    Evaluation,
+    Stage,
+    kept,
+    optimise,
+    soft_maximum,
+)
 
 
 class Ball:
@@ -27,7 +37,12 @@ class Ball:
     def evaluate(self, x: FloatArray, stage: Stage) -> Evaluation:  # noqa: ARG002 - the search passes it
         self.calls += 1
         eye = np.eye(x.size)
-        return Evaluation(self.score(x), 2 * (x - self.target), np.concatenate([1 - x, 1 + x]), np.vstack([-eye, eye]))
+        return Evaluation(
+            self.score(x),
+            2 * (x - self.target),
+            np.concatenate([1 - x, 1 + x]),
+            np.vstack([-eye, eye]),
+        )
 
     def excess(self, x: FloatArray, rate: float) -> float:  # noqa: ARG002 - the search passes it
         return float(np.abs(x).max())
@@ -97,7 +112,9 @@ def test_a_search_that_is_broken_off_before_it_began_has_nothing_to_give() -> No
         None,
     ],
 )
-def test_a_step_of_which_nothing_can_be_said_is_shortened(broken: Callable[[Evaluation], Evaluation] | None) -> None:
+def test_a_step_of_which_nothing_can_be_said_is_shortened(
+    broken: Callable[[Evaluation], Evaluation] | None,
+) -> None:
     class Walled(Ball):
         def evaluate(self, x: FloatArray, stage: Stage) -> Evaluation:
             found = super().evaluate(x, stage)
@@ -117,8 +134,12 @@ def test_a_motion_is_drawn_back_to_exactly_what_it_may_use() -> None:
     np.testing.assert_allclose(kept(problem, x, 100.0), x / 4, rtol=1e-6)
     assert problem.excess(kept(problem, x, 100.0), 100.0) <= 1.0
     np.testing.assert_array_equal(kept(problem, x / 10, 100.0), x / 10)  # within already
-    np.testing.assert_allclose(kept(problem, x / 10, 100.0, 0.9), 0.9 * x / 4, rtol=1e-6)  # enlarged to that
-    np.testing.assert_array_equal(kept(problem, np.zeros(4), 100.0, 0.9), 0.0)  # what cannot be enlarged stays
+    np.testing.assert_allclose(
+        kept(problem, x / 10, 100.0, 0.9), 0.9 * x / 4, rtol=1e-6
+    )  # enlarged to that
+    np.testing.assert_array_equal(
+        kept(problem, np.zeros(4), 100.0, 0.9), 0.0
+    )  # what cannot be enlarged stays
 
 
 def test_a_motion_is_drawn_back_towards_rest_not_towards_zero() -> None:
@@ -129,7 +150,9 @@ def test_a_motion_is_drawn_back_towards_rest_not_towards_zero() -> None:
 
 
 @pytest.mark.parametrize("hardness", [1.0, 50.0, 600.0])
-def test_the_soft_maximum_is_the_logarithm_of_a_sum_and_never_below_the_largest(hardness: float) -> None:
+def test_the_soft_maximum_is_the_logarithm_of_a_sum_and_never_below_the_largest(
+    hardness: float,
+) -> None:
     u = np.random.default_rng(0).normal(0, 2, (3, 40))
     most, share = soft_maximum(u, hardness)
     np.testing.assert_allclose(most, logsumexp(hardness * u, axis=1) / hardness, rtol=1e-12)
@@ -140,7 +163,9 @@ def test_the_soft_maximum_is_the_logarithm_of_a_sum_and_never_below_the_largest(
     for place in (0, int(np.argmax(u[0]))):
         step = np.zeros_like(u)
         step[0, place] = h
-        slope = (soft_maximum(u + step, hardness)[0] - soft_maximum(u - step, hardness)[0]) / (2 * h)
+        slope = (soft_maximum(u + step, hardness)[0] - soft_maximum(u - step, hardness)[0]) / (
+            2 * h
+        )
         np.testing.assert_allclose(slope, [share[0, place], 0, 0], rtol=1e-4, atol=1e-8)
 
 
@@ -151,4 +176,6 @@ def test_an_end_that_is_no_number_leaves_the_start(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr("scipy.optimize.minimize", lambda *_args, **_options: Ended())
     found = module.optimise(Ball(TARGET), 100.0, 0)
     assert np.all(np.isfinite(found.x))
-    assert np.abs(found.x).max() == pytest.approx(0.9, rel=1e-5)  # a random start, halfway from 0.8 to 1
+    assert np.abs(found.x).max() == pytest.approx(
+        0.9, rel=1e-5
+    )  # a random start, halfway from 0.8 to 1

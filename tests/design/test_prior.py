@@ -18,7 +18,9 @@ from algid.synth.sensors import Sensors
 
 @pytest.fixture(scope="module")
 def result() -> Result:
-    logs = algid.synthesise("case1", duration=2.0, rate=500.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
+    logs = algid.synthesise(
+        "case1", duration=2.0, rate=500.0, excitation="wide", sensors=Sensors(1e-3, 1e-2)
+    )
     return algid.identify(*logs)
 
 
@@ -35,15 +37,20 @@ def test_a_result_is_believed_as_far_as_its_error_bars_go(result: Result, tmp_pa
     assert result.fit is not None
     for name, std in zip(prior.belief.shared.names, prior.belief.std, strict=True):
         assert std == pytest.approx(result.estimates[name].std, rel=1e-6)
-    # the largest torque told is that of arms SURE standard deviations away, in the direction that matters
+    # the largest torque told is that of arms SURE standard deviations away, in the direction that
+    # matters
     load = prior.belief.load(False)
     Y = np.zeros((2, load.c.size, 1))
     Y[0, prior.belief.shared.names.index("k4")] = 1.0
     _, more, _ = load.largest(Y)
-    assert more[0, 0] == pytest.approx(SURE * prior.belief.std[prior.belief.shared.names.index("k4")], rel=1e-4)
+    assert more[0, 0] == pytest.approx(
+        SURE * prior.belief.std[prior.belief.shared.names.index("k4")], rel=1e-4
+    )
 
 
-def test_a_result_without_error_bars_needs_to_be_told_how_wrong_it_is(result: Result, tmp_path: Path) -> None:
+def test_a_result_without_error_bars_needs_to_be_told_how_wrong_it_is(
+    result: Result, tmp_path: Path
+) -> None:
     file = saved(result, tmp_path, fit=None)
     with pytest.raises(ResultError, match=r"no error bars; .*--prior-error"):
         prior_of(file, None, KnownBefore())
@@ -69,17 +76,23 @@ def test_a_length_far_from_the_results_is_a_warning(result: Result, tmp_path: Pa
 def test_an_impossible_arm_is_refused(result: Result, tmp_path: Path) -> None:
     k1 = result.parameters["k1"].model_copy(update={"estimate": 0.1})
     with pytest.raises(SettingError, match="not positive definite"):
-        prior_of(saved(result, tmp_path, parameters={**result.parameters, "k1": k1}), None, KnownBefore())
+        prior_of(
+            saved(result, tmp_path, parameters={**result.parameters, "k1": k1}), None, KnownBefore()
+        )
 
 
 def test_friction_of_a_real_arm_is_planned_for_and_what_cannot_be_is_said(tmp_path: Path) -> None:
-    logs = algid.synthesise("case1", duration=2.0, rate=500.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
+    logs = algid.synthesise(
+        "case1", duration=2.0, rate=500.0, excitation="wide", sensors=Sensors(1e-3, 1e-2)
+    )
     settings = Settings(model="coulomb,offset")
     belief = prior_of(saved(algid.identify(*logs, settings), tmp_path), None, KnownBefore()).belief
     assert {"f1", "f2", "o1", "o2"} <= set(belief.shared.names)
     asked = asked_for(belief, None, "it")
     places = [belief.shared.names.index(name) for name in ("o1", "o2")]
-    assert not asked.wanted[places].all()  # the arm has no offsets: no error is large or small beside them
+    assert not asked.wanted[
+        places
+    ].all()  # the arm has no offsets: no error is large or small beside them
 
 
 def test_loaded_runs_need_a_payload(tmp_path: Path) -> None:

@@ -45,7 +45,20 @@ LIKE = {
     "runs": "numbers of runs without and with the payload like 2,1",
 }
 WRONG = {
-    "range": ["", "x", "0", "-1", "nan", "1,2,3", "1:2", "1:2,3", "1,2:3", "1:2:3,1:2:3", "nan:1,0:1", "1,"],
+    "range": [
+        "",
+        "x",
+        "0",
+        "-1",
+        "nan",
+        "1,2,3",
+        "1:2",
+        "1:2,3",
+        "1,2:3",
+        "1:2:3,1:2:3",
+        "nan:1,0:1",
+        "1,",
+    ],
     "speed": ["0", "-3", "3,-3", "3,0", "1:2,3:4", "nan,1", "fast"],
     "acceleration": ["0", "1,2,3", "-0.0"],
     "torque": ["-1", "1,-1", "0:1,0:1", "nan"],
@@ -53,7 +66,9 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize(("name", "text"), [(name, text) for name, texts in WRONG.items() for text in texts])
+@pytest.mark.parametrize(
+    ("name", "text"), [(name, text) for name, texts in WRONG.items() for text in texts]
+)
 def test_flags_that_mean_nothing_are_refused(name: str, text: str) -> None:
     with pytest.raises(SettingError) as refused:
         request(None, {name: text})
@@ -67,7 +82,11 @@ def test_numbers_pass_and_none_leaves_the_file_alone(tmp_path: Path) -> None:
     assert asked.source == str(file)
     assert asked.get("tip_height", 0.0) == -0.3
     assert asked.get("speed", None) == (1.0, 2.0)
-    assert (asked.get("rate", 1.0), asked.get("duration", 1.0), asked.get("torque", 7)) == (250.0, 4.0, 7)
+    assert (asked.get("rate", 1.0), asked.get("duration", 1.0), asked.get("torque", 7)) == (
+        250.0,
+        4.0,
+        7,
+    )
     assert request(None, {}).source == "the flags"
 
 
@@ -85,7 +104,9 @@ def test_numbers_pass_and_none_leaves_the_file_alone(tmp_path: Path) -> None:
         ("pace = 1", "pace"),
     ],
 )
-def test_a_line_of_a_file_that_means_nothing_is_named(line: str, place: str, tmp_path: Path) -> None:
+def test_a_line_of_a_file_that_means_nothing_is_named(
+    line: str, place: str, tmp_path: Path
+) -> None:
     file = tmp_path / "limits.toml"
     file.write_text(f"{line}\n", encoding="utf-8")
     with pytest.raises(SettingError) as refused:
@@ -136,7 +157,9 @@ def test_limits_are_a_pair_of_joints_and_infinite_where_none_is_told() -> None:
         ),
     ],
 )  # fmt: skip
-def test_limits_that_make_no_sense_are_refused(flags: dict[str, Any], lengths: Any, message: str) -> None:
+def test_limits_that_make_no_sense_are_refused(
+    flags: dict[str, Any], lengths: Any, message: str
+) -> None:
     with pytest.raises(SettingError) as refused:
         limits_of(request(None, {**GIVEN, **flags}), lengths)
     assert str(refused.value) == message

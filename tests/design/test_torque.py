@@ -39,9 +39,13 @@ def test_swings_are_those_of_the_simulator() -> None:
     step = step_for(Model(), C, 1.0)
     half = 0.5 * step * np.arange(2 * round(1.0 / step) + 1)
     wave = np.stack([np.sin(6 * half), 0.3 * np.cos(9 * half)])
-    swings = swing(Model(), C, np.repeat(wave.T[:, :, None], 3, axis=2), step, np.array([-np.pi / 2, 0.0]))
+    swings = swing(
+        Model(), C, np.repeat(wave.T[:, :, None], 3, axis=2), step, np.array([-np.pi / 2, 0.0])
+    )
     for place in range(3):
-        exact = simulate(C[:, place], lambda t: np.stack([np.sin(6 * t), 0.3 * np.cos(9 * t)]), swings.t)
+        exact = simulate(
+            C[:, place], lambda t: np.stack([np.sin(6 * t), 0.3 * np.cos(9 * t)]), swings.t
+        )
         # fourth order: a product of step and fastest rate of 2 leaves 1e-4 of the swing
         np.testing.assert_allclose(swings.theta[:, :, place].T, exact.theta, atol=1e-3)
 
@@ -67,7 +71,17 @@ def test_swings_that_are_lost_end_early_and_are_the_same_until_then() -> None:
 
 def test_a_swing_with_all_linear_terms_obeys_the_models_own_accelerations() -> None:
     model = Model(("coulomb", "offset", "rotor", "stribeck", "asymmetry"))
-    value = {"k1": 0.05, "k2": 1.0, "k3": 0.03, "k4": 4.0, "k5": 0.2, "k6": 0.3, "k7": 0.2, "f1": 0.4, "f2": 0.2}
+    value = {
+        "k1": 0.05,
+        "k2": 1.0,
+        "k3": 0.03,
+        "k4": 4.0,
+        "k5": 0.2,
+        "k6": 0.3,
+        "k7": 0.2,
+        "f1": 0.4,
+        "f2": 0.2,
+    }
     value |= {"o1": 0.3, "o2": -0.2, "j2": 0.01, "s1": 0.2, "s2": 0.1, "a1": 0.05, "a2": -0.04}
     c = np.array([value[name] for name in model.names])
     torque = np.zeros((2 * 200 + 1, 2, 2))
@@ -84,10 +98,14 @@ def test_a_swing_with_all_linear_terms_obeys_the_models_own_accelerations() -> N
 def test_a_drive_far_stronger_than_its_arm_is_planned_for_as_well() -> None:
     low, high = np.array([-np.pi / 2, 0.0]) - 1.5, np.array([-np.pi / 2, 0.0]) + 1.5
     asked = open_loop()
-    limits = replace(asked.limits, low=low, high=high, speed=np.full(2, 9.0), torque=np.array([190.0, 95.0]))
+    limits = replace(
+        asked.limits, low=low, high=high, speed=np.full(2, 9.0), torque=np.array([190.0, 95.0])
+    )
     strong = plan(replace(asked, duration=5.0, limits=limits))
     assert strong.open_parameters == []
-    assert 100 * strong.largest < 5  # in percent: 100,000 with amplitudes in shares of the drive's limit
+    assert (
+        100 * strong.largest < 5
+    )  # in percent: 100,000 with amplitudes in shares of the drive's limit
     assert max(used for _, used in strong.binding) <= 0.95 * (1 + 1e-9)
 
 
@@ -109,7 +127,9 @@ def test_no_more_torque_is_searched_for_than_limits_or_arms_ask_for() -> None:
         limits = replace(asked.limits, torque=np.array(torque), speed=np.full(2, speed))
         problem = TorqueProblem(asked.experiment, asked.belief, limits, asked.asked, 2.0, start, 0)
         x = np.zeros(problem.size)
-        x[:: problem.size // 2] = 1.0  # the slowest sine of each joint, whose window is one at a quarter of the time
+        x[:: problem.size // 2] = (
+            1.0  # the slowest sine of each joint, whose window is one at a quarter of the time
+        )
         return np.abs(problem.torques(x, np.array([0.5]))[:, 0])
 
     np.testing.assert_allclose(peak((1.9, 0.95), 3.0), [1.9, 0.95], rtol=1e-12)
@@ -147,4 +167,6 @@ def test_the_plan_is_what_the_believed_arm_does(design: Design) -> None:
         )
         np.testing.assert_allclose(design.motions[loaded].theta[:, ::10], exact.theta, atol=3e-3)
     assert np.ptp(design.motion.theta, axis=1).min() > 0.02
-    assert np.all(np.abs(design.motion.omega[:, -1]) <= 0.1 * np.abs(design.motion.omega).max(axis=1))
+    assert np.all(
+        np.abs(design.motion.omega[:, -1]) <= 0.1 * np.abs(design.motion.omega).max(axis=1)
+    )

@@ -31,7 +31,11 @@ def torque_by_hand() -> sp.Matrix:
     for joint, (angle, speed) in enumerate(zip(angles, speeds, strict=True), 1):
         load = lagrangian.diff(speed).diff(t) - lagrangian.diff(angle)
         sign = sp.tanh(speed / sp.Symbol("ws"))
-        friction = value[f"k{joint + 5}"] * speed + value[f"f{joint}"] * sign + value[f"a{joint}"] * sign**2
+        friction = (
+            value[f"k{joint + 5}"] * speed
+            + value[f"f{joint}"] * sign
+            + value[f"a{joint}"] * sign**2
+        )
         friction += value[f"s{joint}"] * sign * sp.exp(-((speed / sp.Symbol("wS")) ** 2))
         friction += value[f"e{joint}"] * sp.sqrt(load**2) * sign
         torques.append(load + friction + value[f"o{joint}"])
@@ -44,7 +48,9 @@ def torque_by_hand() -> sp.Matrix:
     return sp.Matrix([torque.doit().subs(plain) for torque in torques])
 
 
-def evaluated(expression: sp.Matrix, model: Model, values: Mapping[str, float], motion: Motion) -> FloatArray:
+def evaluated(
+    expression: sp.Matrix, model: Model, values: Mapping[str, float], motion: Motion
+) -> FloatArray:
     """The matrix (n, m, N) along a motion, coefficients by name; those not named are nothing."""
     signals = {
         f"{letter}{j + 1}": x[j]
@@ -60,5 +66,9 @@ def evaluated(expression: sp.Matrix, model: Model, values: Mapping[str, float], 
         **signals,
     }
     names = sorted(map(str, expression.free_symbols))
-    rows = [sp.lambdify(names, entry, "numpy")(*(known[name] for name in names)) for entry in expression]
-    return np.array([np.broadcast_to(row, motion.theta.shape[1:]) for row in rows]).reshape(*expression.shape, -1)
+    rows = [
+        sp.lambdify(names, entry, "numpy")(*(known[name] for name in names)) for entry in expression
+    ]
+    return np.array([np.broadcast_to(row, motion.theta.shape[1:]) for row in rows]).reshape(
+        *expression.shape, -1
+    )

@@ -23,7 +23,11 @@ MODELS = [(), *((term,) for term in WITHOUT_LAG), ("coulomb", "stribeck", "asymm
 
 def _states(seed: int = 0, count: int = 400) -> tuple[FloatArray, FloatArray, FloatArray]:
     rng = np.random.default_rng(seed)
-    return rng.uniform(-3, 3, (2, count)), rng.normal(0, 2, (2, count)), rng.normal(0, 40, (2, count))
+    return (
+        rng.uniform(-3, 3, (2, count)),
+        rng.normal(0, 2, (2, count)),
+        rng.normal(0, 40, (2, count)),
+    )
 
 
 def _constants(model: Model) -> FloatArray:
@@ -45,7 +49,9 @@ def test_without_terms_it_is_the_arms_forward_dynamics() -> None:
     theta, omega, tau = _states(1)
     c = _constants(Model())
     np.testing.assert_allclose(
-        acceleration(Model(), c, theta, omega, tau), forward_dynamics(c, theta, omega, tau), rtol=1e-9
+        acceleration(Model(), c, theta, omega, tau),
+        forward_dynamics(c, theta, omega, tau),
+        rtol=1e-9,
     )
 
 
@@ -63,7 +69,9 @@ def test_a_load_whose_sign_turns_is_found_from_either_side() -> None:
     np.testing.assert_allclose(again, tau, rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("terms", [(), ("coulomb",), ("coulomb", "asymmetry"), ("coulomb", "stribeck"), ("offset",)])
+@pytest.mark.parametrize(
+    "terms", [(), ("coulomb",), ("coulomb", "asymmetry"), ("coulomb", "stribeck"), ("offset",)]
+)
 def test_damping_at_rest_is_the_torques_difference(terms: tuple[str, ...]) -> None:
     model = Model(terms, coulomb_speed=0.3, stribeck_speed=0.4)
     c, still, step = _constants(model), np.zeros((2, 1)), 1e-6

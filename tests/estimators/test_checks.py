@@ -9,7 +9,13 @@ import pytest
 from algid.arm import inverse_dynamics
 from algid.estimators import combine as combine_module
 from algid.estimators import refined, weak
-from algid.estimators.combine import MOST_BLOCKS, BlockSums, LogInformation, jackknife, long_run_variance
+from algid.estimators.combine import (
+    MOST_BLOCKS,
+    BlockSums,
+    LogInformation,
+    jackknife,
+    long_run_variance,
+)
 from algid.estimators.diagnostics import (
     broken_bounds,
     constrained,
@@ -45,7 +51,9 @@ def test_bounds_hold_for_a_real_arm_and_name_what_breaks(bench: Bench) -> None:
 
 def test_constrained_estimates_obey_the_bounds(bench: Bench) -> None:
     log = bench.log(sigma=1e-3)
-    log = replace(log, tau=log.tau - np.array([[0.3], [0.0]]) * bench.bare.omega)  # less than no friction
+    log = replace(
+        log, tau=log.tau - np.array([[0.3], [0.0]]) * bench.bare.omega
+    )  # less than no friction
     free = weak.fit([lambda: [log]])
     assert [bound.bound for bound in broken_bounds(free)] == ["k6 >= 0"]
     bound = constrained(free)
@@ -75,7 +83,9 @@ def test_a_loaded_log_from_another_arm_is_told(bench: Bench) -> None:
 
 def test_prediction_of_an_exact_log_is_exact(bench: Bench) -> None:
     found = score(Model(), bench.arm.constants(), [bench.log()])
-    assert np.all(found.nrmse < 1e-3)  # what the first filter takes of the motion below 5 Hz, and its derivatives err
+    assert np.all(
+        found.nrmse < 1e-3
+    )  # what the first filter takes of the motion below 5 Hz, and its derivatives err
     wrong = score(Model(), 1.3 * bench.arm.constants(), [bench.log()])
     assert np.all(wrong.rmse > 3 * found.rmse)
 
@@ -83,12 +93,16 @@ def test_prediction_of_an_exact_log_is_exact(bench: Bench) -> None:
 def test_a_perfect_fit_of_an_arm_that_turns_round_explains_all_torque() -> None:
     k = load_case("case1").arm.constants()
     t = 1e-3 * np.arange(6001)
-    theta = np.stack([40 * t + np.sin(9 * t), 3 * np.sin(14 * t)])  # six turns a second, swings of 2 Hz
+    theta = np.stack(
+        [40 * t + np.sin(9 * t), 3 * np.sin(14 * t)]
+    )  # six turns a second, swings of 2 Hz
     omega = np.stack([40 + 9 * np.cos(9 * t), 42 * np.cos(14 * t)])
     alpha = np.stack([-81 * np.sin(9 * t), -588 * np.sin(14 * t)])
     log = Segment(0.0, 1e-3, theta, inverse_dynamics(k, theta, omega, alpha))
     assert np.all(score(Model(), k, [log]).r2 > 0.9999)
-    late = replace(log, theta=log.theta[:, :-20], tau=log.tau[:, 20:])  # a torque acts 20 ms after its stamp
+    late = replace(
+        log, theta=log.theta[:, :-20], tau=log.tau[:, 20:]
+    )  # a torque acts 20 ms after its stamp
     assert np.all(score(Model(), k, [late], 0.02).r2 > 0.9999)
     assert np.all(score(Model(), k, [late]).r2 < 0.99)
 
@@ -100,7 +114,8 @@ def test_cross_validation_leaves_each_log_out(bench: Bench) -> None:
     assert found is not None
     others = [sources[:place] + sources[place + 1 :] for place in range(3)]
     by_hand = [
-        score(Model(), weak.fit(rest).values, source()).residual for rest, source in zip(others, sources, strict=True)
+        score(Model(), weak.fit(rest).values, source()).residual
+        for rest, source in zip(others, sources, strict=True)
     ]
     # of noise alone; the weights of the joints are each fit's own
     assert np.allclose(found.residual, np.sum(by_hand, axis=0), rtol=0.01)
@@ -119,15 +134,30 @@ def test_a_parameters_size_is_the_largest_of_its_class() -> None:
     names = ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "f1", "j2", "delay")
     values = np.array([-0.02, 3.0, 0.05, -4.0, 0.03, 0.001, 0.002, 0.5, 1e-3, 1e-5])
     inertia, gravity, damping = 0.05, 4.0, 0.1 * np.sqrt(0.05 * 4.0)
-    expected = [inertia, gravity, inertia, gravity, inertia, damping, damping, gravity, inertia, 1e-3]
+    expected = [
+        inertia,
+        gravity,
+        inertia,
+        gravity,
+        inertia,
+        damping,
+        damping,
+        gravity,
+        inertia,
+        1e-3,
+    ]
     np.testing.assert_allclose(sizes(names, values), expected, rtol=1e-12)
     rubbing = values.copy()
     rubbing[6] = -7.0
     assert sizes(names, rubbing)[[5, 6]].tolist() == [7.0, 7.0]
     turned = values[[2, 1, 4, 3, 0, *range(5, 10)]]  # whichever of its class is the largest
     np.testing.assert_allclose(sizes(names, turned), expected, rtol=1e-12)
-    np.testing.assert_allclose(sizes(("k1", "k4", "m_p"), np.array([0.3, 9.81, 0.01])), [0.3, 9.81, 1.0])
-    np.testing.assert_allclose(sizes(("k1", "k4", "m_p", "l1"), np.array([0.3, 9.81, 0.01, 0.2]))[2:], [0.01, 0.2])
+    np.testing.assert_allclose(
+        sizes(("k1", "k4", "m_p"), np.array([0.3, 9.81, 0.01])), [0.3, 9.81, 1.0]
+    )
+    np.testing.assert_allclose(
+        sizes(("k1", "k4", "m_p", "l1"), np.array([0.3, 9.81, 0.01, 0.2]))[2:], [0.01, 0.2]
+    )
 
 
 def test_what_is_hardly_told_widens_what_it_mixes_with() -> None:
@@ -149,7 +179,9 @@ def test_block_sums_stay_bounded_and_lose_nothing() -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_block_sums_are_of_stretches_one_after_the_other(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_block_sums_are_of_stretches_one_after_the_other(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Odd counts and even, a few at a time and many: each sum is of as many stretches as the others, or the last."""
     monkeypatch.setattr(combine_module, "MOST_BLOCKS", 8)
     rng = np.random.default_rng(seed)
@@ -173,14 +205,18 @@ def test_long_run_variance_of_an_autoregression() -> None:
         scores[step] = 0.6 * scores[step - 1] + noise[step]
     variance, lags = long_run_variance(scores)
     assert lags > 5
-    assert variance[0, 0] / noise.size == pytest.approx(1 / (1 - 0.6) ** 2, rel=0.15)  # spectrum at zero
+    assert variance[0, 0] / noise.size == pytest.approx(
+        1 / (1 - 0.6) ** 2, rel=0.15
+    )  # spectrum at zero
 
 
 def test_the_jackknife_of_a_mean_is_its_standard_error() -> None:
     """Logs of one coefficient each, alike in information: the variance of a mean in closed form."""
     rng = np.random.default_rng(0)
     told = rng.normal(2.0, 0.3, 7)
-    logs = [LogInformation(False, np.array([x]), np.ones((1, 1, 1)), np.zeros((1, 1))) for x in told]
+    logs = [
+        LogInformation(False, np.array([x]), np.ones((1, 1, 1)), np.zeros((1, 1))) for x in told
+    ]
     without = np.array([np.delete(told, place).mean() for place in range(7)])[:, None]
     found = jackknife(logs, without)
     assert found is not None
@@ -193,14 +229,19 @@ def test_what_differs_from_run_to_run_is_in_the_intervals_of_four_logs(bench: Be
     frictions = 1 + 0.1 * np.random.default_rng(1).standard_normal(5)
     logs = [bench.log(sigma=1e-3, seed=seed) for seed in range(5)]
     logs = [
-        replace(log, tau=log.tau + (share - 1) * bench.arm.b1 * np.array([[1.0], [0.0]]) * bench.bare.omega)
+        replace(
+            log,
+            tau=log.tau + (share - 1) * bench.arm.b1 * np.array([[1.0], [0.0]]) * bench.bare.omega,
+        )
         for log, share in zip(logs, frictions, strict=True)
     ]
     sources: list[Source] = [partial(list, [log]) for log in logs]
     three, five = weak.fit(sources[:3]), weak.fit(sources)
     assert (three.intervals, five.intervals) == ("sandwich", "jackknife")
     expected = bench.arm.b1 * frictions.std(ddof=1) / np.sqrt(5)
-    assert 0.5 * expected < five.std[5] < 1.5 * expected  # logs weigh by how well the joint estimate fits them
+    assert (
+        0.5 * expected < five.std[5] < 1.5 * expected
+    )  # logs weigh by how well the joint estimate fits them
     assert abs(five.values[5] - bench.arm.b1) < 3 * five.std[5]
     own = own_estimates(five)
     assert np.allclose([one.values[5] for one in own], bench.arm.b1 * frictions, rtol=0.02)
@@ -218,7 +259,8 @@ def test_friction_that_is_not_there_has_its_error_bar(bench: Bench) -> None:
 def test_intervals_of_a_few_logs_hold_where_runs_differ() -> None:
     """Five logs of an arm that differs from run to run, of independent parameters.
 
-    The jackknife itself is exact for logs alike; with the normal quantile 88 % of the intervals held the truth.
+    The jackknife itself is exact for logs alike; with the normal quantile 88 % of the intervals
+    held the truth.
     """
     rng = np.random.default_rng(0)
     shared = Shared(Model(gravity=0.0))
@@ -245,7 +287,9 @@ def test_each_loaded_run_tells_its_payload_and_how_well_that_repeats(bench: Benc
     added = np.zeros(7)
     added[[4, 2, 0, 3, 1]] = z  # k5, k3, k1, k4, k2
     motion = bench.burdened
-    share = inverse_dynamics(added, motion.theta, motion.omega, np.gradient(motion.omega, DT, axis=1, edge_order=2))
+    share = inverse_dynamics(
+        added, motion.theta, motion.omega, np.gradient(motion.omega, DT, axis=1, edge_order=2)
+    )
     burdened: list[Source] = []
     for seed, mass in enumerate(masses):
         log = bench.log(loaded=True, sigma=1e-4, seed=seed)
@@ -258,7 +302,12 @@ def test_each_loaded_run_tells_its_payload_and_how_well_that_repeats(bench: Benc
     low, high = found.ci95  # χ² with two degrees of freedom: 0.0506 and 7.378
     assert low / found.std == pytest.approx(np.sqrt(2 / 7.378), rel=1e-3)
     assert high / found.std == pytest.approx(np.sqrt(2 / 0.05064), rel=1e-3)
-    assert repeatability(weak.fit(bare, burdened[:1], lengths={"l1": bench.arm.l1, "l2": bench.arm.l2})) is None
+    assert (
+        repeatability(
+            weak.fit(bare, burdened[:1], lengths={"l1": bench.arm.l1, "l2": bench.arm.l2})
+        )
+        is None
+    )
 
 
 def test_constants_of_no_length_and_exchanged_logs_break_bounds(bench: Bench) -> None:
@@ -269,17 +318,25 @@ def test_constants_of_no_length_and_exchanged_logs_break_bounds(bench: Bench) ->
     assert broken.distance is not None
     assert broken.distance > 20
     assert not [bound for bound in broken_bounds(fit) if bound.bound == "k1 k2 >= 0"]
-    inside_out = replace(fit, values=fit.values * np.array([1, 1, -1, 1, -1, 1, 1]))  # det M is positive again
+    inside_out = replace(
+        fit, values=fit.values * np.array([1, 1, -1, 1, -1, 1, 1])
+    )  # det M is positive again
     (broken,) = [bound for bound in broken_bounds(inside_out) if bound.bound == "k5 >= 0"]
     assert broken.distance == pytest.approx(fit.values[4] / fit.std[4])
-    both = weak.fit([lambda: [bench.log(loaded=True, sigma=1e-3)]], [lambda: [bench.log(sigma=1e-3)]])
+    both = weak.fit(
+        [lambda: [bench.log(loaded=True, sigma=1e-3)]], [lambda: [bench.log(sigma=1e-3)]]
+    )
     assert any(warning.code == "EXCHANGED_LOGS" for warning in fit_warnings(both))
-    right = weak.fit([lambda: [bench.log(sigma=1e-3)]], [lambda: [bench.log(loaded=True, sigma=1e-3)]])
+    right = weak.fit(
+        [lambda: [bench.log(sigma=1e-3)]], [lambda: [bench.log(loaded=True, sigma=1e-3)]]
+    )
     assert not any(warning.code == "EXCHANGED_LOGS" for warning in fit_warnings(right))
 
 
 @pytest.mark.parametrize("rotor", [0.0, 0.02])
-def test_a_mass_matrix_that_is_not_positive_definite_breaks_its_bound(bench: Bench, rotor: float) -> None:
+def test_a_mass_matrix_that_is_not_positive_definite_breaks_its_bound(
+    bench: Bench, rotor: float
+) -> None:
     """By the least eigenvalue of M(θ2), eq. (2), with the rotor in M22, over a turn."""
     settings = WeakSettings(Model(("rotor",) if rotor else ()))
     fit = weak.fit([partial(list, [bench.log(sigma=1e-3)])], settings=settings)
@@ -291,9 +348,17 @@ def test_a_mass_matrix_that_is_not_positive_definite_breaks_its_bound(bench: Ben
         values[[fit.names.index(name) for name in ("k1", "k3", "k5")]] = k1, k3, k5
         if rotor:
             values[fit.names.index("j2")] = rotor
-        inertial = [bound for bound in broken_bounds(replace(fit, values=values)) if " M" in f" {bound.bound}"]
-        c = np.cos(np.linspace(0, np.pi, 181))  # the least lies at an end: it may not fall between two of these
-        M = np.array([[k5 + k3 + 2 * k1 * c, k3 + k1 * c], [k3 + k1 * c, np.full_like(c, k3 + rotor)]])
+        inertial = [
+            bound
+            for bound in broken_bounds(replace(fit, values=values))
+            if " M" in f" {bound.bound}"
+        ]
+        c = np.cos(
+            np.linspace(0, np.pi, 181)
+        )  # the least lies at an end: it may not fall between two of these
+        M = np.array(
+            [[k5 + k3 + 2 * k1 * c, k3 + k1 * c], [k3 + k1 * c, np.full_like(c, k3 + rotor)]]
+        )
         least = np.linalg.eigvalsh(np.moveaxis(M, 2, 0))[:, 0]
         assert bool(inertial) == bool(least.min() < 0)
         by_name = {bound.bound: bound.value for bound in inertial}
@@ -313,7 +378,9 @@ def test_gravity_compensated_by_half_is_told_where_the_length_is_known(bench: Be
     """l1 = g k1 / k2 doubles then; with the whole torque it is the arm's own."""
     lengths = {"l1": bench.arm.l1, "l2": bench.arm.l2}
     log, k = bench.log(sigma=1e-4), bench.arm.constants()
-    weight = inverse_dynamics(k * np.array([0, 1, 0, 1, 0, 0, 0]), bench.bare.theta, 0 * bench.bare.omega, 0 * log.tau)
+    weight = inverse_dynamics(
+        k * np.array([0, 1, 0, 1, 0, 0, 0]), bench.bare.theta, 0 * bench.bare.omega, 0 * log.tau
+    )
     for share, told in ((0.0, False), (0.5, True)):
         compensated = replace(log, tau=log.tau - share * weight)
         fit = weak.fit([partial(list, [compensated])], lengths=lengths)
@@ -328,7 +395,11 @@ def test_motion_by_five_points_is_exact_for_a_cubic_and_repeats_itself_at_the_en
     t = dt * np.arange(12)
     motion = motion_of(np.stack([t**3 - t, 2 * t**2]), dt)
     inner, ends = slice(2, -2), [0, 1, -2, -1]
-    np.testing.assert_allclose(motion.omega[:, inner], np.stack([3 * t**2 - 1, 4 * t])[:, inner], atol=1e-12)
-    np.testing.assert_allclose(motion.alpha[:, inner], np.stack([6 * t, np.full_like(t, 4)])[:, inner], atol=1e-10)
+    np.testing.assert_allclose(
+        motion.omega[:, inner], np.stack([3 * t**2 - 1, 4 * t])[:, inner], atol=1e-12
+    )
+    np.testing.assert_allclose(
+        motion.alpha[:, inner], np.stack([6 * t, np.full_like(t, 4)])[:, inner], atol=1e-10
+    )
     np.testing.assert_array_equal(motion.omega[:, ends], motion.omega[:, [2, 2, -3, -3]])
     np.testing.assert_array_equal(motion.alpha[:, ends], motion.alpha[:, [2, 2, -3, -3]])

@@ -28,7 +28,9 @@ TRUTH = np.array([*ARM.constants(), 0.25, ARM.l1, ARM.l2])
 SHARED = Shared(Model(), payload=True)
 
 
-def _log(loaded: bool, seed: int, noise: float = 0.0) -> tuple[LogInformation, FloatArray, FloatArray]:
+def _log(
+    loaded: bool, seed: int, noise: float = 0.0
+) -> tuple[LogInformation, FloatArray, FloatArray]:
     """A log's likelihood at coefficients a little off, and the rows X c = y behind it."""
     rng = np.random.default_rng([seed, loaded])
     c = SHARED.coefficients(TRUTH, loaded)
@@ -53,7 +55,9 @@ def test_what_counts_as_nothing_is_left_out_of_a_pseudo_inverse() -> None:
     S = np.diag([4.0, 0.0, 1e-40, 2.0])
     S[3, 1] = S[1, 3] = 0.0
     np.testing.assert_allclose(scaled_pinv(S), np.diag([0.25, 0.0, 1e40, 0.5]), rtol=1e-12)
-    both = np.array([[1.0, 1.0], [1.0, 1.0]])  # the sum is known alone: half of its variance for each
+    both = np.array(
+        [[1.0, 1.0], [1.0, 1.0]]
+    )  # the sum is known alone: half of its variance for each
     np.testing.assert_allclose(scaled_pinv(both), both / 4, rtol=1e-12)
     np.testing.assert_array_equal(scaled_pinv(np.zeros((3, 3))), 0.0)
 
@@ -94,7 +98,9 @@ def test_the_most_likely_payload_is_that_of_another_solver(start: float) -> None
     other = least_squares(residual, TRUTH, x_scale=TRUTH, xtol=1e-14, ftol=1e-14, gtol=1e-14)
     np.testing.assert_allclose(beta, other.x, rtol=1e-5)
     np.testing.assert_allclose(
-        S / np.outer(1 / TRUTH, 1 / TRUTH), (other.jac.T @ other.jac) * np.outer(TRUTH, TRUTH), rtol=1e-3
+        S / np.outer(1 / TRUTH, 1 / TRUTH),
+        (other.jac.T @ other.jac) * np.outer(TRUTH, TRUTH),
+        rtol=1e-3,
     )
     own = sum(0.5 * float(np.sum((y - X @ log.c0) ** 2)) for log, X, y in logs)
     assert value == pytest.approx(own - other.cost, rel=1e-6)
@@ -127,11 +133,16 @@ def test_a_jackknife_by_kind_is_wolters_sum() -> None:
     for rows in (range(3), range(3, 5)):
         mean = sum(without[row] for row in rows) / len(rows)
         for row in rows:
-            expected += (len(rows) - 1) / len(rows) * np.outer(without[row] - mean, without[row] - mean)
+            expected += (
+                (len(rows) - 1) / len(rows) * np.outer(without[row] - mean, without[row] - mean)
+            )
     found = jackknife(logs, without)
     assert found is not None
     np.testing.assert_allclose(found, expected, rtol=1e-12)
-    one, other = jackknife(logs[:4], without[:4]), jackknife([*logs[:3], logs[4]], without[[0, 1, 2, 4]])
+    one, other = (
+        jackknife(logs[:4], without[:4]),
+        jackknife([*logs[:3], logs[4]], without[[0, 1, 2, 4]]),
+    )
     assert one is not None
     assert other is not None
     np.testing.assert_allclose(one, other, rtol=1e-12)
@@ -146,11 +157,15 @@ def test_what_is_left_out_tells_nothing() -> None:
         A = rng.standard_normal((8, 5))
         weights.append(A.T @ A)
         optima.append(rng.standard_normal(5))
-        logs.append(LogInformation(False, np.zeros(5), weights[-1][None], (weights[-1] @ optima[-1])[None]))
+        logs.append(
+            LogInformation(False, np.zeros(5), weights[-1][None], (weights[-1] @ optima[-1])[None])
+        )
     for place, found in enumerate(left_out(flat, logs, np.zeros(5))):
         rest = [number for number in range(4) if number != place]
         total = sum(weights[number] for number in rest)
-        np.testing.assert_allclose(found, np.linalg.solve(total, sum(weights[n] @ optima[n] for n in rest)), rtol=1e-9)
+        np.testing.assert_allclose(
+            found, np.linalg.solve(total, sum(weights[n] @ optima[n] for n in rest)), rtol=1e-9
+        )
 
 
 def test_no_blocks_have_no_sums() -> None:

@@ -22,7 +22,11 @@ def measured(motion: SimulatedMotion, coulomb: float = 0.02, seed: int = 0) -> P
     """Angles and torques with the sensors' noise, and Coulomb friction that the motors overcome, in N m."""
     rng = np.random.default_rng(seed)
     theta = motion.theta + 3e-4 * rng.standard_normal(motion.theta.shape)
-    tau = motion.tau + coulomb * np.tanh(motion.omega / 0.02) + 1e-2 * rng.standard_normal(motion.tau.shape)
+    tau = (
+        motion.tau
+        + coulomb * np.tanh(motion.omega / 0.02)
+        + 1e-2 * rng.standard_normal(motion.tau.shape)
+    )
     return theta, tau
 
 
@@ -77,7 +81,8 @@ def test_the_convention_that_is_named_undoes_the_mistake(bench: Bench, row: str)
     mends = [found.best.convention, found.best.convention.mirrored()]
     if row == "theta1 by half a turn":
         mends.append(replace(AS_READ, signs=(-1, -1), torque_signs=(-1, -1), zero=(np.pi, 0.0)))
-    # The log again, or the log from behind: cos θ1 and sin θ1 tell angles but for turns. Zeros are fitted to a
+    # The log again, or the log from behind: cos θ1 and sin θ1 tell angles but for turns. Zeros are
+    # fitted to a
     # thousandth, and a free scale to 1e-4 of angles of some ten rad.
     undone = [
         np.allclose(np.exp(1j * one.angles(wrong[0])), np.exp(1j * right), atol=0.01)
@@ -110,12 +115,18 @@ def wrongs(motion: SimulatedMotion) -> dict[str, Callable[[], Pair]]:
         "Coulomb": lambda: (theta, tau + 0.3 * size * sign),
         "load": lambda: (theta, tau + 0.2 * np.abs(tau) * sign),
         "ripple": lambda: (theta, tau + 0.1 * size * np.sin(20 * motion.theta)),
-        "slow": lambda: (theta, tau + 0.2 * size * np.cumsum(rng.standard_normal(tau.shape), axis=1) / 40),
+        "slow": lambda: (
+            theta,
+            tau + 0.2 * size * np.cumsum(rng.standard_normal(tau.shape), axis=1) / 40,
+        ),
         "offset": lambda: (theta, tau + 0.2 * size),
         "noise": lambda: (theta, tau + 0.3 * size * rng.standard_normal(tau.shape)),
         "nothing but noise": lambda: (theta, size * rng.standard_normal(tau.shape)),
         "coarse": lambda: (np.round(theta / 5e-3) * 5e-3, tau),
-        "lost": lambda: (np.delete(theta, np.s_[::20], axis=1), np.delete(tau, np.s_[::20], axis=1)),
+        "lost": lambda: (
+            np.delete(theta, np.s_[::20], axis=1),
+            np.delete(tau, np.s_[::20], axis=1),
+        ),
     }
 
 
@@ -132,11 +143,14 @@ def test_what_no_log_can_tell(bench: Bench) -> None:
     assert behind == AS_READ.mirrored()
     seen = judged(behind.angles(theta), behind.torques(tau)).best.k
     offsets = np.isin(ZEROED, ("o1", "o2"))  # a torque's own, they change their sign with it
-    # the angle added leaves the windows' second derivative a rounding, which offsets of next to nothing see
+    # the angle added leaves the windows' second derivative a rounding, which offsets of next to
+    # nothing see
     assert np.where(offsets, -seen, seen) == pytest.approx(k, rel=1e-4, abs=1e-5)
     louder = judged(theta, 6 * tau)
     assert louder.best.convention == AS_READ
-    assert louder.best.k == pytest.approx(6 * k, rel=1e-6)  # rounding, by the condition of the columns
+    assert louder.best.k == pytest.approx(
+        6 * k, rel=1e-6
+    )  # rounding, by the condition of the columns
 
 
 def test_without_gravity_the_zero_of_the_first_joint_means_nothing(bench: Bench) -> None:
@@ -185,10 +199,16 @@ def test_demands_are_in_standard_deviations(gravity: bool) -> None:
         covariance = root @ root.T
         expected = {}
         for name, value in values(c).items():
-            slope = [(values(c + e)[name] - values(c - e)[name]) / 2e-6 for e in 1e-6 * np.eye(len(names))]
+            slope = [
+                (values(c + e)[name] - values(c - e)[name]) / 2e-6
+                for e in 1e-6 * np.eye(len(names))
+            ]
             expected[name] = value / np.sqrt(slope @ covariance @ slope)
         if gravity:
-            k1, k2 = (c[names.index(name)] / covariance[(names.index(name),) * 2] ** 0.5 for name in ("k1", "k2"))
+            k1, k2 = (
+                c[names.index(name)] / covariance[(names.index(name),) * 2] ** 0.5
+                for name in ("k1", "k2")
+            )
             expected["k1 k2 > 0"] = np.sign(k1 * k2) * min(abs(k1), abs(k2))
         found = _demands(dict(zip(names, c.tolist(), strict=True)), covariance, speed)
         assert found == pytest.approx(expected, rel=1e-5)

@@ -37,7 +37,9 @@ K = np.array([0.03, 1.4, 0.05, 1.9, 0.06, 0.1, 0.2])
 def fit_of(values: FloatArray, model: Model = PLAIN, delay: bool = False) -> Fit:
     """A fit of one log whose information is dense, and that is most likely at `values`."""
     shared = Shared(model, delay)
-    X = np.random.default_rng(0).standard_normal((50, values.size)) / (0.01 * np.maximum(np.abs(values), 1e-3))
+    X = np.random.default_rng(0).standard_normal((50, values.size)) / (
+        0.01 * np.maximum(np.abs(values), 1e-3)
+    )
     log = LogInformation(False, values, X[:, :, None] * X[:, None, :], np.zeros((50, values.size)))
     return conclude("refined", shared, [log], values, np.ones(2), coloured=False)
 
@@ -48,7 +50,9 @@ def test_a_friction_held_at_nothing_moves_the_others_as_conditional_normals(brok
     values = K.copy()
     values[broken] = -0.05
     fit = fit_of(values)
-    expected = fit.values - fit.covariance[:, broken] * fit.values[broken] / fit.covariance[broken, broken]
+    expected = (
+        fit.values - fit.covariance[:, broken] * fit.values[broken] / fit.covariance[broken, broken]
+    )
     found = constrained(fit)
     np.testing.assert_allclose(found.values, expected, atol=1e-4 * np.abs(K).max())
     np.testing.assert_array_equal(found.std, fit.std)
@@ -64,7 +68,9 @@ def test_a_friction_held_at_nothing_moves_the_others_as_conditional_normals(brok
     assert constrained(replace(fit, notes=(before,))).notes == (before, note)
 
 
-def test_bounds_that_no_point_keeps_leave_the_free_estimates(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bounds_that_no_point_keeps_leave_the_free_estimates(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     values = K.copy()
     values[5] = -0.05
     fit = replace(fit_of(values), status=("OK", "NOT_IDENTIFIABLE", *("OK",) * 5))
@@ -99,11 +105,15 @@ def test_the_length_by_constants_has_the_error_of_a_ratio() -> None:
     found = length_by_constants(fit)
     assert found is not None
     assert found[0] == pytest.approx(9.81 * 0.03 / 1.4)
-    drawn = np.random.default_rng(0).multivariate_normal(fit.values[:2], fit.covariance[:2, :2], 5000)
+    drawn = np.random.default_rng(0).multivariate_normal(
+        fit.values[:2], fit.covariance[:2, :2], 5000
+    )
     assert found[1] == pytest.approx(np.std(9.81 * drawn[:, 0] / drawn[:, 1]), rel=0.05)
     assert length_by_constants(fit_of(K[[0, 2, 4, 5, 6]], Model(gravity=0.0))) is None
     assert length_by_constants(replace(fit, values=K * [1, 0, 1, 1, 1, 1, 1])) is None
-    assert length_by_constants(replace(fit, status=("OK", "NOT_IDENTIFIABLE", *("OK",) * 5))) is None
+    assert (
+        length_by_constants(replace(fit, status=("OK", "NOT_IDENTIFIABLE", *("OK",) * 5))) is None
+    )
     assert length_by_constants(replace(fit, status=("NOT_IDENTIFIABLE", *("OK",) * 6))) is None
 
 
@@ -130,12 +140,15 @@ def test_a_terms_worth_is_schwarzs_price_less_walds_statistic() -> None:
 def test_logs_of_one_arm_are_not_taken_for_those_of_two(bench: Bench) -> None:
     """A log of each kind, four seconds: few stretches tell a variance, and none of 12 pairs is 5 deviations apart.
 
-    Without the freedom of so few stretches 1 pair in 6 was. Friction that is another's is still told.
+    Without the freedom of so few stretches 1 pair in 6 was. Friction that is another's is still
+    told.
     """
     found = []
     for seed in range(12):
         logs = [bench.log(loaded, 1e-3, 20 + seed) for loaded in (False, True)]
-        found.append(payload_distance(weak.fit([partial(list, logs[:1])], [partial(list, logs[1:])])))
+        found.append(
+            payload_distance(weak.fit([partial(list, logs[:1])], [partial(list, logs[1:])]))
+        )
     apart = [distance for distance in found if distance is not None]
     assert len(apart) == 12
     assert max(apart) < 5
@@ -167,7 +180,10 @@ def test_a_loaded_log_that_tells_no_mass_has_no_repeatability(bench: Bench) -> N
 
 
 def test_joints_of_an_arm_in_a_plane_are_held_against_each_other_too(bench: Bench) -> None:
-    """Without gravity k1 and k3 are left to compare; torques that differ by less than half contradict nothing."""
+    """Without gravity k1 and k3 are left to compare.
+
+    Torques that differ by less than half contradict nothing.
+    """
     flat = WeakSettings(model=Model(gravity=0.0))
     k = bench.arm.constants()
     theta1, both = bench.bare.theta[0], bench.bare.theta.sum(axis=0)
@@ -182,4 +198,6 @@ def test_joints_of_an_arm_in_a_plane_are_held_against_each_other_too(bench: Benc
         assert (found is not None) is told
         if found is not None:
             truth = dict(zip(("k1", "k3"), k[[0, 2]], strict=True))[found.name]
-            np.testing.assert_allclose([found.first, found.second], [truth, share * truth], rtol=0.05)
+            np.testing.assert_allclose(
+                [found.first, found.second], [truth, share * truth], rtol=0.05
+            )

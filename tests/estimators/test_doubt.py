@@ -37,7 +37,9 @@ def test_a_joint_that_is_hardly_driven_is_told_by_the_other(bench: Bench, idle: 
     apart = joints_apart([normal], Model())
     assert apart is not None
     truth = dict(zip(names, bench.truth[:7], strict=True))
-    np.testing.assert_allclose([apart.first, apart.second], truth[apart.name] * share[:, 0], rtol=0.02)
+    np.testing.assert_allclose(
+        [apart.first, apart.second], truth[apart.name] * share[:, 0], rtol=0.02
+    )
     sound = weak.normal_equations(lambda: [log], WeakSettings())
     assert sound is not None
     assert joints_apart([sound], Model()) is None
@@ -49,9 +51,14 @@ def test_constants_that_the_joints_contradict_are_not_ok(bench: Bench) -> None:
     fit = replace(weak.fit([lambda: [idle]]), notes=(REFUTED,))
     found = doubted(fit, [lambda: [idle]], [], WeakSettings())
     assert _statuses(fit) == dict.fromkeys(fit.names, "OK")
-    assert _statuses(found) == {name: "OK" if name in ("k6", "k7") else "WEAK_EXCITATION" for name in fit.names}
+    assert _statuses(found) == {
+        name: "OK" if name in ("k6", "k7") else "WEAK_EXCITATION" for name in fit.names
+    }
     (doubt,) = (note for note in found.notes if note.code == "JOINTS_CONTRADICT")
-    assert re.match(r"joint 1 by itself tells k\d as [\d.]+ \S.* and joint 2 as .*: one of them is hardly", doubt.text)
+    assert re.match(
+        r"joint 1 by itself tells k\d as [\d.]+ \S.* and joint 2 as .*: one of them is hardly",
+        doubt.text,
+    )
     np.testing.assert_array_equal(found.values, fit.values)
 
 
@@ -71,9 +78,13 @@ def test_a_refuted_log_in_which_a_joint_stood_still_is_not_ok(bench: Bench) -> N
     still = replace(log, theta=np.stack([log.theta[0], 0.3 + tremble]))
     fit = weak.fit([lambda: [still]])
     found = doubted(fit, [lambda: [still]], [], WeakSettings())
-    assert "joint 2 never moved: give a log in which both joints do" in [note.text for note in found.notes]
+    assert "joint 2 never moved: give a log in which both joints do" in [
+        note.text for note in found.notes
+    ]
     assert not [
-        name for name, word in _statuses(found).items() if name in ("k1", "k2", "k3", "k4", "k5") and word == "OK"
+        name
+        for name, word in _statuses(found).items()
+        if name in ("k1", "k2", "k3", "k4", "k5") and word == "OK"
     ]
     with_motion = doubted(weak.fit([lambda: [log]]), [lambda: [log]], [], WeakSettings())
     assert with_motion.notes == ()

@@ -20,7 +20,9 @@ from .conftest import Bench
 
 MOVED = np.ones(2)
 NAMES = ("k1", "k2", "k3", "k4", "k5", "k6", "k7")
-SIZES = np.array([0.05, 2.0, 0.05, 2.0, 0.05, 0.3, 0.3])  # k1, k3, k5; k2, k4; k6, k7 have one size each
+SIZES = np.array(
+    [0.05, 2.0, 0.05, 2.0, 0.05, 0.3, 0.3]
+)  # k1, k3, k5; k2, k4; k6, k7 have one size each
 VALUES = SIZES * np.array([0.8, 1.0, 1.0, -0.7, 0.9, 1.0, 0.5])
 
 
@@ -50,17 +52,23 @@ def axis(**share: float) -> FloatArray:
         ((axis(k2=1, k4=-1), axis(k6=1)), ("k2 and k4 only as a sum", "k6 is not determined")),
     ],
 )
-def test_what_is_open_is_said_in_words(null: tuple[FloatArray, ...], sentences: tuple[str, ...]) -> None:
+def test_what_is_open_is_said_in_words(
+    null: tuple[FloatArray, ...], sentences: tuple[str, ...]
+) -> None:
     S = information(*null)
     known = examine(NAMES, VALUES, S, MOVED)
     assert known.sentences == sentences
-    part = {name for direction in null for name, share in zip(NAMES, direction, strict=True) if share}
+    part = {
+        name for direction in null for name, share in zip(NAMES, direction, strict=True) if share
+    }
     assert known.determined == tuple(name not in part for name in NAMES)
     directions, size = open_directions(NAMES, VALUES, S)
     np.testing.assert_allclose(size, SIZES, rtol=1e-12)
     assert directions.shape == (7, len(null))
     np.testing.assert_allclose(directions.T @ directions, np.eye(len(null)), atol=1e-12)
-    np.testing.assert_allclose(S @ (directions * size[:, None]), 0, atol=1e-6 * np.abs(S).max() * SIZES.min())
+    np.testing.assert_allclose(
+        S @ (directions * size[:, None]), 0, atol=1e-6 * np.abs(S).max() * SIZES.min()
+    )
 
 
 @pytest.mark.parametrize(
@@ -79,31 +87,45 @@ def test_a_joint_that_never_moved_is_why(moved: tuple[float, float], reason: str
 
 
 def test_a_direction_is_open_from_half_the_size_on_and_a_share_of_it_counts() -> None:
-    """A standard deviation of 0.49 sizes is told, one of 0.51 is not; a seventh of a direction is no part in it."""
+    """A standard deviation of 0.49 sizes is told, one of 0.51 is not.
+
+    a seventh of a direction is no part in it.
+    """
     for deviation, told in ((0.49, True), (0.51, False)):
         S = information(axis(k7=1)) + np.diag(axis(k7=1) / (deviation * SIZES) ** 2)
         assert examine(NAMES, VALUES, S, MOVED).determined == (True,) * 6 + (told,)
     for share, told in ((0.14, True), (0.16, False)):
         direction = axis(k7=np.sqrt(1 - share**2), k4=share)
         assert examine(NAMES, VALUES, information(direction), MOVED).determined[3] is told
-    faint = axis(k1=np.sqrt(1 - 0.151**2), k5=0.151)  # what has a part is said in one sentence with the rest
+    faint = axis(
+        k1=np.sqrt(1 - 0.151**2), k5=0.151
+    )  # what has a part is said in one sentence with the rest
     (sentence,) = examine(NAMES, VALUES, information(faint), MOVED).sentences
     assert sentence.startswith("k1 and k5 only as ")
 
 
 def test_a_sum_is_known_whose_terms_are_not(bench: Bench) -> None:
-    """Of k3 + k5 the standard deviation is that of a model whose parameter is the sum; k5 alone has none."""
+    """Of k3 + k5 the standard deviation is that of a model whose parameter is the sum.
+
+    k5 alone has none.
+    """
     shared = Shared(Model())
     rng = np.random.default_rng(0)
     X = rng.standard_normal((60, 7)) / SIZES
     X[:, 4] = X[:, 2]  # k3 and k5 move the torque alike
     y = X @ VALUES + 0.02 * rng.standard_normal(60)
-    log = LogInformation(False, np.zeros(7), X[:, :, None] * X[:, None, :] / 4e-4, X * y[:, None] / 4e-4)
+    log = LogInformation(
+        False, np.zeros(7), X[:, :, None] * X[:, None, :] / 4e-4, X * y[:, None] / 4e-4
+    )
     fit = conclude("refined", shared, [log], VALUES, MOVED, coloured=False)
-    assert [name for name, status in zip(NAMES, fit.status, strict=True) if status != "OK"] == ["k3", "k5"]
+    assert [name for name, status in zip(NAMES, fit.status, strict=True) if status != "OK"] == [
+        "k3",
+        "k5",
+    ]
     merged = np.delete(X, 4, axis=1) / 0.02
     covariance = np.linalg.inv(merged.T @ merged)
-    # the variance of the difference, 1e14 times as large in floating point, leaves two digits of the sum's
+    # the variance of the difference, 1e14 times as large in floating point, leaves two digits of
+    # the sum's
     assert fit.spread(axis(k3=1, k5=1)) == pytest.approx(np.sqrt(covariance[2, 2]), rel=0.02)
     share = axis(k3=1, k5=1, k1=-2)
     of_merged = np.delete(share, 4)
@@ -111,7 +133,9 @@ def test_a_sum_is_known_whose_terms_are_not(bench: Bench) -> None:
     assert fit.spread(axis(k5=1)) == np.inf
     assert fit.spread(axis(k1=1)) == pytest.approx(np.sqrt(covariance[0, 0]), rel=1e-6)
     (own,) = own_estimates(fit)
-    np.testing.assert_array_equal(np.isinf(own.std), [False, False, True, False, True, False, False])
+    np.testing.assert_array_equal(
+        np.isinf(own.std), [False, False, True, False, True, False, False]
+    )
     np.testing.assert_allclose(own.values[[0, 1, 3, 5, 6]], fit.values[[0, 1, 3, 5, 6]], rtol=1e-6)
     whole = weak.fit([lambda: [bench.log(sigma=1e-3)]])
     lost = replace(whole, status=("NOT_IDENTIFIABLE", *whole.status[1:]))
@@ -136,7 +160,9 @@ def test_a_part_that_repeats_has_the_freedom_of_few_logs() -> None:
         g = rng.standard_normal((40, 5)) * 2.0 + S @ (0.3 * rng.standard_normal(5))
         logs.append(LogInformation(False, np.zeros(5), S, g))
     fit = conclude("weak", shared, logs, np.zeros(5), MOVED, coloured=True)
-    within = conclude("weak", shared, logs, np.zeros(5), MOVED, coloured=True, without=np.zeros((5, 5)))
+    within = conclude(
+        "weak", shared, logs, np.zeros(5), MOVED, coloured=True, without=np.zeros((5, 5))
+    )
     assert within.quantile == pytest.approx(
         student.ppf(0.975, fit.freedom), rel=1e-6
     )  # nothing differs: sandwich alone

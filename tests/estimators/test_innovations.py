@@ -8,7 +8,13 @@ from scipy.signal import periodogram
 from scipy.stats import binom
 
 from algid.arm import FloatArray
-from algid.estimators.innovations import autocorrelation, pooled, residual_sums, spectra, whiteness_of
+from algid.estimators.innovations import (
+    autocorrelation,
+    pooled,
+    residual_sums,
+    spectra,
+    whiteness_of,
+)
 
 DT = 2e-3
 
@@ -53,7 +59,8 @@ def test_the_density_holds_the_variance() -> None:
     w = np.random.default_rng(0).normal(size=(2, 3000))
     sums = residual_sums(w, DT)
     _, P = periodogram(w, 1 / DT, window="hann")
-    # scipy halves the last line, which has no partner at negative frequencies; our first two are left out
+    # scipy halves the last line, which has no partner at negative frequencies; our first two are
+    # left out
     ours = 2 * DT * sums.power.sum(axis=1)
     np.testing.assert_allclose(ours, P[:, 2:].sum(axis=1) + P[:, -1], rtol=1e-9)
 
@@ -62,14 +69,20 @@ def test_the_density_of_coloured_noise_is_that_of_its_filter() -> None:
     rng = np.random.default_rng(1)
     count = inside = 0
     for _ in range(30):
-        w = np.stack([np.convolve(row, [1.0, 0.8], "valid") for row in rng.normal(size=(2, 20_001))])
+        w = np.stack(
+            [np.convolve(row, [1.0, 0.8], "valid") for row in rng.normal(size=(2, 20_001))]
+        )
         sums = residual_sums(w, DT)
         found = spectra(sums)
         exact = 2 * DT * np.abs(1 + 0.8 * np.exp(-2j * np.pi * found.frequency * DT)) ** 2
-        # the bins are narrow beside the filter's shape but for the highest, where it falls to a hundredth
+        # the bins are narrow beside the filter's shape but for the highest, where it falls to a
+        # hundredth
         wide = found.frequency < 0.35 / DT
         share = (found.density / exact)[:, wide]
-        count, inside = count + share.size, inside + _inside(share, found.low[wide], found.high[wide])
+        count, inside = (
+            count + share.size,
+            inside + _inside(share, found.low[wide], found.high[wide]),
+        )
         # five standard errors of 20,000 samples
         np.testing.assert_allclose(autocorrelation(sums).correlation[:, 0], 0.8 / 1.64, atol=0.035)
     low, high = binom.interval(0.999, count, 0.95)

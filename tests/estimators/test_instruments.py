@@ -77,7 +77,9 @@ def test_the_estimate_is_that_of_two_stages_of_least_squares() -> None:
     start = np.array([1.1, 1.8, 3.3])
     for seed in (1, 2):
         Z, X, y = _rows(seed)
-        columns = np.concatenate([Z, X, y[:, None]], axis=1).reshape(2, 7, 9, 10)  # nine stretches of ten rows
+        columns = np.concatenate([Z, X, y[:, None]], axis=1).reshape(
+            2, 7, 9, 10
+        )  # nine stretches of ten rows
         logs_.append(instruments.Moments(np.einsum("axbr,aybr->baxy", columns, columns), 100, 10))
         level = np.sqrt(np.sum((y - np.einsum("q,aqr->ar", start, X)) ** 2, axis=1) / 90)
         stacked.append([part / level.reshape(2, *([1] * (part.ndim - 1))) for part in (Z, X, y)])
@@ -98,7 +100,9 @@ def test_the_estimate_is_that_of_two_stages_of_least_squares() -> None:
         # windows overlap eight-fold, every second is taken: a window's worth of rows counts as two
         np.testing.assert_allclose(log.total[0], 0.5 * first.T @ first, rtol=1e-9)
         np.testing.assert_allclose(
-            log.total[1], 0.5 * first.T @ np.concatenate(residual / level[:, None]), atol=1e-9 * log.total[0].max()
+            log.total[1],
+            0.5 * first.T @ np.concatenate(residual / level[:, None]),
+            atol=1e-9 * log.total[0].max(),
         )
         np.testing.assert_array_equal(log.c0, found)
 
@@ -109,13 +113,19 @@ def test_windows_are_simulated_to_the_order_of_their_torque(late: float, order: 
 
     Between samples the torque is a straight line: then of second order, else of fourth.
     """
-    k = load_case("case1").arm.constants() * np.array([1, 1, 1, 1, 1, 0.05, 0.01])  # less friction: a motion less stiff
+    k = load_case("case1").arm.constants() * np.array(
+        [1, 1, 1, 1, 1, 0.05, 0.01]
+    )  # less friction: a motion less stiff
     errors = []
     for dt in (5e-3, 2.5e-3):
         t = np.arange(round(4 / dt)) * dt
-        motion = simulate(k, lambda now: np.stack([0.6 * np.sin(3 * now), 0.2 * np.cos(4 * now)]), t)
+        motion = simulate(
+            k, lambda now: np.stack([0.6 * np.sin(3 * now), 0.2 * np.cos(4 * now)]), t
+        )
         shift = late * dt
-        tau = np.stack([0.6 * np.sin(3 * (t + shift)), 0.2 * np.cos(4 * (t + shift))])  # acts `shift` after its stamp
+        tau = np.stack(
+            [0.6 * np.sin(3 * (t + shift)), 0.2 * np.cos(4 * (t + shift))]
+        )  # acts `shift` after its stamp
         piece = Segment(0.0, dt, motion.theta, tau, motion.omega)
         windows = Windows(dt, 0.32, shift, None)
         found = instruments._simulated(Model(), k, windows, *instruments._cut(piece, windows))
@@ -127,10 +137,16 @@ def test_windows_are_simulated_to_the_order_of_their_torque(late: float, order: 
         at = (starts[:, None] + np.arange(length)).ravel()
         assert good.all()
         assert starts[-1] + length <= t.size - first < starts[-1] + length + 2 * windows.step
-        np.testing.assert_allclose(simulated.tau, motion.tau[:, at], atol=1e-9 if late % 1 == 0 else 6 * dt**2 / 8)
+        np.testing.assert_allclose(
+            simulated.tau, motion.tau[:, at], atol=1e-9 if late % 1 == 0 else 6 * dt**2 / 8
+        )
         assert simulated.omega is not None
-        off = np.abs(np.stack([simulated.theta - motion.theta[:, at], simulated.omega - motion.omega[:, at]]))
-        errors.append([off[..., parity::2].max(axis=2) for parity in (0, 1)])  # steps, and what lies between them
+        off = np.abs(
+            np.stack([simulated.theta - motion.theta[:, at], simulated.omega - motion.omega[:, at]])
+        )
+        errors.append(
+            [off[..., parity::2].max(axis=2) for parity in (0, 1)]
+        )  # steps, and what lies between them
     slopes = np.log2(errors[0]) - np.log2(errors[1])
     assert np.all(slopes > order), slopes
 
@@ -143,13 +159,19 @@ def test_coefficients_that_move_no_arm_and_windows_that_run_away_are_told(bench:
     wild = instruments._simulated(Model(), k * np.array([1, 1, 1, 1, 1, -500, -500]), windows, *cut)
     assert wild is not None
     assert not wild[1].any()
-    found = instruments.moments(lambda: [log], WeakSettings(), k * np.array([1, 1, 1, 1, 1, -500, -500]))
+    found = instruments.moments(
+        lambda: [log], WeakSettings(), k * np.array([1, 1, 1, 1, 1, -500, -500])
+    )
     assert found is not None
     assert found.astray == found.rows > 0
     assert not found.gram.any()
     least = weak.fit([lambda: [log]])
     astray = instruments.fit([lambda: [log]], start=replace(least, values=-least.values))
-    assert (astray.converged, set(astray.status), astray.estimator) == (False, {"NOT_CONVERGED"}, "weak")
+    assert (astray.converged, set(astray.status), astray.estimator) == (
+        False,
+        {"NOT_CONVERGED"},
+        "weak",
+    )
 
 
 def test_windows_move_as_the_model_says_under_a_load_whose_sign_its_inertia_turns() -> None:
@@ -166,14 +188,20 @@ def test_what_start_and_prior_know_stays_known(bench: Bench) -> None:
     found = instruments.fit([lambda: [log]], start=least)
     np.testing.assert_array_equal(found.moved, least.moved)
     k4 = float(least.values[3])
-    sure = Prior(("k1", "k2", "k3", "k4"), np.array([*least.values[:3], 1.01 * k4]), np.diag([0, 0, 0, 1e10 / k4**2]))
+    sure = Prior(
+        ("k1", "k2", "k3", "k4"),
+        np.array([*least.values[:3], 1.01 * k4]),
+        np.diag([0, 0, 0, 1e10 / k4**2]),
+    )
     told = instruments.fit([lambda: [log]], prior=sure)
     assert told.prior is sure
     assert told.values[3] == pytest.approx(1.01 * k4, rel=1e-3)
     assert told.std[3] < 2e-5 * k4
 
 
-def test_of_a_long_log_the_first_pieces_are_looked_at(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_a_long_log_the_first_pieces_are_looked_at(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(weak, "PIECE_SAMPLES", 500)
     log = bench.log(sigma=1e-3)
     least = weak.fit([lambda: [log]])

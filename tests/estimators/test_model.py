@@ -5,12 +5,28 @@ import pytest
 import sympy as sp
 
 from algid import arm
-from algid.model import TERMS, UNITS, Model, Motion, partials, regressor, sensitivity, sine_cosine, torque
+from algid.model import (
+    TERMS,
+    UNITS,
+    Model,
+    Motion,
+    partials,
+    regressor,
+    sensitivity,
+    sine_cosine,
+    torque,
+)
 from tests.estimators.by_hand import evaluated, torque_by_hand
 
 FULL = Model(tuple(TERMS), coulomb_speed=0.5, stribeck_speed=0.8)
 VALUES = {
-    **dict(zip(("k1", "k2", "k3", "k4", "k5", "k6", "k7"), (0.03, 1.4, 0.05, 1.9, 0.06, 0.1, 0.2), strict=True)),
+    **dict(
+        zip(
+            ("k1", "k2", "k3", "k4", "k5", "k6", "k7"),
+            (0.03, 1.4, 0.05, 1.9, 0.06, 0.1, 0.2),
+            strict=True,
+        )
+    ),
     "f1": 0.25,
     "f2": 0.15,
     "o1": 0.01,
@@ -33,7 +49,9 @@ C = np.array([VALUES[name] for name in FULL.names])
 
 def _motion(seed: int = 0) -> Motion:
     rng = np.random.default_rng(seed)
-    return Motion(rng.uniform(-3, 3, (2, 50)), rng.uniform(-2, 2, (2, 50)), rng.uniform(-40, 40, (2, 50)))
+    return Motion(
+        rng.uniform(-3, 3, (2, 50)), rng.uniform(-2, 2, (2, 50)), rng.uniform(-40, 40, (2, 50))
+    )
 
 
 def test_the_torque_of_every_term_is_that_of_sympy() -> None:
@@ -54,7 +72,9 @@ def test_the_regressor_gives_the_torque_and_is_its_slope_where_the_torque_is_lin
     assert linear.linear
     assert not FULL.linear
     assert np.array_equal(regressor(linear, _motion()), sensitivity(linear, c, _motion()))
-    assert np.allclose(np.einsum("aqn,q->an", regressor(FULL, _motion(), C), C), torque(FULL, C, _motion()))
+    assert np.allclose(
+        np.einsum("aqn,q->an", regressor(FULL, _motion(), C), C), torque(FULL, C, _motion())
+    )
     with pytest.raises(ValueError, match=r"load, gain.* depends on the coefficients"):
         regressor(FULL, _motion())
 
@@ -62,7 +82,9 @@ def test_the_regressor_gives_the_torque_and_is_its_slope_where_the_torque_is_lin
 def test_plain_columns_are_those_of_the_arm() -> None:
     motion = _motion()
     ours = regressor(Model(), motion)
-    assert np.allclose(ours, arm.regressor(motion.theta, motion.omega, motion.alpha), atol=1e-13)  # rounding
+    assert np.allclose(
+        ours, arm.regressor(motion.theta, motion.omega, motion.alpha), atol=1e-13
+    )  # rounding
 
 
 def test_terms_are_named_in_one_order_and_unknown_ones_refused() -> None:
@@ -75,9 +97,19 @@ def test_terms_are_named_in_one_order_and_unknown_ones_refused() -> None:
 
 
 def test_sine_and_cosine_are_exact_at_every_angle() -> None:
-    corners = np.pi / 2 * np.arange(-40, 41)  # where the half angle's tangent has its poles and zeros
-    around = [corners, np.nextafter(corners, 1e9), np.nextafter(corners, -1e9), corners + 1e-8, corners - 1e-8]
-    wide = 1e6 * np.random.default_rng(3).standard_normal(1000)  # an encoder that has turned for days
+    corners = (
+        np.pi / 2 * np.arange(-40, 41)
+    )  # where the half angle's tangent has its poles and zeros
+    around = [
+        corners,
+        np.nextafter(corners, 1e9),
+        np.nextafter(corners, -1e9),
+        corners + 1e-8,
+        corners - 1e-8,
+    ]
+    wide = 1e6 * np.random.default_rng(3).standard_normal(
+        1000
+    )  # an encoder that has turned for days
     theta = np.concatenate([*around, wide])
     sine, cosine = sine_cosine(theta)
     unit = np.finfo(float).eps  # a unit in the last place of 1
@@ -85,7 +117,9 @@ def test_sine_and_cosine_are_exact_at_every_angle() -> None:
     assert np.max(np.abs(cosine - [math.cos(angle) for angle in theta])) <= unit
 
 
-@pytest.mark.parametrize("model", [FULL, *(Model((term,)) for term in TERMS)], ids=lambda model: "+".join(model.terms))
+@pytest.mark.parametrize(
+    "model", [FULL, *(Model((term,)) for term in TERMS)], ids=lambda model: "+".join(model.terms)
+)
 def test_partials_are_the_slopes_of_the_torque(model: Model) -> None:
     motion, step = _motion(), 1e-6
     c = np.array([VALUES[name] for name in model.names])
@@ -97,7 +131,9 @@ def test_partials_are_the_slopes_of_the_torque(model: Model) -> None:
             move[joint] = step
             ahead = [s + move * (place == order) for place, s in enumerate(signals)]
             behind = [s - move * (place == order) for place, s in enumerate(signals)]
-            expected = (torque(model, c, Motion(*ahead)) - torque(model, c, Motion(*behind))) / (2 * step)
+            expected = (torque(model, c, Motion(*ahead)) - torque(model, c, Motion(*behind))) / (
+                2 * step
+            )
             assert np.allclose(slopes[order, :, joint], expected, atol=1e-6)  # central differences
 
 

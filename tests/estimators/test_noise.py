@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.estimators.noise import first_guess, floored, largest_change, newton_step, quantum, variance_score
+from algid.estimators.noise import (
+    first_guess,
+    floored,
+    largest_change,
+    newton_step,
+    quantum,
+    variance_score,
+)
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise
 from algid.model import Model
 from algid.signals.differences import HELD, POINTS, Stencil
@@ -20,7 +27,10 @@ ANGLES = 60
 
 
 def test_sixth_differences_leave_nothing_of_a_quintic_and_all_of_white_noise() -> None:
-    """Their variance is C(12, 6) σ²; the median of N correlated ones scatters by less than 4 / √N of it."""
+    """Their variance is C(12, 6) σ².
+
+    The median of N correlated ones scatters by less than 4 / √N of it.
+    """
     t = np.linspace(-1, 1, 20_001)
     smooth = np.stack([3 * t**5 - t**2, 40 + t**4])
     noise = np.random.default_rng(0).standard_normal((4, t.size))
@@ -36,7 +46,9 @@ def test_sixth_differences_leave_nothing_of_a_quintic_and_all_of_white_noise() -
 def test_jumps_are_no_noise_and_signals_that_hardly_change_have_their_mean_square() -> None:
     noise = 1e-3 * np.random.default_rng(1).standard_normal((2, 5000))
     jumps = np.repeat(np.arange(10.0), 500)  # nine jumps of 1000 σ
-    np.testing.assert_allclose(first_guess(noise + jumps, noise).theta, first_guess(noise, noise).theta, rtol=0.02)
+    np.testing.assert_allclose(
+        first_guess(noise + jumps, noise).theta, first_guess(noise, noise).theta, rtol=0.02
+    )
     rare = np.zeros((2, 5000))
     rare[:, 100] = 0.5  # one step of an encoder there and back: most differences are nothing
     expected = np.sqrt(924 * 0.25 / (5000 - 6)) / np.sqrt(924)
@@ -49,11 +61,15 @@ def test_the_step_of_an_encoder_is_found_and_no_step_where_there_is_none(step: f
     swing = 300 * step * np.sin(np.arange(2000) / 90)
     coarse = np.round(swing / step) * step
     rough = coarse * (1 + 1e-12 * rng.standard_normal(2000))  # as floating point leaves it
-    found = quantum(np.stack([coarse, rough, swing, swing + 0.1 * step * rng.standard_normal(2000)]))
+    found = quantum(
+        np.stack([coarse, rough, swing, swing + 0.1 * step * rng.standard_normal(2000)])
+    )
     np.testing.assert_allclose(found, [step, step, 0, 0], rtol=1e-9)
     few = np.repeat(np.arange(8.0), 50)  # seven changes of value are too few to tell
     assert quantum(np.stack([few, np.zeros(400)])).tolist() == [0.0, 0.0]
-    leaps = np.cumsum([1.0] * 5 + [1000.0] * 20)  # 20 steps of another size beside five that could tell
+    leaps = np.cumsum(
+        [1.0] * 5 + [1000.0] * 20
+    )  # 20 steps of another size beside five that could tell
     assert quantum(leaps[None]).tolist() == [0.0]
 
 
@@ -71,7 +87,9 @@ def _parts(linear: Linearised) -> tuple[list[FloatArray], FloatArray]:
     columns = [H[:, :, :, joint].reshape(2 * n, ANGLES) for joint in range(2)]
     parts: list[FloatArray] = [column @ column.T for column in columns]
     parts += [np.kron(weights @ weights.T, np.diag(np.eye(2)[joint])) for joint in range(2)]
-    L = np.asarray(sum(np.diag(linear.factor[below, : 2 * n - below], -below) for below in range(2 * POINTS)))
+    L = np.asarray(
+        sum(np.diag(linear.factor[below, : 2 * n - below], -below) for below in range(2 * POINTS))
+    )
     return parts, L @ linear.columns.T
 
 
@@ -81,7 +99,9 @@ def linear(request: pytest.FixtureRequest, bench: Bench) -> Linearised:
     piece = Segment(0.0, DT, log.theta[:, 900 : 900 + ANGLES], log.tau[:, 900 : 900 + ANGLES])
     levels = NoiseLevels(np.array([1.2e-3, 0.8e-3]), np.array([0.9e-2, 1.3e-2]))
     theta0 = bench.bare.theta[:, 900 : 900 + ANGLES]
-    return linearise(Model(), bench.arm.constants(), theta0, piece, Stencil(DT, held=request.param), levels)
+    return linearise(
+        Model(), bench.arm.constants(), theta0, piece, Stencil(DT, held=request.param), levels
+    )
 
 
 def test_the_score_is_that_of_dense_algebra(linear: Linearised) -> None:
@@ -92,7 +112,9 @@ def test_the_score_is_that_of_dense_algebra(linear: Linearised) -> None:
     lam = inverse @ e
     found = variance_score(linear, ANGLES, 0)
     rounding = np.linalg.cond(V) * np.finfo(float).eps
-    np.testing.assert_allclose(found.power, [lam @ part @ lam for part in parts], rtol=1e3 * rounding)
+    np.testing.assert_allclose(
+        found.power, [lam @ part @ lam for part in parts], rtol=1e3 * rounding
+    )
     average = [[0.5 * lam @ one @ inverse @ other @ lam for one in parts] for other in parts]
     np.testing.assert_allclose(found.average, average, atol=1e3 * rounding * np.abs(average).max())
     for one, part in zip(found.absorbed, parts, strict=True):
@@ -101,11 +123,16 @@ def test_the_score_is_that_of_dense_algebra(linear: Linearised) -> None:
         np.testing.assert_allclose(one / scale, expected / scale, atol=1e3 * rounding)
     traces = np.array([variance_score(linear, ANGLES, seed).trace for seed in range(30)])
     expected = np.array([np.trace(inverse @ part) for part in parts])
-    assert np.all(np.abs(traces.mean(axis=0) - expected) < 4.5 * traces.std(axis=0, ddof=1) / np.sqrt(30) + 1e-9)
+    assert np.all(
+        np.abs(traces.mean(axis=0) - expected)
+        < 4.5 * traces.std(axis=0, ddof=1) / np.sqrt(30) + 1e-9
+    )
     assert traces.mean(axis=0).sum() == pytest.approx(len(V), rel=0.03)  # Σ V_i = V
 
 
-def test_a_newton_step_goes_along_the_slope_of_the_restricted_likelihood(linear: Linearised) -> None:
+def test_a_newton_step_goes_along_the_slope_of_the_restricted_likelihood(
+    linear: Linearised,
+) -> None:
     """−½ log|V| − ½ log|YᵀV⁻¹Y| − ½ eᵀPe (Patterson & Thompson 1971), by central differences in each log σ²."""
     parts, columns = _parts(linear)
     Y, e = columns[:, :-1] / np.abs(columns[:, :-1]).max(axis=0), columns[:, -1]
@@ -115,14 +142,21 @@ def test_a_newton_step_goes_along_the_slope_of_the_restricted_likelihood(linear:
         inverse = np.linalg.inv(V)
         S = Y.T @ inverse @ Y
         rest = e - Y @ np.linalg.solve(S, Y.T @ inverse @ e)
-        return -0.5 * float(np.linalg.slogdet(V)[1] + np.linalg.slogdet(S)[1] + rest @ inverse @ rest)
+        return -0.5 * float(
+            np.linalg.slogdet(V)[1] + np.linalg.slogdet(S)[1] + rest @ inverse @ rest
+        )
 
     h = 1e-4
-    slope = np.array([(restricted(h * axis) - restricted(-h * axis)) / (2 * h) for axis in np.eye(4)])
+    slope = np.array(
+        [(restricted(h * axis) - restricted(-h * axis)) / (2 * h) for axis in np.eye(4)]
+    )
     # The score is that of the residual as it is: taken where the coefficients fit best.
     S = linear.columns[:-1] @ linear.columns[:-1].T
     best = np.linalg.solve(S, linear.columns[:-1] @ linear.columns[-1])
-    settled = replace(linear, columns=np.vstack([linear.columns[:-1], linear.columns[-1] - best @ linear.columns[:-1]]))
+    settled = replace(
+        linear,
+        columns=np.vstack([linear.columns[:-1], linear.columns[-1] - best @ linear.columns[:-1]]),
+    )
     score = variance_score(settled, ANGLES, 0)
     V = sum(parts[1:], parts[0])
     score = replace(score, trace=np.array([np.trace(np.linalg.solve(V, part)) for part in parts]))
@@ -135,13 +169,17 @@ def test_a_newton_step_goes_along_the_slope_of_the_restricted_likelihood(linear:
     assert np.all(np.abs(2 * np.log(np.concatenate([far.theta, far.tau]))) <= 2 + 1e-12)
 
 
-def test_changes_count_in_their_own_deviations_and_levels_keep_their_floor(linear: Linearised) -> None:
+def test_changes_count_in_their_own_deviations_and_levels_keep_their_floor(
+    linear: Linearised,
+) -> None:
     score = replace(variance_score(linear, ANGLES, 0), average=np.diag([4.0, 9.0, 16.0, 25.0]))
     before = NoiseLevels(np.array([1.0, 2.0]), np.array([3.0, 4.0]))
     for place, deviations in enumerate((2.0, 3.0, 4.0, 5.0)):
         level = np.array([1.0, 2.0, 3.0, 4.0])
         level[place] *= np.exp(-0.05)  # the variance by 0.1
-        assert largest_change(before, NoiseLevels(level[:2], level[2:]), score) == pytest.approx(0.1 * deviations)
+        assert largest_change(before, NoiseLevels(level[:2], level[2:]), score) == pytest.approx(
+            0.1 * deviations
+        )
     held = floored(before, NoiseLevels(np.array([1.5, 1.5]), np.array([3.5, 3.5])))
     assert [*held.theta, *held.tau] == [1.5, 2.0, 3.5, 4.0]
 
@@ -152,4 +190,6 @@ def test_a_torque_that_is_none_has_a_share_of_the_others_as_noise() -> None:
     tau = np.stack([np.sin(9 * t), np.zeros_like(t)])
     rms = float(np.sqrt(np.mean(tau[0] ** 2)))
     np.testing.assert_allclose(first_guess(np.stack([t, t]), tau).tau[1], 1e-3 * rms, rtol=1e-12)
-    np.testing.assert_allclose(first_guess(np.stack([t, t]), tau[::-1]).tau[0], 1e-3 * rms, rtol=1e-12)
+    np.testing.assert_allclose(
+        first_guess(np.stack([t, t]), tau[::-1]).tau[0], 1e-3 * rms, rtol=1e-12
+    )

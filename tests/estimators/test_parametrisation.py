@@ -24,19 +24,37 @@ def by_hand(shared: Shared) -> tuple[sp.Matrix, list[sp.Symbol]]:
     """The coefficients of a loaded log in the shared parameters: k + z, eq. (5) against eq. (3)."""
     symbol = {name: sp.Symbol(name) for name in VALUES}
     m, g = symbol["m_p"], sp.Float(shared.model.gravity)
-    l1, l2 = (sp.Float(shared.lengths[name]) if name in shared.lengths else symbol[name] for name in ("l1", "l2"))
-    added = {"k1": m * l1 * l2, "k2": m * g * l2, "k3": m * l2**2, "k4": m * g * l1, "k5": m * l1**2}
+    l1, l2 = (
+        sp.Float(shared.lengths[name]) if name in shared.lengths else symbol[name]
+        for name in ("l1", "l2")
+    )
+    added = {
+        "k1": m * l1 * l2,
+        "k2": m * g * l2,
+        "k3": m * l2**2,
+        "k4": m * g * l1,
+        "k5": m * l1**2,
+    }
     return sp.Matrix([symbol[name] + added.get(name, 0) for name in shared.log_names]), [
         symbol[name] for name in shared.names
     ]
 
 
 @pytest.mark.parametrize("delay", [False, True])
-@pytest.mark.parametrize("model", [Model(), Model(("coulomb",)), Model(gravity=0.0)], ids=["plain", "terms", "flat"])
-@pytest.mark.parametrize("lengths", [{}, {"l1": 0.2}, {"l2": 0.3}, {"l1": 0.2, "l2": 0.3}], ids="+".join)
-def test_a_loaded_log_has_the_constants_of_table_2(lengths: dict[str, float], model: Model, delay: bool) -> None:
+@pytest.mark.parametrize(
+    "model", [Model(), Model(("coulomb",)), Model(gravity=0.0)], ids=["plain", "terms", "flat"]
+)
+@pytest.mark.parametrize(
+    "lengths", [{}, {"l1": 0.2}, {"l2": 0.3}, {"l1": 0.2, "l2": 0.3}], ids="+".join
+)
+def test_a_loaded_log_has_the_constants_of_table_2(
+    lengths: dict[str, float], model: Model, delay: bool
+) -> None:
     shared = Shared(model, delay, True, lengths)
-    assert shared.names == (*shared.log_names, *(name for name in ("m_p", "l1", "l2") if name not in lengths))
+    assert shared.names == (
+        *shared.log_names,
+        *(name for name in ("m_p", "l1", "l2") if name not in lengths),
+    )
     expected, symbols = by_hand(shared)
     beta = np.array([VALUES[name] for name in shared.names])
     at = dict(zip(symbols, beta.tolist(), strict=True))
@@ -46,12 +64,18 @@ def test_a_loaded_log_has_the_constants_of_table_2(lengths: dict[str, float], mo
     np.testing.assert_allclose(shared.jacobian(beta, True), T, rtol=1e-14, atol=1e-15)
     assert shared.physical(beta) == pytest.approx((0.35, 0.2, 0.3, 0.0))
     np.testing.assert_array_equal(shared.coefficients(beta, False), beta[: len(shared.log_names)])
-    np.testing.assert_array_equal(shared.jacobian(beta, False), np.eye(len(shared.log_names), beta.size))
+    np.testing.assert_array_equal(
+        shared.jacobian(beta, False), np.eye(len(shared.log_names), beta.size)
+    )
 
 
 def test_without_a_payload_the_parameters_are_those_of_a_log() -> None:
     shared = Shared(Model(("rotor",)), delay=True)
-    assert shared.names == shared.log_names == (*(f"k{number}" for number in range(1, 8)), "j2", "delay")
+    assert (
+        shared.names
+        == shared.log_names
+        == (*(f"k{number}" for number in range(1, 8)), "j2", "delay")
+    )
     beta = np.arange(9.0)
     shared.coefficients(beta, False)[0] = 99.0
     assert beta[0] == 0.0  # what is handed out is no view of what was handed in
@@ -77,5 +101,7 @@ def test_a_body_and_phasors_follow_from_the_complex_form(body: tuple[str, ...]) 
     for place in range(beta.size):
         step = np.zeros(beta.size)
         step[place] = 1e-7
-        slope = (shared.coefficients(beta + step, True) - shared.coefficients(beta - step, True)) / 2e-7
+        slope = (
+            shared.coefficients(beta + step, True) - shared.coefficients(beta - step, True)
+        ) / 2e-7
         np.testing.assert_allclose(T[:, place], slope, atol=1e-7)

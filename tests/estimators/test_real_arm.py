@@ -20,7 +20,9 @@ from algid.signals.segments import Segment
 RUNS = Path(__file__).parents[3] / "shared" / "data" / "dfki" / "C1_sysid"
 PUBLISHED = (0.159, 0.114)  # N m, of the parameters published with the data
 
-pytestmark = pytest.mark.skipif(not RUNS.is_dir(), reason="the recorded runs are not beside this repository")
+pytestmark = pytest.mark.skipif(
+    not RUNS.is_dir(), reason="the recorded runs are not beside this repository"
+)
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +35,9 @@ def _run(path: Path) -> Segment:
     table = pl.read_csv(path)
     t = table["time"].to_numpy()
     keep = np.append(True, np.diff(t) > 0)
-    signals = np.stack([table[name].to_numpy() for name in ("pos_meas1", "pos_meas2", "tau_meas1", "tau_meas2")])
+    signals = np.stack(
+        [table[name].to_numpy() for name in ("pos_meas1", "pos_meas2", "tau_meas1", "tau_meas2")]
+    )
     signals[0] -= np.pi / 2
     dt = float(np.median(np.diff(t[keep])))
     even = CubicSpline(t[keep], signals[:, keep], axis=1)(np.arange(t[0], t[-1], dt))
@@ -51,13 +55,19 @@ def test_prediction_beats_the_published_parameters(sources: list[Source]) -> Non
 
 def test_the_differentiators_bandwidth_does_not_move_k2(sources: list[Source]) -> None:
     model = Model(("coulomb", "rotor"))
-    narrow, wide = (weak.fit(sources, settings=WeakSettings(model, bandwidth=hertz)) for hertz in (10.0, 30.0))
+    narrow, wide = (
+        weak.fit(sources, settings=WeakSettings(model, bandwidth=hertz)) for hertz in (10.0, 30.0)
+    )
     assert abs(narrow.values[1] - wide.values[1]) < wide.std[1]
 
 
 def test_friction_earns_its_place_and_the_offset_does_not(sources: list[Source]) -> None:
     fit = weak.fit(sources, settings=WeakSettings(Model(("coulomb", "offset", "rotor"))))
-    assert {worth.term: worth.earned for worth in term_worths(fit)} == {"coulomb": True, "offset": False, "rotor": True}
+    assert {worth.term: worth.earned for worth in term_worths(fit)} == {
+        "coulomb": True,
+        "offset": False,
+        "rotor": True,
+    }
 
 
 def test_runs_in_which_a_joint_is_hardly_driven_are_not_ok_alone() -> None:
@@ -66,6 +76,17 @@ def test_runs_in_which_a_joint_is_hardly_driven_are_not_ok_alone() -> None:
     in_doubt = {}
     for name in ("143747", "143906", "144115", "143524", "154220"):
         log = _run(RUNS / f"20230629-{name}.csv")
-        found = doubted(weak.fit([partial(list, [log])], settings=settings), [partial(list, [log])], [], settings)
+        found = doubted(
+            weak.fit([partial(list, [log])], settings=settings),
+            [partial(list, [log])],
+            [],
+            settings,
+        )
         in_doubt[name] = "OK" not in found.status[:5]
-    assert in_doubt == {"143747": True, "143906": True, "144115": True, "143524": False, "154220": False}
+    assert in_doubt == {
+        "143747": True,
+        "143906": True,
+        "144115": True,
+        "143524": False,
+        "154220": False,
+    }

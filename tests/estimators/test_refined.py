@@ -31,7 +31,9 @@ def test_exact_logs_leave_a_hundredth_of_the_papers_error(bench: Bench) -> None:
 
 def test_noise_levels_and_error_bars_are_honest(bench: Bench) -> None:
     logs = [(bench.log(False, 1e-3, seed), bench.log(True, 1e-3, seed)) for seed in range(5)]
-    fits = [refined.fit([partial(list, [bare])], [partial(list, [burdened])]) for bare, burdened in logs]
+    fits = [
+        refined.fit([partial(list, [bare])], [partial(list, [burdened])]) for bare, burdened in logs
+    ]
     levels = np.array([[level.theta, level.tau / 10] for fit in fits for level in fit.noise or ()])
     standard_error = levels.std(axis=0, ddof=1) / np.sqrt(levels.shape[0])
     assert np.all(np.abs(levels.mean(axis=0) - 1e-3) < 4 * standard_error)
@@ -68,7 +70,10 @@ def test_known_noise_levels_are_kept(bench: Bench) -> None:
 
 def test_noise_levels_of_zero_are_refused(bench: Bench) -> None:
     with pytest.raises(ValueError, match="positive"):
-        refined.fit([lambda: [bench.log()]], settings=RefinedSettings(noise=NoiseLevels(np.zeros(2), np.ones(2))))
+        refined.fit(
+            [lambda: [bench.log()]],
+            settings=RefinedSettings(noise=NoiseLevels(np.zeros(2), np.ones(2))),
+        )
 
 
 def test_known_lengths_sharpen_the_payload(bench: Bench) -> None:
@@ -85,7 +90,9 @@ def test_a_loaded_log_alone_with_an_earlier_result(bench: Bench) -> None:
     prior = Prior.of(before.names, before.values, before.covariance)
     together = refined.fit([lambda: [bench.log(sigma=1e-3)]], [lambda: [bench.log(True, 1e-3)]])
     after = refined.fit([], [lambda: [bench.log(True, 1e-3)]], RefinedSettings(prior=prior))
-    assert np.allclose(after.values, together.values, atol=0.3 * together.std.min() + 0.3 * together.std)
+    assert np.allclose(
+        after.values, together.values, atol=0.3 * together.std.min() + 0.3 * together.std
+    )
     assert np.allclose(after.std, together.std, rtol=0.1)
 
 
@@ -153,24 +160,32 @@ def test_a_horizontal_arm_has_five_constants(bench: Bench) -> None:
     t = np.arange(1501) * DT
     motion = simulate(k, lambda now: np.stack([np.sin(9 * now), 0.6 * np.cos(14 * now)]), t)
     fit = refined.fit(
-        [lambda: [Segment(0.0, DT, motion.theta, motion.tau)]], settings=RefinedSettings(model=Model(gravity=0))
+        [lambda: [Segment(0.0, DT, motion.theta, motion.tau)]],
+        settings=RefinedSettings(model=Model(gravity=0)),
     )
     assert fit.names == ("k1", "k3", "k5", "k6", "k7")
     assert np.allclose(fit.values, k[[0, 2, 4, 5, 6]], rtol=1e-4)
 
 
-def test_long_logs_take_one_more_pass_and_agree(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_long_logs_take_one_more_pass_and_agree(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
     log = bench.log(sigma=1e-3)
     monkeypatch.setattr(evidence, "PIECE_SAMPLES", 500)
     whole = refined.fit([lambda: [log]])
     monkeypatch.setattr(evidence, "_TRAINED", 2)
     parts = refined.fit([lambda: [log]])
     assert np.allclose(whole.values, parts.values, atol=0.2 * whole.std.min() + 0.2 * whole.std)
-    for fit in (whole, parts):  # 4001 samples in pieces of 500, whose ends the stencil takes; white, of unit variance
+    for fit in (
+        whole,
+        parts,
+    ):  # 4001 samples in pieces of 500, whose ends the stencil takes; white, of unit variance
         (residual,) = fit.residual
         assert residual.pairs[0] == pytest.approx(4001 - 9 * (POINTS - 1), abs=POINTS)
         assert fit.freedom == pytest.approx(residual.pairs[0], abs=9)
-        assert residual.products[:, 0] / residual.pairs[0] == pytest.approx(1, abs=0.09)  # four standard errors
+        assert residual.products[:, 0] / residual.pairs[0] == pytest.approx(
+            1, abs=0.09
+        )  # four standard errors
 
 
 def test_blocks_of_any_size_give_the_same_estimate(bench: Bench) -> None:
@@ -200,7 +215,9 @@ def test_a_joint_at_rest_leaves_its_friction_open_and_the_rest_known() -> None:
 def test_what_a_log_leaves_open_is_held_within_its_size(bench: Bench) -> None:
     start = weak.fit([lambda: [bench.log()]])
     size = 2.0
-    values = np.array([*start.values[:5], size, size])  # largest in k6 + k7, which the information leaves open
+    values = np.array(
+        [*start.values[:5], size, size]
+    )  # largest in k6 + k7, which the information leaves open
     S = np.diag(1e4 / np.maximum(np.abs(values), 1e-3) ** 2)
     S[5:, 5:] = 1e4 / size**2 * np.array([[1, -1], [-1, 1]])
     information = LogInformation(False, values, S[None], np.zeros((1, 7)))

@@ -16,7 +16,9 @@ from algid.signals.segments import Segment
 from .conftest import DT, Bench
 
 
-def test_steps_that_do_not_settle_leave_the_weak_estimate(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_steps_that_do_not_settle_leave_the_weak_estimate(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
     source: Source = partial(list, [bench.log(sigma=1e-3)])
     monkeypatch.setattr(refined, "_STEPS", 1)
     fit = refined.fit([source])
@@ -27,7 +29,9 @@ def test_steps_that_do_not_settle_leave_the_weak_estimate(bench: Bench, monkeypa
     np.testing.assert_array_equal(fit.covariance, before.covariance)
 
 
-def test_a_factor_that_does_not_exist_leaves_the_weak_estimate(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_factor_that_does_not_exist_leaves_the_weak_estimate(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def fails(*_: object) -> None:
         raise np.linalg.LinAlgError("not positive definite")
 
@@ -41,7 +45,9 @@ def test_a_factor_that_does_not_exist_leaves_the_weak_estimate(bench: Bench, mon
 
 def test_a_covariance_that_is_none_has_no_factor() -> None:
     H = np.zeros((2, 2, POINTS, 12))
-    H[0, :, 2, 7] = 1e9  # both joints' rows the same in floating point: their own noise is lost beside it
+    H[0, :, 2, 7] = (
+        1e9  # both joints' rows the same in floating point: their own noise is lost beside it
+    )
     H[1, :, 2, 7] = 1e9
     with pytest.raises(np.linalg.LinAlgError, match=r"not positive definite \(row 16\)"):
         covariance_factor(H)
@@ -50,7 +56,9 @@ def test_a_covariance_that_is_none_has_no_factor() -> None:
 def test_a_factor_without_a_pivot_solves_nothing() -> None:
     factor = covariance_factor(np.zeros((2, 2, POINTS, 12)))
     factor[0, 5] = 0.0
-    linear = Linearised(np.zeros((1, 24)), factor, np.zeros((2, 2, POINTS, 12)), 0, np.zeros((2, 12)))
+    linear = Linearised(
+        np.zeros((1, 24)), factor, np.zeros((2, 2, POINTS, 12)), 0, np.zeros((2, 12))
+    )
     for solve in (linear.solve, linear.solve_transposed):
         with pytest.raises(np.linalg.LinAlgError, match="substitution failed with info 6"):
             solve(np.ones((1, 24)))
@@ -63,7 +71,9 @@ def test_a_lag_of_nothing_copies_and_a_straight_line_passes_as_it_is() -> None:
     np.testing.assert_array_equal(same, line)
     assert not np.shares_memory(same, line)
     for lag in (4.3 * DT, -4.3 * DT, 0.2 * DT):
-        np.testing.assert_allclose(low_passed(line, DT, lag), line, atol=1e-12)  # unchanged and in time
+        np.testing.assert_allclose(
+            low_passed(line, DT, lag), line, atol=1e-12
+        )  # unchanged and in time
 
 
 def test_stretches_too_short_to_tell_are_left_out_and_each_step_is_told(bench: Bench) -> None:
@@ -72,7 +82,9 @@ def test_stretches_too_short_to_tell_are_left_out_and_each_step_is_told(bench: B
     told: list[tuple[str, int, int]] = []
     fit = refined.fit([lambda: [log, crumb]], progress=lambda *what: told.append(what))
     np.testing.assert_array_equal(fit.values, refined.fit([lambda: [log]]).values)
-    assert [stage for stage, _, _ in told] == [f"fitting, step {step}" for step in range(1, fit.iterations + 1)]
+    assert [stage for stage, _, _ in told] == [
+        f"fitting, step {step}" for step in range(1, fit.iterations + 1)
+    ]
     assert {(done, total) for _, done, total in told} == {(2000, 2000)}
     crumbs = refined.fit([lambda: [log], lambda: [crumb]])
     np.testing.assert_array_equal(crumbs.values, fit.values)
@@ -80,7 +92,10 @@ def test_stretches_too_short_to_tell_are_left_out_and_each_step_is_told(bench: B
 
 
 def test_a_short_log_does_not_hide_its_torques_noise_in_its_angles(bench: Bench) -> None:
-    """Of 0.3 s neighbouring torques tell the noise of 1e-2 N m to a tenth; the likelihood had a twentieth of it."""
+    """Of 0.3 s neighbouring torques tell the noise of 1e-2 N m to a tenth.
+
+    The likelihood had a twentieth of it.
+    """
     levels = []
     for seed in range(4):
         log = bench.log(sigma=1e-3, seed=seed).part(100 * seed, 100 * seed + 300)

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from algid.arm import Arm, FloatArray
-from algid.estimators.rollout import HORIZONS, RolloutScore, _angles_at_horizons, _starts, rollouts, time_step
+from algid.estimators.rollout import (
+    HORIZONS,
+    RolloutScore,
+    _angles_at_horizons,
+    _starts,
+    rollouts,
+    time_step,
+)
 from algid.model import Model
 from algid.signals.segments import Segment
 from algid.synth.simulator import simulate
@@ -37,13 +44,17 @@ def test_angles_are_the_simulators() -> None:
     for start in range(2):
         whole = simulate(K, push, np.array([0.0, *HORIZONS]), starts[:2, start], starts[2:, start])
         for place, angles in enumerate(found):
-            np.testing.assert_allclose(angles[:, start], whole.theta[:, place + 1], rtol=0, atol=1e-7)  # step⁴ twice
+            np.testing.assert_allclose(
+                angles[:, start], whole.theta[:, place + 1], rtol=0, atol=1e-7
+            )  # step⁴ twice
 
 
 def test_the_true_arm_follows_the_log(segment: Segment) -> None:
     score = rollouts(Model(), K, [segment], 8.0)
     assert score.count[0] > score.count[1] > score.count[2] > 50
-    assert score.rmse.max() < 2e-3  # what the filter's ends and straight lines between samples leave
+    assert (
+        score.rmse.max() < 2e-3
+    )  # what the filter's ends and straight lines between samples leave
     assert score.distance.max() > 0.3
 
 
@@ -57,14 +68,20 @@ def test_a_wrong_arm_does_as_its_simulation_says(segment: Segment) -> None:
         ends = np.array([t[start], t[start + 100]])
         alone = simulate(wrong, push, ends, true.theta[:, start], true.omega[:, start])
         errors.append(alone.theta[:, 1] - true.theta[:, start + 100])
-    np.testing.assert_allclose(score.rmse[1], np.sqrt(np.mean(np.square(errors), axis=0)), rtol=0.02)
+    np.testing.assert_allclose(
+        score.rmse[1], np.sqrt(np.mean(np.square(errors), axis=0)), rtol=0.02
+    )
 
 
 def test_a_delay_that_is_known_is_made_up_for(segment: Segment) -> None:
     late = Segment(0.0, DT, segment.theta[:, 8:], segment.tau[:, 8:])
-    early = Segment(0.0, DT, segment.theta[:, 8:], segment.tau[:, :-8])  # torques that act 8 samples before their stamp
+    early = Segment(
+        0.0, DT, segment.theta[:, 8:], segment.tau[:, :-8]
+    )  # torques that act 8 samples before their stamp
     good = rollouts(Model(), K, [late], 8.0).rmse
-    np.testing.assert_allclose(rollouts(Model(), K, [early], 8.0, -8 * DT).rmse, good, rtol=0.1, atol=1e-4)
+    np.testing.assert_allclose(
+        rollouts(Model(), K, [early], 8.0, -8 * DT).rmse, good, rtol=0.1, atol=1e-4
+    )
     assert rollouts(Model(), K, [early], 8.0).rmse[1].min() > 10 * good[1].max()
 
 
@@ -91,7 +108,10 @@ def test_the_step_is_as_long_as_the_stiffest_friction_leaves_stable() -> None:
         model = Model(("coulomb", "rotor"), coulomb_speed=speed)
         step = time_step(model, np.concatenate([k, f[2:] / 10, [j2]]))
         M = np.array(
-            [[k[4] + k[2] + 2 * k[0] * cos, k[2] + k[0] * cos], [k[2] + k[0] * cos, np.full(cos.size, k[2] + j2)]]
+            [
+                [k[4] + k[2] + 2 * k[0] * cos, k[2] + k[0] * cos],
+                [k[2] + k[0] * cos, np.full(cos.size, k[2] + j2)],
+            ]
         )
         D = np.diag(f[:2] + f[2:] / 10 / speed)
         stiffest = np.abs(np.linalg.eigvals(np.linalg.solve(np.moveaxis(M, 2, 0), D))).max()
@@ -105,7 +125,10 @@ def test_the_step_is_as_long_as_the_stiffest_friction_leaves_stable() -> None:
 
 @pytest.mark.parametrize("dt", [5e-4, 2e-3 / 3, 2e-3, 5e-3])
 def test_the_torque_of_a_start_is_what_acts_from_there_on(dt: float) -> None:
-    """At every half step, late by the shift; of a fast log the mean over a step, which errs by τ'' h² / 24."""
+    """At every half step, late by the shift.
+
+    Of a fast log the mean over a step, which errs by τ'' h² / 24.
+    """
     t = np.arange(round(4 / dt)) * dt
     theta = np.stack([0.4 * np.sin(2 * t), 0.5 * np.cos(3 * t)])
     step, shift = 2e-3, 0.013
@@ -121,9 +144,15 @@ def test_the_torque_of_a_start_is_what_acts_from_there_on(dt: float) -> None:
         np.testing.assert_allclose(
             u[:, joint][inside], push(when.ravel())[joint].reshape(when.shape)[inside], atol=atol
         )
-    np.testing.assert_allclose(x[:2], np.stack([0.4 * np.sin(2 * at), 0.5 * np.cos(3 * at)]), atol=1e-3)
-    np.testing.assert_allclose(x[2:], np.stack([0.8 * np.cos(2 * at), -1.5 * np.sin(3 * at)]), atol=5e-3)
+    np.testing.assert_allclose(
+        x[:2], np.stack([0.4 * np.sin(2 * at), 0.5 * np.cos(3 * at)]), atol=1e-3
+    )
+    np.testing.assert_allclose(
+        x[2:], np.stack([0.8 * np.cos(2 * at), -1.5 * np.sin(3 * at)]), atol=5e-3
+    )
     for horizon, angles in zip(HORIZONS, y, strict=True):
         known = np.isfinite(angles[0])
         np.testing.assert_array_equal(known, at + horizon < t[-1] - 0.3 + 1e-9)
-        np.testing.assert_allclose(angles[0, known], 0.4 * np.sin(2 * (at + horizon))[known], atol=1e-3)
+        np.testing.assert_allclose(
+            angles[0, known], 0.4 * np.sin(2 * (at + horizon))[known], atol=1e-3
+        )

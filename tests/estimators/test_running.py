@@ -31,7 +31,9 @@ def test_it_ends_where_the_fit_does(bench: Bench, estimator: str) -> None:
     found = running(fit, [4.0, 4.0], 40)
     assert has_running(fit)
     assert list(np.unique(found.log)) == [0, 1]
-    np.testing.assert_allclose(found.beta[-1], fit.values, rtol=1e-6)  # both are optima, found to 1e-5 deviations
+    np.testing.assert_allclose(
+        found.beta[-1], fit.values, rtol=1e-6
+    )  # both are optima, found to 1e-5 deviations
     np.testing.assert_allclose(found.half[-1], fit.quantile * fit.std, rtol=1e-6)
     first_loaded = int(np.flatnonzero(found.log)[0])
     payload = [fit.names.index(name) for name in ("m_p", "l1", "l2")]
@@ -42,14 +44,21 @@ def test_it_ends_where_the_fit_does(bench: Bench, estimator: str) -> None:
 def test_its_band_shrinks(bench: Bench) -> None:
     found = running(_fit(bench, "refined", 2, loaded=False), [4.0], 40)
     known = found.half[np.isfinite(found.half).all(axis=1)]
-    assert np.all(np.diff(known, axis=0) <= 1e-3 * known[:-1])  # information adds up; its linearisation moves a little
+    assert np.all(
+        np.diff(known, axis=0) <= 1e-3 * known[:-1]
+    )  # information adds up; its linearisation moves a little
     assert np.all(known[-1] < 0.5 * known[0])
 
 
 def test_a_log_that_begins_at_rest_begins_with_nothing(bench: Bench) -> None:
     log = bench.log()
     still = np.zeros((2, 2000))
-    rest = Segment(0.0, log.dt, np.concatenate([still, log.theta], axis=1), np.concatenate([still, log.tau], axis=1))
+    rest = Segment(
+        0.0,
+        log.dt,
+        np.concatenate([still, log.theta], axis=1),
+        np.concatenate([still, log.tau], axis=1),
+    )
     found = running(weak.fit([_source(rest)]), [6.0], 30)  # pytest makes an overflow an error
     assert np.isnan(found.beta[0]).any()
     assert np.isfinite(found.beta[-1]).all()
@@ -63,7 +72,8 @@ def test_half_way_it_is_what_half_of_the_log_tells(bench: Bench) -> None:
     found = running(whole, [4.0], 8)
     place = int(np.argmin(np.abs(found.share - 0.5)))
     assert found.share[place] == pytest.approx(0.5, abs=0.01)
-    # blocks end within 1 % of the half, and each is linearised at the whole's estimate; intervals of 90 %: 16 % less
+    # blocks end within 1 % of the half, and each is linearised at the whole's estimate; intervals
+    # of 90 %: 16 % less
     np.testing.assert_allclose(found.half[place], half.quantile * half.std, rtol=0.03)
     assert np.all(np.abs(found.beta[place] - half.values) < 0.5 * half.std)
 
@@ -80,7 +90,9 @@ def test_what_the_fit_calls_open_has_no_running_estimate(bench: Bench) -> None:
     from dataclasses import replace
 
     fit = _fit(bench, "weak", 1, loaded=False)
-    status: tuple[Status, ...] = tuple("NOT_IDENTIFIABLE" if name == "k3" else "OK" for name in fit.names)
+    status: tuple[Status, ...] = tuple(
+        "NOT_IDENTIFIABLE" if name == "k3" else "OK" for name in fit.names
+    )
     found = running(replace(fit, status=status), [4.0], 10)
     assert np.isnan(found.beta[:, fit.names.index("k3")]).all()
     assert np.isfinite(found.beta[-1, fit.names.index("k4")])

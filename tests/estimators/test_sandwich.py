@@ -18,7 +18,9 @@ Q = len(SHARED.names)
 
 def _information(X: FloatArray, y: FloatArray, loaded: bool = False) -> LogInformation:
     """A row a stretch: the likelihood of y = X c + noise of variance 1, at c = 0."""
-    return LogInformation(loaded, np.zeros(X.shape[1]), X[:, :, None] * X[:, None, :], X * y[:, None])
+    return LogInformation(
+        loaded, np.zeros(X.shape[1]), X[:, :, None] * X[:, None, :], X * y[:, None]
+    )
 
 
 def _regression(rows: int, seed: int) -> tuple[FloatArray, FloatArray]:
@@ -74,7 +76,9 @@ def test_lags_are_those_of_andrews() -> None:
         found = np.sum(scores[1:] * scores[:-1]) / np.sum(scores**2)
         alpha = 4 * found**2 / ((1 - found) ** 2 * (1 + found) ** 2)
         assert long_run_variance(scores[:, None])[1] == int(1.1447 * (alpha * 3001) ** (1 / 3))
-    total, lags = long_run_variance(np.ones((8, 1)))  # as correlated as can be: a quarter of the rows, and no more
+    total, lags = long_run_variance(
+        np.ones((8, 1))
+    )  # as correlated as can be: a quarter of the rows, and no more
     assert lags == 2
     assert total[0, 0] == pytest.approx(_bartlett(np.ones((8, 1)), 2)[0, 0])
     assert long_run_variance(np.zeros((8, 2)))[1] == 0
@@ -95,4 +99,6 @@ def test_each_logs_scores_are_its_own_and_what_is_known_before_counts_as_it_is()
     prior = Prior(("k3", "k7"), np.full(2, 2.0), np.array([[5.0, 1.0], [1.0, 3.0]]))
     known = np.zeros((Q, Q))
     known[np.ix_([1, 4], [1, 4])] = prior.precision
-    np.testing.assert_allclose(sandwich(SHARED, logs, beta, prior)[0], (parts + known) * stretches / free, rtol=1e-10)
+    np.testing.assert_allclose(
+        sandwich(SHARED, logs, beta, prior)[0], (parts + known) * stretches / free, rtol=1e-10
+    )

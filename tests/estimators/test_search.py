@@ -38,7 +38,10 @@ def test_the_lowest_of_a_parabola_is_its_bottom_and_of_none_the_least_value() ->
 
 
 def test_friction_below_nothing_contradicts_physics(bench: Bench) -> None:
-    """Drives that push with the motion are told by the log as surely as friction is; they are not taken for it."""
+    """Drives that push with the motion are told by the log as surely as friction is.
+
+    They are not taken for it.
+    """
     pushed = _rubbing(bench, -0.1)
     chosen = select([lambda: [pushed]], [], SETTINGS, candidates=("coulomb",))
     (trial,) = chosen.trials
@@ -50,7 +53,9 @@ def test_friction_below_nothing_contradicts_physics(bench: Bench) -> None:
 
 
 def test_a_term_that_needs_another_has_no_meaning_alone(bench: Bench) -> None:
-    chosen = select([lambda: [bench.log(sigma=1e-3)]], [], SETTINGS, candidates=("stribeck", "coulomb"))
+    chosen = select(
+        [lambda: [bench.log(sigma=1e-3)]], [], SETTINGS, candidates=("stribeck", "coulomb")
+    )
     reasons = {trial.term: trial.reason for trial in chosen.trials}
     assert reasons["stribeck"] == "left out: no meaning without coulomb"
     assert reasons["coulomb"].startswith("left out: ")
@@ -63,9 +68,19 @@ def test_a_torque_that_acts_late_or_early_is_a_delay_and_no_lag(bench: Bench) ->
     found = {}
     for name, shifted in (("late", late), ("early", early)):
         chosen = select([partial(list, [shifted])], [], SETTINGS, candidates=("delay",))
-        found[name] = (chosen.delay, chosen.model.terms, chosen.trials[0].term, chosen.trials[0].kept)
+        found[name] = (
+            chosen.delay,
+            chosen.model.terms,
+            chosen.trials[0].term,
+            chosen.trials[0].kept,
+        )
     assert found["late"] == (True, (), "delay", True)
-    assert found["early"] == (True, (), "delay", True)  # a lag would lag the more the faster the torque
+    assert found["early"] == (
+        True,
+        (),
+        "delay",
+        True,
+    )  # a lag would lag the more the faster the torque
 
 
 def test_a_joint_without_a_motor_has_no_gain_to_choose(bench: Bench) -> None:
@@ -76,7 +91,9 @@ def test_a_joint_without_a_motor_has_no_gain_to_choose(bench: Bench) -> None:
     assert "gain" in CHOICE
 
 
-def _grams(bench: Bench, model: Model, kinds: tuple[bool, ...]) -> tuple[Grams, dict[bool, FloatArray]]:
+def _grams(
+    bench: Bench, model: Model, kinds: tuple[bool, ...]
+) -> tuple[Grams, dict[bool, FloatArray]]:
     """Gram matrices of all columns, and the coefficients that the weak estimator gives for each kind by itself."""
     settings = replace(SETTINGS, model=model)
     logs = {kind: _rubbing(bench, 0.1, kind) for kind in kinds}
@@ -94,9 +111,13 @@ def test_one_kind_of_log_has_the_coefficients_of_its_weak_fit(bench: Bench) -> N
     model = Model(("coulomb", "offset", "rotor"), coulomb_speed=0.05)
     grams, alone = _grams(bench, model, (False,))
     found = grams.coefficients((*model.terms, "delay"))
-    np.testing.assert_allclose([found[False][name] for name in grams.names], alone[False], rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(
+        [found[False][name] for name in grams.names], alone[False], rtol=1e-5, atol=1e-6
+    )
     assert found[True] == found[False]  # of a kind that there is none of
-    assert {name: found[False][name] for name in ("f1", "f2")} == pytest.approx({"f1": 0.1, "f2": 0.1}, rel=0.05)
+    assert {name: found[False][name] for name in ("f1", "f2")} == pytest.approx(
+        {"f1": 0.1, "f2": 0.1}, rel=0.05
+    )
     without = grams.coefficients(("offset",))
     assert [without[False][name] for name in ("f1", "f2", "j2", "delay")] == [0.0] * 4
 
@@ -110,16 +131,22 @@ def test_both_kinds_share_friction_and_keep_their_own_inertia(bench: Bench) -> N
     for kind in (False, True):
         rigid = [found[kind][name] for name in ("k1", "k2", "k3", "k4", "k5")]
         np.testing.assert_allclose(rigid, alone[kind][:5], rtol=0.02)
-    assert found[True]["k4"] - found[False]["k4"] == pytest.approx(bench.payload * 9.81 * bench.arm.l1, rel=0.02)
+    assert found[True]["k4"] - found[False]["k4"] == pytest.approx(
+        bench.payload * 9.81 * bench.arm.l1, rel=0.02
+    )
 
 
-def test_a_term_that_is_there_predicts_what_was_left_out_and_is_far_from_nothing(bench: Bench) -> None:
+def test_a_term_that_is_there_predicts_what_was_left_out_and_is_far_from_nothing(
+    bench: Bench,
+) -> None:
     """Wald's statistic by the plain covariance is by how much the squares grow where the term goes."""
     model = Model(("coulomb", "offset"), coulomb_speed=0.05)
     grams, _ = _grams(bench, model, (False,))
     assert grams.held_out == "blocks"
     assert grams.held_out_squares(("coulomb",)) < 0.01 * grams.held_out_squares(())
-    assert grams.held_out_squares(("coulomb", "offset")) > 0.9 * grams.held_out_squares(("coulomb",))
+    assert grams.held_out_squares(("coulomb", "offset")) > 0.9 * grams.held_out_squares(
+        ("coulomb",)
+    )
 
     def squares(terms: tuple[str, ...]) -> float:
         asked = {name for term in terms for name in term_names(term)}
@@ -139,7 +166,9 @@ def test_a_term_that_is_there_predicts_what_was_left_out_and_is_far_from_nothing
 
 def test_three_logs_of_a_kind_are_left_out_one_by_one(bench: Bench) -> None:
     log = bench.log(sigma=1e-3)
-    parts: list[Source] = [partial(list, [log.part(first, first + 1300)]) for first in (0, 1300, 2600)]
+    parts: list[Source] = [
+        partial(list, [log.part(first, first + 1300)]) for first in (0, 1300, 2600)
+    ]
     chosen = select(parts, [], SETTINGS, candidates=("offset",))
     assert chosen.held_out == "logs"
     assert select(parts[:2], [], SETTINGS, candidates=("offset",)).held_out == "blocks"

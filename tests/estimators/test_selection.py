@@ -24,9 +24,13 @@ def _chosen(bench: Bench, terms: tuple[str, ...], **asked: object) -> Selection:
 
 
 @pytest.mark.parametrize(
-    "terms", [(), ("coulomb",), ("offset", "rotor"), ("load",), ("gain",), ("phases",), ("lag",)], ids="+".join
+    "terms",
+    [(), ("coulomb",), ("offset", "rotor"), ("load",), ("gain",), ("phases",), ("lag",)],
+    ids="+".join,
 )
-def test_the_terms_that_are_there_are_chosen_and_no_other(bench: Bench, terms: tuple[str, ...]) -> None:
+def test_the_terms_that_are_there_are_chosen_and_no_other(
+    bench: Bench, terms: tuple[str, ...]
+) -> None:
     chosen = _chosen(bench, terms)
     assert chosen.model.terms == terms
     assert not chosen.delay
@@ -41,20 +45,35 @@ def test_the_width_of_friction_is_found(bench: Bench) -> None:
     chosen = _chosen(bench, ("coulomb",), candidates=(), kept=("coulomb",))
     assert chosen.chosen_by == "settings"
     assert chosen.model.terms == ("coulomb",)
-    assert chosen.model.coulomb_speed == pytest.approx(0.05, rel=0.5)  # velocities are smoothed: a widest guess
+    assert chosen.model.coulomb_speed == pytest.approx(
+        0.05, rel=0.5
+    )  # velocities are smoothed: a widest guess
 
 
 def test_what_was_asked_for_and_what_was_not_is_said_term_by_term(bench: Bench) -> None:
-    chosen = _chosen(bench, ("coulomb",), candidates=("coulomb", "stribeck", "offset"), kept=("coulomb",))
+    chosen = _chosen(
+        bench, ("coulomb",), candidates=("coulomb", "stribeck", "offset"), kept=("coulomb",)
+    )
     trials = {trial.term: trial for trial in chosen.trials}
-    assert {term: trial.kept for term, trial in trials.items()} == {"coulomb": True, "stribeck": False, "offset": False}
+    assert {term: trial.kept for term, trial in trials.items()} == {
+        "coulomb": True,
+        "stribeck": False,
+        "offset": False,
+    }
     assert trials["coulomb"].reason == "asked for"
     assert min(trials["coulomb"].prediction, trials["coulomb"].evidence) > 0
-    assert all(trial.reason.startswith("left out: ") for term, trial in trials.items() if term != "coulomb")
+    assert all(
+        trial.reason.startswith("left out: ") for term, trial in trials.items() if term != "coulomb"
+    )
 
 
 def test_terms_with_a_shape_are_those_of_friction() -> None:
-    assert {term for term in TERMS if needs_shape([term])} == {"coulomb", "stribeck", "asymmetry", "load"}
+    assert {term for term in TERMS if needs_shape([term])} == {
+        "coulomb",
+        "stribeck",
+        "asymmetry",
+        "load",
+    }
 
 
 def test_logs_too_short_for_a_window_are_refused() -> None:
@@ -63,7 +82,10 @@ def test_logs_too_short_for_a_window_are_refused() -> None:
 
 
 class _Told(_Search):
-    """A search whose evidence is a table: of terms, beside others; minus one where it has no entry."""
+    """A search whose evidence is a table: of terms, beside others.
+
+    Minus one where it has no entry.
+    """
 
     table: ClassVar[dict[tuple[str, str], float]] = {
         ("rotor", ""): 5.0,
@@ -85,6 +107,7 @@ class _Told(_Search):
 
 def test_a_term_that_a_pair_makes_needless_is_taken_out_again() -> None:
     candidates = ("coulomb", "offset", "rotor")
-    # rotor first, the pair then, and of the two that are poor beside the others the poorer goes: rotor
+    # rotor first, the pair then, and of the two that are poor beside the others the poorer goes:
+    # rotor
     assert sorted(_Told(None, candidates, ()).run()) == ["coulomb", "offset"]  # type: ignore[arg-type]
     assert _Told(None, candidates, ("rotor",)).run() == ["rotor"]  # type: ignore[arg-type]  # it stays whatever it is worth

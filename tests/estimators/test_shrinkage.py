@@ -18,14 +18,19 @@ from algid.signals.segments import Segment
 from .conftest import Bench
 
 SHARED = Shared(Model(("offset",)))
-EXPECTED = Expected(("o1", "o2"), ("offset", "offset"), np.array([0.1, 0.0]), np.array([0.2, 0.4]), np.full(2, 0.5))
+EXPECTED = Expected(
+    ("o1", "o2"), ("offset", "offset"), np.array([0.1, 0.0]), np.array([0.2, 0.4]), np.full(2, 0.5)
+)
 
 
 def _log(information: np.ndarray, estimate: np.ndarray, stretches: int = 4) -> LogInformation:
     """A log whose likelihood has its maximum at `estimate`, with a diagonal information in equal stretches."""
     S = np.diag(information) / stretches
     return LogInformation(
-        False, np.zeros(estimate.size), np.stack([S] * stretches), np.stack([S @ estimate] * stretches)
+        False,
+        np.zeros(estimate.size),
+        np.stack([S] * stretches),
+        np.stack([S @ estimate] * stretches),
     )
 
 
@@ -35,9 +40,13 @@ def test_terms_are_drawn_to_what_is_expected_and_constants_are_not() -> None:
     prior = EXPECTED.prior(np.ones(2))
     beta, share = shrink(SHARED, [_log(information, estimate)], np.zeros(9), EXPECTED, np.ones(2))
     np.testing.assert_allclose(beta[:7], estimate[:7], rtol=1e-9)
-    assert np.all(share == 1.0)  # offsets of 2 are far beyond what is expected: the largest spread stands
+    assert np.all(
+        share == 1.0
+    )  # offsets of 2 are far beyond what is expected: the largest spread stands
     weight = information[7:] / (information[7:] + np.diag(prior.precision))
-    np.testing.assert_allclose(beta[7:], weight * estimate[7:] + (1 - weight) * EXPECTED.mean, rtol=1e-9)
+    np.testing.assert_allclose(
+        beta[7:], weight * estimate[7:] + (1 - weight) * EXPECTED.mean, rtol=1e-9
+    )
 
 
 def test_the_spread_is_a_fixed_point_of_expectation_and_maximisation() -> None:
@@ -55,16 +64,25 @@ def test_dispersion_is_the_variance_of_scores_over_the_information() -> None:
     logs = []
     for _ in range(40):
         S = np.stack([np.eye(9)] * 25)
-        logs.append(LogInformation(False, np.zeros(9), S, np.sqrt(6.0) * rng.standard_normal((25, 9))))
-    assert dispersion(SHARED, logs, np.zeros(9)) == pytest.approx(6.0, rel=0.15)  # 9 · 39 squares: ± 7.6 %
+        logs.append(
+            LogInformation(False, np.zeros(9), S, np.sqrt(6.0) * rng.standard_normal((25, 9)))
+        )
+    assert dispersion(SHARED, logs, np.zeros(9)) == pytest.approx(
+        6.0, rel=0.15
+    )  # 9 · 39 squares: ± 7.6 %
     quiet = [LogInformation(False, log.c0, log.S, log.g / 10) for log in logs]
     assert dispersion(SHARED, quiet, np.zeros(9)) == 1.0
     apart = [LogInformation(False, log.c0, log.S, log.g + rng.standard_normal(9)) for log in quiet]
-    assert dispersion(SHARED, apart, np.zeros(9)) == pytest.approx(25.0, rel=0.2)  # what differs from log to log alone
+    assert dispersion(SHARED, apart, np.zeros(9)) == pytest.approx(
+        25.0, rel=0.2
+    )  # what differs from log to log alone
 
 
 def test_covariances_of_one_log_and_of_many() -> None:
-    """Of white scores all three are the inverse information, the prior's part beside it; of one log two are left."""
+    """Of white scores all three are the inverse information, the prior's part beside it.
+
+    Of one log two are left.
+    """
     rng = np.random.default_rng(4)
     prior = Prior(("o1", "o2"), np.zeros(2), np.diag([1e-9, 1e6]))
     S = np.stack([np.eye(9)] * 30)
@@ -76,7 +94,9 @@ def test_covariances_of_one_log_and_of_many() -> None:
     found = spread(SHARED, logs, beta, prior, without)
     assert found.jackknife is not None
     for covariance in (found.jackknife, found.scores, found.stretches):
-        np.testing.assert_allclose(np.diag(covariance)[:8], 1 / 1800, rtol=0.7)  # 60 squares a parameter: ± 18 %
+        np.testing.assert_allclose(
+            np.diag(covariance)[:8], 1 / 1800, rtol=0.7
+        )  # 60 squares a parameter: ± 18 %
         assert np.mean(np.diag(covariance)[:8]) == pytest.approx(1 / 1800, rel=0.25)
         assert covariance[8, 8] == pytest.approx(1e-6, rel=0.01)  # held by the prior, as wide as it
     alone = spread(SHARED, logs[:1], beta, prior, beta[None])
@@ -98,7 +118,9 @@ def _rubbing(bench: Bench, part: slice) -> Segment:
     """A log of white noise and of Coulomb friction that only the torque feels."""
     log = bench.log(sigma=1e-4).part(part.start, part.stop)
     omega = np.gradient(log.theta, log.dt, axis=1)
-    return Segment(log.start, log.dt, log.theta, log.tau + np.array([[0.05], [0.02]]) * np.tanh(omega / 0.2))
+    return Segment(
+        log.start, log.dt, log.theta, log.tau + np.array([[0.05], [0.02]]) * np.tanh(omega / 0.2)
+    )
 
 
 def test_least_squares_with_the_same_prior_gives_the_same(bench: Bench) -> None:
@@ -108,13 +130,17 @@ def test_least_squares_with_the_same_prior_gives_the_same(bench: Bench) -> None:
     found = shrunk.fit(sources, settings=settings)
     assert found.shrinkage is not None
     still = shrunk.AT_REST * weak.speeds(sources, settings)
-    same = WeakSettings(found.shared.model, bandwidth=60.0, estimate_delay=True, rest=(still[0], still[1]))
+    same = WeakSettings(
+        found.shared.model, bandwidth=60.0, estimate_delay=True, rest=(still[0], still[1])
+    )
     free = weak.fit(sources, settings=same)
     phi = np.trace(free.logs[0].total[0]) / np.trace(found.logs[0].total[0])
     prior = Prior(found.shrinkage.names, found.shrinkage.mean, phi * found.shrinkage.precision)
     every = weak.fit(sources, settings=same, prior=prior)
     assert every.names == found.names
-    np.testing.assert_allclose(every.values[:7], found.values[:7], rtol=6e-3)  # weights rest on another residual
+    np.testing.assert_allclose(
+        every.values[:7], found.values[:7], rtol=6e-3
+    )  # weights rest on another residual
     np.testing.assert_allclose(found.values[:7], bench.truth[:7], rtol=5e-3)
     friction = [found.values[found.names.index(name)] for name in ("f1", "f2")]
     np.testing.assert_allclose(friction, [0.05, 0.02], rtol=0.1)

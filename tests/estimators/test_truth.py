@@ -1,7 +1,7 @@
 """Every kind of estimate, alone and together with the others, against a simulated arm with drives.
 
-The arm is moved here by a Runge-Kutta method of the test's own, all cases side by side; of algid it takes the
-equations of motion without drives, which `tests/test_arm.py` holds against SymPy.
+The arm is moved here by a Runge-Kutta method of the test's own, all cases side by side; of algid
+it takes the equations of motion without drives, which `tests/test_arm.py` holds against SymPy.
 """
 
 from __future__ import annotations
@@ -58,7 +58,8 @@ def cases() -> dict[tuple[str, bool], Case]:
     loaded_k = with_payload(k, case.arm.payload_constants(case.payload))
     constants = np.array([loaded_k if loaded else k for _, loaded in jobs]).T
     f1, f2, o1, o2, j2 = (
-        np.array([_true(name, terms) for terms, _ in jobs]) for name in ("f1", "f2", "o1", "o2", "j2")
+        np.array([_true(name, terms) for terms, _ in jobs])
+        for name in ("f1", "f2", "o1", "o2", "j2")
     )
     torque = wide_multi_sine(case.arm, 5)
     count = round(DURATION / DT)
@@ -78,7 +79,10 @@ def cases() -> dict[tuple[str, bool], Case]:
         free = tau - passive_torque(constants, theta, omega) - np.stack([o1, o2])
         free -= np.stack([f1, f2]) * np.tanh(omega / 0.2)
         determinant = m11 * (m22 + j2) - m12**2
-        alpha = np.stack([(m22 + j2) * free[0] - m12 * free[1], m11 * free[1] - m12 * free[0]]) / determinant
+        alpha = (
+            np.stack([(m22 + j2) * free[0] - m12 * free[1], m11 * free[1] - m12 * free[0]])
+            / determinant
+        )
         return np.concatenate([omega, alpha])
 
     x = np.repeat(np.array([-np.pi / 2, 0, 0, 0])[:, None], len(jobs), axis=1)
@@ -124,7 +128,8 @@ def test_every_kind_of_estimate_is_the_truth_within_its_error(
     assert fit.estimator == estimator
     assert set(fit.status) == {"OK"}
     truth = _truth(fit)
-    # 20 parameters at most, of Student's t with 100 degrees or more: beyond 5 σ once in 30,000 such fits
+    # 20 parameters at most, of Student's t with 100 degrees or more: beyond 5 σ once in 30,000
+    # such fits
     assert np.all(np.abs(fit.values - truth) < 5 * fit.std)
     assert np.all(fit.std < 0.05 * np.abs(truth))  # an error bar that says something
 
@@ -142,11 +147,16 @@ def test_long_delays_are_found_by_both_estimators(
 
 
 def test_cross_validation_counts_a_found_delay_once(cases: dict[tuple[str, bool], Case]) -> None:
-    sources: list[Source] = [lambda seed=seed: [cases["delay", False].log(seed)] for seed in range(3)]  # type: ignore[misc]
+    sources: list[Source] = [
+        lambda seed=seed: [cases["delay", False].log(seed)]  # type: ignore[misc]
+        for seed in range(3)
+    ]
     fit = _fit("weak", "delay", sources, [])
     found = cross_validate(fit, sources)
     assert found is not None
-    exact = [score(Model(), _truth(fit)[:7], source(), TRUE["delay"]).residual for source in sources]
+    exact = [
+        score(Model(), _truth(fit)[:7], source(), TRUE["delay"]).residual for source in sources
+    ]
     assert np.allclose(found.residual, np.sum(exact, axis=0), rtol=0.05)
 
 
@@ -159,7 +169,9 @@ def _arrays(thing: object) -> Iterator[np.ndarray]:
                 yield from _arrays(item)
 
 
-def test_nothing_that_a_fit_hands_out_can_be_written_to(cases: dict[tuple[str, bool], Case]) -> None:
+def test_nothing_that_a_fit_hands_out_can_be_written_to(
+    cases: dict[tuple[str, bool], Case],
+) -> None:
     log = cases["", False].log(1)
     for estimator in ("weak", "refined"):
         found = list(_arrays(_fit(estimator, "delay", [lambda: [log]], [])))

@@ -41,7 +41,9 @@ def test_recorded_velocities_serve_as_well(bench: Bench) -> None:
         weak.fit([lambda: [without]], settings=WeakSettings(bandwidth=None))
 
 
-def test_blocks_of_any_size_give_the_same_normal_equations(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_blocks_of_any_size_give_the_same_normal_equations(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(normal, "PIECE_SAMPLES", 1111)
     log = bench.log(sigma=1e-3)
     whole = normal.normal_equations(lambda: [log], WeakSettings(window=0.2))
@@ -58,7 +60,10 @@ def test_blocks_of_any_size_give_the_same_normal_equations(bench: Bench, monkeyp
 
 @pytest.mark.slow
 def test_intervals_of_a_long_log_hold() -> None:
-    """A minute has blocks enough for the sandwich; windows that overlap make its residuals coloured."""
+    """A minute has blocks enough for the sandwich.
+
+    Windows that overlap make its residuals coloured.
+    """
     case, dt = load_case("case1"), 4e-3
     k = case.arm.constants()
     motion = simulate(k, wide_multi_sine(case.arm, 3), np.arange(15_000) * dt)
@@ -95,12 +100,18 @@ def test_too_short_a_log_is_refused(bench: Bench) -> None:
 
 @pytest.mark.parametrize("delay", [False, True])
 @pytest.mark.parametrize("known", [False, True])
-def test_what_is_told_without_a_log_is_what_the_others_tell(bench: Bench, known: bool, delay: bool) -> None:
+def test_what_is_told_without_a_log_is_what_the_others_tell(
+    bench: Bench, known: bool, delay: bool
+) -> None:
     """The jackknife's estimates against fits of the other logs, with unloaded logs or an earlier result beside them."""
     settings = WeakSettings(estimate_delay=delay)
     cut = [0, 1300, 2600, 4001]
-    bare: list[Source] = [partial(list, [bench.log(False, 1e-4).part(*ends)]) for ends in pairwise(cut)]
-    burdened: list[Source] = [partial(list, [bench.log(True, 1e-4, seed).part(*cut[:3:2])]) for seed in range(4)]
+    bare: list[Source] = [
+        partial(list, [bench.log(False, 1e-4).part(*ends)]) for ends in pairwise(cut)
+    ]
+    burdened: list[Source] = [
+        partial(list, [bench.log(True, 1e-4, seed).part(*cut[:3:2])]) for seed in range(4)
+    ]
     prior = None
     if known:
         before = weak.fit(bare)
@@ -111,7 +122,9 @@ def test_what_is_told_without_a_log_is_what_the_others_tell(bench: Bench, known:
     assert len(fit.without) == len(bare) + len(burdened)
     for place, told in enumerate(fit.without):
         rest = [source for number, source in enumerate(bare) if number != place]
-        rest_loaded = [source for number, source in enumerate(burdened) if len(bare) + number != place]
+        rest_loaded = [
+            source for number, source in enumerate(burdened) if len(bare) + number != place
+        ]
         alone = weak.fit(rest, rest_loaded, settings, prior=prior)
         # a delay found anew is linearised anew
         assert np.all(np.abs(told - alone.values) < (0.02 if delay else 1e-4) * fit.std)
@@ -128,7 +141,9 @@ def test_the_only_log_of_its_kind_is_left_where_it_is(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("lengths", [{}, {"l1": None}, {"l1": None, "l2": None}], ids=len)
-def test_a_first_payload_is_the_one_that_the_loaded_constants_hold(lengths: dict[str, None]) -> None:
+def test_a_first_payload_is_the_one_that_the_loaded_constants_hold(
+    lengths: dict[str, None],
+) -> None:
     """Arms drawn at random, each with its payload: all its constants from the bare ones by Table 2."""
     rng = np.random.default_rng(7)
     for _ in range(40):
@@ -140,6 +155,10 @@ def test_a_first_payload_is_the_one_that_the_loaded_constants_hold(lengths: dict
         bare = arm.constants()
         X = rng.standard_normal((40, 7)) / bare
         S = X.T @ X * 1e6
-        loaded = LogInformation(True, with_payload(bare, arm.payload_constants(mass)), S[None], np.zeros((1, 7)))
-        truth = np.concatenate([bare, [{"m_p": mass, "l1": l1, "l2": l2}[name] for name in shared.names[7:]]])
+        loaded = LogInformation(
+            True, with_payload(bare, arm.payload_constants(mass)), S[None], np.zeros((1, 7))
+        )
+        truth = np.concatenate(
+            [bare, [{"m_p": mass, "l1": l1, "l2": l2}[name] for name in shared.names[7:]]]
+        )
         np.testing.assert_allclose(weak.first_payload(shared, bare, loaded), truth, rtol=1e-3)

@@ -21,22 +21,36 @@ def _ljung_box(x: np.ndarray, lags: int = 10) -> float:
 
 def test_the_p_value_is_that_of_the_least_likely_scale_three_times_over() -> None:
     rng = np.random.default_rng(3)
-    w = np.stack([np.convolve(rng.standard_normal(1301), [1.0, 0.1], "valid"), rng.standard_normal(1300)])
+    w = np.stack(
+        [np.convolve(rng.standard_normal(1301), [1.0, 0.1], "valid"), rng.standard_normal(1300)]
+    )
     found = judge(correlations(w))
     for joint in range(2):
-        by_scale = [w[joint], w[joint, :1296].reshape(-1, 16).sum(axis=1), w[joint, :1280].reshape(-1, 64).sum(axis=1)]
+        by_scale = [
+            w[joint],
+            w[joint, :1296].reshape(-1, 16).sum(axis=1),
+            w[joint, :1280].reshape(-1, 64).sum(axis=1),
+        ]
         # of 20 sums over 64 samples four lags are told: those below a quarter as many
-        q = [(_ljung_box(x, min(10, (x.size - 1) // 4)), min(10, (x.size - 1) // 4)) for x in by_scale]
+        q = [
+            (_ljung_box(x, min(10, (x.size - 1) // 4)), min(10, (x.size - 1) // 4))
+            for x in by_scale
+        ]
         p = min(1.0, 3 * min(float(chi2.sf(value, lags)) for value, lags in q))
         assert found.p_value[joint] == pytest.approx(p, rel=1e-9)
         x = w[joint]
         assert found.lag1[joint] == pytest.approx((x[1:] @ x[:-1]) / (x @ x), rel=1e-12)
-        assert found.kurtosis[joint] == pytest.approx(kurtosis(np.concatenate([x, -x])), rel=1e-9)  # about zero
+        assert found.kurtosis[joint] == pytest.approx(
+            kurtosis(np.concatenate([x, -x])), rel=1e-9
+        )  # about zero
 
 
 def test_sums_of_pieces_are_added() -> None:
     w = np.random.default_rng(4).standard_normal((2, 3000))
-    whole, parts = judge(correlations(w)), judge(correlations(w[:, :1600]) + correlations(w[:, 1600:]))
+    whole, parts = (
+        judge(correlations(w)),
+        judge(correlations(w[:, :1600]) + correlations(w[:, 1600:])),
+    )
     np.testing.assert_allclose(parts.kurtosis, whole.kurtosis, rtol=1e-12)
     np.testing.assert_allclose(parts.lag1, whole.lag1, atol=3 / 3000)  # one product in 3000 is lost
 
@@ -50,10 +64,14 @@ def test_white_innovations_pass_as_often_as_said_and_coloured_ones_do_not() -> N
     assert np.sum(p < 0.05) >= binom.ppf(0.001, p.size, 0.03)
     assert kstest(p[p < 0.3], "uniform", (0, 0.3)).pvalue > 1e-3
     assert sum(one.white for one in found) >= 398
-    fast = np.stack([np.convolve(rng.standard_normal(4001), [1.0, 0.15], "valid"), rng.standard_normal(4000)])
+    fast = np.stack(
+        [np.convolve(rng.standard_normal(4001), [1.0, 0.15], "valid"), rng.standard_normal(4000)]
+    )
     assert judge(correlations(fast)).joint_white == (False, True)
     slow = 0.15 * np.sin(np.arange(4000) / 60)
-    assert judge(correlations(np.stack([rng.standard_normal(4000), rng.standard_normal(4000) + slow]))).joint_white == (
+    assert judge(
+        correlations(np.stack([rng.standard_normal(4000), rng.standard_normal(4000) + slow]))
+    ).joint_white == (
         True,
         False,
     )
@@ -61,7 +79,9 @@ def test_white_innovations_pass_as_often_as_said_and_coloured_ones_do_not() -> N
 
 def test_colour_that_is_too_faint_to_matter_and_tails() -> None:
     rng = np.random.default_rng(6)
-    faint = np.stack([np.convolve(row, [1.0, 0.03], "valid") for row in rng.standard_normal((2, 60_001))])
+    faint = np.stack(
+        [np.convolve(row, [1.0, 0.03], "valid") for row in rng.standard_normal((2, 60_001))]
+    )
     assert float(chi2.sf(60_000 * 0.03**2, 10)) < 1e-6  # Ljung and Box alone would call it coloured
     assert judge(correlations(faint)).white
     heavy = rng.standard_t(5, (2, 60_000))
@@ -71,7 +91,9 @@ def test_colour_that_is_too_faint_to_matter_and_tails() -> None:
 
 
 @pytest.mark.parametrize(("outlier", "white"), [(4.2, True), (4.8, False)])
-def test_tails_of_a_short_log_have_to_be_six_standard_errors_heavy(outlier: float, white: bool) -> None:
+def test_tails_of_a_short_log_have_to_be_six_standard_errors_heavy(
+    outlier: float, white: bool
+) -> None:
     """Signs at random, six of 200 larger: m4 / m2² − 3 by hand; 6 √(24 / 200) is 2.08."""
     rng = np.random.default_rng(7)
     sizes = np.where(np.arange(200) % 33 == 5, outlier, 1.0)

@@ -2,7 +2,14 @@
 
 import numpy as np
 
-from algid.estimators.whitening import NoiseLevels, adjoint, covariance_factor, forward, linearise, trajectory
+from algid.estimators.whitening import (
+    NoiseLevels,
+    adjoint,
+    covariance_factor,
+    forward,
+    linearise,
+    trajectory,
+)
 from algid.model import Model
 from algid.signals.differences import HELD, POINTS, Stencil
 from algid.signals.segments import Segment
@@ -34,7 +41,10 @@ def test_products_and_factor_agree_with_dense_algebra() -> None:
 
 
 def test_a_held_torques_noise_is_that_of_neighbouring_samples() -> None:
-    """F of three weights a row, written out; H of stencils: L Lᵀ = F Fᵀ + H Hᵀ, both joints each for itself in F."""
+    """F of three weights a row, written out.
+
+    H of stencils: L Lᵀ = F Fᵀ + H Hᵀ, both joints each for itself in F.
+    """
     H = np.random.default_rng(1).standard_normal((2, 2, POINTS, 20))
     dense = _dense(H, 0, 20 + POINTS - 1)
     weights = np.zeros((20, 22))
@@ -52,19 +62,25 @@ def test_information_is_the_schur_complement_of_the_normal_equations(bench: Benc
     linear = linearise(Model(), k, theta0, piece, Stencil(log.dt), NOISE)
     S = linear.columns[:-1] @ linear.columns[:-1].T
     g = linear.columns[:-1] @ linear.columns[-1]
-    # Dense: angles' changes x (in σ_θ) and dk from [I 0; H Y] [x; dk] = [θ_m − θ0; τ_m − f], all in σ.
+    # Dense: angles' changes x (in σ_θ) and dk from [I 0; H Y] [x; dk] = [θ_m − θ0; τ_m − f], all
+    # in σ.
     H = _dense(linear.H, linear.first, 120)
     unwhitened = _lower(linear.factor, H.shape[0]) @ linear.columns.T
     Y = unwhitened[:, :-1]
     covariance = np.eye(H.shape[0]) + H @ H.T
     reference = Y.T @ np.linalg.solve(covariance, Y)
     scale = np.sqrt(np.outer(np.diag(reference), np.diag(reference)))
-    rounding = np.linalg.cond(covariance) * np.finfo(float).eps  # what a dense solution resolves: 5e-9 here
+    rounding = (
+        np.linalg.cond(covariance) * np.finfo(float).eps
+    )  # what a dense solution resolves: 5e-9 here
     assert np.max(np.abs(S - reference) / scale) < rounding
     normal = np.block([[np.eye(240) + H.T @ H, H.T @ Y], [Y.T @ H, Y.T @ Y]])
-    schur = normal[240:, 240:] - normal[240:, :240] @ np.linalg.solve(normal[:240, :240], normal[:240, 240:])
+    schur = normal[240:, 240:] - normal[240:, :240] @ np.linalg.solve(
+        normal[:240, :240], normal[:240, 240:]
+    )
     assert np.allclose(S, schur, rtol=1e-6)
-    # linearise() takes the angles' change out of its residual; the dense problem has it as rows of its own.
+    # linearise() takes the angles' change out of its residual; the dense problem has it as rows of
+    # its own.
     moved = ((piece.theta - theta0) / NOISE.theta[:, None]).T.ravel()
     residual = np.concatenate([moved, unwhitened[:, -1] + H @ moved])
     right = np.concatenate([np.eye(240), H]).T @ residual
@@ -74,13 +90,17 @@ def test_information_is_the_schur_complement_of_the_normal_equations(bench: Benc
 
 
 def _lower(factor: np.ndarray, size: int) -> np.ndarray:
-    return np.asarray(sum(np.diag(factor[below, : size - below], -below) for below in range(2 * POINTS)))
+    return np.asarray(
+        sum(np.diag(factor[below, : size - below], -below) for below in range(2 * POINTS))
+    )
 
 
 def test_the_trajectory_moves_towards_the_truth(bench: Bench) -> None:
     log = bench.log(sigma=1e-3)
     levels = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
-    linear = linearise(Model(), bench.arm.constants(), bench.bare.theta, log, Stencil(log.dt), levels)
+    linear = linearise(
+        Model(), bench.arm.constants(), bench.bare.theta, log, Stencil(log.dt), levels
+    )
     found = trajectory(log, linear, linear.solve_transposed(linear.columns[-1:])[0], levels)
     assert np.std(found - bench.bare.theta) < 0.4 * 1e-3  # a fraction of the measured noise is left
     assert abs(np.std(linear.columns[-1]) - 1) < 0.05  # white with unit variance; 8000 innovations

@@ -55,7 +55,14 @@ def result_of(
         ),
         settings={"gravity": model.gravity, **settings},
         log=LogSummary(
-            path="run--1.csv", sha256=None, role="unloaded", format="csv", rows=2, duration=1.0, rate=1.0, mapping={}
+            path="run--1.csv",
+            sha256=None,
+            role="unloaded",
+            format="csv",
+            rows=2,
+            duration=1.0,
+            rate=1.0,
+            mapping={},
         ),
     )
 
@@ -64,5 +71,9 @@ def states(count: int = 1000) -> FloatArray:
     """θ, ω and α of random states: (3, 2, count)."""
     draw = np.random.default_rng(12)
     return np.stack(
-        [draw.uniform(-np.pi, np.pi, (2, count)), draw.normal(0, 3, (2, count)), draw.normal(0, 20, (2, count))]
+        [
+            draw.uniform(-np.pi, np.pi, (2, count)),
+            draw.normal(0, 3, (2, count)),
+            draw.normal(0, 20, (2, count)),
+        ]
     )

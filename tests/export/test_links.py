@@ -47,12 +47,39 @@ def constants_of(links: tuple[Link, Link], rotor: float, arm: Arm) -> list[float
 def test_uniform_links_are_found_from_their_constants(l2: float | None) -> None:
     value = values_of(UNIFORM)
     first, second = links_of(value, 9.81, 9.81 * value["k1"] / value["k2"], Knowns(l2=l2), "arm")
-    found = (first.mass, first.centre, first.inertia, second.length, second.mass, second.centre, second.inertia)
-    expected = (UNIFORM.m1, UNIFORM.lc1, UNIFORM.I1, UNIFORM.l2, UNIFORM.m2, UNIFORM.lc2, UNIFORM.I2)
-    np.testing.assert_allclose(found, expected, rtol=1e-5)  # a minimum is found to the root of rounding
+    found = (
+        first.mass,
+        first.centre,
+        first.inertia,
+        second.length,
+        second.mass,
+        second.centre,
+        second.inertia,
+    )
+    expected = (
+        UNIFORM.m1,
+        UNIFORM.lc1,
+        UNIFORM.I1,
+        UNIFORM.l2,
+        UNIFORM.m2,
+        UNIFORM.lc2,
+        UNIFORM.I2,
+    )
+    np.testing.assert_allclose(
+        found, expected, rtol=1e-5
+    )  # a minimum is found to the root of rounding
 
 
-@given(POSITIVE, POSITIVE, st.floats(-1, 2), st.floats(-1, 2), POSITIVE, POSITIVE, POSITIVE, st.booleans())
+@given(
+    POSITIVE,
+    POSITIVE,
+    st.floats(-1, 2),
+    st.floats(-1, 2),
+    POSITIVE,
+    POSITIVE,
+    POSITIVE,
+    st.booleans(),
+)
 def test_every_possible_arm_gets_possible_links(
     m1: float, m2: float, lc1: float, lc2: float, l1: float, I1: float, I2: float, long: bool
 ) -> None:
@@ -74,9 +101,13 @@ def test_what_is_given_stands_and_the_rest_still_moves_as_identified(name: str) 
     links = links_of(values_of(ODD), 9.81, ODD.l1, Knowns(**{name: given_mass}, rotor1=0.01), "arm")
     assert {"m1": links[0], "m2": links[1]}[name].mass == given_mass
     np.testing.assert_allclose(constants_of(links, 0.01, ODD), ODD.constants(), rtol=1e-12)
-    (first, second), true = (links_of(values_of(ODD), 9.81, ODD.l1, Knowns(m1=2.0, m2=0.7), "arm"), ODD)
+    (first, second), true = (
+        links_of(values_of(ODD), 9.81, ODD.l1, Knowns(m1=2.0, m2=0.7), "arm"),
+        ODD,
+    )
     np.testing.assert_allclose(
-        (first.centre, second.centre, first.inertia, second.inertia), (true.lc1, true.lc2, true.I1, true.I2)
+        (first.centre, second.centre, first.inertia, second.inertia),
+        (true.lc1, true.lc2, true.I1, true.I2),
     )
 
 
@@ -133,9 +164,14 @@ def test_without_error_bars_both_constants_give_way() -> None:
 
 def test_the_file_says_what_is_identified_given_and_chosen() -> None:
     result = result_of(values_of(ODD), payload={"m_p": 0.5, "l1": 0.4, "l2": 0.3})
-    numbers = {number.name: number for number in describe(result, "a", Knowns(m2=0.7, rotor1=0.01), links=True).numbers}
+    numbers = {
+        number.name: number
+        for number in describe(result, "a", Knowns(m2=0.7, rotor1=0.01), links=True).numbers
+    }
     origins = {name: number.origin.split(",")[0].split(":")[0] for name, number in numbers.items()}
-    assert origins == dict.fromkeys(("k1", "k2", "k3", "k4", "k5", "k6", "k7", "l1", "lc2", "I2"), "identified") | {
+    assert origins == dict.fromkeys(
+        ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "l1", "lc2", "I2"), "identified"
+    ) | {
         "g": "given",
         "m2": "given",
         "rotor1": "given",
@@ -154,8 +190,16 @@ def test_the_file_says_what_is_identified_given_and_chosen() -> None:
 @pytest.mark.parametrize(
     ("to", "known", "message"),
     [
-        ("urdf", Knowns(m2=5.0), "--m2: arm: with link 2 of 5 kg an inertia comes out negative; between 0."),
-        ("urdf", Knowns(m1=0.01), "--m1: arm: with link 1 of 0.01 kg a mass or an inertia comes out negative"),
+        (
+            "urdf",
+            Knowns(m2=5.0),
+            "--m2: arm: with link 2 of 5 kg an inertia comes out negative; between 0.",
+        ),
+        (
+            "urdf",
+            Knowns(m1=0.01),
+            "--m1: arm: with link 1 of 0.01 kg a mass or an inertia comes out negative",
+        ),
         ("urdf", Knowns(rotor1=1.0), "--rotor1: arm: the rotor leaves link 1 no inertia"),
         ("urdf", Knowns(l1=-0.1), "--l1: expected a positive number, found -0.1"),
         ("urdf", Knowns(m1=math.nan), "--m1: expected a positive number, found nan"),
@@ -174,20 +218,33 @@ def sure_of_weights(result: Result) -> Result:
     assert result.fit is not None
     covariance = [list(row) for row in result.fit.covariance]
     covariance[0][0] = 1.0
-    return result.model_copy(update={"fit": result.fit.model_copy(update={"covariance": covariance})})
+    return result.model_copy(
+        update={"fit": result.fit.model_copy(update={"covariance": covariance})}
+    )
 
 
 def test_results_that_no_arm_explains_are_refused() -> None:
-    with pytest.raises(ResultError, match=r"k1 .* and k2 .* make l1 = g k1 / k2 no positive length; give --l1"):
+    with pytest.raises(
+        ResultError, match=r"k1 .* and k2 .* make l1 = g k1 / k2 no positive length; give --l1"
+    ):
         exported(result_of({**values_of(ODD), "k2": -0.1}), "arm", "urdf", Knowns())
     with pytest.raises(ResultError, match="not positive definite"):
         exported(result_of({**values_of(ODD), "k1": 3.0}), "arm", "c", Knowns())
-    with pytest.raises(ResultError, match=r"not positive definite .* masses would come out negative; check --l1"):
+    with pytest.raises(
+        ResultError, match=r"not positive definite .* masses would come out negative; check --l1"
+    ):
         exported(sure_of_weights(result_of(values_of(ODD))), "arm", "urdf", Knowns(l1=1.6))
-    with pytest.raises(SettingError, match="--l1: arm: an arm in a horizontal plane does not tell its length"):
+    with pytest.raises(
+        SettingError, match="--l1: arm: an arm in a horizontal plane does not tell its length"
+    ):
         exported(result_of(values_of(ODD), Model(gravity=0.0)), "arm", "mjcf", Knowns())
     with pytest.raises(ResultError, match=r"no load explains a payload of -0\.2 kg"):
-        exported(result_of(values_of(ODD), payload={"m_p": -0.2, "l1": 0.4, "l2": 0.3}), "arm", "yaml", Knowns())
+        exported(
+            result_of(values_of(ODD), payload={"m_p": -0.2, "l1": 0.4, "l2": 0.3}),
+            "arm",
+            "yaml",
+            Knowns(),
+        )
 
 
 def test_the_payload_comes_with_its_error_bars() -> None:
@@ -195,7 +252,10 @@ def test_the_payload_comes_with_its_error_bars() -> None:
     text, warnings = exported(result, "arm", "yaml", Knowns())
     assert warnings == ()
     assert "  mass: 0.5  # kg\n  mass_std: 0.005\n" in text
-    assert "  centre_of_gravity: [0.3, 0.0, 0.0]  # m\n  centre_of_gravity_std: [0.003, 0.0, 0.0]\n" in text
+    assert (
+        "  centre_of_gravity: [0.3, 0.0, 0.0]  # m\n  centre_of_gravity_std: [0.003, 0.0, 0.0]\n"
+        in text
+    )
     text, (warning,) = exported(result, "arm", "yaml", Knowns(l2=0.4))
     assert "[0.4, 0.0, 0.0]" in text
     assert "centre_of_gravity_std: [0.0," in text
@@ -207,12 +267,18 @@ def run(result: Result, folder: Path, *arguments: str) -> tuple[int, str, set[st
     file = folder / "arm.json"
     file.write_text(result_json(result), encoding="utf-8")
     done = CliRunner().invoke(app, ["export", str(file), *arguments])
-    said = done.output if done.exception is None or isinstance(done.exception, SystemExit) else str(done.exception)
+    said = (
+        done.output
+        if done.exception is None or isinstance(done.exception, SystemExit)
+        else str(done.exception)
+    )
     code = 2 if isinstance(done.exception, AlgidError) else done.exit_code
     return code, said, {path.name for path in folder.iterdir()} - {"arm.json"}
 
 
-def test_the_command_warns_refuses_and_never_overwrites(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_warns_refuses_and_never_overwrites(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     result = result_of(values_of(ODD))
     code, said, files = run(result, tmp_path, "--to", "urdf", "--l1", "0.41")
@@ -236,6 +302,8 @@ def test_the_command_warns_refuses_and_never_overwrites(tmp_path: Path, monkeypa
 @pytest.mark.parametrize("to", ["c", "python"])
 def test_words_of_the_templates_stay_as_they_are_in_a_files_name(to: str) -> None:
     for name in ("ROTOR.algid", "ANGLE1.algid", "$SIGNS.algid", "${M11}.algid", "K3ROTOR"):
-        text = exported(result_of(values_of(ODD, j2=0.004), Model(("rotor",))), name, to, Knowns())[0]
+        text = exported(result_of(values_of(ODD, j2=0.004), Model(("rotor",))), name, to, Knowns())[
+            0
+        ]
         assert f"Two-link arm by algid export, from {name}, estimator refined.\n" in text
         assert "$" not in text.replace(name, "")

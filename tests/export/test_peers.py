@@ -22,7 +22,9 @@ from algid.synth.simulator import simulate
 from tests.estimators.test_model import FULL, VALUES
 from tests.export.arms import ODD, UNIFORM, result_of, states, values_of
 
-CLOSE = 1e-9  # of the largest torque: some hundred roundings of 2e-16 and of the numbers' decimal form
+CLOSE = (
+    1e-9  # of the largest torque: some hundred roundings of 2e-16 and of the numbers' decimal form
+)
 THETA, OMEGA, ALPHA = states()
 ROTOR = values_of(ODD, j2=0.004)
 
@@ -35,7 +37,9 @@ def text_of(to: str, value: dict[str, float], model: Model | None = None, **know
 def wanted(value: dict[str, float], model: Model | None = None) -> FloatArray:
     """Torques (2, N) of algid's model at the random states."""
     model = model or Model()
-    return torque(model, np.array([value[name] for name in model.names]), Motion(THETA, OMEGA, ALPHA))
+    return torque(
+        model, np.array([value[name] for name in model.names]), Motion(THETA, OMEGA, ALPHA)
+    )
 
 
 def assert_close(found: FloatArray, expected: FloatArray, tolerance: float) -> None:
@@ -106,7 +110,9 @@ def test_mujocos_simulation_follows_algids() -> None:
     data = mujoco.MjData(model)
     t = np.arange(round(1 / model.opt.timestep) + 1) * model.opt.timestep
     tau = np.stack([9 * np.sin(5 * t), 3 * np.cos(7 * t)])
-    ours = simulate(np.array(list(value.values())), SampledTorque(t, tau, "zoh"), t, np.array([-1.0, 0.4]))
+    ours = simulate(
+        np.array(list(value.values())), SampledTorque(t, tau, "zoh"), t, np.array([-1.0, 0.4])
+    )
     data.qpos[:] = ours.theta[:, 0]
     found = [data.qpos.copy()]
     for data.ctrl[:] in tau.T[:-1]:
@@ -126,7 +132,9 @@ def test_mujoco_slides_against_coulomb_friction() -> None:
     data = mujoco.MjData(model)
     data.qvel[:] = (3.0, -2.0)
     mujoco.mj_forward(model, data)
-    np.testing.assert_allclose(data.qfrc_constraint, [-0.4, 0.3], rtol=1e-3)  # MuJoCo's contact solver
+    np.testing.assert_allclose(
+        data.qfrc_constraint, [-0.4, 0.3], rtol=1e-3
+    )  # MuJoCo's contact solver
 
 
 SETS = [
@@ -149,30 +157,43 @@ def test_modules_of_both_languages_are_algids(to: str, model: Model, tmp_path: P
     tau = torque(model, c, Motion(THETA, OMEGA, ALPHA))
     assert_close(each(arm.inverse_dynamics, THETA, OMEGA, ALPHA), tau, 1e-12)
     left = acceleration(model, c, THETA, OMEGA, tau)
-    np.testing.assert_allclose(left, ALPHA, rtol=0, atol=1e-10 * np.abs(ALPHA).max())  # condition of M: some hundred
-    np.testing.assert_allclose(each(arm.forward_dynamics, THETA, OMEGA, tau), left, rtol=0, atol=1e-10 * 60)
+    np.testing.assert_allclose(
+        left, ALPHA, rtol=0, atol=1e-10 * np.abs(ALPHA).max()
+    )  # condition of M: some hundred
+    np.testing.assert_allclose(
+        each(arm.forward_dynamics, THETA, OMEGA, tau), left, rtol=0, atol=1e-10 * 60
+    )
     assert ("lacks first-order low-pass" in text) == ("lag" in model.terms)
 
 
 @pytest.mark.parametrize("to", ["python", "c"])
 def test_gravity_and_inertia_of_both_languages(to: str, tmp_path: Path) -> None:
     model = Model(("rotor",))
-    arm = (compiled if to == "c" else lambda text, _: imported(text))(text_of(to, ROTOR, model), tmp_path)
+    arm = (compiled if to == "c" else lambda text, _: imported(text))(
+        text_of(to, ROTOR, model), tmp_path
+    )
     k = ODD.constants()
     still = np.zeros_like(THETA)
     assert_close(each(arm.gravity, THETA), inverse_dynamics(k, THETA, still, still), 1e-12)
     matrix = np.array([arm.inertia(theta) for theta in THETA.T.tolist()])
     for joint, row in enumerate(np.eye(2)):
         pushed = np.broadcast_to(row[:, None], THETA.shape)
-        column = inverse_dynamics(k, THETA, still, pushed) - inverse_dynamics(k, THETA, still, still)
+        column = inverse_dynamics(k, THETA, still, pushed) - inverse_dynamics(
+            k, THETA, still, still
+        )
         column[1] += 0.004 * row[1]
-        assert_close(matrix[:, :, joint].T, column, 1e-11)  # differences of torques ten times as large
+        assert_close(
+            matrix[:, :, joint].T, column, 1e-11
+        )  # differences of torques ten times as large
 
 
 def each(function: Any, *arguments: FloatArray) -> FloatArray:
     """A function of pairs at every state: (2, N)."""
     return np.array(
-        [function(*pairs) for pairs in zip(*(argument.T.tolist() for argument in arguments), strict=True)]
+        [
+            function(*pairs)
+            for pairs in zip(*(argument.T.tolist() for argument in arguments), strict=True)
+        ]
     ).T
 
 
@@ -184,7 +205,10 @@ def imported(text: str) -> SimpleNamespace:
 
 
 def compiled(text: str, folder: Path) -> SimpleNamespace:
-    """The functions of a C file, built strictly and called by ctypes; it stands beside a file that declares them."""
+    """The functions of a C file, built strictly and called by ctypes.
+
+    It stands beside a file that declares them.
+    """
     (folder / "arm.c").write_text(text)
     (folder / "user.c").write_text(
         '#define ARM_DECLARATIONS_ONLY\n#include "arm.c"\nvoid (*used)() = gravity;\n'.replace(
@@ -192,7 +216,11 @@ def compiled(text: str, folder: Path) -> SimpleNamespace:
         )
     )
     flags = ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-O2", "-ffp-contract=off"]
-    subprocess.run(["cc", *flags, "-shared", "-fPIC", "-o", "arm.so", "arm.c", "user.c", "-lm"], cwd=folder, check=True)
+    subprocess.run(
+        ["cc", *flags, "-shared", "-fPIC", "-o", "arm.so", "arm.c", "user.c", "-lm"],
+        cwd=folder,
+        check=True,
+    )
     library = ctypes.CDLL(str(folder / "arm.so"))
     pair = ctypes.c_double * 2
 
@@ -205,7 +233,9 @@ def compiled(text: str, folder: Path) -> SimpleNamespace:
         return called
 
     names = ("gravity", "inverse_dynamics", "forward_dynamics")
-    return SimpleNamespace(**{name: function(name, pair) for name in names}, inertia=function("inertia", pair * 2))
+    return SimpleNamespace(
+        **{name: function(name, pair) for name in names}, inertia=function("inertia", pair * 2)
+    )
 
 
 def test_sdf_tells_the_same_links() -> None:
@@ -235,7 +265,9 @@ def test_sdf_tells_the_same_links() -> None:
     assert root.findtext("model/joint[@name='joint1']/axis/xyz") == "0 -1 0"
 
 
-@pytest.mark.parametrize(("to", "term"), list(itertools.product(["urdf", "mjcf", "sdf", "python", "c"], TERMS)))
+@pytest.mark.parametrize(
+    ("to", "term"), list(itertools.product(["urdf", "mjcf", "sdf", "python", "c"], TERMS))
+)
 def test_a_file_says_which_terms_it_lacks(to: str, term: str) -> None:
     held = {
         "urdf": {"coulomb"},
@@ -244,6 +276,9 @@ def test_a_file_says_which_terms_it_lacks(to: str, term: str) -> None:
         "python": set(TERMS) - {"lag"},
         "c": set(TERMS) - {"lag"},
     }[to]
-    value = {**values_of(ODD), **{name: VALUES[name] for one in TERMS.values() for name in one.names}}
+    value = {
+        **values_of(ODD),
+        **{name: VALUES[name] for one in TERMS.values() for name in one.names},
+    }
     text = text_of(to, value, Model((term,)))
     assert (f"lacks {TERMS[term].title}" in text) == (term not in held)

@@ -45,7 +45,9 @@ CAD = """<robot name="cad">
 def test_what_algid_exports_it_reads(tmp_path: Path) -> None:
     value = values_of(ODD, f1=0.4, f2=0.3)
     file = tmp_path / "arm.urdf"
-    file.write_text(exported(result_of(value, Model(("coulomb",))), "arm", "urdf", Knowns(rotor1=0.02))[0])
+    file.write_text(
+        exported(result_of(value, Model(("coulomb",))), "arm", "urdf", Knowns(rotor1=0.02))[0]
+    )
     judged, warnings = read_urdf(file)
     assert warnings == ()
     assert judged.model == Model(("coulomb",))
@@ -66,9 +68,13 @@ def test_an_arm_from_cad_moves_as_pinocchio_says(tmp_path: Path) -> None:
     theta, omega, alpha = states(50)
     robot = pin.buildModelFromXML(CAD)
     robot.damping, data = np.zeros(2), robot.createData()
-    zero = np.array([np.pi / 2 - 1.1, 0.7 - np.pi / 2])  # of algid's angles, where the file's are zero
+    zero = np.array(
+        [np.pi / 2 - 1.1, 0.7 - np.pi / 2]
+    )  # of algid's angles, where the file's are zero
     q = (theta - zero[:, None] + np.pi) % (2 * np.pi) - np.pi
-    found = np.array([pin.rnea(robot, data, *state) for state in zip(q.T, omega.T, alpha.T, strict=True)]).T
+    found = np.array(
+        [pin.rnea(robot, data, *state) for state in zip(q.T, omega.T, alpha.T, strict=True)]
+    ).T
     expected = inverse_dynamics(np.append(c[:5], [0.0, 0.0]), theta, omega, alpha)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
@@ -106,14 +112,20 @@ def test_validate_simulates_results_and_files_alike(tmp_path: Path) -> None:
     unloaded, _ = algid.synthesise("case1", duration=3.0, excitation="wide")
     log, file = tmp_path / "run.csv", tmp_path / "arm.urdf"
     algid.write_log(log, unloaded)
-    result = algid.identify(log, settings=algid.Settings(estimator="weak", model="plain"), out=tmp_path, report=False)
+    result = algid.identify(
+        log, settings=algid.Settings(estimator="weak", model="plain"), out=tmp_path, report=False
+    )
     file.write_text(exported(result, "run", "urdf", Knowns())[0])
     found = []
     for judged, form in ((tmp_path / "run.algid", "table"), (file, "markdown")):
-        done = CliRunner().invoke(app, ["validate", str(judged), str(log), "--simulate", "--format", form])
+        done = CliRunner().invoke(
+            app, ["validate", str(judged), str(log), "--simulate", "--format", form]
+        )
         assert done.exit_code == 0, done.output
         assert done.output.count("rad") >= 2
-        done = CliRunner().invoke(app, ["validate", str(judged), str(log), "--simulate", "--format", "json"])
+        done = CliRunner().invoke(
+            app, ["validate", str(judged), str(log), "--simulate", "--format", "json"]
+        )
         found.append(json.loads(done.stdout)["simulation"]["all logs"])
     ours, theirs = found
     assert [row["horizon"] for row in ours] == [0.1, 0.5, 2.0]

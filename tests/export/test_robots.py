@@ -21,8 +21,15 @@ from tests.export.arms import ODD, UNIFORM, result_of, states, values_of
 XML = ("urdf", "sdf", "mjcf")
 
 
-def text_of(to: str, value: dict[str, float] | None = None, model: Model | None = None, **known: float) -> str:
-    return exported(result_of(values_of(ODD) if value is None else value, model), "arm.algid", to, Knowns(**known))[0]
+def text_of(
+    to: str, value: dict[str, float] | None = None, model: Model | None = None, **known: float
+) -> str:
+    return exported(
+        result_of(values_of(ODD) if value is None else value, model),
+        "arm.algid",
+        to,
+        Knowns(**known),
+    )[0]
 
 
 def test_pinocchios_regressor_and_links_give_the_torque_of_table_1() -> None:
@@ -36,7 +43,9 @@ def test_pinocchios_regressor_and_links_give_the_torque_of_table_1() -> None:
     for place in range(theta.shape[1]):
         q = np.stack([np.cos(theta[:, place]), np.sin(theta[:, place])], axis=1).ravel()
         Y = pin.computeJointTorqueRegressor(robot, data, q, omega[:, place], alpha[:, place])
-        np.testing.assert_allclose(Y @ parameters, ours[:, place], rtol=0, atol=1e-9 * np.abs(ours).max())
+        np.testing.assert_allclose(
+            Y @ parameters, ours[:, place], rtol=0, atol=1e-9 * np.abs(ours).max()
+        )
 
 
 def test_the_tip_is_where_the_angles_say() -> None:
@@ -64,7 +73,9 @@ def test_every_form_holds_the_same_masses_and_names(to: str) -> None:
     if to == "mjcf":
         masses = [float(body.attrib["mass"]) for body in root.iter("inertial")]
     else:
-        masses = [float(mass.attrib.get("value") or mass.text or "nan") for mass in root.iter("mass")]
+        masses = [
+            float(mass.attrib.get("value") or mass.text or "nan") for mass in root.iter("mass")
+        ]
     np.testing.assert_allclose(masses, [UNIFORM.m1, UNIFORM.m2], rtol=1e-5)
     assert (root.attrib.get("name") or root.attrib.get("model") or root[0].attrib["name"]) == "arm"
 
@@ -73,9 +84,13 @@ def test_every_form_holds_the_same_masses_and_names(to: str) -> None:
 def test_a_drawn_link_is_as_long_as_it_is(to: str) -> None:
     root = ET.fromstring(text_of(to, values_of(UNIFORM), l2=0.3))
     if to == "mjcf":
-        boxes = [[float(part) for part in geom.attrib["fromto"].split()] for geom in root.iter("geom")]
+        boxes = [
+            [float(part) for part in geom.attrib["fromto"].split()] for geom in root.iter("geom")
+        ]
         np.testing.assert_allclose(boxes, [[0, 0, 0, 0.4, 0, 0], [0, 0, 0, 0.3, 0, 0]])
-        np.testing.assert_allclose([float(geom.attrib["size"]) for geom in root.iter("geom")], [0.012, 0.009])
+        np.testing.assert_allclose(
+            [float(geom.attrib["size"]) for geom in root.iter("geom")], [0.012, 0.009]
+        )
         return
     sizes = [str(box.attrib.get("size") or box.findtext("size")) for box in root.iter("box")]
     expected = [[0.4, 0.024, 0.024], [0.3, 0.018, 0.018]]
@@ -96,11 +111,14 @@ def test_losses_that_are_negative_are_left_out_and_said(to: str) -> None:
     if to != "mjcf":
         names = ("damping", "friction")
         found = [
-            tuple(float(str(one.attrib.get(n) or one.findtext(n))) for n in names) for one in root.iter("dynamics")
+            tuple(float(str(one.attrib.get(n) or one.findtext(n))) for n in names)
+            for one in root.iter("dynamics")
         ]
     else:
         joints = list(root.iter("joint"))
-        found = [(float(one.attrib["damping"]), float(one.attrib["frictionloss"])) for one in joints]
+        found = [
+            (float(one.attrib["damping"]), float(one.attrib["frictionloss"])) for one in joints
+        ]
         assert [float(one.attrib["armature"]) for one in joints] == [0.0, 0.0]
     assert found == [(ODD.b1, 0.0), (0.0, 0.3)]
 
@@ -115,7 +133,10 @@ def test_the_rotor_of_joint_1_stands_where_a_format_has_a_place_for_it() -> None
         inertias = [float("".join(across.findall(text)[0])) for text in (without, with_rotor)]
         assert inertias[0] == pytest.approx(ODD.I1, rel=1e-9)
         assert inertias[1] == pytest.approx(ODD.I1 - (0.01 if to == "mjcf" else 0.0), rel=1e-9)
-    armature = [joint.attrib["armature"] for joint in ET.fromstring(text_of("mjcf", rotor1=0.01)).iter("joint")]
+    armature = [
+        joint.attrib["armature"]
+        for joint in ET.fromstring(text_of("mjcf", rotor1=0.01)).iter("joint")
+    ]
     assert armature == ["0.01", "0.0"]
 
 
@@ -137,7 +158,10 @@ def test_what_a_comment_may_not_hold_is_written_otherwise() -> None:
 @pytest.mark.parametrize("file", ["lab/arm-7.algid", "lab/arm-7.algid/result.json"])
 def test_a_robot_is_named_after_its_result(file: str) -> None:
     assert '<robot name="arm_7">' in exported(result_of(values_of(ODD)), file, "urdf", Knowns())[0]
-    assert '<robot name="_7arm">' in exported(result_of(values_of(ODD)), "7arm.algid", "urdf", Knowns())[0]
+    assert (
+        '<robot name="_7arm">'
+        in exported(result_of(values_of(ODD)), "7arm.algid", "urdf", Knowns())[0]
+    )
 
 
 def test_every_number_is_listed_with_its_unit_and_reads_back() -> None:
@@ -156,10 +180,18 @@ def test_a_delay_is_said_to_be_lacking() -> None:
     result = result_of(values_of(ODD))
     k1 = result.parameters["k1"]
     delayed = result.model_copy(
-        update={"parameters": {**result.parameters, "delay": k1.model_copy(update={"estimate": 0.0025, "unit": "s"})}}
+        update={
+            "parameters": {
+                **result.parameters,
+                "delay": k1.model_copy(update={"estimate": 0.0025, "unit": "s"}),
+            }
+        }
     )
     for to in FORMATS:
-        assert "This file lacks the delay from torque to angle: 0.0025 s." in exported(delayed, "a", to, Knowns())[0]
+        assert (
+            "This file lacks the delay from torque to angle: 0.0025 s."
+            in exported(delayed, "a", to, Knowns())[0]
+        )
 
 
 def test_the_payload_is_yaml_that_a_planner_reads() -> None:
@@ -174,7 +206,12 @@ def test_the_payload_is_yaml_that_a_planner_reads() -> None:
         "inertia": dict.fromkeys(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), 0.0),
     }
     bare = result.payload["m_p"].model_copy(update={"std": None})
-    text = exported(result.model_copy(update={"payload": {**result.payload, "m_p": bare}}), "a", "yaml", Knowns())[0]
+    text = exported(
+        result.model_copy(update={"payload": {**result.payload, "m_p": bare}}),
+        "a",
+        "yaml",
+        Knowns(),
+    )[0]
     assert YAML(typ="safe").load(text)["payload"]["mass_std"] is None
     told = result_of(values_of(ODD), payload={"m_p": 0.5, "l1": 0.4}, l2=0.25)
     content = YAML(typ="safe").load(exported(told, "a", "yaml", Knowns())[0])["payload"]
@@ -188,7 +225,9 @@ def test_a_payload_without_a_length_or_a_sound_mass_is_refused() -> None:
     assert str(refused.value) == "arm: the result does not tell where the payload hangs; give --l2"
     assert "[0.3, 0.0, 0.0]  # m" in exported(lost, "arm", "yaml", Knowns(l2=0.3))[0]
     vague = lost.payload["m_p"].model_copy(update={"status": Status.NOT_IDENTIFIABLE})
-    with pytest.raises(AlgidError, match="arm: the result has no payload; identify with --loaded LOG"):
+    with pytest.raises(
+        AlgidError, match="arm: the result has no payload; identify with --loaded LOG"
+    ):
         exported(lost.model_copy(update={"payload": {"m_p": vague}}), "arm", "yaml", Knowns(l2=0.3))
 
 
@@ -198,7 +237,10 @@ def test_lengths_that_the_result_was_told_are_taken_and_flags_beat_them() -> Non
     assert re.search(r"l1 +0\.41 +m +given", sdf)
     assert re.search(r"l2 +0\.33 +m +given", sdf)
     # k1 and k2, each to a thousandth, tell the same length then: k1 to a thousandth over √2
-    assert f"identified, ± {1e-3 * 0.7 * 0.4 * 0.11 / np.sqrt(2):.2g}, conditioned on the given l1" in sdf
+    assert (
+        f"identified, ± {1e-3 * 0.7 * 0.4 * 0.11 / np.sqrt(2):.2g}, conditioned on the given l1"
+        in sdf
+    )
     assert re.search(r"l1 +0\.39 +m +given", exported(told, "a", "sdf", Knowns(l1=0.39))[0])
 
 
@@ -239,5 +281,7 @@ def test_links_follow_one_another_without_a_gap() -> None:
 
 def test_no_rotor_may_be_said_and_no_arm_has_two_negative_inertias() -> None:
     assert re.search(r"rotor1 +0\.0 +kg m\^2 +given", text_of("urdf", rotor1=0.0))
-    with pytest.raises(AlgidError, match=r"not positive definite \(k1 0\.0308, k3 -1, k5 -1 kg m²\)"):
+    with pytest.raises(
+        AlgidError, match=r"not positive definite \(k1 0\.0308, k3 -1, k5 -1 kg m²\)"
+    ):
         text_of("c", values_of(ODD) | {"k3": -1.0, "k5": -1.0})

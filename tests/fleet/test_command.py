@@ -25,7 +25,9 @@ from tests.cli.commands import app
 TABLES = (robot_table, drift_table, finding_table)
 
 
-def _batch(folder: Path, robots: int = 2, logs: int = 10, start_ns: int = 1_700_000_000 * 10**9) -> Path:
+def _batch(
+    folder: Path, robots: int = 2, logs: int = 10, start_ns: int = 1_700_000_000 * 10**9
+) -> Path:
     """A batch whose first robot's k6 doubles within its logs, one a day."""
     records = [
         JobRecord(
@@ -50,19 +52,27 @@ def test_drift_and_findings_are_printed_and_written(tmp_path: Path) -> None:
     assert "2 robots, 20 logs: 1 drift and 1 finding" in done.stdout
     assert "payload unlike its label" in done.stdout
     assert "wrote" in done.stderr
-    assert {path.name for path in (tmp_path / "page").iterdir()} == {"fleet.parquet", "findings.parquet", "fleet.html"}
+    assert {path.name for path in (tmp_path / "page").iterdir()} == {
+        "fleet.parquet",
+        "findings.parquet",
+        "fleet.html",
+    }
     assert pl.read_parquet(tmp_path / "page/fleet.parquet").height == 4
 
 
 def test_json_and_markdown_say_the_same(tmp_path: Path) -> None:
     _batch(tmp_path)
-    content = json.loads(CliRunner().invoke(app, ["fleet", str(tmp_path), "--format", "json"]).stdout)
+    content = json.loads(
+        CliRunner().invoke(app, ["fleet", str(tmp_path), "--format", "json"]).stdout
+    )
     assert [(row["robot"], row["logs"], row["tested"]) for row in content["robots"]] == [
         ("r0", 10, True),
         ("r1", 10, True),
     ]
     assert [(row["robot"], row["parameter"]) for row in content["drifts"]] == [("r0", "k6")]
-    assert [(row["job"], row["kind"], row["expected"]) for row in content["findings"]] == [("r0/0", "payload", 0.5)]
+    assert [(row["job"], row["kind"], row["expected"]) for row in content["findings"]] == [
+        ("r0/0", "payload", 0.5)
+    ]
     assert content["untested"] == []
     text = CliRunner().invoke(app, ["fleet", str(tmp_path), "--format", "markdown"]).stdout
     assert "| r0 | k6 |" in text
@@ -90,12 +100,26 @@ def test_the_tables_have_their_columns_and_their_notes(tmp_path: Path) -> None:
     assert first == ("r0", "10", "2023-11-14", "2023-11-23", "k6", "1")
     (drift,) = drift_table(history).rows
     assert drift[:4] == ("r0", "k6", "2023-11-23", "10")
-    assert drift_table(history).note == "1 found. A slope over 3 months is told from none at p < 0.001."
+    assert (
+        drift_table(history).note
+        == "1 found. A slope over 3 months is told from none at p < 0.001."
+    )
     (finding,) = finding_table(history).rows
-    assert finding == ("r0/0", "r0", "payload unlike its label", "m_p", "0.90000", "0.50000", "+400.0")
+    assert finding == (
+        "r0/0",
+        "r0",
+        "payload unlike its label",
+        "m_p",
+        "0.90000",
+        "0.50000",
+        "+400.0",
+    )
     assert finding_table(history).note == "1 found; the farthest 1 are shown."
     # what a narrow terminal leaves out first
-    ranks = [{column.heading: column.rank for column in table(history).columns if column.rank} for table in TABLES]
+    ranks = [
+        {column.heading: column.rank for column in table(history).columns if column.rank}
+        for table in TABLES
+    ]
     assert ranks == [{"From": 2, "To": 1}, {"Until": 1, "Logs": 2, "Mean": 3, "p": 4}, {"Robot": 1}]
 
 
@@ -119,7 +143,9 @@ def test_a_trend_is_told_in_percent_of_a_mean_that_is_not_zero(tmp_path: Path) -
         ),
     )
     assert "the clearest trend is k4 of r" in verdict(history).sentence
-    assert "the clearest trend is k1 of r, +6" in verdict(zeroed).sentence  # 0.002 a day, 30.4 days a month
+    assert (
+        "the clearest trend is k1 of r, +6" in verdict(zeroed).sentence
+    )  # 0.002 a day, 30.4 days a month
 
 
 def test_a_drift_is_drawn_with_its_intervals(tmp_path: Path) -> None:
@@ -131,7 +157,9 @@ def test_a_drift_is_drawn_with_its_intervals(tmp_path: Path) -> None:
     means = history.windows.filter((pl.col("robot") == "r0") & (pl.col("parameter") == "k6"))
     assert (panel.title, trace["type"], trace["mode"]) == ("r0: k6", "scatter", "lines+markers")
     assert trace["y"] == means["mean"].to_list()
-    assert trace["error_y"]["array"] == pytest.approx((norm.ppf(0.975) * means["mean_std"]).to_list(), rel=1e-4)
+    assert trace["error_y"]["array"] == pytest.approx(
+        (norm.ppf(0.975) * means["mean_std"]).to_list(), rel=1e-4
+    )
     assert [datetime.fromisoformat(end) for end in trace["x"]] == means["end"].to_list()
 
 
@@ -139,7 +167,9 @@ def test_what_is_no_batch_is_refused(tmp_path: Path) -> None:
     pl.DataFrame({"a": [1]}).write_parquet(tmp_path / "jobs.parquet")
     done = CliRunner().invoke(app, ["fleet", str(tmp_path)])
     assert isinstance(done.exception, ResultError)
-    assert "no column job, robot, status, time; expected jobs.parquet of algid batch" in str(done.exception)
+    assert "no column job, robot, status, time; expected jobs.parquet of algid batch" in str(
+        done.exception
+    )
     write_jobs(open_store(str(tmp_path)), [])
     with pytest.raises(ResultError, match="no job has given parameters"):
         CliRunner().invoke(app, ["fleet", str(tmp_path)], catch_exceptions=False)
@@ -161,10 +191,13 @@ def test_the_page_shows_every_robot_and_leads_to_its_reports(tmp_path: Path) -> 
     assert '<a href="./../batch/r0/9.algid/report.html">r0</a>' in robots[0]
     assert '<th scope="row">r1</th>' in robots[0]  # its latest log has no report
     listed = re.search(
-        r'(?s)<details class="paper" id="reports"><summary>Reports</summary>\s*<dl>(.*?)</dl></details>', page
+        r'(?s)<details class="paper" id="reports"><summary>Reports</summary>\s*<dl>(.*?)</dl></details>',
+        page,
     )
     assert listed is not None
-    assert listed[1].startswith('<dt>r0</dt><dd><a href="./../batch/r0/9.algid/report.html">r0/9</a></dd><dt>r1</dt>')
+    assert listed[1].startswith(
+        '<dt>r0</dt><dd><a href="./../batch/r0/9.algid/report.html">r0/9</a></dd><dt>r1</dt>'
+    )
     links = re.findall(r'href="(\./[^"]+)"', page)
     assert links
     assert all((tmp_path / "page" / link).is_file() for link in links)

@@ -24,8 +24,13 @@ MONTH = 30.4375  # days
 STAMP = pl.Datetime("us", "UTC")
 
 
-def table(values: Sequence[float], std: Sequence[float] | float = 0.01, **others: Any) -> pl.DataFrame:
-    """A robot's k1, a day apart, as `algid batch` writes it; `others` replace columns or add them."""
+def table(
+    values: Sequence[float], std: Sequence[float] | float = 0.01, **others: Any
+) -> pl.DataFrame:
+    """A robot's k1, a day apart, as `algid batch` writes it.
+
+    `others` replace columns or add them.
+    """
     count = len(values)
     columns = {
         "job": [f"j{row}" for row in range(count)],
@@ -52,8 +57,18 @@ def weighted_line(t: np.ndarray, y: np.ndarray, std: np.ndarray) -> dict[str, fl
     widened = max(1.0, math.sqrt(np.sum(((y - design @ found) / std) ** 2) / freedom))
     slope_std = widened * math.sqrt(np.linalg.inv(normal)[1, 1])
     p = 2 * stats.t.sf(abs(found[1]) / slope_std, freedom)
-    mean, mean_std = np.sum(y / std**2) / np.sum(1 / std**2), widened / math.sqrt(np.sum(1 / std**2))
-    return {"slope": found[1], "slope_std": slope_std, "p": p, "mean": mean, "mean_std": mean_std, "logs": t.size}
+    mean, mean_std = (
+        np.sum(y / std**2) / np.sum(1 / std**2),
+        widened / math.sqrt(np.sum(1 / std**2)),
+    )
+    return {
+        "slope": found[1],
+        "slope_std": slope_std,
+        "p": p,
+        "mean": mean,
+        "mean_std": mean_std,
+        "logs": t.size,
+    }
 
 
 @pytest.mark.parametrize(("scatter", "growth"), [(0.3, 0.0), (1.0, 0.01), (5.0, 0.1)])
@@ -72,8 +87,11 @@ def test_every_window_is_weighted_least_squares_with_students_test(
     for row in found.rows(named=True):
         inside = (month <= row["month"]) & (month > row["month"] - 3)
         expected = weighted_line(days[inside] / MONTH, values[inside], std[inside])
-        # sums of moments about the robot's first log: rounding is that of t² Σw, some 1e-16 × 40 × 60
-        assert {name: row[name] for name in expected} == pytest.approx(expected, rel=1e-8, abs=1e-15)
+        # sums of moments about the robot's first log: rounding is that of t² Σw, some 1e-16 × 40 ×
+        # 60
+        assert {name: row[name] for name in expected} == pytest.approx(
+            expected, rel=1e-8, abs=1e-15
+        )
         assert row["end"] == START + timedelta(days=int(days[inside][-1]))
         assert row["drift"] == (expected["p"] < 1e-3)
     assert found["drift"].any() == (growth / scatter > 0.001 and growth > 0)
@@ -81,7 +99,9 @@ def test_every_window_is_weighted_least_squares_with_students_test(
 
 @pytest.mark.parametrize(("logs", "tested"), [(7, False), (8, True)])
 def test_eight_logs_are_tested(logs: int, tested: bool, tmp_path: Path) -> None:
-    (row,) = windows(read(table([1.0 + 0.5 * day for day in range(logs)]), tmp_path), "k1").rows(named=True)
+    (row,) = windows(read(table([1.0 + 0.5 * day for day in range(logs)]), tmp_path), "k1").rows(
+        named=True
+    )
     assert row["drift"] == tested
     assert math.isnan(row["p"]) != tested
     assert math.isnan(row["slope"]) != tested
@@ -94,7 +114,9 @@ def test_the_alarm_is_at_one_in_a_thousand(factor: float, alarm: bool, tmp_path:
     """On a line without scatter the intervals alone count: t is slope × √Σ(t - t̄)² / std."""
     t = np.arange(20) / MONTH
     critical = stats.t.isf(0.0005, 18) * 0.01 / math.sqrt(np.sum((t - t.mean()) ** 2))
-    (row,) = windows(read(table((2 - factor * critical * t).tolist()), tmp_path), "k1").rows(named=True)
+    (row,) = windows(read(table((2 - factor * critical * t).tolist()), tmp_path), "k1").rows(
+        named=True
+    )
     assert row["p"] == pytest.approx(2 * stats.t.sf(factor * stats.t.isf(0.0005, 18), 18), rel=1e-6)
     assert row["drift"] == alarm
     assert row["slope"] == pytest.approx(-factor * critical, rel=1e-8)
@@ -126,7 +148,9 @@ def test_robots_do_not_see_each_other(tmp_path: Path) -> None:
 def test_estimates_without_an_error_bar_count_for_nothing(tmp_path: Path) -> None:
     good = [1.0, 1.1, 0.9, 1.05, 0.95, 1.02, 0.98, 1.01]
     jobs = table([*good, 50.0, math.nan, 50.0], [*[0.01] * 8, 0.0, 0.01, math.nan])
-    nothing = jobs.with_columns(k1_std=pl.when(pl.col("job") == "j10").then(None).otherwise(pl.col("k1_std")))
+    nothing = jobs.with_columns(
+        k1_std=pl.when(pl.col("job") == "j10").then(None).otherwise(pl.col("k1_std"))
+    )
     for one in (jobs.head(10), nothing):
         found = windows(read(one, tmp_path), "k1").rows(named=True)[-1]
         assert found["logs"] == 8
@@ -156,14 +180,21 @@ def test_an_outlier_is_six_deviations_away(away: float, told: bool, tmp_path: Pa
     assert found.height == told
     if told:
         expected = ("outlier", "r", "j7", "k1", 1.0 + 0.01 * away, 1.0)
-        assert found.select("kind", "robot", "job", "parameter", "value", "expected").row(0) == expected
+        assert (
+            found.select("kind", "robot", "job", "parameter", "value", "expected").row(0)
+            == expected
+        )
         assert found["sigmas"][0] == pytest.approx(away, rel=1e-9)
 
 
 @pytest.mark.parametrize(("away", "told"), [(5.99, False), (6.01, True)])
-def test_logs_that_scatter_are_judged_by_their_scatter(away: float, told: bool, tmp_path: Path) -> None:
+def test_logs_that_scatter_are_judged_by_their_scatter(
+    away: float, told: bool, tmp_path: Path
+) -> None:
     """Deviations of 3 standard deviations to both sides: 1.4826 times them is one robust deviation."""
-    robust = stats.median_abs_deviation([-3, 3, -3, 3, 0], scale="normal")  # scipy has more digits of 1.4826
+    robust = stats.median_abs_deviation(
+        [-3, 3, -3, 3, 0], scale="normal"
+    )  # scipy has more digits of 1.4826
     values = [1 + 0.01 * one for one in (-3, 3, -3, 3, 0, -3, 3, -3, 3, away * robust)]
     jobs = read(table([*values, 1.0]), tmp_path)
     assert jobs["k1"].median() == pytest.approx(1.0, abs=1e-12)
@@ -173,20 +204,35 @@ def test_logs_that_scatter_are_judged_by_their_scatter(away: float, told: bool, 
 
 @pytest.mark.parametrize(("payload", "told"), [(0.5049, False), (0.5051, True), (0.4949, True)])
 def test_a_label_is_wrong_at_five_deviations(payload: float, told: bool, tmp_path: Path) -> None:
-    jobs = table([1.0] * 5, m_p=[0.5, 0.5, payload, 0.5, 0.5], m_p_std=[0.001] * 5, label_payload=[0.5] * 5)
+    jobs = table(
+        [1.0] * 5, m_p=[0.5, 0.5, payload, 0.5, 0.5], m_p_std=[0.001] * 5, label_payload=[0.5] * 5
+    )
     found = mislabelled(read(jobs, tmp_path))
     assert found["job"].to_list() == (["j2"] if told else [])
     if told:
-        assert found.select("kind", "parameter", "value", "expected").row(0) == ("payload", "m_p", payload, 0.5)
+        assert found.select("kind", "parameter", "value", "expected").row(0) == (
+            "payload",
+            "m_p",
+            payload,
+            0.5,
+        )
         assert found["sigmas"][0] == pytest.approx((payload - 0.5) / 0.001, rel=1e-9)
 
 
 def test_labels_are_judged_robot_by_robot_and_only_where_there_are_any(tmp_path: Path) -> None:
     payloads = {"m_p": [0.5, 0.51, 0.49, 0.52, 0.48, 0.56], "m_p_std": [0.001] * 6}
     wild = table([1.0] * 6, **payloads, label_payload=[0.5] * 6)
-    calm = table([1.0] * 6, robot=["s"] * 6, m_p=[0.5] * 5 + [0.51], m_p_std=[0.001] * 6, label_payload=[0.5] * 6)
+    calm = table(
+        [1.0] * 6,
+        robot=["s"] * 6,
+        m_p=[0.5] * 5 + [0.51],
+        m_p_std=[0.001] * 6,
+        label_payload=[0.5] * 6,
+    )
     found = mislabelled(read(pl.concat([wild, calm]), tmp_path))
-    assert found.select("robot", "job").rows() == [("s", "j5")]  # 10 of its own are; 60 where one is 14.8 are not
+    assert found.select("robot", "job").rows() == [
+        ("s", "j5")
+    ]  # 10 of its own are; 60 where one is 14.8 are not
     some = wild.with_columns(label_payload=pl.when(pl.col("job") == "j5").then(0.5).otherwise(None))
     assert mislabelled(read(some, tmp_path))["job"].to_list() == ["j5"]
     without = (
@@ -207,14 +253,25 @@ def test_the_history_has_a_row_a_robot_and_its_findings_in_order(tmp_path: Path)
     early = table([1.0] * 4 + [9.0, 9.5] + [1.0] * 6, job=[f"r{row}" for row in range(12)])
     pl.concat([later, early]).write_parquet(tmp_path / "jobs.parquet")
     history = history_of(tmp_path / "jobs.parquet")
-    assert history.roster.columns == ["robot", "logs", "undated", "first", "last", "latest", "tested"]
+    assert history.roster.columns == [
+        "robot",
+        "logs",
+        "undated",
+        "first",
+        "last",
+        "latest",
+        "tested",
+    ]
     last = {"r": START + timedelta(days=11), "s": START + timedelta(days=8)}
     assert history.roster.rows() == [
         ("r", 12, 0, START, last["r"], "r11", True),
         ("s", 10, 1, START, last["s"], "s8", True),
     ]
     assert (history.robots, history.logs, history.nameless) == (2, 22, 0)
-    assert history.findings.select("robot", "job", "value").rows() == [("r", "r4", 9.0), ("r", "r5", 9.5)]
+    assert history.findings.select("robot", "job", "value").rows() == [
+        ("r", "r4", 9.0),
+        ("r", "r5", 9.5),
+    ]
     assert history.jobs is not None
     assert history.jobs.rows()[:2] == [("r", "r11"), ("r", "r10")]
     assert history.jobs.rows()[-1] == ("s", "s9")  # without a date it stands last
@@ -254,8 +311,14 @@ def test_files_hold_what_the_history_holds(tmp_path: Path) -> None:
     ("change", "told"),
     [
         (lambda jobs: jobs.drop("time"), "no column time; expected jobs.parquet of algid batch"),
-        (lambda jobs: jobs.drop("robot", "job"), "no column job, robot; expected jobs.parquet of algid batch"),
-        (lambda jobs: jobs.drop("k1"), "no job has given parameters; see its column reason, and run algid batch again"),
+        (
+            lambda jobs: jobs.drop("robot", "job"),
+            "no column job, robot; expected jobs.parquet of algid batch",
+        ),
+        (
+            lambda jobs: jobs.drop("k1"),
+            "no job has given parameters; see its column reason, and run algid batch again",
+        ),
         (
             lambda jobs: jobs.drop("k1_std"),
             "no job has given parameters; see its column reason, and run algid batch again",
@@ -273,7 +336,9 @@ def test_files_hold_what_the_history_holds(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_tables_that_tell_nothing_are_refused_in_one_line(change: Any, told: str, tmp_path: Path) -> None:
+def test_tables_that_tell_nothing_are_refused_in_one_line(
+    change: Any, told: str, tmp_path: Path
+) -> None:
     path = tmp_path / "jobs.parquet"
     change(table([1.0, 2.0, 3.0])).write_parquet(path)
     with pytest.raises(ResultError) as raised:
@@ -285,7 +350,8 @@ def test_a_file_that_is_no_table_is_refused_in_one_line(tmp_path: Path) -> None:
     path = tmp_path / "jobs.parquet"
     path.write_text("job,robot\n")
     with pytest.raises(
-        ResultError, match=r"jobs\.parquet: cannot read it \(.+\); expected jobs\.parquet of algid batch$"
+        ResultError,
+        match=r"jobs\.parquet: cannot read it \(.+\); expected jobs\.parquet of algid batch$",
     ) as raised:
         history_of(path)
     assert "\n" not in str(raised.value)

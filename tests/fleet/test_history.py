@@ -21,8 +21,13 @@ START = datetime(2026, 1, 1, tzinfo=UTC)
 NAMES = tuple(f"k{n}" for n in range(1, 8))
 
 
-def _jobs(robots: int, days: int, seed: int, growth: float = 0.0, scatter: float = 1.0) -> pl.DataFrame:
-    """One log a day: estimates of 1 ± 0.5 %, scattering `scatter` times as much as they say; k6 grows a month."""
+def _jobs(
+    robots: int, days: int, seed: int, growth: float = 0.0, scatter: float = 1.0
+) -> pl.DataFrame:
+    """One log a day: estimates of 1 ± 0.5 %, scattering `scatter` times as much as they say.
+
+    k6 grows a month.
+    """
     rng = np.random.default_rng(seed)
     rows = robots * days
     day = np.tile(np.arange(days), robots)
@@ -30,7 +35,9 @@ def _jobs(robots: int, days: int, seed: int, growth: float = 0.0, scatter: float
     columns: dict[str, object] = {
         "job": [f"j{row}" for row in range(rows)],
         "robot": [f"r{one}" for one in robot],
-        "time": pl.Series([START + timedelta(days=int(one)) for one in day], dtype=pl.Datetime("us", "UTC")),
+        "time": pl.Series(
+            [START + timedelta(days=int(one)) for one in day], dtype=pl.Datetime("us", "UTC")
+        ),
         "status": ["ok"] * rows,
     }
     for name in NAMES:
@@ -49,7 +56,9 @@ def test_growth_of_a_percent_a_month_is_found_within_three_months(tmp_path: Path
     history = _history(_jobs(20, 92, seed=1, growth=0.01), tmp_path)
     found = history.drifts.filter(pl.col("parameter") == "k6")
     assert found["robot"].n_unique() == 20
-    assert found["slope"].to_numpy() == pytest.approx(0.01, abs=5 * float(found["slope_std"].to_numpy().max()))
+    assert found["slope"].to_numpy() == pytest.approx(
+        0.01, abs=5 * float(found["slope_std"].to_numpy().max())
+    )
 
 
 @pytest.mark.parametrize("scatter", [1.0, 3.0])
@@ -71,8 +80,15 @@ def test_slopes_of_no_drift_lie_within_their_intervals(tmp_path: Path) -> None:
 
 def test_a_slope_is_that_of_weighted_least_squares(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
-    jobs = _jobs(1, 60, seed=3, growth=0.02).with_columns(k6_std=pl.Series(rng.uniform(0.002, 0.02, 60)))
-    last = _history(jobs, tmp_path).windows.filter(pl.col("parameter") == "k6").sort("month").row(-1, named=True)
+    jobs = _jobs(1, 60, seed=3, growth=0.02).with_columns(
+        k6_std=pl.Series(rng.uniform(0.002, 0.02, 60))
+    )
+    last = (
+        _history(jobs, tmp_path)
+        .windows.filter(pl.col("parameter") == "k6")
+        .sort("month")
+        .row(-1, named=True)
+    )
     t = np.arange(60) / 30.4375
     line = np.polyfit(t, jobs["k6"].to_numpy(), 1, w=1 / jobs["k6_std"].to_numpy())
     assert last["slope"] == pytest.approx(line[0], rel=1e-9)
@@ -85,9 +101,14 @@ def test_outliers_and_wrong_labels_are_told(tmp_path: Path) -> None:
     k3[7] = 1.5
     payload = 0.5 + 0.001 * np.random.default_rng(5).standard_normal(60)
     payload[40] = 0.55
-    jobs = jobs.with_columns(k3=pl.Series(k3), m_p=pl.Series(payload), m_p_std=pl.lit(0.001), label_payload=pl.lit(0.5))
+    jobs = jobs.with_columns(
+        k3=pl.Series(k3), m_p=pl.Series(payload), m_p_std=pl.lit(0.001), label_payload=pl.lit(0.5)
+    )
     findings = _history(jobs, tmp_path).findings
-    assert findings.select("kind", "job", "parameter").rows() == [("outlier", "j7", "k3"), ("payload", "j40", "m_p")]
+    assert findings.select("kind", "job", "parameter").rows() == [
+        ("outlier", "j7", "k3"),
+        ("payload", "j40", "m_p"),
+    ]
 
 
 def _payloads(values: list[float], std: float = 0.001) -> pl.DataFrame:
@@ -109,15 +130,21 @@ def _payloads(values: list[float], std: float = 0.001) -> pl.DataFrame:
         ([0.5, 0.47, 0.53, 0.48, 0.52, 0.51], []),  # their own scatter is what they are judged by
     ],
 )
-def test_a_wrong_label_is_found_however_few_the_logs(values: list[float], wrong: list[str], tmp_path: Path) -> None:
+def test_a_wrong_label_is_found_however_few_the_logs(
+    values: list[float], wrong: list[str], tmp_path: Path
+) -> None:
     findings = _history(_payloads(values), tmp_path).findings
     assert findings.filter(pl.col("kind") == "payload")["job"].to_list() == wrong
 
 
 @pytest.mark.parametrize("days", [[0], [0, 0], [0, 0, 0, 0], [0, 20]])
-def test_few_logs_and_logs_of_one_instant_have_a_mean_with_its_error(days: list[int], tmp_path: Path) -> None:
+def test_few_logs_and_logs_of_one_instant_have_a_mean_with_its_error(
+    days: list[int], tmp_path: Path
+) -> None:
     jobs = _jobs(1, len(days), seed=12).with_columns(
-        time=pl.Series([START + timedelta(days=day) for day in days], dtype=pl.Datetime("us", "UTC"))
+        time=pl.Series(
+            [START + timedelta(days=day) for day in days], dtype=pl.Datetime("us", "UTC")
+        )
     )
     last = _history(jobs, tmp_path).windows.filter(parameter="k2").row(-1, named=True)
     values, count = jobs["k2"].to_numpy(), len(days)
@@ -138,14 +165,26 @@ def test_the_page_of_robots_with_a_log_each_draws_no_point_that_is_none(tmp_path
 
 
 def test_the_scatter_about_the_line_widens_its_error(tmp_path: Path) -> None:
-    last = _history(_jobs(1, 60, seed=7, scatter=4.0), tmp_path).windows.filter(parameter="k2").row(-1, named=True)
+    last = (
+        _history(_jobs(1, 60, seed=7, scatter=4.0), tmp_path)
+        .windows.filter(parameter="k2")
+        .row(-1, named=True)
+    )
     jobs = pl.read_parquet(tmp_path / "jobs.parquet")
     t = np.arange(60) / 30.4375
-    found = linregress(t, jobs["k2"].to_numpy())  # its error is the scatter's, which is four times the intervals'
+    found = linregress(
+        t, jobs["k2"].to_numpy()
+    )  # its error is the scatter's, which is four times the intervals'
     assert last["slope_std"] == pytest.approx(found.stderr, rel=1e-9)
     assert last["p"] == pytest.approx(found.pvalue, rel=1e-6)
-    calm = _history(_jobs(1, 60, seed=7, scatter=0.25), tmp_path).windows.filter(parameter="k2").row(-1, named=True)
-    assert calm["slope_std"] == pytest.approx(0.005 / np.sqrt(np.sum((t - t.mean()) ** 2)), rel=1e-9)
+    calm = (
+        _history(_jobs(1, 60, seed=7, scatter=0.25), tmp_path)
+        .windows.filter(parameter="k2")
+        .row(-1, named=True)
+    )
+    assert calm["slope_std"] == pytest.approx(
+        0.005 / np.sqrt(np.sum((t - t.mean()) ** 2)), rel=1e-9
+    )
 
 
 def test_a_window_holds_three_months(tmp_path: Path) -> None:
@@ -182,8 +221,17 @@ def test_what_was_not_tested_is_said_and_its_robots_are_shown(tmp_path: Path) ->
 
 def test_a_robot_is_shown_with_what_was_found_of_it(tmp_path: Path) -> None:
     jobs = _jobs(2, 92, seed=1, growth=0.05)
-    history = _history(jobs.with_columns(m_p=pl.lit(0.4), m_p_std=pl.lit(0.001), label_payload=pl.lit(0.5)), tmp_path)
-    first = dict(zip((c.heading for c in robot_table(history).columns), robot_table(history).rows[0], strict=True))
+    history = _history(
+        jobs.with_columns(m_p=pl.lit(0.4), m_p_std=pl.lit(0.001), label_payload=pl.lit(0.5)),
+        tmp_path,
+    )
+    first = dict(
+        zip(
+            (c.heading for c in robot_table(history).columns),
+            robot_table(history).rows[0],
+            strict=True,
+        )
+    )
     found = {"Robot": "r0", "Logs": "92", "From": "2026-01-01", "To": "2026-04-02", "Drift": "k6"}
     assert first == found | {"Stand out": "92"}
 
@@ -200,11 +248,15 @@ def test_the_page_escapes_names_and_asks_no_host(tmp_path: Path) -> None:
 
 
 def test_a_table_without_robots_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ResultError, match="none of 3 finished jobs has a robot; give each robot's logs a folder"):
+    with pytest.raises(
+        ResultError, match="none of 3 finished jobs has a robot; give each robot's logs a folder"
+    ):
         _history(_jobs(1, 3, seed=1).with_columns(robot=pl.lit(None, dtype=pl.String)), tmp_path)
     with pytest.raises(ResultError, match="there is no such file"):
         history_of(tmp_path / "absent.parquet")
-    with pytest.raises(ResultError, match=r": it is no regular file; expected jobs\.parquet of algid batch$"):
+    with pytest.raises(
+        ResultError, match=r": it is no regular file; expected jobs\.parquet of algid batch$"
+    ):
         history_of(tmp_path)
 
 

@@ -1,7 +1,8 @@
 """Some sixty identifications, tracks and exports, each as the few numbers and codes that its users rely on.
 
-The suite guards a rebuilding: whatever moves a number or a code shows here, meant or not. It proves nothing right;
-that is the work of the tests beside it, which compare with truth from outside.
+The suite guards a rebuilding: whatever moves a number or a code shows here, meant or not. It
+proves nothing right; that is the work of the tests beside it, which compare with truth from
+outside.
 """
 
 from __future__ import annotations
@@ -131,7 +132,9 @@ def _read_back(suffix: str) -> Callable[[Path], Summary]:
 def _several(count: int, **settings: Any) -> Callable[[Path], Summary]:
     def run(_folder: Path) -> Summary:
         unloaded = [
-            algid.synthesise("case2", duration=2.0, excitation="wide", sensors=replace(NOISY, seed=seed))[0]
+            algid.synthesise(
+                "case2", duration=2.0, excitation="wide", sensors=replace(NOISY, seed=seed)
+            )[0]
             for seed in range(count)
         ]
         return summary(algid.identify(unloaded, settings=algid.Settings(**settings), report=False))
@@ -153,7 +156,10 @@ def _exported(form: str) -> Callable[[Path], Summary]:
         files = sorted(folder.glob("model*"))
         text = "".join(path.read_text(encoding="utf-8") for path in files)
         numbers = re.findall(r"(?<![\w.])-?\d+\.\d+(?:e[+-]?\d+)?", text)
-        return {"code": done.code, "numbers": {str(n): [float(value), None] for n, value in enumerate(numbers)}}
+        return {
+            "code": done.code,
+            "numbers": {str(n): [float(value), None] for n, value in enumerate(numbers)},
+        }
 
     return run
 
@@ -164,7 +170,11 @@ def _real(folder: str, places: slice, **settings: Any) -> Callable[[Path], Summa
 
         paths = sorted((SHARED / folder).glob("*.csv"))[places]
         profile = Profile.model_validate({"zero": "hanging"})
-        return summary(algid.identify(paths, settings=algid.Settings(**settings), profile=profile, report=False))
+        return summary(
+            algid.identify(
+                paths, settings=algid.Settings(**settings), profile=profile, report=False
+            )
+        )
 
     return run
 
@@ -176,7 +186,17 @@ def cases() -> Iterator[Case]:
             for exact in (False, True):
                 label = f"{name} {estimator}{' exact' if exact else ''}"
                 yield Case(label, _of_case(name, estimator, exact))
-    for term in ("coulomb", "offset", "rotor", "load", "gain", "lag", "delay", "coulomb,stribeck", "coulomb,asymmetry"):
+    for term in (
+        "coulomb",
+        "offset",
+        "rotor",
+        "load",
+        "gain",
+        "lag",
+        "delay",
+        "coulomb,stribeck",
+        "coulomb,asymmetry",
+    ):
         yield Case(f"model {term}", _identified(model=term))
         yield Case(f"weak model {term}", _identified(model=term, estimator="weak"))
     more: dict[str, dict[str, Any]] = {

@@ -1,4 +1,7 @@
-"""Write what the suite expects: `make golden`. The commit that does so says which numbers moved, and why."""
+"""Write what the suite expects: `make golden`.
+
+The commit that does so says which numbers moved, and why.
+"""
 
 from __future__ import annotations
 

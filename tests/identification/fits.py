@@ -19,14 +19,22 @@ K = CASE.arm.constants()
 QUANTILE = 2.5
 
 
-def information(size: int, *, loaded: bool = False, c0: FloatArray | None = None, stretches: int = 6) -> LogInformation:
+def information(
+    size: int, *, loaded: bool = False, c0: FloatArray | None = None, stretches: int = 6
+) -> LogInformation:
     """A log that tells each coefficient alike and well, at `c0` the most likely ones."""
     S = np.tile(1e9 * np.eye(size), (stretches, 1, 1))
-    return LogInformation(loaded, np.zeros(size) if c0 is None else c0, S, np.zeros((stretches, size)))
+    return LogInformation(
+        loaded, np.zeros(size) if c0 is None else c0, S, np.zeros((stretches, size))
+    )
 
 
 def fit_of(
-    *, terms: tuple[str, ...] = (), lengths: dict[str, float] | None = None, payload: bool = True, **changes: Any
+    *,
+    terms: tuple[str, ...] = (),
+    lengths: dict[str, float] | None = None,
+    payload: bool = True,
+    **changes: Any,
 ) -> Fit:
     """The first case's arm with its payload, each standard deviation a hundredth of its value."""
     shared = Shared(Model(terms), payload=payload, lengths=lengths or {})
@@ -60,7 +68,10 @@ def with_values(fit: Fit, **values: float) -> Fit:
 
 
 def with_stds(fit: Fit, **stds: float) -> Fit:
-    """The fit with other standard deviations of some parameters; an infinite one is not identifiable."""
+    """The fit with other standard deviations of some parameters.
+
+    An infinite one is not identifiable.
+    """
     variance, status = np.diag(fit.covariance).copy(), list(fit.status)
     for name, std in stds.items():
         place = fit.names.index(name)

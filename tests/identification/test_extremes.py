@@ -27,8 +27,12 @@ def log_of(t: FloatArray, theta: FloatArray, tau: FloatArray) -> Log:
     return Log(np.rint(t * 1e9).astype(np.int64), theta, tau, Origin("log", "", {}))
 
 
-@pytest.mark.parametrize(("rate", "seconds"), [(5, 5), (5, 10), (10, 2), (10, 5), (20, 1), (3, 10), (1, 30)])
-def test_a_log_too_short_for_the_likelihood_is_refused_with_what_it_takes(rate: float, seconds: float) -> None:
+@pytest.mark.parametrize(
+    ("rate", "seconds"), [(5, 5), (5, 10), (10, 2), (10, 5), (20, 1), (3, 10), (1, 30)]
+)
+def test_a_log_too_short_for_the_likelihood_is_refused_with_what_it_takes(
+    rate: float, seconds: float
+) -> None:
     log = log_of(*moving(rate, seconds))
     said = "no unloaded log is long enough for the likelihood: expected at least 72 samples without a gap"
     with pytest.raises(LogError, match=f"{said}; record longer"):
@@ -52,7 +56,9 @@ def test_a_spike_in_an_angle_is_no_convention(spike: float, tmp_path: Path) -> N
     with pytest.raises(LogError, match="DEGREES: angles reach"):
         identify(path, report=False)
     profile = Profile(accept=("DEGREES",))
-    assert identify(path, settings=Settings(estimator="weak"), profile=profile, report=False).parameters
+    assert identify(
+        path, settings=Settings(estimator="weak"), profile=profile, report=False
+    ).parameters
 
 
 @pytest.mark.parametrize("spike", [1e6, 1e29])

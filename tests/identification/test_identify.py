@@ -50,18 +50,25 @@ def test_paper_observer_and_poles_stay_within_the_paper_s_own_bound() -> None:
 
 @pytest.mark.parametrize("estimator", ["paper", "weak", "refined"])
 def test_exact_logs_give_the_arm_and_the_payload(estimator: str, wide: tuple[Log, Log]) -> None:
-    settings = Settings(estimator=estimator, velocity="measured" if estimator == "paper" else "observer")  # type: ignore[arg-type]
+    settings = Settings(
+        estimator=estimator,  # type: ignore[arg-type]
+        velocity="measured" if estimator == "paper" else "observer",
+    )
     result = identify(*wide, settings)
     limit = {"paper": 0.1, "weak": 0.5, "refined": 1e-4}[estimator]  # percent; fast motion at 1 kHz
     assert result.complete
-    assert all(row.error_percent is not None and row.error_percent < limit for row in result.table4), result.table4
+    assert all(
+        row.error_percent is not None and row.error_percent < limit for row in result.table4
+    ), result.table4
 
 
 def test_noise_lies_within_the_intervals(noisy: tuple[Log, Log]) -> None:
     result = identify(*noisy)
     assert result.fit is not None
     assert result.fit.converged
-    truth = dict(zip(result.parameters, algid.Arm.constants(noisy[0].origin.truth.arm), strict=False))  # type: ignore[union-attr]
+    truth = dict(
+        zip(result.parameters, algid.Arm.constants(noisy[0].origin.truth.arm), strict=False)  # type: ignore[union-attr]
+    )
     for name, true in truth.items():
         found = result.parameters[name]
         assert found.estimate is not None
@@ -69,7 +76,9 @@ def test_noise_lies_within_the_intervals(noisy: tuple[Log, Log]) -> None:
         assert abs(found.estimate - true) < 4.5 * found.std  # 7 draws of a normal: 1 in 20,000
 
 
-def test_folder_holds_schema_valid_result_and_flat_series(tmp_path: Path, wide: tuple[Log, Log]) -> None:
+def test_folder_holds_schema_valid_result_and_flat_series(
+    tmp_path: Path, wide: tuple[Log, Log]
+) -> None:
     result = identify(*wide, PAPER, out=tmp_path)
     folder = tmp_path / "case1-unloaded.algid"
     content = json.loads((folder / "result.json").read_text())
@@ -85,7 +94,9 @@ def test_folder_holds_schema_valid_result_and_flat_series(tmp_path: Path, wide: 
     assert sorted(path.name for path in tmp_path.iterdir()) == ["case1-unloaded.algid"]
 
 
-def test_result_is_refused_twice_and_replaced_by_force(tmp_path: Path, wide: tuple[Log, Log]) -> None:
+def test_result_is_refused_twice_and_replaced_by_force(
+    tmp_path: Path, wide: tuple[Log, Log]
+) -> None:
     identify(wide[0], None, PAPER, out=tmp_path, report=False)
     with pytest.raises(OutputError, match="--force"):
         identify(wide[0], None, PAPER, out=tmp_path, report=False)
@@ -99,7 +110,9 @@ def test_failure_leaves_nothing_behind(tmp_path: Path, wide: tuple[Log, Log]) ->
 
 
 @pytest.mark.parametrize("estimator", ["paper", "refined"])
-def test_loaded_log_alone_with_parameters(estimator: str, noisy: tuple[Log, Log], wide: tuple[Log, Log]) -> None:
+def test_loaded_log_alone_with_parameters(
+    estimator: str, noisy: tuple[Log, Log], wide: tuple[Log, Log]
+) -> None:
     logs = wide if estimator == "paper" else noisy
     settings = PAPER if estimator == "paper" else Settings(model="plain")
     arm = identify(logs[0], None, settings)
@@ -121,7 +134,9 @@ def test_logs_of_two_arms_are_told() -> None:
     _, second = algid.synthesise("case2", duration=6.0, excitation="wide", sensors=sensors)
     result = identify(first, second, Settings(model="plain"))
     assert any("another arm" in warning for warning in result.warnings)
-    assert any("standard deviations from belonging to one arm" in warning for warning in result.warnings)
+    assert any(
+        "standard deviations from belonging to one arm" in warning for warning in result.warnings
+    )
 
 
 def test_weak_excitation_is_a_status_not_a_number() -> None:
@@ -158,7 +173,9 @@ def test_other_schema_versions_are_refused(tmp_path: Path, wide: tuple[Log, Log]
         read_result(file)
 
 
-def test_blocks_change_no_estimate(tmp_path: Path, wide: tuple[Log, Log], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_blocks_change_no_estimate(
+    tmp_path: Path, wide: tuple[Log, Log], monkeypatch: pytest.MonkeyPatch
+) -> None:
     algid.write_log(tmp_path / "log.parquet", wide[0], truth=wide[0].origin.truth)
     settings = Settings(estimator="weak", model="plain")
     whole = identify(wide[0], None, settings)
@@ -189,12 +206,25 @@ def test_a_joint_that_stands_still_is_a_status(wide: tuple[Log, Log], tmp_path: 
     held = replace(log, theta=np.full_like(log.theta, -1.5), omega=None)
     for number, stuck in enumerate((still, held)):
         for settings in (Settings(), PAPER):
-            result = identify(stuck, None, settings, out=tmp_path / f"{number}{settings.estimator}", report=number == 0)
+            result = identify(
+                stuck,
+                None,
+                settings,
+                out=tmp_path / f"{number}{settings.estimator}",
+                report=number == 0,
+            )
             assert not result.complete
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("gravity", -9.81), ("gravity", np.nan), ("delay", np.inf), ("l1", np.inf), ("window", np.nan)]
+    ("name", "value"),
+    [
+        ("gravity", -9.81),
+        ("gravity", np.nan),
+        ("delay", np.inf),
+        ("l1", np.inf),
+        ("window", np.nan),
+    ],
 )
 def test_numbers_without_a_meaning_are_refused(name: str, value: float) -> None:
     with pytest.raises(SettingError, match=f"{name}: expected"):
@@ -208,16 +238,29 @@ def test_a_result_names_the_estimator_whose_numbers_it_holds(shared_data: Path) 
     logs = sorted((shared_data / "dfki" / "C1_sysid").glob("*.csv"))
     profile = with_settings(Profile(), {"zero": "hanging"})
     result = identify(logs[:2], None, Settings(model="coulomb"), profile=profile)
-    assert result.estimator in ("weak", "instruments")  # whichever foretells the logs left out better
+    assert result.estimator in (
+        "weak",
+        "instruments",
+    )  # whichever foretells the logs left out better
     assert result.settings["estimator"] == "refined"
-    own = identify(logs[:2], None, Settings(model="coulomb", estimator=result.estimator), profile=profile)  # type: ignore[arg-type]
+    own = identify(
+        logs[:2],
+        None,
+        Settings(model="coulomb", estimator=result.estimator),  # type: ignore[arg-type]
+        profile=profile,
+    )
     for name, found in own.parameters.items():
         shown = result.parameters[name]
         assert found.estimate is not None
         assert shown.estimate is not None
         assert found.std is not None
-        assert abs(shown.estimate - found.estimate) < 0.1 * found.std  # iterations from another start
-    assert f"by the {result.estimator} estimator in place of the refined one" in result.verdict.sentence
+        assert (
+            abs(shown.estimate - found.estimate) < 0.1 * found.std
+        )  # iterations from another start
+    assert (
+        f"by the {result.estimator} estimator in place of the refined one"
+        in result.verdict.sentence
+    )
     (jitter,) = (notice for notice in result.notices if notice.code == "JITTER")
     assert jitter.logs == (logs[0].name, logs[1].name)
 
@@ -228,7 +271,9 @@ def flipped(log: Log) -> Log:
 
 
 @pytest.mark.parametrize("estimator", ["weak", "paper"])
-def test_an_impossible_arm_has_no_status_ok(estimator: str, noisy: tuple[Log, Log], wide: tuple[Log, Log]) -> None:
+def test_an_impossible_arm_has_no_status_ok(
+    estimator: str, noisy: tuple[Log, Log], wide: tuple[Log, Log]
+) -> None:
 
     log = (noisy if estimator == "weak" else wide)[0]
     result = identify(flipped(log), None, Settings(estimator=estimator))  # type: ignore[arg-type]
@@ -243,14 +288,26 @@ def test_an_impossible_arm_has_no_status_ok(estimator: str, noisy: tuple[Log, Lo
 
 @pytest.mark.parametrize("change", ["joint 2 flipped", "torque flipped"])
 def test_constrain_obeys_every_bound(change: str, noisy: tuple[Log, Log]) -> None:
-    logs = [flipped(log) if change == "joint 2 flipped" else replace(log, tau=-log.tau) for log in noisy]
+    logs = [
+        flipped(log) if change == "joint 2 flipped" else replace(log, tau=-log.tau) for log in noisy
+    ]
     settings = Settings(estimator="weak", constrain=True, model="coulomb,rotor")
     result = identify(logs[0], logs[1], settings)
     found = {name: e.estimate for name, e in result.estimates.items() if e.estimate is not None}
-    assert all(found[name] >= 0 for name in ("k6", "k7", "f1", "f2", "j2", "m_p", "l1", "l2") if name in found)
+    assert all(
+        found[name] >= 0
+        for name in ("k6", "k7", "f1", "f2", "j2", "m_p", "l1", "l2")
+        if name in found
+    )
     m22 = found["k3"] + found["j2"]
-    for cosine in (1, -1):  # eq. (2) with the rotor in M22: positive definite wherever joint 2 stands
-        m11, m12 = found["k5"] + found["k3"] + 2 * found["k1"] * cosine, found["k3"] + found["k1"] * cosine
+    for cosine in (
+        1,
+        -1,
+    ):  # eq. (2) with the rotor in M22: positive definite wherever joint 2 stands
+        m11, m12 = (
+            found["k5"] + found["k3"] + 2 * found["k1"] * cosine,
+            found["k3"] + found["k1"] * cosine,
+        )
         assert np.all(np.linalg.eigvalsh([[m11, m12], [m12, m22]]) > 0)
     assert any("--constrain enforces" in warning for warning in result.warnings)
 
@@ -259,7 +316,9 @@ def test_a_bound_broken_by_chance_is_no_failure() -> None:
     from algid.identification.outcome import is_implausible
 
     def fit(sigma: float | None, r2: float, nrmse: float) -> results.FitSummary:
-        predicted = results.TorquePrediction(rmse=(1, 1), nrmse=(0.1, nrmse), r2=(0.9, r2), filter="none")
+        predicted = results.TorquePrediction(
+            rmse=(1, 1), nrmse=(0.1, nrmse), r2=(0.9, r2), filter="none"
+        )
         bounds = [results.Bound(bound="k6 >= 0", value=-1, distance_sigma=sigma)]
         return results.FitSummary(
             noise={}, covariance_names=[], covariance=[], intervals="sandwich", iterations=0, converged=True,
@@ -270,24 +329,36 @@ def test_a_bound_broken_by_chance_is_no_failure() -> None:
     assert not is_implausible(fit(None, 0.9, 0.3))
     assert is_implausible(fit(3.1, 0.9, 0.3))
     assert is_implausible(fit(1.0, -0.01, 0.9))
-    assert not is_implausible(fit(1.0, -0.01, 0.05))  # the torque hardly varies: there is nothing to explain
+    assert not is_implausible(
+        fit(1.0, -0.01, 0.05)
+    )  # the torque hardly varies: there is nothing to explain
 
 
 def test_a_log_whose_lost_samples_were_renumbered_has_failed_unless_it_is_accepted() -> None:
     log, _ = algid.synthesise("case1", duration=4.0, excitation="wide", sensors=Sensors(1e-4, 1e-3))
     kept = np.random.default_rng(5).random(len(log)) > 0.05
     some = int(kept.sum())
-    lost = replace(log, stamp_ns=log.stamp_ns[:some], theta=log.theta[:, kept], tau=log.tau[:, kept], omega=None)
+    lost = replace(
+        log,
+        stamp_ns=log.stamp_ns[:some],
+        theta=log.theta[:, kept],
+        tau=log.tau[:, kept],
+        omega=None,
+    )
     found = algid.identify(lost, report=False, settings=WEAK)
     assert found.verdict.grade == "failed"
     assert not any(one.status is Status.OK for one in found.parameters.values())
     reading = replace(lost.origin.reading, accepted=("LOST_SAMPLES",))
-    accepted = algid.identify(replace(lost, origin=replace(lost.origin, reading=reading)), report=False, settings=WEAK)
+    accepted = algid.identify(
+        replace(lost, origin=replace(lost.origin, reading=reading)), report=False, settings=WEAK
+    )
     assert any(one.status is Status.OK for one in accepted.parameters.values())
     assert any("LOST_SAMPLES" in warning for warning in accepted.warnings)
 
 
-def test_a_log_in_memory_is_in_radians_however_often_its_joints_turn(noisy: tuple[Log, Log]) -> None:
+def test_a_log_in_memory_is_in_radians_however_often_its_joints_turn(
+    noisy: tuple[Log, Log],
+) -> None:
     """`Log` has rad by its definition: what looks like degrees is said, and refuses nothing."""
     wide = replace(noisy[0], theta=noisy[0].theta * 40, omega=None)
     (block,) = open_source(wide, "unloaded").blocks()
@@ -300,7 +371,9 @@ def test_a_payload_without_gravity_raises_no_warning_of_numpy() -> None:
     """Its weight tells no length then: the weak estimate starts from a usual one."""
     flat = replace(load_case("case1").arm, g=0.0)
     case = replace(load_case("case1"), arm=flat)
-    recording = Recording(rate=500.0, duration=4.0, sensors=Sensors(position_noise=1e-4, torque_noise=1e-3))
+    recording = Recording(
+        rate=500.0, duration=4.0, sensors=Sensors(position_noise=1e-4, torque_noise=1e-3)
+    )
     logs = synthesise(case, wide_multi_sine(flat, 3), recording)
     result = identify(*logs, replace(WEAK, gravity=0.0, l1=flat.l1))
     found = result.payload["m_p"]

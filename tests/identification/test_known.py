@@ -29,7 +29,9 @@ NAMES = [f"k{n}" for n in range(1, 8)]
 
 @pytest.fixture(scope="module")
 def weighed() -> Result:
-    logs = algid.synthesise("case1", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2, seed=1))
+    logs = algid.synthesise(
+        "case1", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2, seed=1)
+    )
     return identify(*logs, Settings(model="coulomb"), report=False)
 
 
@@ -48,7 +50,9 @@ def test_the_model_is_the_fits_or_that_of_the_settings(weighed: Result) -> None:
     assert (model_of(weighed).terms, model_of(weighed).gravity) == (("coulomb",), 9.81)
     assert weighed.fit is not None
     assert weighed.fit.model is not None
-    other = weighed.fit.model.model_copy(update={"coulomb_speed": 0.77, "stribeck_speed": 0.55, "terms": ["rotor"]})
+    other = weighed.fit.model.model_copy(
+        update={"coulomb_speed": 0.77, "stribeck_speed": 0.55, "terms": ["rotor"]}
+    )
     kept = weighed.model_copy(update={"fit": weighed.fit.model_copy(update={"model": other})})
     assert model_of(kept) == Model(("rotor",), 9.81, 0.77, 0.55)
     assert model_of(without_fit(weighed)) == Model(("coulomb",))
@@ -65,37 +69,60 @@ def test_a_torque_acts_after_half_its_hold_and_the_delay_found_or_else_set(
     assert shift_of(result)(2e-3) == pytest.approx(0.004 + share * 2e-3, abs=1e-15)
     found = Estimate(estimate=0.0061, unit="s")
     parameters = {**result.parameters, "delay": found}
-    assert shift_of(result.model_copy(update={"parameters": parameters}))(0.01) == pytest.approx(0.0061 + share * 0.01)
-    lost = {**result.parameters, "delay": Estimate(estimate=None, unit="s", status=Status.NOT_IDENTIFIABLE)}
-    assert shift_of(result.model_copy(update={"parameters": lost}))(0.01) == pytest.approx(0.004 + share * 0.01)
+    assert shift_of(result.model_copy(update={"parameters": parameters}))(0.01) == pytest.approx(
+        0.0061 + share * 0.01
+    )
+    lost = {
+        **result.parameters,
+        "delay": Estimate(estimate=None, unit="s", status=Status.NOT_IDENTIFIABLE),
+    }
+    assert shift_of(result.model_copy(update={"parameters": lost}))(0.01) == pytest.approx(
+        0.004 + share * 0.01
+    )
 
 
-def test_the_prior_of_a_model_is_the_results_estimate_and_the_inverse_of_its_covariance(weighed: Result) -> None:
+def test_the_prior_of_a_model_is_the_results_estimate_and_the_inverse_of_its_covariance(
+    weighed: Result,
+) -> None:
     assert weighed.fit is not None
     names = ("k3", "k1", "f2", "k7", "k2", "k4", "k5", "k6", "f1")
     model = model_of(weighed)
     prior = prior_of(weighed, model)
     assert set(prior.names) == set(names)
-    np.testing.assert_array_equal(prior.mean, [weighed.parameters[name].estimate for name in prior.names])
+    np.testing.assert_array_equal(
+        prior.mean, [weighed.parameters[name].estimate for name in prior.names]
+    )
     places = [weighed.fit.covariance_names.index(name) for name in prior.names]
     covariance = np.array(weighed.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
     size = np.sqrt(np.diag(covariance))
     product = (prior.precision * np.outer(size, size)) @ (covariance / np.outer(size, size))
-    np.testing.assert_allclose(product, np.eye(9), atol=1e-6)  # correlations of .99: conditions to 1e4
+    np.testing.assert_allclose(
+        product, np.eye(9), atol=1e-6
+    )  # correlations of .99: conditions to 1e4
 
 
 def test_a_prior_that_a_result_cannot_give_is_refused_with_what_to_do(weighed: Result) -> None:
     assert weighed.fit is not None
     where = weighed.log.path
     with pytest.raises(
-        ResultError, match=rf"^{where}: the result of --estimator refined has no error bars; identify with"
+        ResultError,
+        match=rf"^{where}: the result of --estimator refined has no error bars; identify with",
     ):
         prior_of(without_fit(weighed), Model())
-    with pytest.raises(ResultError, match=r"^arm\.json: the result has no j2, s1, s2; use the flags it was made with$"):
+    with pytest.raises(
+        ResultError,
+        match=r"^arm\.json: the result has no j2, s1, s2; use the flags it was made with$",
+    ):
         prior_of(weighed, Model(("coulomb", "rotor", "stribeck")), "arm.json")
-    open_one = [[None] * len(row) if place == 2 else row for place, row in enumerate(weighed.fit.covariance)]
-    lost = weighed.model_copy(update={"fit": weighed.fit.model_copy(update={"covariance": open_one})})
-    with pytest.raises(ResultError, match="leaves constants undetermined; identify from more logs first"):
+    open_one = [
+        [None] * len(row) if place == 2 else row for place, row in enumerate(weighed.fit.covariance)
+    ]
+    lost = weighed.model_copy(
+        update={"fit": weighed.fit.model_copy(update={"covariance": open_one})}
+    )
+    with pytest.raises(
+        ResultError, match="leaves constants undetermined; identify from more logs first"
+    ):
         prior_of(lost, model_of(weighed))
     with pytest.raises(ResultError, match="leaves constants undetermined"):
         prior_of(changed(weighed, "parameters", "k4", estimate=None), model_of(weighed))
@@ -103,29 +130,54 @@ def test_a_prior_that_a_result_cannot_give_is_refused_with_what_to_do(weighed: R
 
 def test_a_loaded_logs_constants_hold_the_payload(weighed: Result) -> None:
     model = model_of(weighed)
-    value = {name: one.estimate or 0.0 for name, one in (weighed.parameters | weighed.payload).items()}
+    value = {
+        name: one.estimate or 0.0 for name, one in (weighed.parameters | weighed.payload).items()
+    }
     bare = torque_constants(weighed, model, "unloaded", "r")
     assert bare.tolist() == [value[name] for name in model.names]
     m, l1, l2 = value["m_p"], value["l1"], value["l2"]
-    added = {"k1": m * l1 * l2, "k2": m * 9.81 * l2, "k3": m * l2**2, "k4": m * 9.81 * l1, "k5": m * l1**2}
+    added = {
+        "k1": m * l1 * l2,
+        "k2": m * 9.81 * l2,
+        "k3": m * l2**2,
+        "k4": m * 9.81 * l1,
+        "k5": m * l1**2,
+    }
     loaded = torque_constants(weighed, model, "loaded", "r")
-    assert loaded.tolist() == pytest.approx([value[n] + added.get(n, 0.0) for n in model.names], rel=1e-12)
+    assert loaded.tolist() == pytest.approx(
+        [value[n] + added.get(n, 0.0) for n in model.names], rel=1e-12
+    )
 
 
 def test_given_lengths_go_before_those_of_the_result(weighed: Result) -> None:
     result = weighed.model_copy(update={"settings": weighed.settings | {"l1": 0.3, "l2": 0.2}})
-    value = {name: one.estimate or 0.0 for name, one in (result.parameters | result.payload).items()}
+    value = {
+        name: one.estimate or 0.0 for name, one in (result.parameters | result.payload).items()
+    }
     k = np.array([value[name] for name in NAMES])
     m = value["m_p"]
     expected = with_payload(k, m * np.array([0.09, 0.04, 0.06, 9.81 * 0.3, 9.81 * 0.2]))
-    found = dict(zip(model_of(result).names, torque_constants(result, model_of(result), "loaded", "r"), strict=True))
+    found = dict(
+        zip(
+            model_of(result).names,
+            torque_constants(result, model_of(result), "loaded", "r"),
+            strict=True,
+        )
+    )
     assert [found[name] for name in NAMES] == pytest.approx(expected.tolist(), rel=1e-12)
 
 
-@pytest.mark.parametrize(("group", "name", "role"), [("parameters", "k6", "unloaded"), ("payload", "l2", "loaded")])
-def test_a_constant_that_is_needed_and_open_is_named(weighed: Result, group: str, name: str, role: str) -> None:
+@pytest.mark.parametrize(
+    ("group", "name", "role"), [("parameters", "k6", "unloaded"), ("payload", "l2", "loaded")]
+)
+def test_a_constant_that_is_needed_and_open_is_named(
+    weighed: Result, group: str, name: str, role: str
+) -> None:
     result = changed(weighed, group, name, estimate=None, status=Status.NOT_IDENTIFIABLE)
-    with pytest.raises(ResultError, match=rf"^r\.json: the result has no {name}; identify it from logs that tell it$"):
+    with pytest.raises(
+        ResultError,
+        match=rf"^r\.json: the result has no {name}; identify it from logs that tell it$",
+    ):
         torque_constants(result, model_of(result), role, "r.json")  # type: ignore[arg-type]
     if role == "loaded":
         assert torque_constants(result, model_of(result), "unloaded", "r.json").size == 9
@@ -139,15 +191,22 @@ def test_the_first_length_is_that_of_table_1_with_its_propagated_error(weighed: 
     assert found[0] == pytest.approx(9.81 * k1 / k2, rel=1e-12)
     draws = np.random.default_rng(0).standard_normal((2, 40_000))
     places = [weighed.fit.covariance_names.index(name) for name in ("k1", "k2")]
-    root = np.linalg.cholesky(np.array(weighed.fit.covariance, dtype=np.float64)[np.ix_(places, places)])
+    root = np.linalg.cholesky(
+        np.array(weighed.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
+    )
     drawn = np.array([[k1], [k2]]) + root @ draws
-    assert found[1] == pytest.approx(float(np.std(9.81 * drawn[0] / drawn[1])), rel=0.03)  # 8 standard errors
+    assert found[1] == pytest.approx(
+        float(np.std(9.81 * drawn[0] / drawn[1])), rel=0.03
+    )  # 8 standard errors
     assert abs(found[0] - load_case("case1").arm.l1) < 4.5 * found[1]
 
 
 def test_no_length_follows_from_constants_that_are_not_sound(weighed: Result) -> None:
     assert first_length(without_fit(weighed)) is None
-    assert first_length(weighed.model_copy(update={"settings": weighed.settings | {"gravity": 0.0}})) is None
+    assert (
+        first_length(weighed.model_copy(update={"settings": weighed.settings | {"gravity": 0.0}}))
+        is None
+    )
     for name in ("k1", "k2"):
         assert first_length(changed(weighed, "parameters", name, estimate=0.0)) is None
         assert first_length(changed(weighed, "parameters", name, status=Status.IMPLAUSIBLE)) is None
@@ -165,7 +224,10 @@ def test_lengths_five_deviations_off_contradict_the_result(weighed: Result) -> N
     (l1, s1), (l2, s2) = by_constants, (own.estimate, own.std)
     assert contradictions(weighed, {"l1": l1 + 4.9 * s1, "l2": l2 - 4.9 * s2}) == ()
     first, second = contradictions(weighed, {"l1": l1 + 5.6 * s1, "l2": l2 - 7.2 * s2})
-    assert first.text == f"l1 of {l1 + 5.6 * s1:g} m lies 6 σ from the result's {l1:.5g} ± {s1:.2g} m; one is wrong"
+    assert (
+        first.text
+        == f"l1 of {l1 + 5.6 * s1:g} m lies 6 σ from the result's {l1:.5g} ± {s1:.2g} m; one is wrong"
+    )
     assert (second.numbers["name"], second.numbers["distance"]) == ("l2", pytest.approx(7.2))
     bare = weighed.model_copy(update={"payload": {}})
     assert contradictions(bare, {"l2": 9.0}) == ()  # the constants tell l1 alone

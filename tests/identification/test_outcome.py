@@ -16,7 +16,14 @@ from algid.estimators.identifiability import Whiteness
 from algid.estimators.prediction import PredictionScore
 from algid.estimators.selection import Selection
 from algid.estimators.whitening import NoiseLevels
-from algid.identification.outcome import distrusted, estimate, outcome_of, prediction, table_rows, unknown
+from algid.identification.outcome import (
+    distrusted,
+    estimate,
+    outcome_of,
+    prediction,
+    table_rows,
+    unknown,
+)
 from algid.identification.remarks import fit_notes, fit_warnings
 from algid.identification.source import open_source
 from algid.identification.survey import Survey
@@ -36,8 +43,13 @@ def survey(*, loaded: bool = True) -> Survey:
     """A short log of each kind, or of the unloaded arm alone, too short to judge a prediction by."""
     t = np.arange(50) * 1e-3
     theta = np.stack([np.sin(9 * t), np.cos(7 * t)])
-    logs = [Log((t * 1e9).astype(np.int64), theta, 3 * np.cos(theta), Origin(name, "csv", {})) for name in "ab"]
-    return Survey([open_source(logs[0], "unloaded"), *([open_source(logs[1], "loaded")] if loaded else [])])
+    logs = [
+        Log((t * 1e9).astype(np.int64), theta, 3 * np.cos(theta), Origin(name, "csv", {}))
+        for name in "ab"
+    ]
+    return Survey(
+        [open_source(logs[0], "unloaded"), *([open_source(logs[1], "loaded")] if loaded else [])]
+    )
 
 
 def summed(fit: Fit, chosen: Selection | None = None, **settings: Any) -> FitSummary:
@@ -58,9 +70,17 @@ def test_an_estimate_has_its_interval_and_one_that_is_open_has_nothing_but_its_u
 
 
 def test_distrust_takes_ok_and_leaves_what_was_no_better() -> None:
-    group = {"a": estimate(1, 1, 1, "kg", "OK"), "b": unknown("kg"), "c": estimate(1, 1, 1, "kg", "NOT_CONVERGED")}
+    group = {
+        "a": estimate(1, 1, 1, "kg", "OK"),
+        "b": unknown("kg"),
+        "c": estimate(1, 1, 1, "kg", "NOT_CONVERGED"),
+    }
     found = distrusted(group)
-    assert [one.status for one in found.values()] == ["IMPLAUSIBLE", "NOT_IDENTIFIABLE", "NOT_CONVERGED"]
+    assert [one.status for one in found.values()] == [
+        "IMPLAUSIBLE",
+        "NOT_IDENTIFIABLE",
+        "NOT_CONVERGED",
+    ]
     assert found["a"].ci95 == group["a"].ci95
     assert group["a"].status is Status.OK
 
@@ -72,9 +92,13 @@ def test_parameters_are_within_the_fits_quantile_of_their_deviations() -> None:
     k4 = found.parameters["k4"]
     assert k4.estimate == pytest.approx(K4)
     assert k4.unit == "N m"
-    assert k4.ci95 == pytest.approx((K4 * (1 - 0.01 * QUANTILE), K4 * (1 + 0.01 * QUANTILE)), rel=1e-12)
+    assert k4.ci95 == pytest.approx(
+        (K4 * (1 - 0.01 * QUANTILE), K4 * (1 + 0.01 * QUANTILE)), rel=1e-12
+    )
     assert found.payload["m_p"].std == pytest.approx(0.01 * PAYLOAD, rel=1e-12)
-    assert {one.status for one in (found.parameters | found.payload | found.loaded).values()} == {Status.OK}
+    assert {one.status for one in (found.parameters | found.payload | found.loaded).values()} == {
+        Status.OK
+    }
 
 
 def test_rows_of_table_4_are_sums_of_constants_and_their_deviations_are_propagated() -> None:
@@ -85,7 +109,13 @@ def test_rows_of_table_4_are_sums_of_constants_and_their_deviations_are_propagat
     l1, l2, g = ARM.l1, ARM.l2, ARM.g
     unloaded = (K5 + K3, K1, K3, K6, K4, K2)
     m = PAYLOAD
-    loaded = (K5 + K3 + m * (l1**2 + l2**2), K1 + m * l1 * l2, K3 + m * l2**2, K4 + m * g * l1, K2 + m * g * l2)
+    loaded = (
+        K5 + K3 + m * (l1**2 + l2**2),
+        K1 + m * l1 * l2,
+        K3 + m * l2**2,
+        K4 + m * g * l1,
+        K2 + m * g * l2,
+    )
     assert list(rows.values()) == pytest.approx([*unloaded, *loaded, m], rel=1e-12)
     assert stds["k5+k3"] == pytest.approx(0.01 * math.hypot(K5, K3), rel=1e-9)
     assert stds["k6"] == pytest.approx(0.01 * K6, rel=1e-9)
@@ -106,7 +136,9 @@ def test_rows_of_what_the_logs_leave_open_are_left_out() -> None:
 
 
 def test_loaded_rows_of_a_fit_that_did_not_settle_say_so() -> None:
-    found = outcome_of(replace(fit_of(), converged=False), {}, survey(), Settings(), Selection(Model(), False))
+    found = outcome_of(
+        replace(fit_of(), converged=False), {}, survey(), Settings(), Selection(Model(), False)
+    )
     assert {one.status for one in found.loaded.values()} == {Status.NOT_CONVERGED}
     assert list(found.loaded) == list(LOADED_ROWS)
     assert found.loaded["k4+z4"].ci95 is not None
@@ -122,7 +154,10 @@ def test_a_bound_broken_by_far_spoils_every_estimate_and_one_broken_by_chance_no
 
 
 def test_noise_is_the_root_mean_square_over_logs() -> None:
-    levels = (NoiseLevels(np.array([3.0, 1.0]), np.array([0.0, 2.0])), NoiseLevels(np.array([4.0, 7.0]), np.zeros(2)))
+    levels = (
+        NoiseLevels(np.array([3.0, 1.0]), np.array([0.0, 2.0])),
+        NoiseLevels(np.array([4.0, 7.0]), np.zeros(2)),
+    )
     assert summed(replace(fit_of(), noise=levels)).noise == pytest.approx(
         {"theta1": math.sqrt(12.5), "theta2": 5.0, "tau1": 0.0, "tau2": math.sqrt(2)}
     )
@@ -151,7 +186,9 @@ def test_whiteness_goes_by_joint() -> None:
 
 
 @pytest.mark.parametrize(("statistic", "endogenous"), [(0.5, False), (3.2, None), (7.0, True)])
-def test_endogeneity_is_judged_for_as_many_coefficients_as_a_log_has(statistic: float, endogenous: bool | None) -> None:
+def test_endogeneity_is_judged_for_as_many_coefficients_as_a_log_has(
+    statistic: float, endogenous: bool | None
+) -> None:
     found = summed(replace(fit_of(), endogeneity=statistic)).endogeneity["largest"]
     assert found.statistic == statistic
     assert found.p_value == pytest.approx(min(1.0, 7 * 2 * norm.sf(statistic)), rel=1e-9)
@@ -165,11 +202,15 @@ def test_each_log_tells_its_own_estimates() -> None:
     size, c0 = 7, K
     S = np.tile(np.diag([4e8] * 6 + [0.0]), (1, 1, 1))
     g = np.array([[2e4, *[0.0] * 6]])  # the most likely k1 lies 2e4 / 4e8 further
-    fit = replace(fit_of(), logs=(LogInformation(False, c0, S, g), information(size, loaded=True, c0=c0)))
+    fit = replace(
+        fit_of(), logs=(LogInformation(False, c0, S, g), information(size, loaded=True, c0=c0))
+    )
     own, _ = summed(fit).by_log
     assert own["k1"].estimate == pytest.approx(K1 + 5e-5, rel=1e-9)
     assert own["k1"].std == pytest.approx(5e-5, rel=1e-6)
-    assert own["k1"].ci95 == pytest.approx((K1 + 5e-5 * (1 - QUANTILE), K1 + 5e-5 * (1 + QUANTILE)), rel=1e-6)
+    assert own["k1"].ci95 == pytest.approx(
+        (K1 + 5e-5 * (1 - QUANTILE), K1 + 5e-5 * (1 + QUANTILE)), rel=1e-6
+    )
     assert own["k7"].status is Status.NOT_IDENTIFIABLE
     assert own["k7"].estimate is None
 
@@ -187,19 +228,25 @@ def test_the_torques_gain_is_the_known_mass_over_the_found_one(known: float) -> 
 def test_a_mass_not_told_from_zero_tells_no_gain() -> None:
     for fit in (with_stds(fit_of(), m_p=PAYLOAD / QUANTILE), with_stds(fit_of(), m_p=np.inf)):
         assert summed(fit, payload_mass=1.0).torque_gain == unknown("1")
-    assert summed(with_stds(fit_of(), m_p=0.99 * PAYLOAD / QUANTILE), payload_mass=1.0).torque_gain != unknown("1")
+    assert summed(
+        with_stds(fit_of(), m_p=0.99 * PAYLOAD / QUANTILE), payload_mass=1.0
+    ).torque_gain != unknown("1")
     assert summed(fit_of(payload=False), payload_mass=1.0).torque_gain is None
     assert summed(fit_of()).torque_gain is None
 
 
 def test_a_prediction_without_samples_is_none_and_others_hold_their_sums() -> None:
     assert prediction(PredictionScore()) is None
-    sums = PredictionScore(100.0, np.array([4.0, 9.0]), np.array([0.0, 50.0]), np.array([400.0, 125.0]))
+    sums = PredictionScore(
+        100.0, np.array([4.0, 9.0]), np.array([0.0, 50.0]), np.array([400.0, 125.0])
+    )
     found = prediction(sums)
     assert found is not None
     assert found.rmse == pytest.approx((0.2, 0.3))
     assert found.nrmse == pytest.approx((0.1, math.sqrt(9 / 125)))
-    assert found.r2 == pytest.approx((0.99, 0.91))  # 125 − 50²/100 = 100 is the variance left to explain
+    assert found.r2 == pytest.approx(
+        (0.99, 0.91)
+    )  # 125 − 50²/100 = 100 is the variance left to explain
 
 
 def found(fit: Fit, code: str) -> list[Notice]:
@@ -228,7 +275,9 @@ def test_a_length_that_the_constants_contradict_is_named() -> None:
         fit = fit_of(lengths={"l1": ARM.l1 + times * std})
         assert bool(found(fit, "LENGTH_MISMATCH")) is told
     (one,) = found(fit, "LENGTH_MISMATCH")
-    assert one.numbers == pytest.approx({"length": ARM.l1, "half": QUANTILE * std, "given": ARM.l1 + 5.1 * std})
+    assert one.numbers == pytest.approx(
+        {"length": ARM.l1, "half": QUANTILE * std, "given": ARM.l1 + 5.1 * std}
+    )
 
 
 def test_a_negative_mass_by_five_deviations_says_exchanged() -> None:
@@ -273,7 +322,8 @@ def test_repeatability_and_gain_are_told_in_numbers() -> None:
     repeated = Repeatability(masses=[0.5, 0.51234], std=0.0087, ci95=(0.0039, 0.28))
     (one,) = notes(repeatability=repeated)
     assert (
-        one.text == "the loaded runs by themselves weigh 0.5, 0.5123 kg: repeatability 0.0087 kg (95 %: 0.0039 to 0.28)"
+        one.text
+        == "the loaded runs by themselves weigh 0.5, 0.5123 kg: repeatability 0.0087 kg (95 %: 0.0039 to 0.28)"
     )
     gain = Estimate(estimate=1.25, std=0.01, ci95=(1.23, 1.27), unit="1")
     (one,) = notes(torque_gain=gain)
@@ -283,7 +333,9 @@ def test_repeatability_and_gain_are_told_in_numbers() -> None:
 
 
 def test_cross_validation_that_could_not_be_done_is_told() -> None:
-    outcome = outcome_of(fit_of(), {}, survey(), Settings(cross_validate=True), Selection(Model(), False))
+    outcome = outcome_of(
+        fit_of(), {}, survey(), Settings(cross_validate=True), Selection(Model(), False)
+    )
     assert [one.code for one in outcome.notices] == ["NO_CROSS_VALIDATION"]
 
 

@@ -37,13 +37,17 @@ def moved(case: str, passive: int, duration: float = 5.0) -> SimulatedMotion:
     arm = load_case(case).arm
     wide = wide_multi_sine(arm, 3)
     driven = np.array([[float(passive != 1)], [float(passive != 2)]])
-    return simulate(arm.constants(), lambda t: wide(t) * driven, np.arange(round(duration / DT) + 1) * DT)
+    return simulate(
+        arm.constants(), lambda t: wide(t) * driven, np.arange(round(duration / DT) + 1) * DT
+    )
 
 
 def logged(motion: SimulatedMotion, seed: int, sigma: float = SIGMA) -> Segment:
     rng = np.random.default_rng(seed)
     noise = sigma * rng.standard_normal((2, *motion.theta.shape))
-    return Segment(0.0, DT, motion.theta + noise[0], np.where(motion.tau != 0, motion.tau + 10 * noise[1], 0.0))
+    return Segment(
+        0.0, DT, motion.theta + noise[0], np.where(motion.tau != 0, motion.tau + 10 * noise[1], 0.0)
+    )
 
 
 def source(log: Segment) -> Source:
@@ -52,7 +56,9 @@ def source(log: Segment) -> Source:
 
 def identified(log: Segment, model: str = "auto") -> Result:
     stamps = np.arange(len(log), dtype=np.int64) * round(1e9 * DT)
-    origin = Origin("pendubot.csv", "csv", {}, reading=Reading(passive=1 if not log.tau[0].any() else 2))
+    origin = Origin(
+        "pendubot.csv", "csv", {}, reading=Reading(passive=1 if not log.tau[0].any() else 2)
+    )
     return identify(Log(stamps, log.theta, log.tau, origin), settings=Settings(model=model))
 
 
@@ -88,8 +94,11 @@ def test_exact_logs_give_exact_constants(estimator: object, passive: int) -> Non
 def test_intervals_hold_where_a_joint_has_no_motor(passive: int) -> None:
     motion, k = moved("case1", passive), load_case("case1").arm.constants()
     fits = [refined.fit([source(logged(motion, seed))]) for seed in range(140)]
-    # The motorless row has a noise of its own, a thousandth of the other joint's torque; here it has none.
-    holds_at_least_95(np.array([in_axes(fit.values - k, fit.covariance, fit.quantile) for fit in fits]))
+    # The motorless row has a noise of its own, a thousandth of the other joint's torque; here it
+    # has none.
+    holds_at_least_95(
+        np.array([in_axes(fit.values - k, fit.covariance, fit.quantile) for fit in fits])
+    )
 
 
 def test_a_log_needs_no_torque_of_a_joint_without_motor(tmp_path: Path) -> None:
@@ -104,8 +113,16 @@ def test_a_log_needs_no_torque_of_a_joint_without_motor(tmp_path: Path) -> None:
 
 def test_what_a_joint_without_motor_logs_as_torque_is_not_read(tmp_path: Path) -> None:
     log = logged(moved("case1", 2), 0)
-    columns = np.column_stack([np.arange(len(log)) * DT, *log.theta, log.tau[0], np.full(len(log), np.nan)])
-    np.savetxt(tmp_path / "log.csv", columns, delimiter=",", header="t,theta1,theta2,tau1,tau2", comments="")
+    columns = np.column_stack(
+        [np.arange(len(log)) * DT, *log.theta, log.tau[0], np.full(len(log), np.nan)]
+    )
+    np.savetxt(
+        tmp_path / "log.csv",
+        columns,
+        delimiter=",",
+        header="t,theta1,theta2,tau1,tau2",
+        comments="",
+    )
     read = open_log(tmp_path / "log.csv", Profile(passive=2)).whole()
     assert not read.tau[1].any()
 
@@ -117,7 +134,9 @@ def test_a_torque_that_is_zero_is_refused_until_the_joint_is_called_passive(tmp_
     np.savetxt(file, columns, delimiter=",", header="t,theta1,theta2,tau1,tau2", comments="")
     with pytest.raises(LogError, match=r"EFFORT_ZERO.*--passive 2 \(profile: passive = 2\)"):
         identify(file)
-    done = CliRunner().invoke(app, ["identify", str(file), "--passive", "2", "-o", str(tmp_path), "--no-report"])
+    done = CliRunner().invoke(
+        app, ["identify", str(file), "--passive", "2", "-o", str(tmp_path), "--no-report"]
+    )
     assert done.exit_code == 0, done.output
     assert "EFFORT_ZERO" not in done.output
 

@@ -29,7 +29,9 @@ def test_a_log_given_twice_counts_once_and_is_told(tmp_path: Path) -> None:
     assert {name: one.std for name, one in twice.parameters.items()} == {
         name: one.std for name, one in once.parameters.items()
     }
-    assert [str(one.numbers["name"]) for one in twice.notices if one.code == "SAME_LOG"] == [str(tmp_path / "copy.csv")]
+    assert [str(one.numbers["name"]) for one in twice.notices if one.code == "SAME_LOG"] == [
+        str(tmp_path / "copy.csv")
+    ]
 
 
 def test_logs_of_one_length_and_other_content_stay() -> None:
@@ -41,7 +43,12 @@ def test_logs_of_one_length_and_other_content_stay() -> None:
 
 def test_a_cut_that_was_asked_for_is_a_note_and_no_warning(tmp_path: Path) -> None:
     write_log(tmp_path / "one.csv", moving_log(4000))
-    result = identify(tmp_path / "one.csv", settings=Settings(estimator="weak"), profile=Profile(start=1), report=False)
+    result = identify(
+        tmp_path / "one.csv",
+        settings=Settings(estimator="weak"),
+        profile=Profile(start=1),
+        report=False,
+    )
     assert result.warnings == []
     note = next(note for note in result.notes if "left out" in note)
     assert "1,000 samples before 1 s" in note
@@ -59,12 +66,26 @@ def test_one_log_as_unloaded_and_as_loaded_is_told_in_one_line(tmp_path: Path) -
 
 @pytest.mark.parametrize(
     ("flags", "expected"),
-    [((), 0.0), (("--gravity", "9.81"), 9.81), (("--set", "gravity=3.7"), 3.7), (("--gravity", "1.6"), 1.6)],
+    [
+        ((), 0.0),
+        (("--gravity", "9.81"), 9.81),
+        (("--set", "gravity=3.7"), 3.7),
+        (("--gravity", "1.6"), 1.6),
+    ],
 )
-def test_gravity_flag_over_profile_over_default(flags: tuple[str, ...], expected: float, tmp_path: Path) -> None:
+def test_gravity_flag_over_profile_over_default(
+    flags: tuple[str, ...], expected: float, tmp_path: Path
+) -> None:
     write_log(tmp_path / "one.csv", moving_log(4000))
     (tmp_path / "algid.toml").write_text("gravity = 0\n")
-    command = ["identify", str(tmp_path / "one.csv"), "-o", str(tmp_path), "--profile", str(tmp_path / "algid.toml")]
+    command = [
+        "identify",
+        str(tmp_path / "one.csv"),
+        "-o",
+        str(tmp_path),
+        "--profile",
+        str(tmp_path / "algid.toml"),
+    ]
     more = ["--estimator", "weak", "--model", "plain", "--no-report", "-q", *flags]
     CliRunner().invoke(app, [*command, *more])
     assert read_result(tmp_path / "one.algid").settings["gravity"] == expected

@@ -40,14 +40,18 @@ DT = 2e-3
 LOADED_K = with_payload(K, CASE.arm.payload_constants(CASE.payload))
 
 
-def moved(k: FloatArray, seed: int, lead: int = 0, start_ns: int = 7_000_000_000) -> tuple[Log, FloatArray]:
+def moved(
+    k: FloatArray, seed: int, lead: int = 0, start_ns: int = 7_000_000_000
+) -> tuple[Log, FloatArray]:
     """Four seconds without noise, its torque logged `lead` samples early, and the true velocities (2, N)."""
     t = DT * np.arange(2001)
     motion = simulate(k, wide_multi_sine(CASE.arm, seed), t)
     rows = t.size - lead
     tau = motion.tau[:, lead:]
     stamps = start_ns + np.rint(t[:rows] * 1e9).astype(np.int64)
-    return Log(stamps, motion.theta[:, :rows], tau, Origin(f"{seed}.csv", "csv", {})), motion.omega[:, :rows]
+    return Log(stamps, motion.theta[:, :rows], tau, Origin(f"{seed}.csv", "csv", {})), motion.omega[
+        :, :rows
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +61,11 @@ def both() -> tuple[tuple[Log, FloatArray], tuple[Log, FloatArray]]:
 
 def test_blocks_become_one_file_with_the_first_stamps_beside_them(tmp_path: Path) -> None:
     def blocks() -> Iterator[dict[str, object]]:
-        yield {"log": np.array([0, 0], dtype=np.int32), "t": np.array([0.0, 0.5]), "kind": ["a", "b"]}
+        yield {
+            "log": np.array([0, 0], dtype=np.int32),
+            "t": np.array([0.0, 0.5]),
+            "kind": ["a", "b"],
+        }
         yield {"log": np.array([1], dtype=np.int32), "t": np.array([np.nan]), "kind": ["c"]}
 
     write_columns(tmp_path / "some.parquet", blocks(), [5, 1_700_000_000_123_456_789])
@@ -67,7 +75,10 @@ def test_blocks_become_one_file_with_the_first_stamps_beside_them(tmp_path: Path
     assert np.isnan(table["t"].to_pylist()[2])
     assert table["kind"].to_pylist() == ["a", "b", "c"]
     assert json.loads(table.schema.metadata[START_KEY]) == [5, 1_700_000_000_123_456_789]
-    assert pq.ParquetFile(tmp_path / "some.parquet").metadata.row_group(0).column(1).compression == "ZSTD"
+    assert (
+        pq.ParquetFile(tmp_path / "some.parquet").metadata.row_group(0).column(1).compression
+        == "ZSTD"
+    )
 
 
 def test_a_block_that_fails_leaves_a_file_that_is_closed(tmp_path: Path) -> None:
@@ -94,7 +105,9 @@ def test_windows_are_gathered_into_blocks_of_so_many_rows(
     assert [block["t"].size for block in found] == sizes
     assert list(found[0]) == ["t", "k1", "k2"]
     np.testing.assert_array_equal(np.concatenate([block["k2"] for block in found]), -np.arange(9.0))
-    np.testing.assert_array_equal(np.concatenate([block["k1"] for block in found]), np.arange(9.0) + 0.1)
+    np.testing.assert_array_equal(
+        np.concatenate([block["k1"] for block in found]), np.arange(9.0) + 0.1
+    )
     assert list(series_blocks([], ["k1"])) == []
 
 
@@ -103,7 +116,9 @@ def test_the_predicted_torque_is_that_of_the_equation_of_motion(
 ) -> None:
     """Of noiseless logs the prediction is the torque itself wherever the smoother does not reach over an end."""
     survey = Survey([open_source(both[0][0], "unloaded"), open_source(both[1][0], "loaded")])
-    blocks = list(torque_blocks(survey, Model(), {"unloaded": K, "loaded": LOADED_K}, lambda _: 0.0))
+    blocks = list(
+        torque_blocks(survey, Model(), {"unloaded": K, "loaded": LOADED_K}, lambda _: 0.0)
+    )
     for number, (log, omega) in enumerate(both):
         own = [block for block in blocks if block["log"][0] == number]
         column = {name: np.concatenate([block[name] for block in own]) for name in own[0]}
@@ -113,14 +128,20 @@ def test_the_predicted_torque_is_that_of_the_equation_of_motion(
             np.testing.assert_array_equal(column[f"theta{joint + 1}"], log.theta[joint])
             np.testing.assert_array_equal(column[f"tau{joint + 1}"], log.tau[joint])
             speed = np.sqrt(np.mean(omega[joint] ** 2))
-            # smoothed at 40 Hz and by differences of second order: (2π f dt)²/6 of motion up to 8 Hz
-            np.testing.assert_allclose(column[f"omega{joint + 1}"][50:-50], omega[joint, 50:-50], atol=5e-3 * speed)
+            # smoothed at 40 Hz and by differences of second order: (2π f dt)²/6 of motion up to 8
+            # Hz
+            np.testing.assert_allclose(
+                column[f"omega{joint + 1}"][50:-50], omega[joint, 50:-50], atol=5e-3 * speed
+            )
             known = column[f"tau{joint + 1}_predicted"]
             inner = ~np.isnan(known)
             assert 0.9 * known.size < inner.sum() < known.size
             assert not inner[0]
             assert not inner[-1]
-            assert np.flatnonzero(~inner[: known.size // 2]).size == np.flatnonzero(~inner[known.size // 2 :]).size
+            assert (
+                np.flatnonzero(~inner[: known.size // 2]).size
+                == np.flatnonzero(~inner[known.size // 2 :]).size
+            )
             off = known[inner] - log.tau[joint, inner]
             assert np.sqrt(np.mean(off**2)) < 0.02 * np.sqrt(np.mean(log.tau[joint] ** 2))
 
@@ -131,7 +152,12 @@ def test_a_torque_that_is_logged_early_is_shown_where_it_was_logged(
     early, _ = moved(K, 3, lead=5)
     survey = Survey([open_source(early, "unloaded")])
     known, wrong = (
-        np.concatenate([b["tau1_predicted"] for b in torque_blocks(survey, Model(), {"unloaded": K}, lambda _, s=s: s)])  # type: ignore[misc]
+        np.concatenate(
+            [
+                b["tau1_predicted"]
+                for b in torque_blocks(survey, Model(), {"unloaded": K}, lambda _, s=s: s)  # type: ignore[misc]
+            ]
+        )
         for s in (5 * DT, 0.0)
     )
     rms = [np.sqrt(np.nanmean((one - early.tau[0]) ** 2)) for one in (known, wrong)]
@@ -139,17 +165,27 @@ def test_a_torque_that_is_logged_early_is_shown_where_it_was_logged(
     assert len(both[0][0]) == len(early) + 5
 
 
-def test_a_stretch_of_a_few_samples_has_no_prediction(both: tuple[tuple[Log, FloatArray], object]) -> None:
+def test_a_stretch_of_a_few_samples_has_no_prediction(
+    both: tuple[tuple[Log, FloatArray], object],
+) -> None:
     (block,) = torque_blocks(
-        Survey([open_source(both[0][0].part(0, 15), "unloaded")]), Model(), {"unloaded": K}, lambda _: 0.0
+        Survey([open_source(both[0][0].part(0, 15), "unloaded")]),
+        Model(),
+        {"unloaded": K},
+        lambda _: 0.0,
     )
     assert np.isnan(block["tau1_predicted"]).all()
     assert np.isnan(block["omega2"]).all()
     assert block["theta1"].tolist() == both[0][0].theta[0, :15].tolist()
 
 
-def test_noise_narrows_what_is_shown_of_the_torque(both: tuple[tuple[Log, FloatArray], object]) -> None:
-    """White noise of σ has σ √(2 dt B/5) (2π B)² of acceleration below B; its inertia torque stays below 5 %."""
+def test_noise_narrows_what_is_shown_of_the_torque(
+    both: tuple[tuple[Log, FloatArray], object],
+) -> None:
+    """White noise of σ has σ √(2 dt B/5) (2π B)² of acceleration below B.
+
+    Its inertia torque stays below 5 %.
+    """
     log = both[0][0]
     sigma = 3e-3
     noise = np.random.default_rng(0).normal(0, sigma, log.theta.shape)
@@ -161,7 +197,9 @@ def test_noise_narrows_what_is_shown_of_the_torque(both: tuple[tuple[Log, FloatA
         band.append((allowed / (inertia * sigma * np.sqrt(0.4 * DT) * (2 * np.pi) ** 2)) ** 0.4)
     assert 4 < min(band) < 25  # neither end of the range
     reach = np.flatnonzero(~np.isnan(block["tau1_predicted"]))[0]
-    assert reach == pytest.approx(2.5 / (min(band) * DT), rel=0.1)  # half a kernel is 2.5 periods; σ is estimated
+    assert reach == pytest.approx(
+        2.5 / (min(band) * DT), rel=0.1
+    )  # half a kernel is 2.5 periods; σ is estimated
 
 
 def test_information_is_added_up_by_second_and_carried_to_the_shared_parameters() -> None:
@@ -191,7 +229,11 @@ def test_coefficients_of_a_loaded_log_hold_the_payload_and_no_delay() -> None:
     shared = replace(delayed.shared, delay=True)
     values = np.insert(delayed.values, 7, 0.003)
     with_delay = replace(
-        delayed, shared=shared, values=values, covariance=np.eye(values.size), status=tuple("OK" for _ in values)
+        delayed,
+        shared=shared,
+        values=values,
+        covariance=np.eye(values.size),
+        status=tuple("OK" for _ in values),
     )
     assert torque_coefficients(with_delay, "loaded").size == 7
     assert torque_shift(Settings(torque_hold="zoh"), with_delay)(0.01) == pytest.approx(0.008)
@@ -203,12 +245,17 @@ def test_a_fits_series_stand_in_its_folder(
 ) -> None:
     survey = Survey([open_source(both[0][0], "unloaded"), open_source(both[1][0], "loaded")])
     fit = fit_of()
-    residual = residual_sums(np.random.default_rng(0).standard_normal((4, 4000)), DT)  # torques beside it
+    residual = residual_sums(
+        np.random.default_rng(0).standard_normal((4, 4000)), DT
+    )  # torques beside it
     write_fit_series(tmp_path, fit, survey, Settings(), residual)
     names = ["information.parquet", "innovations.parquet", "running.parquet", "torque.parquet"]
     assert sorted(path.name for path in tmp_path.iterdir()) == names
     for name in names:
-        assert json.loads(pq.read_schema(tmp_path / name).metadata[START_KEY]) == [7_000_000_000, 90_000_000_000]
+        assert json.loads(pq.read_schema(tmp_path / name).metadata[START_KEY]) == [
+            7_000_000_000,
+            90_000_000_000,
+        ]
     torques = pq.read_table(tmp_path / "torque.parquet")
     assert torques.num_rows == 2 * 2001
     running = pq.read_table(tmp_path / "running.parquet").to_pydict()

@@ -13,8 +13,12 @@ from algid.synth.sensors import Sensors
 
 def test_a_log_too_short_beside_a_good_one_still_gives_a_report(tmp_path: Path) -> None:
     log, _ = algid.synthesise("case1", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
-    short = replace(log, stamp_ns=log.stamp_ns[:30], theta=log.theta[:, :30], tau=log.tau[:, :30], omega=None)
-    result = identify([log, short], settings=Settings(estimator="weak", model="plain"), out=tmp_path, name="both")
+    short = replace(
+        log, stamp_ns=log.stamp_ns[:30], theta=log.theta[:, :30], tau=log.tau[:, :30], omega=None
+    )
+    result = identify(
+        [log, short], settings=Settings(estimator="weak", model="plain"), out=tmp_path, name="both"
+    )
     assert result.parameters["k1"].status == "OK"
     page = (tmp_path / "both.algid/report.html").read_text(encoding="utf-8")
     assert "Not shown: information.parquet is not in this folder" in page

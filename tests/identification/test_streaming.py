@@ -39,9 +39,14 @@ def chopped(log: Log, rows: int) -> LogSource:
 
 @pytest.fixture(scope="module")
 def uneven() -> Log:
-    """Jitter, lost samples and a gap; long enough that the refined estimator leaves pieces out of its training."""
+    """Jitter, lost samples and a gap.
+
+    Long enough that the refined estimator leaves pieces out of its training.
+    """
     sensors = Sensors(position_noise=1e-4, torque_noise=1e-2, jitter=1e-5, drop=1e-3, seed=1)
-    first, _ = algid.synthesise("case1", duration=8.0, rate=500.0, excitation="wide", sensors=sensors)
+    first, _ = algid.synthesise(
+        "case1", duration=8.0, rate=500.0, excitation="wide", sensors=sensors
+    )
     stamps = np.concatenate([first.stamp_ns + 8_500_000_000 * n for n in range(12)])
     return Log(stamps, np.tile(first.theta, 12), np.tile(first.tau, 12), first.origin)
 
@@ -56,7 +61,8 @@ def estimates(log: LogSource, settings: Settings) -> tuple[FloatArray, FloatArra
     chosen = choose_model(survey, settings)
     fit, predictions, chosen = run_fit(survey, settings, chosen, None)
     assert fit.converged
-    # A window or sample lost at a seam moves an estimate by 1e-4 of its deviation or more; rounding, times the
+    # A window or sample lost at a seam moves an estimate by 1e-4 of its deviation or more;
+    # rounding, times the
     # condition of the normal equations, by 1e-9 of it.
     room = np.concatenate([fit.std, fit.std]) * 1e-7
     result = result_of(outcome_of(fit, predictions, survey, settings, chosen), settings, survey)
@@ -74,7 +80,9 @@ def test_blocks_do_not_show_in_the_estimates(name: str, uneven: Log) -> None:
         if result.fit is not None and result.fit.residual is not None:
             assert streamed.fit is not None
             assert streamed.fit.residual is not None
-            np.testing.assert_allclose(streamed.fit.residual.rmse, result.fit.residual.rmse, rtol=1e-10)
+            np.testing.assert_allclose(
+                streamed.fit.residual.rmse, result.fit.residual.rmse, rtol=1e-10
+            )
 
 
 @pytest.mark.parametrize(("room", "readings"), [(1 << 20, 1), (1000, 3)])
@@ -90,7 +98,10 @@ def test_logs_that_fit_in_memory_are_read_once(
     assert len(begun) == readings
     for again in passes[1:]:
         assert [piece.start for piece in again] == [piece.start for piece in passes[0]]
-        assert all(np.array_equal(one.theta, other.theta) for one, other in zip(again, passes[0], strict=True))
+        assert all(
+            np.array_equal(one.theta, other.theta)
+            for one, other in zip(again, passes[0], strict=True)
+        )
 
 
 def test_a_pass_that_ends_early_is_not_taken_for_the_whole_log(uneven: Log) -> None:

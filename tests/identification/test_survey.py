@@ -13,7 +13,14 @@ import pytest
 
 from algid.errors import LogError
 from algid.identification import source
-from algid.identification.source import LogSource, Staged, open_source, open_sources, sha256_of, with_twins_marked
+from algid.identification.source import (
+    LogSource,
+    Staged,
+    open_source,
+    open_sources,
+    sha256_of,
+    with_twins_marked,
+)
 from algid.identification.survey import Survey
 from algid.log import Log, Origin, Truth
 from algid.notices import Notice
@@ -23,7 +30,9 @@ from algid.writers import write_log
 ARM = load_case("case1").arm
 
 
-def moving(name: str = "log.csv", samples: int = 600, payload: float | None = None, **origin: object) -> Log:
+def moving(
+    name: str = "log.csv", samples: int = 600, payload: float | None = None, **origin: object
+) -> Log:
     """An arm that swings at 1 kHz, whose first stamp is not zero."""
     t = np.arange(samples) * 1e-3
     theta = np.stack([np.sin(9 * t) - 1.5, np.cos(7 * t)])
@@ -41,11 +50,21 @@ def in_blocks(log: Log, cuts: list[int], promised: int = 0) -> LogSource:
 @pytest.mark.parametrize(
     ("payload", "role", "said"),
     [
-        (0.2, "unloaded", "expected a log of the unloaded arm, its metadata say a payload of 0.2 kg; swap the logs"),
-        (0.0, "loaded", "expected a log of the loaded arm, its metadata say no payload; swap the logs"),
+        (
+            0.2,
+            "unloaded",
+            "expected a log of the unloaded arm, its metadata say a payload of 0.2 kg; swap the logs",
+        ),
+        (
+            0.0,
+            "loaded",
+            "expected a log of the loaded arm, its metadata say no payload; swap the logs",
+        ),
     ],
 )
-def test_a_log_of_the_other_role_is_refused_and_one_of_its_own_is_not(payload: float, role: str, said: str) -> None:
+def test_a_log_of_the_other_role_is_refused_and_one_of_its_own_is_not(
+    payload: float, role: str, said: str
+) -> None:
     log = moving(payload=payload)
     with pytest.raises(LogError, match=f"^log.csv: {said}$"):
         open_source(log, role)  # type: ignore[arg-type]
@@ -59,7 +78,8 @@ def test_a_log_whose_payload_changes_is_only_for_tracking() -> None:
     log = replace(moving(), origin=replace(moving().origin, truth=truth))
     for role in ("unloaded", "loaded"):
         with pytest.raises(
-            LogError, match=r"^log\.csv: its metadata say that the payload changes; weigh it with algid"
+            LogError,
+            match=r"^log\.csv: its metadata say that the payload changes; weigh it with algid",
         ):
             open_source(log, role)
     assert open_source(log, "loaded", changing=True).role == "loaded"
@@ -69,7 +89,12 @@ def test_a_summary_holds_what_the_whole_log_showed() -> None:
     log = in_blocks(moving(samples=601), [100, 100, 350])
     survey = Survey([log])
     summary = survey.summary(log)
-    assert (summary.path, summary.role, summary.format, summary.rows) == ("log.csv", "unloaded", "csv", 601)
+    assert (summary.path, summary.role, summary.format, summary.rows) == (
+        "log.csv",
+        "unloaded",
+        "csv",
+        601,
+    )
     assert summary.start_ns == 5_000_000_000
     assert summary.duration == pytest.approx(0.6, rel=1e-12)
     assert summary.rate == pytest.approx(1000, rel=1e-12)
@@ -119,7 +144,9 @@ def test_twins_count_once_and_others_of_their_length_stay() -> None:
     ]
     assert kept[1].notices == ()
     assert open_sources(None, "loaded", None, 9.81) == []
-    assert [source.name for source in open_sources(iter([one]), "unloaded", None, 1.6)] == ["one.csv"]
+    assert [source.name for source in open_sources(iter([one]), "unloaded", None, 1.6)] == [
+        "one.csv"
+    ]
     assert open_sources(one, "unloaded", None, 1.6)[0].gravity == 1.6
 
 
@@ -127,7 +154,9 @@ def test_logs_of_lengths_of_their_own_are_not_hashed_before_the_first_pass() -> 
     def never() -> str:
         raise AssertionError("hashed")
 
-    one, two = (replace(open_source(moving(samples=n), "unloaded"), digest=never) for n in (300, 301))
+    one, two = (
+        replace(open_source(moving(samples=n), "unloaded"), digest=never) for n in (300, 301)
+    )
     assert with_twins_marked([one], [two]) == [one, two]
     with pytest.raises(AssertionError, match="hashed"):
         with_twins_marked([one], [replace(two, promised=300)])
@@ -149,7 +178,10 @@ def test_files_of_lengths_of_their_own_are_opened_without_hashing(
 
 def test_a_loaded_twin_of_an_unloaded_log_tells_so_and_stays() -> None:
     bare = open_source(moving("bare.csv"), "unloaded")
-    loaded = [open_source(moving("twin.csv"), "loaded"), open_source(moving("own.csv", samples=601), "loaded")]
+    loaded = [
+        open_source(moving("twin.csv"), "loaded"),
+        open_source(moving("own.csv", samples=601), "loaded"),
+    ]
     found = with_twins_marked([bare], loaded)
     assert [source.name for source in found] == ["bare.csv", "twin.csv", "own.csv"]
     assert [len(source.notices) for source in found] == [0, 1, 0]
@@ -157,7 +189,9 @@ def test_a_loaded_twin_of_an_unloaded_log_tells_so_and_stays() -> None:
 
 
 @pytest.mark.parametrize(("cuts", "alone"), [([], True), ([599], False), ([300], False)])
-def test_the_named_checks_refuse_a_log_only_where_they_see_all_of_it(cuts: list[int], alone: bool) -> None:
+def test_the_named_checks_refuse_a_log_only_where_they_see_all_of_it(
+    cuts: list[int], alone: bool
+) -> None:
     dead = replace(moving(), tau=np.zeros((2, 600)))
     survey = Survey([in_blocks(dead, cuts)])
     if alone:
@@ -169,7 +203,9 @@ def test_the_named_checks_refuse_a_log_only_where_they_see_all_of_it(cuts: list[
 
 
 @pytest.mark.parametrize("promised", [0, 600, 601])
-def test_a_first_block_need_not_wait_where_the_file_promises_more_than_twice_of_it(promised: int) -> None:
+def test_a_first_block_need_not_wait_where_the_file_promises_more_than_twice_of_it(
+    promised: int,
+) -> None:
     """Of 600 promised samples one block of 300 may be all; of 601 it is not."""
     log, begun = moving(), list[int]()
 
@@ -185,7 +221,9 @@ def test_a_first_block_need_not_wait_where_the_file_promises_more_than_twice_of_
     assert begun == ([0] if promised == 601 else [0, 300])
 
 
-def test_notices_of_the_log_its_blocks_and_the_checks_come_once_however_often_it_is_gone_over() -> None:
+def test_notices_of_the_log_its_blocks_and_the_checks_come_once_however_often_it_is_gone_over() -> (
+    None
+):
     log, told = moving(), Notice("CUT", "CUT: some", lossy=True)
     source = in_blocks(replace(log, notices=(told,)), [300])
     source = replace(source, notices=(Notice("SAME_LOG", "SAME_LOG: twin"),))
@@ -200,7 +238,10 @@ def test_notices_of_the_log_its_blocks_and_the_checks_come_once_however_often_it
 
 def test_progress_goes_from_nothing_to_all_samples_and_names_the_stage() -> None:
     told: list[tuple[str, int, int]] = []
-    one, other = in_blocks(moving(samples=600), [200], 600), in_blocks(moving("b.csv", samples=300), [], 300)
+    one, other = (
+        in_blocks(moving(samples=600), [200], 600),
+        in_blocks(moving("b.csv", samples=300), [], 300),
+    )
     survey = Survey([one, other], lambda *what: told.append(what))
     survey.begin("choosing terms")
     for log in survey.logs:

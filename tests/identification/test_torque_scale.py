@@ -59,7 +59,9 @@ def test_a_known_payload_tells_the_gain_of_the_torques() -> None:
 
 
 def test_without_a_payload_there_is_no_gain_to_tell() -> None:
-    bare = identify(currents(loaded=False), settings=Settings(model="plain", payload_mass=0.5), report=False)
+    bare = identify(
+        currents(loaded=False), settings=Settings(model="plain", payload_mass=0.5), report=False
+    )
     assert bare.fit is not None
     assert bare.fit.torque_gain is None
     with pytest.raises(SettingError, match="--payload-mass: expected a number from"):

@@ -42,11 +42,18 @@ def logged(motion: SimulatedMotion, seed: int, *, lead: int = 0) -> Log:
     noise = SIGMA * np.random.default_rng(seed).standard_normal(motion.tau.shape)
     rows = motion.t.size - lead
     stamps = np.rint(motion.t[:rows] * 1e9).astype(np.int64)
-    return Log(stamps, motion.theta[:, :rows], (motion.tau + noise)[:, lead:], Origin(f"log{seed}", "csv", {}))
+    return Log(
+        stamps,
+        motion.theta[:, :rows],
+        (motion.tau + noise)[:, lead:],
+        Origin(f"log{seed}", "csv", {}),
+    )
 
 
 def low(x: FloatArray) -> FloatArray:
-    return np.asarray(sosfiltfilt(butter(3, 5.0, fs=1 / DT, output="sos"), x, axis=-1)[..., EDGE:-EDGE])
+    return np.asarray(
+        sosfiltfilt(butter(3, 5.0, fs=1 / DT, output="sos"), x, axis=-1)[..., EDGE:-EDGE]
+    )
 
 
 def columns(motion: SimulatedMotion, k: FloatArray = K) -> FloatArray:
@@ -81,8 +88,12 @@ def test_a_hold_out_score_is_that_of_scipys_filters_on_the_true_motion(
     rms = np.sqrt(np.mean(residual**2, axis=1))
     # the score's own filter differs at the ends, and it differentiates angles that pass 20 Hz
     np.testing.assert_allclose(found.rmse, rms, rtol=0.05, atol=0.1 * SIGMA)
-    np.testing.assert_allclose(found.nrmse, rms / np.sqrt(np.mean(tau**2, axis=1)), rtol=0.1, atol=2e-3)
-    np.testing.assert_allclose(found.r2, 1 - rms**2 / np.var(tau, axis=1), atol=2e-3 if not wrong else 0.02)
+    np.testing.assert_allclose(
+        found.nrmse, rms / np.sqrt(np.mean(tau**2, axis=1)), rtol=0.1, atol=2e-3
+    )
+    np.testing.assert_allclose(
+        found.r2, 1 - rms**2 / np.var(tau, axis=1), atol=2e-3 if not wrong else 0.02
+    )
 
 
 def test_all_logs_together_weigh_by_their_samples(motions: list[SimulatedMotion]) -> None:
@@ -97,7 +108,9 @@ def test_all_logs_together_weigh_by_their_samples(motions: list[SimulatedMotion]
     np.testing.assert_allclose(both.total.rmse, np.sqrt(counts @ squares / counts.sum()), rtol=1e-2)
 
 
-def test_a_log_too_short_to_judge_is_none_and_does_not_count(motions: list[SimulatedMotion]) -> None:
+def test_a_log_too_short_to_judge_is_none_and_does_not_count(
+    motions: list[SimulatedMotion],
+) -> None:
     one, other = logged(motions[0], 1), logged(motions[1], 2).part(0, 100)
     both = validate(known(K), survey((one, "unloaded"), (other, "unloaded")))
     assert both.logs["log2"] is None
@@ -107,7 +120,9 @@ def test_a_log_too_short_to_judge_is_none_and_does_not_count(motions: list[Simul
 
 def test_a_torque_that_acts_late_is_predicted_where_it_acts(motions: list[SimulatedMotion]) -> None:
     early = logged(motions[0], 1, lead=6)
-    right, wrong = (validate(known(K, shift), survey((early, "unloaded"))).total for shift in (6 * DT, 0.0))
+    right, wrong = (
+        validate(known(K, shift), survey((early, "unloaded"))).total for shift in (6 * DT, 0.0)
+    )
     assert right is not None
     assert wrong is not None
     exact = validate(known(K), survey((logged(motions[0], 1), "unloaded"))).total
@@ -116,7 +131,9 @@ def test_a_torque_that_acts_late_is_predicted_where_it_acts(motions: list[Simula
     assert wrong.rmse[0] > 5 * right.rmse[0]
 
 
-def test_cross_validation_is_the_prediction_of_each_log_by_a_fit_of_the_others(motions: list[SimulatedMotion]) -> None:
+def test_cross_validation_is_the_prediction_of_each_log_by_a_fit_of_the_others(
+    motions: list[SimulatedMotion],
+) -> None:
     """By hand: least squares on the true motion of two logs, scored on the third, for each in turn."""
     logs = [logged(motion, seed) for seed, motion in enumerate(motions)]
     settings = Settings(estimator="weak", model="plain", cross_validate=True)
@@ -143,8 +160,12 @@ def weighed(motions: list[SimulatedMotion]) -> Result:
     return identify(logged(motions[0], 1), logged(moved(4, loaded=True), 2), settings, report=False)
 
 
-def test_a_result_predicts_logs_of_both_roles(weighed: Result, motions: list[SimulatedMotion]) -> None:
-    fresh = survey((logged(motions[1], 11), "unloaded"), (logged(moved(8, loaded=True), 12), "loaded"))
+def test_a_result_predicts_logs_of_both_roles(
+    weighed: Result, motions: list[SimulatedMotion]
+) -> None:
+    fresh = survey(
+        (logged(motions[1], 11), "unloaded"), (logged(moved(8, loaded=True), 12), "loaded")
+    )
     found = validate(predictor_of(weighed, "r"), fresh)
     for name in ("log11", "log12"):
         one = found.logs[name]
@@ -157,13 +178,17 @@ def test_a_result_predicts_logs_of_both_roles(weighed: Result, motions: list[Sim
     assert bad.rmse[0] > 3 * SIGMA
 
 
-def test_a_prediction_without_a_constant_is_refused_by_the_results_own_file(weighed: Result) -> None:
+def test_a_prediction_without_a_constant_is_refused_by_the_results_own_file(
+    weighed: Result,
+) -> None:
     bare = weighed.model_copy(update={"payload": {}})
     judge = predictor_of(bare, "arm.algid/result.json")
     log = logged(moved(3), 12).part(0, 400)
     validate(judge, survey((log, "unloaded")))
     for work in (validate, simulate):
-        with pytest.raises(ResultError, match=r"^arm\.algid/result\.json: the result has no m_p; identify"):
+        with pytest.raises(
+            ResultError, match=r"^arm\.algid/result\.json: the result has no m_p; identify"
+        ):
             work(judge, survey((log, "loaded")))
 
 
@@ -172,6 +197,8 @@ def test_simulations_by_the_true_constants_stay_on_the_log(motions: list[Simulat
     right = simulate(known(K), survey((exact, "unloaded")))
     wrong = simulate(known(1.2 * K), survey((exact, "unloaded")))
     assert list(right.logs) == ["log1"]
-    assert np.all(right.total.rmse[:2] < 2e-3)  # of joints that turn by radians; integration and differences
+    assert np.all(
+        right.total.rmse[:2] < 2e-3
+    )  # of joints that turn by radians; integration and differences
     assert np.all(wrong.total.rmse[:2] > 30 * right.total.rmse[:2])
     assert np.isnan(right.total.rmse[2]).all()  # no start is so long before the log's end

@@ -65,7 +65,9 @@ def test_the_differentiator_does_not_see_blocks_and_starts_anew_behind_a_gap(row
 
 
 @pytest.mark.parametrize("length", [4, 30, REACH, REACH + 1, REACH + 2, 2 * REACH + 1])
-def test_a_stretch_shorter_than_the_kernel_has_numpys_gradient_and_a_longer_one_the_kernels(length: int) -> None:
+def test_a_stretch_shorter_than_the_kernel_has_numpys_gradient_and_a_longer_one_the_kernels(
+    length: int,
+) -> None:
     log = log_at(np.concatenate([np.arange(500.0), 600 + np.arange(float(length))]))
     _, second = observed(log, 10_000)
     theta = log.theta[:, 500:]
@@ -89,13 +91,17 @@ def test_poles_that_are_set_are_the_observers() -> None:
     poles = (-20.0, -30.0, -40.0, -25.0, -35.0, -45.0)
     (found,) = observed(log_at(np.arange(300.0)), 300, luenberger=True, poles=poles)
     assert found.omega is not None
-    np.testing.assert_allclose(found.omega, LuenbergerObserver(DT, poles).velocities(found.theta), atol=1e-9)
+    np.testing.assert_allclose(
+        found.omega, LuenbergerObserver(DT, poles).velocities(found.theta), atol=1e-9
+    )
 
 
 def test_measured_velocities_are_the_logs_whatever_the_observer() -> None:
     omega = np.random.default_rng(1).normal(size=(2, 300))
     for luenberger in (False, True):
-        (found,) = observed(log_at(np.arange(300.0), omega), 300, luenberger=luenberger, velocity="measured")
+        (found,) = observed(
+            log_at(np.arange(300.0), omega), 300, luenberger=luenberger, velocity="measured"
+        )
         assert found.omega is not None
         np.testing.assert_array_equal(found.omega, omega)
 

@@ -32,7 +32,11 @@ def logged(
 ) -> Log:
     """A log at 1 kHz: by default slow sines, and torques of which no two samples are alike."""
     angles = np.stack([np.sin(T), np.cos(T)]) if theta is None else theta
-    stamp_ns = np.arange(angles.shape[1]) * 10**6 if stamps is None else np.rint(stamps * 1e9).astype(np.int64)
+    stamp_ns = (
+        np.arange(angles.shape[1]) * 10**6
+        if stamps is None
+        else np.rint(stamps * 1e9).astype(np.int64)
+    )
     t = stamp_ns * 1e-9
     torques = np.stack([np.sin(3 * t) + t, np.cos(2 * t) + t]) if tau is None else tau
     origin = Origin("arm.csv", "csv", mapping or {}, reading=reading or Reading())
@@ -47,7 +51,9 @@ def only(found: Sequence[Notice]) -> Notice:
 def test_each_torque_that_is_none_is_told_with_its_source_and_what_names_another() -> None:
     tau = logged().tau
     other = '--set tau2.source=NAME (profile: source = "NAME" of [tau2])'
-    zero = only([*channels.efforts(logged(tau=np.stack([tau[0], 0 * tau[1]]), mapping={"tau2": "effort"}))])
+    zero = only(
+        [*channels.efforts(logged(tau=np.stack([tau[0], 0 * tau[1]]), mapping={"tau2": "effort"}))]
+    )
     assert (zero.code, zero.refuse) == ("EFFORT_ZERO", True)
     assert zero.clause == (
         f"tau2 (effort) is zero in every sample: name the measured torque: {other}; for a joint without a motor: "
@@ -90,10 +96,14 @@ def test_a_hundredth_of_the_samples_at_the_limit_is_told(clipped: int, told: str
         (500, 99, None),  # a tenth of a second is the least
     ],
 )
-def test_a_torque_that_drops_out_is_told_with_when_and_how_long(first: int, length: int, told: str | None) -> None:
+def test_a_torque_that_drops_out_is_told_with_when_and_how_long(
+    first: int, length: int, told: str | None
+) -> None:
     tau = np.stack([np.sin(3 * T) + T, np.sin(40 * T)])
     tau[1, first : first + length] = 0.25
-    assert [one.text for one in channels.dead_efforts(logged(tau=tau))] == ([] if told is None else [told])
+    assert [one.text for one in channels.dead_efforts(logged(tau=tau))] == (
+        [] if told is None else [told]
+    )
 
 
 @pytest.mark.parametrize(("repeated", "dead"), [(1, True), (20, True), (21, False), (50, False)])
@@ -101,7 +111,9 @@ def test_a_slow_publisher_is_told_from_a_torque_that_drops_out(repeated: int, de
     """A run of 400 samples is 20 usual ones where each value stands 20 times."""
     held = np.repeat(np.sin(0.05 * np.arange(ROWS)), repeated)[:ROWS]
     start = 20 * repeated if repeated < 50 else 1000
-    tau = np.stack([np.sin(3 * T) + T, np.concatenate([held[:start], np.full(400, 0.123), held[start:-400]])])
+    tau = np.stack(
+        [np.sin(3 * T) + T, np.concatenate([held[:start], np.full(400, 0.123), held[start:-400]])]
+    )
     assert bool([*channels.dead_efforts(logged(tau=tau))]) == dead
 
 
@@ -109,7 +121,9 @@ def test_a_torque_at_rest_at_its_largest_or_smallest_is_at_a_limit() -> None:
     tau = np.stack([np.sin(40 * T), np.sin(40 * T)])
     tau[0, 500:900], tau[1, 500:900] = 1.5, -1.5
     assert [*channels.dead_efforts(logged(tau=tau))] == []
-    few = np.repeat(np.arange(19.0) % 7, 110)[:ROWS]  # with fewer than twenty changes nothing is usual
+    few = np.repeat(np.arange(19.0) % 7, 110)[
+        :ROWS
+    ]  # with fewer than twenty changes nothing is usual
     assert [*channels.dead_efforts(logged(tau=np.stack([few, few])))] == []
 
 
@@ -120,12 +134,15 @@ def test_wraps_are_counted(turns: int) -> None:
     times = "1 time" if turns == 1 else "3 times"
     assert found.refuse
     assert (
-        found.clause == f"theta2 jumps by a turn {times}: --set theta2.unwrap=true (profile: unwrap = true of [theta2])"
+        found.clause
+        == f"theta2 jumps by a turn {times}: --set theta2.unwrap=true (profile: unwrap = true of [theta2])"
     )
     assert [*channels.angles(logged(np.stack([np.sin(T), angle])))] == []
 
 
-@pytest.mark.parametrize(("jump", "wraps"), [(0.89, False), (0.92, True), (1.08, True), (1.11, False)])
+@pytest.mark.parametrize(
+    ("jump", "wraps"), [(0.89, False), (0.92, True), (1.08, True), (1.11, False)]
+)
 def test_a_jump_is_a_wrap_where_it_is_a_turn_within_a_tenth(jump: float, wraps: bool) -> None:
     theta = np.stack([np.sin(T), 0.1 * T])
     theta[1, 700:] += jump * 2 * math.pi
@@ -139,12 +156,19 @@ def test_an_arm_that_makes_half_a_radian_a_sample_may_make_a_turn() -> None:
     assert [*channels.angles(logged(np.stack([np.sin(T), theta])))] == []
     steps[steps == 0.51] = 0.49
     theta = np.concatenate([[0.0], np.cumsum(steps)])
-    assert [one.code for one in channels.angles(logged(np.stack([np.sin(T), theta])))] == ["WRAPPED_ANGLE"]
+    assert [one.code for one in channels.angles(logged(np.stack([np.sin(T), theta])))] == [
+        "WRAPPED_ANGLE"
+    ]
 
 
 @pytest.mark.parametrize(("length", "told"), [(21, True), (20, False)])
-def test_a_sensor_that_freezes_and_jumps_is_told_with_when_and_how_long(length: int, told: bool) -> None:
-    """A step of a sample is 1e-3 rad; behind 21 samples or more without one comes all that was left out."""
+def test_a_sensor_that_freezes_and_jumps_is_told_with_when_and_how_long(
+    length: int, told: bool
+) -> None:
+    """A step of a sample is 1e-3 rad.
+
+    Behind 21 samples or more without one comes all that was left out.
+    """
     theta = np.stack([np.sin(T), T.copy()])
     theta[1, 600 : 600 + length] = theta[1, 600]
     found = [*channels.angles(logged(theta))]
@@ -153,7 +177,9 @@ def test_a_sensor_that_freezes_and_jumps_is_told_with_when_and_how_long(length: 
         assert not only(found).refuse
     else:
         assert found == []
-    rested = np.stack([np.sin(T), np.concatenate([T[:600], np.full(300, T[599]), T[600 : ROWS - 300]])])
+    rested = np.stack(
+        [np.sin(T), np.concatenate([T[:600], np.full(300, T[599]), T[600 : ROWS - 300]])]
+    )
     assert [*channels.angles(logged(rested))] == []  # it stood still, and went on as before
 
 
@@ -200,7 +226,10 @@ def test_what_is_in_degrees_is_told_with_the_flags_of_its_channel() -> None:
         {"theta1.unit": "rad"},
     ]
     velocity = only([*channels.degrees(turning((math.pi / 180, 1.0)), never)])
-    assert [one.settings for one in velocity.remedies] == [{"omega1.unit": "deg"}, {"omega1.unit": "rad"}]
+    assert [one.settings for one in velocity.remedies] == [
+        {"omega1.unit": "deg"},
+        {"omega1.unit": "rad"},
+    ]
     assert angle.refuse
     assert velocity.refuse
 
@@ -210,26 +239,37 @@ def test_a_unit_that_the_user_said_is_believed() -> None:
     said = Reading(channels={"theta1": ChannelReading("q1", "rad", "flag")})
     found = only([*channels.degrees(replace(log, origin=replace(log.origin, reading=said)), never)])
     assert not found.refuse
-    assert found.text == "angles of joint 1 are in degrees by the other signal; they are taken for rad as told"
+    assert (
+        found.text
+        == "angles of joint 1 are in degrees by the other signal; they are taken for rad as told"
+    )
 
 
-@pytest.mark.parametrize(("turns", "right", "told"), [(5.9, False, False), (6.1, False, True), (6.1, True, False)])
+@pytest.mark.parametrize(
+    ("turns", "right", "told"), [(5.9, False, False), (6.1, False, True), (6.1, True, False)]
+)
 def test_without_velocities_angles_may_turn_six_times_or_as_physics_allows(
     turns: float, right: bool, told: bool
 ) -> None:
     theta = np.stack([np.sin(T), -turns * 2 * math.pi * T / T[-1]])
     found = [*channels.degrees(logged(theta), lambda: right)]
     assert [one.text.partition(":")[0] for one in found] == (["angles reach 38.33"] if told else [])
-    still = replace(logged(theta), omega=np.zeros((2, ROWS)))  # velocities that say nothing are none
+    still = replace(
+        logged(theta), omega=np.zeros((2, ROWS))
+    )  # velocities that say nothing are none
     assert bool([*channels.degrees(still, lambda: right)]) == told
 
 
 @pytest.mark.parametrize("name", ["theta1", "theta2", "tau1", "tau2"])
 def test_spikes_are_counted_in_every_channel(name: str) -> None:
     draw = np.random.default_rng(1)
-    values = {one: np.sin(T) + draw.normal(0, 1e-3, ROWS) for one in ("theta1", "theta2", "tau1", "tau2")}
+    values = {
+        one: np.sin(T) + draw.normal(0, 1e-3, ROWS) for one in ("theta1", "theta2", "tau1", "tau2")
+    }
     values[name][[250, 900, 1300]] += 1.0
-    log = logged(np.stack([values["theta1"], values["theta2"]]), np.stack([values["tau1"], values["tau2"]]))
+    log = logged(
+        np.stack([values["theta1"], values["theta2"]]), np.stack([values["tau1"], values["tau2"]])
+    )
     assert only([*channels.spikes(log)]).text == f"{name} has 3 spikes, the first at t = 0.25 s"
 
 
@@ -249,11 +289,16 @@ def test_samples_in_a_period_are_those_of_the_faster_joint(period: float) -> Non
     count = np.arange(20_000)
     fast, slow = (np.sin(2 * math.pi * count / one) for one in (period, math.sqrt(40_001)))
     for pair in ((fast, slow), (slow, fast)):
-        # the phases are spread evenly: medians of first and second differences stand for the same phase
+        # the phases are spread evenly: medians of first and second differences stand for the same
+        # phase
         assert samples_a_period(logged(np.stack(pair))) == pytest.approx(period, rel=1e-3)
-    assert samples_a_period(logged(np.stack([0.01 * fast, slow]))) == pytest.approx(200, rel=0.01)  # of 100 periods
+    assert samples_a_period(logged(np.stack([0.01 * fast, slow]))) == pytest.approx(
+        200, rel=0.01
+    )  # of 100 periods
     assert samples_a_period(logged(np.stack([0.01 * fast, 0.5 * slow]))) == math.inf
-    assert samples_a_period(logged(np.stack([count / 16, count / 16]))) == math.inf  # no bend, no period
+    assert (
+        samples_a_period(logged(np.stack([count / 16, count / 16]))) == math.inf
+    )  # no bend, no period
 
 
 @pytest.mark.parametrize(("lost", "told"), [(11, 11), (40, 40), (10, 0)])
@@ -263,7 +308,9 @@ def test_steps_twice_as_long_are_counted(lost: int, told: int) -> None:
     steps[20 + 40 * np.arange(lost)] = 2.0
     place = 1e-3 * np.concatenate([[0.0], np.cumsum(steps)])
     assert lost_steps(logged(np.stack([place, -2 * place]))) == told
-    steps[40 + 40 * np.arange(math.ceil(lost / 5))] = 0.0  # a halt for five of them: all may be noise's
+    steps[40 + 40 * np.arange(math.ceil(lost / 5))] = (
+        0.0  # a halt for five of them: all may be noise's
+    )
     place = 1e-3 * np.concatenate([[0.0], np.cumsum(steps)])
     assert lost_steps(logged(np.stack([place, -2 * place]))) == 0
 
@@ -283,7 +330,9 @@ def test_gaps_are_counted_and_measured() -> None:
     stamps = T.copy()
     stamps[500:] += 0.25
     stamps[1200:] += 1.5
-    assert codes(logged(stamps=stamps)) == {"GAPS": "2 gaps, the longest 1.501 s; no window spans one"}
+    assert codes(logged(stamps=stamps)) == {
+        "GAPS": "2 gaps, the longest 1.501 s; no window spans one"
+    }
     stamps = T.copy()
     stamps[500:] += 1.4e-3  # a step of 2.4 periods is none
     assert "GAPS" not in codes(logged(stamps=stamps))
@@ -303,13 +352,18 @@ def test_stamps_on_top_of_one_another_are_counted() -> None:
     stamps = np.sort(np.concatenate([T, T[[100, 700, 701]] + 1e-5]))
     theta = np.stack([np.sin(stamps), np.cos(stamps)])
     told = codes(logged(theta, stamps=stamps))["NEAR_STAMPS"]
-    assert told.startswith("3 samples follow the one before by less than 0.3 of a period of 1 ms, as receipt times do")
+    assert told.startswith(
+        "3 samples follow the one before by less than 0.3 of a period of 1 ms, as receipt times do"
+    )
 
 
 def test_a_log_of_a_second_is_long_enough() -> None:
     assert "SHORT_LOG" not in codes(logged(np.stack([np.sin(T[:1001])] * 2)))
     told = codes(logged(np.stack([np.sin(T[:1000])] * 2)))["SHORT_LOG"]
-    assert told == "the log lasts 0.999 s; an estimate needs a second of motion at least, ten are better"
+    assert (
+        told
+        == "the log lasts 0.999 s; an estimate needs a second of motion at least, ten are better"
+    )
 
 
 def held(before: float, after: float, creep: float = 0.0) -> Log:
@@ -328,10 +382,14 @@ def held(before: float, after: float, creep: float = 0.0) -> Log:
         (0.499, 0.499, ("--start 0.501", "--end 2.997")),
     ],
 )
-def test_rest_lasts_until_a_thousandth_of_the_way(before: float, after: float, flags: tuple[str, ...]) -> None:
+def test_rest_lasts_until_a_thousandth_of_the_way(
+    before: float, after: float, flags: tuple[str, ...]
+) -> None:
     """Two samples of 1e-3 rad are within 2.5e-3 rad."""
     found = [*rests(held(before, after), True)]
-    assert [" ".join(one.remedies[0].flags) for one in found] == ([" ".join(flags)] if flags else [])
+    assert [" ".join(one.remedies[0].flags) for one in found] == (
+        [" ".join(flags)] if flags else []
+    )
     for one in found:
         assert f"leave the rest out: {' '.join(flags)} (profile: " in one.clause
         assert one.note
@@ -347,28 +405,41 @@ def test_a_joint_that_creeps_does_not_rest_and_one_that_never_moves_has_no_end_o
 def test_fewer_than_four_samples_are_not_looked_at() -> None:
     three = np.zeros((2, 3))
     assert examine(logged(three, three)) == ()
-    assert "EFFORT_ZERO" in [one.code for one in examine(logged(np.zeros((2, 4)), np.zeros((2, 4))))]
+    assert "EFFORT_ZERO" in [
+        one.code for one in examine(logged(np.zeros((2, 4)), np.zeros((2, 4))))
+    ]
 
 
 def test_of_the_beginning_of_a_log_nothing_is_refused_and_the_place_is_told() -> None:
     log = logged(tau=np.zeros((2, ROWS)))
-    with pytest.raises(LogError, match=r"^arm\.csv: EFFORT_ZERO: tau1 is zero .*--accept EFFORT_ZERO \(profile: "):
+    with pytest.raises(
+        LogError, match=r"^arm\.csv: EFFORT_ZERO: tau1 is zero .*--accept EFFORT_ZERO \(profile: "
+    ):
         noticed(log)
     told = noticed(log, whole=False)
     assert [one.code for one in told] == ["EFFORT_ZERO", "EFFORT_ZERO"]
-    assert all(one.code == "EFFORT_ZERO" and one.text.endswith(" (in its first 2 s)") for one in told)
+    assert all(
+        one.code == "EFFORT_ZERO" and one.text.endswith(" (in its first 2 s)") for one in told
+    )
 
 
-def test_a_log_that_is_refused_is_not_asked_for_its_physics(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_log_that_is_refused_is_not_asked_for_its_physics(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def asked(*_: object, **__: object) -> None:
         raise AssertionError("conventions are sought in a log without torques")
 
     for name in ("judged", "dynamic_figures"):
         monkeypatch.setattr(f"algid.inspection.checks.{name}", asked)
-    assert [one.code for one in examine(logged(tau=np.zeros((2, ROWS))))] == ["EFFORT_ZERO", "EFFORT_ZERO"]
+    assert [one.code for one in examine(logged(tau=np.zeros((2, ROWS))))] == [
+        "EFFORT_ZERO",
+        "EFFORT_ZERO",
+    ]
 
 
-def test_an_arm_in_a_horizontal_plane_is_not_asked_for_gravity(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_arm_in_a_horizontal_plane_is_not_asked_for_gravity(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     asked: list[Log] = []
     monkeypatch.setattr("algid.inspection.checks.judged", lambda *_, **__: None)
     monkeypatch.setattr("algid.inspection.checks.dynamic_figures", asked.append)

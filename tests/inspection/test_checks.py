@@ -154,7 +154,9 @@ def test_encoder_step_and_noise_floor() -> None:
 def test_a_recorded_run_tells_its_zero(shared_data: Path) -> None:
     run = sorted((shared_data / "dfki" / "C1_sysid").glob("*.csv"))[0]
     assert {"WRONG_ZERO", "WRONG_CONVENTION"} & set(codes(read_log(run)))
-    assert not {"WRONG_ZERO", "WRONG_CONVENTION"} & set(codes(read_log(run, Profile(zero="hanging"))))
+    assert not {"WRONG_ZERO", "WRONG_CONVENTION"} & set(
+        codes(read_log(run, Profile(zero="hanging")))
+    )
 
 
 @pytest.mark.slow
@@ -176,16 +178,24 @@ def sine(rate: float, duration: float, frequency: float = 2.0) -> Log:
     """Both joints swing by one radian; torques follow in closed form."""
     t = np.arange(round(rate * duration)) / rate
     theta = np.stack([np.sin(2 * np.pi * frequency * t), np.cos(2 * np.pi * frequency * t)])
-    return Log(np.rint(t * 1e9).astype(np.int64), theta, 3 * theta[::-1].copy(), Origin("arm.csv", "csv", {}))
+    return Log(
+        np.rint(t * 1e9).astype(np.int64),
+        theta,
+        3 * theta[::-1].copy(),
+        Origin("arm.csv", "csv", {}),
+    )
 
 
 @pytest.mark.usefixtures("signals_alone")
-@pytest.mark.parametrize(("rate", "slow"), [(12.3, True), (17.3, True), (25.1, False), (1000, False)])
+@pytest.mark.parametrize(
+    ("rate", "slow"), [(12.3, True), (17.3, True), (25.1, False), (1000, False)]
+)
 def test_sampling_too_slow_for_the_motion_is_told(rate: float, slow: bool) -> None:
     found = {finding.code: finding.text for finding in examine(sine(rate, 20), gravity=0)}
     assert ("SLOW_SAMPLING" in found) == slow
     if slow:
-        # a rate that does not beat with the motion; medians of some hundred samples are good to a few percent
+        # a rate that does not beat with the motion; medians of some hundred samples are good to a
+        # few percent
         assert float(found["SLOW_SAMPLING"].split()[0]) == pytest.approx(rate / 2, rel=0.1)
 
 
@@ -204,7 +214,12 @@ def moving(rate: float = 1000.0, sigma: float = 3e-4) -> Log:
     motion = simulate(arm.constants(), wide_multi_sine(arm, 3), t)
     noise = np.random.default_rng(0).standard_normal((2, *motion.theta.shape))
     stamps = np.round(t * 1e9).astype(np.int64)
-    return Log(stamps, motion.theta + sigma * noise[0], motion.tau + 1e-2 * noise[1], Origin("a.csv", "csv", {}))
+    return Log(
+        stamps,
+        motion.theta + sigma * noise[0],
+        motion.tau + 1e-2 * noise[1],
+        Origin("a.csv", "csv", {}),
+    )
 
 
 def found_codes(log: Log) -> set[str]:
@@ -238,7 +253,9 @@ def test_lost_samples_with_new_numbers_are_told(rate: float, sigma: float) -> No
     assert "LOST_SAMPLES" not in found_codes(log)
     kept = np.random.default_rng(1).random(len(log)) > 0.05
     some = int(kept.sum())
-    lost = replace(log, stamp_ns=log.stamp_ns[:some], theta=log.theta[:, kept], tau=log.tau[:, kept])
+    lost = replace(
+        log, stamp_ns=log.stamp_ns[:some], theta=log.theta[:, kept], tau=log.tau[:, kept]
+    )
     assert "LOST_SAMPLES" in found_codes(lost)
     told = replace(lost, stamp_ns=log.stamp_ns[kept])  # with their own stamps nothing is wrong
     assert "LOST_SAMPLES" not in found_codes(told)
@@ -248,14 +265,21 @@ def test_lost_samples_with_new_numbers_are_told(rate: float, sigma: float) -> No
 def test_encoders_and_rest_make_no_lost_samples() -> None:
     log = moving()
     step = 2 * np.pi / 4096
-    rest = replace(log, theta=log.theta[:, :1] + 3e-4 * np.random.default_rng(0).standard_normal(log.theta.shape))
+    rest = replace(
+        log,
+        theta=log.theta[:, :1] + 3e-4 * np.random.default_rng(0).standard_normal(log.theta.shape),
+    )
     for one in (replace(log, theta=np.round(log.theta / step) * step), rest):
         assert "LOST_SAMPLES" not in found_codes(one)
 
 
 def test_angles_of_motors_may_be_what_looks_like_degrees() -> None:
     log = moving()
-    (told,) = [finding for finding in examine(replace(log, theta=30 * log.theta)) if finding.code == "DEGREES"]
+    (told,) = [
+        finding
+        for finding in examine(replace(log, theta=30 * log.theta))
+        if finding.code == "DEGREES"
+    ]
     assert "--set theta1.gear_ratio=N" in told.clause or "--set theta2.gear_ratio=N" in told.clause
 
 
@@ -264,7 +288,10 @@ def resting(before: float, after: float) -> Log:
     log = moving_log()
     rows = [round(1000 * seconds) for seconds in (before, after)]
     noise = np.random.default_rng(8).normal(0, 1e-4, (2, sum(rows)))
-    held = [np.repeat(log.theta[:, [end]], count, axis=1) for end, count in zip((0, -1), rows, strict=True)]
+    held = [
+        np.repeat(log.theta[:, [end]], count, axis=1)
+        for end, count in zip((0, -1), rows, strict=True)
+    ]
     theta = np.hstack([held[0], log.theta, held[1]])
     theta[:, : rows[0]] += noise[:, : rows[0]]
     theta[:, theta.shape[1] - rows[1] :] += noise[:, rows[0] :]
@@ -292,12 +319,18 @@ def test_a_short_rest_and_the_end_of_a_part_are_no_rest() -> None:
 
 
 def test_a_refusal_alone_names_what_overrides_it_and_yields_to_that() -> None:
-    refusal, warning = Notice("STILL", "joint 2 is still", refuse=True), Notice("RESTS", "the arm rests")
+    refusal, warning = (
+        Notice("STILL", "joint 2 is still", refuse=True),
+        Notice("RESTS", "the arm rests"),
+    )
     assert yielding(warning, ()) == warning
     assert yielding(warning, ("RESTS",)) == warning
     named = yielding(refusal, ("RESTS",))
     assert named.refuse
-    assert named.clause == 'joint 2 is still: to use it nevertheless: --accept STILL (profile: accept = ["STILL"])'
+    assert (
+        named.clause
+        == 'joint 2 is still: to use it nevertheless: --accept STILL (profile: accept = ["STILL"])'
+    )
     accepted = yielding(refusal, ("RESTS", "STILL"))
     assert not accepted.refuse
     assert accepted.text == "joint 2 is still; used nevertheless, as accept says"
@@ -309,7 +342,9 @@ def test_joints_that_turn_many_times_are_read_where_physics_holds_for_radians() 
     motion = simulate(arm.constants(), wide_multi_sine(arm, sum(b"arm22")), t)
     assert np.abs(motion.theta).max() > 12 * np.pi
     draw = np.random.default_rng(11)
-    theta, tau = (values + 1e-3 * draw.standard_normal(values.shape) for values in (motion.theta, motion.tau))
+    theta, tau = (
+        values + 1e-3 * draw.standard_normal(values.shape) for values in (motion.theta, motion.tau)
+    )
     log = Log(np.arange(t.size) * 1_000_000, theta, tau, Origin("arm.csv", "csv", {}))
     assert codes(log) == []
     assert codes(replace(log, theta=np.degrees(log.theta))) == ["DEGREES"]

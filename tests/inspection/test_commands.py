@@ -48,7 +48,9 @@ def test_inspect_tells_what_a_log_is(kind: str, tmp_path: Path) -> None:
     assert found["refused"] is None
     assert found["clock"]["rows"] == 6000
     assert found["clock"]["rate"] == pytest.approx(1000)
-    assert set(found["signals"]) == {f"{name}{joint}" for name in ("theta", "tau", "omega") for joint in (1, 2)}
+    assert set(found["signals"]) == {
+        f"{name}{joint}" for name in ("theta", "tau", "omega") for joint in (1, 2)
+    }
 
 
 def test_inspect_tells_types_and_counts_of_flat_logs(tmp_path: Path) -> None:
@@ -75,11 +77,17 @@ def test_inspect_tells_types_and_counts_of_flat_logs(tmp_path: Path) -> None:
     assert entries("arm.csv") == [[name, "Float64", 6000] for name in names]
     assert [one for one in entries("arm.parquet") if one[0] != "stamp_ns"] == entries("arm.csv")
     assert ["stamp_ns", "Int64", 6000] in entries("arm.parquet")
-    assert entries("noted.csv.gz") == [["note", "String", 6000], ["n", "Int64", 6000], *entries("arm.csv")]
+    assert entries("noted.csv.gz") == [
+        ["note", "String", 6000],
+        ["n", "Int64", 6000],
+        *entries("arm.csv"),
+    ]
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("ms", 1), ("us", 1000)])
-def test_times_too_far_apart_are_told_and_how_to_mend_them(unit: str, factor: int, tmp_path: Path) -> None:
+def test_times_too_far_apart_are_told_and_how_to_mend_them(
+    unit: str, factor: int, tmp_path: Path
+) -> None:
     log = moving_log()
     frame = pl.DataFrame(
         {
@@ -101,7 +109,14 @@ def test_times_too_far_apart_are_told_and_how_to_mend_them(unit: str, factor: in
         assert told["clock"]["rate"] == pytest.approx(1000)
         assert "SLOW_CLOCK" not in [one["code"] for one in told["notices"]]
         (tmp_path / "algid.toml").write_text(f'time_unit = "{unit}"\n')
-        mended = run("inspect", tmp_path / f"t.{kind}", "--profile", tmp_path / "algid.toml", "--format", "json")
+        mended = run(
+            "inspect",
+            tmp_path / f"t.{kind}",
+            "--profile",
+            tmp_path / "algid.toml",
+            "--format",
+            "json",
+        )
         assert json.loads(mended)["clock"]["rate"] == pytest.approx(1000)
         assert "SLOW_CLOCK" not in mended
 
@@ -113,7 +128,9 @@ def test_inspect_works_on_what_it_refuses(tmp_path: Path) -> None:
     assert "refused" in text
     assert "q2" in text
     assert "\u0085" not in text
-    assert json.loads(run("inspect", path, "--format", "json", code=2))["entries"][2]["name"] == "q2"
+    assert (
+        json.loads(run("inspect", path, "--format", "json", code=2))["entries"][2]["name"] == "q2"
+    )
 
 
 def test_inspect_on_a_cut_file_exits_with_4(tmp_path: Path) -> None:
@@ -158,7 +175,9 @@ def test_a_new_profile_reads_the_log_as_before(kind: str, tmp_path: Path) -> Non
 def test_inspect_of_a_refused_mcap_shows_joints_and_fields(tmp_path: Path) -> None:
     stamps = [EPOCH_NS + step * 1_000_000 for step in range(10)]
     names = ["shoulder", "elbow"]
-    messages = [("/joint_states", one, joint_state(one, names, [1, 2], [], []).done()) for one in stamps]
+    messages = [
+        ("/joint_states", one, joint_state(one, names, [1, 2], [], []).done()) for one in stamps
+    ]
     write_mcap(tmp_path / "log.mcap", messages)
     text = " ".join(run("inspect", tmp_path / "log.mcap", code=2).split())
     assert "/joint_states: joints shoulder, elbow; fields" in text
@@ -172,16 +191,25 @@ def test_inspect_of_a_refused_mcap_shows_joints_and_fields(tmp_path: Path) -> No
 def test_what_inspect_prints_is_what_a_profile_takes(tmp_path: Path) -> None:
     stamps = [EPOCH_NS + step * 1_000_000 for step in range(10)]
     for topic in ("/one", "/two"):
-        messages = [(topic, one, joint_state(one, ["a", "b"], [1, 2], [], [3, 4]).done()) for one in stamps]
+        messages = [
+            (topic, one, joint_state(one, ["a", "b"], [1, 2], [], [3, 4]).done()) for one in stamps
+        ]
         write_mcap(tmp_path / f"{topic[1:]}.mcap", messages)
     first = read_log(tmp_path / "one.mcap")
-    sources = {name: {"source": first.origin.mapping[name]} for name in ("theta1", "theta2", "tau1", "tau2")}
+    sources = {
+        name: {"source": first.origin.mapping[name]}
+        for name in ("theta1", "theta2", "tau1", "tau2")
+    }
     assert sources["theta1"] == {"source": "/one: position[a]"}
     assert same(read_log(tmp_path / "one.mcap", Profile.model_validate(sources)), first)
 
 
 def keys(model: type[BaseModel]) -> set[str]:
-    return {name for name, field in model.model_fields.items() if field.annotation not in (Angle, Velocity, Torque)}
+    return {
+        name
+        for name, field in model.model_fields.items()
+        if field.annotation not in (Angle, Velocity, Torque)
+    }
 
 
 @pytest.mark.parametrize("kind", FORMATS)
@@ -210,7 +238,11 @@ def test_topics_of_bags_are_listed_as_of_mcap(tmp_path: Path) -> None:
     for form, found in seen.items():
         (entry,) = found.entries
         assert found.format == form
-        assert (entry.name, entry.count, entry.joints) == ("/joint_states", 2001, ("joint1", "joint2"))
+        assert (entry.name, entry.count, entry.joints) == (
+            "/joint_states",
+            2001,
+            ("joint1", "joint2"),
+        )
         assert entry.rate == pytest.approx(1000)
         assert {"position[joint1]", "velocity[joint2]", "effort[joint2]"} <= set(entry.fields)
     assert {found.entries[0].type for found in seen.values()} == {

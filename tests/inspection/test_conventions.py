@@ -69,7 +69,12 @@ ROWS = (
 
 @pytest.mark.parametrize(
     ("row", "kind"),
-    [*((row, "csv") for row in ROWS), ("swapped", "mcap"), ("torques swapped", "mcap"), ("zeros", "mcap")],
+    [
+        *((row, "csv") for row in ROWS),
+        ("swapped", "mcap"),
+        ("torques swapped", "mcap"),
+        ("zeros", "mcap"),
+    ],
 )
 def test_the_settings_named_mend_the_log(row: str, kind: str, tmp_path: Path) -> None:
     path = written(tmp_path / f"arm.{kind}", *recorded(row))

@@ -31,12 +31,25 @@ K = ARM.constants()
 
 
 def swung(turn: float = 0.0, gain: float = 1.0, weight: bool = True, rate: float = 400.0) -> Log:
-    """Slow closed-form motion with eq. (1)'s torque; θ1 is read `turn` too large, the torque `gain` times."""
+    """Slow closed-form motion with eq. (1)'s torque.
+
+    θ1 is read `turn` too large, the torque `gain` times.
+    """
     t = np.arange(round(20 * rate)) / rate
-    theta = np.stack([np.sin(0.9 * t) + 0.3 * np.sin(2.3 * t), 1.1 * np.sin(1.3 * t) + 0.4 * np.cos(1.9 * t)])
-    omega = np.stack([0.9 * np.cos(0.9 * t) + 0.69 * np.cos(2.3 * t), 1.43 * np.cos(1.3 * t) - 0.76 * np.sin(1.9 * t)])
+    theta = np.stack(
+        [np.sin(0.9 * t) + 0.3 * np.sin(2.3 * t), 1.1 * np.sin(1.3 * t) + 0.4 * np.cos(1.9 * t)]
+    )
+    omega = np.stack(
+        [
+            0.9 * np.cos(0.9 * t) + 0.69 * np.cos(2.3 * t),
+            1.43 * np.cos(1.3 * t) - 0.76 * np.sin(1.9 * t),
+        ]
+    )
     alpha = np.stack(
-        [-0.81 * np.sin(0.9 * t) - 1.587 * np.sin(2.3 * t), -1.859 * np.sin(1.3 * t) - 1.444 * np.cos(1.9 * t)]
+        [
+            -0.81 * np.sin(0.9 * t) - 1.587 * np.sin(2.3 * t),
+            -1.859 * np.sin(1.3 * t) - 1.444 * np.cos(1.9 * t),
+        ]
     )
     k = K.copy()
     if not weight:
@@ -55,7 +68,8 @@ def figures_of(log: Log) -> DynamicFigures:
 @pytest.mark.parametrize("rate", [100.0, 400.0])
 def test_a_rough_fit_finds_the_weights_of_the_arm(rate: float) -> None:
     found = figures_of(swung(rate=rate))
-    # smoothing over 90 ms takes (ω 0.09)²/24 or so of each harmonic, 0.2 % at 2.3 rad/s, of angles and torques alike
+    # smoothing over 90 ms takes (ω 0.09)²/24 or so of each harmonic, 0.2 % at 2.3 rad/s, of angles
+    # and torques alike
     assert found.weight1 == pytest.approx(K[3], rel=2e-3)
     assert found.weight2 == pytest.approx(K[1], rel=2e-3)
     assert found.inertia == pytest.approx(K[2] + K[4], rel=0.02)
@@ -66,7 +80,8 @@ def test_a_rough_fit_finds_the_weights_of_the_arm(rate: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("degrees", "told"), [(0, None), (30, None), (60, "WRONG_ZERO"), (-90, "WRONG_ZERO"), (170, "FLIPPED_SIGN")]
+    ("degrees", "told"),
+    [(0, None), (30, None), (60, "WRONG_ZERO"), (-90, "WRONG_ZERO"), (170, "FLIPPED_SIGN")],
 )
 def test_gravity_is_found_turned_as_far_as_the_zero_is(degrees: float, told: str | None) -> None:
     """cos(θ1 read - δ) pulls where algid expects cos(θ1 read): δ of the turn."""
@@ -101,10 +116,16 @@ def test_an_arm_without_weight_and_one_that_stands_still() -> None:
 
 def test_noise_is_not_gravitys() -> None:
     log = swung(weight=False)
-    noise = np.random.default_rng(3).standard_normal(log.tau.shape) * 2 * log.tau.std(axis=1, keepdims=True)
+    noise = (
+        np.random.default_rng(3).standard_normal(log.tau.shape)
+        * 2
+        * log.tau.std(axis=1, keepdims=True)
+    )
     found = figures_of(replace(log, tau=log.tau + noise))
     assert 0.2 < found.explained < 0.9
-    assert 0 <= found.gravity_share < 0.01  # four columns of some thousands explain one in a thousand by chance
+    assert (
+        0 <= found.gravity_share < 0.01
+    )  # four columns of some thousands explain one in a thousand by chance
 
 
 @pytest.mark.parametrize(("rows", "told"), [(39, False), (40, True)])
@@ -117,7 +138,14 @@ def test_forty_samples_at_a_hundred_hertz_are_enough(rows: int, told: bool) -> N
 
 
 SURE = DynamicFigures(
-    condition=10, explained=0.99, weight1=6, weight2=2, turn=0, gravity_share=0.5, seen=0.5, inertia=0.5
+    condition=10,
+    explained=0.99,
+    weight1=6,
+    weight2=2,
+    turn=0,
+    gravity_share=0.5,
+    seen=0.5,
+    inertia=0.5,
 )
 LIGHT = replace(SURE, weight1=0.0, weight2=0.1, gravity_share=0.001)
 UP, ASIDE = replace(SURE, turn=170), replace(SURE, turn=-90)
@@ -155,17 +183,23 @@ def test_each_limit_of_what_is_said_of_gravity(figures: DynamicFigures, code: st
     assert [one.code for one in gravity_findings(figures)] == ([] if code is None else [code])
 
 
-def judgement(convention: Convention, *, broken: dict[str, float] | None = None, alone: bool = True) -> Any:
+def judgement(
+    convention: Convention, *, broken: dict[str, float] | None = None, alone: bool = True
+) -> Any:
     """What a log may say: that `convention` is the right one, and what the one that it was read by breaks."""
     as_read = SimpleNamespace(broken=broken or {}, left=np.array([0.123, 0.456]))
     return SimpleNamespace(
-        as_read=as_read, best=SimpleNamespace(convention=convention, left=np.array([0.001, 0.0123])), alone=alone
+        as_read=as_read,
+        best=SimpleNamespace(convention=convention, left=np.array([0.001, 0.0123])),
+        alone=alone,
     )
 
 
 def read_by(reading: Reading | None = None, mapping: dict[str, str] | None = None) -> Log:
     log = moving_log(10)
-    return replace(log, origin=Origin("arm.csv", "csv", mapping or {}, reading=reading or Reading()))
+    return replace(
+        log, origin=Origin("arm.csv", "csv", mapping or {}, reading=reading or Reading())
+    )
 
 
 def mended(convention: Convention, reading: Reading | None = None) -> Mend:
@@ -219,7 +253,11 @@ TORQUES_SWAPPED = '--set tau1.source="tau2" --set tau2.source="tau1"'
         ),
         (Convention(zero=(-HALF, 0.0)), "θ1 is zero hanging straight down", "--zero hanging"),
         (Convention(zero=(HALF, 0.0)), "θ1 is zero upright", "--set offsets=[1.5708, 0.0]"),
-        (Convention(zero=(0.0, HALF)), "the zero of θ2 is off by 90°", "--set offsets=[0.0, 1.5708]"),
+        (
+            Convention(zero=(0.0, HALF)),
+            "the zero of θ2 is off by 90°",
+            "--set offsets=[0.0, 1.5708]",
+        ),
         (
             Convention(zero=(0.2, -0.3)),
             "the zero of θ1 is off by 11.46° and the zero of θ2 is off by -17.19°",
@@ -244,14 +282,18 @@ def test_what_is_wrong_is_said_in_words_and_in_flags_that_are_taken(
     profile = profile_from(given)
     assert profile is not None
     plain = profile.model_dump(exclude_unset=True)
-    assert {name: [*value] if isinstance(value, tuple) else value for name, value in plain.items()} == found.settings
+    assert {
+        name: [*value] if isinstance(value, tuple) else value for name, value in plain.items()
+    } == found.settings
 
 
 def test_the_lines_of_a_profile_stand_before_those_of_its_channels() -> None:
     found = mended(Convention(signs=(-1, 1), base=True, zero=(-HALF, 0.0)))
     assert found.remedy.lines == 'drive = "base", zero = "hanging", sign = -1 of [theta1]'
     turned = mended(Convention(signs=(-1, -1), torque_signs=(-1, -1)))
-    assert turned.words.startswith("all signs are turned round, or θ1 counts from the other horizontal")
+    assert turned.words.startswith(
+        "all signs are turned round, or θ1 counts from the other horizontal"
+    )
 
 
 @pytest.mark.parametrize(("off", "another"), [(0.099, False), (0.78, False), (0.79, True)])
@@ -261,7 +303,9 @@ def test_zeros_that_are_a_little_off_are_no_other_convention(off: float, another
 
 
 def test_settings_are_over_those_that_the_log_was_read_by() -> None:
-    joints = mended(Convention(swapped=True, torques_swapped=True), Reading(joints=("shoulder", "elbow")))
+    joints = mended(
+        Convention(swapped=True, torques_swapped=True), Reading(joints=("shoulder", "elbow"))
+    )
     assert joints.remedy.flags == ("--joints", "elbow,shoulder")
     signs = mended(Convention(signs=(-1, 1), torque_signs=(-1, 1)), Reading(signs=(-1, 1)))
     assert signs.settings == {"signs": [1, 1]}
@@ -281,7 +325,9 @@ def test_what_contradicts_is_the_worst_that_is_broken() -> None:
     broken = {"k1 > 0": -5.4, "k3 > 0": -60.2, "k5 > 0": -7.0}
     found = mend(read_by(), judgement(Convention(base=True), broken=broken))
     assert found is not None
-    assert found.contradiction == "it demands k3 > 0, which the log misses by 60 standard deviations"
+    assert (
+        found.contradiction == "it demands k3 > 0, which the log misses by 60 standard deviations"
+    )
     unexplained = mended(Convention(base=True)).contradiction
     assert unexplained == "45.6 % of a torque stays unexplained, 1.2 % then"
 
@@ -292,7 +338,13 @@ NAMES = ("q\U0001f600", 'say "hi"', "back\\slash", "bell\x7f", "θ₁ rad")
 @pytest.mark.parametrize("name", NAMES)
 def test_a_flag_takes_a_column_whatever_it_is_called(name: str, tmp_path: Path) -> None:
     log = moving_log(200)
-    rows = {"t": log.t, name: log.theta[0], "q2": log.theta[1], "tau1": log.tau[0], "tau2": log.tau[1]}
+    rows = {
+        "t": log.t,
+        name: log.theta[0],
+        "q2": log.theta[1],
+        "tau1": log.tau[0],
+        "tau2": log.tau[1],
+    }
     pl.DataFrame(rows).write_parquet(tmp_path / "arm.parquet")
     profile = profile_from({"set": [f"theta1.source={name}", "theta2.source=q2"]})
     assert profile is not None
@@ -305,7 +357,9 @@ def test_a_draft_reads_its_log_whatever_its_joints_are_called(name: str, tmp_pat
     """TOML has no halves of characters, as JSON has."""
     stamps = [EPOCH_NS + step * 1_000_000 for step in range(10)]
     states = [joint_state(one, [name, "elbow"], [1, 2], [], [3, 4]).done() for one in stamps]
-    write_mcap(tmp_path / "arm.mcap", [(f"/{name}", *one) for one in zip(stamps, states, strict=True)])
+    write_mcap(
+        tmp_path / "arm.mcap", [(f"/{name}", *one) for one in zip(stamps, states, strict=True)]
+    )
     text = draft_profile(tmp_path / "arm.mcap")
     content = tomllib.loads(text)
     assert (content["topic"], content["joints"]) == (f"/{name}", [name, "elbow"])
@@ -316,19 +370,31 @@ def test_a_draft_reads_its_log_whatever_its_joints_are_called(name: str, tmp_pat
 
 def test_a_draft_of_a_log_that_tells_its_sources_is_that_reading(tmp_path: Path) -> None:
     log = moving_log(200)
-    rows = {"time": log.t, "q1": log.theta[0], "q2": log.theta[1], "tau1": log.tau[0], "tau2": log.tau[1]}
+    rows = {
+        "time": log.t,
+        "q1": log.theta[0],
+        "q2": log.theta[1],
+        "tau1": log.tau[0],
+        "tau2": log.tau[1],
+    }
     pl.DataFrame(rows).write_csv(tmp_path / "arm.csv")
     text = draft_profile(tmp_path / "arm.csv")
     (tmp_path / "algid.toml").write_text(text)
     profile = load_profile(tmp_path / "algid.toml")
     assert (profile.time, profile.theta1.source, profile.tau2.source) == ("time", "q1", "tau2")
-    assert np.array_equal(read_log(tmp_path / "arm.csv", profile).theta, read_log(tmp_path / "arm.csv").theta)
+    assert np.array_equal(
+        read_log(tmp_path / "arm.csv", profile).theta, read_log(tmp_path / "arm.csv").theta
+    )
 
 
-def test_a_draft_of_a_log_that_cannot_be_read_says_why_and_names_what_is_there(tmp_path: Path) -> None:
+def test_a_draft_of_a_log_that_cannot_be_read_says_why_and_names_what_is_there(
+    tmp_path: Path,
+) -> None:
     (tmp_path / "arm.csv").write_text("when,angle \u200ba,angle b\n0,1,2\n1,2,3\n")
     text = draft_profile(tmp_path / "arm.csv")
-    assert tomllib.loads(text) == {name: {} for name in ("theta1", "theta2", "tau1", "tau2", "omega1", "omega2")}
+    assert tomllib.loads(text) == {
+        name: {} for name in ("theta1", "theta2", "tau1", "tau2", "omega1", "omega2")
+    }
     assert text.splitlines()[13].startswith("# ")
     assert str(tmp_path / "arm.csv") in text
     assert "# in the log: angle \ufffda (Int64)" in text

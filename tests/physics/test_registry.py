@@ -91,7 +91,9 @@ print("all follow", here)
 @pytest.mark.slow
 def test_terms_added_and_left_out_need_nothing_else_touched(tmp_path: Path) -> None:
     package = tmp_path / "algid"
-    shutil.copytree(Path(algid.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(
+        Path(algid.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__")
+    )
     folder = package / "physics" / "terms"
     (folder / "toy.py").write_text(TOY)
     registry = folder / "__init__.py"
@@ -101,11 +103,16 @@ def test_terms_added_and_left_out_need_nothing_else_touched(tmp_path: Path) -> N
         text = text.replace(f"from algid.physics.terms.{name} import {name.upper()}\n", "")
         text = text.replace(f"{name.upper()}, ", "").replace(f", {name.upper()}", "")
     text = text.replace(
-        "from algid.physics.terms.viscous", "from algid.physics.terms.toy import TOY\nfrom algid.physics.terms.viscous"
+        "from algid.physics.terms.viscous",
+        "from algid.physics.terms.toy import TOY\nfrom algid.physics.terms.viscous",
     )
     registry.write_text(text.replace("(COULOMB, ", "(COULOMB, TOY, "))
     environment = {**os.environ, "PYTHONPATH": str(tmp_path), "OPENBLAS_NUM_THREADS": "1"}
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", TRIAL], env=environment, cwd=tmp_path, capture_output=True, text=True
+        [sys.executable, "-W", "error", "-c", TRIAL],
+        env=environment,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
     )
     assert f"all follow {package}" in done.stdout, done.stdout + done.stderr

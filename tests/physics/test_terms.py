@@ -58,7 +58,9 @@ def test_partials_are_the_differences_of_the_torque(term: str) -> None:
                 moved[order][joint] += sign * step
                 both.append(torque(model, c, Motion(moved[0], moved[1], moved[2])))
             slope = (both[0] - both[1]) / (2 * step)
-            np.testing.assert_allclose(P[order, :, joint], slope, atol=1e-7)  # rounding over the step
+            np.testing.assert_allclose(
+                P[order, :, joint], slope, atol=1e-7
+            )  # rounding over the step
 
 
 @pytest.mark.parametrize("term", IN_MODELS)
@@ -67,7 +69,9 @@ def test_moments_over_windows_are_those_of_the_columns(term: str) -> None:
     model, motion = model_with(term), moving()
     at = None if model.linear else constants(model)
     windows = Windows(DT, 0.4, bandwidth=None)
-    X = windows.equations(model, Segment(0.0, DT, motion.theta, motion.theta, motion.omega), False, at)
+    X = windows.equations(
+        model, Segment(0.0, DT, motion.theta, motion.theta, motion.omega), False, at
+    )
     Y = regressor(model, motion, at)
     for place, name in enumerate(model.names):
         if any(name == own for own, _ in EVERY_TERM[term].gains):
@@ -75,7 +79,9 @@ def test_moments_over_windows_are_those_of_the_columns(term: str) -> None:
         if name == model.lag_name:
             continue
         expected = windows.moments(Y[:, place], windows.kernels()[0])
-        np.testing.assert_allclose(X[:, place], expected, rtol=1e-3, atol=1e-4)  # the quadrature at 1 kHz
+        np.testing.assert_allclose(
+            X[:, place], expected, rtol=1e-3, atol=1e-4
+        )  # the quadrature at 1 kHz
 
 
 @pytest.mark.parametrize("term", [name for name in IN_MODELS if EVERY_TERM[name].timing is None])
@@ -84,7 +90,9 @@ def test_the_c_source_is_the_torque(term: str, tmp_path: Path) -> None:
     value = {name: VALUES[name] for name in model.names}
     arm = compiled(text_of("c", value, model), tmp_path)
     found = each(arm.inverse_dynamics, motion.theta, motion.omega, motion.alpha)
-    np.testing.assert_allclose(found, torque(model, constants(model), motion), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(
+        found, torque(model, constants(model), motion), rtol=1e-12, atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("term", [term.name for term in (*ALWAYS, *OPTIONAL) if term.columns])
@@ -96,9 +104,13 @@ def test_the_form_is_the_column(term: str) -> None:
     Y = regressor(model, motion)
     for column in EVERY_TERM[term].columns:
         for joint in range(2):
-            s, p, f = (_by_sympy(getattr(column, part)[joint], angles, model) for part in ("s", "p", "f"))
+            s, p, f = (
+                _by_sympy(getattr(column, part)[joint], angles, model) for part in ("s", "p", "f")
+            )
             expected = _along(sp.diff(s, t, 2) + sp.diff(p, t) + f, angles, motion)
-            np.testing.assert_allclose(Y[joint, model.names.index(column.parameter)], expected, atol=1e-11)
+            np.testing.assert_allclose(
+                Y[joint, model.names.index(column.parameter)], expected, atol=1e-11
+            )
 
 
 def _by_sympy(expression: Expression, angles: list[sp.Expr], model: Model) -> sp.Expr:

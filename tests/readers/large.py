@@ -66,38 +66,57 @@ def _record(code: int, content: bytes) -> bytes:
 
 def write_mcap(path: Path, rows: int) -> None:
     """An MCAP file with message indexes and a summary."""
-    schema = _record(3, b"\1\0" + _text(JOINT_STATE) + _text("ros2msg") + _text(JOINT_STATE_DEFINITION))
+    schema = _record(
+        3, b"\1\0" + _text(JOINT_STATE) + _text("ros2msg") + _text(JOINT_STATE_DEFINITION)
+    )
     channel = _record(4, b"\1\0\1\0" + _text(TOPIC) + _text("cdr") + struct.pack("<I", 0))
     indexes: list[bytes] = []
     with path.open("wb") as stream:
-        stream.write(b"\x89MCAP0\r\n" + _record(1, _text("ros2") + _text("large")) + schema + channel)
+        stream.write(
+            b"\x89MCAP0\r\n" + _record(1, _text("ros2") + _text("large")) + schema + channel
+        )
         for first, count in _spans(rows):
             bodies = _bodies(first, count, ros1=False)
             stamps = np.arange(first, first + count, dtype="<i8") * 1_000_000
-            head = np.frombuffer(struct.pack("<BQHIQQ", 5, 22 + bodies.shape[1], 1, 0, 0, 0), np.uint8)
+            head = np.frombuffer(
+                struct.pack("<BQHIQQ", 5, 22 + bodies.shape[1], 1, 0, 0, 0), np.uint8
+            )
             records = _behind(head, bodies, log=(15, stamps), publish=(23, stamps))
             inside = records.tobytes()
             times = struct.pack("<QQ", int(stamps[0]), int(stamps[-1]))
-            chunk = times + struct.pack("<QI", len(inside), 0) + _text("") + struct.pack("<Q", len(inside)) + inside
+            chunk = (
+                times
+                + struct.pack("<QI", len(inside), 0)
+                + _text("")
+                + struct.pack("<Q", len(inside))
+                + inside
+            )
             place = stream.tell()
             stream.write(_record(6, chunk))
             offsets = np.arange(count, dtype="<i8") * records.shape[1]
-            index = _record(7, struct.pack("<HI", 1, 16 * count) + np.stack([stamps, offsets], 1).tobytes())
+            index = _record(
+                7, struct.pack("<HI", 1, 16 * count) + np.stack([stamps, offsets], 1).tobytes()
+            )
             at = stream.tell()
             stream.write(index)
-            body = times + struct.pack("<QQIHQQ", place, at - place, 10, 1, at, len(index)) + _text("")
+            body = (
+                times + struct.pack("<QQIHQQ", place, at - place, 10, 1, at, len(index)) + _text("")
+            )
             indexes.append(_record(8, body + struct.pack("<QQ", len(inside), len(inside))))
         stream.write(_record(15, bytes(4)))
         start = stream.tell()
         last = (rows - 1) * 1_000_000
-        counts = struct.pack("<QHIIIIQQ", rows, 1, 1, 0, 0, len(indexes), 0, last) + struct.pack("<IHQ", 10, 1, rows)
+        counts = struct.pack("<QHIIIIQQ", rows, 1, 1, 0, 0, len(indexes), 0, last) + struct.pack(
+            "<IHQ", 10, 1, rows
+        )
         stream.write(schema + channel + b"".join(indexes) + _record(11, counts))
         stream.write(_record(2, struct.pack("<QQI", start, 0, 0)) + b"\x89MCAP0\r\n")
 
 
 def _fields(**fields: bytes) -> bytes:
     parts = [
-        struct.pack("<I", len(name) + 1 + len(value)) + name.encode() + b"=" + value for name, value in fields.items()
+        struct.pack("<I", len(name) + 1 + len(value)) + name.encode() + b"=" + value
+        for name, value in fields.items()
     ]
     return struct.pack("<I", sum(map(len, parts))) + b"".join(parts)
 
@@ -123,7 +142,10 @@ def write_bag(path: Path, rows: int) -> None:
         place = stream.tell()
 
         def head(index: int) -> bytes:
-            counts = {"conn_count": struct.pack("<I", 1), "chunk_count": struct.pack("<I", len(infos))}
+            counts = {
+                "conn_count": struct.pack("<I", 1),
+                "chunk_count": struct.pack("<I", len(infos)),
+            }
             return _part(b" " * 4000, op=b"\x03", index_pos=struct.pack("<Q", index), **counts)
 
         stream.write(head(0))
@@ -131,16 +153,23 @@ def write_bag(path: Path, rows: int) -> None:
             bodies = _bodies(first, count, ros1=True)
             ticks = np.arange(first, first + count, dtype=np.int64)
             stamps = np.stack([ticks // 1000, ticks % 1000 * 1_000_000], 1).astype("<u4")
-            lead = _fields(op=b"\x02", conn=bytes(4), time=bytes(8)) + struct.pack("<I", bodies.shape[1])
+            lead = _fields(op=b"\x02", conn=bytes(4), time=bytes(8)) + struct.pack(
+                "<I", bodies.shape[1]
+            )
             records = _behind(np.frombuffer(lead, np.uint8), bodies, time=(len(lead) - 12, stamps))
             inside = connection + records.tobytes()
             at = stream.tell()
             size = struct.pack("<I", len(inside))
             stream.write(_part(inside, op=b"\x05", compression=b"none", size=size))
             entries = np.empty((count, 3), "<u4")
-            entries[:, :2], entries[:, 2] = stamps, len(connection) + np.arange(count) * records.shape[1]
+            entries[:, :2], entries[:, 2] = (
+                stamps,
+                len(connection) + np.arange(count) * records.shape[1],
+            )
             several = struct.pack("<I", count)
-            stream.write(_part(entries.tobytes(), op=b"\x04", ver=b"\1\0\0\0", conn=bytes(4), count=several))
+            stream.write(
+                _part(entries.tobytes(), op=b"\x04", ver=b"\1\0\0\0", conn=bytes(4), count=several)
+            )
             times = {"start_time": stamps[0].tobytes(), "end_time": stamps[-1].tobytes()}
             position = struct.pack("<Q", at)
             infos.append(
@@ -164,13 +193,19 @@ def write_db3(path: Path, rows: int) -> None:
     with closing(sqlite3.connect(path)) as base:
         base.execute("PRAGMA journal_mode = OFF")
         base.execute("PRAGMA synchronous = OFF")
-        base.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT)")
-        base.execute("CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)")
+        base.execute(
+            "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT)"
+        )
+        base.execute(
+            "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)"
+        )
         base.execute("INSERT INTO topics VALUES (1, ?, ?, 'cdr')", (TOPIC, JOINT_STATE))
         for first, count in _spans(rows):
             bodies = _bodies(first, count, ros1=False)
             cells = ((1, (first + row) * 1_000_000, bodies[row].tobytes()) for row in range(count))
-            base.executemany("INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)", cells)
+            base.executemany(
+                "INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)", cells
+            )
         base.commit()
 
 
@@ -191,6 +226,8 @@ print(rows, 1024 * int(re.search(r"VmHWM:\\s*(\\d+)", status)[1]))
 
 def peak_of_reading(path: Path) -> tuple[int, int]:
     """Samples of a log, and the bytes that a program of its own takes to go through its blocks."""
-    done = subprocess.run([sys.executable, "-c", _PEAK, str(path)], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", _PEAK, str(path)], capture_output=True, text=True, check=True
+    )
     rows, peak = map(int, done.stdout.split())
     return rows, peak

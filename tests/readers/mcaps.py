@@ -83,7 +83,9 @@ def write_mcap(
         channels: dict[str, int] = {}
         for topic, stamp, data in messages:
             if topic not in channels:
-                name, kind, text = (schemas or {}).get(topic, (JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode()))
+                name, kind, text = (schemas or {}).get(
+                    topic, (JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode())
+                )
                 schema = writer.register_schema(name, kind, text)
                 channels[topic] = writer.register_channel(topic, encoding, schema)
             writer.add_message(channels[topic], stamp, data, stamp)
@@ -119,8 +121,16 @@ def protobuf_schema() -> tuple[bytes, Any]:
     file = descriptor_pb2.FileDescriptorProto(name="arm.proto", package="arm", syntax="proto3")
     file.dependency.append("google/protobuf/timestamp.proto")
     message = file.message_type.add(name="State")
-    kinds = {"name": (9, 3), "position": (1, 3), "velocity": (1, 3), "effort": (1, 3), "mode": (17, 1)}
-    message.field.add(name="timestamp", number=1, type=11, label=1, type_name=".google.protobuf.Timestamp")
+    kinds = {
+        "name": (9, 3),
+        "position": (1, 3),
+        "velocity": (1, 3),
+        "effort": (1, 3),
+        "mode": (17, 1),
+    }
+    message.field.add(
+        name="timestamp", number=1, type=11, label=1, type_name=".google.protobuf.Timestamp"
+    )
     for number, (name, (kind, label)) in enumerate(kinds.items(), start=2):
         message.field.add(name=name, number=number, type=kind, label=label)
     stamp = descriptor_pb2.FileDescriptorProto()

@@ -10,7 +10,9 @@ from algid.readers.mcap.records import alike, records_in
 
 
 def message(number: int, size: int, code: int = 5) -> bytes:
-    return struct.pack("<BQHIQQ", code, 22 + size, 1, number, 10 * number, 10 * number) + bytes(size)
+    return struct.pack("<BQHIQQ", code, 22 + size, 1, number, 10 * number, 10 * number) + bytes(
+        size
+    )
 
 
 def found(content: bytes) -> list[int] | None:

@@ -29,7 +29,9 @@ TAU = np.stack([5 * np.cos(2 * T), np.sin(7 * T)])
 
 def right(log: Log, stamp_tolerance: int = 1) -> bool:
     stamps = np.abs(log.stamp_ns - np.rint(T * 1e9).astype(np.int64)).max() <= stamp_tolerance
-    return bool(stamps and np.allclose(log.theta, THETA, rtol=1e-6) and np.allclose(log.tau, TAU, rtol=1e-6))
+    return bool(
+        stamps and np.allclose(log.theta, THETA, rtol=1e-6) and np.allclose(log.tau, TAU, rtol=1e-6)
+    )
 
 
 def npz(folder: Path) -> Path:
@@ -63,7 +65,9 @@ def mat(folder: Path) -> Path:
 
 def mat_struct(folder: Path) -> Path:
     savemat(
-        folder / "log.mat", {"run": {"time": T[:, None], "signals": {"pos": THETA, "torque": TAU}}}, do_compression=True
+        folder / "log.mat",
+        {"run": {"time": T[:, None], "signals": {"pos": THETA, "torque": TAU}}},
+        do_compression=True,
     )
     return folder / "log.mat"
 
@@ -76,8 +80,15 @@ def feather_flat(folder: Path) -> Path:
 
 def feather_lists(folder: Path) -> Path:
     stamps = pa.array(np.rint(T * 1e9).astype(np.int64), pa.timestamp("ns"))
-    columns = {"timestamp": stamps, "position": pa.array(THETA.T.tolist()), "effort": pa.array(TAU.T.tolist())}
-    with pa.OSFile(str(folder / "log.arrow"), "wb") as sink, pa.ipc.new_file(sink, pa.table(columns).schema) as file:
+    columns = {
+        "timestamp": stamps,
+        "position": pa.array(THETA.T.tolist()),
+        "effort": pa.array(TAU.T.tolist()),
+    }
+    with (
+        pa.OSFile(str(folder / "log.arrow"), "wb") as sink,
+        pa.ipc.new_file(sink, pa.table(columns).schema) as file,
+    ):
         file.write_table(pa.table(columns))
     return folder / "log.arrow"
 
@@ -113,7 +124,9 @@ def test_files_of_other_libraries_are_read(make: Callable[[Path], Path], tmp_pat
 
 @pytest.mark.parametrize("make", [npz, mat, feather_flat])
 @pytest.mark.parametrize("share", [0.2, 0.9])
-def test_cut_files_are_refused_in_one_line(make: Callable[[Path], Path], share: float, tmp_path: Path) -> None:
+def test_cut_files_are_refused_in_one_line(
+    make: Callable[[Path], Path], share: float, tmp_path: Path
+) -> None:
     path = make(tmp_path)
     content = path.read_bytes()
     path.write_bytes(content[: int(share * len(content))])
@@ -131,23 +144,27 @@ def test_cut_files_are_refused_in_one_line(make: Callable[[Path], Path], share: 
         ({"note": np.array("no number")}, "no arrays of two samples"),
     ],
 )
-def test_archives_without_a_log_are_refused(content: dict[str, Any], words: str, tmp_path: Path) -> None:
+def test_archives_without_a_log_are_refused(
+    content: dict[str, Any], words: str, tmp_path: Path
+) -> None:
     np.savez(tmp_path / "log.npz", **content)
     with pytest.raises(LogError, match=words):
         read_log(tmp_path / "log.npz")
 
 
 def test_more_joints_of_a_matrix_are_chosen_by_number(tmp_path: Path) -> None:
-    np.savez(tmp_path / "log.npz", t=T, q=np.vstack([THETA, 0 * T]).T, tau=np.vstack([TAU, 0 * T]).T)
+    np.savez(
+        tmp_path / "log.npz", t=T, q=np.vstack([THETA, 0 * T]).T, tau=np.vstack([TAU, 0 * T]).T
+    )
     with pytest.raises(LogError, match="3 joints"):
         read_log(tmp_path / "log.npz")
     assert right(read_log(tmp_path / "log.npz", Profile(joints=("0", "1"))))
 
 
 def test_a_frame_of_polars_is_read_too(tmp_path: Path) -> None:
-    pl.DataFrame({"t": T, "q1": THETA[0], "q2": THETA[1], "tau1": TAU[0], "tau2": TAU[1]}).write_ipc(
-        tmp_path / "log.ipc"
-    )
+    pl.DataFrame(
+        {"t": T, "q1": THETA[0], "q2": THETA[1], "tau1": TAU[0], "tau2": TAU[1]}
+    ).write_ipc(tmp_path / "log.ipc")
     assert right(read_log(tmp_path / "log.ipc"))
 
 
@@ -174,6 +191,12 @@ def test_elements_beyond_a_bound_are_refused(tmp_path: Path, limited: Limited) -
 
 
 def test_cells_texts_and_other_variables_are_passed_over(tmp_path: Path) -> None:
-    others = {"cells": np.array([1, "x", T], object), "text": "arm", "empty": np.empty(0), "flag": True, "z": 1j * T}
+    others = {
+        "cells": np.array([1, "x", T], object),
+        "text": "arm",
+        "empty": np.empty(0),
+        "flag": True,
+        "z": 1j * T,
+    }
     savemat(tmp_path / "log.mat", {"t": T, "q": THETA.T, "tau": TAU.T, **others})
     assert right(read_log(tmp_path / "log.mat"))

@@ -26,14 +26,20 @@ def tables(*sizes: int, **channels: FloatArray) -> Iterator[SampleTable]:
     for number, size in enumerate(sizes):
         rows = np.arange(first, first + size)
         columns = {name: channels.get(name, np.arange(sum(sizes)) * 1.0)[rows] for name in MAPPING}
-        yield SampleTable(rows * MS, columns, (Notice(f"TABLE{number}", f"table {number}", lossy=number == 1),))
+        yield SampleTable(
+            rows * MS, columns, (Notice(f"TABLE{number}", f"table {number}", lossy=number == 1),)
+        )
         first += size
 
 
-def reader(*sizes: int, settings: dict[str, Any] | None = None, **channels: FloatArray) -> TableReader:
+def reader(
+    *sizes: int, settings: dict[str, Any] | None = None, **channels: FloatArray
+) -> TableReader:
     profile = Profile.model_validate(settings or {})
     origin = Origin("log.csv", "csv", MAPPING)
-    return reader_of(origin, lambda _rows: tables(*sizes, **channels), profile, {}, (Notice("FIRST", "first"),))
+    return reader_of(
+        origin, lambda _rows: tables(*sizes, **channels), profile, {}, (Notice("FIRST", "first"),)
+    )
 
 
 def codes(log: Log) -> list[str]:
@@ -43,7 +49,10 @@ def codes(log: Log) -> list[str]:
 def test_notices_come_with_the_samples_they_were_found_at() -> None:
     blocks = list(reader(4, 0, 4, 0).blocks(4))
     assert [len(block) for block in blocks] == [4, 4]
-    assert [codes(block) for block in blocks] == [["FIRST", "TABLE0", "TABLE1"], ["TABLE2", "TABLE3"]]
+    assert [codes(block) for block in blocks] == [
+        ["FIRST", "TABLE0", "TABLE1"],
+        ["TABLE2", "TABLE3"],
+    ]
     assert sorted(codes(reader(0, 4).whole())) == ["FIRST", "TABLE0", "TABLE1"]
 
 
@@ -58,7 +67,9 @@ def test_blocks_are_as_large_as_asked_and_add_up(rows: int) -> None:
 
 
 @pytest.mark.parametrize("sizes", [(), (0,), (1,), (1, 0)])
-def test_a_log_of_fewer_than_two_samples_is_refused_with_what_was_lost(sizes: tuple[int, ...]) -> None:
+def test_a_log_of_fewer_than_two_samples_is_refused_with_what_was_lost(
+    sizes: tuple[int, ...],
+) -> None:
     count = "1 sample" if 1 in sizes else "0 samples"
     worst = "table 1" if len(sizes) == 2 else "first"
     with pytest.raises(LogError, match=rf"log.csv: {count}; a log needs two at least \({worst}\)$"):
@@ -69,8 +80,16 @@ def test_a_log_of_fewer_than_two_samples_is_refused_with_what_was_lost(sizes: tu
 def test_a_log_is_cut_where_the_user_says(sizes: tuple[int, ...]) -> None:
     """Both ends stay; times count from the first sample, whatever its stamp."""
     for settings, kept, text in (
-        ({"start": 0.003, "end": 0.006}, range(3, 7), "6 samples before 0.003 s or behind 0.006 s left out, as told"),
-        ({"start": 0.0035}, range(4, 10), "4 samples before 0.0035 s or behind the end left out, as told"),
+        (
+            {"start": 0.003, "end": 0.006},
+            range(3, 7),
+            "6 samples before 0.003 s or behind 0.006 s left out, as told",
+        ),
+        (
+            {"start": 0.0035},
+            range(4, 10),
+            "4 samples before 0.0035 s or behind the end left out, as told",
+        ),
         ({"end": 0.0088}, range(9), "1 sample before 0 s or behind 0.0088 s left out, as told"),
     ):
         log = reader(*sizes, settings=settings).whole()
@@ -82,13 +101,15 @@ def test_a_log_is_cut_where_the_user_says(sizes: tuple[int, ...]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("wrong", "found"), [(np.nan, "nan"), (-np.inf, "-inf"), (1e30, "1e\\+30"), (-3e200, "-3e\\+200")]
+    ("wrong", "found"),
+    [(np.nan, "nan"), (-np.inf, "-inf"), (1e30, "1e\\+30"), (-3e200, "-3e\\+200")],
 )
 def test_numbers_that_are_none_are_refused_or_left_out(wrong: float, found: str) -> None:
     values = np.zeros(10)
     values[7] = wrong
     with pytest.raises(
-        LogError, match=rf"tau2 \(column tau2\) in sample 8: expected a finite number .* found {found};"
+        LogError,
+        match=rf"tau2 \(column tau2\) in sample 8: expected a finite number .* found {found};",
     ):
         reader(4, 6, tau2=values).whole()
     log = reader(4, 6, tau2=values, settings={"accept": ["NOT_FINITE"]}).whole()

@@ -24,7 +24,9 @@ TYPE = "sensor_msgs/msg/JointState"
 
 
 def message(store: Any, log: Log, row: int, *, first: bool) -> Any:
-    time, header, state = (store.types[name] for name in ("builtin_interfaces/msg/Time", "std_msgs/msg/Header", TYPE))
+    time, header, state = (
+        store.types[name] for name in ("builtin_interfaces/msg/Time", "std_msgs/msg/Header", TYPE)
+    )
     sec, nanosec = divmod(int(log.stamp_ns[row]), 10**9)
     stamp = time(sec=sec, nanosec=nanosec)
     head = header(seq=row, stamp=stamp, frame_id="") if first else header(stamp=stamp, frame_id="")
@@ -44,7 +46,9 @@ def test_bags_of_both_generations_read_the_same(tmp_path: Path) -> None:
     with Writer1(tmp_path / "one.bag") as writer:
         channel = writer.add_connection("/joint_states", TYPE, typestore=store)
         for row, stamp in enumerate(log.stamp_ns.tolist()):
-            writer.write(channel, stamp, store.serialize_ros1(message(store, log, row, first=True), TYPE))
+            writer.write(
+                channel, stamp, store.serialize_ros1(message(store, log, row, first=True), TYPE)
+            )
     store = get_typestore(Stores.ROS2_HUMBLE)
     with Writer2(tmp_path / "two", version=9, storage_plugin=StoragePlugin.SQLITE3) as writer2:
         channel2 = writer2.add_connection("/joint_states", TYPE, typestore=store)
@@ -82,7 +86,11 @@ def test_topic_and_source_of_a_profile_are_honoured(tmp_path: Path) -> None:
     log = two(tmp_path / "bag", ("/one", "/two"))
     assert read_log(tmp_path / "bag", Profile(topic="/two")).origin.reading.topics == ("/two",)
     crossed = Profile.model_validate(
-        {"topic": "/one", "tau1": {"source": "effort[j2]"}, "tau2": {"topic": "/two", "source": "effort[0]"}}
+        {
+            "topic": "/one",
+            "tau1": {"source": "effort[j2]"},
+            "tau2": {"topic": "/two", "source": "effort[0]"},
+        }
     )
     found = read_log(tmp_path / "bag", crossed)
     assert found.tau.tolist() == log.tau[::-1].tolist()
@@ -110,7 +118,9 @@ def test_metadata_may_list_its_files_in_brackets(tmp_path: Path) -> None:
 
 def test_a_damaged_bag_is_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "log.bag").write_bytes(b"#ROSBAG V2.0\n" + np.arange(100).tobytes())
-    with pytest.raises(LogError, match=r"log\.bag: the file is damaged \(a record without 'op'.*copy it again"):
+    with pytest.raises(
+        LogError, match=r"log\.bag: the file is damaged \(a record without 'op'.*copy it again"
+    ):
         read_log(tmp_path / "log.bag")
 
 
@@ -121,7 +131,11 @@ def test_other_joints_of_a_bag_that_move_are_told(tmp_path: Path) -> None:
         channel = writer.add_connection("/joint_states", TYPE, typestore=store)
         for row, stamp in enumerate(log.stamp_ns.tolist()):
             own = message(store, log, row, first=False)
-            more = {"position": [0.1 * (row % 2), 0.0], "velocity": [0.0, 0.0], "effort": [0.0, 0.0]}
+            more = {
+                "position": [0.1 * (row % 2), 0.0],
+                "velocity": [0.0, 0.0],
+                "effort": [0.0, 0.0],
+            }
             values = {key: np.append(getattr(own, key), more[key]) for key in more}
             long = store.types[TYPE](header=own.header, name=["j1", "j2", "j3", "j4"], **values)
             writer.write(channel, stamp, store.serialize_cdr(long, TYPE))
@@ -135,7 +149,9 @@ def described(folder: Path, names: list[str], more: str = "") -> Path:
     """A folder of empty files, and metadata that list them."""
     folder.mkdir()
     listed = "".join(f"    - {name}\n" for name in names)
-    (folder / "metadata.yaml").write_text(f"info:\n  version: 5\n{more}  relative_file_paths:\n{listed}  files: []\n")
+    (folder / "metadata.yaml").write_text(
+        f"info:\n  version: 5\n{more}  relative_file_paths:\n{listed}  files: []\n"
+    )
     return folder
 
 
@@ -148,7 +164,11 @@ def test_the_files_of_a_bag_come_as_its_metadata_list_them(tmp_path: Path) -> No
     assert [path.name for path in bag.paths] == ["bag_1.mcap", "bag_0.mcap", "bag_2.mcap"]
     assert bag.kind == "mcap"
     (lost,) = bag.notices
-    assert (lost.code, lost.lossy, lost.text) == ("MISSING_SPLIT", True, "1 of 4 files of the bag missing: bag_10.mcap")
+    assert (lost.code, lost.lossy, lost.text) == (
+        "MISSING_SPLIT",
+        True,
+        "1 of 4 files of the bag missing: bag_10.mcap",
+    )
 
 
 def test_files_without_metadata_come_by_their_numbers(tmp_path: Path) -> None:
@@ -158,7 +178,9 @@ def test_files_without_metadata_come_by_their_numbers(tmp_path: Path) -> None:
     assert [path.name for path in found.paths] == ["run.db3", "a_9.db3", "run_9.db3", "run_10.db3"]
     assert (found.kind, found.notices) == ("db3", ())
     (tmp_path / "run_11.mcap").touch()
-    with pytest.raises(LogError, match=r"the bag mixes files of \.db3, \.mcap; read one file of it"):
+    with pytest.raises(
+        LogError, match=r"the bag mixes files of \.db3, \.mcap; read one file of it"
+    ):
         bag_files(tmp_path)
 
 
@@ -173,12 +195,18 @@ def test_files_without_metadata_come_by_their_numbers(tmp_path: Path) -> None:
         (["../a.db3"], "", r"'../a.db3' leads outside the bag's folder"),
         (["/etc/passwd"], "", "leads outside the bag's folder"),
         ([".."], "", "leads outside the bag's folder"),
-        (["a.db3"], "  compression_mode: FILE\n", r"compressed by rosbag2 \(compression_mode FILE\), unreadable"),
+        (
+            ["a.db3"],
+            "  compression_mode: FILE\n",
+            r"compressed by rosbag2 \(compression_mode FILE\), unreadable",
+        ),
         (["a.db3"], '  compression_mode: "message"\n', "compression_mode message"),
         ([], "", "no relative_file_paths; expected the metadata"),
     ],
 )
-def test_folders_that_are_no_bag_are_refused(names: list[str], more: str, words: str, tmp_path: Path) -> None:
+def test_folders_that_are_no_bag_are_refused(
+    names: list[str], more: str, words: str, tmp_path: Path
+) -> None:
     with pytest.raises(LogError, match=words):
         bag_files(described(tmp_path / "bag", names, more))
 
@@ -190,9 +218,14 @@ def states(folder: Path, *messages: dict[str, Any], topic: str = "/joint_states"
     with Writer2(folder, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
         channel = writer.add_connection(topic, TYPE, typestore=store)
         for row, fields in enumerate(messages):
-            values = {name: np.array(fields.get(name, ()), float) for name in ("position", "velocity", "effort")}
+            values = {
+                name: np.array(fields.get(name, ()), float)
+                for name in ("position", "velocity", "effort")
+            }
             stamp = time(sec=5, nanosec=row * 1_000_000)
-            state = store.types[TYPE](header=header(stamp=stamp, frame_id=""), name=fields["name"], **values)
+            state = store.types[TYPE](
+                header=header(stamp=stamp, frame_id=""), name=fields["name"], **values
+            )
             writer.write(channel, 10**9 + row, store.serialize_cdr(state, TYPE))
     return folder
 
@@ -201,7 +234,14 @@ PAIR = {"name": ["b", "a"], "position": [1, 2], "effort": [10, 20]}
 
 
 def test_joints_come_along_the_arm_and_messages_without_them_are_counted(tmp_path: Path) -> None:
-    path = states(tmp_path / "bag", PAIR, {"name": ["c"], "position": [9], "effort": [9]}, PAIR, {"name": []}, PAIR)
+    path = states(
+        tmp_path / "bag",
+        PAIR,
+        {"name": ["c"], "position": [9], "effort": [9]},
+        PAIR,
+        {"name": []},
+        PAIR,
+    )
     log = read_log(path)
     assert log.theta.tolist() == [[2] * 3, [1] * 3]
     assert log.tau.tolist() == [[20] * 3, [10] * 3]
@@ -212,7 +252,9 @@ def test_joints_come_along_the_arm_and_messages_without_them_are_counted(tmp_pat
         "2 messages on '/joint_states' left out: of other joints"
     ]
     # the recorder's own times, where a user asks for them
-    assert read_log(path, Profile(clock="log")).stamp_ns.tolist() == [10**9 + row for row in (0, 2, 4)]
+    assert read_log(path, Profile(clock="log")).stamp_ns.tolist() == [
+        10**9 + row for row in (0, 2, 4)
+    ]
 
 
 def test_velocities_are_read_only_where_they_are_wanted(tmp_path: Path) -> None:
@@ -226,7 +268,10 @@ def test_velocities_are_read_only_where_they_are_wanted(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("message", "words"),
     [
-        ({**PAIR, "effort": []}, "found '/joint_states' with the joints b, a, whose effort stay empty; name topics"),
+        (
+            {**PAIR, "effort": []},
+            "found '/joint_states' with the joints b, a, whose effort stay empty; name topics",
+        ),
         (
             {**PAIR, "name": ["a", "a"]},
             "messages on '/joint_states' name the joint 'a' twice; name the fields by their places",
@@ -241,7 +286,9 @@ def test_velocities_are_read_only_where_they_are_wanted(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_joint_states_that_do_not_fit_are_told(message: dict[str, Any], words: str, tmp_path: Path) -> None:
+def test_joint_states_that_do_not_fit_are_told(
+    message: dict[str, Any], words: str, tmp_path: Path
+) -> None:
     path = states(tmp_path / "bag", *[message] * 3)
     with pytest.raises(LogError, match=words):
         read_log(path)
@@ -251,23 +298,36 @@ def test_a_search_for_joints_ends(tmp_path: Path) -> None:
     """Among messages that all have other joints the first sixty-four tell enough."""
     odd = [{"name": [f"j{row}"], "position": [1], "effort": [1]} for row in range(80)]
     path = states(tmp_path / "bag", *odd, PAIR, PAIR)
-    with pytest.raises(LogError, match="no topic holds positions and efforts of two joints") as refused:
+    with pytest.raises(
+        LogError, match="no topic holds positions and efforts of two joints"
+    ) as refused:
         read_log(path)
     assert str(refused.value).count("with the joints") == 4
-    with pytest.raises(LogError, match=r"'/joint_states' has 64 joints \(j0, j1, .*, j11\); choose: --joints A,B"):
+    with pytest.raises(
+        LogError, match=r"'/joint_states' has 64 joints \(j0, j1, .*, j11\); choose: --joints A,B"
+    ):
         read_log(path, Profile(joints=("a", "b")))
 
 
 def test_a_field_needs_a_topic_and_a_topic_its_field(tmp_path: Path) -> None:
     path = states(tmp_path / "bag", *[PAIR] * 3)
-    fields = {"theta1": "position[0]", "theta2": "position[1]", "tau1": "effort[0]", "tau2": "effort[1]"}
+    fields = {
+        "theta1": "position[0]",
+        "theta2": "position[1]",
+        "tau1": "effort[0]",
+        "tau2": "effort[1]",
+    }
     named: dict[str, Any] = {name: {"source": field} for name, field in fields.items()}
-    with pytest.raises(LogError, match=r"theta1 is taken from 'position\[0\]' without a topic: --topic NAME"):
+    with pytest.raises(
+        LogError, match=r"theta1 is taken from 'position\[0\]' without a topic: --topic NAME"
+    ):
         read_log(path, Profile.model_validate(named))
     log = read_log(path, Profile.model_validate({**named, "topic": "/joint_states"}))
     assert log.tau.tolist() == [[10] * 3, [20] * 3]
     with pytest.raises(LogError, match=r"no message on topic '/other'; .*--set CHANNEL.topic=NAME"):
         read_log(path, Profile.model_validate({"tau2": {"source": "effort[0]", "topic": "/other"}}))
     for wrong in ("effort[²]", "effort[2]", "header.frame_id"):
-        with pytest.raises(LogError, match=r"messages on '/joint_states' have no .* for tau2; found header"):
+        with pytest.raises(
+            LogError, match=r"messages on '/joint_states' have no .* for tau2; found header"
+        ):
             read_log(path, Profile.model_validate({"tau2": {"source": wrong}}))

@@ -46,7 +46,9 @@ def ros1(path: Path, packing: Packing = None, threshold: int = 4096, imu: bool =
         other = writer.add_connection("/tick", "std_msgs/msg/Time", typestore=ROS1) if imu else None
         moment = ROS1.types["builtin_interfaces/msg/Time"]
         for row, stamp in enumerate(LOG.stamp_ns.tolist()):
-            writer.write(channel, stamp, ROS1.serialize_ros1(message(ROS1, LOG, row, first=True), TYPE))
+            writer.write(
+                channel, stamp, ROS1.serialize_ros1(message(ROS1, LOG, row, first=True), TYPE)
+            )
             for tick in range(60 if row % 50 == 0 else 0):
                 if other is None:
                     break
@@ -65,16 +67,23 @@ def codes(log: Log) -> dict[str, bool]:
     return {notice.code: notice.lossy for notice in log.notices}
 
 
-@pytest.mark.parametrize("packing", [None, Writer.CompressionFormat.BZ2, Writer.CompressionFormat.LZ4])
+@pytest.mark.parametrize(
+    "packing", [None, Writer.CompressionFormat.BZ2, Writer.CompressionFormat.LZ4]
+)
 @pytest.mark.parametrize("imu", [False, True])
-def test_every_packing_reads_the_same_as_with_the_library(packing: Packing, imu: bool, tmp_path: Path) -> None:
+def test_every_packing_reads_the_same_as_with_the_library(
+    packing: Packing, imu: bool, tmp_path: Path
+) -> None:
     path = ros1(tmp_path / "a.bag", packing, imu=imu)
     found = read_log(path)
     assert same(found, LOG)
     assert found.notices == ()
     with AnyReader([path]) as reader:
         wanted = [one for one in reader.connections if one.topic == "/joint_states"]
-        theirs = [reader.deserialize(raw, one.msgtype) for one, _, raw in reader.messages(connections=wanted)]
+        theirs = [
+            reader.deserialize(raw, one.msgtype)
+            for one, _, raw in reader.messages(connections=wanted)
+        ]
     assert np.array_equal(found.tau, np.array([one.effort for one in theirs]).T)  # type: ignore[attr-defined]
 
 
@@ -92,8 +101,12 @@ def test_a_header_that_lies_about_its_chunks_loses_nothing(chunks: int, tmp_path
     assert codes(found) == ({"CUT_OFF": True} if chunks == 1000 else {"DAMAGED_INDEX": False})
 
 
-@pytest.mark.parametrize(("name", "form", "value"), [(b"conn_count", "<I", 7), (b"index_pos", "<Q", 5000)])
-def test_a_header_that_lies_about_its_index_loses_nothing(name: bytes, form: str, value: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "form", "value"), [(b"conn_count", "<I", 7), (b"index_pos", "<Q", 5000)]
+)
+def test_a_header_that_lies_about_its_index_loses_nothing(
+    name: bytes, form: str, value: int, tmp_path: Path
+) -> None:
     path = ros1(tmp_path / "a.bag", imu=True)
     poked(path, head_field(path.read_bytes(), name), form, value)
     found = read_log(path)
@@ -127,7 +140,12 @@ def test_an_index_of_wrong_offsets_is_not_believed(tmp_path: Path) -> None:
     path = ros1(tmp_path / "a.bag")
     content = path.read_bytes()
     place = content.index(b"op=\x04")
-    poked(path, content.index(struct.pack("<II", *divmod(int(LOG.stamp_ns[0]), 10**9)), place) + 8, "<I", 40)
+    poked(
+        path,
+        content.index(struct.pack("<II", *divmod(int(LOG.stamp_ns[0]), 10**9)), place) + 8,
+        "<I",
+        40,
+    )
     assert same(read_log(path), LOG)
 
 
@@ -161,7 +179,9 @@ def test_records_behind_a_chunk_that_was_never_closed_are_read(tmp_path: Path) -
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
 @pytest.mark.parametrize("packing", [None, Writer.CompressionFormat.LZ4])
-def test_a_bag_that_breaks_off_is_read_up_to_there(packing: Packing, share: float, tmp_path: Path) -> None:
+def test_a_bag_that_breaks_off_is_read_up_to_there(
+    packing: Packing, share: float, tmp_path: Path
+) -> None:
     path = ros1(tmp_path / "a.bag", packing)
     content = path.read_bytes()
     path.write_bytes(content[: round(share * len(content))])
@@ -188,7 +208,9 @@ def test_a_connection_that_is_given_another_meaning_ends_what_is_read(tmp_path: 
     path = ros1(tmp_path / "a.bag")
     content = path.read_bytes()
     last = content.rindex(b"op=\x07")
-    path.write_bytes(content[: last - 60] + content[last - 60 :].replace(b"/joint_states", b"/joint_statez"))
+    path.write_bytes(
+        content[: last - 60] + content[last - 60 :].replace(b"/joint_states", b"/joint_statez")
+    )
     with pytest.raises(LogError, match="connection 0 is defined anew and differently"):
         read_log(path)
 
@@ -209,12 +231,16 @@ def test_a_chunk_that_claims_another_size_is_told(claim: int, tmp_path: Path) ->
 def test_an_encrypted_bag_is_refused(tmp_path: Path) -> None:
     fields = [b"op=\x03", b"index_pos=" + bytes(8), b"encryptor=some/AesCbc"]
     head = b"".join(struct.pack("<I", len(one)) + one for one in fields)
-    (tmp_path / "a.bag").write_bytes(b"#ROSBAG V2.0\n" + struct.pack("<I", len(head)) + head + struct.pack("<I", 0))
+    (tmp_path / "a.bag").write_bytes(
+        b"#ROSBAG V2.0\n" + struct.pack("<I", len(head)) + head + struct.pack("<I", 0)
+    )
     with pytest.raises(LogError, match=r"the bag is encrypted \(some/AesCbc\); decrypt it first"):
         read_log(tmp_path / "a.bag")
 
 
-def test_times_durations_and_empty_parts_of_ros1_stand_where_the_library_has_them(tmp_path: Path) -> None:
+def test_times_durations_and_empty_parts_of_ros1_stand_where_the_library_has_them(
+    tmp_path: Path,
+) -> None:
     """In an MCAP file, as recorders of ROS 1 write it: the encoding is the bag's."""
     text = (
         "time stamp\nduration wait\nbyte[3] raw\nstd_msgs/Empty none\nfloat32[] q\nduration[] list\nfloat64[2] tau\n"
@@ -225,15 +251,31 @@ def test_times_durations_and_empty_parts_of_ros1_stand_where_the_library_has_the
     for row in range(30):
         body = struct.pack("<IIii3b", 7, row, -1, 500, 1, 2, 3)
         body += struct.pack("<I2f", 2, row * 0.5, row * 0.25) + struct.pack("<I4i", 2, 1, 2, 3, 4)
-        body += struct.pack("<2d", 10.0 + row, 20.0 - row) + struct.pack("<I", len(note)) + note + b"\x09"
+        body += (
+            struct.pack("<2d", 10.0 + row, 20.0 - row)
+            + struct.pack("<I", len(note))
+            + note
+            + b"\x09"
+        )
         messages.append(("/arm", row * 10**6, body))
-    write_mcap(tmp_path / "a.mcap", messages, {"/arm": ("lab/Arm", "ros1msg", text.encode())}, encoding="ros1")
+    write_mcap(
+        tmp_path / "a.mcap",
+        messages,
+        {"/arm": ("lab/Arm", "ros1msg", text.encode())},
+        encoding="ros1",
+    )
     places = {"theta1": "q[0]", "theta2": "q[1]", "tau1": "tau[0]", "tau2": "tau[1]"}
     profile = {"topic": "/arm", **{name: {"source": source} for name, source in places.items()}}
     found = read_log(tmp_path / "a.mcap", Profile.model_validate(profile))
     assert found.stamp_ns.tolist() == [7 * 10**9 + row for row in range(30)]
-    assert found.theta.tolist() == [[row * 0.5 for row in range(30)], [row * 0.25 for row in range(30)]]
-    assert found.tau.tolist() == [[10.0 + row for row in range(30)], [20.0 - row for row in range(30)]]
+    assert found.theta.tolist() == [
+        [row * 0.5 for row in range(30)],
+        [row * 0.25 for row in range(30)],
+    ]
+    assert found.tau.tolist() == [
+        [10.0 + row for row in range(30)],
+        [20.0 - row for row in range(30)],
+    ]
     odd = Profile.model_validate({**profile, "tau2": {"source": "tail"}})
     assert read_log(tmp_path / "a.mcap", odd).tau[1].tolist() == [9.0] * 30
 
@@ -254,7 +296,9 @@ def changed(file: Path, *statements: str) -> None:
 def test_rows_without_a_time_are_counted(tmp_path: Path) -> None:
     file, log = database(tmp_path)
     changed(
-        file, "UPDATE messages SET timestamp = 'noon' WHERE rowid = 7", "UPDATE messages SET data = 5 WHERE rowid = 9"
+        file,
+        "UPDATE messages SET timestamp = 'noon' WHERE rowid = 7",
+        "UPDATE messages SET data = 5 WHERE rowid = 9",
     )
     found = read_log(file)
     assert len(found) == len(log) - 2
@@ -263,7 +307,10 @@ def test_rows_without_a_time_are_counted(tmp_path: Path) -> None:
     assert "2 damaged rows left out; the first: b'" not in notice.text
     assert "2 messages are missing" in notice.text
     changed(file, "UPDATE messages SET timestamp = 'noon'")
-    with pytest.raises(LogError, match=r"the file is damaged \('noon' for a time or a message in the table 'messages'"):
+    with pytest.raises(
+        LogError,
+        match=r"the file is damaged \('noon' for a time or a message in the table 'messages'",
+    ):
         read_log(file)
 
 
@@ -273,7 +320,10 @@ def test_messages_of_no_topic_are_told(tmp_path: Path) -> None:
     found = read_log(file)
     assert len(found) == 150
     assert codes(found) == {"STRAY_MESSAGES": True}
-    assert found.notices[0].text == f"{len(log) - 150} messages of no topic that the table 'topics' lists; left out"
+    assert (
+        found.notices[0].text
+        == f"{len(log) - 150} messages of no topic that the table 'topics' lists; left out"
+    )
 
 
 ENDLESS = "WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c)"
@@ -327,15 +377,24 @@ def test_a_database_that_is_none_of_rosbag2_is_refused_at_once(kind: str, tmp_pa
 
 def test_an_index_that_leaves_rows_out_is_not_used(tmp_path: Path) -> None:
     file, log = database(tmp_path)
-    changed(file, "CREATE INDEX few ON messages(topic_id, timestamp, data) WHERE topic_id IS NOT NULL")
+    changed(
+        file, "CREATE INDEX few ON messages(topic_id, timestamp, data) WHERE topic_id IS NOT NULL"
+    )
     assert same(read_log(file), log)
 
 
-def test_pages_in_a_circle_end_after_so_many_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pages_in_a_circle_end_after_so_many_steps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Rows without end stand for them: what a database may ask for is bounded by its size."""
     file, _ = database(tmp_path)
-    changed(file, f"INSERT INTO messages(topic_id, timestamp, data) {ENDLESS} SELECT 1, x, x'00' FROM c LIMIT 5000")
-    monkeypatch.setattr("algid.readers.bags.sqlite.LIMITS", limits(free_sqlite_steps=10_000, sqlite_steps_a_byte=0))
+    changed(
+        file,
+        f"INSERT INTO messages(topic_id, timestamp, data) {ENDLESS} SELECT 1, x, x'00' FROM c LIMIT 5000",
+    )
+    monkeypatch.setattr(
+        "algid.readers.bags.sqlite.LIMITS", limits(free_sqlite_steps=10_000, sqlite_steps_a_byte=0)
+    )
     with pytest.raises(LogError, match="it asks for more steps than any database of its size"):
         read_log(file)
     monkeypatch.setattr("algid.readers.bags.sqlite.LIMITS", limits(free_work=10, work_a_byte=0))
@@ -393,14 +452,20 @@ def test_messages_without_effort_are_lost_and_counted(form: str, tmp_path: Path)
 
 
 @pytest.mark.parametrize("known", [True, False])
-def test_a_type_whose_definition_the_file_lacks(known: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_type_whose_definition_the_file_lacks(
+    known: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Files of older rosbag2 hold no definitions: the usual types are those of the rosbags package."""
     file, log = database(tmp_path)
     store = get_typestore(Stores.ROS2_HUMBLE)
     kind, lists = "std_msgs/msg/Float64MultiArray", store.types["std_msgs/msg/Float64MultiArray"]
     layout = store.types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
     rows = [
-        (2, stamp, bytes(store.serialize_cdr(lists(layout=layout, data=np.array([*theta, *tau])), kind)))
+        (
+            2,
+            stamp,
+            bytes(store.serialize_cdr(lists(layout=layout, data=np.array([*theta, *tau])), kind)),
+        )
         for stamp, theta, tau in zip(log.stamp_ns.tolist(), log.theta.T, log.tau.T, strict=True)
     ]
     with closing(sqlite3.connect(file)) as base:
@@ -409,7 +474,9 @@ def test_a_type_whose_definition_the_file_lacks(known: bool, tmp_path: Path, mon
         base.execute("INSERT INTO topics VALUES (2, '/arm', ?, 'cdr', '', '')", (kind,))
         base.executemany("INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)", rows)
         base.commit()
-    places = dict(zip(("theta1", "theta2", "tau1", "tau2"), (f"data[{one}]" for one in range(4)), strict=True))
+    places = dict(
+        zip(("theta1", "theta2", "tau1", "tau2"), (f"data[{one}]" for one in range(4)), strict=True)
+    )
     profile = {"topic": "/arm", **{name: {"source": source} for name, source in places.items()}}
     if known:
         found = read_log(file, Profile.model_validate(profile))
@@ -417,11 +484,15 @@ def test_a_type_whose_definition_the_file_lacks(known: bool, tmp_path: Path, mon
         assert np.array_equal(found.tau, log.tau)
     else:
         monkeypatch.setitem(sys.modules, "rosbags.typesys", None)
-        with pytest.raises(LogError, match=r"holds no definition of std_msgs/msg/Float64MultiArray.*algid\[bags\]"):
+        with pytest.raises(
+            LogError, match=r"holds no definition of std_msgs/msg/Float64MultiArray.*algid\[bags\]"
+        ):
             read_log(file, Profile.model_validate(profile))
 
 
-def test_a_type_of_every_file_needs_no_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_type_of_every_file_needs_no_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     file, log = database(tmp_path)
     changed(file, "DROP TABLE message_definitions")
     monkeypatch.setitem(sys.modules, "rosbags.typesys", None)
@@ -432,10 +503,15 @@ def test_a_type_of_every_file_needs_no_package(tmp_path: Path, monkeypatch: pyte
 def test_a_database_that_asks_for_much_ends_by_a_signal(tmp_path: Path) -> None:
     """A table of very many small rows of another topic: what SQLite does in one call is bounded."""
     file, _ = database(tmp_path)
-    changed(file, f"INSERT INTO messages(topic_id, timestamp, data) {ENDLESS} SELECT 1, x, x'00' FROM c LIMIT 3000000")
+    changed(
+        file,
+        f"INSERT INTO messages(topic_id, timestamp, data) {ENDLESS} SELECT 1, x, x'00' FROM c LIMIT 3000000",
+    )
     code = "import sys; from algid.cli import main; sys.argv = ['algid', 'inspect', sys.argv[1]]; main()"
     process = subprocess.Popen(
-        [sys.executable, "-c", code, str(file)], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL
+        [sys.executable, "-c", code, str(file)],
+        stderr=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
     )
     time.sleep(1.5)
     process.send_signal(signal.SIGTERM)
@@ -453,7 +529,10 @@ def test_channels_of_bags_are_listed(tmp_path: Path) -> None:
         assert source.span_ns == (int(LOG.stamp_ns[0]), int(LOG.stamp_ns[-1]))
 
 
-OPENERS: list[Callable[[Path], Path]] = [lambda folder: ros1(folder / "a.bag"), lambda folder: database(folder)[0]]
+OPENERS: list[Callable[[Path], Path]] = [
+    lambda folder: ros1(folder / "a.bag"),
+    lambda folder: database(folder)[0],
+]
 
 
 @pytest.mark.parametrize("made", OPENERS)

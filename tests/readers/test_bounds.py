@@ -1,4 +1,6 @@
-"""Every loop over what a file claims has a bound, `algid.limits.LIMITS`; and patterns take time with a text's length.
+"""Every loop over what a file claims has a bound, `algid.limits.LIMITS`.
+
+And patterns take time with a text's length.
 
 A text here is so long that a pattern which takes time with its square would not end.
 """
@@ -45,7 +47,10 @@ def test_a_long_name_of_a_column_is_passed_over(piece: str, tmp_path: Path) -> N
     name = "q" + piece * 500_000
     assert len(read_log(parquet(tmp_path, **{name: [0.0] * 300, f"{name}x": [0.0] * 300}))) == 300
     name = name[:60_000]
-    assert len(read_log(csv(tmp_path, f"{','.join(COLUMNS)},{name}", *(f"{row},0" for row in ROWS)))) == 300
+    assert (
+        len(read_log(csv(tmp_path, f"{','.join(COLUMNS)},{name}", *(f"{row},0" for row in ROWS))))
+        == 300
+    )
 
 
 def test_a_name_beyond_the_bound_is_its_own_stem(limited: Limited) -> None:
@@ -56,7 +61,10 @@ def test_a_name_beyond_the_bound_is_its_own_stem(limited: Limited) -> None:
 
 def test_a_cell_of_very_many_digits_is_no_number(tmp_path: Path) -> None:
     name = "9" * 60_000 + "x"
-    assert len(read_log(csv(tmp_path, f"{','.join(COLUMNS)},{name}", *(f"{row},0" for row in ROWS)))) == 300
+    assert (
+        len(read_log(csv(tmp_path, f"{','.join(COLUMNS)},{name}", *(f"{row},0" for row in ROWS))))
+        == 300
+    )
 
 
 def test_a_table_of_blanks_is_refused_at_its_row(tmp_path: Path) -> None:
@@ -99,18 +107,25 @@ def test_a_footer_of_very_many_values_is_refused(tmp_path: Path, limited: Limite
 def test_a_table_of_very_many_columns_is_refused(tmp_path: Path, limited: Limited) -> None:
     limited(columns=5)
     assert len(read_log(parquet(tmp_path))) == 300
-    for path in (parquet(tmp_path, x=[0.0] * 300), csv(tmp_path, f"{','.join(COLUMNS)},x", *(f"{r},0" for r in ROWS))):
+    for path in (
+        parquet(tmp_path, x=[0.0] * 300),
+        csv(tmp_path, f"{','.join(COLUMNS)},x", *(f"{r},0" for r in ROWS)),
+    ):
         with pytest.raises(LogError, match=f"6 columns; expected {LIMITS.columns} at most"):
             read_log(path)
 
 
 @pytest.mark.parametrize("step", [1, 10, 999])
 @pytest.mark.parametrize("kind", ["csv", "parquet", "mcap"])
-def test_steps_that_no_arm_is_sampled_with_are_refused(step: int, kind: str, tmp_path: Path) -> None:
+def test_steps_that_no_arm_is_sampled_with_are_refused(
+    step: int, kind: str, tmp_path: Path
+) -> None:
     log = clean_log(300)
     quick = replace(log, stamp_ns=10**18 + np.arange(300) * step)
     write_log(tmp_path / f"log.{kind}", quick)
-    with pytest.raises(LogError, match=f"its stamps are {step} ns apart in the median, .* say their unit"):
+    with pytest.raises(
+        LogError, match=f"its stamps are {step} ns apart in the median, .* say their unit"
+    ):
         identify(tmp_path / f"log.{kind}", report=False)
     with pytest.raises(LogError, match="as no arm's log is"):
         identify(quick, report=False)

@@ -42,7 +42,9 @@ def test_columns_that_are_missing_are_named_with_the_flags_that_name_them() -> N
 
 
 def test_columns_that_were_written_must_be_there() -> None:
-    with pytest.raises(LogError, match="the columns tau2, omega1 that were written are not there: the file was"):
+    with pytest.raises(
+        LogError, match="the columns tau2, omega1 that were written are not there: the file was"
+    ):
         assign("log.csv", PLAIN.split()[:-1], Profile(), {}, ["tau2", "tau1", "omega1"])
 
 
@@ -54,7 +56,9 @@ def test_a_joint_without_motor_needs_no_torque(passive: int) -> None:
         assert found.sources[f"tau{driven}"] == torque
         assert found.sources[f"tau{passive}"] == torque
     assert "no column for tau1, tau2" in refusal(f"t q1 q2 tau{driven}")
-    assert "no column for tau" in refusal("t q1 q2 tau7 tau8 tau9".replace("tau8 tau9", ""), {"passive": passive})
+    assert "no column for tau" in refusal(
+        "t q1 q2 tau7 tau8 tau9".replace("tau8 tau9", ""), {"passive": passive}
+    )
 
 
 def test_velocities_are_taken_in_pairs_and_if_wanted() -> None:
@@ -68,7 +72,8 @@ def test_velocities_are_taken_in_pairs_and_if_wanted() -> None:
 
 def test_who_said_which_joint_is_the_first() -> None:
     sources: dict[str, Any] = {
-        name: {"source": own} for name, own in zip(("theta1", "theta2", "tau1", "tau2"), PLAIN.split()[1:], strict=True)
+        name: {"source": own}
+        for name, own in zip(("theta1", "theta2", "tau1", "tau2"), PLAIN.split()[1:], strict=True)
     }
     named = "t wrist_pos elbow_pos wrist_torque elbow_torque"
     found = assigned(named)
@@ -77,7 +82,11 @@ def test_who_said_which_joint_is_the_first() -> None:
     assert assigned(PLAIN).reading.joints_told == "names"
     assert assigned(PLAIN, sources).reading.joints_told == "profile"
     told = assigned(named, {"joints": ["wrist", "elbow"]})
-    assert (told.reading.joints, told.reading.joints_told, told.notices) == (("wrist", "elbow"), "flag", ())
+    assert (told.reading.joints, told.reading.joints_told, told.notices) == (
+        ("wrist", "elbow"),
+        "flag",
+        (),
+    )
     assert told.sources["tau1"] == "wrist_torque"
 
 
@@ -91,7 +100,9 @@ def test_who_said_which_joint_is_the_first() -> None:
         ("t theta1 theta2 tau1 tau2", {}, "s", False),
     ],
 )
-def test_the_unit_of_time(header: str, settings: dict[str, Any], unit: str | None, stated: bool) -> None:
+def test_the_unit_of_time(
+    header: str, settings: dict[str, Any], unit: str | None, stated: bool
+) -> None:
     """algid's own names mean seconds, and still are only taken to."""
     found = assigned(header, settings)
     assert (found.time_unit, found.time_stated) == (unit, stated)
@@ -121,14 +132,27 @@ def test_currents_are_in_amperes_unless_their_unit_is_told() -> None:
 
 
 def test_the_file_and_the_user_differ_about_a_unit() -> None:
-    assert said(assigned("t q1_deg q2_deg tau1 tau2", {"theta1": {"unit": "rad"}, "theta2": {"unit": "deg"}})) == [
-        ("OTHER_UNIT", "the file states the unit deg for theta1 ('q1_deg'), which is taken for rad as told")
+    assert said(
+        assigned(
+            "t q1_deg q2_deg tau1 tau2", {"theta1": {"unit": "rad"}, "theta2": {"unit": "deg"}}
+        )
+    ) == [
+        (
+            "OTHER_UNIT",
+            "the file states the unit deg for theta1 ('q1_deg'), which is taken for rad as told",
+        )
     ]
     assert said(assigned("t q1_deg q2 tau1 tau2", None, q1_deg="rad", q2="deg")) == [
-        ("OTHER_UNIT", "the file states the unit rad beside theta1; its name, 'q1_deg', says deg, which holds")
+        (
+            "OTHER_UNIT",
+            "the file states the unit rad beside theta1; its name, 'q1_deg', says deg, which holds",
+        )
     ]
     assert said(assigned("time_ms q1 q2 tau1 tau2", {"time_unit": "s"})) == [
-        ("OTHER_UNIT", "the file states the unit ms for t ('time_ms'), which is taken for s as told")
+        (
+            "OTHER_UNIT",
+            "the file states the unit ms for t ('time_ms'), which is taken for s as told",
+        )
     ]
 
 
@@ -139,7 +163,10 @@ def test_a_unit_of_no_joint_is_refused_where_it_counts() -> None:
     )
     assert '--set tau2.unit="N m"' in refusal(PLAIN, None, tau2="%")
     (foreign,) = said(assigned("t q1_inch q2 tau1 tau2", {"theta1": {"unit": "rev"}}))
-    assert foreign[1] == "the column 'q1_inch' for theta1 states the unit 'inch', and is taken for rev as told"
+    assert (
+        foreign[1]
+        == "the column 'q1_inch' for theta1 states the unit 'inch', and is taken for rev as told"
+    )
     assert said(assigned("t q1_inch q2 q_b tau1 tau2", {"theta1": {"source": "q_b"}})) == []
     assert said(assigned(PLAIN, None, t="%")) == []
 
@@ -172,7 +199,9 @@ def test_motors_beside_joints_need_a_gear() -> None:
         ("[Nm]", "[nm]", None, None, None),
     ],
 )
-def test_a_name_taken_apart(column: str, stem: str, joint: str | None, unit: str | None, foreign: str | None) -> None:
+def test_a_name_taken_apart(
+    column: str, stem: str, joint: str | None, unit: str | None, foreign: str | None
+) -> None:
     assert take_apart(column) == Name(stem, joint, unit, foreign)
 
 
@@ -203,12 +232,16 @@ def test_the_pair_chosen(columns: str, joints: tuple[str, str] | None, chosen: s
 
 def test_joints_told_that_stand_there_twice_or_not_at_all() -> None:
     columns = ["t", "/a/x/position", "/b/x/position", "/a/y/position", "/a/x/effort", "/a/y/effort"]
-    with pytest.raises(LookupError, match=r"no columns of the joints x, y; joints there are: x, y$"):
+    with pytest.raises(
+        LookupError, match=r"no columns of the joints x, y; joints there are: x, y$"
+    ):
         choose(columns, ("x", "y"))
     assert choose(columns, ("/a/x", "y")).columns["theta1"] == "/a/x/position"
     with pytest.raises(LookupError, match="joints there are: none that can be told by their names"):
         choose(["t", "alpha", "beta"], ("1", "2"))
-    with pytest.raises(LookupError, match=re.escape("'pos' stands there for 9 joints: 1, 2, 3, 4, 5, 6, 7, 8")):
+    with pytest.raises(
+        LookupError, match=re.escape("'pos' stands there for 9 joints: 1, 2, 3, 4, 5, 6, 7, 8")
+    ):
         choose([f"pos{joint}" for joint in range(1, 10)])
 
 
@@ -231,7 +264,9 @@ def test_other_joints_are_those_of_the_same_quantity_and_topic() -> None:
     assert other_joints(flat, ["q1", "q2"]) == {"3": "q3"}
     topics = ["/a/x/position", "/a/y/position", "/a/z/position", "/b/w/position", "/a/z/effort"]
     assert other_joints(topics, topics[:2]) == {"z": "/a/z/position"}
-    assert other_joints(["hip_pos", "knee_pos", "toe_pos", "max_pos"], ["hip_pos", "knee_pos"]) == {"toe": "toe_pos"}
+    assert other_joints(["hip_pos", "knee_pos", "toe_pos", "max_pos"], ["hip_pos", "knee_pos"]) == {
+        "toe": "toe_pos"
+    }
 
 
 def test_the_first_of_two_clocks_of_one_name_and_the_only_torque() -> None:
@@ -246,7 +281,11 @@ def test_the_first_of_two_clocks_of_one_name_and_the_only_torque() -> None:
 
 
 def test_joint_and_axis_are_no_joints_names() -> None:
-    columns = [f"{joint}_{signal}" for joint in ("base_axis", "elbow_axis") for signal in ("pos", "torque")]
+    columns = [
+        f"{joint}_{signal}" for joint in ("base_axis", "elbow_axis") for signal in ("pos", "torque")
+    ]
     assert choose(["t", *columns]).joints == ("base", "elbow")
     assert choose(["t", *columns], ("elbow", "base")).columns["theta1"] == "elbow_axis_pos"
-    assert choose(["t", "axis_pos", "joint_pos", "axis_torque", "joint_torque"]).columns == {"t": "t"}
+    assert choose(["t", "axis_pos", "joint_pos", "axis_torque", "joint_torque"]).columns == {
+        "t": "t"
+    }

@@ -30,12 +30,18 @@ VELOCITIES = {**ANGLES, "rpm": TURN / constants.minute}
 MAPPING = {name: f"column of {name}" for name in CHANNELS}
 
 
-def readings(settings: dict[str, Any], stated: dict[str, str] | None = None) -> dict[str, ChannelReading]:
+def readings(
+    settings: dict[str, Any], stated: dict[str, str] | None = None
+) -> dict[str, ChannelReading]:
     return channel_readings("log", MAPPING, Profile.model_validate(settings), stated or {})
 
 
 def test_the_units_are_those_known_here() -> None:
-    assert (set(TORQUES), set(VELOCITIES), set(CURRENT)) == (set(TORQUE), set(VELOCITY), {"A", "mA"})
+    assert (set(TORQUES), set(VELOCITIES), set(CURRENT)) == (
+        set(TORQUE),
+        set(VELOCITY),
+        {"A", "mA"},
+    )
 
 
 @pytest.mark.parametrize("gear", [1.0, 100.0])
@@ -49,7 +55,9 @@ def test_every_unit_on_either_side_of_a_gear(gear: float) -> None:
         found = readings({"omega2": channel})["omega2"]
         assert found.factor == pytest.approx(size / gear, rel=1e-12)
         if unit in ANGLES:
-            assert readings({"theta2": channel})["theta2"].factor == pytest.approx(size / gear, rel=1e-12)
+            assert readings({"theta2": channel})["theta2"].factor == pytest.approx(
+                size / gear, rel=1e-12
+            )
     drive = {"torque_constant": 0.05, "gear_ratio": gear}
     for unit, size in (("A", 1), ("mA", 1e-3)):
         found = readings({"tau2": drive}, {"tau2": unit})["tau2"]
@@ -82,13 +90,31 @@ def test_signs_and_offsets_of_channels_and_joints_add_up() -> None:
 @pytest.mark.parametrize(
     ("settings", "stated", "words"),
     [
-        ({}, {"tau1": "deg"}, r"tau1 \(column of tau1\) is in 'deg' by its name; expected one of N m, .*, A, mA; say"),
-        ({}, {"theta2": "N m"}, r"theta2 .* expected one of rad, .*, rpm, counts; .*--set theta2.unit=\"rad\""),
-        ({}, {"tau2": "A"}, r"tau2 is a current; .*--set tau2.torque_constant=… .*tau2.unit=\"N m\".*up to a gain"),
-        ({}, {"theta1": "counts"}, r"theta1 in encoder counts needs counts a turn: --set theta1.counts=…"),
+        (
+            {},
+            {"tau1": "deg"},
+            r"tau1 \(column of tau1\) is in 'deg' by its name; expected one of N m, .*, A, mA; say",
+        ),
+        (
+            {},
+            {"theta2": "N m"},
+            r"theta2 .* expected one of rad, .*, rpm, counts; .*--set theta2.unit=\"rad\"",
+        ),
+        (
+            {},
+            {"tau2": "A"},
+            r"tau2 is a current; .*--set tau2.torque_constant=… .*tau2.unit=\"N m\".*up to a gain",
+        ),
+        (
+            {},
+            {"theta1": "counts"},
+            r"theta1 in encoder counts needs counts a turn: --set theta1.counts=…",
+        ),
     ],
 )
-def test_units_that_do_not_fit_are_refused(settings: dict[str, Any], stated: dict[str, str], words: str) -> None:
+def test_units_that_do_not_fit_are_refused(
+    settings: dict[str, Any], stated: dict[str, str], words: str
+) -> None:
     with pytest.raises(LogError, match=words):
         readings(settings, stated)
 
@@ -104,7 +130,9 @@ SIGNALS = np.random.default_rng(7).normal(size=(6, 50))
 def converted(**settings: Any) -> Room:
     samples = SampleTable(np.arange(50), dict(zip(CHANNELS, SIGNALS, strict=True)))
     room = Room.empty(50, velocity=True)
-    Conversion({name: ChannelReading(name, "") for name in CHANNELS}, **settings).apply(samples, room)
+    Conversion({name: ChannelReading(name, "") for name in CHANNELS}, **settings).apply(
+        samples, room
+    )
     return room
 
 
@@ -113,7 +141,12 @@ def test_a_second_motor_at_the_base_does_the_same_work() -> None:
     room = converted(base=True)
     assert room.omega is not None
     (first, second), (one, two) = SIGNALS[2:4], SIGNALS[4:6]
-    assert np.allclose((room.tau * room.omega).sum(axis=0), first * one + second * (one + two), rtol=1e-13, atol=1e-13)
+    assert np.allclose(
+        (room.tau * room.omega).sum(axis=0),
+        first * one + second * (one + two),
+        rtol=1e-13,
+        atol=1e-13,
+    )
 
 
 def test_zero_and_reference_of_the_angles() -> None:
@@ -132,7 +165,8 @@ def test_factor_and_offset_of_a_channel() -> None:
     samples = SampleTable(np.arange(50), dict(zip(CHANNELS, SIGNALS, strict=True)))
     room = Room.empty(50, velocity=False)
     channels = {
-        name: ChannelReading(name, "", factor=place - 1.5, offset=1.0 - place) for place, name in enumerate(CHANNELS)
+        name: ChannelReading(name, "", factor=place - 1.5, offset=1.0 - place)
+        for place, name in enumerate(CHANNELS)
     }
     Conversion(channels).apply(samples, room)
     wanted = [(place - 1.5) * SIGNALS[place] + 1.0 - place for place in range(4)]
@@ -147,7 +181,11 @@ def test_a_file_is_not_believed_how_many_samples_it_holds() -> None:
 
 
 @settings(max_examples=40, deadline=None)
-@given(sizes=st.lists(st.integers(0, 40), min_size=1, max_size=8), expected=st.integers(0, 60), velocity=st.booleans())
+@given(
+    sizes=st.lists(st.integers(0, 40), min_size=1, max_size=8),
+    expected=st.integers(0, 60),
+    velocity=st.booleans(),
+)
 def test_a_gatherer_keeps_what_was_put_in(sizes: list[int], expected: int, velocity: bool) -> None:
     """Whatever number of samples was expected, also none."""
     gatherer, total = Gatherer(expected, velocity=velocity), sum(sizes)
@@ -155,7 +193,10 @@ def test_a_gatherer_keeps_what_was_put_in(sizes: list[int], expected: int, veloc
     done = 0
     for size in sizes:
         room, rows = gatherer.more(size), slice(done, done + size)
-        room.stamp_ns[:], room.theta[:], room.tau[:] = np.arange(done, done + size), *signals[:2, :, rows]
+        room.stamp_ns[:], room.theta[:], room.tau[:] = (
+            np.arange(done, done + size),
+            *signals[:2, :, rows],
+        )
         if room.omega is not None:
             room.omega[:] = signals[2, :, rows]
         done += size
@@ -169,7 +210,10 @@ def test_a_gatherer_keeps_what_was_put_in(sizes: list[int], expected: int, veloc
 
 
 @settings(max_examples=40, deadline=None)
-@given(steps=st.lists(st.floats(-3, 3), min_size=2, max_size=60), cuts=st.sets(st.integers(0, 59), max_size=4))
+@given(
+    steps=st.lists(st.floats(-3, 3), min_size=2, max_size=60),
+    cuts=st.sets(st.integers(0, 59), max_size=4),
+)
 def test_unwrapping_is_that_of_numpy_in_any_blocks(steps: list[float], cuts: set[int]) -> None:
     turning = np.cumsum(steps)
     wrapped = np.angle(np.exp(1j * turning))

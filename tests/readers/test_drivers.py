@@ -18,9 +18,24 @@ from tests.readers.mcaps import TOPIC, joint_state, messages_of, write_mcap
 
 LOG = noise_log(80, start_ns=EPOCH_NS)
 DRIVERS = {
-    "libfranka": ("state.q[{}]", "state.tau_J[{}]", "state.dq[{}]", ("state.q_d[{}]", "state.tau_J_d[{}]")),
-    "franka_ros": ("franka_state.q[{}]", "franka_state.tau_J[{}]", "franka_state.dq[{}]", ("franka_state.dtheta[{}]",)),
-    "unitree": ("motor_state[{}].q", "motor_state[{}].tau_est", "motor_state[{}].dq", ("motor_state[{}].temperature",)),
+    "libfranka": (
+        "state.q[{}]",
+        "state.tau_J[{}]",
+        "state.dq[{}]",
+        ("state.q_d[{}]", "state.tau_J_d[{}]"),
+    ),
+    "franka_ros": (
+        "franka_state.q[{}]",
+        "franka_state.tau_J[{}]",
+        "franka_state.dq[{}]",
+        ("franka_state.dtheta[{}]",),
+    ),
+    "unitree": (
+        "motor_state[{}].q",
+        "motor_state[{}].tau_est",
+        "motor_state[{}].dq",
+        ("motor_state[{}].temperature",),
+    ),
     "low_state": (
         "low_state.motor_state[{}].q",
         "low_state.motor_state[{}].tau_est",
@@ -71,21 +86,30 @@ def test_plain_columns_stand_before_those_of_a_state(tmp_path: Path) -> None:
 def test_messages_of_unitree_are_read(tmp_path: Path) -> None:
     messages = []
     for row, stamp in enumerate(LOG.stamp_ns.tolist()):
-        motors = [{"q": LOG.theta[one, row], "tau_est": LOG.tau[one, row], "mode": 1} for one in (0, 1)]
+        motors = [
+            {"q": LOG.theta[one, row], "tau_est": LOG.tau[one, row], "mode": 1} for one in (0, 1)
+        ]
         messages.append(("/lowstate", stamp, json.dumps({"motor_state": motors}).encode()))
-    write_mcap(tmp_path / "a.mcap", messages, {"/lowstate": ("L", "jsonschema", b"{}")}, encoding="json")
+    write_mcap(
+        tmp_path / "a.mcap", messages, {"/lowstate": ("L", "jsonschema", b"{}")}, encoding="json"
+    )
     log = read_log(tmp_path / "a.mcap")
     assert np.array_equal(log.theta, LOG.theta)
     assert np.array_equal(log.tau, LOG.tau)
 
 
 def test_of_two_topics_with_both_joints_it_is_said_which_was_taken(tmp_path: Path) -> None:
-    messages = [*messages_of(LOG), *(("/arm/state", stamp, data) for _, stamp, data in messages_of(LOG))]
+    messages = [
+        *messages_of(LOG),
+        *(("/arm/state", stamp, data) for _, stamp, data in messages_of(LOG)),
+    ]
     write_mcap(tmp_path / "a.mcap", messages)
     log = read_log(tmp_path / "a.mcap")
     (notice,) = (notice for notice in log.notices if notice.code == "TOPIC_CHOICE")
     assert notice.note
-    assert notice.text == "the joints are taken from '/joint_states'; there are two also on /arm/state"
+    assert (
+        notice.text == "the joints are taken from '/joint_states'; there are two also on /arm/state"
+    )
     assert [remedy.settings for remedy in notice.remedies] == [{"topic": "/arm/state"}]
     chosen = read_log(tmp_path / "a.mcap", Profile(topic="/arm/state"))
     assert not [notice for notice in chosen.notices if notice.code == "TOPIC_CHOICE"]
@@ -94,7 +118,9 @@ def test_of_two_topics_with_both_joints_it_is_said_which_was_taken(tmp_path: Pat
 def held_beside(log: Log, joint: int) -> list[dict[str, object]]:
     """The settings that are told to take other channels for the torque of a joint that is zero."""
     zero = [one for one in examine(log) if one.code == "EFFORT_ZERO"]
-    remedies = [remedy for one in zero for remedy in one.remedies if remedy.when == "the log also holds"]
+    remedies = [
+        remedy for one in zero for remedy in one.remedies if remedy.when == "the log also holds"
+    ]
     return [dict(remedy.settings) for remedy in remedies if f"tau{joint}.source" in remedy.settings]
 
 
@@ -142,6 +168,14 @@ def write_both(path: Path, messages: list[tuple[str, int, bytes]]) -> None:
 
 
 def test_columns_that_may_be_the_torque_are_named(tmp_path: Path) -> None:
-    table = {"t": LOG.t, "q1": LOG.theta[0], "q2": LOG.theta[1], "tau1": 0 * LOG.t, "tau2": LOG.tau[1]}
-    pl.DataFrame({**table, "torque_sensor": LOG.tau[0], "torque_limit": LOG.t}).write_csv(tmp_path / "a.csv")
+    table = {
+        "t": LOG.t,
+        "q1": LOG.theta[0],
+        "q2": LOG.theta[1],
+        "tau1": 0 * LOG.t,
+        "tau2": LOG.tau[1],
+    }
+    pl.DataFrame({**table, "torque_sensor": LOG.tau[0], "torque_limit": LOG.t}).write_csv(
+        tmp_path / "a.csv"
+    )
     assert held_beside(read_log(tmp_path / "a.csv"), 1) == [{"tau1.source": "torque_sensor"}]

@@ -32,7 +32,9 @@ REFUSED = {
     "dense union": pa.UnionArray.from_dense(
         pa.array([0] * N, pa.int8()), pa.array(range(N), pa.int32()), [pa.array(T)]
     ),
-    "run-end encoded": pa.RunEndEncodedArray.from_arrays(pa.array([N], pa.int32()), pa.array([1.0])),
+    "run-end encoded": pa.RunEndEncodedArray.from_arrays(
+        pa.array([N], pa.int32()), pa.array([1.0])
+    ),
     "interval": pa.array([(1, 2, 3)] * N, pa.month_day_nano_interval()),
     "list view": pa.array([[1.0]] * N, pa.list_view(pa.float64())),
     "map": pa.array([[("a", 1)]] * N, pa.map_(pa.string(), pa.int64())),
@@ -42,11 +44,16 @@ REFUSED = {
 }
 
 
-def write(path: Path, columns: dict[str, Any], names: list[str] | None = None, **options: Any) -> Path:
+def write(
+    path: Path, columns: dict[str, Any], names: list[str] | None = None, **options: Any
+) -> Path:
     arrays = [pa.array(one) if isinstance(one, np.ndarray) else one for one in columns.values()]
     table = pa.Table.from_arrays(arrays, names or list(columns))
     written = pa.ipc.IpcWriteOptions(**options)
-    with pa.OSFile(str(path), "wb") as sink, pa.ipc.new_file(sink, table.schema, options=written) as file:
+    with (
+        pa.OSFile(str(path), "wb") as sink,
+        pa.ipc.new_file(sink, table.schema, options=written) as file,
+    ):
         file.write_table(table, max_chunksize=100)
     return path
 
@@ -56,7 +63,9 @@ def right(log: Log) -> bool:
 
 
 @pytest.mark.parametrize("kind", REFUSED)
-def test_a_type_that_holds_no_numbers_is_refused_where_it_is_needed_alone(kind: str, tmp_path: Path) -> None:
+def test_a_type_that_holds_no_numbers_is_refused_where_it_is_needed_alone(
+    kind: str, tmp_path: Path
+) -> None:
     assert right(read_log(write(tmp_path / "log.feather", {**LOG, "extra": REFUSED[kind]})))
     with pytest.raises(LogError, match=r"column 'theta1' for theta1 holds .*; expected numbers"):
         read_log(write(tmp_path / "log.feather", {**LOG, "theta1": REFUSED[kind]}))

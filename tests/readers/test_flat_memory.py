@@ -49,7 +49,13 @@ def _packed(columns: Columns) -> bytes:
 
 def _write(path: Path, kind: str, rows: int) -> None:
     t = np.arange(rows) / 1000
-    columns = {"t": t, "theta1": np.sin(2 * t), "theta2": np.cos(3 * t), "tau1": np.cos(t), "tau2": np.sin(t)}
+    columns = {
+        "t": t,
+        "theta1": np.sin(2 * t),
+        "theta2": np.cos(3 * t),
+        "tau1": np.cos(t),
+        "tau2": np.sin(t),
+    }
     WRITERS[kind](path, columns)
 
 
@@ -61,11 +67,15 @@ def test_blocks_of_a_table_are_its_rows(kind: str, tmp_path: Path) -> None:
     assert [len(block) for block in blocks] == [5000, 5000, 2000]
     stamps = np.concatenate([block.stamp_ns for block in blocks])
     assert np.array_equal(stamps, np.arange(12_000) * 1_000_000)
-    assert np.allclose(np.concatenate([block.tau[1] for block in blocks]), np.sin(stamps * 1e-9), atol=1e-6)
+    assert np.allclose(
+        np.concatenate([block.tau[1] for block in blocks]), np.sin(stamps * 1e-9), atol=1e-6
+    )
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the system does not tell a program's peak")
+@pytest.mark.skipif(
+    not Path("/proc/self/status").exists(), reason="the system does not tell a program's peak"
+)
 @pytest.mark.parametrize("kind", WRITERS)
 def test_ten_million_samples_are_read_in_bounded_memory(kind: str, tmp_path: Path) -> None:
     path = tmp_path / f"log.{kind}"

@@ -31,7 +31,9 @@ def arm(rows: int = ROWS, joints: int = 3) -> pl.DataFrame:
     """Joints that all swing by 0.8 rad, at 1 kHz."""
     t = np.arange(rows) * 1e-3
     angles = {f"q{joint}": 0.4 * np.sin(9 * t + joint) for joint in range(1, joints + 1)}
-    return pl.DataFrame({"t": t, **angles, **{f"tau{joint}": np.cos(t + joint) for joint in range(1, joints + 1)}})
+    return pl.DataFrame(
+        {"t": t, **angles, **{f"tau{joint}": np.cos(t + joint) for joint in range(1, joints + 1)}}
+    )
 
 
 def other_joints(path: Path) -> list[str]:
@@ -39,12 +41,21 @@ def other_joints(path: Path) -> list[str]:
     return [notice.text for notice in reader.notices if notice.code == "OTHER_JOINTS"]
 
 
-@pytest.mark.parametrize("options", [{"row_group_size": 17_000}, {"data_page_size": 32_000, "write_batch_size": 4096}])
-def test_other_joints_are_looked_at_in_the_first_samples_only(options: dict[str, int], tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "options", [{"row_group_size": 17_000}, {"data_page_size": 32_000, "write_batch_size": 4096}]
+)
+def test_other_joints_are_looked_at_in_the_first_samples_only(
+    options: dict[str, int], tmp_path: Path
+) -> None:
     """A page of theirs that is damaged further on is not read for it; one among the first is."""
     path, frame = tmp_path / "log.parquet", arm()
     pq.write_table(
-        frame.to_arrow(), path, compression="none", use_dictionary=False, write_page_checksum=True, **options
+        frame.to_arrow(),
+        path,
+        compression="none",
+        use_dictionary=False,
+        write_page_checksum=True,
+        **options,
     )
     whole = path.read_bytes()
     for row, told in ((ROWS - 1, 1), (5000, 0)):
@@ -58,11 +69,17 @@ def test_other_joints_are_looked_at_in_the_first_samples_only(options: dict[str,
 
 
 @pytest.mark.parametrize("separator", [",", " "])
-def test_other_joints_of_text_are_looked_at_in_the_first_rows_only(separator: str, tmp_path: Path) -> None:
+def test_other_joints_of_text_are_looked_at_in_the_first_rows_only(
+    separator: str, tmp_path: Path
+) -> None:
     path, lines = tmp_path / "log.csv", arm().write_csv(separator=separator).splitlines()
     for row, told in ((ROWS, 1), (5000, 0)):
         cells = lines[row].split(separator)
-        path.write_text("\n".join([*lines[:row], separator.join([*cells[:3], "torn", *cells[4:]]), *lines[row + 1 :]]))
+        path.write_text(
+            "\n".join(
+                [*lines[:row], separator.join([*cells[:3], "torn", *cells[4:]]), *lines[row + 1 :]]
+            )
+        )
         assert len(other_joints(path)) == told
 
 
@@ -86,7 +103,11 @@ STAMPS: dict[str, tuple[list[Any], Any, int]] = {
         pl.Datetime("ms", "UTC"),
         1709337599500000000,
     ),
-    "a duration": ([timedelta(seconds=2, milliseconds=k) for k in range(9)], pl.Duration("us"), 2_000_000_000),
+    "a duration": (
+        [timedelta(seconds=2, milliseconds=k) for k in range(9)],
+        pl.Duration("us"),
+        2_000_000_000,
+    ),
     "a time of day": ([time(0, 1, 0, 1000 * k) for k in range(9)], pl.Time(), 60_000_000_000),
 }
 
@@ -116,14 +137,19 @@ def test_days_are_no_clock(form: str, tmp_path: Path) -> None:
 def test_a_date_is_no_angle(form: str, tmp_path: Path) -> None:
     frame = arm(9, 2).with_columns(pl.Series("q2", [START] * 9))
     WRITERS[form](frame, tmp_path / f"log.{form}")
-    with pytest.raises(LogError, match=r"column 'q2' for theta2 holds Datetime.*; expected numbers"):
+    with pytest.raises(
+        LogError, match=r"column 'q2' for theta2 holds Datetime.*; expected numbers"
+    ):
         read_log(tmp_path / f"log.{form}")
 
 
 def test_whole_stamps_in_lists_stay_exact(tmp_path: Path) -> None:
     """Past 2^53 a float64 would lose the last digits."""
     stamps = [1_700_000_000_123_456_789 + 1_000_001 * row for row in range(5)]
-    frame = {"stamp_ns": pa.array([[stamp, 0] for stamp in stamps]), "q": pa.array([[0.1, 0.2]] * 5)}
+    frame = {
+        "stamp_ns": pa.array([[stamp, 0] for stamp in stamps]),
+        "q": pa.array([[0.1, 0.2]] * 5),
+    }
     table = pa.table({**frame, "tau": pa.array([[1.0, 2.0]] * 5)})
     pq.write_table(table, tmp_path / "log.parquet")
     log = read_log(tmp_path / "log.parquet", Profile(time="stamp_ns[0]", time_unit="ns"))
@@ -170,18 +196,24 @@ def test_a_clock_too_slow_for_an_arm_is_told_once(slower: int, told: bool, tmp_p
         (list(range(10)), "EMPTY_CELLS", "10 of 30 rows dropped for want of a value"),
     ],
 )
-def test_rows_that_lack_a_value_are_dropped_and_told(gaps: list[int], code: str, text: str, tmp_path: Path) -> None:
+def test_rows_that_lack_a_value_are_dropped_and_told(
+    gaps: list[int], code: str, text: str, tmp_path: Path
+) -> None:
     """Also where a whole table of the pass is lost, the first or the last."""
     frame = arm(30, 2).with_columns(
         pl.when(pl.int_range(30).is_in(gaps)).then(None).otherwise(pl.col("q2")).alias("q2")
     )
-    frame.with_columns(t=pl.int_range(30)).write_ipc(tmp_path / "log.feather")  # in ms, as nobody says
+    frame.with_columns(t=pl.int_range(30)).write_ipc(
+        tmp_path / "log.feather"
+    )  # in ms, as nobody says
     tables = list(open_log(tmp_path / "log.feather").tables(10))
     kept = [row for row in range(30) if row not in gaps]
-    assert [row for table in tables for row in np.rint(table.stamp_ns * 1e-6).astype(int).tolist()] == kept
-    assert [(one.code, one.text, one.lossy) for table in tables for one in table.notices if one.lossy] == [
-        (code, text, True)
-    ]
+    assert [
+        row for table in tables for row in np.rint(table.stamp_ns * 1e-6).astype(int).tolist()
+    ] == kept
+    assert [
+        (one.code, one.text, one.lossy) for table in tables for one in table.notices if one.lossy
+    ] == [(code, text, True)]
 
 
 def test_of_wide_lists_the_first_places_are_taken(tmp_path: Path) -> None:
@@ -190,10 +222,13 @@ def test_of_wide_lists_the_first_places_are_taken(tmp_path: Path) -> None:
     frame = pl.DataFrame({"t": np.arange(9) * 1e-3, "q": rows, "tau": [[1.0, 2.0]] * 8 + [[1.0]]})
     for form, write in WRITERS.items():
         write(frame, tmp_path / f"log.{form}")
-        with pytest.raises(LogError, match="'q' stands there for 64 joints: 0, 1, 2, 3, 4, 5, 6, 7"):
+        with pytest.raises(
+            LogError, match="'q' stands there for 64 joints: 0, 1, 2, 3, 4, 5, 6, 7"
+        ):
             read_log(tmp_path / f"log.{form}")
         log = read_log(
-            tmp_path / f"log.{form}", Profile.model_validate({"theta1": {"source": "q[62]"}, "joints": ["0", "1"]})
+            tmp_path / f"log.{form}",
+            Profile.model_validate({"theta1": {"source": "q[62]"}, "joints": ["0", "1"]}),
         )
         assert np.allclose(log.theta[0], 6.2, rtol=1e-12)
         assert [notice.code for notice in log.notices if notice.lossy] == ["CUT_OFF"]
@@ -202,7 +237,9 @@ def test_of_wide_lists_the_first_places_are_taken(tmp_path: Path) -> None:
 def test_a_look_at_other_joints_does_not_stand_for_the_check_of_all_pages(tmp_path: Path) -> None:
     """A page of a joint that is read is checked to its last, though its first were looked at before."""
     path, frame = tmp_path / "log.parquet", arm()
-    pq.write_table(frame.to_arrow(), path, compression="none", use_dictionary=False, write_page_checksum=True)
+    pq.write_table(
+        frame.to_arrow(), path, compression="none", use_dictionary=False, write_page_checksum=True
+    )
     content = bytearray(path.read_bytes())
     content[content.index(struct.pack("<d", frame["q1"][ROWS - 1]))] ^= 1
     path.write_bytes(content)

@@ -43,7 +43,9 @@ def test_the_judge_sees_what_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
     assert judged(log.part(0, 19)) == "silent"
     assert judged(_noting(log.part(0, 19), other)) == "silent"
     assert judged(_noting(log.part(0, 19), lossy)) == "told"
-    assert judged(Log(log.stamp_ns, log.theta + 1, log.tau, Origin("", "", {}), log.omega)) == "silent"
+    assert (
+        judged(Log(log.stamp_ns, log.theta + 1, log.tau, Origin("", "", {}), log.omega)) == "silent"
+    )
 
     def fails(_: Path) -> Log:
         raise RuntimeError
@@ -57,7 +59,9 @@ def _noting(log: Log, notice: Notice) -> Log:
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(1000, marks=pytest.mark.slow)])
-def test_damaged_bytes_of_every_format_are_read_told_or_refused(seed: int, capfd: pytest.CaptureFixture[str]) -> None:
+def test_damaged_bytes_of_every_format_are_read_told_or_refused(
+    seed: int, capfd: pytest.CaptureFixture[str]
+) -> None:
     assert fuzz.batch("damaged", seed, 120) == 0
     counts = [line.split("\t")[0] for line in capfd.readouterr().out.splitlines()]
     assert not set(counts) & set(fuzz.FAILURES)

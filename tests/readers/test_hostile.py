@@ -127,16 +127,23 @@ def test_a_name_that_is_no_text_is_refused(tmp_path: Path) -> None:
 def test_a_finite_number_too_large_is_told_so(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("t,theta1,theta2,tau1,tau2\n0,0,0,0,0\n1,1e300,0,0,0\n")
-    with pytest.raises(LogError, match=r"sample 2: expected a finite number below 1e\+30 in size, found 1e\+300"):
+    with pytest.raises(
+        LogError, match=r"sample 2: expected a finite number below 1e\+30 in size, found 1e\+300"
+    ):
         read_log(path)
 
 
-TABLE = b"t,theta1,theta2,tau1,tau2\n" + b"".join(b"%d,0.%d,1,2.5,-3\n" % (row, row) for row in range(3000))
+TABLE = b"t,theta1,theta2,tau1,tau2\n" + b"".join(
+    b"%d,0.%d,1,2.5,-3\n" % (row, row) for row in range(3000)
+)
 
 
 @pytest.mark.parametrize("share", [0.3, 0.9, 0.999])
 def test_compressed_text_that_breaks_off_is_refused(share: float, tmp_path: Path) -> None:
-    for name, packed in (("log.csv.gz", gzip.compress(TABLE)), ("log.csv.zst", zstandard.compress(TABLE))):
+    for name, packed in (
+        ("log.csv.gz", gzip.compress(TABLE)),
+        ("log.csv.zst", zstandard.compress(TABLE)),
+    ):
         (tmp_path / name).write_bytes(packed)
         assert len(read_log(tmp_path / name)) == 3000
         (tmp_path / name).write_bytes(packed[: int(len(packed) * share)])
@@ -145,7 +152,9 @@ def test_compressed_text_that_breaks_off_is_refused(share: float, tmp_path: Path
 
 
 def test_frames_of_zstd_behind_one_another_are_one_table(tmp_path: Path) -> None:
-    (tmp_path / "log.csv.zst").write_bytes(zstandard.compress(TABLE[:5000]) + zstandard.compress(TABLE[5000:]))
+    (tmp_path / "log.csv.zst").write_bytes(
+        zstandard.compress(TABLE[:5000]) + zstandard.compress(TABLE[5000:])
+    )
     assert len(read_log(tmp_path / "log.csv.zst")) == 3000
     (tmp_path / "log.csv.zst").write_bytes(zstandard.compress(TABLE) + b"no frame")
     with pytest.raises(LogError, match="damaged or cut off"):
@@ -155,7 +164,9 @@ def test_frames_of_zstd_behind_one_another_are_one_table(tmp_path: Path) -> None
 @pytest.mark.parametrize("end", [b"\n", b"\r\n"])
 def test_empty_lines_without_end_take_no_memory(end: bytes, tmp_path: Path) -> None:
     text = TABLE.replace(b"\n", end)
-    packed = zstandard.compress(b"# a log" + end * 3 + text + end * 10_000_000 + b"9999,1,1,1,1" + end)
+    packed = zstandard.compress(
+        b"# a log" + end * 3 + text + end * 10_000_000 + b"9999,1,1,1,1" + end
+    )
     (tmp_path / "log.csv.zst").write_bytes(packed)
     tracemalloc.start()
     assert len(read_log(tmp_path / "log.csv.zst")) == 3001
@@ -163,7 +174,9 @@ def test_empty_lines_without_end_take_no_memory(end: bytes, tmp_path: Path) -> N
     tracemalloc.stop()
 
 
-def test_text_that_unpacks_to_more_than_any_table_is_refused(tmp_path: Path, limited: Limited) -> None:
+def test_text_that_unpacks_to_more_than_any_table_is_refused(
+    tmp_path: Path, limited: Limited
+) -> None:
     limited(free_text_bytes=1 << 24)
     stream = zstandard.ZstdCompressor().compressobj()
     with (tmp_path / "log.csv.zst").open("wb") as file:
@@ -171,7 +184,9 @@ def test_text_that_unpacks_to_more_than_any_table_is_refused(tmp_path: Path, lim
         for _ in range(40):
             file.write(stream.compress(b"\n" * (1 << 23)))
         file.write(stream.flush())
-    with pytest.raises(LogError, match="as no table of their size does; if it is one, unpack it first"):
+    with pytest.raises(
+        LogError, match="as no table of their size does; if it is one, unpack it first"
+    ):
         read_log(tmp_path / "log.csv.zst")
 
 
@@ -212,14 +227,29 @@ def test_a_path_is_no_pattern(name: str, kind: str, tmp_path: Path) -> None:
 
 def arm_table(rows: int = 2000) -> pa.Table:
     log = clean_log(rows)
-    columns = {"t": log.t, "theta1": log.theta[0], "theta2": log.theta[1], "tau1": log.tau[0], "tau2": log.tau[1]}
+    columns = {
+        "t": log.t,
+        "theta1": log.theta[0],
+        "theta2": log.theta[1],
+        "tau1": log.tau[0],
+        "tau2": log.tau[1],
+    }
     return pa.table({name: pa.array(values) for name, values in columns.items()})
 
 
-@pytest.mark.parametrize("options", [{"use_dictionary": False}, {"use_dictionary": True}, {"data_page_version": "2.0"}])
+@pytest.mark.parametrize(
+    "options", [{"use_dictionary": False}, {"use_dictionary": True}, {"data_page_version": "2.0"}]
+)
 def test_checksums_of_parquet_pages_are_verified(options: dict[str, Any], tmp_path: Path) -> None:
     path = tmp_path / "log.parquet"
-    pq.write_table(arm_table(), path, write_page_checksum=True, compression="none", row_group_size=500, **options)
+    pq.write_table(
+        arm_table(),
+        path,
+        write_page_checksum=True,
+        compression="none",
+        row_group_size=500,
+        **options,
+    )
     assert len(read_log(path)) == 2000
     content = bytearray(path.read_bytes())
     content[content.index(struct.pack("<d", clean_log(2000).theta[0, 1234]))] ^= 1
@@ -246,7 +276,9 @@ def read_alone(*paths: Path) -> list[str]:
         "    try: print(len(read_log(path)))\n"
         "    except Exception as error: print(type(error).__name__, error)"
     )
-    done = subprocess.run([sys.executable, "-c", code, *paths], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code, *paths], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr  # not -6, an abort
     told = done.stdout.splitlines()
     assert len(told) == len(paths)
@@ -254,7 +286,11 @@ def read_alone(*paths: Path) -> list[str]:
 
 
 KEYS: list[dict[str, Any]] = [
-    *({"column_keys": {"k": ["theta1"]}}, {"column_keys": {"k": ["note"]}}, {"uniform_encryption": True}),
+    *(
+        {"column_keys": {"k": ["theta1"]}},
+        {"column_keys": {"k": ["note"]}},
+        {"uniform_encryption": True},
+    ),
 ]
 
 
@@ -270,10 +306,14 @@ def test_encrypted_parquet_is_refused_and_ends_no_process(tmp_path: Path) -> Non
         configuration = encryption.EncryptionConfiguration(
             footer_key="k", plaintext_footer=plain, double_wrapping=False, **keys
         )
-        properties = factory.file_encryption_properties(encryption.KmsConnectionConfig(), configuration)
+        properties = factory.file_encryption_properties(
+            encryption.KmsConnectionConfig(), configuration
+        )
         with pq.ParquetWriter(path, table.schema, encryption_properties=properties) as writer:
             writer.write_table(table)
-    for (path, plain, _), told in zip(made, read_alone(*(path for path, _, _ in made)), strict=True):
+    for (path, plain, _), told in zip(
+        made, read_alone(*(path for path, _, _ in made)), strict=True
+    ):
         assert told.startswith(f"LogError {path}: ")
         assert "encrypt" in told or not plain
 
@@ -287,7 +327,9 @@ def test_a_footer_that_is_none_is_refused(tmp_path: Path) -> None:
         b"\x1b\x00",
         b"\x18\xff\xff\x03",
     ):
-        (tmp_path / "log.parquet").write_bytes(b"PAR1" + footer + len(footer).to_bytes(4, "little") + b"PAR1")
+        (tmp_path / "log.parquet").write_bytes(
+            b"PAR1" + footer + len(footer).to_bytes(4, "little") + b"PAR1"
+        )
         with pytest.raises(LogError, match="footer is damaged"):
             read_log(tmp_path / "log.parquet")
 
@@ -295,15 +337,21 @@ def test_a_footer_that_is_none_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("number", [math.nan, math.inf, 10**400])
 def test_a_truth_that_is_no_number_is_refused(number: float, tmp_path: Path) -> None:
     content = {"sums": {}, "arm": asdict(TRUTH.arm), "payload": number, "case": None}
-    text = json.dumps({**content, "crc32": zlib.crc32(json.dumps(content, sort_keys=True).encode())})
+    text = json.dumps(
+        {**content, "crc32": zlib.crc32(json.dumps(content, sort_keys=True).encode())}
+    )
     pq.write_table(arm_table().replace_schema_metadata({"algid": text}), tmp_path / "log.parquet")
     with pytest.raises(LogError, match="truth in the file's metadata cannot be read"):
         read_log(tmp_path / "log.parquet")
 
 
-@pytest.mark.parametrize("header", ["t,theta1,theta2,tau1,tau2", '"t","theta1","theta2","tau1","tau2"'])
+@pytest.mark.parametrize(
+    "header", ["t,theta1,theta2,tau1,tau2", '"t","theta1","theta2","tau1","tau2"']
+)
 @pytest.mark.parametrize("end", ["", "\n", "\n1,2,3,4,5\n"])
-def test_lines_that_end_in_carriage_returns_alone_are_refused(header: str, end: str, tmp_path: Path) -> None:
+def test_lines_that_end_in_carriage_returns_alone_are_refused(
+    header: str, end: str, tmp_path: Path
+) -> None:
     rows = [f"{row},0,0,0,0" for row in range(30)]
     (tmp_path / "log.csv").write_bytes(("\r".join([header, *rows]) + end).encode())
     with pytest.raises(LogError, match="carriage returns alone"):
@@ -318,7 +366,9 @@ def test_a_footer_that_claims_pages_beyond_the_file_is_refused(tmp_path: Path) -
     content = whole.getvalue()
     start = len(content) - 8 - int.from_bytes(content[-8:-4], "little")
     for cut in (100, start // 2):
-        (tmp_path / "log.parquet").write_bytes(b"PAR1" + content[start - cut : start] + content[start:])
+        (tmp_path / "log.parquet").write_bytes(
+            b"PAR1" + content[start - cut : start] + content[start:]
+        )
         with pytest.raises(LogError, match="pages beyond the end of the file"):
             read_log(tmp_path / "log.parquet")
 
@@ -337,7 +387,11 @@ def test_statistics_that_contradict_their_column_do_not_end_the_process(tmp_path
 
 
 def test_a_page_that_claims_impossible_values_does_not_end_the_process(tmp_path: Path) -> None:
-    options: list[dict[str, Any]] = [{"use_dictionary": False}, {"use_dictionary": True}, {"data_page_version": "2.0"}]
+    options: list[dict[str, Any]] = [
+        {"use_dictionary": False},
+        {"use_dictionary": True},
+        {"data_page_version": "2.0"},
+    ]
     paths = [tmp_path / f"{place}.parquet" for place in range(3)]
     for path, own in zip(paths, options, strict=True):
         pq.write_table(arm_table(60), path, compression="none", **own)

@@ -26,12 +26,40 @@ IN_ORDER = [
         ("J1", "j2"),
         ("arm_1_joint", "arm_2_joint"),
     ),
-    *(("base_joint", "arm_joint"), ("shoulder_lift_joint", "elbow_joint"), ("leftShoulder", "leftElbow")),
-    *(("proximal", "distal"), ("hip", "knee"), ("a", "b"), ("joint_a", "joint_b"), ("upper_arm", "forearm")),
-    *(("left_shoulder", "left_elbow"), ("elbow", "wrist_1"), ("first", "second"), ("axis02", "axis3"), ("root", "x")),
-    *(("1", "2"), ("inner_link", "outer_link"), ("thigh", "shank"), ("boom", "stick"), ("waist", "shoulder")),
+    *(
+        ("base_joint", "arm_joint"),
+        ("shoulder_lift_joint", "elbow_joint"),
+        ("leftShoulder", "leftElbow"),
+    ),
+    *(
+        ("proximal", "distal"),
+        ("hip", "knee"),
+        ("a", "b"),
+        ("joint_a", "joint_b"),
+        ("upper_arm", "forearm"),
+    ),
+    *(
+        ("left_shoulder", "left_elbow"),
+        ("elbow", "wrist_1"),
+        ("first", "second"),
+        ("axis02", "axis3"),
+        ("root", "x"),
+    ),
+    *(
+        ("1", "2"),
+        ("inner_link", "outer_link"),
+        ("thigh", "shank"),
+        ("boom", "stick"),
+        ("waist", "shoulder"),
+    ),
 ]
-UNKNOWN = [("left", "right"), ("q", "x"), ("alpha_joint", "omega_joint"), ("joint1", "arm2"), ("elbow_1", "elbow_x")]
+UNKNOWN = [
+    ("left", "right"),
+    ("q", "x"),
+    ("alpha_joint", "omega_joint"),
+    ("joint1", "arm2"),
+    ("elbow_1", "elbow_x"),
+]
 
 
 @pytest.mark.parametrize("names", IN_ORDER)
@@ -47,7 +75,10 @@ def test_names_that_do_not_tell_leave_the_order_as_it_is(names: tuple[str, str])
 
 
 def states(path: Path, names: tuple[str, str]) -> Path:
-    """Ten messages; the first joint of the list stands at 1 rad under 10 N m, the second at 2 under 20."""
+    """Ten messages.
+
+    The first joint of the list stands at 1 rad under 10 N m, the second at 2 under 20.
+    """
     stamps = [EPOCH_NS + step * 1_000_000 for step in range(10)]
     messages = [
         ("/joint_states", stamp, joint_state(stamp, names, [1, 2 + step], [0, 0], [10, 20]).done())
@@ -110,8 +141,15 @@ def test_columns_of_named_joints(names: tuple[str, str], tmp_path: Path) -> None
 
 def test_everything_a_reader_was_told_is_in_the_origin(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("ms,q1_deg,q2_deg,tau1,tau2\n1,10,20,30,40\n2,10,20,30,40\n")
-    settings = {"zero": "hanging", "time": "ms", "time_unit": "ms", "tau1": {"unit": "mN m", "sign": -1}}
-    profile = with_settings(Profile.model_validate(settings), {"tau2": {"unit": "Nm"}, "offsets": [0.5, 0]})
+    settings = {
+        "zero": "hanging",
+        "time": "ms",
+        "time_unit": "ms",
+        "tau1": {"unit": "mN m", "sign": -1},
+    }
+    profile = with_settings(
+        Profile.model_validate(settings), {"tau2": {"unit": "Nm"}, "offsets": [0.5, 0]}
+    )
     log = read_log(tmp_path / "log.csv", profile)
     reading = log.origin.reading
     assert (reading.zero, reading.second_angle, reading.time_unit, reading.clock) == (
@@ -120,8 +158,16 @@ def test_everything_a_reader_was_told_is_in_the_origin(tmp_path: Path) -> None:
         "ms",
         "column",
     )
-    assert [reading.channels[name].unit for name in ("theta1", "tau1", "tau2")] == ["deg", "mN m", "N m"]
-    assert [reading.channels[name].told for name in ("theta1", "tau1", "tau2")] == ["names", "profile", "flag"]
+    assert [reading.channels[name].unit for name in ("theta1", "tau1", "tau2")] == [
+        "deg",
+        "mN m",
+        "N m",
+    ]
+    assert [reading.channels[name].told for name in ("theta1", "tau1", "tau2")] == [
+        "names",
+        "profile",
+        "flag",
+    ]
     assert [reading.channels[name].sign for name in ("tau1", "tau2")] == [-1, 1]
     for name, row, value in (("theta1", log.theta[0] + np.pi / 2, 10), ("tau1", log.tau[0], 30)):
         channel = reading.channels[name]
@@ -138,7 +184,9 @@ FLAT = [
 
 
 @pytest.mark.parametrize("content", FLAT)
-def test_flat_json_messages_are_read_by_their_names(content: dict[str, object], tmp_path: Path) -> None:
+def test_flat_json_messages_are_read_by_their_names(
+    content: dict[str, object], tmp_path: Path
+) -> None:
     stamps = [EPOCH_NS + step * 1_000_000 for step in range(10)]
     messages = [("/arm", one, json.dumps(content).encode()) for one in stamps]
     schema = ("arm", "jsonschema", b'{"type": "object"}')
@@ -156,7 +204,9 @@ def test_a_raised_digit_is_no_number() -> None:
     assert along_the_arm(["axis 3", "axis 2"]) == (("axis 2", "axis 3"), "names")
 
 
-@pytest.mark.parametrize("names", [("pan", "tilt"), ("primary", "secondary"), ("tilt", "wrist"), ("axis_i", "axis_ii")])
+@pytest.mark.parametrize(
+    "names", [("pan", "tilt"), ("primary", "secondary"), ("tilt", "wrist"), ("axis_i", "axis_ii")]
+)
 def test_more_words_of_the_field_tell_the_order(names: tuple[str, str]) -> None:
     assert along_the_arm(names[::-1]) == (names, "names")
 
@@ -182,7 +232,10 @@ def test_joints_that_move_are_told_from_those_that_creep() -> None:
     assert moving() is None
     assert moving(a=0.0199, b=-0.0199) is None
     assert moving(a=0.0201, b=0.0) == "1 other joint moves meanwhile: joint of a by 0.02 rad"
-    assert moving(unit=np.pi / 180, a=1.0, b=-90.0) == "1 other joint moves meanwhile: joint of b by 1.6 rad"
+    assert (
+        moving(unit=np.pi / 180, a=1.0, b=-90.0)
+        == "1 other joint moves meanwhile: joint of b by 1.6 rad"
+    )
     assert moving(a=float("nan"), b=float("inf")) is None
 
 
@@ -191,7 +244,9 @@ def test_the_four_that_move_furthest_are_named() -> None:
         "4 other joints move meanwhile: joint of b by 0.5 rad, joint of c by 0.3 rad, joint of d by 0.2 rad, "
         "joint of a by 0.1 rad"
     )
-    assert (moving(a=1, b=2, c=3, d=4, e=5, f=6) or "").endswith("joint of d by 4 rad, joint of c by 3 rad and 2 more")
+    assert (moving(a=1, b=2, c=3, d=4, e=5, f=6) or "").endswith(
+        "joint of d by 4 rad, joint of c by 3 rad and 2 more"
+    )
 
 
 def test_joints_that_cannot_be_read_or_were_not_recorded_tell_nothing() -> None:
@@ -211,6 +266,9 @@ def test_a_user_who_says_the_joints_is_not_told_of_their_order() -> None:
     )  # fmt: skip
     assert said[0].note
     told = with_settings(Profile(), {"joints": ["elbow", "shoulder"]})
-    assert reading_of(["shoulder", "elbow"], told) == (Reading(joints=("elbow", "shoulder"), joints_told="flag"), ())
+    assert reading_of(["shoulder", "elbow"], told) == (
+        Reading(joints=("elbow", "shoulder"), joints_told="flag"),
+        (),
+    )
     (unknown,) = reading_of(["left", "right"], Profile())[1]
     assert not unknown.note

@@ -70,9 +70,17 @@ def test_names_that_change_place_are_followed(tmp_path: Path) -> None:
         names, order = (["a1", "x", "a2"], [0, 2, 1]) if row % 3 else (["a2", "a1", "x"], [1, 0, 2])
         values = [*log.theta[:, row], 7.0]
         efforts = [*log.tau[:, row], 9.0]
-        data = joint_state(stamp, names, [values[place] for place in order], (), [efforts[place] for place in order])
+        data = joint_state(
+            stamp,
+            names,
+            [values[place] for place in order],
+            (),
+            [efforts[place] for place in order],
+        )
         messages.append((TOPIC, stamp, data.done()))
-        messages.append((TOPIC, stamp + 5, joint_state(stamp + 5, ["gripper"], [1.0], (), [2.0]).done()))
+        messages.append(
+            (TOPIC, stamp + 5, joint_state(stamp + 5, ["gripper"], [1.0], (), [2.0]).done())
+        )
     write_mcap(tmp_path / "log.mcap", messages)
     found = read_log(tmp_path / "log.mcap", Profile(joints=("a1", "a2")))
     assert same(found, log)
@@ -166,7 +174,10 @@ def test_an_array_without_names_or_stamps_through_a_profile(tmp_path: Path) -> N
         messages.append(("/state", stamp, data.done()))
     schema = {"/state": ("std_msgs/msg/Float64MultiArray", "ros2msg", definition.encode())}
     write_mcap(tmp_path / "log.mcap", messages, schema)
-    paths = {name: {"source": f"data[{place}]"} for place, name in enumerate(("theta1", "theta2", "tau1", "tau2"))}
+    paths = {
+        name: {"source": f"data[{place}]"}
+        for place, name in enumerate(("theta1", "theta2", "tau1", "tau2"))
+    }
     profile = Profile.model_validate({"topic": "/state", **paths})
     assert same(read_log(tmp_path / "log.mcap", profile), log)
 
@@ -182,7 +193,9 @@ def test_json_joint_states(tmp_path: Path) -> None:
             "effort": log.tau[::-1, row].tolist(),
         }
         messages.append(("/arm", stamp, json.dumps(text).encode()))
-    write_mcap(tmp_path / "log.mcap", messages, {"/arm": ("arm", "jsonschema", b"{}")}, encoding="json")
+    write_mcap(
+        tmp_path / "log.mcap", messages, {"/arm": ("arm", "jsonschema", b"{}")}, encoding="json"
+    )
     assert same(read_log(tmp_path / "log.mcap", Profile(joints=("a", "b"))), log)
 
 
@@ -213,7 +226,9 @@ def test_xcdr2_is_refused(tmp_path: Path) -> None:
 
 def test_stamps_that_stand_still_give_way_to_log_times(tmp_path: Path) -> None:
     log = noise_log(50, start_ns=EPOCH_NS)
-    messages = [(topic, stamp, data[:4] + bytes(8) + data[12:]) for topic, stamp, data in messages_of(log)]
+    messages = [
+        (topic, stamp, data[:4] + bytes(8) + data[12:]) for topic, stamp, data in messages_of(log)
+    ]
     write_mcap(tmp_path / "log.mcap", messages)
     found = read_log(tmp_path / "log.mcap")
     assert same(found, log)
@@ -248,7 +263,9 @@ def test_splits_of_a_rosbag2_folder_are_one_log(tmp_path: Path) -> None:
 def test_paths_in_a_bag_that_lead_elsewhere_are_refused(tmp_path: Path) -> None:
     (tmp_path / "bag").mkdir()
     write_log(tmp_path / "secret.mcap", noise_log(10))
-    (tmp_path / "bag" / "metadata.yaml").write_text("  relative_file_paths:\n    - ../secret.mcap\n")
+    (tmp_path / "bag" / "metadata.yaml").write_text(
+        "  relative_file_paths:\n    - ../secret.mcap\n"
+    )
     with pytest.raises(LogError, match="outside"):
         open_log(tmp_path / "bag")
 
@@ -266,7 +283,8 @@ def test_bags_compressed_by_message_are_refused(tmp_path: Path) -> None:
 def test_nan_in_a_message_is_refused(tmp_path: Path) -> None:
     stamp = EPOCH_NS
     messages = [
-        (TOPIC, stamp + row, joint_state(stamp + row, position=[0, 1], effort=[1, math.nan]).done()) for row in range(3)
+        (TOPIC, stamp + row, joint_state(stamp + row, position=[0, 1], effort=[1, math.nan]).done())
+        for row in range(3)
     ]
     write_mcap(tmp_path / "log.mcap", messages)
     with pytest.raises(LogError, match=r"tau2 .*effort\[joint2\].* sample 1"):
@@ -299,12 +317,18 @@ def test_small_chunks_that_unpack_to_much_are_not_held_together(
     small_chunks(tmp_path / "a.mcap", rows=500)
     monkeypatch.setattr("algid.readers.mcap.load._GROUP_UNPACKED", 1000)
     with opened(tmp_path / "a.mcap") as (file, found):
-        held = [len(batch.messages) for batch in batches(file, found, frozenset({1})) if batch.messages is not None]
+        held = [
+            len(batch.messages)
+            for batch in batches(file, found, frozenset({1}))
+            if batch.messages is not None
+        ]
     assert sum(held) == 500
     assert max(held) < 10
 
 
-def test_a_file_without_summary_is_walked_once_for_all_passes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_without_summary_is_walked_once_for_all_passes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     small_chunks(tmp_path / "a.mcap", index_types=IndexType.NONE)
     walks: list[Path] = []
 
@@ -323,7 +347,9 @@ def test_a_file_without_summary_is_walked_once_for_all_passes(tmp_path: Path, mo
 
 def test_json_of_very_many_fields_is_refused_before_it_takes_long(tmp_path: Path) -> None:
     plain: dict[str, Any] = {"name": ["a", "b"], "position": [1, 2], "effort": [3, 4]}
-    texts = [json.dumps(plain)] * 64 + [json.dumps({**plain, "x": {str(k): 0 for k in range(50_000)}})] * 60
+    texts = [json.dumps(plain)] * 64 + [
+        json.dumps({**plain, "x": {str(k): 0 for k in range(50_000)}})
+    ] * 60
     messages = ((TOPIC, row * 10**6, text.encode()) for row, text in enumerate(texts))
     schemas = {"/joint_states": ("J", "jsonschema", b"{}")}
     write_mcap(tmp_path / "a.mcap", messages, schemas, encoding="json", chunk_size=1 << 26)
@@ -333,7 +359,10 @@ def test_json_of_very_many_fields_is_refused_before_it_takes_long(tmp_path: Path
 
 def test_a_json_path_is_looked_up_once_among_many_fields() -> None:
     found = _Paths({"name": ["a", "b", "b"], "position": [1.5, 2, 3], "x": 1})
-    assert [found.value(path) for path in (["position", "[a]"], ["position", "[2]"], ["position", "[b]"])] == [
+    assert [
+        found.value(path)
+        for path in (["position", "[a]"], ["position", "[2]"], ["position", "[b]"])
+    ] == [
         1.5,
         3,
         None,
@@ -354,7 +383,9 @@ def test_other_joints_that_move_are_told_with_how_far(moved: float, tmp_path: Pa
             joint_state(
                 stamp,
                 names if row % 7 else names[:4],  # a message may lack a joint
-                position=[0.5, log.theta[0, row], swing[row], log.theta[1, row], float("nan")][: 5 if row % 7 else 4],
+                position=[0.5, log.theta[0, row], swing[row], log.theta[1, row], float("nan")][
+                    : 5 if row % 7 else 4
+                ],
                 effort=[0, log.tau[0, row], 0, log.tau[1, row], 0][: 5 if row % 7 else 4],
             ).done(),
         )

@@ -54,10 +54,14 @@ def test_a_chunk_that_breaks_off_yields_its_whole_messages(
     compression: CompressionType, options: dict[str, Any], long: LongLog, tmp_path: Path
 ) -> None:
     log, messages = long
-    write_mcap(tmp_path / "whole.mcap", messages, compression=compression, chunk_size=1 << 24, **options)
+    write_mcap(
+        tmp_path / "whole.mcap", messages, compression=compression, chunk_size=1 << 24, **options
+    )
     content = (tmp_path / "whole.mcap").read_bytes()
     (chunk,) = chunks_of(tmp_path / "whole.mcap")
-    (tmp_path / "cut.mcap").write_bytes(content[: chunk.chunk_start_offset + chunk.chunk_length * 6 // 10])
+    (tmp_path / "cut.mcap").write_bytes(
+        content[: chunk.chunk_start_offset + chunk.chunk_length * 6 // 10]
+    )
     found = read_log(tmp_path / "cut.mcap")
     # zstd and lz4 lose the block that breaks off, 128 and 64 KiB of about 3 MB
     assert 0.53 < len(found) / len(log) < 0.61
@@ -113,26 +117,39 @@ def test_a_message_index_that_lies_is_not_believed(tmp_path: Path) -> None:
 
 def test_a_file_of_which_damage_left_nothing_says_so_and_where(tmp_path: Path) -> None:
     log = noise_log(100, start_ns=EPOCH_NS)
-    write_mcap(tmp_path / "log.mcap", messages_of(log), compression=CompressionType.NONE, chunk_size=1 << 20)
+    write_mcap(
+        tmp_path / "log.mcap",
+        messages_of(log),
+        compression=CompressionType.NONE,
+        chunk_size=1 << 20,
+    )
     whole = (tmp_path / "log.mcap").read_bytes()
     (chunk,) = chunks_of(tmp_path / "log.mcap")
     content = bytearray(whole)
     content[content.index(struct.pack("<d", log.theta[0, 50]))] ^= 1
     (tmp_path / "log.mcap").write_bytes(content)
-    with pytest.raises(LogError, match=rf"damaged \(.*checksum.*byte {chunk.chunk_start_offset + 9}\).*no topic"):
+    with pytest.raises(
+        LogError, match=rf"damaged \(.*checksum.*byte {chunk.chunk_start_offset + 9}\).*no topic"
+    ):
         read_log(tmp_path / "log.mcap")
     content[content.rindex(b"JointState")] ^= 1  # in the summary
     (tmp_path / "log.mcap").write_bytes(content)
-    with pytest.raises(LogError, match=r"damaged \(its summary: its checksum is wrong; .*\).*no topic"):
+    with pytest.raises(
+        LogError, match=r"damaged \(its summary: its checksum is wrong; .*\).*no topic"
+    ):
         read_log(tmp_path / "log.mcap")
     (tmp_path / "log.mcap").write_bytes(whole[: chunk.chunk_start_offset + 100])
-    with pytest.raises(LogError, match=rf"damaged \(.*breaks off at byte {chunk.chunk_start_offset}\).*no topic"):
+    with pytest.raises(
+        LogError, match=rf"damaged \(.*breaks off at byte {chunk.chunk_start_offset}\).*no topic"
+    ):
         read_log(tmp_path / "log.mcap")
 
 
 def test_damage_is_not_blamed_for_a_choice_that_is_missing(tmp_path: Path) -> None:
     names = [f"joint{number}" for number in range(7)]
-    messages = [(TOPIC, row, joint_state(row, names, [0.0] * 7, (), [1.0] * 7).done()) for row in range(100)]
+    messages = [
+        (TOPIC, row, joint_state(row, names, [0.0] * 7, (), [1.0] * 7).done()) for row in range(100)
+    ]
     write_mcap(tmp_path / "log.mcap", messages, compression=CompressionType.NONE)
     content = (tmp_path / "log.mcap").read_bytes()
     (tmp_path / "log.mcap").write_bytes(content[: len(content) // 2])
@@ -155,7 +172,9 @@ def test_a_chunk_that_claims_too_much_is_left_out_unread(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("chunked", [True, False])
 @pytest.mark.parametrize("length", [0, 3, 1 << 20, 1 << 63, (1 << 64) - 1])
-def test_behind_a_broken_record_the_next_whole_one_is_found(length: int, chunked: bool, tmp_path: Path) -> None:
+def test_behind_a_broken_record_the_next_whole_one_is_found(
+    length: int, chunked: bool, tmp_path: Path
+) -> None:
     log = noise_log(2000, start_ns=EPOCH_NS)
     path = tmp_path / "log.mcap"
     options: dict[str, Any] = {} if chunked else NO_INDEX
@@ -167,7 +186,9 @@ def test_behind_a_broken_record_the_next_whole_one_is_found(length: int, chunked
     else:
         size = len(messages_of(log)[1000][2])
         place = content.rindex(
-            struct.pack("<BQ", 5, 22 + size), 0, content.index(struct.pack("<d", log.theta[0, 1000]))
+            struct.pack("<BQ", 5, 22 + size),
+            0,
+            content.index(struct.pack("<d", log.theta[0, 1000])),
         )
     struct.pack_into("<Q", content, place + 1, length)
     path.write_bytes(content)
@@ -180,7 +201,9 @@ def test_behind_a_broken_record_the_next_whole_one_is_found(length: int, chunked
     assert any(notice.lossy and f"byte {place}" in notice.text for notice in found.notices)
 
 
-def test_a_chunk_that_claims_to_go_on_yields_its_messages_and_those_behind_it(tmp_path: Path) -> None:
+def test_a_chunk_that_claims_to_go_on_yields_its_messages_and_those_behind_it(
+    tmp_path: Path,
+) -> None:
     log = noise_log(2000, start_ns=EPOCH_NS)
     path = tmp_path / "log.mcap"
     write_mcap(path, messages_of(log), compression=CompressionType.NONE)
@@ -216,7 +239,9 @@ def test_messages_of_a_damaged_chunk_are_counted_by_its_index(tmp_path: Path) ->
     content[content.index(struct.pack("<d", log.theta[0, 1000]))] ^= 1
     path.write_bytes(content)
     found = read_log(path)
-    assert any(f"{len(log) - len(found):,} messages are missing" in notice.text for notice in found.notices)
+    assert any(
+        f"{len(log) - len(found):,} messages are missing" in notice.text for notice in found.notices
+    )
 
 
 def test_one_damaged_chunk_among_many_small_ones_is_left_out_alone(tmp_path: Path) -> None:

@@ -47,7 +47,9 @@ def summarised(content: bytes, edit: Callable[[Records], Records], checksum: boo
     start, _, _ = struct.unpack_from("<QQI", content, len(content) - 28)
     records = list(StreamReader(BytesIO(content[start:]), skip_magic=True).records)
     builder = RecordBuilder()
-    for record in edit([one for one in records if type(one).__name__ not in ("Footer", "SummaryOffset")]):
+    for record in edit(
+        [one for one in records if type(one).__name__ not in ("Footer", "SummaryOffset")]
+    ):
         record.write(builder)
     body = builder.end()  # type: ignore[no-untyped-call]
     head = struct.pack("<BQQQ", 2, 20, start, 0)
@@ -87,7 +89,10 @@ def hiding(records: Records) -> Records:
 def overlapping(records: Records) -> Records:
     """The second chunk is listed in place of the third too."""
     chunks = [one for one in unindexed(records) if isinstance(one, ChunkIndex)]
-    chunks[2].chunk_start_offset, chunks[2].chunk_length = chunks[1].chunk_start_offset, chunks[1].chunk_length
+    chunks[2].chunk_start_offset, chunks[2].chunk_length = (
+        chunks[1].chunk_start_offset,
+        chunks[1].chunk_length,
+    )
     return records
 
 
@@ -102,7 +107,9 @@ def hidden_index(records: Records) -> Records:
     (channel,) = chunk.message_index_offsets
     count = (chunk.message_index_length - 15) // 16
     chunk.message_index_offsets = {}
-    changing(Statistics, lambda one: one.channel_message_counts.update({channel: len(LOG) - count}))(records)
+    changing(
+        Statistics, lambda one: one.channel_message_counts.update({channel: len(LOG) - count})
+    )(records)
     return records
 
 
@@ -115,7 +122,9 @@ def cut_index(records: Records) -> Records:
 
 
 def misplaced(chunk: ChunkIndex) -> None:
-    chunk.message_index_offsets = {number: place + 1 for number, place in chunk.message_index_offsets.items()}
+    chunk.message_index_offsets = {
+        number: place + 1 for number, place in chunk.message_index_offsets.items()
+    }
 
 
 def redefined(kind: type, **change: Any) -> Callable[[Records], Records]:
@@ -173,7 +182,9 @@ def test_a_summary_that_does_not_agree_with_the_file_is_not_used(
 
 
 @pytest.mark.parametrize("checksum", [True, False])
-@pytest.mark.parametrize("kept", [lambda records: records, unindexed, redefined(Schema), redefined(Channel)])
+@pytest.mark.parametrize(
+    "kept", [lambda records: records, unindexed, redefined(Schema), redefined(Channel)]
+)
 def test_a_summary_that_agrees_is_used(
     kept: Callable[[Records], Records], checksum: bool, whole: bytes, tmp_path: Path
 ) -> None:
@@ -187,7 +198,9 @@ def test_a_summary_that_agrees_is_used(
 @pytest.mark.parametrize(
     "missing", [(Statistics,), (ChunkIndex,), (Channel,), (Statistics, ChunkIndex, Channel, Schema)]
 )
-def test_a_summary_that_says_too_little_is_no_damage(missing: tuple[type, ...], whole: bytes, tmp_path: Path) -> None:
+def test_a_summary_that_says_too_little_is_no_damage(
+    missing: tuple[type, ...], whole: bytes, tmp_path: Path
+) -> None:
     path = tmp_path / "log.mcap"
     path.write_bytes(summarised(whole, without(*missing)))
     found = read_log(path)
@@ -207,7 +220,10 @@ def poked(content: bytes, place: int, kind: str, *values: int) -> bytes:
     [
         (lambda whole: poked(whole, -37, "<B", 7), "its footer is damaged"),
         (lambda whole: poked(whole, -36, "<Q", 21), "its footer is damaged"),
-        (lambda whole: poked(whole, -28, "<Q", len(whole)), r"its footer claims a summary at byte \d+"),
+        (
+            lambda whole: poked(whole, -28, "<Q", len(whole)),
+            r"its footer claims a summary at byte \d+",
+        ),
         (lambda whole: poked(whole, -28, "<Q", 7), "its footer claims a summary at byte 7"),
         (lambda whole: poked(whole, -12, "<I", 1), "its checksum is wrong"),
         (lambda whole: whole[:-1], "the file has no end: it was cut off"),
@@ -223,11 +239,15 @@ def test_a_damaged_footer_is_told_and_the_file_is_walked(
     assert same(found, LOG)
     first = found.notices[0]
     assert first.code == "DAMAGED_SUMMARY"
-    assert re.fullmatch(rf"the file's summary cannot be used \({told}\); read by scanning", first.text)
+    assert re.fullmatch(
+        rf"the file's summary cannot be used \({told}\); read by scanning", first.text
+    )
 
 
 @pytest.mark.parametrize("kind", [ChunkIndex, Statistics, Channel])
-def test_a_record_of_the_summary_that_breaks_off_within_is_told(kind: type, whole: bytes, tmp_path: Path) -> None:
+def test_a_record_of_the_summary_that_breaks_off_within_is_told(
+    kind: type, whole: bytes, tmp_path: Path
+) -> None:
     start, _, _ = struct.unpack_from("<QQI", whole, len(whole) - 28)
     place, codes = start, {Channel: 4, ChunkIndex: 8, Statistics: 11}
     while whole[place] != codes[kind]:
@@ -241,12 +261,19 @@ def test_a_record_of_the_summary_that_breaks_off_within_is_told(kind: type, whol
 
 
 def test_what_does_not_begin_as_mcap_is_no_mcap(whole: bytes, tmp_path: Path) -> None:
-    for name, content in (("short", whole[:7]), ("other", b"\x89MCAP1" + whole[6:]), ("empty", b"")):
+    for name, content in (
+        ("short", whole[:7]),
+        ("other", b"\x89MCAP1" + whole[6:]),
+        ("empty", b""),
+    ):
         (tmp_path / name).write_bytes(content)
         begins = "the MCAP file cannot be read: the file does not begin as MCAP does"
         with pytest.raises(LogError, match=begins), opened(tmp_path / name):
             pass
-    with pytest.raises(LogError, match=r"none: the log cannot be read \(No such file"), File(tmp_path / "none"):
+    with (
+        pytest.raises(LogError, match=r"none: the log cannot be read \(No such file"),
+        File(tmp_path / "none"),
+    ):
         pass
 
 
@@ -256,7 +283,9 @@ def test_bytes_outside_a_file_are_not_read(tmp_path: Path) -> None:
         assert file.read(2, 3) == b"\2\3\4"
         assert file.read(10, 0) == b""
         for start, length in ((-1, 2), (8, 3), (11, 0), (3, -1)):
-            with pytest.raises(DamagedError, match=rf"bytes {start} to {start + length} of a file of 10"):
+            with pytest.raises(
+                DamagedError, match=rf"bytes {start} to {start + length} of a file of 10"
+            ):
                 file.read(start, length)
         assert file.read_bytes == 3
         (tmp_path / "a").write_bytes(b"\0\1")  # cut while it is read
@@ -266,15 +295,24 @@ def test_bytes_outside_a_file_are_not_read(tmp_path: Path) -> None:
 
 def test_records_are_walked_to_the_byte_where_they_break_off(tmp_path: Path) -> None:
     sizes = [22, 400_000, 22, 900_000, 60_000, 22]
-    content = b"".join(struct.pack("<BQHIQQ", 5, size, 1, 0, 0, 0) + bytes(size - 22) for size in sizes)
+    content = b"".join(
+        struct.pack("<BQHIQQ", 5, size, 1, 0, 0, 0) + bytes(size - 22) for size in sizes
+    )
     places = np.cumsum([0, *(9 + size for size in sizes)]).tolist()
     (tmp_path / "a").write_bytes(content)
     with File(tmp_path / "a") as file:
         found = list(walk(file, 0, len(content)))
-        assert found == [Record(5, place + 9, size) for place, size in zip(places, sizes, strict=False)]
+        assert found == [
+            Record(5, place + 9, size) for place, size in zip(places, sizes, strict=False)
+        ]
         assert [one.end for one in found] == places[1:]
-        for end, record in ((len(content) - 1, Record(5, places[-2] + 9, 22)), (places[-2] + 8, None)):
-            with pytest.raises(BrokenOffError, match=f"a record at byte {places[-2]} breaks off") as caught:
+        for end, record in (
+            (len(content) - 1, Record(5, places[-2] + 9, 22)),
+            (places[-2] + 8, None),
+        ):
+            with pytest.raises(
+                BrokenOffError, match=f"a record at byte {places[-2]} breaks off"
+            ) as caught:
                 list(walk(file, 0, end))
             assert (caught.value.place, caught.value.record) == (places[-2], record)
         assert list(walk(file, 5, 5)) == []
@@ -286,12 +324,19 @@ PACKED: dict[bytes, Callable[[bytes], bytes]] = {
     b"lz4": lambda content: lz4.frame.compress(content, block_size=lz4.frame.BLOCKSIZE_MAX64KB),
 }
 NOISE = np.random.default_rng(4)
-MESSAGES = [struct.pack("<BQHIQQ", 5, 222, 1, row, row, row) + NOISE.bytes(200) for row in range(2000)]
+MESSAGES = [
+    struct.pack("<BQHIQQ", 5, 222, 1, row, row, row) + NOISE.bytes(200) for row in range(2000)
+]
 INSIDE = b"".join(MESSAGES)
 
 
-def chunk(inside: bytes, name: bytes, *, size: int | None = None, crc: int | None = None, cut: int = 0) -> bytes:
-    """A chunk record's content; `size` and `crc` lie where they are given, `cut` bytes are missing at its end."""
+def chunk(
+    inside: bytes, name: bytes, *, size: int | None = None, crc: int | None = None, cut: int = 0
+) -> bytes:
+    """A chunk record's content.
+
+    `size` and `crc` lie where they are given, `cut` bytes are missing at its end.
+    """
     packed = PACKED.get(name, bytes)(inside)
     told = (0, 0, len(inside) if size is None else size, zlib.crc32(inside) if crc is None else crc)
     head = struct.pack("<QQQII", *told, len(name)) + name + struct.pack("<Q", len(packed))
@@ -309,10 +354,16 @@ def test_a_chunk_unpacks_to_what_was_packed_or_is_refused(name: bytes) -> None:
         (chunk(INSIDE, name, cut=5), r"a chunk claims [\d,]+ bytes and has \d+"),
         (chunk(INSIDE, name, size=len(INSIDE) + 1), r"a chunk of 462,001 bytes unpacks to 462000"),
         (chunk(INSIDE, name, size=len(INSIDE) - 1), r"unpacks to|holds a zstd frame of 462000"),
-        (chunk(INSIDE, name, size=1 << 29), "a chunk claims 536,870,912 bytes unpacked, more than 268435456"),
+        (
+            chunk(INSIDE, name, size=1 << 29),
+            "a chunk claims 536,870,912 bytes unpacked, more than 268435456",
+        ),
         (chunk(INSIDE, name)[:39], "a chunk breaks off"),
         (poked(chunk(INSIDE, name), 28, "<I", 33), "a chunk's compression has no name"),
-        (chunk(b"abcdef", name + b"2"), f"packed with '{name.decode()}2'; expected zstd, lz4 or nothing"),
+        (
+            chunk(b"abcdef", name + b"2"),
+            f"packed with '{name.decode()}2'; expected zstd, lz4 or nothing",
+        ),
     ):
         with pytest.raises(DamagedError, match=told):
             unpack(wrong)
@@ -342,7 +393,9 @@ def test_of_a_torn_chunk_whole_records_are_left_and_nothing_else(name: bytes, sh
 
 @pytest.mark.parametrize("summary", [True, False])
 @pytest.mark.parametrize("code", [3, 4])
-def test_behind_a_definition_that_changes_nothing_of_it_is_read(code: int, summary: bool, tmp_path: Path) -> None:
+def test_behind_a_definition_that_changes_nothing_of_it_is_read(
+    code: int, summary: bool, tmp_path: Path
+) -> None:
     path = tmp_path / "log.mcap"
     with path.open("wb") as stream:
         writer = Writer(stream, chunk_size=600, compression=CompressionType.NONE, enable_crcs=False)
@@ -352,7 +405,9 @@ def test_behind_a_definition_that_changes_nothing_of_it_is_read(code: int, summa
         for row, (_, stamp, data) in enumerate(messages_of(LOG)):
             if row == 50:
                 other = writer.register_schema("a/msg/B", "ros2msg", b"int8 x")
-                writer.add_message(writer.register_channel("/other", "cdr", other), stamp, b"\0\1\0\0\7", stamp)
+                writer.add_message(
+                    writer.register_channel("/other", "cdr", other), stamp, b"\0\1\0\0\7", stamp
+                )
             writer.add_message(1, stamp, data, stamp)
         writer.finish()  # type: ignore[no-untyped-call]
     content = path.read_bytes()
@@ -380,7 +435,9 @@ def test_the_truth_in_the_metadata_is_read_where_it_can_be(tmp_path: Path) -> No
         assert found.truth(path) == TRUTH
     content = path.read_bytes()
     path.write_bytes(content.replace(b'"arm"', b'"mra"'))
-    with pytest.raises(LogError, match=rf"^{path}: the truth in the file's metadata cannot be read \(.+\)$"):
+    with pytest.raises(
+        LogError, match=rf"^{path}: the truth in the file's metadata cannot be read \(.+\)$"
+    ):
         read_log(path)
     with path.open("rb") as stream:
         (index,) = make_reader(stream).get_summary().metadata_indexes  # type: ignore[union-attr]
@@ -395,7 +452,12 @@ def hiding_one_of_two(path: Path, others: int) -> None:
     messages = messages_of(LOG)
     beside = [("/other", stamp, b"\0\1\0\0\7") for _, stamp, _ in messages[30 : 30 + others]]
     mixed = [*messages[:30], *beside, *messages[30:]]
-    write_mcap(path, mixed, {"/other": ("a/msg/B", "ros2msg", b"int8 x")} if others else None, chunk_size=2000)
+    write_mcap(
+        path,
+        mixed,
+        {"/other": ("a/msg/B", "ros2msg", b"int8 x")} if others else None,
+        chunk_size=2000,
+    )
 
 
 def test_a_summary_that_hides_the_joints_of_a_chunk_is_not_used(tmp_path: Path) -> None:
@@ -410,7 +472,9 @@ def test_a_summary_that_hides_the_joints_of_a_chunk_is_not_used(tmp_path: Path) 
             if len(chunk.message_index_offsets) == 2:
                 places = sorted([*chunk.message_index_offsets.values(), _end_of(chunk)])
                 start = chunk.message_index_offsets.pop(1)
-                statistics.channel_message_counts[1] -= (places[places.index(start) + 1] - start - 15) // 16
+                statistics.channel_message_counts[1] -= (
+                    places[places.index(start) + 1] - start - 15
+                ) // 16
         return records
 
     path.write_bytes(summarised(path.read_bytes(), hide))
@@ -425,7 +489,9 @@ def _end_of(chunk: ChunkIndex) -> int:
 
 
 @pytest.mark.parametrize("code", [3, 4])
-def test_a_definition_in_a_chunk_of_others_that_changes_the_joints_ends_them(code: int, tmp_path: Path) -> None:
+def test_a_definition_in_a_chunk_of_others_that_changes_the_joints_ends_them(
+    code: int, tmp_path: Path
+) -> None:
     """The chunk holds no message of the joints, so its index does not name them."""
     path = tmp_path / "log.mcap"
     with path.open("wb") as stream:
@@ -436,11 +502,15 @@ def test_a_definition_in_a_chunk_of_others_that_changes_the_joints_ends_them(cod
         for row, (_, stamp, data) in enumerate(messages_of(LOG)):
             if row == 50:
                 other = writer.register_schema("a/msg/B", "ros2msg", b"int8 x")
-                writer.add_message(writer.register_channel("/other", "cdr", other), stamp, b"\0\1\0\0\7", stamp)
+                writer.add_message(
+                    writer.register_channel("/other", "cdr", other), stamp, b"\0\1\0\0\7", stamp
+                )
             writer.add_message(1, stamp, data, stamp)
         writer.finish()  # type: ignore[no-untyped-call]
     content = path.read_bytes()
-    assert [set(chunk.message_index_offsets) for chunk in chunks_of(path)] == [{1}] * 50 + [{2}] + [{1}] * 70
+    assert [set(chunk.message_index_offsets) for chunk in chunks_of(path)] == [{1}] * 50 + [{2}] + [
+        {1}
+    ] * 70
     place = next(
         place for place in range(content.index(b"/other") - 200, len(content))
         if content[place] == code and content[place + 9 : place + 11] == b"\2\0"

@@ -54,7 +54,12 @@ def test_units_in_names() -> None:
 @pytest.mark.parametrize(
     ("name", "unit"),
     [
-        *(("t_ms", "ms"), ("time_us", "us"), ("timestamp_nanoseconds", "ns"), ("Time (msec)", "ms")),
+        *(
+            ("t_ms", "ms"),
+            ("time_us", "us"),
+            ("timestamp_nanoseconds", "ns"),
+            ("Time (msec)", "ms"),
+        ),
         *(("seconds", "s"), ("millis", "ms"), ("elapsed_s", "s"), ("t", None), ("time", None)),
     ],
 )
@@ -69,7 +74,12 @@ def test_more_joints_than_two_need_a_choice() -> None:
     with pytest.raises(LookupError, match="7 joints"):
         choose(columns)
     chosen = choose(columns, ("3", "5")).columns
-    assert [chosen[name] for name in ("theta1", "theta2", "tau1", "tau2")] == ["q3", "q5", "tau3", "tau5"]
+    assert [chosen[name] for name in ("theta1", "theta2", "tau1", "tau2")] == [
+        "q3",
+        "q5",
+        "tau3",
+        "tau5",
+    ]
 
 
 def test_torques_of_other_joints_are_not_taken() -> None:
@@ -84,7 +94,10 @@ def test_units_of_time_are_told_by_size_and_step(unit: str, start: int) -> None:
     times = start * factor + np.arange(100) * (factor * 2e-3)
     assert time_unit(times) == unit
     # float64 seconds since 1970 resolve 0.24 µs; half of that is the rounding
-    assert np.abs(to_nanoseconds(times, unit) - (start * 10**9 + np.arange(100) * 2_000_000)).max() <= 240
+    assert (
+        np.abs(to_nanoseconds(times, unit) - (start * 10**9 + np.arange(100) * 2_000_000)).max()
+        <= 240
+    )
 
 
 def test_whole_nanoseconds_stay_exact() -> None:

@@ -43,7 +43,13 @@ CUSTOM = {
 def store() -> Any:
     """The types of ROS 2, and those above."""
     types = get_typestore(Stores.ROS2_HUMBLE)
-    types.register({key: kind for name, text in CUSTOM.items() for key, kind in get_types_from_msg(text, name).items()})
+    types.register(
+        {
+            key: kind
+            for name, text in CUSTOM.items()
+            for key, kind in get_types_from_msg(text, name).items()
+        }
+    )
     return types
 
 
@@ -61,11 +67,20 @@ def header(stamp: int, frame: str) -> Any:
 def joint_state(stamp: int, values: Sequence[float], draw: np.random.Generator) -> Any:
     """Three joints in any order, the gripper's numbers made up."""
     order = draw.permutation(3)
-    position, effort = (np.array([*pair, draw.normal()])[order] for pair in (values[:2], values[2:]))
+    position, effort = (
+        np.array([*pair, draw.normal()])[order] for pair in (values[:2], values[2:])
+    )
     names = [["shoulder", "elbow", "gripper"][place] for place in order]
     kind = "sensor_msgs/msg/JointState"
     frame = "f" * int(draw.integers(0, 9))
-    return made(kind, header=header(stamp, frame), name=names, position=position, velocity=np.empty(0), effort=effort)
+    return made(
+        kind,
+        header=header(stamp, frame),
+        name=names,
+        position=position,
+        velocity=np.empty(0),
+        effort=effort,
+    )
 
 
 def dynamic(stamp: int, values: Sequence[float], draw: np.random.Generator) -> Any:
@@ -74,25 +89,39 @@ def dynamic(stamp: int, values: Sequence[float], draw: np.random.Generator) -> A
     names = draw.permutation(["shoulder", "elbow"]).tolist()
     for name in names:
         joint = ("shoulder", "elbow").index(name)
-        told = {"position": values[joint], "effort": values[2 + joint], "temperature": draw.normal()}
+        told = {
+            "position": values[joint],
+            "effort": values[2 + joint],
+            "temperature": draw.normal(),
+        }
         kinds = draw.permutation([*told]).tolist()
         numbers = np.array([told[kind] for kind in kinds])
-        joints.append(made("control_msgs/msg/InterfaceValue", interface_names=kinds, values=numbers))
+        joints.append(
+            made("control_msgs/msg/InterfaceValue", interface_names=kinds, values=numbers)
+        )
     kind = "control_msgs/msg/DynamicJointState"
     return made(kind, header=header(stamp, ""), joint_names=names, interface_values=joints)
 
 
 def array(_stamp: int, values: Sequence[float], draw: np.random.Generator) -> Any:
     """Numbers without names, dimensions of any label."""
-    dimension = made("std_msgs/msg/MultiArrayDimension", label="x" * int(draw.integers(0, 6)), size=5, stride=5)
-    layout = made("std_msgs/msg/MultiArrayLayout", dim=[dimension] * int(draw.integers(0, 3)), data_offset=0)
-    return made("std_msgs/msg/Float64MultiArray", layout=layout, data=np.array([draw.normal(), *values]))
+    dimension = made(
+        "std_msgs/msg/MultiArrayDimension", label="x" * int(draw.integers(0, 6)), size=5, stride=5
+    )
+    layout = made(
+        "std_msgs/msg/MultiArrayLayout", dim=[dimension] * int(draw.integers(0, 3)), data_offset=0
+    )
+    return made(
+        "std_msgs/msg/Float64MultiArray", layout=layout, data=np.array([draw.normal(), *values])
+    )
 
 
 def wrench(stamp: int, values: Sequence[float], draw: np.random.Generator) -> Any:
     """A force and a torque."""
     kind = "geometry_msgs/msg/Vector3"
-    force, torque = (made(kind, x=pair[0], y=pair[1], z=draw.normal()) for pair in (values[:2], values[2:]))
+    force, torque = (
+        made(kind, x=pair[0], y=pair[1], z=draw.normal()) for pair in (values[:2], values[2:])
+    )
     both = made("geometry_msgs/msg/Wrench", force=force, torque=torque)
     return made("geometry_msgs/msg/WrenchStamped", header=header(stamp, "tool"), wrench=both)
 
@@ -103,7 +132,9 @@ def custom(_stamp: int, values: Sequence[float], draw: np.random.Generator) -> A
     def joint(angle: float, torque: float) -> Any:
         flags, torques = draw.integers(0, 2, 3).astype(bool), np.array([draw.normal(), torque])
         warm = float(np.float32(draw.normal()))
-        return made("lab/msg/Joint", flags=flags, temperature=warm, angle=angle, mode=7, torques=torques)
+        return made(
+            "lab/msg/Joint", flags=flags, temperature=warm, angle=angle, mode=7, torques=torques
+        )
 
     words = ["w" * int(size) for size in draw.integers(0, 5, int(draw.integers(0, 3)))]
     return made(
@@ -120,7 +151,10 @@ def custom(_stamp: int, values: Sequence[float], draw: np.random.Generator) -> A
 
 def indexed(*paths: str) -> dict[str, Any]:
     """A profile that names each channel's field."""
-    return {"topic": TOPIC, **{name: {"source": path} for name, path in zip(CHANNELS, paths, strict=True)}}
+    return {
+        "topic": TOPIC,
+        **{name: {"source": path} for name, path in zip(CHANNELS, paths, strict=True)},
+    }
 
 
 @dataclass(frozen=True)
@@ -147,7 +181,9 @@ def fields(*paths: str) -> Callable[[Any], list[float]]:
 def named(message: Any) -> list[float]:
     """Positions and efforts of a JointState by name."""
     joints = [list(message.name).index(name) for name in ("shoulder", "elbow")]
-    return [float(numbers[joint]) for numbers in (message.position, message.effort) for joint in joints]
+    return [
+        float(numbers[joint]) for numbers in (message.position, message.effort) for joint in joints
+    ]
 
 
 def interfaces(message: Any) -> list[float]:
@@ -178,7 +214,13 @@ def write(path: Path, kind: Kind, log: Log, *, little: bool, **options: Any) -> 
     draw = np.random.default_rng(8)
     rows = np.concatenate([log.theta, log.tau]).T.tolist()
     messages = [
-        (TOPIC, stamp, bytes(store().serialize_cdr(kind.make(stamp, row, draw), kind.type, little_endian=little)))
+        (
+            TOPIC,
+            stamp,
+            bytes(
+                store().serialize_cdr(kind.make(stamp, row, draw), kind.type, little_endian=little)
+            ),
+        )
         for stamp, row in zip(log.stamp_ns.tolist(), rows, strict=True)
     ]
     definition, _ = store().generate_msgdef(kind.type, ros_version=2)
@@ -195,7 +237,10 @@ def by_mcap_ros2(path: Path, kind: Kind) -> FloatArray:
 def by_rosbags(path: Path, kind: Kind) -> FloatArray:
     """Angles and torques (4, N) as rosbags deserialises them."""
     with AnyReader([path]) as reader:
-        messages = (reader.deserialize(data, connection.msgtype) for connection, _, data in reader.messages())
+        messages = (
+            reader.deserialize(data, connection.msgtype)
+            for connection, _, data in reader.messages()
+        )
         return np.array([kind.values(message) for message in messages]).T
 
 
@@ -208,7 +253,9 @@ PACKINGS: list[tuple[CompressionType, dict[str, Any]]] = [
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.type.split("/")[-1])
-@pytest.mark.parametrize(("compression", "options"), PACKINGS, ids=["zstd", "lz4", "none", "unchunked"])
+@pytest.mark.parametrize(
+    ("compression", "options"), PACKINGS, ids=["zstd", "lz4", "none", "unchunked"]
+)
 @pytest.mark.parametrize("little", [True, False], ids=["little", "big"])
 def test_every_type_reads_as_in_other_readers(
     kind: Kind, compression: CompressionType, options: dict[str, Any], little: bool, tmp_path: Path

@@ -17,7 +17,10 @@ STILL = np.full(T.size, 0.7)
 
 
 def _arm(position: str, effort: str, joints: tuple[str, ...], unit: float = 1.0) -> pl.DataFrame:
-    """Four joints: the first is held, the last turns through 0.6 rad; the two between are those to read."""
+    """Four joints: the first is held, the last turns through 0.6 rad.
+
+    The two between are those to read.
+    """
     angles = [STILL, SWING, np.cos(3 * T), 0.3 * SWING]
     columns = {"time": T}
     for joint, angle in zip(joints, angles, strict=True):
@@ -28,14 +31,18 @@ def _arm(position: str, effort: str, joints: tuple[str, ...], unit: float = 1.0)
 
 
 def _told(path: Path, profile: Profile) -> list[str]:
-    return [notice.text for notice in read_log(path, profile).notices if notice.code == "OTHER_JOINTS"]
+    return [
+        notice.text for notice in read_log(path, profile).notices if notice.code == "OTHER_JOINTS"
+    ]
 
 
 @pytest.mark.parametrize("form", ["csv", "parquet", "feather"])
 def test_a_joint_that_moves_beside_is_told(form: str, tmp_path: Path) -> None:
     path = tmp_path / f"log.{form}"
     frame = _arm("q{}", "tau{}", ("1", "2", "3", "4"))
-    getattr(frame, {"csv": "write_csv", "parquet": "write_parquet", "feather": "write_ipc"}[form])(path)
+    getattr(frame, {"csv": "write_csv", "parquet": "write_parquet", "feather": "write_ipc"}[form])(
+        path
+    )
     (text,) = _told(path, Profile(joints=("2", "3")))
     assert text.startswith("1 other joint moves meanwhile: 4 by 0.6 rad (in the first 400 samples)")
 
@@ -49,7 +56,9 @@ def test_angles_in_degrees_are_told_in_rad(tmp_path: Path) -> None:
 def test_of_counts_nobody_knows_how_far_they_are(tmp_path: Path) -> None:
     _arm("q{}", "tau{}", ("1", "2", "3", "4"), 1e-3).write_csv(tmp_path / "log.csv")
     counts = Profile(
-        joints=("2", "3"), theta1=Angle(unit="counts", counts=6283), theta2=Angle(unit="counts", counts=6283)
+        joints=("2", "3"),
+        theta1=Angle(unit="counts", counts=6283),
+        theta2=Angle(unit="counts", counts=6283),
     )
     assert _told(tmp_path / "log.csv", counts) == []
 
@@ -62,7 +71,9 @@ def test_joints_with_names_are_told_by_them(position: str, tmp_path: Path) -> No
         else "/joint_states/{}/effort"
     )
     frame = _arm(position, effort, ("base", "shoulder", "elbow", "wrist"))
-    frame = frame.with_columns(pl.Series("/joint_commands/gripper/position", SWING))  # no joint of this topic
+    frame = frame.with_columns(
+        pl.Series("/joint_commands/gripper/position", SWING)
+    )  # no joint of this topic
     frame.write_csv(tmp_path / "log.csv")
     (text,) = _told(tmp_path / "log.csv", Profile(joints=("shoulder", "elbow")))
     assert "1 other joint moves meanwhile: wrist by 0.6 rad" in text
@@ -78,5 +89,7 @@ def test_what_cannot_be_read_of_other_joints_takes_nothing_from_the_two(tmp_path
 
 def test_a_two_jointed_log_tells_nothing(tmp_path: Path) -> None:
     frame = _arm("q{}", "tau{}", ("1", "2", "3", "4")).select("time", "q2", "q3", "tau2", "tau3")
-    frame.rename({"q2": "q1", "q3": "q2", "tau2": "tau1", "tau3": "tau2"}).write_csv(tmp_path / "log.csv")
+    frame.rename({"q2": "q1", "q3": "q2", "tau2": "tau1", "tau3": "tau2"}).write_csv(
+        tmp_path / "log.csv"
+    )
     assert _told(tmp_path / "log.csv", Profile()) == []

@@ -108,10 +108,14 @@ def test_signals_on_several_topics_are_aligned(tmp_path: Path) -> None:
     settings: dict[str, Any] = {
         f"tau{joint}": {"topic": f"/torque{joint}", "source": "wrench.torque.z"} for joint in (1, 2)
     }
-    found = read_log(tmp_path / "log.mcap", Profile.model_validate({"joints": ["a", "b"], **settings}))
+    found = read_log(
+        tmp_path / "log.mcap", Profile.model_validate({"joints": ["a", "b"], **settings})
+    )
     times = (found.stamp_ns - EPOCH_NS) * 1e-9
     # linear interpolation over 3 ms of sin 3t: at most 9 (3e-3)^2 / 8
-    assert np.abs(found.tau - np.stack([np.sin(3 * times), 2 * np.sin(3 * times)])).max() < 2 * 1.02e-5
+    assert (
+        np.abs(found.tau - np.stack([np.sin(3 * times), 2 * np.sin(3 * times)])).max() < 2 * 1.02e-5
+    )
     assert np.abs(found.theta[0] - np.sin(times)).max() < 1e-15  # not interpolated
     assert not np.any((times > 0.9) & (times < 0.998))
     codes = [notice.code for notice in found.notices]

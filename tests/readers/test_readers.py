@@ -26,7 +26,9 @@ CSV = "t,theta1,theta2,tau1,tau2\n"
 @pytest.mark.parametrize("kind", FORMATS)
 @pytest.mark.parametrize("start_ns", [0, EPOCH_NS])
 @pytest.mark.parametrize("velocity", [True, False])
-def test_round_trip_keeps_every_bit_and_the_truth(kind: str, start_ns: int, velocity: bool, tmp_path: Path) -> None:
+def test_round_trip_keeps_every_bit_and_the_truth(
+    kind: str, start_ns: int, velocity: bool, tmp_path: Path
+) -> None:
     log = noise_log(start_ns=start_ns, velocity=velocity)
     write_log(tmp_path / f"log.{kind}", log, truth=TRUTH)
     found = read_log(tmp_path / f"log.{kind}")
@@ -86,7 +88,10 @@ def test_mcap_reads_the_same_in_mcap_ros2_and_rosbags(tmp_path: Path) -> None:
     assert stamps == log.stamp_ns.tolist()
     assert all(one.name == ["joint1", "joint2"] for one in decoded)
     with AnyReader([path]) as reader:
-        messages = [reader.deserialize(data, connection.msgtype) for connection, _, data in reader.messages()]
+        messages = [
+            reader.deserialize(data, connection.msgtype)
+            for connection, _, data in reader.messages()
+        ]
     velocities = np.array([one.velocity for one in messages]).T  # type: ignore[attr-defined]
     assert log.omega is not None
     assert np.array_equal(velocities, log.omega)
@@ -109,7 +114,11 @@ def test_a_repeated_first_stamp_is_dropped_and_told(shared_data: Path) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["rosbag2_cdr_test_0.mcap", "rosbag2_wrong_rmw_test_0.mcap", "lichtblick_example_logs_json.mcap"],
+    [
+        "rosbag2_cdr_test_0.mcap",
+        "rosbag2_wrong_rmw_test_0.mcap",
+        "lichtblick_example_logs_json.mcap",
+    ],
 )
 def test_logs_without_joints_are_refused(name: str, shared_data: Path) -> None:
     with pytest.raises(LogError, match="topic"):

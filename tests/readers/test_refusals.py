@@ -1,7 +1,7 @@
 """Every refusal that a flag overrides: what is refused, the flag that its message names, and the warning that stays.
 
-`REFUSALS` is the table of them. A refusal that is not in it cannot be overridden: the file is missing, damaged, cut
-off, of another format, or changed since algid wrote it.
+`REFUSALS` is the table of them. A refusal that is not in it cannot be overridden: the file is
+missing, damaged, cut off, of another format, or changed since algid wrote it.
 """
 
 from __future__ import annotations
@@ -29,7 +29,13 @@ from tests.inspection.test_checks import moving_log, spoiled
 from tests.readers.logs import EPOCH_NS
 from tests.readers.mcaps import joint_state, write_mcap
 
-FLAGS = {"--joints": "joints", "--topic": "topic", "--clock": "clock", "--accept": "accept", "--zero": "zero"}
+FLAGS = {
+    "--joints": "joints",
+    "--topic": "topic",
+    "--clock": "clock",
+    "--accept": "accept",
+    "--zero": "zero",
+}
 ROWS = 40
 
 
@@ -90,7 +96,11 @@ def states(topics: tuple[str, ...], names: tuple[str, ...]) -> Callable[[Path], 
         stamps = [EPOCH_NS + step * 1_000_000 for step in range(ROWS)]
         values = [0.1 * place for place in range(len(names))]
         messages = [
-            (topic, stamp, joint_state(stamp, names, moved(values, stamp), [], moved(values, stamp)).done())
+            (
+                topic,
+                stamp,
+                joint_state(stamp, names, moved(values, stamp), [], moved(values, stamp)).done(),
+            )
             for stamp in stamps
             for topic in topics
         ]
@@ -166,7 +176,9 @@ def settings_of(flags: str) -> dict[str, Any]:
             except tomllib.TOMLDecodeError:
                 new = tomllib.loads(f'{key} = "{text}"')
             for name, inner in new.items():
-                settings[name] = {**settings.get(name, {}), **inner} if isinstance(inner, dict) else inner
+                settings[name] = (
+                    {**settings.get(name, {}), **inner} if isinstance(inner, dict) else inner
+                )
         elif flag == "--angle-unit":
             settings |= {name: {"unit": value} for name in ("theta1", "theta2", "omega1", "omega2")}
         else:
@@ -202,9 +214,16 @@ def flat(seconds: float) -> Callable[[Path], Path]:
         for step in range(ROWS):
             values = moved([0.1, 0.2], step)
             stamp = {"sec": seconds, "nanosec": step}
-            text = {"header": {"stamp": stamp}, "name": ["j1", "j2"], "position": values, "effort": values}
+            text = {
+                "header": {"stamp": stamp},
+                "name": ["j1", "j2"],
+                "position": values,
+                "effort": values,
+            }
             messages.append(("/arm", EPOCH_NS + step * 1_000_000, json.dumps(text).encode()))
-        write_mcap(folder / "log.mcap", messages, {"/arm": ("arm", "jsonschema", b"{}")}, encoding="json")
+        write_mcap(
+            folder / "log.mcap", messages, {"/arm": ("arm", "jsonschema", b"{}")}, encoding="json"
+        )
         return folder / "log.mcap"
 
     return make
@@ -250,11 +269,19 @@ def test_what_a_profile_says_wrongly_is_mended_by_a_flag(name: str, tmp_path: Pa
 
 
 def texts(room: str) -> list[tuple[str, str]]:
-    """Every text of a room's sources that is no docstring, what is filled in as its name; with its place."""
+    """Every text of a room's sources that is no docstring, what is filled in as its name.
+
+    With its place.
+    """
     found = []
     for path in sorted((Path(algid.__file__).parent / room).rglob("*.py")):
         tree = ast.parse(path.read_text(encoding="utf-8"))
-        held = {id(one) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for one in node.values}
+        held = {
+            id(one)
+            for node in ast.walk(tree)
+            if isinstance(node, ast.JoinedStr)
+            for one in node.values
+        }
         held |= {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
         for node in ast.walk(tree):
             if id(node) in held:
@@ -268,9 +295,17 @@ def texts(room: str) -> list[tuple[str, str]]:
 
 def test_no_text_names_a_line_of_a_profile_alone() -> None:
     """Also the messages that no log of these tests brings out."""
-    said = [(place, text) for place, text in texts("readers") if re.search(r"\bprofile: |\b(a|the) profile\b", text)]
+    said = [
+        (place, text)
+        for place, text in texts("readers")
+        if re.search(r"\bprofile: |\b(a|the) profile\b", text)
+    ]
     assert len(said) > 3
-    alone = [one for one in said if not re.search(r"--[a-z].*profile|\{.*flag.*profile", one[1], re.DOTALL)]
+    alone = [
+        one
+        for one in said
+        if not re.search(r"--[a-z].*profile|\{.*flag.*profile", one[1], re.DOTALL)
+    ]
     assert alone == []
 
 
@@ -293,7 +328,9 @@ def test_columns_named_by_their_joint(tmp_path: Path) -> None:
     assert swapped.origin.mapping["theta1"] == "elbow_pos"
 
 
-@pytest.mark.parametrize("header", ["t,q1,q2,q_cmd,q_ref,tau1,tau2", "t,max_pos,min_pos,q1,q2,tau1,tau2"])
+@pytest.mark.parametrize(
+    "header", ["t,q1,q2,q_cmd,q_ref,tau1,tau2", "t,max_pos,min_pos,q1,q2,tau1,tau2"]
+)
 def test_words_that_are_no_joints_are_let_be(header: str, tmp_path: Path) -> None:
     assert read_log(table(header)(tmp_path)).origin.mapping["theta1"] == "q1"
 
@@ -302,7 +339,9 @@ def test_signals_of_motors_are_told(tmp_path: Path) -> None:
     path = table("t,motor1_pos,motor2_pos,motor1_torque,motor2_torque")(tmp_path)
     (said,) = [one for one in read_log(path).notices if one.code == "MOTOR_SIDE"]
     assert "--set tau1.gear_ratio=N" in said.text
-    ratios: dict[str, Any] = {name: {"gear_ratio": 4} for name in ("theta1", "theta2", "tau1", "tau2")}
+    ratios: dict[str, Any] = {
+        name: {"gear_ratio": 4} for name in ("theta1", "theta2", "tau1", "tau2")
+    }
     geared = read_log(path, Profile.model_validate(ratios))
     assert np.allclose(geared.tau, 4 * read_log(path).tau)
     assert np.allclose(geared.theta, read_log(path).theta / 4)
@@ -311,7 +350,14 @@ def test_signals_of_motors_are_told(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("written", "unit"),
-    [("Nm", "N m"), ("N.m", "N m"), ("mNm", "mN m"), ("Newton-meters", "N m"), ("lb-ft", "lbf ft"), ("N·m", "N m")],
+    [
+        ("Nm", "N m"),
+        ("N.m", "N m"),
+        ("mNm", "mN m"),
+        ("Newton-meters", "N m"),
+        ("lb-ft", "lbf ft"),
+        ("N·m", "N m"),
+    ],
 )
 def test_units_are_known_as_people_write_them(written: str, unit: str) -> None:
     assert Profile.model_validate({"tau1": {"unit": written}}).tau1.unit == unit

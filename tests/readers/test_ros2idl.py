@@ -60,7 +60,13 @@ STATE_TEXT = (
     f"{LINE}IDL: sensor_msgs/msg/JointState\n{JOINT_STATE}\n{LINE}IDL: std_msgs/msg/Header\n{HEADER}\n"
     f"{LINE}IDL: builtin_interfaces/msg/Time\n{TIME}"
 )
-IDL_NAMES = {"bool": "boolean", "byte": "octet", "char": "uint8", "float32": "float", "float64": "double"}
+IDL_NAMES = {
+    "bool": "boolean",
+    "byte": "octet",
+    "char": "uint8",
+    "float32": "float",
+    "float64": "double",
+}
 
 
 def idl_of(name: str) -> str:
@@ -132,14 +138,26 @@ def without_includes(text: str) -> str:
 def decoded(path: Path) -> list[Any]:
     """The messages of a file as rosbags reads them, by the file's own definitions."""
     with AnyReader([path]) as reader:
-        return [reader.deserialize(data, connection.msgtype) for connection, _, data in reader.messages()]
+        return [
+            reader.deserialize(data, connection.msgtype)
+            for connection, _, data in reader.messages()
+        ]
 
 
 def test_joint_states_read_as_in_rosbags(tmp_path: Path) -> None:
     log = noise_log(200, start_ns=EPOCH_NS)
     assert log.omega is not None
-    rows = zip(log.stamp_ns.tolist(), log.theta.T.tolist(), log.omega.T.tolist(), log.tau.T.tolist(), strict=True)
-    messages = [("/js", stamp, joint_state(stamp, ["a", "b"], *values, frame="base").done()) for stamp, *values in rows]
+    rows = zip(
+        log.stamp_ns.tolist(),
+        log.theta.T.tolist(),
+        log.omega.T.tolist(),
+        log.tau.T.tolist(),
+        strict=True,
+    )
+    messages = [
+        ("/js", stamp, joint_state(stamp, ["a", "b"], *values, frame="base").done())
+        for stamp, *values in rows
+    ]
     for name, text in (("log", STATE_TEXT), ("plain", without_includes(STATE_TEXT))):
         schema = ("sensor_msgs/msg/JointState", "ros2idl", text.encode())
         write_mcap(tmp_path / f"{name}.mcap", messages, {"/js": schema})
@@ -184,7 +202,9 @@ def test_every_kind_of_member_takes_its_place(tmp_path: Path) -> None:
         for joint in (0, 1):
             data.put("B", joint).put("d", log.theta[joint, row], log.tau[joint, row])
         messages.append(("/state", stamp, data.done()))
-    write_mcap(tmp_path / "log.mcap", messages, {"/state": ("arm/msg/State", "ros2idl", text.encode())})
+    write_mcap(
+        tmp_path / "log.mcap", messages, {"/state": ("arm/msg/State", "ros2idl", text.encode())}
+    )
     paths = {
         f"{name}{joint + 1}": {"source": f"joints[{joint}].{part}"}
         for name, part in (("theta", "angle"), ("tau", "torque"))
@@ -197,14 +217,26 @@ def test_every_kind_of_member_takes_its_place(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("union U switch (long) { case 1: long a; };", "'union' where module, struct, typedef or const"),
-        ("module a { module msg { struct T { sequence<sequence<double>> x; }; }; };", "sequence of sequences"),
+        (
+            "union U switch (long) { case 1: long a; };",
+            "'union' where module, struct, typedef or const",
+        ),
+        (
+            "module a { module msg { struct T { sequence<sequence<double>> x; }; }; };",
+            "sequence of sequences",
+        ),
         ("module a { module msg { struct T { Other x; }; }; };", "'Other' of 'x' is not defined"),
         ("module a { module msg { struct T { @optional double x; }; }; };", "@optional"),
-        ("module a { module msg { struct T { double x[2][2]; }; }; };", "list of lists|expected ',' or ';'"),
+        (
+            "module a { module msg { struct T { double x[2][2]; }; }; };",
+            "list of lists|expected ',' or ';'",
+        ),
         ("module a { module msg { struct T { double x", "breaks off"),
         ("module a { module msg { struct T { sequence<T> x; }; }; };", "nested more than 32"),
-        ("module a { module msg { typedef U V; typedef V U; struct T { U x; }; }; };", "typedefs.*nested"),
+        (
+            "module a { module msg { typedef U V; typedef V U; struct T { U x; }; }; };",
+            "typedefs.*nested",
+        ),
         ("module a { struct Other { double x; }; };", "not defined; found a/Other"),
         ("module a {" * 100, "modules nested"),
         ("module a { module msg { struct T { }; }; };", "no member"),
@@ -222,6 +254,8 @@ def test_definitions_that_fan_out_are_not_followed_without_end(tmp_path: Path) -
     assert len(parse_idl("a/msg/T19", text)) == 20
     messages = [("/state", row, bytes([0, 1, 0, 0]) + bytes(1 << 20)) for row in (1, 2)]
     write_mcap(tmp_path / "log.mcap", messages, {"/state": ("a/msg/T19", "ros2idl", text.encode())})
-    profile = Profile.model_validate({"topic": "/state", **{name: {"source": "x"} for name in ("theta1", "theta2")}})
+    profile = Profile.model_validate(
+        {"topic": "/state", **{name: {"source": "x"} for name in ("theta1", "theta2")}}
+    )
     with pytest.raises(LogError, match="more than 100000 parts"):
         read_log(tmp_path / "log.mcap", profile)

@@ -70,8 +70,13 @@ def test_json_integers_beyond_64_bits_are_no_traceback(digits: int, tmp_path: Pa
 @pytest.mark.parametrize("seconds", [float("nan"), float("inf"), 1e300, 10**30])
 def test_seconds_that_are_no_time_late_in_json_are_refused(seconds: float, tmp_path: Path) -> None:
     log = noise_log(200, start_ns=EPOCH_NS, velocity=False)
-    write_json(tmp_path / "log.mcap", json_messages(log, row150={"header": {"stamp": {"sec": seconds, "nanosec": 0}}}))
-    with pytest.raises(LogError, match=r'header stamp with .* --clock log \(profile: clock = "log"\)'):
+    write_json(
+        tmp_path / "log.mcap",
+        json_messages(log, row150={"header": {"stamp": {"sec": seconds, "nanosec": 0}}}),
+    )
+    with pytest.raises(
+        LogError, match=r'header stamp with .* --clock log \(profile: clock = "log"\)'
+    ):
         read_log(tmp_path / "log.mcap")
     assert same(read_log(tmp_path / "log.mcap", Profile(clock="log")), log)
 
@@ -84,7 +89,9 @@ def test_seconds_with_a_fraction_are_taken_whole(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("names", [["a1", "a1"], ["1", "1"]])
-def test_a_joint_named_twice_is_refused_and_read_by_its_place(names: list[str], tmp_path: Path) -> None:
+def test_a_joint_named_twice_is_refused_and_read_by_its_place(
+    names: list[str], tmp_path: Path
+) -> None:
     log = noise_log(20, start_ns=EPOCH_NS, velocity=False)
     sources = {
         f"{name}{joint}": {"source": f"{field}[{joint - 1}]"}
@@ -95,10 +102,18 @@ def test_a_joint_named_twice_is_refused_and_read_by_its_place(names: list[str], 
     for encoding in ("cdr", "json"):
         path = tmp_path / f"{encoding}.mcap"
         if encoding == "json":
-            write_json(path, json_messages(log, **{f"row{row}": {"name": names} for row in range(20)}))
+            write_json(
+                path, json_messages(log, **{f"row{row}": {"name": names} for row in range(20)})
+            )
         else:
             rows = zip(log.stamp_ns.tolist(), log.theta.T.tolist(), log.tau.T.tolist(), strict=True)
-            write_mcap(path, [(TOPIC, ns, joint_state(ns, names, one, (), other).done()) for ns, one, other in rows])
+            write_mcap(
+                path,
+                [
+                    (TOPIC, ns, joint_state(ns, names, one, (), other).done())
+                    for ns, one, other in rows
+                ],
+            )
         with pytest.raises(LogError, match=rf"joint '{names[0]}' twice.*position\[0\]"):
             read_log(path)
         if names[0] == "a1":
@@ -138,7 +153,8 @@ def test_messages_that_do_not_fit_are_left_out_and_counted(tmp_path: Path) -> No
     assert notice.lossy
     assert "1 message on '/joint_states' of another form than the schema says" in notice.text
     write_mcap(
-        tmp_path / "log.mcap", [(TOPIC, ns, data[: 90 if row else 200]) for row, (_, ns, data) in enumerate(messages)]
+        tmp_path / "log.mcap",
+        [(TOPIC, ns, data[: 90 if row else 200]) for row, (_, ns, data) in enumerate(messages)],
     )
     with pytest.raises(LogError, match="cannot be read"):
         read_log(tmp_path / "log.mcap")
@@ -147,8 +163,12 @@ def test_messages_that_do_not_fit_are_left_out_and_counted(tmp_path: Path) -> No
 def test_messages_each_of_another_layout_are_read_as_far_as_a_file_may_ask() -> None:
     rows = range(2000)
     names = [["joint1", "joint2", f"{row:06d}"] for row in rows]
-    messages = [joint_state(row, names[row], (row, 1.0, 0.0), (), (1.0, 2.0, 0.0)).done() for row in rows]
-    content = b"".join(struct.pack("<BQHIQQ", 5, 22 + len(one), 1, 0, 0, 0) + one for one in messages)
+    messages = [
+        joint_state(row, names[row], (row, 1.0, 0.0), (), (1.0, 2.0, 0.0)).done() for row in rows
+    ]
+    content = b"".join(
+        struct.pack("<BQHIQQ", 5, 22 + len(one), 1, 0, 0, 0) + one for one in messages
+    )
     types = parse_msg(JOINT_STATE, JOINT_STATE_DEFINITION)
     wanted, spent = {"theta1": "position[joint1]"}, [0]
 
@@ -156,7 +176,9 @@ def test_messages_each_of_another_layout_are_read_as_far_as_a_file_may_ask() -> 
         spent[0] += steps
         return spent[0] < 1_000_000
 
-    decoder = ColumnDecoder(wanted, works, walk=lambda payload: cdr.walk(payload, JOINT_STATE, types))
+    decoder = ColumnDecoder(
+        wanted, works, walk=lambda payload: cdr.walk(payload, JOINT_STATE, types)
+    )
     found = records_in(content).of({1})
     held, columns = decoder.columns(found)
     assert held.all()
@@ -215,7 +237,9 @@ def test_a_structure_of_nothing_is_counted(tmp_path: Path) -> None:
     text = "Zero[] effort\n" + "=" * 80 + f"\nMSG: a/Zero\n{fields}"
     message = b"\0\1\0\0" + struct.pack("<I", 1 << 19) + bytes(1 << 20)
     write_mcap(
-        tmp_path / "log.mcap", [("/s", row, message) for row in range(2)], {"/s": ("a/msg/S", "ros2msg", text.encode())}
+        tmp_path / "log.mcap",
+        [("/s", row, message) for row in range(2)],
+        {"/s": ("a/msg/S", "ros2msg", text.encode())},
     )
     with pytest.raises(LogError, match="more than 100000 parts"):
         read_log(tmp_path / "log.mcap")
@@ -227,7 +251,9 @@ def descriptors(**types: list[tuple[str, str]]) -> bytes:
     for name, fields in types.items():
         message = file.message_type.add(name=name)
         for number, (field, kind) in enumerate(fields, start=1):
-            message.field.add(name=field, number=number, type=11 if kind else 1, label=1, type_name=kind)
+            message.field.add(
+                name=field, number=number, type=11 if kind else 1, label=1, type_name=kind
+            )
     return descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString()
 
 
@@ -242,7 +268,9 @@ def test_a_protobuf_type_that_is_missing_is_refused_where_it_is_needed() -> None
 
 
 def test_protobuf_types_that_refer_to_themselves_are_followed_by_name_only() -> None:
-    types = protobuf.parse("a.T", descriptors(T=[*((f"f{number}", ".a.T") for number in range(1000)), ("x", "")]))
+    types = protobuf.parse(
+        "a.T", descriptors(T=[*((f"f{number}", ".a.T") for number in range(1000)), ("x", "")])
+    )
     shape = protobuf.walk(b"\x12\x02\x1a\x00", "a.T", types)
     assert shape.find("f1.f2.x") is not None
     assert shape.find("f1.f2.f3.x") is None
@@ -273,8 +301,12 @@ def test_a_protobuf_message_that_is_none_is_left_out(damage: str, tmp_path: Path
         "width": messages[9] + b"\x1a\x03abc",
     }
     messages[9] = broken[damage]
-    rows = [("/arm", stamp, one) for stamp, one in zip(log.stamp_ns.tolist(), messages, strict=True)]
-    write_mcap(tmp_path / "log.mcap", rows, {"/arm": ("arm.State", "protobuf", data)}, encoding="protobuf")
+    rows = [
+        ("/arm", stamp, one) for stamp, one in zip(log.stamp_ns.tolist(), messages, strict=True)
+    ]
+    write_mcap(
+        tmp_path / "log.mcap", rows, {"/arm": ("arm.State", "protobuf", data)}, encoding="protobuf"
+    )
     found = read_log(tmp_path / "log.mcap")
     assert np.array_equal(found.stamp_ns, np.delete(log.stamp_ns, 9))
     assert [notice.code for notice in found.notices if notice.lossy] == ["MISFIT_MESSAGES"]
@@ -315,7 +347,9 @@ def test_a_protobuf_number_written_in_another_type_is_no_number() -> None:
         pytest.param(18, [0, 1, -1, 2**63 - 1, -(2**63)], id="sint64"),
     ],
 )
-def test_every_protobuf_number_is_read_as_protobuf_itself_wrote_it(kind: int, values: list[float]) -> None:
+def test_every_protobuf_number_is_read_as_protobuf_itself_wrote_it(
+    kind: int, values: list[float]
+) -> None:
     file = descriptor_pb2.FileDescriptorProto(name="n.proto", package="n", syntax="proto3")
     file.message_type.add(name="N").field.add(name="value", number=1, type=kind, label=1)
     pool = descriptor_pool.DescriptorPool()
@@ -323,13 +357,19 @@ def test_every_protobuf_number_is_read_as_protobuf_itself_wrote_it(kind: int, va
     written = message_factory.GetMessageClass(pool.FindMessageTypeByName("n.N"))
     messages = [written(value=value).SerializeToString() for value in values]
     types = protobuf.parse("n.N", descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString())
-    content = b"".join(struct.pack("<BQHIQQ", 5, 22 + len(one), 1, 0, 0, 0) + one for one in messages)
-    decoder = ColumnDecoder({"value": "value"}, bool, walk=lambda data: protobuf.walk(data, "n.N", types))
+    content = b"".join(
+        struct.pack("<BQHIQQ", 5, 22 + len(one), 1, 0, 0, 0) + one for one in messages
+    )
+    decoder = ColumnDecoder(
+        {"value": "value"}, bool, walk=lambda data: protobuf.walk(data, "n.N", types)
+    )
     held, columns = decoder.columns(records_in(content).of({1}))
     assert held.all()
     parsed = [float(written.FromString(one).value) for one in messages]
     assert (
-        columns["value"].astype(np.float64).tolist() == parsed == np.array(values, "f4" if kind == 2 else "f8").tolist()
+        columns["value"].astype(np.float64).tolist()
+        == parsed
+        == np.array(values, "f4" if kind == 2 else "f8").tolist()
     )
 
 
@@ -345,8 +385,18 @@ def bomb(content: bytes) -> bytes:
     schema = record(3, b"\1\0", text(JOINT_STATE), text("ros2msg"), text(JOINT_STATE_DEFINITION))
     channel = record(4, b"\1\0\1\0", text(TOPIC), text("cdr"), bytes(4))
     packed = zstandard.compress(content)
-    head = struct.pack("<QQQI", 0, 0, len(content), zlib.crc32(content)) + text("zstd") + struct.pack("<Q", len(packed))
-    return b"\x89MCAP0\r\n" + record(1, text(""), text("")) + schema + channel + record(6, head, packed)
+    head = (
+        struct.pack("<QQQI", 0, 0, len(content), zlib.crc32(content))
+        + text("zstd")
+        + struct.pack("<Q", len(packed))
+    )
+    return (
+        b"\x89MCAP0\r\n"
+        + record(1, text(""), text(""))
+        + schema
+        + channel
+        + record(6, head, packed)
+    )
 
 
 MESSAGES = [struct.pack("<BQHIQQ", 5, 22 + size, 1, 0, 0, 0) + bytes(size) for size in (0, 1)]
@@ -357,11 +407,17 @@ MESSAGES = [struct.pack("<BQHIQQ", 5, 22 + size, 1, 0, 0, 0) + bytes(size) for s
     [
         (b"\x4d" + bytes(8), 10_000_000, "records that are no messages"),
         (MESSAGES[0], 10_000_000, "a message of 0 bytes"),
-        (MESSAGES[0] + MESSAGES[1], 50_000_000, "of 0 bytes|of more parts than|more small messages"),
+        (
+            MESSAGES[0] + MESSAGES[1],
+            50_000_000,
+            "of 0 bytes|of more parts than|more small messages",
+        ),
     ],
     ids=["others", "alike", "mixed"],
 )
-def test_a_chunk_of_countless_small_records_is_bounded(content: bytes, size: int, reason: str, tmp_path: Path) -> None:
+def test_a_chunk_of_countless_small_records_is_bounded(
+    content: bytes, size: int, reason: str, tmp_path: Path
+) -> None:
     (tmp_path / "log.mcap").write_bytes(bomb(content * (size // len(content))))
     with pytest.raises(LogError, match=reason):
         read_log(tmp_path / "log.mcap")
@@ -398,7 +454,9 @@ def arm_file(presence: str) -> descriptor_pb2.FileDescriptorProto:
     return file
 
 
-@pytest.mark.parametrize("presence", ["proto3", "proto2", "editions", "optional", "oneof", "message"])
+@pytest.mark.parametrize(
+    "presence", ["proto3", "proto2", "editions", "optional", "oneof", "message"]
+)
 def test_a_protobuf_number_that_is_unset_is_no_zero(presence: str, tmp_path: Path) -> None:
     file = arm_file(presence)
     made = proto_class(file, "p.Arm")
@@ -415,10 +473,19 @@ def test_a_protobuf_number_that_is_unset_is_no_zero(presence: str, tmp_path: Pat
                 setattr(one, name, value)
         messages.append(("/arm", row * 10**6, one.SerializeToString()))
     schema = descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString()
-    write_mcap(tmp_path / "log.mcap", messages, {"/arm": ("p.Arm", "protobuf", schema)}, encoding="protobuf")
+    write_mcap(
+        tmp_path / "log.mcap",
+        messages,
+        {"/arm": ("p.Arm", "protobuf", schema)},
+        encoding="protobuf",
+    )
     places = {name: {"source": f"{name}.value" if presence == "message" else name} for name in ARM}
-    log = read_log(tmp_path / "log.mcap", Profile.model_validate({"topic": "/arm", "clock": "log", **places}))
-    lost = [notice.text for notice in log.notices if notice.code == "LACKING_MESSAGES" and notice.lossy]
+    log = read_log(
+        tmp_path / "log.mcap", Profile.model_validate({"topic": "/arm", "clock": "log", **places})
+    )
+    lost = [
+        notice.text for notice in log.notices if notice.code == "LACKING_MESSAGES" and notice.lossy
+    ]
     if presence == "proto3":  # it cannot tell 0 from unset
         assert (len(log), lost) == (40, [])
         assert log.tau[1, 1] == 0
@@ -430,14 +497,22 @@ def test_a_protobuf_number_that_is_unset_is_no_zero(presence: str, tmp_path: Pat
 
 def test_a_field_without_presence_of_an_edition_is_zero_where_it_is_left_out() -> None:
     file = arm_file("editions")
-    file.message_type[0].field[0].options.features.field_presence = descriptor_pb2.FeatureSet.IMPLICIT
-    types = protobuf.parse("p.Arm", descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString())
+    file.message_type[0].field[
+        0
+    ].options.features.field_presence = descriptor_pb2.FeatureSet.IMPLICIT
+    types = protobuf.parse(
+        "p.Arm", descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString()
+    )
     shape = protobuf.walk(b"", "p.Arm", types)
     assert shape.find("theta1") is not None
     assert shape.find("theta2") is None
     file.options.features.field_presence = descriptor_pb2.FeatureSet.IMPLICIT
-    file.message_type[0].field[0].options.features.field_presence = descriptor_pb2.FeatureSet.EXPLICIT
-    types = protobuf.parse("p.Arm", descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString())
+    file.message_type[0].field[
+        0
+    ].options.features.field_presence = descriptor_pb2.FeatureSet.EXPLICIT
+    types = protobuf.parse(
+        "p.Arm", descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString()
+    )
     shape = protobuf.walk(b"", "p.Arm", types)
     assert shape.find("theta1") is None
     assert shape.find("theta2") is not None
@@ -480,7 +555,9 @@ def test_a_list_in_several_runs_is_one_list(kinds: str, *, nested: bool) -> None
     made = proto_class(file, "r.R")
     parts = []
     for place, kind in enumerate(kinds):
-        packed = made(values=[place + 0.25, place + 0.5], counts=[-place, place], names=[f"j{place}"])
+        packed = made(
+            values=[place + 0.25, place + 0.5], counts=[-place, place], names=[f"j{place}"]
+        )
         part = packed.SerializeToString() if kind == "p" else single(place + 0.75)
         parts.append(made(inner=made.FromString(part)).SerializeToString() if nested else part)
     data = b"".join(parts)
@@ -489,8 +566,12 @@ def test_a_list_in_several_runs_is_one_list(kinds: str, *, nested: bool) -> None
     expected = expected.inner if nested else expected
     assert len(expected.values) > 2
     types = protobuf.parse("r.R", descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString())
-    wanted = {f"values[{place}]": f"{prefix}values[{place}]" for place in range(len(expected.values))}
-    wanted |= {f"counts[{place}]": f"{prefix}counts[{place}]" for place in range(len(expected.counts))}
+    wanted = {
+        f"values[{place}]": f"{prefix}values[{place}]" for place in range(len(expected.values))
+    }
+    wanted |= {
+        f"counts[{place}]": f"{prefix}counts[{place}]" for place in range(len(expected.counts))
+    }
     content = struct.pack("<BQHIQQ", 5, 22 + len(data), 1, 0, 0, 0) + data
     decoder = ColumnDecoder(wanted, bool, walk=lambda data: protobuf.walk(data, "r.R", types))
     held, columns = decoder.columns(records_in(content).of({1}))

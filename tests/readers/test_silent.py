@@ -24,7 +24,12 @@ T = np.arange(N) / 100
 
 
 def signals(t: FloatArray) -> dict[str, FloatArray]:
-    return {"theta1": np.sin(2 * t), "theta2": np.cos(3 * t), "tau1": np.cos(t), "tau2": np.sin(2 * t)}
+    return {
+        "theta1": np.sin(2 * t),
+        "theta2": np.cos(3 * t),
+        "tau1": np.cos(t),
+        "tau2": np.sin(2 * t),
+    }
 
 
 def rows_of(stamps: list[Any], t: FloatArray) -> list[str]:
@@ -62,7 +67,9 @@ def test_empty_lines_are_no_rows(tmp_path: Path) -> None:
 def test_rows_without_a_value_are_counted_in_compressed_text(tmp_path: Path) -> None:
     text = "\n".join([HEAD, *ROWS[:500], *[",,,,"] * 20, "", *ROWS[520:]])
     (tmp_path / "log.csv.gz").write_bytes(gzip.compress(text.encode()))
-    assert lost(read_log(tmp_path / "log.csv.gz")) == ["20 of 1,000 rows dropped for want of a value"]
+    assert lost(read_log(tmp_path / "log.csv.gz")) == [
+        "20 of 1,000 rows dropped for want of a value"
+    ]
 
 
 @pytest.mark.parametrize("quoted", ['"x', 'a"b', '"'])
@@ -71,7 +78,9 @@ def test_rows_between_quotes_are_refused(quoted: str, closed: bool, tmp_path: Pa
     noted = [f"{one},x" for one in ROWS]
     noted[500] = f"{ROWS[500]},{quoted}"
     noted[700] = f'{ROWS[700]},x"' if closed else noted[700]
-    with pytest.raises(LogError, match="line 503 lies between quotes, of which the first stands in line 502"):
+    with pytest.raises(
+        LogError, match="line 503 lies between quotes, of which the first stands in line 502"
+    ):
         read(tmp_path, f"{HEAD},note", *noted)
 
 
@@ -82,7 +91,9 @@ def test_texts_in_quotes_are_texts(note: str, tmp_path: Path) -> None:
     assert lost(log) == []
 
 
-@pytest.mark.parametrize("day", ["0001-01-01", "1600-02-29", "1677-09-21", "2262-04-12", "2300-01-01", "9999-12-31"])
+@pytest.mark.parametrize(
+    "day", ["0001-01-01", "1600-02-29", "1677-09-21", "2262-04-12", "2300-01-01", "9999-12-31"]
+)
 def test_dates_beyond_int64_nanoseconds_are_refused(day: str, tmp_path: Path) -> None:
     dates = [f"{day}T00:00:{second:05.2f}Z" for second in T]
     with pytest.raises(LogError, match="a time beyond 292 years in column 't'"):
@@ -115,7 +126,9 @@ WRITERS: Mapping[str, Callable[[pa.Table, Path], Any]] = {
     ],
     ids=str,
 )
-def test_times_beyond_int64_nanoseconds_are_refused(kind: str, times: pa.Array, tmp_path: Path) -> None:
+def test_times_beyond_int64_nanoseconds_are_refused(
+    kind: str, times: pa.Array, tmp_path: Path
+) -> None:
     WRITERS[kind](pa.table({"t": times, **signals(T)}), tmp_path / "log")
     with pytest.raises(LogError, match="a time beyond 292 years in column 't'"):
         read_log(tmp_path / "log")
@@ -147,16 +160,22 @@ def test_a_clock_that_is_set_back_is_refused(step: float, place: int, tmp_path: 
     stamps = t.copy()
     stamps[place:] -= min(step, 0.09 if place == 100 else step)
     pq.write_table(pa.table({"t": stamps, **signals(t)}), tmp_path / "log.parquet")
-    with pytest.raises(LogError, match=r"time goes backwards by .* split the file where its clock starts again"):
+    with pytest.raises(
+        LogError, match=r"time goes backwards by .* split the file where its clock starts again"
+    ):
         read_log(tmp_path / "log.parquet")
 
 
 def test_late_blocks_and_repeated_blocks_are_put_in_order(tmp_path: Path) -> None:
     t = np.arange(5000) / 1000
-    order = np.concatenate([np.arange(1000), np.arange(1400, 1800), np.arange(1000, 1400), np.arange(1800, 5000)])
+    order = np.concatenate(
+        [np.arange(1000), np.arange(1400, 1800), np.arange(1000, 1400), np.arange(1800, 5000)]
+    )
     twice = np.concatenate([np.arange(3000), np.arange(2500, 5000)])
     for chosen in (order, twice, order[twice]):
-        table = pa.table({"t": t[chosen], **{name: values[chosen] for name, values in signals(t).items()}})
+        table = pa.table(
+            {"t": t[chosen], **{name: values[chosen] for name, values in signals(t).items()}}
+        )
         pq.write_table(table, tmp_path / "log.parquet")
         log = read_log(tmp_path / "log.parquet")
         assert np.array_equal(log.theta[0], np.sin(2 * t))

@@ -44,7 +44,10 @@ def test_a_zip_is_a_log_of_numpy_by_its_name_alone(tmp_path: Path) -> None:
         if kind:
             assert sniff(tmp_path / name) == kind
         else:
-            with pytest.raises(LogError, match=r"unknown format, it begins with b'PK\\x03\\x04.*MCAP, Parquet or CSV"):
+            with pytest.raises(
+                LogError,
+                match=r"unknown format, it begins with b'PK\\x03\\x04.*MCAP, Parquet or CSV",
+            ):
                 sniff(tmp_path / name)
 
 
@@ -92,12 +95,19 @@ def test_text_may_be_cut_within_a_letter_and_nowhere_else() -> None:
 
 
 @settings(max_examples=30, deadline=None)
-@given(lines=st.lists(st.sampled_from([b"1,2", b"", b"\r", b"33,4"]), max_size=30), size=st.integers(1, 40))
+@given(
+    lines=st.lists(st.sampled_from([b"1,2", b"", b"\r", b"33,4"]), max_size=30),
+    size=st.integers(1, 40),
+)
 def test_pieces_add_up(lines: list[bytes], size: int) -> None:
     text = b"\n".join(lines)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log"
-        for name, packed in (("csv", text), ("csv.gz", gzip.compress(text)), ("csv.zst", zstandard.compress(text))):
+        for name, packed in (
+            ("csv", text),
+            ("csv.gz", gzip.compress(text)),
+            ("csv.zst", zstandard.compress(text)),
+        ):
             path.write_bytes(packed)
             parts = list(pieces(path, name, size))
             assert b"".join(parts) == text
@@ -127,10 +137,16 @@ def found(text: str) -> Dialect:
         ("t,q1\n", "a header and no rows below it"),
         ("t,q1\ns,rad\n", "a header and no rows below it"),
         ("time\n1\n2\n", "'time' has one column; expected columns split by"),
-        ("1,2\n3,4\n", "no header, its first line is '1, 2'; put a line with the columns' names above it: t,theta1"),
+        (
+            "1,2\n3,4\n",
+            "no header, its first line is '1, 2'; put a line with the columns' names above it: t,theta1",
+        ),
         ("# t q1 q2\n1,2\n3,4\n", "no header"),
         ("t,q1,t\n1,2,3\n4,5,6\n", "the column 't' stands in the header twice; rename one"),
-        ("t,q1,q2,tau1,tau2\n1,2,3\n4,5,6\n", "line 2 has 3 cells under a header of 5; mend the header"),
+        (
+            "t,q1,q2,tau1,tau2\n1,2,3\n4,5,6\n",
+            "line 2 has 3 cells under a header of 5; mend the header",
+        ),
     ],
 )
 def test_tables_that_are_none(text: str, words: str) -> None:
@@ -149,7 +165,12 @@ def test_the_dialect_of_a_table() -> None:
         'made by hand\n\n"t" ; q1; "on, off" ;day\n1 ; 2,5;7;2024-01-02 03:04:05\n-2;.5;8;2024-01-02T03:04:06\n'
     )
     assert dialect.columns == ("t", "q1", "on, off", "day")
-    assert (dialect.separator, dialect.decimal_comma, dialect.skip, dialect.padded) == (";", True, 3, True)
+    assert (dialect.separator, dialect.decimal_comma, dialect.skip, dialect.padded) == (
+        ";",
+        True,
+        3,
+        True,
+    )
     assert (set(dialect.whole), set(dialect.dates)) == ({"t", "on, off"}, {"day"})
     plain = found("% rate 5\n% t q1\n1 2.5\n2 3\n")
     assert (plain.columns, plain.separator, plain.comment, plain.skip) == (("t", "q1"), "", "%", 2)
@@ -162,7 +183,8 @@ def test_the_dialect_of_a_table() -> None:
 def test_titles_may_hold_separators_and_rows_may_break_off() -> None:
     dialect = found("run;7;b\nDate,2026-01-01\nt,q1,q2\n1,2,3\n2,3,4\n3,4")
     assert (dialect.columns, dialect.skip) == (("t", "q1", "q2"), 3)
-    # of a table none of whose rows fits its header, the first separator that makes more than four cells of it
+    # of a table none of whose rows fits its header, the first separator that makes more than four
+    # cells of it
     assert found("a|b|c|d|e\n1|2|3|4|5\n1|2\n1|2|3\n").separator == "|"
 
 
@@ -186,7 +208,9 @@ def test_cells_in_quotes() -> None:
 
 def test_a_row_of_too_many_cells_is_told_by_its_number(tmp_path: Path) -> None:
     rows = [f"{place},2,3,4,5" for place in range(40)]
-    (tmp_path / "log.csv").write_text("\n".join(["t,q1,q2,tau1,tau2", *rows, "1,2,3,4,5,6", *rows]) + "\n")
+    (tmp_path / "log.csv").write_text(
+        "\n".join(["t,q1,q2,tau1,tau2", *rows, "1,2,3,4,5,6", *rows]) + "\n"
+    )
     with pytest.raises(LogError, match="row 41 has more cells than the header's 5; mend that row"):
         read_log(tmp_path / "log.csv")
 
@@ -194,7 +218,9 @@ def test_a_row_of_too_many_cells_is_told_by_its_number(tmp_path: Path) -> None:
 def test_a_cell_that_is_no_number_is_told_by_its_column(tmp_path: Path) -> None:
     rows = [f"{place},2,3,{'off' if place == 30 else 4},5" for place in range(600)]
     (tmp_path / "log.csv").write_text("\n".join(["t,q1,q2,tau1,tau2", *rows]) + "\n")
-    with pytest.raises(LogError, match="column 'tau1', past row 0: expected a number, found 'off'; mend the file"):
+    with pytest.raises(
+        LogError, match="column 'tau1', past row 0: expected a number, found 'off'; mend the file"
+    ):
         read_log(tmp_path / "log.csv")
 
 

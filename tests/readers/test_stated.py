@@ -48,7 +48,9 @@ def test_statements(line: str, units: dict[str, str]) -> None:
     assert in_text([line], COLUMNS) == units
 
 
-@pytest.mark.parametrize("above", ["# tau in mNm\n# q in deg", "A title, of the log\nunits: s, deg, deg, mNm, mNm"])
+@pytest.mark.parametrize(
+    "above", ["# tau in mNm\n# q in deg", "A title, of the log\nunits: s, deg, deg, mNm, mNm"]
+)
 def test_units_above_a_table_are_used(above: str, tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(table(above))
     log = read_log(tmp_path / "log.csv")
@@ -62,7 +64,9 @@ def test_a_flag_beats_a_statement_and_says_so(tmp_path: Path) -> None:
     log = read_log(tmp_path / "log.csv", Profile(tau1=Torque(unit="N m"), tau2=Torque(unit="mN m")))
     assert log.tau[:, 0].tolist() == [5, -0.005]
     said = [notice.text for notice in log.notices if notice.code == "OTHER_UNIT"]
-    assert said == ["the file states the unit mN m for tau1 ('tau1'), which is taken for N m as told"]
+    assert said == [
+        "the file states the unit mN m for tau1 ('tau1'), which is taken for N m as told"
+    ]
 
 
 def test_a_name_beats_a_line_and_says_so(tmp_path: Path) -> None:
@@ -81,14 +85,20 @@ def test_a_foreign_unit_above_a_table_is_refused(tmp_path: Path) -> None:
 def test_a_current_in_mA_is_not_one_in_A(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(table("#", "time,q1,q2,current1 [mA],current2 [mA]"))
     drive = Torque(torque_constant=0.5)
-    assert read_log(tmp_path / "log.csv", Profile(tau1=drive, tau2=drive)).tau[0, 0] == pytest.approx(0.0025, rel=1e-12)
+    assert read_log(tmp_path / "log.csv", Profile(tau1=drive, tau2=drive)).tau[
+        0, 0
+    ] == pytest.approx(0.0025, rel=1e-12)
 
 
 def arrow(field_units: dict[str, str], metadata: dict[str, str]) -> pa.Table:
     """A table with units beside its columns."""
     values = {name: np.arange(ROWS) + 1.0 for name in COLUMNS} | {"time": np.arange(ROWS) / 100}
     fields = [
-        pa.field(name, pa.float64(), metadata={"unit": field_units[name]} if name in field_units else None)
+        pa.field(
+            name,
+            pa.float64(),
+            metadata={"unit": field_units[name]} if name in field_units else None,
+        )
         for name in COLUMNS
     ]
     return pa.table(values, schema=pa.schema(fields, metadata=metadata or None))
@@ -100,7 +110,10 @@ def arrow(field_units: dict[str, str], metadata: dict[str, str]) -> pa.Table:
     [
         ({"q1": "deg", "q2": "deg", "tau1": "mNm", "tau2": "mNm"}, {}),
         ({}, {"units": json.dumps({"q": "deg", "tau1": "mNm", "tau2": "mNm"})}),
-        ({"q1": "deg", "q2": "deg"}, {"unit:tau1": "mNm", "tau2.unit": "mNm", "author": "A. N. Other"}),
+        (
+            {"q1": "deg", "q2": "deg"},
+            {"unit:tau1": "mNm", "tau2.unit": "mNm", "author": "A. N. Other"},
+        ),
         ({}, {"units": "time in s, q in deg, tau in mNm"}),
     ],
 )
@@ -117,8 +130,16 @@ def test_units_of_a_schema_are_used(
 
 def test_units_of_a_list_column(tmp_path: Path) -> None:
     pairs = pa.array([[row, row] for row in np.arange(ROWS) + 1.0])
-    schema = pa.schema([("t", pa.float64()), pa.field("q", pairs.type, metadata={"units": "deg"}), ("tau", pairs.type)])
-    pq.write_table(pa.table([np.arange(ROWS) / 100, pairs, pairs], schema=schema), tmp_path / "log.parquet")
+    schema = pa.schema(
+        [
+            ("t", pa.float64()),
+            pa.field("q", pairs.type, metadata={"units": "deg"}),
+            ("tau", pairs.type),
+        ]
+    )
+    pq.write_table(
+        pa.table([np.arange(ROWS) / 100, pairs, pairs], schema=schema), tmp_path / "log.parquet"
+    )
     log = read_log(tmp_path / "log.parquet")
     assert np.rad2deg(log.theta[1, 0]) == pytest.approx(1)
     assert log.tau[1, 0] == 1
@@ -127,7 +148,13 @@ def test_units_of_a_list_column(tmp_path: Path) -> None:
 def test_metadata_that_are_no_units_are_left_alone() -> None:
     assert (
         in_metadata(
-            {"units": "{" * 9000, "pandas": "{}", "q1.unit": "blue", "unit": "x" * 100_000 + ", y" * 50_000}, COLUMNS
+            {
+                "units": "{" * 9000,
+                "pandas": "{}",
+                "q1.unit": "blue",
+                "unit": "x" * 100_000 + ", y" * 50_000,
+            },
+            COLUMNS,
         )
         == {}
     )

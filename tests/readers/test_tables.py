@@ -15,7 +15,10 @@ ROWS = [(0.0, 10, 20, 30, 40), (0.001, 11, 21, 31, 41), (0.002, 12, 22, 32, 42)]
 
 
 def text_of(
-    rows: Sequence[tuple[float, ...]], header: str = "time,q1,q2,tau1,tau2", above: str = "", units: str = ""
+    rows: Sequence[tuple[float, ...]],
+    header: str = "time,q1,q2,tau1,tau2",
+    above: str = "",
+    units: str = "",
 ) -> str:
     lines = [",".join(f"{value:g}" for value in row) for row in rows]
     return above + "\n".join([header, *([units] if units else []), *lines]) + "\n"
@@ -26,7 +29,9 @@ def written(folder: Path, text: str) -> Path:
     return folder / "log.csv"
 
 
-@pytest.mark.parametrize("units", ["s,deg,deg,mNm,Nm", "[s],[deg],[deg],[mN m],[N m]", ",degrees,degrees,(mNm),"])
+@pytest.mark.parametrize(
+    "units", ["s,deg,deg,mNm,Nm", "[s],[deg],[deg],[mN m],[N m]", ",degrees,degrees,(mNm),"]
+)
 def test_a_row_of_units_under_the_header(units: str, tmp_path: Path) -> None:
     log = read_log(written(tmp_path, text_of(ROWS, units=units)))
     assert np.allclose(log.theta[0], np.radians([10, 11, 12]))
@@ -42,7 +47,11 @@ def test_a_foreign_unit_under_the_header_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "above",
-    ["Recorded by the test bench\n", "Arm 7, run 3\nOperator: N. N.\n\n", "a;b;c\nDate,2026-01-01\nrate [Hz],1000\n"],
+    [
+        "Recorded by the test bench\n",
+        "Arm 7, run 3\nOperator: N. N.\n\n",
+        "a;b;c\nDate,2026-01-01\nrate [Hz],1000\n",
+    ],
 )
 @pytest.mark.parametrize("units", ["", "s,rad,rad,Nm,Nm"])
 def test_titles_above_the_header(above: str, units: str, tmp_path: Path) -> None:
@@ -71,7 +80,11 @@ def test_dates_as_times(first: str, second: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("blank", [",", " ,", ", "])
 def test_rows_with_empty_cells_are_dropped_and_counted(blank: str, tmp_path: Path) -> None:
     rows = [",".join(map(str, row)) for row in ROWS]
-    text = "time,q1,q2,tau1,tau2\n" + "\n".join([*rows, "0.003,,1,2,3", "0.004,1,,,", "0.005,1,2,3,4"]) + "\n"
+    text = (
+        "time,q1,q2,tau1,tau2\n"
+        + "\n".join([*rows, "0.003,,1,2,3", "0.004,1,,,", "0.005,1,2,3,4"])
+        + "\n"
+    )
     log = read_log(written(tmp_path, text.replace(",", blank)))
     assert log.stamp_ns.tolist() == [0, 1_000_000, 2_000_000, 5_000_000]
     (said,) = [one for one in log.notices if one.lossy]

@@ -44,7 +44,10 @@ def test_late_and_repeated_samples_in_any_tables(data: st.DataObject) -> None:
         stamps[8 * place : 8 * place + 2] = stamps[8 * place : 8 * place + 2][::-1]
     values = np.arange(stamps.size, dtype=float)
     cuts = sorted(data.draw(st.sets(st.integers(1, stamps.size - 1), max_size=4)))
-    parts = [table(own, q=kept) for own, kept in zip(np.split(stamps, cuts), np.split(values, cuts), strict=True)]
+    parts = [
+        table(own, q=kept)
+        for own, kept in zip(np.split(stamps, cuts), np.split(values, cuts), strict=True)
+    ]
     unique, first = np.unique(stamps, return_index=True)
     try:
         found = ordered(*parts)
@@ -61,11 +64,15 @@ def test_late_and_repeated_samples_in_any_tables(data: st.DataObject) -> None:
 @pytest.mark.parametrize(("late", "fits"), [(HORIZON, True), (HORIZON + 1, False)])
 def test_a_sample_may_come_late_by_the_horizon_and_no_more(late: int, fits: bool) -> None:
     stamps = np.arange(4 * HORIZON) * MS
-    moved = np.concatenate([stamps[:10], stamps[11 : 11 + late], stamps[10:11], stamps[11 + late :]])
+    moved = np.concatenate(
+        [stamps[:10], stamps[11 : 11 + late], stamps[10:11], stamps[11 + late :]]
+    )
     if fits:
         assert ordered(table(moved)).stamp_ns.tolist() == stamps.tolist()
     else:
-        with pytest.raises(LogError, match=f"backwards by {late * 1e-3:.6g} s behind stamp {stamps[10 + late]} ns"):
+        with pytest.raises(
+            LogError, match=f"backwards by {late * 1e-3:.6g} s behind stamp {stamps[10 + late]} ns"
+        ):
             ordered(table(moved))
 
 
@@ -128,16 +135,40 @@ def test_the_error_told_is_that_of_a_parabola(step: int, start: int) -> None:
     missed = other.at(middle)["tau1"] - 3 * ((middle - start) * 1e-9) ** 2
     # differences of squares of up to 0.36 s² lose 1e-16 of these
     assert np.abs(missed - 0.75 * (step * 1e-9) ** 2).max() < 1e-14
-    assert other.error() == f"tau1 {0.75 * (step * 1e-9) ** 2:.2g}, tau2 {float(other.error().split()[-1]):.2g}"
+    assert (
+        other.error()
+        == f"tau1 {0.75 * (step * 1e-9) ** 2:.2g}, tau2 {float(other.error().split()[-1]):.2g}"
+    )
     assert float(other.error().split()[-1]) < 1e-15
 
 
 def test_samples_three_periods_apart_are_bridged_and_no_further() -> None:
-    stamps = np.array([0, 10, 20, 30, 60, 70, 80, 111, 121, 131]) * MS  # a gap of three periods, and one of 3.1
+    stamps = (
+        np.array([0, 10, 20, 30, 60, 70, 80, 111, 121, 131]) * MS
+    )  # a gap of three periods, and one of 3.1
     other = series(stamps, tau1=stamps * 1.0)
     assert other.period == 10 * MS
-    asked = [-1, 0, 30 * MS + 1, 60 * MS - 1, 80 * MS, 80 * MS + 1, 111 * MS - 1, 111 * MS, 131 * MS, 131 * MS + 1]
-    assert other.covers(np.array(asked)).tolist() == [False, *[True] * 4, False, False, True, True, False]
+    asked = [
+        -1,
+        0,
+        30 * MS + 1,
+        60 * MS - 1,
+        80 * MS,
+        80 * MS + 1,
+        111 * MS - 1,
+        111 * MS,
+        131 * MS,
+        131 * MS + 1,
+    ]
+    assert other.covers(np.array(asked)).tolist() == [
+        False,
+        *[True] * 4,
+        False,
+        False,
+        True,
+        True,
+        False,
+    ]
     torn = series(np.array([0, 9, 10, 11, 12]) * MS, tau1=np.zeros(5))
     assert torn.covers(np.array([0, 1, 9 * MS])).tolist() == [True, False, True]
     assert not series(stamps[:1], tau1=np.ones(1)).covers(np.array(asked)).any()
@@ -157,28 +188,45 @@ def test_alignment_does_not_depend_on_the_clock_or_the_tables(shift: int, cut: i
     assert found.columns["theta1"].tolist() == own[inside].tolist()
     assert np.allclose(found.columns["tau1"], 2.0 + 1e-9 * (own[inside] - theirs[0]), rtol=1e-14)
     texts = {notice.code: notice for notice in found.notices}
-    assert texts["NOT_COVERED"].text == f"{60 - inside.sum()} samples were dropped, where another topic has none"
+    assert (
+        texts["NOT_COVERED"].text
+        == f"{60 - inside.sum()} samples were dropped, where another topic has none"
+    )
     assert texts["NOT_COVERED"].lossy
-    assert texts["ALIGNED"].text.startswith("'/other' (333.333 Hz) was interpolated; error, root mean square")
+    assert texts["ALIGNED"].text.startswith(
+        "'/other' (333.333 Hz) was interpolated; error, root mean square"
+    )
 
 
 def test_all_topics_must_cover_a_sample() -> None:
     own = np.arange(30) * MS
     early, late = (
-        series(own[part], **{name: own[part] * 1.0}) for part, name in ((slice(0, 20), "tau1"), (slice(10, 30), "tau2"))
+        series(own[part], **{name: own[part] * 1.0})
+        for part, name in ((slice(0, 20), "tau1"), (slice(10, 30), "tau2"))
     )
     early = Series("/early", early.table.noting(Notice("LATE", "of the other topic")))
     (found,) = aligned(iter([table(own, theta1=own * 1.0)]), [early, late])
     assert found.stamp_ns.tolist() == own[10:20].tolist()
     assert found.columns.keys() == {"theta1", "tau1", "tau2"}
-    assert [notice.code for notice in found.notices] == ["ALIGNED", "ALIGNED", "NOT_COVERED", "LATE"]
+    assert [notice.code for notice in found.notices] == [
+        "ALIGNED",
+        "ALIGNED",
+        "NOT_COVERED",
+        "LATE",
+    ]
 
 
 def test_a_topic_is_read_whole_in_order_or_refused() -> None:
-    found = whole_topic("log", "/other", ["tau1"], iter([table(range(0, 20, 2)), table([]), table([17, 21, 22, 23])]))
+    found = whole_topic(
+        "log",
+        "/other",
+        ["tau1"],
+        iter([table(range(0, 20, 2)), table([]), table([17, 21, 22, 23])]),
+    )
     assert found.table.stamp_ns.tolist() == [*range(0, 17, 2), 17, 18, 21, 22, 23]
     with pytest.raises(
-        LogError, match=r"topic '/other' holds no sample of tau1; .*--set tau1.topic=NAME .*\(profile: "
+        LogError,
+        match=r"topic '/other' holds no sample of tau1; .*--set tau1.topic=NAME .*\(profile: ",
     ):
         whole_topic("log", "/other", ["tau1", "tau2"], iter([table([])]))
 

@@ -35,7 +35,8 @@ def nested() -> list[dict[str, Any]]:
             "t": LOG.t[row],
             "mode": "run",
             "motor_state": [
-                {"q": LOG.theta[one, row], "dq": OMEGA[one, row], "tau_est": LOG.tau[one, row]} for one in (0, 1)
+                {"q": LOG.theta[one, row], "dq": OMEGA[one, row], "tau_est": LOG.tau[one, row]}
+                for one in (0, 1)
             ],
         }
         for row in range(len(LOG))
@@ -56,7 +57,10 @@ def test_nested_json_lines_are_read(name: str, tmp_path: Path) -> None:
 
 
 def test_lists_and_plain_numbers_of_json_lines_are_read(tmp_path: Path) -> None:
-    rows = [{"time": LOG.t[row], "q": LOG.theta[:, row].tolist(), "tau": LOG.tau[:, row].tolist()} for row in range(60)]
+    rows = [
+        {"time": LOG.t[row], "q": LOG.theta[:, row].tolist(), "tau": LOG.tau[:, row].tolist()}
+        for row in range(60)
+    ]
     log = read_log(lines(tmp_path / "a.jsonl", rows))
     assert np.array_equal(log.theta, LOG.theta)
     assert np.array_equal(log.tau, LOG.tau)
@@ -117,7 +121,14 @@ def test_hdf5_is_read_and_its_arrays_are_listed(tmp_path: Path) -> None:
     assert np.array_equal(log.tau, LOG.tau)
     kind, entries = contents(path)
     assert kind == "hdf5"
-    assert {entry.name for entry in entries} == {"q[0]", "q[1]", "tau[0]", "tau[1]", "time", "gains (3 × 3)"}
+    assert {entry.name for entry in entries} == {
+        "q[0]",
+        "q[1]",
+        "tau[0]",
+        "tau[1]",
+        "time",
+        "gains (3 × 3)",
+    }
 
 
 def test_matlab_7_3_is_hdf5_behind_a_head(tmp_path: Path) -> None:
@@ -139,10 +150,14 @@ def struct_of_version() -> bytes:
     return b"\x00\x02IM"
 
 
-def test_hdf5_without_its_package_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_hdf5_without_its_package_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = written_hdf5(tmp_path / "a.h5")
     monkeypatch.setitem(sys.modules, "h5py", None)
-    with pytest.raises(LogError, match=r"an HDF5 file, for which h5py is needed: pip install 'algid\[hdf5\]'"):
+    with pytest.raises(
+        LogError, match=r"an HDF5 file, for which h5py is needed: pip install 'algid\[hdf5\]'"
+    ):
         read_log(path)
 
 
@@ -170,9 +185,14 @@ def test_a_matlab_file_whose_matrices_fit_nothing_says_what_it_holds(tmp_path: P
     found = inspect_log(path)
     assert [entry.name for entry in found.entries] == ["t", "A (80 × 80)", "q (50 × 2)"]
     scipy.io.savemat(path, {"data": np.ones((100, 5))})
-    with pytest.raises(LogError, match=r"found 'data\[0\]', 'data\[1\]', .*--set theta1.source=NAME"):
+    with pytest.raises(
+        LogError, match=r"found 'data\[0\]', 'data\[1\]', .*--set theta1.source=NAME"
+    ):
         read_log(path)
-    named = {"time": "data[0]", **{name: {"source": f"data[{place}]"} for place, name in enumerate(ARM, start=1)}}
+    named = {
+        "time": "data[0]",
+        **{name: {"source": f"data[{place}]"} for place, name in enumerate(ARM, start=1)},
+    }
     scipy.io.savemat(path, {"data": np.column_stack([LOG.t, *LOG.theta, *LOG.tau])})
     assert np.array_equal(read_log(path, Profile.model_validate(named)).tau, LOG.tau)
 

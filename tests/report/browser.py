@@ -67,7 +67,9 @@ class Browser:
         options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
         self.driver = webdriver.Chrome(options=options, service=Service(DRIVER))
 
-    def look(self, page: Path, width: int = 1400, dark: bool = False, picture: Path | None = None) -> Seen:
+    def look(
+        self, page: Path, width: int = 1400, dark: bool = False, picture: Path | None = None
+    ) -> Seen:
         """Open `page`, wait until its figures are drawn, and look."""
         self._set_screen(width, 1000, dark)
         self.driver.get("about:blank")
@@ -113,7 +115,11 @@ class Browser:
 
     def _requests(self) -> list[str]:
         events = [json.loads(entry["message"])["message"] for entry in self._log("performance")]
-        sent = [event["params"]["request"]["url"] for event in events if event["method"] == "Network.requestWillBeSent"]
+        sent = [
+            event["params"]["request"]["url"]
+            for event in events
+            if event["method"] == "Network.requestWillBeSent"
+        ]
         return [url for url in sent if not url.startswith(("data:", "about:"))]
 
     def _log(self, kind: str) -> list[dict[str, Any]]:

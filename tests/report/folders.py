@@ -12,7 +12,14 @@ import polars as pl
 import pyarrow.parquet as pq
 from scipy.signal import butter, filtfilt
 
-from algid.arm import CONSTANT_NAMES, CONSTANT_UNITS, FloatArray, forward_dynamics, regressor, with_payload
+from algid.arm import (
+    CONSTANT_NAMES,
+    CONSTANT_UNITS,
+    FloatArray,
+    forward_dynamics,
+    regressor,
+    with_payload,
+)
 from algid.estimators.innovations import residual_sums
 from algid.estimators.paper import STAGE2_NAMES, stage1, stage2
 from algid.identification.series import innovation_rows, write_columns
@@ -126,10 +133,18 @@ def _result(case: Case, k: FloatArray, covariance: FloatArray, unloaded: Recordi
 
 def estimate(value: float, std: float, unit: str, status: Status = Status.OK) -> Estimate:
     """An estimate with its normal interval."""
-    return Estimate(estimate=value, std=std, ci95=(value - 1.96 * std, value + 1.96 * std), unit=unit, status=status)
+    return Estimate(
+        estimate=value,
+        std=std,
+        ci95=(value - 1.96 * std, value + 1.96 * std),
+        unit=unit,
+        status=status,
+    )
 
 
-def _table4(case: Case, parameters: dict[str, Estimate], truth: dict[str, float]) -> list[Table4Row]:
+def _table4(
+    case: Case, parameters: dict[str, Estimate], truth: dict[str, float]
+) -> list[Table4Row]:
     return [
         Table4Row(
             parameter=name,
@@ -162,11 +177,17 @@ def _log(path: str, role: Any, recording: Recording) -> LogSummary:
 def _write_torque(path: Path, recordings: list[Recording], k: FloatArray) -> None:
     frames = []
     for log, found in enumerate(recordings):
-        predicted = np.einsum("jkn,k->jn", regressor(found.motion.theta, found.motion.omega, found.alpha), k)
+        predicted = np.einsum(
+            "jkn,k->jn", regressor(found.motion.theta, found.motion.omega, found.alpha), k
+        )
         if log:  # the loaded arm's own constants would predict its torque
             predicted = found.motion.tau
         columns = {"log": np.full(found.motion.t.size, log, np.int32), "t": found.motion.t}
-        for name, pair in (("theta", found.motion.theta), ("omega", found.motion.omega), ("tau", found.measured)):
+        for name, pair in (
+            ("theta", found.motion.theta),
+            ("omega", found.motion.omega),
+            ("tau", found.measured),
+        ):
             columns |= {f"{name}{joint + 1}": pair[joint] for joint in range(2)}
         columns |= {f"tau{joint + 1}_predicted": predicted[joint] for joint in range(2)}
         frames.append(pl.DataFrame(columns))
@@ -191,7 +212,9 @@ def _write_running(path: Path, y: FloatArray, found: Recording) -> None:
     for end in np.linspace(0, y.shape[2], 21).astype(int)[1:]:
         k, covariance = _least_squares(y[:, :, :end], found.measured[:, :end])
         columns["t"].append(end / RATE)
-        for name, value, spread in zip(CONSTANT_NAMES, k, np.sqrt(np.diag(covariance)), strict=True):
+        for name, value, spread in zip(
+            CONSTANT_NAMES, k, np.sqrt(np.diag(covariance)), strict=True
+        ):
             columns[name].append(float(value))
             columns[f"{name}_half"].append(1.96 * float(spread))
     log = pl.Series("log", [0] * len(columns["t"]), pl.Int32)
@@ -211,21 +234,38 @@ def _write_series(folder: Path, unloaded: Recording, loaded: Recording, k: Float
     def windows(signal: FloatArray) -> FloatArray:
         return signal[:, : signal.shape[1] // rows * rows].reshape(2, -1, rows)
 
-    one = stage1(windows(unloaded.motion.theta), windows(unloaded.motion.omega), windows(unloaded.motion.tau), 1 / RATE)
+    one = stage1(
+        windows(unloaded.motion.theta),
+        windows(unloaded.motion.omega),
+        windows(unloaded.motion.tau),
+        1 / RATE,
+    )
     two = stage2(
-        windows(loaded.motion.theta), windows(loaded.motion.omega), windows(loaded.motion.tau), 1 / RATE, k, 9.81
+        windows(loaded.motion.theta),
+        windows(loaded.motion.omega),
+        windows(loaded.motion.tau),
+        1 / RATE,
+        k,
+        9.81,
     )
     series = dict(zip(CONSTANT_NAMES, one.k, strict=True)) | {
         "condition": one.condition,
         "k7_condition": one.k7_condition,
     }
-    other = dict(zip(STAGE2_NAMES, two.x, strict=True)) | {"l1": two.l1, "m_p": two.m_p, "condition": two.condition}
+    other = dict(zip(STAGE2_NAMES, two.x, strict=True)) | {
+        "l1": two.l1,
+        "m_p": two.m_p,
+        "condition": two.condition,
+    }
     for name, found in (("estimates", series), ("loaded", other)):
         flat = {key: values.reshape(-1) for key, values in found.items()}
         t = np.arange(flat["condition"].size) / RATE
         table = pl.DataFrame({"t": t, **flat}).to_arrow()
         start = START_NS if name == "estimates" else LOADED_START_NS
-        pq.write_table(table.replace_schema_metadata({"start_ns": json.dumps([start])}), folder / f"{name}.parquet")
+        pq.write_table(
+            table.replace_schema_metadata({"start_ns": json.dumps([start])}),
+            folder / f"{name}.parquet",
+        )
 
 
 def build_recorded(folder: Path, csv: Path) -> Result:
@@ -236,7 +276,9 @@ def build_recorded(folder: Path, csv: Path) -> Result:
     grid = np.arange(int(t[-1] / dt)) * dt
 
     def smooth(name: str) -> FloatArray:
-        values = np.stack([np.interp(grid, t, run[f"{name}{joint}"].to_numpy()) for joint in (1, 2)])
+        values = np.stack(
+            [np.interp(grid, t, run[f"{name}{joint}"].to_numpy()) for joint in (1, 2)]
+        )
         low: FloatArray = filtfilt(*butter(3, 5.0 * 2 * dt), values)
         return low
 
@@ -271,9 +313,13 @@ def hostile(result: Result) -> Result:
     return result.model_copy(
         update={
             "log": log,
-            "more_logs": [replace_log(log, "x/</script><svg onload=alert(1)>\x1b[31m\u202egnp.csv")],
+            "more_logs": [
+                replace_log(log, "x/</script><svg onload=alert(1)>\x1b[31m\u202egnp.csv")
+            ],
             "settings": {HOSTILE: HOSTILE, "a|b": "`c` | [red]d[/red] [x](javascript:alert(1))"},
-            "notices": [Notice("H", text) for text in (HOSTILE, "]]><!-- \x1b]0;owned\x07", "@everyone ```")],
+            "notices": [
+                Notice("H", text) for text in (HOSTILE, "]]><!-- \x1b]0;owned\x07", "@everyone ```")
+            ],
             "estimator": "<b>bold</b>",
         }
     )
@@ -281,4 +327,6 @@ def hostile(result: Result) -> Result:
 
 def replace_log(log: LogSummary, path: str) -> LogSummary:
     """`log` under another name, its channels named as badly."""
-    return log.model_copy(update={"path": path, "mapping": {"theta1": f"/joint {HOSTILE}", HOSTILE: "x"}})
+    return log.model_copy(
+        update={"path": path, "mapping": {"theta1": f"/joint {HOSTILE}", HOSTILE: "x"}}
+    )

@@ -19,7 +19,9 @@ def held(result: Result) -> str:
     """The lines as one text, once they are within their bounds."""
     lines = brief(result)
     assert len(lines) <= HEIGHT, lines
-    commands = [line for line in lines if line.startswith("Run first: ")]  # there to be copied, whole
+    commands = [
+        line for line in lines if line.startswith("Run first: ")
+    ]  # there to be copied, whole
     assert all(len(line) <= WIDTH for line in lines if line not in commands), lines
     return "\n".join(lines)
 
@@ -29,7 +31,10 @@ def test_verdict_reasons_estimates_terms_and_fit_stand_in_25_lines(result: Resul
     assert text.startswith("Good: ")
     for words in ("gravity moment of link 2", "k7", "m_p", "R²", "Terms kept"):
         assert words in text
-    noted = [Notice(code, "said " * 40, logs=(f"{code}.csv",)) for code in ("ONE", "TWO", "THREE", "FOUR")]
+    noted = [
+        Notice(code, "said " * 40, logs=(f"{code}.csv",))
+        for code in ("ONE", "TWO", "THREE", "FOUR")
+    ]
     doubtful = held(result.model_copy(update={"notices": noted}))
     assert "[ONE]" in doubtful
     assert "with -v: " in doubtful
@@ -53,5 +58,7 @@ def test_a_failed_log_says_what_to_run_first() -> None:
 @pytest.mark.slow
 def test_a_real_arm_fits_too(shared_data: Path) -> None:
     logs = sorted((shared_data / "dfki" / "A0_sysid").glob("*.csv"))
-    found = algid.identify(logs[0], settings=Settings(estimator="weak"), profile=Profile(zero="hanging"))
+    found = algid.identify(
+        logs[0], settings=Settings(estimator="weak"), profile=Profile(zero="hanging")
+    )
     assert "gravity moment of link 2" in held(found)

@@ -53,7 +53,9 @@ def test_a_complete_report(browser: Browser, folder: Path, width: int, dark: boo
     seen = browser.look(page, width, dark)
     assert_sound(seen, page, "case1-unloaded.mcap · algid")
     assert seen.drawn == 39
-    written = browser.driver.execute_script("return document.getElementById('correlation-0').data[0].texttemplate")
+    written = browser.driver.execute_script(
+        "return document.getElementById('correlation-0').data[0].texttemplate"
+    )
     assert (written is None) == (width == 400)  # where the cells have no room for numbers
     assert seen.background == ("rgb(16, 21, 28)" if dark else "rgb(255, 255, 255)")
 
@@ -64,10 +66,15 @@ def test_a_parameter_that_cannot_be_identified_and_the_library_beside(
     lost = Estimate(estimate=None, ci95=(None, None), unit="kg m^2", status=Status.NOT_IDENTIFIABLE)
     assert result.fit is not None
     covariance = [
-        [None if 4 in (i, j) else value for j, value in enumerate(row)] for i, row in enumerate(result.fit.covariance)
+        [None if 4 in (i, j) else value for j, value in enumerate(row)]
+        for i, row in enumerate(result.fit.covariance)
     ]
-    fit = result.fit.model_copy(update={"covariance": covariance, "unidentifiable": ["k3 and k5 only as a sum"]})
-    changed = result.model_copy(update={"parameters": {**result.parameters, "k5": lost}, "fit": fit})
+    fit = result.fit.model_copy(
+        update={"covariance": covariance, "unidentifiable": ["k3 and k5 only as a sum"]}
+    )
+    changed = result.model_copy(
+        update={"parameters": {**result.parameters, "k5": lost}, "fit": fit}
+    )
     write_result(changed, folder / "result.json")
     page = write_report(folder, shared_library=True)
     seen = browser.look(page)
@@ -81,7 +88,9 @@ def test_a_log_whose_names_attack(browser: Browser, folder: Path, result: Result
     page = write_report(folder)
     seen = browser.look(page, 400)
     assert_sound(seen, page, seen.title)
-    assert seen.title.startswith("script>")  # the path's last part, shown; what it would run sets another title
+    assert seen.title.startswith(
+        "script>"
+    )  # the path's last part, shown; what it would run sets another title
 
 
 @pytest.mark.skipif(not RUN.exists(), reason="../shared/data is not here")
@@ -95,7 +104,9 @@ def test_a_real_log(browser: Browser, tmp_path: Path) -> None:
 def test_figures_follow_legend_theme_keys_and_paper(browser: Browser, folder: Path) -> None:
     browser.look(write_report(folder))
     run = browser.driver.execute_script
-    shown = "return document.getElementById('torque-0').data.map((trace) => trace.visible !== false)"
+    shown = (
+        "return document.getElementById('torque-0').data.map((trace) => trace.visible !== false)"
+    )
     ink = "return document.getElementById('torque-0')._fullLayout.font.color"
     assert run(shown) == [True, True, True]
     run("document.querySelector('button[data-figure=torque][data-group=measured]').click()")
@@ -105,7 +116,10 @@ def test_figures_follow_legend_theme_keys_and_paper(browser: Browser, folder: Pa
     ranges = "return ['torque-0', 'torque-1'].map((id) => [...document.getElementById(id)._fullLayout.xaxis.range])"
     whole = run(ranges)[0]
     run(press, "+")
-    browser.until("return document.getElementById('torque-1')._fullLayout.xaxis.range[0] > arguments[0]", whole[0])
+    browser.until(
+        "return document.getElementById('torque-1')._fullLayout.xaxis.range[0] > arguments[0]",
+        whole[0],
+    )
     one, two = run(ranges)
     assert one == two
     assert whole[0] < one[0] < one[1] < whole[1]

@@ -42,8 +42,13 @@ def test_a_good_reports_innovations_lie_in_their_band(case_folder: Path, result:
 def test_the_note_counts_what_the_picture_shows(folder: Path, result: Result) -> None:
     path = folder / "innovations.parquet"
     figure = _figure(innovations(path, result))
-    rows = pl.read_parquet(path).with_columns(inside=pl.col("value").is_between(pl.col("low"), pl.col("high")))
-    for quantity, words in ((CORRELATION, "correlations of joints 1 and 2"), (WHITENED, "frequencies")):
+    rows = pl.read_parquet(path).with_columns(
+        inside=pl.col("value").is_between(pl.col("low"), pl.col("high"))
+    )
+    for quantity, words in (
+        (CORRELATION, "correlations of joints 1 and 2"),
+        (WHITENED, "frequencies"),
+    ):
         own = rows.filter(pl.col("quantity") == quantity)
         told = [own.filter(pl.col("joint") == joint) for joint in (1, 2)]
         counts = " and ".join(f"{int(one['inside'].sum())} of {one.height}" for one in told)
@@ -56,18 +61,25 @@ def test_colour_is_told_and_seen(folder: Path, result: Result) -> None:
     raised = pl.when(pl.col("quantity") == CORRELATION).then(0.8).otherwise(pl.col("value"))
     pl.read_parquet(path).with_columns(value=raised).write_parquet(path)
     assert result.fit is not None
-    coloured = {name: WhitenessTest(white=False, p_value=0.0, lag1_correlation=0.8) for name in ("tau1", "tau2")}
+    coloured = {
+        name: WhitenessTest(white=False, p_value=0.0, lag1_correlation=0.8)
+        for name in ("tau1", "tau2")
+    }
     poor = result.model_copy(update={"fit": result.fit.model_copy(update={"whiteness": coloured})})
     figure = _figure(innovations(path, poor))
     assert "Inside the band: 0 of 40 and 0 of 40 correlations" in figure.note
     assert "coloured; the intervals do not allow for that" in figure.note
 
 
-def test_the_running_estimate_ends_at_the_estimate_and_tells_when_it_strayed(folder: Path, result: Result) -> None:
+def test_the_running_estimate_ends_at_the_estimate_and_tells_when_it_strayed(
+    folder: Path, result: Result
+) -> None:
     path = folder / "running.parquet"
     figure = _figure(running(path, result))
     rows = pl.read_parquet(path)
-    assert [panel.title for panel in figure.panels] == [name for name in rows.columns if f"{name}_half" in rows.columns]
+    assert [panel.title for panel in figure.panels] == [
+        name for name in rows.columns if f"{name}_half" in rows.columns
+    ]
     for panel in figure.panels:
         estimate = result.parameters[panel.title].estimate
         assert estimate is not None
@@ -77,16 +89,25 @@ def test_the_running_estimate_ends_at_the_estimate_and_tells_when_it_strayed(fol
         low, high = panel.layout["yaxis"]["range"]
         assert low < estimate < high
     truth = {row.parameter: row.truth for row in result.table4}
-    held = [np.mean(np.abs(rows[name].to_numpy() - truth[name]) <= rows[f"{name}_half"].to_numpy()) for name in truth]
+    held = [
+        np.mean(np.abs(rows[name].to_numpy() - truth[name]) <= rows[f"{name}_half"].to_numpy())
+        for name in truth
+    ]
     told = re.search(r"The bands hold the truth ([\d.]+) % of the time", figure.note)
     assert told is not None
-    assert float(told[1]) == pytest.approx(100 * float(np.mean(held)), rel=1e-2)  # three digits are written
+    assert float(told[1]) == pytest.approx(
+        100 * float(np.mean(held)), rel=1e-2
+    )  # three digits are written
 
 
 def test_what_has_no_estimate_has_no_running_one(case_folder: Path, result: Result) -> None:
-    lost = result.parameters["k3"].model_copy(update={"estimate": None, "std": None, "ci95": (None, None)})
+    lost = result.parameters["k3"].model_copy(
+        update={"estimate": None, "std": None, "ci95": (None, None)}
+    )
     poor = result.model_copy(update={"parameters": {**result.parameters, "k3": lost}})
-    titles = [panel.title for panel in _figure(running(case_folder / "running.parquet", poor)).panels]
+    titles = [
+        panel.title for panel in _figure(running(case_folder / "running.parquet", poor)).panels
+    ]
     assert "k3" not in titles
     assert "k4" in titles
 

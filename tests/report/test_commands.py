@@ -24,7 +24,9 @@ def folder(case_folder: Path, tmp_path: Path) -> Path:
 
 
 def run(*arguments: object) -> tuple[str, str]:
-    done = CliRunner().invoke(app, [str(argument) for argument in arguments], catch_exceptions=False)
+    done = CliRunner().invoke(
+        app, [str(argument) for argument in arguments], catch_exceptions=False
+    )
     assert done.exit_code == 0
     return done.stdout, done.stderr
 
@@ -32,8 +34,12 @@ def run(*arguments: object) -> tuple[str, str]:
 def test_report_writes_its_files_and_prints_the_table(folder: Path) -> None:
     out, err = run("report", folder, "--export", "mcap")
     assert "k1" in out
-    assert err.splitlines() == [f"wrote {folder / name}" for name in ("report.html", "report.md", "estimates.mcap")]
-    assert all((folder / name).stat().st_size for name in ("report.html", "report.md", "estimates.mcap"))
+    assert err.splitlines() == [
+        f"wrote {folder / name}" for name in ("report.html", "report.md", "estimates.mcap")
+    ]
+    assert all(
+        (folder / name).stat().st_size for name in ("report.html", "report.md", "estimates.mcap")
+    )
 
 
 def test_json_is_the_result_alone(folder: Path) -> None:
@@ -49,7 +55,9 @@ def test_markdown_is_report_md(folder: Path) -> None:
 
 def test_compare_tells_sigma_in_every_format(folder: Path) -> None:
     table, _ = run("compare", folder, folder / "result.json")
-    assert "Every setting is the same, and every log was read the same way." in " ".join(table.split())
+    assert "Every setting is the same, and every log was read the same way." in " ".join(
+        table.split()
+    )
     text, _ = run("compare", folder, folder, "--format", "markdown")
     assert "**Estimates side by side**" in text
     found = json.loads(run("compare", folder, folder, "--format", "json")[0])

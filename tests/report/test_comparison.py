@@ -8,16 +8,24 @@ from tests.report.folders import estimate
 
 
 def test_the_difference_is_over_both_standard_deviations(result: Result) -> None:
-    one = result.model_copy(update={"parameters": {"k6": estimate(1.0, 0.3, "N m s/rad")}, "payload": {}})
-    two = result.model_copy(update={"parameters": {"k6": estimate(2.0, 0.4, "N m s/rad")}, "payload": {}})
+    one = result.model_copy(
+        update={"parameters": {"k6": estimate(1.0, 0.3, "N m s/rad")}, "payload": {}}
+    )
+    two = result.model_copy(
+        update={"parameters": {"k6": estimate(2.0, 0.4, "N m s/rad")}, "payload": {}}
+    )
     found = compare([one, two], ["before", "after"])
     assert found.sigma["k6"][0] == pytest.approx(2.0, rel=1e-12)  # 1 over hypot(0.3, 0.4)
     assert found.largest_sigma == pytest.approx(2.0, rel=1e-12)
-    assert found.estimates.rows == (("k6", "N m s/rad", "1.00 ± 0.30", "2.00 ± 0.40", "+100", "+2.0"),)
+    assert found.estimates.rows == (
+        ("k6", "N m s/rad", "1.00 ± 0.30", "2.00 ± 0.40", "+100", "+2.0"),
+    )
 
 
 def test_only_settings_that_differ_are_shown(result: Result) -> None:
-    other = result.model_copy(update={"settings": {**result.settings, "window": 4.0}, "estimator": "weak"})
+    other = result.model_copy(
+        update={"settings": {**result.settings, "window": 4.0}, "estimator": "weak"}
+    )
     rows = compare([result, other], ["a", "b"]).settings.rows
     assert rows == (("estimator", "refined", "weak"), ("window", "–", "4"))
     assert (
@@ -27,7 +35,9 @@ def test_only_settings_that_differ_are_shown(result: Result) -> None:
 
 
 def test_a_parameter_that_only_one_has_is_shown_without_a_difference(result: Result) -> None:
-    paper = result.model_copy(update={"parameters": {"kx": Estimate(estimate=1.0, unit="kg")}, "payload": {}})
+    paper = result.model_copy(
+        update={"parameters": {"kx": Estimate(estimate=1.0, unit="kg")}, "payload": {}}
+    )
     found = compare([result, paper])
     assert found.sigma["kx"] == (None,)
     assert found.sigma["k1"] == (None,)

@@ -20,14 +20,18 @@ from tests.report.folders import HOSTILE
 
 def _moved(result: Result, sigmas: float) -> Result:
     moved = {
-        name: found.model_copy(update={"estimate": (found.estimate or 0.0) + sigmas * 2**0.5 * (found.std or 0.0)})
+        name: found.model_copy(
+            update={"estimate": (found.estimate or 0.0) + sigmas * 2**0.5 * (found.std or 0.0)}
+        )
         for name, found in result.parameters.items()
     }
     return result.model_copy(update={"parameters": moved})
 
 
 def _values(packed: dict[str, str]) -> list[float]:
-    values: list[float] = np.frombuffer(base64.b64decode(packed["bdata"]), dtype=f"<{packed['dtype']}").tolist()
+    values: list[float] = np.frombuffer(
+        base64.b64decode(packed["bdata"]), dtype=f"<{packed['dtype']}"
+    ).tolist()
     return values
 
 
@@ -54,7 +58,9 @@ def test_intervals_are_those_of_the_results(result: Result) -> None:
     assert k1.estimate is not None
     assert k1.std is not None
     assert _values(first["x"])[0] == 0.0
-    assert first["error_x"]["array"][0] == pytest.approx(100 * 1.96 * k1.std / k1.estimate, rel=1e-3)
+    assert first["error_x"]["array"][0] == pytest.approx(
+        100 * 1.96 * k1.std / k1.estimate, rel=1e-3
+    )
     assert _values(second["x"])[0] == pytest.approx(100 * 2**0.5 * k1.std / k1.estimate, rel=1e-5)
 
 

@@ -42,11 +42,16 @@ NASTY = "<b>&\"'</b>"
 
 
 def table(title: str, depth: Depth = Depth.TERMINAL, rows: int = 1) -> Table:
-    return Table(title, COLUMNS, tuple((f"row {place}", str(place)) for place in range(rows)), depth=depth)
+    return Table(
+        title, COLUMNS, tuple((f"row {place}", str(place)) for place in range(rows)), depth=depth
+    )
 
 
 def figure(key: str, panels: int = 1) -> Figure:
-    made = tuple(Panel([{"type": "scatter"}], {}, f"says {place}", height=100 + place) for place in range(panels))
+    made = tuple(
+        Panel([{"type": "scatter"}], {}, f"says {place}", height=100 + place)
+        for place in range(panels)
+    )
     return Figure(key, f"Figure {key}", made, "Read: it.")
 
 
@@ -76,17 +81,40 @@ def positions(text: str, words: list[str]) -> list[int]:
 
 
 DEPTHS = document(
-    Section((table("Deep", Depth.PAGE), table("First"), figure("one"), table("Folded", Depth.FOLDED))),
+    Section(
+        (table("Deep", Depth.PAGE), table("First"), figure("one"), table("Folded", Depth.FOLDED))
+    ),
     Section((table("Second"), table("Third", Depth.MARKDOWN)), "more", "More"),
     Section((table("Last"),), "paper", "The paper's", fold="closed"),
 )
 
 
 def test_each_format_goes_as_deep_as_it_has_room_and_keeps_the_order() -> None:
-    printed, text, shown = terminal(DEPTHS), markdown(DEPTHS), main_of(page(DEPTHS, shared_library=True))
-    assert re.findall(r"^(Deep|First|Second|Third|Folded|Last)\b", printed, re.M) == ["First", "Second", "Last"]
-    assert re.findall(r"^\*\*(\w+)\*\*$", text, re.M) == ["First", "Second", "Third", "Last", "Folded"]
-    assert re.findall(r"<caption>(\w+)</caption>", shown) == ["Deep", "First", "Folded", "Second", "Third", "Last"]
+    printed, text, shown = (
+        terminal(DEPTHS),
+        markdown(DEPTHS),
+        main_of(page(DEPTHS, shared_library=True)),
+    )
+    assert re.findall(r"^(Deep|First|Second|Third|Folded|Last)\b", printed, re.M) == [
+        "First",
+        "Second",
+        "Last",
+    ]
+    assert re.findall(r"^\*\*(\w+)\*\*$", text, re.M) == [
+        "First",
+        "Second",
+        "Third",
+        "Last",
+        "Folded",
+    ]
+    assert re.findall(r"<caption>(\w+)</caption>", shown) == [
+        "Deep",
+        "First",
+        "Folded",
+        "Second",
+        "Third",
+        "Last",
+    ]
     assert text.index("<details>") < text.index("**Folded**") < text.index("</details>")
     assert "<details>" not in markdown(document(Section((table("First"),))))
 
@@ -129,7 +157,9 @@ def test_an_arm_stands_beside_its_section_and_brings_its_script_once() -> None:
 def test_a_fold_is_open_or_closed() -> None:
     for fold, attribute in (("open", " open"), ("closed", "")):
         text = section_html(Section((table("T"),), "key", "A <fold>", fold=fold))  # type: ignore[arg-type]
-        assert text.startswith(f'<details class="paper" id="key"{attribute}><summary>A &lt;fold&gt;</summary>')
+        assert text.startswith(
+            f'<details class="paper" id="key"{attribute}><summary>A &lt;fold&gt;</summary>'
+        )
         assert text.endswith("</details>")
     assert section_html(Section((), "key", "A fold", fold="open")) == ""
 
@@ -138,10 +168,16 @@ def test_a_fold_is_open_or_closed() -> None:
     ("content", "expected"),
     [
         (ReadingAid(NASTY), '<p class="reading">&lt;b&gt;&amp;&quot;&#x27;&lt;/b&gt;</p>'),
-        (Bullets(("one", NASTY)), "<ul><li>one</li><li>&lt;b&gt;&amp;&quot;&#x27;&lt;/b&gt;</li></ul>"),
+        (
+            Bullets(("one", NASTY)),
+            "<ul><li>one</li><li>&lt;b&gt;&amp;&quot;&#x27;&lt;/b&gt;</li></ul>",
+        ),
         (Bullets((), "None & done."), '<p class="note">None &amp; done.</p>'),
         (
-            References({"r<1>": [("a&b", "./a%26b"), ("c", "./c"), ("d", "./d"), ("e", "./e")], "r2": []}, 2),
+            References(
+                {"r<1>": [("a&b", "./a%26b"), ("c", "./c"), ("d", "./d"), ("e", "./e")], "r2": []},
+                2,
+            ),
             (
                 '<dl><dt>r&lt;1&gt;</dt><dd><a href="./a%26b">a&amp;b</a>, <a href="./c">c</a> and 2 more</dd>'
                 "<dt>r2</dt><dd>none</dd></dl>"
@@ -158,13 +194,22 @@ def test_words_lists_and_links_are_set_as_text(content: Content, expected: str) 
 
 
 def test_a_page_says_what_kind_it_is_of_what_and_who_made_it() -> None:
-    shown = replace(document(Section((table("T"),))), kicker="k<1>", name="n<2>", facts="f<3>", made="m<4>", tab="")
+    shown = replace(
+        document(Section((table("T"),))),
+        kicker="k<1>",
+        name="n<2>",
+        facts="f<3>",
+        made="m<4>",
+        tab="",
+    )
     text = page(shown, shared_library=True)
     assert '<p class="kicker">algid · k&lt;1&gt;</p><h1>n&lt;2&gt;</h1>' in text
     assert '<p class="facts">f&lt;3&gt;</p>' in text
     assert "<footer>m&lt;4&gt;</footer>" in text
     assert "<title>n&lt;2&gt; · algid</title>" in text
-    assert "<title>t&lt;5&gt; · algid</title>" in page(replace(shown, tab="t<5>"), shared_library=True)
+    assert "<title>t&lt;5&gt; · algid</title>" in page(
+        replace(shown, tab="t<5>"), shared_library=True
+    )
     assert markdown(replace(shown, title="a_b")).startswith("### a\\_b\n")
 
 
@@ -175,7 +220,9 @@ def test_the_policy_names_every_script_that_runs_and_no_other(shared: bool) -> N
     assert policy is not None
     scripts = re.findall(r"<script>(.*?)</script>", text, re.S)
     assert len(scripts) == 2
-    hashes = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts]
+    hashes = [
+        base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts
+    ]
     source = policy[1].partition("script-src ")[2].partition(";")[0].split()
     assert source[1:] == [f"'sha256-{digest}'" for digest in hashes]
     nonce = re.search(r'<script nonce="(\w+)" src="\.\./plotly\.min\.js">', text)
@@ -184,7 +231,9 @@ def test_the_policy_names_every_script_that_runs_and_no_other(shared: bool) -> N
         assert source[0] == f"'nonce-{nonce[1]}'"
         other = page(document(Section((arm(), figure("two")))), shared_library=True)
         assert nonce[1] not in other  # nobody can foretell it from another page
-        worded = page(replace(document(Section((arm(), figure("one")))), facts="others"), shared_library=True)
+        worded = page(
+            replace(document(Section((arm(), figure("one")))), facts="others"), shared_library=True
+        )
         assert nonce[1] not in worded  # nor from the same figures
     else:
         assert nonce is None
@@ -194,11 +243,20 @@ def test_the_policy_names_every_script_that_runs_and_no_other(shared: bool) -> N
 
 def test_the_script_is_handed_every_panel_in_its_place() -> None:
     two = replace(figure("two", panels=2), columns=2)
-    shown = document(Section((figure("one"), Missing("x", "X", "gone"))), Section((two,), "part", "P"))
+    shown = document(
+        Section((figure("one"), Missing("x", "X", "gone"))), Section((two,), "part", "P")
+    )
     text = page(shown, shared_library=True)
     data = json.loads(text.partition('id="figures">')[2].partition("</script>")[0])
-    told = [(panel["id"], panel["figure"], panel["columns"], panel["height"]) for panel in data["panels"]]
-    assert told == [("one-0", "one", "one", 100), ("two-0", "two", "two", 100), ("two-1", "two", "two", 101)]
+    told = [
+        (panel["id"], panel["figure"], panel["columns"], panel["height"])
+        for panel in data["panels"]
+    ]
+    assert told == [
+        ("one-0", "one", "one", 100),
+        ("two-0", "two", "two", 100),
+        ("two-1", "two", "two", 101),
+    ]
     assert all(text.count(f'id="{key}"') == 1 for key, *_ in told)
     assert text.index('class="panels two"') > text.index('id="two"') > text.index('class="panels"')
     assert text.count('<div class="panels two">') == text.count('<div class="panels">') == 1
@@ -213,7 +271,9 @@ def test_a_legend_with_a_group_is_a_button_and_views_are_a_choice() -> None:
     assert len(buttons) == 1
     assert 'data-figure="one" data-group="g&amp;"' in buttons[0]
     assert 'class="swatch area" style="--tint:var(--blue);opacity:0.25"' in buttons[0]
-    assert '<span class="entry"><span class="swatch line" style="--tint:var(--ink);opacity:1">' in text
+    assert (
+        '<span class="entry"><span class="swatch line" style="--tint:var(--ink);opacity:1">' in text
+    )
     assert re.findall(r'<option value="(.*?)">(.*?)</option>', text) == [
         ("", "all logs"),
         ("0,1.5", "log &lt;a&gt;"),
@@ -251,7 +311,9 @@ def test_cells_say_what_they_hold() -> None:
     assert '<td class="number" data-label="±">0.1</td>' in text
     assert '<td class="text" data-label="Why">yes</td>' in text  # means nothing without its heading
     assert f'<td class="text long">{"x" * 41}</td>' in text
-    assert 'class="text long"' not in table_html(replace(WIDE, rows=(("k", "1", "", "OK", "x" * 40),)))
+    assert 'class="text long"' not in table_html(
+        replace(WIDE, rows=(("k", "1", "", "OK", "x" * 40),))
+    )
     assert '<th scope="row">k&lt;2&gt;</th>' in text
     assert text.count('<th scope="col" class="number">') == 2
     assert '<p class="note">A note &amp; more.</p>' in text
@@ -299,11 +361,18 @@ def test_tables_lose_columns_but_never_their_place_in_the_report() -> None:
     assert (fewer.depth, fewer.links, fewer.note) == (Depth.FOLDED, {"k1": "x"}, made.note)
     empty = replace(WIDE, rows=(("k1", "–", "", "OK", "–"),)).without_empty()
     assert [column.heading for column in empty.columns] == ["Parameter", "Status"]
-    assert filled(table("a"), table("b", rows=0), table("c", rows=2)) == (table("a"), table("c", rows=2))
+    assert filled(table("a"), table("b", rows=0), table("c", rows=2)) == (
+        table("a"),
+        table("c", rows=2),
+    )
 
 
 def test_a_narrow_table_loses_the_highest_rank_first_and_never_one_without() -> None:
-    ranked = Table("T", tuple(Column(str(rank), "text", rank) for rank in (0, 2, 1, 3)), (("a", "b", "c", "d"),))
+    ranked = Table(
+        "T",
+        tuple(Column(str(rank), "text", rank) for rank in (0, 2, 1, 3)),
+        (("a", "b", "c", "d"),),
+    )
     left = []
     one: Table | None = ranked
     while one is not None:
@@ -316,7 +385,10 @@ def test_a_narrow_table_loses_the_highest_rank_first_and_never_one_without() -> 
 def test_one_sentence_judges_every_report() -> None:
     reasons = (Notice("A", "k2 is singular"), Notice("B", "it jitters"))
     assert graded("k is known").sentence == "Good: k is known."
-    assert graded("k is known", reasons).sentence == "With reservations: k is known, but k2 is singular."
+    assert (
+        graded("k is known", reasons).sentence
+        == "With reservations: k is known, but k2 is singular."
+    )
     failed = graded("k is known", reasons, failure="it broke", things="masses", command="run")
     assert failed.sentence == "Failed: it broke; do not use these masses."
     assert (failed.grade, failed.reasons, failed.command) == ("failed", reasons, "run")

@@ -25,12 +25,16 @@ def messages(case_folder: Path) -> dict[str, list[Any]]:
 def read(path: Path) -> dict[str, list[Any]]:
     found = defaultdict(list)
     with path.open("rb") as stream:
-        for message in make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
+        for message in make_reader(
+            stream, decoder_factories=[DecoderFactory()]
+        ).iter_decoded_messages():
             found[message.channel.topic].append(message)
     return found
 
 
-def test_the_log_holds_predicted_torque_residual_and_estimates(messages: dict[str, list[Any]]) -> None:
+def test_the_log_holds_predicted_torque_residual_and_estimates(
+    messages: dict[str, list[Any]],
+) -> None:
     assert set(messages) == {
         "/algid/measured",
         "/algid/log2/measured",
@@ -43,28 +47,42 @@ def test_the_log_holds_predicted_torque_residual_and_estimates(messages: dict[st
     }
 
 
-def test_torques_are_bit_for_bit_those_of_the_parquet(messages: dict[str, list[Any]], case_folder: Path) -> None:
+def test_torques_are_bit_for_bit_those_of_the_parquet(
+    messages: dict[str, list[Any]], case_folder: Path
+) -> None:
     rows = pl.read_parquet(case_folder / "torque.parquet").filter(pl.col("log") == 0)
-    predicted = np.array([message.decoded_message.effort for message in messages["/algid/predicted"]])
+    predicted = np.array(
+        [message.decoded_message.effort for message in messages["/algid/predicted"]]
+    )
     residual = np.array([message.decoded_message.effort for message in messages["/algid/residual"]])
-    np.testing.assert_array_equal(predicted, rows.select("tau1_predicted", "tau2_predicted").to_numpy())
+    np.testing.assert_array_equal(
+        predicted, rows.select("tau1_predicted", "tau2_predicted").to_numpy()
+    )
     measured = rows.select("tau1", "tau2").to_numpy()
     np.testing.assert_array_equal(residual, measured - predicted)
     assert messages["/algid/predicted"][0].decoded_message.name == ["joint1", "joint2"]
 
 
-def test_what_was_measured_stands_beside_it_bit_for_bit(messages: dict[str, list[Any]], case_folder: Path) -> None:
+def test_what_was_measured_stands_beside_it_bit_for_bit(
+    messages: dict[str, list[Any]], case_folder: Path
+) -> None:
     rows = pl.read_parquet(case_folder / "torque.parquet")
     for log, topic in ((0, "/algid/measured"), (1, "/algid/log2/measured")):
         own = rows.filter(pl.col("log") == log)
         for field, name in (("position", "theta"), ("velocity", "omega"), ("effort", "tau")):
-            found = np.array([getattr(message.decoded_message, field) for message in messages[topic]])
+            found = np.array(
+                [getattr(message.decoded_message, field) for message in messages[topic]]
+            )
             np.testing.assert_array_equal(found, own.select(f"{name}1", f"{name}2").to_numpy())
 
 
 def test_stamps_are_those_of_the_original_log(messages: dict[str, list[Any]]) -> None:
     found = messages["/algid/residual"]
-    assert [message.message.log_time for message in found[:3]] == [START_NS, START_NS + 1_000_000, START_NS + 2_000_000]
+    assert [message.message.log_time for message in found[:3]] == [
+        START_NS,
+        START_NS + 1_000_000,
+        START_NS + 2_000_000,
+    ]
     stamp = found[1].decoded_message.header.stamp
     assert stamp.sec * 1_000_000_000 + stamp.nanosec == START_NS + 1_000_000
     assert messages["/algid/loaded"][0].message.log_time == START_NS + 60_000_000_000

@@ -38,14 +38,19 @@ def test_the_truth_and_each_log_stand_where_they_belong() -> None:
     drawing = forest(GROUP, {"k1": 2.2}, {"k1": [1.0, 1.8, 9.0]}).rows["k1"]
     ring = re.search(r'class="truth" cx="([\d.]+)"', drawing)
     assert ring is not None
-    assert float(ring[1]) == pytest.approx(reach(drawing)[1], abs=0.06)  # the upper end of the interval
+    assert float(ring[1]) == pytest.approx(
+        reach(drawing)[1], abs=0.06
+    )  # the upper end of the interval
     dots = [float(x) for x in re.findall(r'class="log" cx="([\d.]+)"', drawing)]
     assert dots == pytest.approx([EDGE, reach(drawing)[0]], abs=0.06)
     assert f'class="log beyond" cx="{WIDTH - 2.5:g}"' in drawing  # 9.0 lies beyond the scale
 
 
 def test_one_wild_row_does_not_hide_the_others() -> None:
-    steady = {f"k{place}": Estimate(estimate=1.0, std=0.01, ci95=(0.98, 1.02), unit="m") for place in range(5)}
+    steady = {
+        f"k{place}": Estimate(estimate=1.0, std=0.01, ci95=(0.98, 1.02), unit="m")
+        for place in range(5)
+    }
     wild = {"k9": Estimate(estimate=1.0, std=0.4, ci95=(0.2, 1.8), unit="m")}
     drawn = forest(steady | wild)
     assert drawn.limit == 5.0  # 2.5 times 2 %
@@ -55,7 +60,10 @@ def test_one_wild_row_does_not_hide_the_others() -> None:
 
 def test_bars_stand_on_the_side_of_their_sign_and_share_a_scale() -> None:
     drawn = bars({"coulomb": -50.0, "offset": 25.0, "gain": 0.0})
-    sizes = {name: float(re.findall(r'width="([-\d.]+)" height="10"', drawing)[0]) for name, drawing in drawn.items()}
+    sizes = {
+        name: float(re.findall(r'width="([-\d.]+)" height="10"', drawing)[0])
+        for name, drawing in drawn.items()
+    }
     assert sizes["coulomb"] == pytest.approx(2 * sizes["offset"], abs=0.1)
     assert sizes["gain"] == 0.0
     assert 'class="less"' in drawn["coulomb"]

@@ -18,8 +18,28 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A synthetic pair of logs, and what each command makes of them."""
     place = tmp_path_factory.mktemp("traces")
     calls = (
-        ["synth", "case1", "-o", "{}", "--duration", "2", "--torque", "wide", "--position-noise", "1e-3"],
-        ["identify", "{}/case1-unloaded.mcap", "--loaded", "{}/case1-loaded.mcap", "-o", "{}", "--export", "mcap"],
+        [
+            "synth",
+            "case1",
+            "-o",
+            "{}",
+            "--duration",
+            "2",
+            "--torque",
+            "wide",
+            "--position-noise",
+            "1e-3",
+        ],
+        [
+            "identify",
+            "{}/case1-unloaded.mcap",
+            "--loaded",
+            "{}/case1-loaded.mcap",
+            "-o",
+            "{}",
+            "--export",
+            "mcap",
+        ],
         ["track", "{}/case1-loaded.mcap", "--parameters", "{}/case1-unloaded.algid", "-o", "{}"],
         ["compare", "{}/case1-unloaded.algid", "{}/case1-unloaded.algid", "-o", "{}/compared"],
     )
@@ -31,6 +51,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_nothing_names_a_folder_that_is_gone(folder: Path) -> None:
     written = [path for path in folder.rglob("*") if path.is_file()]
-    assert {"report.html", "report.md", "result.json", "estimates.mcap", "compare.html"} <= {p.name for p in written}
-    traces = {path.name: TRACE.findall(path.read_bytes()) for path in written if path.suffix != ".gz"}
+    assert {"report.html", "report.md", "result.json", "estimates.mcap", "compare.html"} <= {
+        p.name for p in written
+    }
+    traces = {
+        path.name: TRACE.findall(path.read_bytes()) for path in written if path.suffix != ".gz"
+    }
     assert not {name: found for name, found in traces.items() if found}

@@ -62,7 +62,9 @@ def test_every_figure_is_one_that_plotly_knows(case_folder: Path, result: Result
         assert isinstance(figure, Figure)
         assert figure.reading.startswith("Read: ")
         for panel in figure.panels:
-            go.Figure({"data": _without_tokens(panel.traces), "layout": _without_tokens(panel.layout)})
+            go.Figure(
+                {"data": _without_tokens(panel.traces), "layout": _without_tokens(panel.layout)}
+            )
 
 
 def _without_tokens(value: object) -> object:
@@ -80,7 +82,9 @@ def test_the_page_asks_nothing_of_any_host(folder: Path) -> None:
     assert not [tag for tag, attrs in tags if "src" in attrs]
     links = [attrs.get("href") or "" for _, attrs in tags if "href" in attrs]
     assert all(link.startswith(("#", "data:,")) for link in links)
-    policy = next(attrs["content"] for tag, attrs in tags if tag == "meta" and "http-equiv" in attrs)
+    policy = next(
+        attrs["content"] for tag, attrs in tags if tag == "meta" and "http-equiv" in attrs
+    )
     assert policy is not None
     assert policy.startswith("default-src 'none'; script-src 'sha256-")
     assert "unsafe-eval" not in policy
@@ -106,12 +110,16 @@ def test_foreign_text_stays_text(folder: Path, result: Result) -> None:
     write_result(hostile(result), folder / "result.json")
     text = write_report(folder).read_text(encoding="utf-8")
     own = re.sub(r"<(script|style)[^>]*>.*?</\1>", "", text, flags=re.DOTALL)
-    own = re.sub(r'<svg (?:class="forest"|viewBox="-).*?</svg>', "", own, flags=re.DOTALL)  # the page's own drawings
+    own = re.sub(
+        r'<svg (?:class="forest"|viewBox="-).*?</svg>', "", own, flags=re.DOTALL
+    )  # the page's own drawings
     tags = Tags(own).found
     assert {"img", "svg", "b", "script"}.isdisjoint(tag for tag, _ in tags)
     assert not [attrs for _, attrs in tags if any(name.startswith("on") for name in attrs)]
     assert escaped(HOSTILE) in own
-    assert text.count("<script") == 5  # the data, the library, the page's own, the arm's frames and its player
+    assert (
+        text.count("<script") == 5
+    )  # the data, the library, the page's own, the arm's frames and its player
     for character in "\x1b\x07\u202e":
         assert character not in text
 
@@ -125,10 +133,14 @@ def test_data_cannot_end_its_script() -> None:
 @pytest.mark.parametrize("name", ["estimates", "torque", "information", "innovations", "running"])
 def test_the_page_says_which_file_is_absent(folder: Path, name: str) -> None:
     (folder / f"{name}.parquet").unlink()
-    assert f"Not shown: {name}.parquet is not in this folder." in write_report(folder).read_text(encoding="utf-8")
+    assert f"Not shown: {name}.parquet is not in this folder." in write_report(folder).read_text(
+        encoding="utf-8"
+    )
 
 
-@pytest.mark.parametrize("name", ["estimates", "loaded", "torque", "information", "innovations", "running"])
+@pytest.mark.parametrize(
+    "name", ["estimates", "loaded", "torque", "information", "innovations", "running"]
+)
 def test_the_page_says_which_file_is_broken(folder: Path, name: str) -> None:
     (folder / f"{name}.parquet").write_bytes(b"PAR1 no parquet")
     assert "cannot read it as Parquet" in write_report(folder).read_text(encoding="utf-8")
@@ -137,7 +149,9 @@ def test_the_page_says_which_file_is_broken(folder: Path, name: str) -> None:
 def test_a_missing_column_is_named(folder: Path) -> None:
     path = folder / "torque.parquet"
     pl.read_parquet(path).drop("omega2").write_parquet(path)
-    assert "expected a column &#x27;omega2&#x27;" in write_report(folder).read_text(encoding="utf-8")
+    assert "expected a column &#x27;omega2&#x27;" in write_report(folder).read_text(
+        encoding="utf-8"
+    )
 
 
 def test_a_bare_result_still_makes_a_page(tmp_path: Path, result: Result) -> None:
@@ -153,7 +167,9 @@ def test_a_folder_without_a_result_is_refused(tmp_path: Path) -> None:
         write_report(tmp_path)
 
 
-def test_nothing_is_lost_of_a_torque_log_in_blocks(case_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_is_lost_of_a_torque_log_in_blocks(
+    case_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     whole = read_torque(case_folder / "torque.parquet")
     rows = pl.read_parquet(case_folder / "torque.parquet")
     residual = (rows["tau1"] - rows["tau1_predicted"]).to_numpy()
@@ -165,7 +181,9 @@ def test_nothing_is_lost_of_a_torque_log_in_blocks(case_folder: Path, monkeypatc
     cut = read_torque(case_folder / "torque.parquet")
     for log, span in whole.ranges.items():
         assert cut.ranges[log] == replace(span, period=cut.ranges[log].period)
-        assert cut.ranges[log].period == pytest.approx(span.period, rel=1e-9)  # a median of other stamps
+        assert cut.ranges[log].period == pytest.approx(
+            span.period, rel=1e-9
+        )  # a median of other stamps
     assert cut.extremes == whole.extremes
     np.testing.assert_array_equal(cut.motion, whole.motion)
     for name, series in whole.series[1].items():
@@ -191,7 +209,9 @@ def test_a_log_without_prediction_has_its_torque_alone(folder: Path) -> None:
 
 
 def _ids(text: str) -> Iterator[str]:
-    yield from re.findall(r'\sid="([^"]+)"', re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL))
+    yield from re.findall(
+        r'\sid="([^"]+)"', re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
+    )
 
 
 def test_numbers_that_no_arm_has_are_told_and_not_drawn(folder: Path, result: Result) -> None:
@@ -199,9 +219,15 @@ def test_numbers_that_no_arm_has_are_told_and_not_drawn(folder: Path, result: Re
     assert result.fit is not None
     fit = result.fit.model_copy(update={"covariance": [[9e59] * 7] * 7})
     names = dict.fromkeys(result.parameters, huge)
-    write_result(result.model_copy(update={"parameters": names, "fit": fit}), folder / "result.json")
+    write_result(
+        result.model_copy(update={"parameters": names, "fit": fit}), folder / "result.json"
+    )
     torque = pl.read_parquet(folder / "torque.parquet")
-    beyond = pl.when(pl.int_range(pl.len()) % 3 == 0).then(pl.lit(-1.7e308)).otherwise(pl.col("tau1_predicted"))
+    beyond = (
+        pl.when(pl.int_range(pl.len()) % 3 == 0)
+        .then(pl.lit(-1.7e308))
+        .otherwise(pl.col("tau1_predicted"))
+    )
     torque.with_columns(tau1_predicted=beyond).write_parquet(folder / "torque.parquet")
     page = write_report(folder).read_text(encoding="utf-8")  # pytest makes any overflow an error
     assert "9e29" in page or "9.0e+29" in page
@@ -219,7 +245,9 @@ def test_numbers_are_legible_on_the_strongest_colours_of_a_matrix() -> None:
     style = (resources.files("algid.report") / "assets/report.css").read_text(encoding="utf-8")
     light, dark = style.split("@media (prefers-color-scheme: dark)")[:2]
     for theme in (light, dark):
-        colours = {name: _channels(value) for name, value in re.findall(r"--(\w+): (#\w{6});", theme)}
+        colours = {
+            name: _channels(value) for name, value in re.findall(r"--(\w+): (#\w{6});", theme)
+        }
         for strong in ("blue", "orange"):
             ground = 0.5 * colours[strong] + 0.5 * colours["page"]
             high, low = sorted((_luminance(ground), _luminance(colours["ink"])), reverse=True)
@@ -248,12 +276,16 @@ def test_the_library_in_a_page_is_the_one_that_was_built_for_it(folder: Path) ->
     assert f"script-src 'sha256-{digest}'" in page
 
 
-@pytest.mark.skipif(not BUNDLE.is_file(), reason="built without npm: pages carry the whole of plotly")
+@pytest.mark.skipif(
+    not BUNDLE.is_file(), reason="built without npm: pages carry the whole of plotly"
+)
 def test_a_page_is_light(folder: Path) -> None:
     assert write_report(folder).stat().st_size <= 1_500_000
 
 
-def test_the_papers_part_is_open_for_its_own_cases_and_folded_for_a_real_log(folder: Path, result: Result) -> None:
+def test_the_papers_part_is_open_for_its_own_cases_and_folded_for_a_real_log(
+    folder: Path, result: Result
+) -> None:
     assert '<details class="paper" id="paper" open>' in page_html(folder, result)
     rows = [row.model_copy(update={"truth": None, "error_percent": None}) for row in result.table4]
     real = page_html(folder, result.model_copy(update={"table4": rows, "truth": {}}))
@@ -271,7 +303,9 @@ def test_the_papers_part_is_open_for_its_own_cases_and_folded_for_a_real_log(fol
 
 def test_rows_that_must_not_be_used_are_not_green(folder: Path, result: Result) -> None:
     poor = result.parameters["k1"].model_copy(update={"status": Status.NOT_CONVERGED})
-    failed = page_html(folder, result.model_copy(update={"parameters": {**result.parameters, "k1": poor}}))
+    failed = page_html(
+        folder, result.model_copy(update={"parameters": {**result.parameters, "k1": poor}})
+    )
     assert 'class="verdict failed"' in failed
     assert 'class="status ok"' not in failed
     assert failed.count('<tr class="doubtful">') >= len(result.parameters)
@@ -292,7 +326,9 @@ def test_each_logs_own_estimate_is_a_dot_of_the_forest_plot(folder: Path, result
     assert result.fit is not None
     k1 = result.parameters["k1"]
     assert k1.estimate is not None
-    own = [{"k1": k1.model_copy(update={"estimate": share * k1.estimate})} for share in (0.999, 1.001)]
+    own = [
+        {"k1": k1.model_copy(update={"estimate": share * k1.estimate})} for share in (0.999, 1.001)
+    ]
     both = [result.log, result.log.model_copy(update={"path": "second.csv"})]
     changes = {"fit": result.fit.model_copy(update={"by_log": own}), "more_logs": both[1:]}
     page = page_html(folder, result.model_copy(update=changes))
@@ -308,10 +344,14 @@ def test_each_logs_own_estimate_is_a_dot_of_the_forest_plot(folder: Path, result
 def test_what_was_tried_stands_second_with_what_it_gains(folder: Path, result: Result) -> None:
     assert result.fit is not None
     terms = [
-        TermCriterion(term="coulomb", kept=True, gain_heldout=0.5, evidence=40.0, why="kept: predicts better"),
+        TermCriterion(
+            term="coulomb", kept=True, gain_heldout=0.5, evidence=40.0, why="kept: predicts better"
+        ),
         TermCriterion(term="offset", kept=False, gain_heldout=-0.01, evidence=-4.0, why="left out"),
     ]
-    page = page_html(folder, result.model_copy(update={"fit": result.fit.model_copy(update={"terms": terms})}))
+    page = page_html(
+        folder, result.model_copy(update={"fit": result.fit.model_copy(update={"terms": terms})})
+    )
     order = [page.index(f'id="{key}"') for key in ("torque", "terms", "closeup", "innovations")]
     assert order == sorted(order)
     assert "a bar to the left lowers the error" in page
@@ -320,7 +360,9 @@ def test_what_was_tried_stands_second_with_what_it_gains(folder: Path, result: R
 
 def test_a_page_shows_three_reasons_and_folds_the_rest_and_the_notes() -> None:
     reasons = tuple(Notice("A", f"reason {place}", logs=("a.csv",)) for place in range(5))
-    shown = banner(Verdict("reservations", "k1 is known", reasons, (Notice("B", "a note", note=True),)))
+    shown = banner(
+        Verdict("reservations", "k1 is known", reasons, (Notice("B", "a note", note=True),))
+    )
     first, _, rest = shown.partition("<details>")
     assert [place for place in range(5) if f"reason {place}" in first] == [0, 1, 2]
     assert "2 more reasons" in rest

@@ -46,13 +46,19 @@ def test_figures_are_saved_in_the_form_that_is_asked_for(tmp_path: Path) -> None
     assert [path.name for path in written] == ["case1-one.pdf"]
     once = written[0].read_bytes()
     assert once.startswith(b"%PDF")
-    assert save_plots(shown[:1], tmp_path, "case1")[0].read_bytes() == once  # no date, no random name
+    assert (
+        save_plots(shown[:1], tmp_path, "case1")[0].read_bytes() == once
+    )  # no date, no random name
 
 
 @pytest.mark.slow  # matplotlib takes fonts apart for every file
-def test_the_command_saves_every_figure_of_the_page(case_folder: Path, result: Result, tmp_path: Path) -> None:
+def test_the_command_saves_every_figure_of_the_page(
+    case_folder: Path, result: Result, tmp_path: Path
+) -> None:
     folder = Path(shutil.copytree(case_folder, tmp_path / "case1.algid"))
-    done = CliRunner().invoke(app, ["report", str(folder), "--save-plots", str(tmp_path / "figures")])
+    done = CliRunner().invoke(
+        app, ["report", str(folder), "--save-plots", str(tmp_path / "figures")]
+    )
     assert done.exit_code == 0, done.output
     files = sorted((tmp_path / "figures").iterdir())
     keys = [figure.key for figure in gallery(case_folder, result).every]
@@ -81,7 +87,9 @@ def test_without_matplotlib_the_flag_says_what_to_install(
     case_folder: Path, result: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(SettingError, match=r"--save-plots: expected matplotlib.*pip install 'algid\[plots\]'"):
+    with pytest.raises(
+        SettingError, match=r"--save-plots: expected matplotlib.*pip install 'algid\[plots\]'"
+    ):
         save_plots(gallery(case_folder, result).every, tmp_path / "figures", "case1")
     assert not (tmp_path / "figures").exists()
 
@@ -127,7 +135,10 @@ def test_closed_areas_break_where_they_are_broken() -> None:
         "fillcolor": "@green",
     }
     axes = one_panel([{**trace, "line": {"width": 0}}])
-    assert [len(patch.get_xy()) - 1 for patch in axes.patches] == [4, 3]  # the last part has a single corner
+    assert [len(patch.get_xy()) - 1 for patch in axes.patches] == [
+        4,
+        3,
+    ]  # the last part has a single corner
 
 
 def test_markers_steps_and_error_bars_are_those_of_the_page() -> None:
@@ -144,10 +155,16 @@ def test_markers_steps_and_error_bars_are_those_of_the_page() -> None:
     axes = one_panel([dots, steps])
     marks, stairs = axes.lines[0], axes.lines[-1]
     assert (marks.get_marker(), marks.get_alpha(), marks.get_markersize()) == ("o", 0.5, 6.0)
-    assert (stairs.get_drawstyle(), stairs.get_linestyle(), stairs.get_linewidth()) == ("steps-post", "--", 1.5)
+    assert (stairs.get_drawstyle(), stairs.get_linestyle(), stairs.get_linewidth()) == (
+        "steps-post",
+        "--",
+        1.5,
+    )
     (bars,) = axes.containers
     ends = bars.lines[2][0].get_segments()
-    np.testing.assert_allclose([end[:, 0] for end in ends], [[-0.1, 0.1], [0.8, 1.2], [1.7, 2.3]], atol=1e-7)
+    np.testing.assert_allclose(
+        [end[:, 0] for end in ends], [[-0.1, 0.1], [0.8, 1.2], [1.7, 2.3]], atol=1e-7
+    )
 
 
 def test_a_matrix_has_its_names_its_numbers_and_its_scale() -> None:
@@ -170,9 +187,13 @@ def test_a_matrix_has_its_names_its_numbers_and_its_scale() -> None:
     assert axes.yaxis_inverted()
     (mesh,) = axes.collections
     assert mesh.get_clim() == (-1, 1)
-    np.testing.assert_array_equal(np.ma.getmaskarray(mesh.get_array()).ravel(), [False, False, True, False])
+    np.testing.assert_array_equal(
+        np.ma.getmaskarray(mesh.get_array()).ravel(), [False, False, True, False]
+    )
     low, middle, high = (mesh.get_cmap()(place) for place in (0.0, 0.5, 1.0))
-    assert low[:3] == pytest.approx(((255 + 0xC2) / 510, (255 + 0x57) / 510, (255 + 0x0C) / 510), abs=1e-3)
+    assert low[:3] == pytest.approx(
+        ((255 + 0xC2) / 510, (255 + 0x57) / 510, (255 + 0x0C) / 510), abs=1e-3
+    )
     assert middle[:3] == pytest.approx((1, 1, 1), abs=0.01)  # clear on white paper
     assert high[:3] == pytest.approx((0x0B / 255, 0x62 / 255, 0xB0 / 255), abs=1e-3)
 
@@ -210,21 +231,34 @@ def test_shapes_lie_where_the_page_has_them() -> None:
     assert list(vertical.get_xdata()) == [1.25, 1.25]
     assert vertical.get_linestyle() == ":"
     (part,) = axes.collections
-    assert (part.get_paths()[0].vertices[:, 0].min(), part.get_paths()[0].vertices[:, 0].max()) == (0.2, 0.4)
+    assert (part.get_paths()[0].vertices[:, 0].min(), part.get_paths()[0].vertices[:, 0].max()) == (
+        0.2,
+        0.4,
+    )
 
 
 def test_a_residual_has_axes_of_its_own_and_a_share_has_none() -> None:
     lower = {**line(X, Y, "@orange", "n", "g"), "yaxis": "y2"}
     panel = Panel(
         [line(X, 2 * Y, "@blue", "n", "g"), lower],
-        {"xaxis": axis("t"), "yaxis": axis("torque", domain=[0.4, 1]), "yaxis2": axis("residual", domain=[0, 0.3])},
+        {
+            "xaxis": axis("t"),
+            "yaxis": axis("torque", domain=[0.4, 1]),
+            "yaxis2": axis("residual", domain=[0, 0.3]),
+        },
         "says",
     )
     top, bottom = sheet_of(Figure("key", "title", (panel,), "Read: it.")).axes
-    assert (top.get_ylabel(), bottom.get_ylabel(), bottom.get_xlabel()) == ("torque", "residual", "t")
+    assert (top.get_ylabel(), bottom.get_ylabel(), bottom.get_xlabel()) == (
+        "torque",
+        "residual",
+        "t",
+    )
     np.testing.assert_allclose(np.asarray(bottom.lines[0].get_ydata()), Y)
     assert top.get_position().height > bottom.get_position().height
-    share = Panel(panel.traces, {**panel.layout, "yaxis2": {"range": [0, 1], "overlaying": "y"}}, "says")
+    share = Panel(
+        panel.traces, {**panel.layout, "yaxis2": {"range": [0, 1], "overlaying": "y"}}, "says"
+    )
     first, second = sheet_of(Figure("key", "title", (share,), "Read: it.")).axes
     assert second.get_ylim() == (0, 1)
     assert not second.axison
@@ -254,7 +288,10 @@ def test_a_legend_has_every_entry_of_the_page_and_missing_figures_no_file(tmp_pa
         Legend("", "an area", "@blue/0.25", "area"),
         Legend("", "c", "@ink"),
     )
-    panels = tuple(Panel([line(X, Y, "@blue", "n", "g")], {"xaxis": axis(), "yaxis": axis()}, "says") for _ in range(3))
+    panels = tuple(
+        Panel([line(X, Y, "@blue", "n", "g")], {"xaxis": axis(), "yaxis": axis()}, "says")
+        for _ in range(3)
+    )
     sheet = sheet_of(Figure("key", "title", panels, "Read: it.", legend, columns=2))
     assert len(sheet.axes) == 3
     assert [text.get_text() for text in sheet.legends[0].get_texts()] == ["a line", "an area", "c"]

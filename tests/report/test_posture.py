@@ -21,17 +21,25 @@ def drawn(result: Result, torque: TorqueLog) -> str:
 
 
 def links(drawing: str) -> tuple[float, float]:
-    found = [float(x) for x in re.findall(r'class="link[^"]*" x1="0" y1="0" x2="([\d.]+)"', drawing)]
+    found = [
+        float(x) for x in re.findall(r'class="link[^"]*" x1="0" y1="0" x2="([\d.]+)"', drawing)
+    ]
     assert len(found) == 2
     return found[0], found[1]
 
 
-def test_links_are_as_long_as_the_payload_tells_or_as_the_constants_do(result: Result, case_folder: Path) -> None:
+def test_links_are_as_long_as_the_payload_tells_or_as_the_constants_do(
+    result: Result, case_folder: Path
+) -> None:
     torque = read_torque(case_folder / "torque.parquet")
     known = {name: Estimate(estimate=value, unit="m") for name, value in (("l1", 0.3), ("l2", 0.2))}
     assert links(drawn(result.model_copy(update={"payload": known}), torque)) == (0.3, 0.2)
     k1, k2 = (Estimate(estimate=value, unit="") for value in (0.2, 9.81 * 0.2 / 0.25))
-    bare = {"payload": {}, "settings": {"gravity": 9.81}, "parameters": {**result.parameters, "k1": k1, "k2": k2}}
+    bare = {
+        "payload": {},
+        "settings": {"gravity": 9.81},
+        "parameters": {**result.parameters, "k1": k1, "k2": k2},
+    }
     drawing = drawn(result.model_copy(update=bare), torque)
     assert links(drawing)[0] == pytest.approx(0.25)  # l1 = g k1 / k2
     assert "not known" in drawing
@@ -48,7 +56,9 @@ def test_the_arm_stands_as_the_log_begins(result: Result, case_folder: Path) -> 
     turned = re.search(r'class="link1" transform="rotate\(([-\d.]+)\)"', drawing)
     assert turned is not None
     first = torque.series[0]["theta1"][1]
-    assert float(turned[1]) == pytest.approx(-np.degrees(first[np.isfinite(first)][0]), abs=1e-3)  # SVG turns clockwise
+    assert float(turned[1]) == pytest.approx(
+        -np.degrees(first[np.isfinite(first)][0]), abs=1e-3
+    )  # SVG turns clockwise
 
 
 def test_the_drawing_holds_the_arm_all_along_its_motion_and_its_limit_and_little_more() -> None:

@@ -42,9 +42,14 @@ def path(log: Log, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def on_a_terminal(*arguments: object, **environment: str) -> tuple[str, str]:
     """What a command that ends well prints to a file as stdout and to a terminal as stderr."""
     ours, theirs = pty.openpty()
-    settings = {"TERM": "xterm", **{k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "TERM")}}
+    settings = {
+        "TERM": "xterm",
+        **{k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "TERM")},
+    }
     with tempfile.TemporaryFile() as printed:
-        ended = begin(*arguments, stdout=printed.fileno(), stderr=theirs, env=settings | environment)
+        ended = begin(
+            *arguments, stdout=printed.fileno(), stderr=theirs, env=settings | environment
+        )
         os.close(theirs)
         seen = b""
         try:
@@ -59,7 +64,9 @@ def on_a_terminal(*arguments: object, **environment: str) -> tuple[str, str]:
 
 
 @pytest.mark.slow
-def test_a_terminal_is_shown_stages_and_samples_and_is_left_clean(path: Path, tmp_path: Path) -> None:
+def test_a_terminal_is_shown_stages_and_samples_and_is_left_clean(
+    path: Path, tmp_path: Path
+) -> None:
     printed, seen = on_a_terminal("identify", path, "-o", tmp_path)
     assert "reading" in seen
     assert "of 2,000 samples" in seen
@@ -82,7 +89,9 @@ def test_quiet_is_silent_on_a_terminal(path: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("command", ["identify", "convert", "validate"])
-def test_a_pipe_gets_none_of_it(command: str, path: Path, tmp_path: Path, case_folder: Path) -> None:
+def test_a_pipe_gets_none_of_it(
+    command: str, path: Path, tmp_path: Path, case_folder: Path
+) -> None:
     arguments: dict[str, list[str | Path]] = {
         "identify": ["-q", path, "-o", tmp_path],
         "convert": [path, tmp_path / "log.csv"],
@@ -113,7 +122,9 @@ def test_every_stage_comes_to_its_end(estimator: str, log: Log, tmp_path: Path) 
     for stage in stages:
         done = [(done, total) for told, done, total in calls if told == stage and total]
         assert all(0 <= one <= total for one, total in done)
-        if done and not (stage == "series" and estimator == "refined"):  # whose last one is the first log's alone
+        if done and not (
+            stage == "series" and estimator == "refined"
+        ):  # whose last one is the first log's alone
             assert done[-1] == (samples, samples)
 
 

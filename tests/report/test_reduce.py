@@ -17,8 +17,15 @@ def reduced(y: FloatArray, size: int, cuts: list[int]) -> tuple[FloatArray, Floa
     return reducer.result()
 
 
-@given(st.integers(1, 400), st.integers(1, 60), st.lists(st.integers(0, 400), max_size=5), st.integers(0, 2**32 - 1))
-def test_no_extreme_is_lost_however_the_series_is_cut(samples: int, size: int, cuts: list[int], seed: int) -> None:
+@given(
+    st.integers(1, 400),
+    st.integers(1, 60),
+    st.lists(st.integers(0, 400), max_size=5),
+    st.integers(0, 2**32 - 1),
+)
+def test_no_extreme_is_lost_however_the_series_is_cut(
+    samples: int, size: int, cuts: list[int], seed: int
+) -> None:
     y = np.random.default_rng(seed).normal(size=samples)
     whole = reduced(y, size, [])
     x, values = reduced(y, size, sorted(min(cut, samples) for cut in cuts))

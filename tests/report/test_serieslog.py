@@ -21,7 +21,9 @@ def test_only_ill_conditioned_stretches_after_epsilon_are_singular(tmp_path: Pat
     condition[1000:1100] = np.inf
     k1[1000:1100] = np.nan
     k1[3000:3100] = np.nan  # absent for another reason
-    read = read_series(write(tmp_path / "e.parquet", k1=k1, condition=condition), {"estimator": "refined"})
+    read = read_series(
+        write(tmp_path / "e.parquet", k1=k1, condition=condition), {"estimator": "refined"}
+    )
     where, share = read.singular["k1"]
     assert where[share > 0] == pytest.approx(np.arange(100, 110) / 100)
     assert read.windows == [0.0, 2.0]
@@ -40,7 +42,9 @@ def test_k7_is_singular_where_its_own_equation_is(tmp_path: Path) -> None:
 def test_the_window_is_the_paper_methods_own_setting(tmp_path: Path) -> None:
     path = write(tmp_path / "e.parquet", k1=np.ones(4000))
     assert read_series(path, {"estimator": "paper", "window": 1.0}).window == 1.0
-    assert read_series(path, {"estimator": "weak", "window": 0.4}).window == 2.0  # 0.4 s is the weak form's
+    assert (
+        read_series(path, {"estimator": "weak", "window": 0.4}).window == 2.0
+    )  # 0.4 s is the weak form's
     assert read_series(path, {"estimator": "paper", "window": None}).window == 2.0
 
 

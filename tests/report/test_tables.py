@@ -12,7 +12,13 @@ from rich.console import Console
 from algid.report.document import Table
 from algid.report.markdown import escaped, markdown
 from algid.report.page import FIRST, TOLD_ELSEWHERE, page_html, result_document, write_report
-from algid.report.tables import estimate_tables, flat_settings, log_tables, settings_table, terms_tables
+from algid.report.tables import (
+    estimate_tables,
+    flat_settings,
+    log_tables,
+    settings_table,
+    terms_tables,
+)
 from algid.report.terminal import print_document
 from algid.results import Estimate, Result, Status, TermCriterion, TorquePrediction, result_json
 from algid.text import digits_of, resolved, significant
@@ -27,13 +33,20 @@ def terminal(result: Result, width: int = 200, **options: object) -> str:
 
 def from_markdown(text: str) -> list[list[str]]:
     cells = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
-    return [[re.sub(r"\\(.)", r"\1", cell) for cell in row] for row in cells if not row[0].startswith(":--")]
+    return [
+        [re.sub(r"\\(.)", r"\1", cell) for cell in row]
+        for row in cells
+        if not row[0].startswith(":--")
+    ]
 
 
 def from_html(text: str) -> list[list[str]]:
     text = re.sub(r'<t[hd][^>]*class="drawn[^>]*>.*?</t[hd]>', "", text, flags=re.DOTALL)
     rows = re.findall(r"<tr[^>]*>(.*?)</tr>", text, re.DOTALL)
-    return [[html.unescape(cell) for cell in re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row, re.DOTALL)] for row in rows]
+    return [
+        [html.unescape(cell) for cell in re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row, re.DOTALL)]
+        for row in rows
+    ]
 
 
 def from_terminal(text: str, heading: str) -> list[list[str]]:
@@ -48,7 +61,9 @@ def from_terminal(text: str, heading: str) -> list[list[str]]:
     return rows
 
 
-def test_every_format_shows_the_same_digits_and_json_holds_them(result: Result, case_folder: Path) -> None:
+def test_every_format_shows_the_same_digits_and_json_holds_them(
+    result: Result, case_folder: Path
+) -> None:
     parameters = next(table for table in estimate_tables(result) if table.title == "Parameters")
     expected = [list(row) for row in parameters.rows]
     first = [list(row) for row in parameters.without(TOLD_ELSEWHERE).rows]
@@ -59,7 +74,9 @@ def test_every_format_shows_the_same_digits_and_json_holds_them(result: Result, 
     stored = json.loads(result_json(result))["parameters"]
     for name, shown, std, *_ in expected:
         number, spread = stored[name]["estimate"], stored[name]["std"]
-        assert float(shown) == pytest.approx(number, rel=0.501 * 10 ** (1 - digits_of(number, spread)))
+        assert float(shown) == pytest.approx(
+            number, rel=0.501 * 10 ** (1 - digits_of(number, spread))
+        )
         assert shown == resolved(number, spread)
         assert std == significant(spread, 2)
 
@@ -96,10 +113,16 @@ def test_the_truth_of_what_table_4_lacks_is_the_arms_own(result: Result) -> None
     assert "0.16260" in next(row for row in payload.rows if row[0] == "l1")
 
 
-def test_cross_validation_stands_beside_the_residual_in_every_format(result: Result, case_folder: Path) -> None:
-    crossed = TorquePrediction(rmse=(0.25, 0.125), nrmse=(0.5, 0.0625), r2=(0.75, 0.996), filter="3 Hz")
+def test_cross_validation_stands_beside_the_residual_in_every_format(
+    result: Result, case_folder: Path
+) -> None:
+    crossed = TorquePrediction(
+        rmse=(0.25, 0.125), nrmse=(0.5, 0.0625), r2=(0.75, 0.996), filter="3 Hz"
+    )
     assert result.fit is not None
-    changed = result.model_copy(update={"fit": result.fit.model_copy(update={"cross_validation": crossed})})
+    changed = result.model_copy(
+        update={"fit": result.fit.model_copy(update={"cross_validation": crossed})}
+    )
     expected = ["each log by the others", "1", "0.250", "50.0", "0.75000"]
     assert expected in from_terminal(terminal(changed), "Torque prediction")
     assert expected in from_markdown(markdown(result_document(changed)))
@@ -107,7 +130,9 @@ def test_cross_validation_stands_beside_the_residual_in_every_format(result: Res
 
 
 def test_the_error_belongs_to_the_estimate_beside_it(result: Result) -> None:
-    row = result.table4[0].model_copy(update={"parameter": "m_p", "estimate": 0.5, "truth": 0.5, "error_percent": 0.0})
+    row = result.table4[0].model_copy(
+        update={"parameter": "m_p", "estimate": 0.5, "truth": 0.5, "error_percent": 0.0}
+    )
     other = {"m_p": Estimate(estimate=0.51, unit="kg")}
     changed = result.model_copy(update={"table4": [row], "paper_payload": other, "payload": {}})
     table = next(table for table in estimate_tables(changed) if "route" in table.title)
@@ -116,8 +141,15 @@ def test_the_error_belongs_to_the_estimate_beside_it(result: Result) -> None:
 
 def test_a_column_that_nobody_fills_is_dropped(result: Result) -> None:
     bare = {"k1": Estimate(estimate=1.0, unit="kg m^2")}
-    tables = estimate_tables(result.model_copy(update={"parameters": bare, "table4": [], "payload": {}}))
-    assert [column.heading for column in tables[0].columns] == ["Parameter", "Estimate", "Unit", "Status"]
+    tables = estimate_tables(
+        result.model_copy(update={"parameters": bare, "table4": [], "payload": {}})
+    )
+    assert [column.heading for column in tables[0].columns] == [
+        "Parameter",
+        "Estimate",
+        "Unit",
+        "Status",
+    ]
     assert tables[0].rows == (("k1", "1.0000", "kg m²", "OK"),)
 
 
@@ -141,7 +173,9 @@ def test_channels_name_a_log_only_where_they_differ(result: Result) -> None:
     assert differing.rows[-1] == ("theta1", "q1", "case1-loaded.mcap")
 
 
-def test_the_terminal_has_no_colour_without_a_colour_system(result: Result, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_terminal_has_no_colour_without_a_colour_system(
+    result: Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("NO_COLOR", "1")
     assert "\x1b[3" not in terminal(result, force_terminal=True)
 
@@ -207,7 +241,9 @@ def test_a_term_that_lowers_the_error_has_a_minus(result: Result) -> None:
         TermCriterion(term="coulomb", kept=True, gain_heldout=0.5, evidence=40.0, why="kept"),
         TermCriterion(term="offset", kept=False, delta_bic=3.25, why="left out"),
     ]
-    (table,) = terms_tables(result.model_copy(update={"fit": result.fit.model_copy(update={"terms": terms})}))
+    (table,) = terms_tables(
+        result.model_copy(update={"fit": result.fit.model_copy(update={"terms": terms})})
+    )
     assert table.rows == (
         ("coulomb", "–", "-50.00", "+40.0", "yes", "kept"),
         ("offset", "+3.2", "–", "–", "no", "left out"),

@@ -26,8 +26,30 @@ ESTIMATES = Table(
     "Parameters",
     ESTIMATE_COLUMNS,
     (
-        ("k5+k3+z1+z2", "0.123456", "0.000123", "0.0123", "kg m²", "OK", "[0.123210, 0.123702]", "0.1234", "0.04", "1"),
-        ("k6", "12.34567", "0.01234", "0.0999", "N m s/rad", "NOT_IDENTIFIABLE", "[−∞, ∞]", "12.3456", "0.05", "2.34"),
+        (
+            "k5+k3+z1+z2",
+            "0.123456",
+            "0.000123",
+            "0.0123",
+            "kg m²",
+            "OK",
+            "[0.123210, 0.123702]",
+            "0.1234",
+            "0.04",
+            "1",
+        ),
+        (
+            "k6",
+            "12.34567",
+            "0.01234",
+            "0.0999",
+            "N m s/rad",
+            "NOT_IDENTIFIABLE",
+            "[−∞, ∞]",
+            "12.3456",
+            "0.05",
+            "2.34",
+        ),
     ),
 )
 
@@ -35,7 +57,14 @@ ESTIMATES = Table(
 @pytest.mark.parametrize("width", [80, 100])
 def test_the_interval_stays_at_eighty_columns(width: int) -> None:
     text = printed(ESTIMATES, width)
-    for cell in ("95 % interval", "[0.123210, 0.123702]", "[−∞, ∞]", "NOT_IDENTIFIABLE", "0.123456", "k5+k3+z1+z2"):
+    for cell in (
+        "95 % interval",
+        "[0.123210, 0.123702]",
+        "[−∞, ∞]",
+        "NOT_IDENTIFIABLE",
+        "0.123456",
+        "k5+k3+z1+z2",
+    ):
         assert cell in text
     assert "Truth" not in text
 
@@ -65,7 +94,9 @@ def test_lines_break_between_words() -> None:
 
 def test_a_path_that_fits_nowhere_breaks_and_numbers_do_not() -> None:
     path = "/a/very/long/path/" + "x" * 100 + ".mcap"
-    table = Table("T", (Column("Log", "name"), Column("Samples", "number")), ((path, "1234567890"),))
+    table = Table(
+        "T", (Column("Log", "name"), Column("Samples", "number")), ((path, "1234567890"),)
+    )
     text = printed(table, 60)
     assert "1234567890" in text
     assert "".join(path.split()) in "".join(part for part in text.split() if part != "1234567890")

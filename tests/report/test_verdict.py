@@ -22,7 +22,9 @@ def with_fit(result: Result, **changes: object) -> Result:
 
 
 def with_parameter(result: Result, name: str, found: Estimate) -> Result:
-    return result.model_copy(update={"parameters": {**result.parameters, name: found}, "table4": []})
+    return result.model_copy(
+        update={"parameters": {**result.parameters, name: found}, "table4": []}
+    )
 
 
 def test_a_result_without_a_flaw_is_good_and_says_how_good(result: Result) -> None:
@@ -34,7 +36,9 @@ def test_a_result_without_a_flaw_is_good_and_says_how_good(result: Result) -> No
 
 
 def test_the_papers_estimator_is_good_without_error_bars(result: Result) -> None:
-    bare = {name: Estimate(estimate=e.estimate, unit=e.unit) for name, e in result.parameters.items()}
+    bare = {
+        name: Estimate(estimate=e.estimate, unit=e.unit) for name, e in result.parameters.items()
+    }
     plain = result.model_copy(
         update={"parameters": bare, "payload": {}, "fit": None, "estimator": "paper", "table4": []}
     )
@@ -47,7 +51,10 @@ def test_one_reservation_is_told_in_the_sentence(result: Result) -> None:
     lost = Estimate(estimate=None, unit="kg m^2", status=Status.NOT_IDENTIFIABLE)
     found = with_parameter(result, "k5", lost).verdict
     assert found.grade == "reservations"
-    assert found.sentence == "With reservations: 8 of 9 parameters are identified, but k5 is not identifiable."
+    assert (
+        found.sentence
+        == "With reservations: 8 of 9 parameters are identified, but k5 is not identifiable."
+    )
     assert [reason.code for reason in found.reasons] == ["NOT_IDENTIFIABLE"]
 
 
@@ -71,7 +78,11 @@ def test_warnings_are_reasons_and_notes_are_none(result: Result) -> None:
             "the residual of tau1 is not white",
         ),
         (
-            {"cross_validation": TorquePrediction(rmse=(1, 1), nrmse=(1, 1), r2=(0.62, 0.99), filter="none")},
+            {
+                "cross_validation": TorquePrediction(
+                    rmse=(1, 1), nrmse=(1, 1), r2=(0.62, 0.99), filter="none"
+                )
+            },
             "the model explains only 62 % of the torque of joint 1",
         ),
     ],
@@ -93,12 +104,18 @@ def test_wide_intervals_and_distance_from_the_truth_are_reservations(result: Res
     wide = with_parameter(result, "k2", estimate(0.05, 0.01, "N m")).verdict
     assert "k2 (±39 %)" in wide.sentence  # 1.96 times 20 %
     row = result.table4[0].model_copy(update={"estimate": 2.0, "truth": 1.0, "std": 0.1})
-    assert "k1 (10 σ) lies far from the truth" in result.model_copy(update={"table4": [row]}).verdict.sentence
+    assert (
+        "k1 (10 σ) lies far from the truth"
+        in result.model_copy(update={"table4": [row]}).verdict.sentence
+    )
 
 
 def test_an_estimator_that_did_not_converge_failed(result: Result) -> None:
     found = with_fit(result, converged=False).verdict
-    assert found.sentence == "Failed: the estimator did not converge in 4 iterations; do not use these numbers."
+    assert (
+        found.sentence
+        == "Failed: the estimator did not converge in 4 iterations; do not use these numbers."
+    )
     one = result.parameters["k1"].model_copy(update={"status": Status.NOT_CONVERGED})
     assert with_parameter(result, "k1", one).verdict.grade == "failed"
 
@@ -113,7 +130,9 @@ def test_a_model_that_explains_little_of_the_torque_failed(result: Result) -> No
 
 def test_fewer_than_half_of_the_parameters_is_a_failure(result: Result) -> None:
     lost = Estimate(estimate=None, unit="kg m^2", status=Status.NOT_IDENTIFIABLE)
-    few = {name: found if name in ("k1", "k2") else lost for name, found in result.parameters.items()}
+    few = {
+        name: found if name in ("k1", "k2") else lost for name, found in result.parameters.items()
+    }
     found = result.model_copy(update={"parameters": few, "payload": {}, "table4": []}).verdict
     assert found.sentence.startswith("Failed: only 2 of 7 parameters could be identified")
 
@@ -121,7 +140,9 @@ def test_fewer_than_half_of_the_parameters_is_a_failure(result: Result) -> None:
 def test_nothing_identified_is_a_failure(result: Result) -> None:
     weak = {"k1": Estimate(estimate=None, unit="kg m^2", status=Status.WEAK_EXCITATION)}
     found = result.model_copy(update={"parameters": weak, "payload": {}, "table4": []}).verdict
-    assert found.sentence.startswith("Failed: no parameter could be identified (too weakly excited)")
+    assert found.sentence.startswith(
+        "Failed: no parameter could be identified (too weakly excited)"
+    )
 
 
 def test_an_undetermined_parameter_is_told_once(result: Result) -> None:
@@ -131,7 +152,11 @@ def test_an_undetermined_parameter_is_told_once(result: Result) -> None:
 
 
 def test_many_estimates_far_from_the_truth_are_one_reason(result: Result) -> None:
-    wrong = [row.model_copy(update={"truth": row.truth * 2}) for row in result.table4 if row.truth is not None]
+    wrong = [
+        row.model_copy(update={"truth": row.truth * 2})
+        for row in result.table4
+        if row.truth is not None
+    ]
     reasons = result.model_copy(update={"table4": wrong}).verdict.reasons
     assert len(reasons) == 1
     assert reasons[0].code == "FAR_FROM_TRUTH"
@@ -142,7 +167,10 @@ def test_many_estimates_far_from_the_truth_are_one_reason(result: Result) -> Non
 def implausible(result: Result, **changes: object) -> Result:
     """The result with no status OK left, as identification leaves it where physics or torque contradict a fit."""
     groups = {
-        group: {name: e.model_copy(update={"status": Status.IMPLAUSIBLE}) for name, e in getattr(result, group).items()}
+        group: {
+            name: e.model_copy(update={"status": Status.IMPLAUSIBLE})
+            for name, e in getattr(result, group).items()
+        }
         for group in ("parameters", "loaded", "payload")
     }
     return with_fit(result, **changes).model_copy(update=groups)
@@ -152,14 +180,18 @@ def test_broken_physics_failed_and_the_likely_cause_leads(result: Result) -> Non
     broken = [Bound(bound="k7 >= 0", value=-0.3, distance_sigma=43.0)]
     found = implausible(result, broken_bounds=broken).verdict
     assert found.grade == "failed"
-    assert found.sentence.startswith("Failed: the estimates break k7 >= 0 by 43 standard deviations")
+    assert found.sentence.startswith(
+        "Failed: the estimates break k7 >= 0 by 43 standard deviations"
+    )
     assert found.reasons[0].code == "UNKNOWN_CAUSE"
     assert found.command == f"algid inspect {result.log.path}"
     assert not any("k7" in reason.text for reason in found.reasons)
 
 
 def test_a_known_cause_comes_with_the_command_that_mends_it(result: Result) -> None:
-    told = result.model_copy(update={"notices": [HANGING], "settings": {"command": "algid identify 'a b.csv' -o out"}})
+    told = result.model_copy(
+        update={"notices": [HANGING], "settings": {"command": "algid identify 'a b.csv' -o out"}}
+    )
     found = implausible(told).verdict
     assert found.reasons[0] == HANGING
     assert found.command == "algid identify 'a b.csv' -o out --zero hanging --force"
@@ -200,15 +232,33 @@ def predicted(one: float, two: float) -> TorquePrediction:
 @pytest.mark.parametrize(
     ("r2", "level", "words"),
     [
-        ((0.91, 0.93), "good", "the model explains 91.00 % of joint 1's torque and 93.00 % of joint 2's"),
+        (
+            (0.91, 0.93),
+            "good",
+            "the model explains 91.00 % of joint 1's torque and 93.00 % of joint 2's",
+        ),
         ((0.995, 0.995), "good", "the model explains 99.50 % of the torque of both joints"),
-        ((0.89, 0.99), "reservations", "but the model explains only 89 % of the torque of joint 1."),
-        ((0.99, 0.51), "reservations", "but the model explains only 51 % of the torque of joint 2."),
+        (
+            (0.89, 0.99),
+            "reservations",
+            "but the model explains only 89 % of the torque of joint 1.",
+        ),
+        (
+            (0.99, 0.51),
+            "reservations",
+            "but the model explains only 51 % of the torque of joint 2.",
+        ),
         ((0.45, 0.99), "failed", "Failed: the model explains only 45 % of the torque of joint 1;"),
-        ((-0.2, 0.99), "failed", "Failed: the model predicts the torque of joint 1 worse than its mean does;"),
+        (
+            (-0.2, 0.99),
+            "failed",
+            "Failed: the model predicts the torque of joint 1 worse than its mean does;",
+        ),
     ],
 )
-def test_what_the_model_explains_decides(result: Result, r2: tuple[float, float], level: str, words: str) -> None:
+def test_what_the_model_explains_decides(
+    result: Result, r2: tuple[float, float], level: str, words: str
+) -> None:
     found = with_fit(result, residual=predicted(*r2)).verdict
     assert (found.grade, words in found.sentence) == (level, True), found.sentence
 
@@ -220,17 +270,27 @@ def test_what_the_model_explains_decides(result: Result, r2: tuple[float, float]
         (5, "Failed: only 3 of 8 parameters could be identified; do not use these numbers."),
     ],
 )
-def test_half_of_the_parameters_must_be_identified(result: Result, lost: int, sentence: str) -> None:
+def test_half_of_the_parameters_must_be_identified(
+    result: Result, lost: int, sentence: str
+) -> None:
     none = Estimate(estimate=None, unit="kg m^2", status=Status.NOT_IDENTIFIABLE)
     names = list(result.parameters)
-    parameters = {name: none if place < lost else result.parameters[name] for place, name in enumerate(names)}
+    parameters = {
+        name: none if place < lost else result.parameters[name] for place, name in enumerate(names)
+    }
     payload = {"m_p": result.payload["m_p"]}
-    found = result.model_copy(update={"parameters": parameters, "payload": payload, "table4": []}).verdict
+    found = result.model_copy(
+        update={"parameters": parameters, "payload": payload, "table4": []}
+    ).verdict
     assert found.sentence.startswith(sentence)
 
 
-@pytest.mark.parametrize(("sigmas", "reasons"), [(3.9, ()), (4.5, ("k1 (4.5 σ) lies far from the truth",))])
-def test_four_sigma_from_the_truth_are_too_far(result: Result, sigmas: float, reasons: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(
+    ("sigmas", "reasons"), [(3.9, ()), (4.5, ("k1 (4.5 σ) lies far from the truth",))]
+)
+def test_four_sigma_from_the_truth_are_too_far(
+    result: Result, sigmas: float, reasons: tuple[str, ...]
+) -> None:
     (row,) = [row for row in result.table4 if row.parameter == "k1"]
     assert row.estimate is not None
     assert row.std is not None
@@ -245,14 +305,20 @@ def test_praise_tells_the_widest_interval_in_percent(result: Result) -> None:
 
 
 def test_a_command_is_forced_once(result: Result) -> None:
-    told = result.model_copy(update={"notices": [HANGING], "settings": {"command": "algid identify a.csv --force"}})
+    told = result.model_copy(
+        update={"notices": [HANGING], "settings": {"command": "algid identify a.csv --force"}}
+    )
     assert implausible(told).verdict.command == "algid identify a.csv --force --zero hanging"
 
 
 def test_a_bound_without_a_distance_does_not_hide_a_useless_model(result: Result) -> None:
     near = [Bound(bound="k7 >= 0", value=0.0, distance_sigma=None)]
     found = implausible(result, broken_bounds=near, residual=predicted(-0.3, 0.9)).verdict
-    assert found.sentence.startswith("Failed: the model predicts the torque of joint 1 worse than its mean does;")
+    assert found.sentence.startswith(
+        "Failed: the model predicts the torque of joint 1 worse than its mean does;"
+    )
     fine = implausible(result, broken_bounds=near).verdict
     assert fine.sentence.startswith("Failed: the estimates break k7 >= 0;")
-    assert implausible(result).verdict.sentence.startswith("Failed: physics forbids these estimates;")
+    assert implausible(result).verdict.sentence.startswith(
+        "Failed: physics forbids these estimates;"
+    )

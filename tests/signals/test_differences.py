@@ -46,9 +46,13 @@ def test_noise_behind_a_held_torque_is_whitened() -> None:
     rng = np.random.default_rng(0)
     noise = rng.standard_normal((2, 20002))
     H = np.zeros((2, 2, POINTS, 20000))
-    linear = Linearised(np.empty((0, 40000)), covariance_factor(H, held=True), H, 0, np.empty(0), held=True)
+    linear = Linearised(
+        np.empty((0, 40000)), covariance_factor(H, held=True), H, 0, np.empty(0), held=True
+    )
     white = linear.solve(held_torque(noise)[:, 1:-1].T.reshape(1, -1)).reshape(-1, 2)
     assert abs(white.var() - 1) < 0.03  # four standard errors of 40,000 squares
     for joint in white.T:
         assert abs(joint[1:] @ joint[:-1] / joint.size) < 4.5 / np.sqrt(joint.size)
-    assert abs(held_torque(noise)[0, 2:-1] @ held_torque(noise)[0, 1:-2]) / 20000 > 0.05  # what there was to whiten
+    assert (
+        abs(held_torque(noise)[0, 2:-1] @ held_torque(noise)[0, 1:-2]) / 20000 > 0.05
+    )  # what there was to whiten

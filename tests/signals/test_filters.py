@@ -5,7 +5,15 @@ import pytest
 from scipy.signal import butter, freqz, lfilter, sosfiltfilt
 
 from algid.arm import FloatArray
-from algid.signals.filters import butterworth, correlate, differentiator, half_length, recursion, smoothed, smoother
+from algid.signals.filters import (
+    butterworth,
+    correlate,
+    differentiator,
+    half_length,
+    recursion,
+    smoothed,
+    smoother,
+)
 
 
 def test_a_ramp_has_its_slope() -> None:
@@ -20,7 +28,9 @@ def test_velocity_is_right_below_a_quarter_of_the_bandwidth(hertz: float) -> Non
     reach = half_length(1e-3, 40.0)
     velocity = correlate(np.sin(2 * np.pi * hertz * t)[None], differentiator(1e-3, 40.0))[0]
     truth = 2 * np.pi * hertz * np.cos(2 * np.pi * hertz * t[reach:-reach])
-    assert np.abs(velocity - truth).max() < 1e-3 * 2 * np.pi * hertz  # the ripple at a quarter is 4e-4
+    assert (
+        np.abs(velocity - truth).max() < 1e-3 * 2 * np.pi * hertz
+    )  # the ripple at a quarter is 4e-4
 
 
 def test_correlation_agrees_with_numpy() -> None:
@@ -45,7 +55,10 @@ def test_butterworth_agrees_with_scipy_away_from_the_ends(order: int, cutoff: fl
     sections = butter(order, cutoff, fs=250.0, output="sos")
     inner = slice(500, -500)
     expected = sosfiltfilt(sections, x, axis=-1)[:, inner]
-    assert np.abs(butterworth(x, 1 / 250, cutoff, order)[:, inner] - expected).max() < 1e-6 * np.abs(x).max()
+    assert (
+        np.abs(butterworth(x, 1 / 250, cutoff, order)[:, inner] - expected).max()
+        < 1e-6 * np.abs(x).max()
+    )
 
 
 def test_every_third_correlation_is_every_third_correlation() -> None:
@@ -66,7 +79,10 @@ def test_slow_sampling_keeps_what_the_kernel_promises(rate: float) -> None:
 def test_a_recursion_is_scipys_and_leaves_its_state(n: int) -> None:
     rng = np.random.default_rng(4)
     x, state = rng.normal(size=n), rng.normal(size=3)
-    numerator, denominator = np.array([0.3, -0.1, 0.4, 0.2]), np.poly([0.9, 0.5 + 0.4j, 0.5 - 0.4j]).real
+    numerator, denominator = (
+        np.array([0.3, -0.1, 0.4, 0.2]),
+        np.poly([0.9, 0.5 + 0.4j, 0.5 - 0.4j]).real,
+    )
     y, left = recursion(numerator, denominator, x, state)
     expected, expected_left = lfilter(numerator, denominator, x, zi=state)
     np.testing.assert_allclose(y, expected, atol=1e-12)
@@ -81,9 +97,12 @@ def test_kernels_are_kept_and_nobody_writes_into_them() -> None:
 
 
 @pytest.mark.parametrize(
-    ("dt", "bandwidth", "reach"), [(1e-3, 50.0, 50), (2e-3, 50.0, 25), (0.1, 60.0, 3), (1.0, 0.1, 25)]
+    ("dt", "bandwidth", "reach"),
+    [(1e-3, 50.0, 50), (2e-3, 50.0, 25), (0.1, 60.0, 3), (1.0, 0.1, 25)],
 )
-def test_a_kernel_reaches_two_and_a_half_periods_of_its_bandwidth(dt: float, bandwidth: float, reach: int) -> None:
+def test_a_kernel_reaches_two_and_a_half_periods_of_its_bandwidth(
+    dt: float, bandwidth: float, reach: int
+) -> None:
     assert half_length(dt, bandwidth) == reach
     assert smoother(dt, bandwidth).size == differentiator(dt, bandwidth).size == 2 * reach + 1
 
@@ -95,7 +114,9 @@ def test_the_differentiators_response_is_that_of_a_derivative_and_falls_off() ->
     np.testing.assert_allclose(kernel, -kernel[::-1], atol=1e-9 * np.abs(kernel).max())  # no phase
     hertz = np.array([0.1, 2.0, 8.0, 20.0, 80.0, 200.0, 450.0])
     _, response = freqz(kernel[::-1], worN=hertz, fs=1 / dt)
-    response = response * np.exp(2j * np.pi * hertz * dt * (kernel.size // 2)) / (2j * np.pi * hertz)
+    response = (
+        response * np.exp(2j * np.pi * hertz * dt * (kernel.size // 2)) / (2j * np.pi * hertz)
+    )
     assert np.abs(response.imag).max() < 1e-9
     np.testing.assert_allclose(response.real[:3], 1, atol=1e-3)
     assert response.real[3] == pytest.approx(1, abs=0.03)
@@ -110,7 +131,9 @@ def test_the_smoother_passes_what_is_slow_halves_its_bandwidth_and_stops_at_70_d
     gain = np.abs(response)
     assert gain[0] == pytest.approx(1, abs=1e-12)
     assert gain[1] == pytest.approx(1, abs=2e-3)
-    assert gain[2] == pytest.approx(0.5, abs=0.01)  # the window's middle lies on the ideal filter's edge
+    assert gain[2] == pytest.approx(
+        0.5, abs=0.01
+    )  # the window's middle lies on the ideal filter's edge
     assert 20 * np.log10(gain[3:].max()) < -70
 
 
@@ -154,7 +177,9 @@ def test_butterworth_is_scipys_ends_included(order: int, cutoff: float) -> None:
     reach = min(math.ceil(order * 500 / cutoff), x.shape[1] - 1)
     expected = sosfiltfilt(sections, x, axis=-1, padtype="odd", padlen=reach)
     # the same arithmetic in another order: rounding, grown by sections that remember 1e3 samples
-    np.testing.assert_allclose(butterworth(x, 1 / 500, cutoff, order), expected, atol=1e-8 * np.abs(x).max())
+    np.testing.assert_allclose(
+        butterworth(x, 1 / 500, cutoff, order), expected, atol=1e-8 * np.abs(x).max()
+    )
 
 
 @pytest.mark.parametrize("order", [1, 2, 3, 4, 8])
@@ -164,7 +189,9 @@ def test_butterworth_keeps_constants_and_slopes_and_halves_its_cutoff(order: int
     np.testing.assert_allclose(butterworth(constant, 2e-3, 0.2, order), constant, rtol=1e-12)
     slope = (3 * t - 2)[None]
     inner = slice(200, -200)  # a filter at rest takes some periods of its cutoff to follow a slope
-    np.testing.assert_allclose(butterworth(slope, 2e-3, 10.0, order)[:, inner], slope[:, inner], atol=1e-6)
+    np.testing.assert_allclose(
+        butterworth(slope, 2e-3, 10.0, order)[:, inner], slope[:, inner], atol=1e-6
+    )
     wave = np.cos(2 * np.pi * 5.0 * t)[None]  # forwards and backwards: 2^-1/2 twice
     halved = butterworth(wave, 2e-3, 5.0, order)[0, 800:-800]
     np.testing.assert_allclose(halved, 0.5 * wave[0, 800:-800], atol=1e-3)
@@ -186,4 +213,6 @@ def test_a_recursion_goes_on_from_the_state_it_left() -> None:
     for part in np.split(x, [1, 3, 50, 333]):
         y, state = recursion(numerator, denominator, part, state)
         parts.append(y)
-    np.testing.assert_allclose(np.concatenate(parts), lfilter(numerator, denominator, x), atol=1e-11)
+    np.testing.assert_allclose(
+        np.concatenate(parts), lfilter(numerator, denominator, x), atol=1e-11
+    )

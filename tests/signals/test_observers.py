@@ -14,7 +14,9 @@ DT = 1e-3
 
 def test_gain_places_the_poles_of_the_paper() -> None:
     found = np.sort(np.linalg.eigvals(A - observer_gain(PAPER_POLES) @ C).real)
-    np.testing.assert_allclose(found, np.sort(PAPER_POLES), rtol=1e-4)  # close poles: eigenvalues lose digits
+    np.testing.assert_allclose(
+        found, np.sort(PAPER_POLES), rtol=1e-4
+    )  # close poles: eigenvalues lose digits
 
 
 @pytest.mark.parametrize("poles", [PAPER_POLES, (-50 + 20j, -50 - 20j, -60, -80, -90, -100)])
@@ -24,7 +26,9 @@ def test_velocities_are_those_of_the_differential_equation(poles: tuple[complex,
     gain = observer_gain(poles)
 
     def rate(now: float, x: np.ndarray) -> np.ndarray:
-        y = np.array([np.interp(now, t, angle) for angle in theta])  # linear between samples, as assumed
+        y = np.array(
+            [np.interp(now, t, angle) for angle in theta]
+        )  # linear between samples, as assumed
         return (A - gain @ C) @ x + gain @ y
 
     start = np.array([theta[0, 0], 0, 0, theta[1, 0], 0, 0])
@@ -37,7 +41,9 @@ def test_velocities_are_those_of_the_differential_equation(poles: tuple[complex,
 def test_steady_sine_meets_the_transfer_function() -> None:
     frequency = 2 * np.pi * 1.0
     t = DT * np.arange(4000)
-    found = LuenbergerObserver(DT).velocities(np.stack([np.sin(frequency * t), np.zeros_like(t)]))[0, 2000:]
+    found = LuenbergerObserver(DT).velocities(np.stack([np.sin(frequency * t), np.zeros_like(t)]))[
+        0, 2000:
+    ]
     s = 1j * frequency
     _, l1, l2, l3 = np.poly(PAPER_POLES[:3])
     gain = (l2 * s + l3) * s / (s**3 + l1 * s**2 + l2 * s + l3)
@@ -60,20 +66,26 @@ def test_an_arm_at_rest_has_no_velocity() -> None:
     np.testing.assert_allclose(found, 0, atol=1e-8)  # rounding of gains up to 6e7
 
 
-@pytest.mark.parametrize("poles", [(-1.0,) * 5, (1.0, -1, -2, -3, -4, -5), (-1 + 1j, -2, -3, -1 - 1j, -4, -5)])
+@pytest.mark.parametrize(
+    "poles", [(-1.0,) * 5, (1.0, -1, -2, -3, -4, -5), (-1 + 1j, -2, -3, -1 - 1j, -4, -5)]
+)
 def test_poles_that_cannot_be_are_refused(poles: tuple[complex, ...]) -> None:
     with pytest.raises(ValueError, match="poles"):
         observer_gain(poles)
 
 
 @pytest.mark.parametrize("poles", [PAPER_POLES, (-30 + 40j, -30 - 40j, -50, -20, -25, -90)])
-def test_the_recursion_is_scipys_first_order_hold_of_each_joints_transfer_function(poles: tuple[complex, ...]) -> None:
+def test_the_recursion_is_scipys_first_order_hold_of_each_joints_transfer_function(
+    poles: tuple[complex, ...],
+) -> None:
     theta = np.cumsum(np.random.default_rng(2).normal(0, 0.01, (2, 400)), axis=1)
     theta -= theta[:, :1]
     found = LuenbergerObserver(DT, poles).velocities(theta)
     for joint, own in enumerate((poles[:3], poles[3:])):
         _, l1, l2, l3 = np.poly(np.array(own)).real
-        numerator, denominator, _ = cont2discrete(([l2, l3, 0.0], [1.0, l1, l2, l3]), DT, method="foh")
+        numerator, denominator, _ = cont2discrete(
+            ([l2, l3, 0.0], [1.0, l1, l2, l3]), DT, method="foh"
+        )
         expected = lfilter(np.ravel(numerator), denominator, theta[joint])
         np.testing.assert_allclose(found[joint], expected, atol=1e-6 * np.abs(expected).max())
 
@@ -85,7 +97,9 @@ def test_after_a_reset_the_observer_starts_at_rest_where_it_is() -> None:
     observer.velocities(first)
     observer.reset()
     found = observer.velocities(second + 5.0)
-    np.testing.assert_allclose(found, LuenbergerObserver(DT).velocities(second), rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(
+        found, LuenbergerObserver(DT).velocities(second), rtol=1e-9, atol=1e-6
+    )
     assert np.all(np.abs(found[:, 0]) < 1e-6)
 
 
@@ -99,10 +113,16 @@ def test_no_joint_disturbs_the_other() -> None:
 def test_a_ramp_ends_at_its_slope() -> None:
     t = DT * np.arange(1000)
     found = LuenbergerObserver(DT).velocities(np.stack([2.0 * t, -0.5 * t + 1.0]))
-    np.testing.assert_allclose(found[:, -1], [2.0, -0.5], rtol=1e-6)  # type 1: the filter has no error of position
+    np.testing.assert_allclose(
+        found[:, -1], [2.0, -0.5], rtol=1e-6
+    )  # type 1: the filter has no error of position
 
 
-@pytest.mark.parametrize("poles", [(-1.0, -2, -3, -4, -5, 0.0), (-1.0,) * 7, (-1 + 1j, -1 - 2j, -3, -4, -5, -6)])
-def test_poles_on_the_axis_too_many_or_not_conjugate_are_refused(poles: tuple[complex, ...]) -> None:
+@pytest.mark.parametrize(
+    "poles", [(-1.0, -2, -3, -4, -5, 0.0), (-1.0,) * 7, (-1 + 1j, -1 - 2j, -3, -4, -5, -6)]
+)
+def test_poles_on_the_axis_too_many_or_not_conjugate_are_refused(
+    poles: tuple[complex, ...],
+) -> None:
     with pytest.raises(ValueError, match=r"poles.*got \("):
         observer_gain(poles)

@@ -32,14 +32,21 @@ def test_segments_do_not_depend_on_the_blocks(stamps: np.ndarray, rows: int) -> 
     log = log_at(stamps)
     whole, cut = list(segments([log])), list(segments(blocks(log, rows)))
     for name in ("theta", "tau"):
-        one, other = (np.concatenate([getattr(part, name) for part in parts], axis=1) for parts in (whole, cut))
+        one, other = (
+            np.concatenate([getattr(part, name) for part in parts], axis=1)
+            for parts in (whole, cut)
+        )
         np.testing.assert_array_equal(one, other)
-    assert [part.start for part in cut if not part.continues] == [part.start for part in whole if not part.continues]
+    assert [part.start for part in cut if not part.continues] == [
+        part.start for part in whole if not part.continues
+    ]
 
 
 def test_even_stamps_pass_unchanged() -> None:
     log = log_at(EVEN)
-    np.testing.assert_array_equal(np.concatenate([s.theta for s in segments([log])], axis=1), log.theta)
+    np.testing.assert_array_equal(
+        np.concatenate([s.theta for s in segments([log])], axis=1), log.theta
+    )
 
 
 def test_jittered_samples_are_put_on_the_time_base() -> None:
@@ -62,7 +69,11 @@ def test_pieces_keep_every_sample_once(lengths: list[int], rows: int) -> None:
     source, start = [], 0
     for number, length in enumerate(lengths):
         values = np.arange(start, start + length, dtype=float)
-        source.append(Segment(start * 0.1, 0.1, np.stack([values] * 2), np.stack([values] * 2), None, number > 0))
+        source.append(
+            Segment(
+                start * 0.1, 0.1, np.stack([values] * 2), np.stack([values] * 2), None, number > 0
+            )
+        )
         start += length
     cut = list(pieces(source, rows))
     np.testing.assert_array_equal(np.concatenate([part.theta[0] for part in cut]), np.arange(start))

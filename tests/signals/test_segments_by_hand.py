@@ -22,7 +22,9 @@ def log_at(ms: list[float], *, omega: bool = False) -> Log:
     stamp_ns = np.array([round(one * MS) for one in ms], dtype=np.int64)
     t = stamp_ns * 1e-9
     signals = [np.stack([a * t + b, b * t - a]) for a, b in ((2.0, 1.0), (-3.0, 0.5), (0.25, 4.0))]
-    return Log(stamp_ns, signals[0], signals[1], Origin("log", "test", {}), signals[2] if omega else None)
+    return Log(
+        stamp_ns, signals[0], signals[1], Origin("log", "test", {}), signals[2] if omega else None
+    )
 
 
 def found(log: Log | list[float], *, omega: bool = False) -> list[Segment]:
@@ -45,11 +47,15 @@ def test_a_log_without_samples_has_no_segments() -> None:
 def test_empty_blocks_between_others_do_not_show() -> None:
     log = log_at([*range(40)])
     blocks = [log.part(0, 0), log.part(0, 11), log.part(11, 11), log.part(11, 40), log.part(40, 40)]
-    np.testing.assert_array_equal(np.concatenate([one.theta for one in segments(blocks)], axis=1), log.theta)
+    np.testing.assert_array_equal(
+        np.concatenate([one.theta for one in segments(blocks)], axis=1), log.theta
+    )
 
 
 @pytest.mark.parametrize(("gap", "starts"), [(5.0, [0.0]), (5.1, [0.0, 0.0141])])
-def test_a_log_is_cut_where_more_than_five_periods_lack_samples(gap: float, starts: list[float]) -> None:
+def test_a_log_is_cut_where_more_than_five_periods_lack_samples(
+    gap: float, starts: list[float]
+) -> None:
     stretches = found([*range(10), *(9 + gap + n for n in range(12))])
     assert [one.start for one in stretches] == pytest.approx(starts, abs=1e-12)
     assert [one.dt for one in stretches] == pytest.approx([1e-3] * len(starts), rel=1e-12)
@@ -83,7 +89,9 @@ def test_a_stamp_within_a_thousandth_of_a_period_lies_on_the_grid(off: float, ta
     ms = [float(n) for n in range(30)]
     ms[17] += off
     log = log_at(ms)
-    bent = replace(log, theta=log.theta**3 + np.arange(30) ** 2)  # no line: what is put in between differs
+    bent = replace(
+        log, theta=log.theta**3 + np.arange(30) ** 2
+    )  # no line: what is put in between differs
     (whole,) = found(bent)
     assert np.array_equal(whole.theta[:, 17], bent.theta[:, 17]) is taken
 
@@ -92,12 +100,18 @@ def test_missing_samples_are_those_of_the_cubic_through_four_neighbours() -> Non
     """Samples 12 and 13 are lost; SciPy's polynomial through 10, 11, 14 and 15."""
     rng = np.random.default_rng(0)
     kept = [n for n in range(30) if n not in (12, 13)]
-    log = replace(log_at([*map(float, kept)]), theta=rng.standard_normal((2, 28)), tau=rng.standard_normal((2, 28)))
+    log = replace(
+        log_at([*map(float, kept)]),
+        theta=rng.standard_normal((2, 28)),
+        tau=rng.standard_normal((2, 28)),
+    )
     values = np.concatenate([one.theta for one in segments([log])], axis=1)
     assert values.shape == (2, 30)
     nodes = [kept.index(n) for n in (10, 11, 14, 15)]
     cubic = BarycentricInterpolator(np.array([10.0, 11.0, 14.0, 15.0]), log.theta[:, nodes].T)
-    np.testing.assert_allclose(values[:, 12:14], cubic(np.array([12.0, 13.0])).T, atol=1e-9)  # rounding of stamps
+    np.testing.assert_allclose(
+        values[:, 12:14], cubic(np.array([12.0, 13.0])).T, atol=1e-9
+    )  # rounding of stamps
     np.testing.assert_allclose(values[:, :12], log.theta[:, :12], atol=1e-9)
 
 
@@ -114,7 +128,10 @@ def test_the_ends_of_a_stretch_use_the_four_samples_there() -> None:
 
 
 def test_the_period_is_the_mean_of_the_steps_near_the_usual_one() -> None:
-    """Stamps in whole tenths of a millisecond, 1.0 and 1.1 by turns; a gap of 4 ms counts for nothing."""
+    """Stamps in whole tenths of a millisecond, 1.0 and 1.1 by turns.
+
+    a gap of 4 ms counts for nothing.
+    """
     steps = [1.0, 1.1] * 50 + [4.0] + [1.0, 1.1] * 50
     (whole,) = found(np.concatenate([[0.0], np.cumsum(steps)]).tolist())
     assert whole.dt == pytest.approx(1.05e-3, rel=1e-9)
@@ -131,12 +148,16 @@ def test_velocities_come_along_or_stay_away() -> None:
     log = log_at(ms, omega=True)
     for part in segments([log]):
         assert part.omega is not None
-        line = np.stack([0.25 * part.t + 4.0, 4.0 * part.t - 0.25])  # the cubic through a line is the line
+        line = np.stack(
+            [0.25 * part.t + 4.0, 4.0 * part.t - 0.25]
+        )  # the cubic through a line is the line
         np.testing.assert_allclose(part.omega, line, atol=1e-9)
     assert all(part.omega is None for part in segments([replace(log, omega=None)]))
 
 
-def numbered(length: int, *, start: float = 2.0, continues: bool = False, omega: bool = True) -> Segment:
+def numbered(
+    length: int, *, start: float = 2.0, continues: bool = False, omega: bool = True
+) -> Segment:
     values = np.stack([np.arange(length), -np.arange(length)]).astype(np.float64)
     return Segment(start, 0.5, values, 10 * values, 100 * values if omega else None, continues)
 
@@ -166,7 +187,10 @@ def test_two_segments_are_one_after_the_other_and_lose_velocities_that_one_lacks
 
 
 def stretches(lengths: list[list[int]]) -> Iterator[Segment]:
-    """Stretches given as the lengths of the segments they come in; a sample's value is its number in all."""
+    """Stretches given as the lengths of the segments they come in.
+
+    a sample's value is its number in all.
+    """
     number = 0
     for place, parts in enumerate(lengths):
         for order, length in enumerate(parts):
@@ -189,7 +213,9 @@ def stretches(lengths: list[list[int]]) -> Iterator[Segment]:
         ([[12], [3], [9, 9]], [[12], [3], [10, 8]]),
     ],
 )
-def test_pieces_have_the_lengths_that_they_promise(lengths: list[list[int]], expected: list[list[int]]) -> None:
+def test_pieces_have_the_lengths_that_they_promise(
+    lengths: list[list[int]], expected: list[list[int]]
+) -> None:
     cut: list[list[int]] = []
     for piece in pieces(stretches(lengths), 10):
         if piece.continues:
@@ -201,7 +227,9 @@ def test_pieces_have_the_lengths_that_they_promise(lengths: list[list[int]], exp
 
 @given(parts=st.lists(st.lists(st.integers(1, 35), min_size=1, max_size=5), min_size=1, max_size=4))
 def test_pieces_do_not_depend_on_how_a_stretch_came_in(parts: list[list[int]]) -> None:
-    one, other = (list(pieces(stretches(kind), 10)) for kind in (parts, [[sum(lengths)] for lengths in parts]))
+    one, other = (
+        list(pieces(stretches(kind), 10)) for kind in (parts, [[sum(lengths)] for lengths in parts])
+    )
     assert [len(piece) for piece in one] == [len(piece) for piece in other]
     for mine, whole in zip(one, other, strict=True):
         np.testing.assert_array_equal(mine.theta, whole.theta)

@@ -78,7 +78,13 @@ def half_a_period() -> tuple[FloatArray, FloatArray]:
     return t, t
 
 
-KINDS: list[Callable[[], tuple[FloatArray, FloatArray]]] = [late_pairs, bursts, batches, repeated, half_a_period]
+KINDS: list[Callable[[], tuple[FloatArray, FloatArray]]] = [
+    late_pairs,
+    bursts,
+    batches,
+    repeated,
+    half_a_period,
+]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -89,7 +95,8 @@ def test_the_motion_is_recovered(kind: Callable[[], tuple[FloatArray, FloatArray
     # the time base may be a little slower where every tenth sample is merged with a neighbour
     assert dt == pytest.approx(PERIOD, rel=0.03 if kind is half_a_period else 1e-3)
     t = log.stamp_ns[0] * 1e-9 + start + dt * np.arange(theta.shape[1])
-    # a cluster's samples are right to its own length in time, 20 µs at 6 rad/s, a cubic between to far less
+    # a cluster's samples are right to its own length in time, 20 µs at 6 rad/s, a cubic between to
+    # far less
     assert np.abs(theta - moving(t))[:, 20:].max() < (2e-4 if kind is batches else 1.3e-5)
 
 
@@ -101,10 +108,14 @@ def _whole(parts: object) -> list[tuple[float, float, FloatArray]]:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("rows", [1, 7, 1000])
-def test_blocks_make_no_difference(kind: Callable[[], tuple[FloatArray, FloatArray]], rows: int) -> None:
+def test_blocks_make_no_difference(
+    kind: Callable[[], tuple[FloatArray, FloatArray]], rows: int
+) -> None:
     log = log_of(*kind())
     whole = join(spaced([log], PERIOD))
-    parts = join(spaced([log.part(first, first + rows) for first in range(0, len(log), rows)], PERIOD))
+    parts = join(
+        spaced([log.part(first, first + rows) for first in range(0, len(log), rows)], PERIOD)
+    )
     assert parts.stamp_ns.tolist() == whole.stamp_ns.tolist()
     assert np.array_equal(parts.theta, whole.theta)
     assert np.array_equal(parts.tau, whole.tau)
@@ -118,8 +129,12 @@ def test_logs_without_clusters_pass_as_they_are() -> None:
 
 
 def test_the_period_of_bursts_is_their_mean_pace() -> None:
-    assert usual_period(np.rint(batches()[1] * 1e9).astype(np.int64)) == pytest.approx(PERIOD, rel=0.01)
-    assert usual_period(np.rint(regular() * 1e9).astype(np.int64)) == pytest.approx(PERIOD, rel=1e-12)
+    assert usual_period(np.rint(batches()[1] * 1e9).astype(np.int64)) == pytest.approx(
+        PERIOD, rel=0.01
+    )
+    assert usual_period(np.rint(regular() * 1e9).astype(np.int64)) == pytest.approx(
+        PERIOD, rel=1e-12
+    )
 
 
 def test_how_many_are_near_is_told() -> None:
@@ -130,12 +145,18 @@ def test_how_many_are_near_is_told() -> None:
 
 
 def simulated(extra: FloatArray, late: FloatArray) -> Log:
-    """Four seconds of the first case with noise; `extra` samples follow 2 µs after theirs, `late` come one too late."""
+    """Four seconds of the first case with noise.
+
+    `extra` samples follow 2 µs after theirs, `late` come one too late.
+    """
     case = load_case("case1")
     t = regular()
     times = np.unique(np.concatenate([t, t[extra] + 2e-6]))
     motion = simulate(case.arm.constants(), wide_multi_sine(case.arm), times, HANGING, np.zeros(2))
-    noise = np.random.default_rng(3).standard_normal((2, 2, ROWS)) * np.array([3e-4, 1e-2])[:, None, None]
+    noise = (
+        np.random.default_rng(3).standard_normal((2, 2, ROWS))
+        * np.array([3e-4, 1e-2])[:, None, None]
+    )
     own = np.searchsorted(times, t)
     theta, tau = motion.theta, motion.tau
     theta[:, own] += noise[0]

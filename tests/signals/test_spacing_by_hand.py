@@ -13,9 +13,18 @@ US = 1000  # ns
 
 
 def log_of(us: list[int], angles: list[float], *, omega: bool = False) -> Log:
-    """Stamps in µs; both joints turn alike, joint 2 the other way round, torques ten times as large."""
+    """Stamps in µs.
+
+    Both joints turn alike, joint 2 the other way round, torques ten times as large.
+    """
     theta = np.array([angles, [-one for one in angles]], dtype=np.float64)
-    return Log(np.array(us) * US, theta, 10 * theta, Origin("log", "test", {}), 100 * theta if omega else None)
+    return Log(
+        np.array(us) * US,
+        theta,
+        10 * theta,
+        Origin("log", "test", {}),
+        100 * theta if omega else None,
+    )
 
 
 def settled(log: Log) -> Log:
@@ -47,7 +56,10 @@ def test_two_samples_of_one_instant_after_a_gap_are_one() -> None:
 
 
 def test_a_late_cluster_fills_as_many_periods_as_lack_samples_and_no_other() -> None:
-    """Three samples of 2, 3, 4 ms come at once at 4 ms; the same three after four periods are one instant."""
+    """Three samples of 2, 3, 4 ms come at once at 4 ms.
+
+    The same three after four periods are one instant.
+    """
     late = settled(log_of([0, 1000, 3996, 3998, 4000, 5000], [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]))
     assert (late.stamp_ns // US).tolist() == [0, 1000, 2000, 3000, 4000, 5000]
     other = settled(log_of([0, 1000, 4996, 4998, 5000, 6000], [0.0, 1.0, 2.0, 3.0, 4.0, 6.0]))

@@ -29,7 +29,9 @@ def test_a_pendulum_swings_as_jacobi_s_elliptic_sine() -> None:
 
 
 def test_corners_between_and_on_samples_are_met() -> None:
-    corners = np.array([0.1, 0.25, 0.2501, 0.7])  # a push that begins and ends: velocity and angle in closed form
+    corners = np.array(
+        [0.1, 0.25, 0.2501, 0.7]
+    )  # a push that begins and ends: velocity and angle in closed form
     t = np.linspace(0, 1, 11)
     levels = np.array([0.0, 3.0, -7.0, 2.0, 0.0])
 
@@ -41,7 +43,9 @@ def test_corners_between_and_on_samples_are_met() -> None:
     spans = np.clip(t[:, None] - edges[:-1], 0, np.diff(edges))
     after = t[:, None] - edges[:-1] - spans  # time since each push ended
     np.testing.assert_allclose(states[1], spans @ levels, atol=1e-13)
-    np.testing.assert_allclose(states[0], (spans**2 / 2 + spans * np.maximum(after, 0)) @ levels, atol=1e-13)
+    np.testing.assert_allclose(
+        states[0], (spans**2 / 2 + spans * np.maximum(after, 0)) @ levels, atol=1e-13
+    )
 
 
 def test_a_stiff_damper_agrees_with_an_implicit_integrator() -> None:
@@ -59,5 +63,9 @@ def test_a_stiff_damper_agrees_with_an_implicit_integrator() -> None:
 
 
 def test_what_no_double_holds_is_refused() -> None:
-    with pytest.raises(ArithmeticError, match=r"beyond (1|0\.99)"):  # θ̈ = 6 θ² from θ(0) = 1: (1 − t)^−2
-        integrate(at(lambda _t, theta, _omega: 6 * theta**2), np.array([1.0, 2.0]), np.array([0.0, 2.0]))
+    with pytest.raises(
+        ArithmeticError, match=r"beyond (1|0\.99)"
+    ):  # θ̈ = 6 θ² from θ(0) = 1: (1 − t)^−2
+        integrate(
+            at(lambda _t, theta, _omega: 6 * theta**2), np.array([1.0, 2.0]), np.array([0.0, 2.0])
+        )

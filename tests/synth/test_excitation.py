@@ -1,4 +1,7 @@
-"""Torques that drive a simulated arm: closed forms, holds, and what is refused; cases and their files."""
+"""Torques that drive a simulated arm: closed forms, holds, and what is refused.
+
+Cases and their files.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,10 @@ TIMES = np.array([0.0, 0.013, 0.7, 3.0])
 def test_a_multi_sine_is_the_sum_of_its_waves() -> None:
     torque = MultiSine(((2.0, 0.5), (1.0,)), ((0.3, 4.0), (2.5,)), ((0.1, -1.0), (0.7,)))
     expected = [
-        [2 * math.sin(2 * math.pi * 0.3 * t + 0.1) + 0.5 * math.sin(8 * math.pi * t - 1) for t in TIMES],
+        [
+            2 * math.sin(2 * math.pi * 0.3 * t + 0.1) + 0.5 * math.sin(8 * math.pi * t - 1)
+            for t in TIMES
+        ],
         [math.sin(5 * math.pi * t + 0.7) for t in TIMES],
     ]
     np.testing.assert_allclose(torque(TIMES), expected, atol=1e-13)
@@ -48,10 +54,15 @@ def test_the_wide_torque_scales_with_what_the_arm_asks_for() -> None:
 
 
 @pytest.mark.parametrize(
-    ("hold", "between", "just_before"), [("zoh", [1.0, -2.0], [1.0, -2.0]), ("foh", [2.0, 0.0], [3.0, 2.0])]
+    ("hold", "between", "just_before"),
+    [("zoh", [1.0, -2.0], [1.0, -2.0]), ("foh", [2.0, 0.0], [3.0, 2.0])],
 )
-def test_a_sampled_torque_is_held_or_joined(hold: Hold, between: list[float], just_before: list[float]) -> None:
-    torque = SampledTorque(np.array([0.0, 1.0, 3.0]), np.array([[1.0, 3.0, 5.0], [-2.0, 2.0, 4.0]]), hold)
+def test_a_sampled_torque_is_held_or_joined(
+    hold: Hold, between: list[float], just_before: list[float]
+) -> None:
+    torque = SampledTorque(
+        np.array([0.0, 1.0, 3.0]), np.array([[1.0, 3.0, 5.0], [-2.0, 2.0, 4.0]]), hold
+    )
     found = torque(np.array([-1.0, 0.0, 0.5, 1.0 - 1e-12, 1.0, 3.0, 9.0]))
     expected = np.array([[1, -2], [1, -2], between, just_before, [3, 2], [5, 4], [5, 4]]).T
     np.testing.assert_allclose(found, expected, atol=1e-11)
@@ -82,15 +93,41 @@ def test_excitations_go_by_their_names() -> None:
 def test_the_cases_are_those_of_table_3() -> None:
     assert case_names() == ["case1", "case2"]
     expected = {
-        "case1": (0.3674, 0.0814, 0.0813, 0.0616, 0.1626, 0.1232, 0.0009, 0.0018, 0.1360, 0.3072, 9.81),
-        "case2": (0.4274, 0.1077, 0.1213, 0.0857, 0.1925, 0.1433, 0.0011, 0.0022, 0.1570, 0.3392, 9.81),
+        "case1": (
+            0.3674,
+            0.0814,
+            0.0813,
+            0.0616,
+            0.1626,
+            0.1232,
+            0.0009,
+            0.0018,
+            0.1360,
+            0.3072,
+            9.81,
+        ),
+        "case2": (
+            0.4274,
+            0.1077,
+            0.1213,
+            0.0857,
+            0.1925,
+            0.1433,
+            0.0011,
+            0.0022,
+            0.1570,
+            0.3392,
+            9.81,
+        ),
     }
     for name, values in expected.items():
         case = load_case(name)
         assert case.arm == Arm(*values)
         assert case.payload == {"case1": 0.3515, "case2": 0.6315}[name]
         assert case.torque is not None
-        assert set(map(len, (*case.torque.amplitude, *case.torque.frequency, *case.torque.phase))) == {4}
+        assert set(
+            map(len, (*case.torque.amplitude, *case.torque.frequency, *case.torque.phase))
+        ) == {4}
         assert case.paper_error_percent["m_p"] > 0
 
 
@@ -100,11 +137,21 @@ def test_a_file_of_lengths_and_masses_is_an_arm_of_uniform_links(tmp_path: Path)
     file.write_text(text, encoding="utf-8")
     case = load_case(str(file))
     assert case.name == "mine"
-    assert case.arm == Arm(3.0, 1.2, 0.25, 0.2, 0.5, 0.4, 3.0 * 0.5**2 / 12, 1.2 * 0.4**2 / 12, 0.0, 0.0, 9.81)
+    assert case.arm == Arm(
+        3.0, 1.2, 0.25, 0.2, 0.5, 0.4, 3.0 * 0.5**2 / 12, 1.2 * 0.4**2 / 12, 0.0, 0.0, 9.81
+    )
     assert (case.payload, case.torque, case.paper_error_percent) == (0.0, None, {})
-    file.write_text(text + "lc2 = -0.1\nI1 = 0.0\nb2 = 0.3\ng = 0.0\n[payload]\nm_p = 0.7\n", encoding="utf-8")
+    file.write_text(
+        text + "lc2 = -0.1\nI1 = 0.0\nb2 = 0.3\ng = 0.0\n[payload]\nm_p = 0.7\n", encoding="utf-8"
+    )
     case = load_case(str(file))
-    assert (case.arm.lc2, case.arm.I1, case.arm.b2, case.arm.g, case.payload) == (-0.1, 0.0, 0.3, 0.0, 0.7)
+    assert (case.arm.lc2, case.arm.I1, case.arm.b2, case.arm.g, case.payload) == (
+        -0.1,
+        0.0,
+        0.3,
+        0.0,
+        0.7,
+    )
     np.testing.assert_allclose([case.arm.lc1, case.arm.I2], [0.25, 1.2 * 0.4**2 / 12])
 
 
@@ -120,14 +167,22 @@ JOINT = "[torque.joint{}]\namplitude = {}\nfrequency = [1.0]\nphase = [0.0]\n"
         ("lc1 = nan\n", "arm.lc1: "),
         ("[payload]\nm_p = -0.1\n", "payload.m_p: "),
         ("[payload]\nmass = 0.1\n", "payload.m"),
-        ("[torque.joint1]\namplitude = []\nfrequency = []\nphase = []\n", "torque.joint1.amplitude: "),
-        (JOINT.format(1, "[1.0, 2.0]") + JOINT.format(2, "[1.0]"), "need the same number of harmonics"),
+        (
+            "[torque.joint1]\namplitude = []\nfrequency = []\nphase = []\n",
+            "torque.joint1.amplitude: ",
+        ),
+        (
+            JOINT.format(1, "[1.0, 2.0]") + JOINT.format(2, "[1.0]"),
+            "need the same number of harmonics",
+        ),
         (JOINT.format(1, "[1.0]"), "torque.joint2: "),
         ("[paper_error_percent]\nk1 = 0.0\n", "paper_error_percent.k1: "),
         ("m1 = 1.0\n", "not TOML ("),
     ],
 )
-def test_a_file_that_describes_no_arm_is_refused_with_its_line(more: str, message: str, tmp_path: Path) -> None:
+def test_a_file_that_describes_no_arm_is_refused_with_its_line(
+    more: str, message: str, tmp_path: Path
+) -> None:
     file = tmp_path / "mine.toml"
     file.write_text("[arm]\nm1 = 3.0\nm2 = 1.2\nl1 = 0.5\nl2 = 0.4\n" + more, encoding="utf-8")
     with pytest.raises(SettingError) as refused:

@@ -13,7 +13,9 @@ from algid.readers import read_log
 from tests.cli.commands import app
 
 BARE = "[arm]\nm1 = 2.0\nm2 = 1.0\nl1 = 0.4\nl2 = 0.3\nb1 = 0.2\nb2 = 0.1\n"
-PLAN = "t,theta1,theta2,omega1,omega2,tau1,tau2\n" + "".join(f"{t},-1.57,0,0,0,0,0\n" for t in (0, 0.01, 0.02, 0.03))
+PLAN = "t,theta1,theta2,omega1,omega2,tau1,tau2\n" + "".join(
+    f"{t},-1.57,0,0,0,0,0\n" for t in (0, 0.01, 0.02, 0.03)
+)
 
 
 def synth(*arguments: object) -> tuple[int, str]:
@@ -26,11 +28,25 @@ def synth(*arguments: object) -> tuple[int, str]:
 def test_an_arm_without_payload_leaves_one_log_with_the_noise_of_its_seed(tmp_path: Path) -> None:
     case, logs = tmp_path / "bare.toml", tmp_path / "logs"
     case.write_text(BARE, encoding="utf-8")
-    code, said = synth(case, "--torque-noise", "0.1", "--duration", "0.1", "--format", "csv", "-o", logs)
+    code, said = synth(
+        case, "--torque-noise", "0.1", "--duration", "0.1", "--format", "csv", "-o", logs
+    )
     assert (code, said.split()) == (0, [str(logs / "bare-unloaded.csv")])
     case.write_text(BARE + "[payload]\nm_p = 0.3\n", encoding="utf-8")
-    synth(case, "--torque-noise", "0.1", "--duration", "0.1", "--format", "csv", "-o", tmp_path / "both")
-    once, both = (read_log(folder / "bare-unloaded.csv").tau for folder in (logs, tmp_path / "both"))
+    synth(
+        case,
+        "--torque-noise",
+        "0.1",
+        "--duration",
+        "0.1",
+        "--format",
+        "csv",
+        "-o",
+        tmp_path / "both",
+    )
+    once, both = (
+        read_log(folder / "bare-unloaded.csv").tau for folder in (logs, tmp_path / "both")
+    )
     np.testing.assert_array_equal(once, both)
 
 
@@ -59,10 +75,22 @@ SCHEDULE = "--payload-schedule: expected increasing times and payloads of 0 or m
             (["case1", "--payload-schedule", text], f"{SCHEDULE}{text!r}")
             for text in ("1=2=3", "2=1,1=0", "1=-1", "nan=1")
         ),
-        (["nocase"], "nocase: no such case; expected case1, case2 or a .toml file that describes an arm"),
-        (["case1", "--initial", "0,0,0"], "--initial: expected four numbers like -1.57,0,0,0, found '0,0,0'"),
-        (["case1", "--initial", "0,0,0,inf"], "--initial: expected four numbers like -1.57,0,0,0, found '0,0,0,inf'"),
-        (["case1", "--torque", "fast"], "--torque fast: expected case, wide, none or a log, found neither"),
+        (
+            ["nocase"],
+            "nocase: no such case; expected case1, case2 or a .toml file that describes an arm",
+        ),
+        (
+            ["case1", "--initial", "0,0,0"],
+            "--initial: expected four numbers like -1.57,0,0,0, found '0,0,0'",
+        ),
+        (
+            ["case1", "--initial", "0,0,0,inf"],
+            "--initial: expected four numbers like -1.57,0,0,0, found '0,0,0,inf'",
+        ),
+        (
+            ["case1", "--torque", "fast"],
+            "--torque fast: expected case, wide, none or a log, found neither",
+        ),
         (
             ["case1", "--motion", "x", "--initial", "0,0,0,0"],
             "--initial 0,0,0,0: a motion starts where it was planned and carries one payload; leave it out",
@@ -70,7 +98,9 @@ SCHEDULE = "--payload-schedule: expected increasing times and payloads of 0 or m
         (["case1", "--motion", "x"], "x: not the trajectory of a design ("),
     ],
 )
-def test_what_makes_no_log_is_refused_in_one_line(arguments: list[str], message: str, tmp_path: Path) -> None:
+def test_what_makes_no_log_is_refused_in_one_line(
+    arguments: list[str], message: str, tmp_path: Path
+) -> None:
     code, said = synth(*arguments, "-o", tmp_path)
     assert code == 2
     assert said.startswith(message)

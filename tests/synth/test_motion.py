@@ -51,7 +51,9 @@ def test_an_arm_without_coupling_is_two_bodies_in_closed_form() -> None:
     """With k1 = 0 and no weight, k5 θ̈1 = τ1 − τ2 and k3 (θ̈1 + θ̈2) = τ2."""
     k = np.array([0.0, 0.0, 0.5, 0.0, 2.0, 0.0, 0.0])
     t = np.linspace(0, 2, 41)
-    motion = simulate(k, lambda now: np.stack([3 * np.cos(2 * now), 1.0 + 0 * now]), t, np.zeros(2), np.zeros(2))
+    motion = simulate(
+        k, lambda now: np.stack([3 * np.cos(2 * now), 1.0 + 0 * now]), t, np.zeros(2), np.zeros(2)
+    )
     first = (3 * (1 - np.cos(2 * t)) / 4 - t**2 / 2) / 2.0
     whole = t**2 / 2 / 0.5
     np.testing.assert_allclose(motion.theta, [first, whole - first], atol=1e-11)
@@ -76,7 +78,9 @@ def test_shifting_the_clock_or_turning_the_arm_by_whole_turns_changes_nothing() 
     later = simulate(FREE, lambda now: torque(now - 7.0), t + 7.0, *START)
     np.testing.assert_allclose(later.theta, plain.theta, atol=1e-9)
     turned = simulate(FREE, torque, t, START[0] + 2 * np.pi * np.array([3, -2]), START[1])
-    np.testing.assert_allclose(turned.theta - plain.theta, 2 * np.pi * np.array([[3.0], [-2.0]]) + 0 * t, atol=1e-9)
+    np.testing.assert_allclose(
+        turned.theta - plain.theta, 2 * np.pi * np.array([[3.0], [-2.0]]) + 0 * t, atol=1e-9
+    )
 
 
 def test_scaling_masses_and_torques_alike_changes_nothing() -> None:
@@ -89,13 +93,19 @@ def test_scaling_masses_and_torques_alike_changes_nothing() -> None:
 def test_an_arm_at_rest_stays_there() -> None:
     motion = simulate(FREE, no_torque, np.linspace(0, 1, 5))
     np.testing.assert_allclose(motion.theta, np.repeat(HANGING[:, None], 5, axis=1), atol=1e-12)
-    up = simulate(FREE, lambda t: np.stack([5.0 + 0 * t, 1.0 + 0 * t]), np.linspace(0, 1, 5), np.zeros(2))
+    up = simulate(
+        FREE, lambda t: np.stack([5.0 + 0 * t, 1.0 + 0 * t]), np.linspace(0, 1, 5), np.zeros(2)
+    )
     np.testing.assert_allclose(up.theta, 0.0, atol=1e-12)  # held outstretched by k4 + k2 and k2
 
 
 def states(count: int = 40) -> tuple[FloatArray, FloatArray, FloatArray]:
     draw = np.random.default_rng(5)
-    return draw.uniform(-3, 3, (2, count)), draw.normal(0, 4, (2, count)), draw.normal(0, 9, (2, count))
+    return (
+        draw.uniform(-3, 3, (2, count)),
+        draw.normal(0, 4, (2, count)),
+        draw.normal(0, 9, (2, count)),
+    )
 
 
 def test_pinocchios_articulated_bodies_accelerate_alike() -> None:
@@ -113,13 +123,17 @@ def test_pinocchios_articulated_bodies_accelerate_alike() -> None:
         kinetic.append(pin.computeKineticEnergy(robot, data, posture, v) + stands)
     np.testing.assert_allclose(np.array(found).T, ours, rtol=0, atol=1e-9 * np.abs(ours).max())
     stored = energy(k, theta, omega)
-    np.testing.assert_allclose(np.array(kinetic) - kinetic[0], stored - stored[0], atol=1e-10 * np.abs(stored).max())
+    np.testing.assert_allclose(
+        np.array(kinetic) - kinetic[0], stored - stored[0], atol=1e-10 * np.abs(stored).max()
+    )
 
 
 def test_mujocos_inertia_and_acceleration_are_alike() -> None:
     mujoco = pytest.importorskip("mujoco")
     value = values_of(ODD, j2=0.004)
-    model = mujoco.MjModel.from_xml_string(exported(result_of(value, Model(("rotor",))), "arm", "mjcf", Knowns())[0])
+    model = mujoco.MjModel.from_xml_string(
+        exported(result_of(value, Model(("rotor",))), "arm", "mjcf", Knowns())[0]
+    )
     data, (theta, omega, tau) = mujoco.MjData(model), states()
     k = np.array(list(value.values()))[:7]
     full = np.zeros((2, 2))

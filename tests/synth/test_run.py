@@ -34,19 +34,27 @@ def test_the_logs_of_a_case_are_the_simulators_motions() -> None:
     unloaded, loaded = synthesise(CASE, WAVE, SHORT)
     t = np.arange(61) / 100
     for log, mass, role in ((unloaded, 0.0, "unloaded"), (loaded, 0.5, "loaded")):
-        motion = simulate(loaded_constants(mass), WAVE, t, np.array([-1.0, 0.3]), np.array([0.5, -0.2]))
+        motion = simulate(
+            loaded_constants(mass), WAVE, t, np.array([-1.0, 0.3]), np.array([0.5, -0.2])
+        )
         np.testing.assert_allclose(log.theta, motion.theta, atol=1e-12)
         np.testing.assert_allclose(log.tau, WAVE(t), atol=1e-12)
         assert log.origin.path == f"mine-{role}"
         assert log.origin.truth is not None
-        assert (log.origin.truth.payload, log.origin.truth.case, log.origin.truth.arm) == (mass, "mine", ARM)
+        assert (log.origin.truth.payload, log.origin.truth.case, log.origin.truth.arm) == (
+            mass,
+            "mine",
+            ARM,
+        )
 
 
 def test_the_loaded_log_has_noise_of_its_own() -> None:
     noisy = replace(SHORT, sensors=Sensors(torque_noise=1.0, seed=7))
     first, second = synthesise(replace(CASE, payload=0.0), no_torque, noisy)
     assert abs(np.corrcoef(first.tau.ravel(), second.tau.ravel())[0, 1]) < 0.5
-    again, _ = synthesise(CASE, no_torque, replace(SHORT, sensors=Sensors(torque_noise=1.0, seed=8)))
+    again, _ = synthesise(
+        CASE, no_torque, replace(SHORT, sensors=Sensors(torque_noise=1.0, seed=8))
+    )
     np.testing.assert_array_equal(second.tau, again.tau)  # that of the next seed
 
 
@@ -60,7 +68,9 @@ def test_an_object_is_grasped_and_let_go_without_a_step() -> None:
         own = t[(t >= start - 1e-9) & (t < end - 1e-9)]
         every = np.unique(np.concatenate([[start], own, [end]]))
         motion = simulate(loaded_constants(mass), WAVE, every, state[:2], state[2:])
-        np.testing.assert_allclose(log.theta[:, np.isin(t, own)], motion.theta[:, np.isin(every, own)], atol=1e-10)
+        np.testing.assert_allclose(
+            log.theta[:, np.isin(t, own)], motion.theta[:, np.isin(every, own)], atol=1e-10
+        )
         state = np.concatenate([motion.theta[:, -1], motion.omega[:, -1]])
     assert log.origin.truth is not None
     assert log.origin.truth.schedule == ((0.2, 0.5), (0.405, 0.0))
@@ -70,16 +80,31 @@ def test_an_object_is_grasped_and_let_go_without_a_step() -> None:
 
 def test_a_schedule_that_begins_at_once_or_after_the_log_is_a_constant_payload() -> None:
     unloaded, loaded = synthesise(CASE, WAVE, SHORT)
-    np.testing.assert_allclose(with_schedule(CASE, WAVE, SHORT, [(0.0, 0.5)]).theta, loaded.theta, atol=1e-11)
-    np.testing.assert_allclose(with_schedule(CASE, WAVE, SHORT, [(5.0, 0.5)]).theta, unloaded.theta, atol=1e-11)
-    np.testing.assert_allclose(with_schedule(CASE, WAVE, SHORT, []).theta, unloaded.theta, atol=1e-11)
+    np.testing.assert_allclose(
+        with_schedule(CASE, WAVE, SHORT, [(0.0, 0.5)]).theta, loaded.theta, atol=1e-11
+    )
+    np.testing.assert_allclose(
+        with_schedule(CASE, WAVE, SHORT, [(5.0, 0.5)]).theta, unloaded.theta, atol=1e-11
+    )
+    np.testing.assert_allclose(
+        with_schedule(CASE, WAVE, SHORT, []).theta, unloaded.theta, atol=1e-11
+    )
 
 
 @pytest.mark.parametrize(
-    "schedule", [[(1.0, 0.1), (1.0, 0.2)], [(2.0, 0.1), (1.0, 0.2)], [(1.0, -0.1)], [(1.0, np.inf)], [(np.nan, 0.1)]]
+    "schedule",
+    [
+        [(1.0, 0.1), (1.0, 0.2)],
+        [(2.0, 0.1), (1.0, 0.2)],
+        [(1.0, -0.1)],
+        [(1.0, np.inf)],
+        [(np.nan, 0.1)],
+    ],
 )
 def test_a_schedule_that_makes_no_sense_is_refused(schedule: list[tuple[float, float]]) -> None:
-    with pytest.raises(ValueError, match="schedule must hold increasing times and payloads of 0 or more, got "):
+    with pytest.raises(
+        ValueError, match="schedule must hold increasing times and payloads of 0 or more, got "
+    ):
         with_schedule(CASE, WAVE, SHORT, schedule)
 
 
@@ -89,7 +114,9 @@ def plan_of(k: FloatArray, loaded: FloatArray, amplitude: float = 0.4) -> Refere
     theta = np.stack([-1.2 + amplitude * (1 - np.cos(wave)), 0.5 * amplitude * (1 - np.cos(wave))])
     omega = np.stack([np.ones(401), np.full(401, 0.5)]) * amplitude * 2 * np.pi * np.sin(wave)
     alpha = np.stack([np.ones(401), np.full(401, 0.5)]) * amplitude * 4 * np.pi**2 * np.cos(wave)
-    return Reference(t, theta, omega, *(inverse_dynamics(c, theta, omega, alpha) for c in (k, loaded)))
+    return Reference(
+        t, theta, omega, *(inverse_dynamics(c, theta, omega, alpha) for c in (k, loaded))
+    )
 
 
 def test_an_arm_that_is_as_believed_follows_its_plan() -> None:
@@ -109,7 +136,8 @@ def test_beyond_its_end_a_plan_holds_its_last_posture() -> None:
     log: Log = rehearse(replace(CASE, payload=0.0), plan, Recording(rate=50.0, duration=1.6))[0]
     late = log.t > 1.3
     assert late.sum() > 10
-    # at rest where gravity is what the plan's last torque holds, which is that of its last acceleration too
+    # at rest where gravity is what the plan's last torque holds, which is that of its last
+    # acceleration too
     k = ARM.constants()
     still = np.zeros((2, 1))
     end = plan.theta[:, -1:]
@@ -145,7 +173,9 @@ HEAD = "t,theta1,theta2,omega1,omega2,tau1,tau2"
 
 def test_a_plan_is_read_with_or_without_the_loaded_torque(tmp_path: Path) -> None:
     rows = "5,1,2,3,4,5,6,7,8\n5.5,1,2,3,4,5.5,6.5,7.5,8.5\n"
-    (tmp_path / "trajectory.csv").write_text(f"{HEAD},loaded_tau1,loaded_tau2\n{rows}", encoding="utf-8")
+    (tmp_path / "trajectory.csv").write_text(
+        f"{HEAD},loaded_tau1,loaded_tau2\n{rows}", encoding="utf-8"
+    )
     plan = read_plan(tmp_path)
     np.testing.assert_array_equal(plan.t, [0, 0.5])
     assert plan.duration == 0.5
@@ -183,10 +213,14 @@ def test_a_file_that_is_no_plan_is_refused(text: str, found: str, tmp_path: Path
 @pytest.mark.slow
 def test_bent_links_and_a_body_at_the_tip_are_found_without_a_flag() -> None:
     """Centres of mass 10° off both links, a payload of 5 cm radius of gyration: all within their intervals' reach."""
-    arm = Arm(4.0, 2.5, 0.2, 0.15, 0.4, 0.35, 0.06, 0.03, 0.8, 0.5, 9.81, np.radians(10), np.radians(10))
+    arm = Arm(
+        4.0, 2.5, 0.2, 0.15, 0.4, 0.35, 0.06, 0.03, 0.8, 0.5, 9.81, np.radians(10), np.radians(10)
+    )
     case = Case("bent", arm, 0.5, None, {}, (None, 0.0), 0.5 * 0.05**2)
     sensors = Sensors(position_noise=1e-4, torque_noise=2e-2, seed=1)
-    logs = synthesise(case, wide_multi_sine(arm, 3), Recording(rate=500.0, duration=10.0, sensors=sensors))
+    logs = synthesise(
+        case, wide_multi_sine(arm, 3), Recording(rate=500.0, duration=10.0, sensors=sensors)
+    )
     unloaded, loaded = (replace(log, origin=replace(log.origin, truth=None)) for log in logs)
     result = identify(unloaded, loaded)
     names = ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "k1s", "k2s", "k4s")

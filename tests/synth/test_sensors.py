@@ -14,7 +14,9 @@ from algid.synth.simulator import SimulatedMotion
 
 CASE = load_case("case1")
 COUNT = 20_000
-RARE = 1e-6  # how often a bound may be broken by chance: seeds are fixed, so it holds always or never
+RARE = (
+    1e-6  # how often a bound may be broken by chance: seeds are fixed, so it holds always or never
+)
 
 
 def motion(count: int = COUNT) -> SimulatedMotion:
@@ -41,7 +43,9 @@ def test_exact_sensors_change_nothing() -> None:
 
 
 @pytest.mark.parametrize(("position", "torque"), [(2e-3, 0.0), (0.0, 5e-2), (2e-3, 5e-2)])
-def test_noise_has_the_standard_deviation_asked_for_and_no_memory(position: float, torque: float) -> None:
+def test_noise_has_the_standard_deviation_asked_for_and_no_memory(
+    position: float, torque: float
+) -> None:
     theta, tau, omega = recorded(position_noise=position, torque_noise=torque, seed=4)
     assert (omega is None) == (position > 0)
     for error, std in ((theta - motion().theta, position), (tau - motion().tau, torque)):
@@ -68,7 +72,10 @@ def test_noise_of_angles_and_torques_is_not_the_same() -> None:
 def test_a_seed_gives_its_own_noise_and_the_same_each_time() -> None:
     first, again, other = (recorded(torque_noise=1.0, seed=seed)[1] for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
-    assert np.abs(np.corrcoef((first - motion().tau).ravel(), (other - motion().tau).ravel())[0, 1]) < 0.03
+    assert (
+        np.abs(np.corrcoef((first - motion().tau).ravel(), (other - motion().tau).ravel())[0, 1])
+        < 0.03
+    )
 
 
 @pytest.mark.parametrize("bits", [4, 12, 20])
@@ -81,7 +88,9 @@ def test_an_encoder_rounds_to_the_nearest_of_its_lines(bits: int) -> None:
     assert np.abs(error).max() <= 0.5 + 1e-9
     assert omega is None
     np.testing.assert_array_equal(tau, motion().tau)
-    if bits == 20:  # fine lines: the error is uniform, of variance a twelfth, whose square has variance 1 / 180
+    if (
+        bits == 20
+    ):  # fine lines: the error is uniform, of variance a twelfth, whose square has variance 1 / 180
         squares = error**2
         assert abs(squares.mean() - 1 / 12) < 5 * np.sqrt(1 / 180 / squares.size)
         assert abs(error.mean()) < 5 * np.sqrt(1 / 12 / error.size)
@@ -114,7 +123,9 @@ def test_jitter_is_as_large_as_asked_and_keeps_the_order() -> None:
     error = t - np.arange(t.size) / rate
     assert error[0] == 0
     low, high = chi2.ppf([RARE / 2, 1 - RARE / 2], t.size - 1)
-    assert low < np.sum(error**2) / std**2 < high  # clipped at 4.5 standard deviations, which takes 1e-4 of them away
+    assert (
+        low < np.sum(error**2) / std**2 < high
+    )  # clipped at 4.5 standard deviations, which takes 1e-4 of them away
     wild = sample_times(rate, 20.0, Sensors(jitter=1.0, seed=2))
     assert np.diff(wild).min() >= 0.1 / rate - 1e-9  # 0.45 to either side leave a tenth
     assert np.abs(wild - np.arange(wild.size) / rate).max() <= 0.45 / rate + 1e-9
@@ -134,7 +145,10 @@ def test_as_many_samples_are_lost_as_asked_but_not_the_ends(share: float) -> Non
 
 def test_jitter_and_losses_leave_the_noise_alone() -> None:
     short = Sensors(torque_noise=1.0, seed=5)
-    plain, uneven = (sample_times(100.0, 1.0, one) for one in (short, Sensors(torque_noise=1.0, seed=5, jitter=1e-3)))
+    plain, uneven = (
+        sample_times(100.0, 1.0, one)
+        for one in (short, Sensors(torque_noise=1.0, seed=5, jitter=1e-3))
+    )
     assert plain.size == uneven.size == 101
     zero = np.zeros((2, 101))
     still = [SimulatedMotion(t, zero, zero, zero) for t in (plain, uneven)]
@@ -143,6 +157,9 @@ def test_jitter_and_losses_leave_the_noise_alone() -> None:
 
 
 def test_one_sample_is_no_log() -> None:
-    with pytest.raises(ValueError, match=r"^rate and duration must give at least two samples, got 10.0 Hz for 0.04 s$"):
+    with pytest.raises(
+        ValueError,
+        match=r"^rate and duration must give at least two samples, got 10.0 Hz for 0.04 s$",
+    ):
         sample_times(10.0, 0.04, Sensors())
     assert sample_times(10.0, 0.06, Sensors()).size == 2

@@ -39,11 +39,16 @@ def test_small_swing_is_that_of_the_linear_arm() -> None:
     mass = np.array([[k5 + k3 + 2 * k1, k3 + k1], [k3 + k1, k3]])
     stiffness, damping = np.array([[k4 + k2, k2], [k2, k2]]), np.diag([k6, k7])
     rate = np.block(
-        [[np.zeros((2, 2)), np.eye(2)], [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)]]
+        [
+            [np.zeros((2, 2)), np.eye(2)],
+            [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)],
+        ]
     )
     linear = np.stack([expm(rate * now) @ [small, 0, 0, 0] for now in t], axis=1)
     # terms of third order in the swing, 1e-18, and the integrator's tolerance
-    np.testing.assert_allclose(motion.theta + np.array([[np.pi / 2], [0.0]]), linear[:2], atol=1e-12)
+    np.testing.assert_allclose(
+        motion.theta + np.array([[np.pi / 2], [0.0]]), linear[:2], atol=1e-12
+    )
 
 
 def test_angles_agree_with_another_integrator() -> None:
@@ -52,9 +57,13 @@ def test_angles_agree_with_another_integrator() -> None:
     motion = simulate(K, torque, t)
 
     def rate(now: float, y: np.ndarray) -> np.ndarray:
-        return np.concatenate([y[2:], forward_dynamics(K, y[:2], y[2:], torque(np.array([now]))[:, 0])])
+        return np.concatenate(
+            [y[2:], forward_dynamics(K, y[:2], y[2:], torque(np.array([now]))[:, 0])]
+        )
 
-    other = solve_ivp(rate, (0, 0.3), [-np.pi / 2, 0, 0, 0], method="LSODA", t_eval=t, rtol=1e-11, atol=1e-12).y
+    other = solve_ivp(
+        rate, (0, 0.3), [-np.pi / 2, 0, 0, 0], method="LSODA", t_eval=t, rtol=1e-11, atol=1e-12
+    ).y
     np.testing.assert_allclose(motion.theta, other[:2], atol=1e-9)
 
 

@@ -10,4 +10,6 @@ from tests.track.folders import CASE
 @pytest.fixture(scope="session")
 def picking() -> Log:
     """50 g picked and placed, without noise."""
-    return with_schedule(CASE, excitation(CASE, "wide"), Recording(duration=4.5), [(1.5, 0.05), (3.0, 0.0)])
+    return with_schedule(
+        CASE, excitation(CASE, "wide"), Recording(duration=4.5), [(1.5, 0.05), (3.0, 0.0)]
+    )

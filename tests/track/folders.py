@@ -15,4 +15,6 @@ CASE = load_case("case1")
 def noisy(log: Log, rng: np.random.Generator) -> Log:
     """The log as sensors of 1e-3 rad and 1e-2 N m see it."""
     theta = log.theta + 1e-3 * rng.standard_normal(log.theta.shape)
-    return replace(log, theta=theta, tau=log.tau + 1e-2 * rng.standard_normal(log.tau.shape), omega=None)
+    return replace(
+        log, theta=theta, tau=log.tau + 1e-2 * rng.standard_normal(log.tau.shape), omega=None
+    )

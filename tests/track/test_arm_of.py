@@ -31,7 +31,14 @@ def weighed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     names = [folder / "bare.mcap", folder / "loaded.mcap"]
     for path, log in zip(names, logs, strict=True):
         write_log(path, log)
-    identify(names[0], loaded=names[1], out=folder, name="arm", report=False, settings=algid.Settings(model="plain"))
+    identify(
+        names[0],
+        loaded=names[1],
+        out=folder,
+        name="arm",
+        report=False,
+        settings=algid.Settings(model="plain"),
+    )
     return folder / "arm.algid"
 
 
@@ -54,14 +61,21 @@ def test_lengths_that_were_estimated_come_with_their_errors(result: Result, firs
     assert arm.l1 == result.payload["l1"].estimate == pytest.approx(CASE.arm.l1, rel=0.05)
     assert arm.l2 == result.payload["l2"].estimate == pytest.approx(CASE.arm.l2, rel=0.05)
     assert result.fit is not None
-    stds = [result.estimates[name].std for name in ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "l1", "l2")]
-    np.testing.assert_allclose(np.sqrt(np.diag(covariance)), np.array(stds, dtype=np.float64), rtol=1e-6)
+    stds = [
+        result.estimates[name].std
+        for name in ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "l1", "l2")
+    ]
+    np.testing.assert_allclose(
+        np.sqrt(np.diag(covariance)), np.array(stds, dtype=np.float64), rtol=1e-6
+    )
     full, names = np.array(result.fit.covariance), result.fit.covariance_names
     assert covariance[0, 7] == full[names.index("k1"), names.index("l1")]
     assert covariance[8, 7] == full[names.index("l2"), names.index("l1")]
 
 
-def test_a_length_that_is_given_goes_before_the_results_and_is_exact(result: Result, first: Segment) -> None:
+def test_a_length_that_is_given_goes_before_the_results_and_is_exact(
+    result: Result, first: Segment
+) -> None:
     arm, covariance = arm_of(result, first, l1=0.4)
     assert (arm.l1, arm.l2) == (0.4, result.payload["l2"].estimate)
     assert not covariance[7].any()
@@ -97,7 +111,9 @@ def test_noise_is_the_results_or_else_the_logs(result: Result, first: Segment) -
 def test_the_torque_acts_after_its_delay_and_half_its_hold(result: Result, first: Segment) -> None:
     assert arm_of(_with(result, delay=0.0, torque_hold="foh"), first)[0].shift == 0.0
     assert arm_of(_with(result, delay=0.004, torque_hold="foh"), first)[0].shift == 0.004
-    assert arm_of(_with(result, delay=0.004, torque_hold="zoh"), first)[0].shift == pytest.approx(0.004 + first.dt / 2)
+    assert arm_of(_with(result, delay=0.004, torque_hold="zoh"), first)[0].shift == pytest.approx(
+        0.004 + first.dt / 2
+    )
     found = _with(result, model="delay", torque_hold="foh")
     assert arm_of(found, first)[0].shift == 0.0
     delay = result.parameters["k1"].model_copy(update={"estimate": 0.007, "unit": "s"})
@@ -114,7 +130,9 @@ def test_a_delay_that_the_logs_chose_shifts_the_torque_as_one_that_was_asked_for
     assert arm_of(chosen, first)[0].shift == 0.007
 
 
-def test_what_the_log_tells_stands_in_the_track(weighed: Path, picking: algid.Log, tmp_path: Path) -> None:
+def test_what_the_log_tells_stands_in_the_track(
+    weighed: Path, picking: algid.Log, tmp_path: Path
+) -> None:
     log = noisy(picking, np.random.default_rng(4))
     write_log(tmp_path / "log.mcap", log, truth=log.origin.truth)
     plain = track_log(tmp_path / "log.mcap", weighed)

@@ -34,7 +34,9 @@ NOTHING = np.zeros((9, 9))
 
 def numbered(count: int) -> Cells:
     n = np.arange(1.0, count + 1)
-    return Cells(n, n + 0.5, 2 * n, 6 * n, np.outer(n, np.arange(7.0)), 20 * n, 30 * n, np.full(count, 4.0))
+    return Cells(
+        n, n + 0.5, 2 * n, 6 * n, np.outer(n, np.arange(7.0)), 20 * n, 30 * n, np.full(count, 4.0)
+    )
 
 
 def loaded(mass: float, duration: float = 3.0, seed: int = 3) -> Log:
@@ -42,7 +44,12 @@ def loaded(mass: float, duration: float = 3.0, seed: int = 3) -> Log:
     k = with_payload(CASE.arm.constants(), CASE.arm.payload_constants(mass))
     t = 2e-3 * np.arange(round(500 * duration) + 1)
     motion = simulate(k, wide_multi_sine(CASE.arm, seed), t)
-    log = Log(np.rint(t * 1e9).astype(np.int64), motion.theta, motion.tau, Origin("picking.csv", "csv", {}))
+    log = Log(
+        np.rint(t * 1e9).astype(np.int64),
+        motion.theta,
+        motion.tau,
+        Origin("picking.csv", "csv", {}),
+    )
     return noisy(log, np.random.default_rng(seed))
 
 
@@ -61,7 +68,9 @@ def test_the_mass_is_the_least_squares_one_and_its_squares_are_those_it_leaves()
     assert cells.mass == pytest.approx(3.0)
     # e² − 2 m g e + m² g²: 20 − 2·3·6 + 9·2 = 2
     np.testing.assert_allclose(cells.squares(3.0), 2 * np.arange(1.0, 6))
-    np.testing.assert_allclose(cells.squares(np.array([0.0, 1.0, 2.0, 3.0, 4.0])), [20, 20, 12, 8, 20])
+    np.testing.assert_allclose(
+        cells.squares(np.array([0.0, 1.0, 2.0, 3.0, 4.0])), [20, 20, 12, 8, 20]
+    )
     empty = numbered(2)
     assert replace(empty, A=np.zeros(2), B=np.zeros(2)).mass == 0.0
 
@@ -132,10 +141,14 @@ def test_an_uncertain_arm_adds_its_share_to_the_variance() -> None:
     log = loaded(0.3)
     k = CASE.arm.constants()
     covariance = np.diag(np.append((1e-3 * k) ** 2, [1e-8, 4e-8]))
-    sure, wide = (track(lambda: segments([log]), ARM, one).stretches[0] for one in (NOTHING, covariance))
+    sure, wide = (
+        track(lambda: segments([log]), ARM, one).stretches[0] for one in (NOTHING, covariance)
+    )
     cells = joined(cells_of(segments([log]), ARM, sure.m_p))
     J = cells.sensitivity(ARM, sure.m_p).sum(axis=0) / cells.A.sum()
-    assert sure.std**2 == pytest.approx(1 / cells.A.sum(), rel=0.1)  # cells at both ends are left out
+    assert sure.std**2 == pytest.approx(
+        1 / cells.A.sum(), rel=0.1
+    )  # cells at both ends are left out
     assert wide.std**2 - sure.std**2 == pytest.approx(float(J @ covariance @ J), rel=0.1)
 
 
@@ -154,7 +167,9 @@ def test_a_log_too_short_to_hold_a_change_is_refused(weighed_arm: Path) -> None:
     log = loaded(0.0)
     with pytest.raises(ValueError, match=r"^the log is too short: expected 0.4 s at least$"):
         track(lambda: segments([log.part(0, 150)]), ARM, NOTHING)
-    with pytest.raises(LogError, match=r"^picking\.csv: the log is too short: expected 0\.4 s at least; record"):
+    with pytest.raises(
+        LogError, match=r"^picking\.csv: the log is too short: expected 0\.4 s at least; record"
+    ):
         track_log(log.part(0, 150), weighed_arm)
     with pytest.raises(LogError, match=r"^picking\.csv: it holds no samples; record longer$"):
         track_log(log.part(0, 0), weighed_arm)
@@ -178,9 +193,19 @@ def judged(
         np.array([[5.0, 6.0]]), bare,
     )  # fmt: skip
     log = LogSummary(
-        path="a", sha256=None, role="loaded", format="csv", rows=2, start_ns=0, duration=1.0, rate=1.0, mapping={}
+        path="a",
+        sha256=None,
+        role="loaded",
+        format="csv",
+        rows=2,
+        start_ns=0,
+        duration=1.0,
+        rate=1.0,
+        mapping={},
     )
-    return TrackResult(found, log, "arm", "0" * 64, {"l1": 0.3}, "1", schedule, (Notice("A", "a warning"),), True)
+    return TrackResult(
+        found, log, "arm", "0" * 64, {"l1": 0.3}, "1", schedule, (Notice("A", "a warning"),), True
+    )
 
 
 @pytest.mark.parametrize(
@@ -195,7 +220,9 @@ def judged(
         (-0.101, 0.025, StretchStatus.NEGATIVE_MASS),
     ],
 )
-def test_a_stretchs_status_goes_by_its_deviation_and_its_sign(m_p: float, std: float, status: StretchStatus) -> None:
+def test_a_stretchs_status_goes_by_its_deviation_and_its_sign(
+    m_p: float, std: float, status: StretchStatus
+) -> None:
     found = judged(Stretch(0.0, 2.0, 0.0, 0.01), Stretch(2.0, 4.0, m_p, std))
     assert found.statuses == [StretchStatus.OK, status]
     assert found.complete is (status is StretchStatus.OK)
@@ -226,7 +253,9 @@ def test_track_json_holds_what_was_found() -> None:
 def test_an_object_is_shaped_like_the_payload_that_was_identified() -> None:
     """What a kilogram adds to the coefficients, with its offset and its inertia, in the complex form."""
     model = Model(("phases",))
-    k = np.array([0.1, 0.5, 0.2, 0.9, 0.4, 0.1, 0.1, 0.02, 0.1, 0.05])  # arg K1 = arg K2: θ1's zero is right
+    k = np.array(
+        [0.1, 0.5, 0.2, 0.9, 0.4, 0.1, 0.1, 0.02, 0.1, 0.05]
+    )  # arg K1 = arg K2: θ1's zero is right
     noise = NoiseLevels(np.full(2, 1e-4), np.full(2, 1e-2))
     arm = IdentifiedArm(model, k, 0.4, 0.3, noise, 0.0, 0.05, 0.07)
     added = dict(zip(model.names, arm.unit.tolist(), strict=True))

@@ -13,13 +13,28 @@ from algid.arm import FloatArray
 from algid.estimators.whitening import NoiseLevels
 from algid.model import Model
 from algid.track.bins import CELL, Cells, IdentifiedArm
-from algid.track.change_points import GUARD, NARROW, PENALTY, SHORTEST, cuts, edges, excess, fused, placed, variance
+from algid.track.change_points import (
+    GUARD,
+    NARROW,
+    PENALTY,
+    SHORTEST,
+    cuts,
+    edges,
+    excess,
+    fused,
+    placed,
+    variance,
+)
 from tests.track.folders import CASE
 
-ARM = IdentifiedArm(Model(), CASE.arm.constants(), CASE.arm.l1, CASE.arm.l2, NoiseLevels(np.ones(2), np.ones(2)))
+ARM = IdentifiedArm(
+    Model(), CASE.arm.constants(), CASE.arm.l1, CASE.arm.l2, NoiseLevels(np.ones(2), np.ones(2))
+)
 
 
-def cells_of(masses: FloatArray, rng: np.random.Generator, spread: float = 1.0, rows: int = 20) -> Cells:
+def cells_of(
+    masses: FloatArray, rng: np.random.Generator, spread: float = 1.0, rows: int = 20
+) -> Cells:
     """Cells (C,) of `rows` rows e = g m + noise of `spread`, g of size one."""
     g = rng.standard_normal((masses.size, rows))
     e = g * masses[:, None] + spread * rng.standard_normal(g.shape)
@@ -45,19 +60,30 @@ def brute(A: FloatArray, B: FloatArray, penalty: float, shortest: int) -> list[i
             ends = [0, *chosen, A.size]
             if min(b - a for a, b in pairwise(ends)) < shortest:
                 continue
-            cost = count * penalty - sum(B[a:b].sum() ** 2 / A[a:b].sum() for a, b in pairwise(ends))
+            cost = count * penalty - sum(
+                B[a:b].sum() ** 2 / A[a:b].sum() for a, b in pairwise(ends)
+            )
             if cost < best - 1e-12:
                 best, found = cost, list(chosen)
     return found
 
 
 @settings(max_examples=60)
-@example(seed=10_000, count=13, shortest=3, penalty=3.0)  # a start that was given up before its better might stand
-@given(seed=st.integers(0, 10_000), count=st.integers(3, 13), shortest=st.integers(1, 4), penalty=st.floats(0.1, 30.0))
+@example(
+    seed=10_000, count=13, shortest=3, penalty=3.0
+)  # a start that was given up before its better might stand
+@given(
+    seed=st.integers(0, 10_000),
+    count=st.integers(3, 13),
+    shortest=st.integers(1, 4),
+    penalty=st.floats(0.1, 30.0),
+)
 def test_cuts_are_the_best_of_all(seed: int, count: int, shortest: int, penalty: float) -> None:
     rng = np.random.default_rng(seed)
     A = rng.uniform(0.5, 2.0, count)
-    B = A * np.repeat(rng.normal(0, 3, count), rng.integers(1, 5, count))[:count] + rng.standard_normal(count)
+    B = A * np.repeat(rng.normal(0, 3, count), rng.integers(1, 5, count))[
+        :count
+    ] + rng.standard_normal(count)
     shortest = min(shortest, count)
     assert cuts(A, B, penalty, shortest) == brute(A, B, penalty, shortest)
 
@@ -83,9 +109,11 @@ def test_white_rows_have_no_excess_and_slow_errors_have_theirs() -> None:
     B, exact = np.sqrt(A) * rng.standard_normal(4000), np.zeros((2, 2))
     T = rng.standard_normal((4000, 2))
     assert excess(A, B, T, exact) == 1.0
-    # the largest of ten spans, of which the longest has 80 blocks: 9 and up to four deviations of its median more
+    # the largest of ten spans, of which the longest has 80 blocks: 9 and up to four deviations of
+    # its median more
     assert 8.5 < excess(A, 3 * B, T, exact) < 9 * (1 + 4 * 2.33 / np.sqrt(79))
-    # in blocks of 50 cells a mass error of 0.3 that turns once a second adds 0.3² 50 · 2 / 2 and more
+    # in blocks of 50 cells a mass error of 0.3 that turns once a second adds 0.3² 50 · 2 / 2 and
+    # more
     slow = 0.5 * np.sign(np.sin(np.arange(4000) * np.pi / 50))
     assert excess(A, B + A * slow, T, exact) > 10
 
@@ -110,7 +138,15 @@ def test_the_rows_variance_is_that_of_their_noise_one_at_least(spread: float) ->
     cells = cells_of(np.full(500, 0.4), np.random.default_rng(2), spread)
     found = variance(cells, np.full(500, 0.4), ARM, np.zeros((9, 9)))
     assert found == pytest.approx(spread**2, rel=0.15)
-    assert variance(cells_of(np.zeros(500), np.random.default_rng(2), 0.1), np.zeros(500), ARM, np.zeros((9, 9))) == 1.0
+    assert (
+        variance(
+            cells_of(np.zeros(500), np.random.default_rng(2), 0.1),
+            np.zeros(500),
+            ARM,
+            np.zeros((9, 9)),
+        )
+        == 1.0
+    )
 
 
 @pytest.mark.parametrize("place", [40, 57, 80])
@@ -123,7 +159,9 @@ def test_a_change_is_placed_where_the_masses_on_both_sides_fit_best(place: int) 
         assert (first, last) == (0, 120)
         assert abs(found - place) <= GUARD  # cells so near to a change tell nothing of it
         assert low <= found <= high
-        assert high - low <= 4 * GUARD  # 20 rows of a step of a σ tell a cell by 20 squares of the 25
+        assert (
+            high - low <= 4 * GUARD
+        )  # 20 rows of a step of a σ tell a cell by 20 squares of the 25
     jolted = Cells(*(getattr(cells, name).copy() for name in cells.__dataclass_fields__))
     jolted.B[place - 2 : place + 2] += 300.0  # within the guard nothing counts
     jolted.E[place - 2 : place + 2] += 9000.0
@@ -145,7 +183,9 @@ def test_two_changes_of_one_jolt_are_one_and_two_of_their_own_stay() -> None:
         assert len(found) == (3 if merged else 4)
         assert abs(found[1] - 60) <= 2 * GUARD
     far = cells_of(np.repeat([0.0, 0.01, 0.0], [60, NARROW + 1, 60]), rng)
-    assert len(fused([0, 60, 81, 141], far, PENALTY)) == 4  # too far apart to be one, whatever they explain
+    assert (
+        len(fused([0, 60, 81, 141], far, PENALTY)) == 4
+    )  # too far apart to be one, whatever they explain
 
 
 @pytest.mark.parametrize("step", [0.0, 1.0])
@@ -164,7 +204,9 @@ def test_edges_of_a_simulated_log_are_its_own(step: float) -> None:
 def test_white_logs_are_left_whole() -> None:
     """A penalty of 60 is 7.7 deviations: 40 logs of 300 cells are never cut."""
     rng = np.random.default_rng(6)
-    assert [edges(cells_of(np.full(300, 0.5), rng), ARM).places for _ in range(40)] == [[0, 300]] * 40
+    assert [edges(cells_of(np.full(300, 0.5), rng), ARM).places for _ in range(40)] == [
+        [0, 300]
+    ] * 40
 
 
 def test_no_stretch_is_shorter_than_the_shortest() -> None:

@@ -46,10 +46,16 @@ START_NS = 1_700_000_000_000_000_000
 def files(picking: algid.Log, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """A log with its schedule, and the result of its arm."""
     folder = tmp_path_factory.mktemp("track")
-    unloaded, _ = algid.synthesise("case1", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
+    unloaded, _ = algid.synthesise(
+        "case1", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2)
+    )
     identify(unloaded, out=folder, name="arm", report=False)
     log = noisy(picking, np.random.default_rng(4))
-    write_log(folder / "picking.mcap", replace(log, stamp_ns=log.stamp_ns + START_NS), truth=log.origin.truth)
+    write_log(
+        folder / "picking.mcap",
+        replace(log, stamp_ns=log.stamp_ns + START_NS),
+        truth=log.origin.truth,
+    )
     return folder / "picking.mcap", folder / "arm.algid"
 
 
@@ -140,9 +146,14 @@ def test_the_mcap_bears_the_stamps_of_the_log(result: TrackResult, tmp_path: Pat
     rows = pl.read_parquet(tmp_path / "track.parquet")
     with (tmp_path / "track.mcap").open("rb") as stream:
         reader = make_reader(stream, decoder_factories=[DecoderFactory()])
-        found = [(m.channel.topic, m.message.log_time, m.decoded_message) for m in reader.iter_decoded_messages()]
+        found = [
+            (m.channel.topic, m.message.log_time, m.decoded_message)
+            for m in reader.iter_decoded_messages()
+        ]
     assert {topic for topic, _, _ in found} == {"/algid/payload"}
-    assert [time for _, time, _ in found] == (START_NS + np.rint(rows["t"].to_numpy() * 1e9).astype(np.int64)).tolist()
+    assert [time for _, time, _ in found] == (
+        START_NS + np.rint(rows["t"].to_numpy() * 1e9).astype(np.int64)
+    ).tolist()
     for name in ("m_p", "low", "high", "stretch_m_p", "stretch_low", "stretch_high"):
         assert [getattr(message, name) for _, _, message in found] == rows[name].to_list()
 
@@ -150,7 +161,11 @@ def test_the_mcap_bears_the_stamps_of_the_log(result: TrackResult, tmp_path: Pat
 def test_masses_that_cannot_be_are_not_passed_on(result: TrackResult) -> None:
     less, still = Stretch(0.0, 1.0, -0.2, 0.01), Stretch(1.0, 2.0, 0.1, 3.0)
     found = replace(result, track=replace(result.track, stretches=[less, still, less]))
-    assert found.statuses == [StretchStatus.NEGATIVE_MASS, StretchStatus.WEAK_EXCITATION, StretchStatus.NEGATIVE_MASS]
+    assert found.statuses == [
+        StretchStatus.NEGATIVE_MASS,
+        StretchStatus.WEAK_EXCITATION,
+        StretchStatus.NEGATIVE_MASS,
+    ]
     judged = verdict(found)
     assert judged.grade == "failed"
     assert "2 of 3 stretches weigh less than nothing" in judged.sentence
@@ -161,7 +176,9 @@ def test_masses_that_cannot_be_are_not_passed_on(result: TrackResult) -> None:
 
 
 def test_the_arm_of_another_log_is_told(files: tuple[Path, Path], tmp_path: Path) -> None:
-    other, _ = algid.synthesise("case2", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
+    other, _ = algid.synthesise(
+        "case2", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2)
+    )
     write_log(tmp_path / "other.mcap", other)
     judged = verdict(track_log(tmp_path / "other.mcap", files[1], l1=CASE.arm.l1, l2=CASE.arm.l2))
     assert judged.grade == "failed"
@@ -169,21 +186,35 @@ def test_the_arm_of_another_log_is_told(files: tuple[Path, Path], tmp_path: Path
 
 def test_names_that_attack_stay_text(result: TrackResult) -> None:
     hostile = replace(
-        result, arm=HOSTILE, log=result.log.model_copy(update={"path": HOSTILE}), notices=(Notice("HOSTILE", HOSTILE),)
+        result,
+        arm=HOSTILE,
+        log=result.log.model_copy(update={"path": HOSTILE}),
+        notices=(Notice("HOSTILE", HOSTILE),),
     )
-    own = re.sub(r"<(script|style)[^>]*>.*?</\1>", "", page(track_document(hostile)), flags=re.DOTALL)
+    own = re.sub(
+        r"<(script|style)[^>]*>.*?</\1>", "", page(track_document(hostile)), flags=re.DOTALL
+    )
     assert "<img" not in own
     assert "<script" not in own
 
 
-def test_the_command_prints_json_alone_and_keeps_what_is_there(files: tuple[Path, Path], tmp_path: Path) -> None:
+def test_the_command_prints_json_alone_and_keeps_what_is_there(
+    files: tuple[Path, Path], tmp_path: Path
+) -> None:
     lengths = ["--l1", str(CASE.arm.l1), "--l2", str(CASE.arm.l2)]
     command = ["track", str(files[0]), "--parameters", str(files[1]), *lengths, "-o", str(tmp_path)]
     done = CliRunner().invoke(app, [*command, "--format", "json", "--export", "mcap"])
     assert done.exit_code == 0, done.output
     assert json.loads(done.stdout)["schema_version"] == 2
     folder = tmp_path / "picking.track"
-    names = {"track.json", "track.parquet", "stretches.parquet", "report.html", "report.md", "track.mcap"}
+    names = {
+        "track.json",
+        "track.parquet",
+        "stretches.parquet",
+        "report.html",
+        "report.md",
+        "track.mcap",
+    }
     assert {path.name for path in folder.iterdir()} == names
     again = CliRunner().invoke(app, command)
     assert "exists already" in str(again.exception)
@@ -198,10 +229,13 @@ def browser() -> Iterator[Browser]:
 
 @pytest.mark.slow
 @pytest.mark.skipif(
-    DRIVER is None or shutil.which("chromium") is None, reason="chromium and chromium-driver are not installed"
+    DRIVER is None or shutil.which("chromium") is None,
+    reason="chromium and chromium-driver are not installed",
 )
 @pytest.mark.parametrize(("width", "dark"), [(1400, False), (400, True)])
-def test_the_page_is_drawn_whole(browser: Browser, result: TrackResult, tmp_path: Path, width: int, dark: bool) -> None:
+def test_the_page_is_drawn_whole(
+    browser: Browser, result: TrackResult, tmp_path: Path, width: int, dark: bool
+) -> None:
     write_track(result, tmp_path)
     path = tmp_path / "report.html"
     seen = browser.look(path, width, dark)
@@ -227,20 +261,29 @@ def test_the_report_of_a_track_is_made_again(result: TrackResult, tmp_path: Path
     markdown_before = (folder / "report.md").read_text(encoding="utf-8")
     (folder / "report.html").unlink()
     (folder / "report.md").unlink()
-    done = CliRunner().invoke(app, ["report", str(folder), "--save-plots", str(tmp_path / "figures")])
+    done = CliRunner().invoke(
+        app, ["report", str(folder), "--save-plots", str(tmp_path / "figures")]
+    )
     assert done.exit_code == 0, done.output
     assert "Payload by stretch" in done.stdout
     assert "Payload in time" in (folder / "report.html").read_text(encoding="utf-8")
     assert (folder / "report.md").read_text(encoding="utf-8") == markdown_before
-    assert {path.name for path in (tmp_path / "figures").iterdir()} == {"picking-payload.pdf", "picking-left.pdf"}
+    assert {path.name for path in (tmp_path / "figures").iterdir()} == {
+        "picking-payload.pdf",
+        "picking-left.pdf",
+    }
 
 
 @pytest.mark.parametrize("damage", ['{"stretches": []}', "[]", "{", '{"stretches": 3}'])
-def test_a_damaged_track_is_refused_in_one_line(result: TrackResult, tmp_path: Path, damage: str) -> None:
+def test_a_damaged_track_is_refused_in_one_line(
+    result: TrackResult, tmp_path: Path, damage: str
+) -> None:
     folder = tmp_path / "picking.track"
     write_track(result, folder)
     (folder / "track.json").write_text(damage)
-    with pytest.raises(ResultError, match=r"track\.json: (not JSON|.*(required|expected|valid))") as refused:
+    with pytest.raises(
+        ResultError, match=r"track\.json: (not JSON|.*(required|expected|valid))"
+    ) as refused:
         read_track(folder)
     assert "\n" not in str(refused.value)
 
@@ -252,10 +295,15 @@ def test_what_a_track_cannot_explain_is_told_by_how_much(result: TrackResult) ->
     nothing = "arm and payload explain only 0 % of the torque: is it this arm, in these units?"
     assert judged(explained=-0.3).sentence == f"Failed: {nothing}; do not use these masses."
     strange = judged(explained=0.95, colour=250_000.0).sentence
-    assert strange.startswith("Failed: arm and payload miss the torque by 500 times its sensors' noise: is it this arm")
+    assert strange.startswith(
+        "Failed: arm and payload miss the torque by 500 times its sensors' noise: is it this arm"
+    )
     assert judged(explained=0.995, colour=250_000.0).grade == "reservations"  # very quiet sensors
     poor = judged(explained=0.8)
-    assert (poor.grade, poor.reasons[0].text) == ("reservations", "arm and payload explain only 80 % of the torque")
+    assert (poor.grade, poor.reasons[0].text) == (
+        "reservations",
+        "arm and payload explain only 80 % of the torque",
+    )
     wider = judged(colour=9.0)
     assert wider.reasons[0].text.startswith("the torque holds errors 3.0 times its sensors' noise")
     lost = verdict(replace(result, data_lost=True))
@@ -265,16 +313,27 @@ def test_what_a_track_cannot_explain_is_told_by_how_much(result: TrackResult) ->
 
 def test_one_stretch_and_many_are_told_in_words(result: TrackResult) -> None:
     first = result.track.stretches[0]
-    alone = replace(result.track, stretches=[replace(first, m_p=0.2, std=0.001)], changes=np.zeros((0, 3)))
+    alone = replace(
+        result.track, stretches=[replace(first, m_p=0.2, std=0.001)], changes=np.zeros((0, 3))
+    )
     assert verdict(replace(result, track=alone)).sentence == (
         "Good: the payload does not change: 0.2000 ± 0.0020 kg throughout."
     )
     many = [replace(first, m_p=0.1 * place, std=0.001) for place in range(1, 8)]
     changes = np.stack([np.arange(1.0, 7.0)] * 3, axis=1)
-    told = verdict(replace(result, track=replace(result.track, stretches=many, changes=changes))).sentence
-    assert "the payload changes 6 times, in 7 stretches, the least certain to ± 0.0020 kg (95 %)" in told
+    told = verdict(
+        replace(result, track=replace(result.track, stretches=many, changes=changes))
+    ).sentence
+    assert (
+        "the payload changes 6 times, in 7 stretches, the least certain to ± 0.0020 kg (95 %)"
+        in told
+    )
     still = [replace(first, m_p=0.1, std=3.0)]
     weak = verdict(replace(result, track=replace(alone, stretches=still)))
     assert weak.sentence.startswith("Failed: the arm moves too little to weigh anything")
-    light = verdict(replace(result, track=replace(alone, stretches=[replace(first, m_p=-0.2, std=0.001)])))
-    assert light.sentence.startswith("Failed: the payload weighs less than nothing: the arm's constants do not fit")
+    light = verdict(
+        replace(result, track=replace(alone, stretches=[replace(first, m_p=-0.2, std=0.001)]))
+    )
+    assert light.sentence.startswith(
+        "Failed: the payload weighs less than nothing: the arm's constants do not fit"
+    )

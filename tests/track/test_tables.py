@@ -26,7 +26,9 @@ from algid.track.tables import change_table, fixed, quality_tables, stretch_tabl
 
 
 def values(typed: dict[str, str]) -> FloatArray:
-    return np.frombuffer(base64.b64decode(typed["bdata"]), dtype=f"<{typed['dtype']}").astype(np.float64)
+    return np.frombuffer(base64.b64decode(typed["bdata"]), dtype=f"<{typed['dtype']}").astype(
+        np.float64
+    )
 
 
 LOG = LogSummary(
@@ -52,14 +54,25 @@ def track(masses: list[float], std: float = 0.001, **changes: object) -> TrackRe
         std=np.full(t.size, std),
         left=np.ones(t.size),
         stretch=stretch,
-        stretches=[Stretch(float(place), place + 1.0, mass, std) for place, mass in enumerate(masses)],
-        changes=np.array([[place, place - 0.1, place + 0.1] for place in range(1, len(masses))]).reshape(-1, 3),
+        stretches=[
+            Stretch(float(place), place + 1.0, mass, std) for place, mass in enumerate(masses)
+        ],
+        changes=np.array(
+            [[place, place - 0.1, place + 0.1] for place in range(1, len(masses))]
+        ).reshape(-1, 3),
         holes=np.zeros((0, 2)),
         explained=0.999,
         colour=1.0,
         tip_equivalent=0.05,
     )
-    made = TrackResult(track=found, log=LOG, arm="arm.algid", arm_sha256="1" * 64, settings={"l1": 0.2}, version="1")
+    made = TrackResult(
+        track=found,
+        log=LOG,
+        arm="arm.algid",
+        arm_sha256="1" * 64,
+        settings={"l1": 0.2},
+        version="1",
+    )
     return replace(made, **changes)  # type: ignore[arg-type]
 
 
@@ -84,11 +97,18 @@ def test_changes_have_their_sign_and_the_nearest_true_moment() -> None:
     rows = change_table(made).rows
     assert [row[3] for row in rows] == ["+0.2500", "-0.1500"]
     assert [row[1:3] for row in rows] == [("1.000", "[0.900, 1.100]"), ("2.000", "[1.900, 2.100]")]
-    assert [row[5] for row in rows] == ["1.020", "1.900"]  # what the arm held at the start is no change
-    assert "Truth at, s" not in [column.heading for column in change_table(track([0.1, 0.2])).columns]
+    assert [row[5] for row in rows] == [
+        "1.020",
+        "1.900",
+    ]  # what the arm held at the start is no change
+    assert "Truth at, s" not in [
+        column.heading for column in change_table(track([0.1, 0.2])).columns
+    ]
     uneven = track([0.1, 0.2])
     coarse = replace(uneven.track.stretches[1], std=0.04)
-    made = replace(uneven, track=replace(uneven.track, stretches=[uneven.track.stretches[0], coarse]))
+    made = replace(
+        uneven, track=replace(uneven.track, stretches=[uneven.track.stretches[0], coarse])
+    )
     assert change_table(made).rows[0][3] == "+0.100"  # as fine as the coarser of both
 
 
@@ -120,10 +140,20 @@ def test_a_report_shows_changes_and_holes_where_there_are_any() -> None:
                       "Provenance"]  # fmt: skip
     assert quality_tables(holey)[-1].rows == (("0.250", "0.500"),)
     log, channels = quality_tables(holey)[1:3]
-    assert [column.heading for column in log.columns] == ["Log", "Format", "Samples", "Duration, s", "Rate, Hz"]
+    assert [column.heading for column in log.columns] == [
+        "Log",
+        "Format",
+        "Samples",
+        "Duration, s",
+        "Rate, Hz",
+    ]
     assert channels.rows == (("theta1", "q1"), ("tau1", "t1"))
     shown = html.unescape(page(document, shared_library=True))
-    assert shown.index("Payload by stretch") < shown.index('id="payload"') < shown.index("<caption>Changes</caption>")
+    assert (
+        shown.index("Payload by stretch")
+        < shown.index('id="payload"')
+        < shown.index("<caption>Changes</caption>")
+    )
     assert "The readers gave no warning." in shown
     assert "<li>it jitters</li>" in page(track_document(still), shared_library=True)
     assert re.findall(r"^\*\*(.+)\*\*$", markdown(document), re.M) == [
@@ -137,9 +167,15 @@ def test_the_figure_steps_where_the_payload_does() -> None:
     payload, left = figures(made)
     by_name = {trace["name"]: trace for trace in payload.panels[0].traces}
     np.testing.assert_allclose(values(by_name["stretch"]["x"]), [0, 1, 1, 2, 2, 3])
-    np.testing.assert_allclose(values(by_name["stretch"]["y"]), [0.1, 0.1, 0.35, 0.35, 0.2, 0.2], rtol=1e-6)
-    np.testing.assert_allclose(values(by_name["truth"]["x"]), [0, 0, 0, 1.02, 1.02, 1.9, 1.9, 3], rtol=1e-6)
-    np.testing.assert_allclose(values(by_name["truth"]["y"]), [0, 0, 0.1, 0.1, 0.35, 0.35, 0.2, 0.2], rtol=1e-6)
+    np.testing.assert_allclose(
+        values(by_name["stretch"]["y"]), [0.1, 0.1, 0.35, 0.35, 0.2, 0.2], rtol=1e-6
+    )
+    np.testing.assert_allclose(
+        values(by_name["truth"]["x"]), [0, 0, 0, 1.02, 1.02, 1.9, 1.9, 3], rtol=1e-6
+    )
+    np.testing.assert_allclose(
+        values(by_name["truth"]["y"]), [0, 0, 0.1, 0.1, 0.35, 0.35, 0.2, 0.2], rtol=1e-6
+    )
     marks = [(shape["x0"], shape["x1"]) for shape in payload.panels[0].layout["shapes"]]
     assert marks == [(0.9, 1.1), (1.9, 2.1)]
     noise = left.panels[0].layout["shapes"][-1]
@@ -149,7 +185,9 @@ def test_the_figure_steps_where_the_payload_does() -> None:
     band = values(by_name["band"]["y"])
     assert np.count_nonzero(np.isnan(band)) == 3  # one closed area a stretch
     inside = band[np.isfinite(band)]
-    assert (inside.min(), inside.max()) == pytest.approx((0.1 - 1.96 * 0.001, 0.35 + 1.96 * 0.001), rel=1e-4)
+    assert (inside.min(), inside.max()) == pytest.approx(
+        (0.1 - 1.96 * 0.001, 0.35 + 1.96 * 0.001), rel=1e-4
+    )
 
 
 def test_many_changes_do_not_hide_the_payload() -> None:
@@ -168,6 +206,8 @@ def test_a_jolt_leaves_the_frame_and_a_still_arm_does_too() -> None:
     m_p[40] = 90.0  # a jolt: one sample in three hundred
     std[10:20] = 40.0  # the arm stood still
     low, high = (
-        figures(replace(made, track=replace(made.track, m_p=m_p, std=std)))[0].panels[0].layout["yaxis"]["range"]
+        figures(replace(made, track=replace(made.track, m_p=m_p, std=std)))[0]
+        .panels[0]
+        .layout["yaxis"]["range"]
     )
     assert -1 < low < 0.1 < 0.35 < high < 2

@@ -34,15 +34,21 @@ NOISE = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
 
 
 def _track(log: Log, k: FloatArray | None = None, covariance: FloatArray | None = None) -> Track:
-    arm = IdentifiedArm(Model(), CASE.arm.constants() if k is None else k, CASE.arm.l1, CASE.arm.l2, NOISE)
-    return track(lambda: segments([log]), arm, np.zeros((9, 9)) if covariance is None else covariance)
+    arm = IdentifiedArm(
+        Model(), CASE.arm.constants() if k is None else k, CASE.arm.l1, CASE.arm.l2, NOISE
+    )
+    return track(
+        lambda: segments([log]), arm, np.zeros((9, 9)) if covariance is None else covariance
+    )
 
 
 def test_changes_of_50_g_are_found(picking: Log) -> None:
     rng = np.random.default_rng(0)
     for _ in range(5):
         found = _track(noisy(picking, rng))
-        assert [stretch.end for stretch in found.stretches] == pytest.approx([1.5, 3.0, 4.5], abs=0.1)
+        assert [stretch.end for stretch in found.stretches] == pytest.approx(
+            [1.5, 3.0, 4.5], abs=0.1
+        )
         for stretch, mass in zip(found.stretches, MASSES, strict=True):
             assert abs(stretch.m_p - mass) < 4.5 * stretch.std < 0.01
 
@@ -50,13 +56,20 @@ def test_changes_of_50_g_are_found(picking: Log) -> None:
 @pytest.mark.slow
 def test_masses_lie_within_their_intervals() -> None:
     """Those of stretches, and those of m_p(t) at two instants a stretch that have no cell in common."""
-    log = with_schedule(CASE, excitation(CASE, "wide"), Recording(rate=500.0, duration=4.5), [(1.5, 0.05), (3.0, 0.0)])
+    log = with_schedule(
+        CASE,
+        excitation(CASE, "wide"),
+        Recording(rate=500.0, duration=4.5),
+        [(1.5, 0.05), (3.0, 0.0)],
+    )
     rng = np.random.default_rng(0)
     stretches, instants = [], []
     for _ in range(240):
         found = _track(noisy(log, rng))
         assert len(found.stretches) == 3
-        stretches += [(s.m_p - m) / (1.959964 * s.std) for s, m in zip(found.stretches, MASSES, strict=True)]
+        stretches += [
+            (s.m_p - m) / (1.959964 * s.std) for s, m in zip(found.stretches, MASSES, strict=True)
+        ]
         for number, mass in enumerate(MASSES):
             own = np.flatnonzero(found.stretch == number)
             apart = own[[own.size // 4, 3 * own.size // 4]]
@@ -74,8 +87,12 @@ def test_an_uncertain_arm_widens_the_intervals_by_what_moves_the_masses(picking:
     before = _track(log)
     moves = []
     for k, (l1, l2) in ((known[:7] + step[:7], known[7:] + step[7:]) for step in spread):
-        after = track(lambda: segments([log]), IdentifiedArm(Model(), k, l1, l2, NOISE), np.zeros((9, 9)))
-        moves.append([a.m_p - b.m_p for a, b in zip(after.stretches, before.stretches, strict=True)])
+        after = track(
+            lambda: segments([log]), IdentifiedArm(Model(), k, l1, l2, NOISE), np.zeros((9, 9))
+        )
+        moves.append(
+            [a.m_p - b.m_p for a, b in zip(after.stretches, before.stretches, strict=True)]
+        )
     wider = _track(log, covariance=spread.T @ spread)
     found = [a.std**2 - b.std**2 for a, b in zip(wider.stretches, before.stretches, strict=True)]
     np.testing.assert_allclose(found, np.square(moves).sum(axis=0), rtol=0.05)
@@ -100,7 +117,9 @@ def test_slow_errors_of_the_torque_pass_for_no_payload(picking: Log) -> None:
 
 def test_stretches_follow_one_another_without_a_hole(picking: Log) -> None:
     found = _track(noisy(picking, np.random.default_rng(6)))
-    assert [s.end for s in found.stretches[:-1]] == pytest.approx([s.start for s in found.stretches[1:]], abs=1e-9)
+    assert [s.end for s in found.stretches[:-1]] == pytest.approx(
+        [s.start for s in found.stretches[1:]], abs=1e-9
+    )
     for stretch in range(3):
         assert np.diff(found.t[found.stretch == stretch]) == pytest.approx(0.02, abs=1e-9)
 
@@ -124,21 +143,36 @@ def test_cuts_are_the_best_ones() -> None:
         both = list(pairwise(edges))
         return sum(10.0 - B[a:b].sum() ** 2 / A[a:b].sum() for a, b in both)
 
-    best = min(([0, a, b, 24] for a in range(3, 22) for b in range(a + 3, 22)), key=cost)  # by trying every pair
+    best = min(
+        ([0, a, b, 24] for a in range(3, 22) for b in range(a + 3, 22)), key=cost
+    )  # by trying every pair
     assert cuts(A, B, penalty=10.0, shortest=3) == best[1:-1] == [8, 16]
 
 
 def test_the_command_writes_both_tables(picking: Log, tmp_path: Path) -> None:
-    unloaded, _ = algid.synthesise("case1", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
+    unloaded, _ = algid.synthesise(
+        "case1", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2)
+    )
     identify(unloaded, out=tmp_path, name="arm", report=False)
     write_log(tmp_path / "picking.parquet", noisy(picking, np.random.default_rng(4)))
     lengths = ["--l1", str(CASE.arm.l1), "--l2", str(CASE.arm.l2)]
-    command = ["track", str(tmp_path / "picking.parquet"), "--parameters", str(tmp_path / "arm.algid"), *lengths]
+    command = [
+        "track",
+        str(tmp_path / "picking.parquet"),
+        "--parameters",
+        str(tmp_path / "arm.algid"),
+        *lengths,
+    ]
     done = CliRunner().invoke(app, [*command, "-o", str(tmp_path)])
     assert done.exit_code == 0, done.output
     stretches = pl.read_parquet(tmp_path / "picking.track/stretches.parquet")
     assert stretches["m_p"].to_list() == pytest.approx(MASSES, abs=0.005)
-    assert pl.read_parquet(tmp_path / "picking.track/track.parquet").columns[:4] == ["t", "m_p", "low", "high"]
+    assert pl.read_parquet(tmp_path / "picking.track/track.parquet").columns[:4] == [
+        "t",
+        "m_p",
+        "low",
+        "high",
+    ]
 
 
 @pytest.mark.parametrize("suffix", ["mcap", "parquet", "csv"])

@@ -20,5 +20,16 @@ __all__ = ["ALWAYS", "OPTIONAL", "Term", "TorqueColumn"]
 
 ALWAYS: tuple[Term, ...] = (RIGID, VISCOUS)
 """Eq. (1): what every arm has."""
-OPTIONAL: tuple[Term, ...] = (COULOMB, OFFSET, ROTOR, STRIBECK, ASYMMETRY, LOAD, GAIN, PHASES, LAG, DELAY)
+OPTIONAL: tuple[Term, ...] = (
+    COULOMB,
+    OFFSET,
+    ROTOR,
+    STRIBECK,
+    ASYMMETRY,
+    LOAD,
+    GAIN,
+    PHASES,
+    LAG,
+    DELAY,
+)
 """What real joints add; all their parameters are zero on an arm without them."""

@@ -10,8 +10,12 @@ ASYMMETRY = Term(
     title="asymmetric Coulomb friction",
     equation="a_i tanh²(ω_i / ω_s)",
     parameters=(
-        Parameter("a1", "a₁", "N m", "half of what joint 1's Coulomb friction is larger forward", MOMENT),
-        Parameter("a2", "a₂", "N m", "half of what joint 2's Coulomb friction is larger forward", MOMENT),
+        Parameter(
+            "a1", "a₁", "N m", "half of what joint 1's Coulomb friction is larger forward", MOMENT
+        ),
+        Parameter(
+            "a2", "a₂", "N m", "half of what joint 2's Coulomb friction is larger forward", MOMENT
+        ),
     ),
     columns=(TorqueColumn("a1", f=(T1 * T1, NOTHING)), TorqueColumn("a2", f=(NOTHING, T2 * T2))),
     needs="coulomb",

@@ -4,8 +4,9 @@ A term of motion writes each of its columns as three vectors, by the least deriv
 
     τ = d²s/dt² + dp/dt + f,   s(θ), p(θ, ω), f(θ, ω)
 
-and the regressor, the moments over windows, M(θ), the dynamics, the partials and the exports all derive from them. A
-term that acts on the torque's channel instead says which parameters do so, and has no columns.
+and the regressor, the moments over windows, M(θ), the dynamics, the partials and the exports all
+derive from them. A term that acts on the torque's channel instead says which parameters do so, and
+has no columns.
 """
 
 from __future__ import annotations
@@ -44,7 +45,8 @@ class Term:
     needs : str or None
         A term without which it has no meaning.
     inertial : bool
-        Whether its columns are the joints' load, on which friction may depend: inertia, Coriolis and gravity.
+        Whether its columns are the joints' load, on which friction may depend: inertia, Coriolis
+        and gravity.
     usual : bool
         Whether most real joints have it: other terms are weighed beside it first.
     shapes : names of the widths that its columns have, fields of `algid.physics.motion.Widths`
@@ -52,7 +54,8 @@ class Term:
     gains : pairs of a parameter g and the joint whose torque it multiplies by 1 + g
     sines : pairs of a parameter and the one whose sine part it is: both are one phasor
     timing : "delay" or "lag"
-        Whether its one parameter is a time by which the torque is late, as a whole or after a low-pass.
+        Whether its one parameter is a time by which the torque is late, as a whole or after a
+        low-pass.
     """
 
     name: str

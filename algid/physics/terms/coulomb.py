@@ -1,4 +1,7 @@
-"""Coulomb friction; tanh(ω / ω_s) in place of a jump, so that noise at standstill flips no sample."""
+"""Coulomb friction.
+
+tanh(ω / ω_s) in place of a jump, so that noise at standstill flips no sample.
+"""
 
 from math import inf
 

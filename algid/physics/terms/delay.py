@@ -8,7 +8,15 @@ DELAY = Term(
     title="delay from torque to angle",
     equation="τ(t) acts at t + delay",
     parameters=(
-        Parameter("delay", "t_d", "s", "delay from the logged torque to the angles", TIME, "±", (-0.05, 0.05)),
+        Parameter(
+            "delay",
+            "t_d",
+            "s",
+            "delay from the logged torque to the angles",
+            TIME,
+            "±",
+            (-0.05, 0.05),
+        ),
     ),
     timing="delay",
 )

@@ -1,4 +1,7 @@
-"""Inertia, Coriolis torques and gravity of two links: eq. (1) and (2) of Páez-García et al. 2023."""
+"""Inertia, Coriolis torques and gravity of two links: eq. (1) and (2) of Páez-García et al.
+
+2023.
+"""
 
 from algid.physics.expressions import NOTHING
 from algid.physics.parameters import INERTIA, MOMENT, Parameter
@@ -21,10 +24,22 @@ RIGID = Term(
             MOMENT,
             weighs=True,
         ),
-        Parameter("k5", "k₅", "kg m^2", "inertia about joint 1 less k3, I1 + m1 lc1² + m2 l1²", INERTIA, "+"),
+        Parameter(
+            "k5",
+            "k₅",
+            "kg m^2",
+            "inertia about joint 1 less k3, I1 + m1 lc1² + m2 l1²",
+            INERTIA,
+            "+",
+        ),
     ),
     columns=(
-        TorqueColumn("k1", s=(S2, NOTHING), p=(2 * C2 * W1, C2 * W1), f=(NOTHING, S2 * W1 * W1 + S2 * W1 * W2)),
+        TorqueColumn(
+            "k1",
+            s=(S2, NOTHING),
+            p=(2 * C2 * W1, C2 * W1),
+            f=(NOTHING, S2 * W1 * W1 + S2 * W1 * W2),
+        ),
         TorqueColumn("k2", f=(C12, C12)),
         TorqueColumn("k3", s=(Q1 + Q2, Q1 + Q2)),
         TorqueColumn("k4", f=(C1, NOTHING)),

@@ -1,4 +1,7 @@
-"""ROS 1 bags, and rosbag2's SQLite files by themselves or in their folder; their messages are read by columns."""
+"""ROS 1 bags, and rosbag2's SQLite files by themselves or in their folder.
+
+Their messages are read by columns.
+"""
 
 from __future__ import annotations
 

@@ -28,7 +28,8 @@ def bag_files(folder: Path) -> Bag:
     Raises
     ------
     LogError
-        If there is none, a path leads out of the folder, or the bag is compressed by rosbag2 itself.
+        If there is none, a path leads out of the folder, or the bag is compressed by rosbag2
+        itself.
     """
     metadata = folder / "metadata.yaml"
     if metadata.is_file():
@@ -36,14 +37,21 @@ def bag_files(folder: Path) -> Bag:
     else:  # the files themselves, by the numbers that end their names
         found = [*folder.glob("*.mcap"), *folder.glob("*.db3")]
         numbers = [(re.search(r"_(\d+)$", path.stem), path.name) for path in found]
-        names = [name for _, name in sorted((int(number[1]) if number else 0, name) for number, name in numbers)]
+        names = [
+            name
+            for _, name in sorted(
+                (int(number[1]) if number else 0, name) for number, name in numbers
+            )
+        ]
     paths = [folder / name for name in names]
     there = [path for path in paths if path.is_file()]
     if not there:
         raise LogError(f"{folder}: none of the bag's files is there; expected {names[:3]}")
     kinds = {path.suffix for path in there}
     if len(kinds) > 1:
-        raise LogError(f"{folder}: the bag mixes files of {', '.join(sorted(kinds))}; read one file of it")
+        raise LogError(
+            f"{folder}: the bag mixes files of {', '.join(sorted(kinds))}; read one file of it"
+        )
     missing = [path.name for path in paths if path not in there]
     text = f"{len(missing)} of {counted(len(paths), 'file')} of the bag missing: {', '.join(missing[:3])}"
     notices = (Notice("MISSING_SPLIT", text, lossy=True),) if missing else ()
@@ -63,10 +71,20 @@ def _listed(metadata: Path) -> list[str]:
     block = re.search(r"^\s*relative_file_paths:\s*\n((?:\s*-\s*\S.*\n?)+)", text, re.MULTILINE)
     flow = re.search(r"^\s*relative_file_paths:\s*\[([^\]]*)\]", text, re.MULTILINE)
     if block is None and flow is None:
-        raise LogError(f"{metadata}: no relative_file_paths; expected the metadata of a rosbag2 folder")
-    lines = block[1].splitlines() if block else [one for one in flow[1].split(",") if one.strip()] if flow else []
+        raise LogError(
+            f"{metadata}: no relative_file_paths; expected the metadata of a rosbag2 folder"
+        )
+    lines = (
+        block[1].splitlines()
+        if block
+        else [one for one in flow[1].split(",") if one.strip()]
+        if flow
+        else []
+    )
     names = [line.strip().removeprefix("-").strip().strip("\"'") for line in lines]
     for name in names:
         if Path(name).name != name or name in ("", ".", ".."):
-            raise LogError(f"{metadata}: {name[:80]!r} leads outside the bag's folder; expected a file in it")
+            raise LogError(
+                f"{metadata}: {name[:80]!r} leads outside the bag's folder; expected a file in it"
+            )
     return names

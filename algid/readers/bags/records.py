@@ -1,7 +1,7 @@
 """Records of a ROS 1 bag in memory: fields, connections, and the messages of a chunk.
 
-An index is believed only where the messages that it lists, with the connections between them, tile the chunk without a
-gap. Otherwise the records are walked one by one.
+An index is believed only where the messages that it lists, with the connections between them, tile
+the chunk without a gap. Otherwise the records are walked one by one.
 """
 
 from __future__ import annotations
@@ -97,7 +97,9 @@ def connection(fields: dict[str, bytes], data: bytes) -> tuple[int, MessageChann
     told = fields_of(data)
     kind = told.get("type", b"").decode("utf-8", errors="replace")
     definition = told.get("message_definition", b"")
-    return record.number("conn"), MessageChannel(record.text("topic"), kind, "ros1", "ros1msg", definition)
+    return record.number("conn"), MessageChannel(
+        record.text("topic"), kind, "ros1", "ros1msg", definition
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,8 +114,12 @@ Others = list[tuple[dict[str, bytes], bytes]]
 """Fields and data of connections."""
 
 
-def walked(content: bytes, works: Callable[[int], bool], *, torn: bool) -> tuple[ChunkMessages, Others]:
-    """The messages and connections within unpacked bytes, one by one; of a `torn` chunk those before the break.
+def walked(
+    content: bytes, works: Callable[[int], bool], *, torn: bool
+) -> tuple[ChunkMessages, Others]:
+    """The messages and connections within unpacked bytes, one by one.
+
+    Of a `torn` chunk those before the break.
 
     Raises
     ------
@@ -131,7 +137,14 @@ def walked(content: bytes, works: Callable[[int], bool], *, torn: bool) -> tuple
             code = fields.get("op")
             if code == bytes([MESSAGE]):
                 record = BagRecord(fields, start, end)
-                rows.append((record.number("conn"), start, end - start, nanoseconds(record.number("time", 8))))
+                rows.append(
+                    (
+                        record.number("conn"),
+                        start,
+                        end - start,
+                        nanoseconds(record.number("time", 8)),
+                    )
+                )
             elif code == bytes([CONNECTION]):
                 others.append((fields, content[start:end]))
                 if len(others) > LIMITS.other_records:
@@ -166,13 +179,20 @@ def _inside(content: bytes, place: int, end: int) -> Iterator[tuple[dict[str, by
 
 
 def indexed(content: bytes, listed: IntArray) -> tuple[ChunkMessages, Others] | None:
-    """The messages at the offsets `listed` (N,), and the connections between; None where these do not tile."""
+    """The messages at the offsets `listed` (N,), and the connections between.
+
+    None where these do not tile.
+    """
     octets = np.frombuffer(content, np.uint8)
     if not listed.size or listed[-1] > octets.size - 8:
         return None
     lengths = gather(octets, listed, "<u4").astype(np.int64)
     length = int(lengths[0])
-    if np.any(lengths != length) or length > LIMITS.bag_header_bytes or listed[-1] + 8 + length > octets.size:
+    if (
+        np.any(lengths != length)
+        or length > LIMITS.bag_header_bytes
+        or listed[-1] + 8 + length > octets.size
+    ):
         return None
     starts = listed + 8 + length
     sizes = gather(octets, starts - 4, "<u4").astype(np.int64)
@@ -187,7 +207,10 @@ def indexed(content: bytes, listed: IntArray) -> tuple[ChunkMessages, Others] | 
 
 
 def _between(content: bytes, starts: IntArray, ends: IntArray) -> Others | None:
-    """The connections before, between and behind messages; None where anything else stands there, or is missing."""
+    """The connections before, between and behind messages.
+
+    None where anything else stands there, or is missing.
+    """
     gaps = np.flatnonzero(ends[:-1] != starts[1:])
     if gaps.size > LIMITS.index_gaps or ends[-1] > len(content):
         return None
@@ -210,7 +233,10 @@ _WIDTHS = {"op": 1, "conn": 4, "time": 8}
 
 
 def _places(octets: NDArray[np.uint8], listed: IntArray, length: int) -> dict[str, int] | None:
-    """Where the values of a message's header stand behind its start; None where the headers are not all alike."""
+    """Where the values of a message's header stand behind its start.
+
+    None where the headers are not all alike.
+    """
     first = int(listed[0]) + 4
     try:
         head = fields_of(octets[first : first + length].tobytes())
@@ -236,7 +262,9 @@ _UNPACKERS = ("none", "bz2", "lz4")
 
 
 def unpacked(packed: bytes, packing: str, size: int, *, torn: bool) -> bytes:
-    """What is packed by the method `packing`, in memory bounded by the `size` claimed; a torn one as far as it goes.
+    """What is packed by the method `packing`, in memory bounded by the `size` claimed.
+
+    a torn one as far as it goes.
 
     Raises
     ------
@@ -259,5 +287,7 @@ def unpacked(packed: bytes, packing: str, size: int, *, torn: bool) -> bytes:
     except (OSError, EOFError, RuntimeError, ValueError) as error:
         raise BagError(f"a chunk cannot be unpacked ({error})") from error
     if len(found) != size and not torn:
-        raise BagError(f"a chunk of {counted(size, 'byte')} unpacks to {'more' if len(found) > size else len(found)}")
+        raise BagError(
+            f"a chunk of {counted(size, 'byte')} unpacks to {'more' if len(found) > size else len(found)}"
+        )
     return found

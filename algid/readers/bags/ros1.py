@@ -1,9 +1,10 @@
 """ROS 1 bags (format 2.0): chunks of records, walked from the start.
 
-A record is a header of fields ``name=value`` and data, each with its length before it. Chunks hold the messages; behind
-each stand the indexes of its messages by connection, at the end of the file the connections (topics) and what is in
-which chunk. All that is redundant: the file's own records are what is believed, and a chunk is passed over only where
-everything that is said of it agrees. A bag has no checksums.
+A record is a header of fields ``name=value`` and data, each with its length before it. Chunks hold
+the messages; behind each stand the indexes of its messages by connection, at the end of the file
+the connections (topics) and what is in which chunk. All that is redundant: the file's own records
+are what is believed, and a chunk is passed over only where everything that is said of it agrees. A
+bag has no checksums.
 """
 
 from __future__ import annotations
@@ -55,7 +56,8 @@ _LOOSE_BYTES = 1 << 23
 class BagPart:
     """A chunk, or records outside of any: where its data start and end, and what its indexes list.
 
-    `indexes` has by connection where its index stands and how many messages that lists; `torn`: the file ends within.
+    `indexes` has by connection where its index stands and how many messages that lists; `torn`:
+    the file ends within.
     """
 
     start: int
@@ -98,7 +100,9 @@ def bag_messages(path: Path, known: Bags | None = None) -> Iterator[Ros1Source]:
         try:
             layout = layout or _layout(file)
         except BagError as error:
-            raise LogError(f"{path}: the bag cannot be read ({error}); copy it again, or rosbag reindex") from error
+            raise LogError(
+                f"{path}: the bag cannot be read ({error}); copy it again, or rosbag reindex"
+            ) from error
         if known is not None:
             known[key] = layout
         yield Ros1Source(file, layout)
@@ -120,13 +124,18 @@ class _File:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         os.close(self._handle)
 
     def read(self, start: int, end: int) -> bytes:
         """The bytes [start, end), or `BagError` where the file ends before."""
-        found = os.pread(self._handle, end - start, start) if 0 <= start <= end <= self.size else b""
+        found = (
+            os.pread(self._handle, end - start, start) if 0 <= start <= end <= self.size else b""
+        )
         if len(found) != end - start:
             raise BagError(f"bytes {start} to {end} of a file of {self.size}")
         return found
@@ -205,14 +214,18 @@ class _Outline:
         elif code == BAG:
             self._head = record
             if encryptor := record.text("encryptor"):
-                raise LogError(f"{self._file.path}: the bag is encrypted ({encryptor[:40]}); decrypt it first")
+                raise LogError(
+                    f"{self._file.path}: the bag is encrypted ({encryptor[:40]}); decrypt it first"
+                )
         if record.end > self._file.size:
             raise BagError("a record breaks off")
 
     def _chunk(self, record: BagRecord, place: int) -> None:
         size = record.number("size")
         if max(size, record.end - record.start) > LIMITS.bag_record_bytes:
-            raise BagError(f"a chunk claims {counted(size, 'byte')}, more than {LIMITS.bag_record_bytes}")
+            raise BagError(
+                f"a chunk claims {counted(size, 'byte')}, more than {LIMITS.bag_record_bytes}"
+            )
         self._claimed += size
         if self._claimed > LIMITS.free_unpacked_bytes + LIMITS.unpacked_a_byte * self._file.size:
             raise BagError(f"its chunks claim {counted(self._claimed, 'byte')} so far")
@@ -237,10 +250,17 @@ class _Outline:
     def _loose(self, record: BagRecord, place: int) -> None:
         last = self._found.parts[-1] if self._found.parts else None
         end = min(record.end, self._file.size)
-        if last is not None and last.loose and last.end == place and last.end - last.start < _LOOSE_BYTES:
+        if (
+            last is not None
+            and last.loose
+            and last.end == place
+            and last.end - last.start < _LOOSE_BYTES
+        ):
             self._found.parts[-1] = replace(last, end=end, size=end - last.start)
         else:
-            self._found.parts.append(BagPart(place, end, "none", end - place, torn=True, loose=True))
+            self._found.parts.append(
+                BagPart(place, end, "none", end - place, torn=True, loose=True)
+            )
             self._starts.append(place)
         self._found.agreed = False
 
@@ -252,13 +272,17 @@ class _Outline:
     def _info(self, record: BagRecord) -> None:
         data = self._file.read(record.start, record.end)
         pairs = struct.iter_unpack("<II", data) if len(data) % _INFO_ENTRY == 0 else ()
-        self._told[record.number("chunk_pos", 8)] = {number: count for number, count in pairs if count}
+        self._told[record.number("chunk_pos", 8)] = {
+            number: count for number, count in pairs if count
+        }
         self._times += [nanoseconds(record.number(name, 8)) for name in ("start_time", "end_time")]
 
     def broken(self, place: int, why: str) -> None:
         """Note that nothing is read from byte `place` on."""
         rest = counted(self._file.size - place, "byte")
-        text = f"the bag breaks off at byte {place} ({why}); of what follows nothing is read: {rest}"
+        text = (
+            f"the bag breaks off at byte {place} ({why}); of what follows nothing is read: {rest}"
+        )
         self._found.notices.append(Notice("CUT_OFF", text, lossy=True))
         self._found.damage.append(f"{why} at byte {place}")
 
@@ -285,9 +309,15 @@ class _Outline:
         }
         chunks, connections = head.number("chunk_count"), head.number("conn_count")
         if chunks != len(found.parts):
-            return f"it tells of {counted(chunks, 'chunk')} and has {len(found.parts)}", chunks > len(found.parts)
+            return (
+                f"it tells of {counted(chunks, 'chunk')} and has {len(found.parts)}",
+                chunks > len(found.parts),
+            )
         if connections != len(found.channels):
-            return f"it tells of {counted(connections, 'connection')} and has {len(found.channels)}", False
+            return (
+                f"it tells of {counted(connections, 'connection')} and has {len(found.channels)}",
+                False,
+            )
         if self._tail is not None and head.number("index_pos", 8) != self._tail:
             return f"it tells of an index at byte {head.number('index_pos', 8)}", False
         return ("chunks hold other messages than it tells" if own != self._told else ""), False
@@ -312,7 +342,10 @@ class Ros1Source(Source):
             self._define_inside()
 
     def _define_inside(self) -> None:
-        """Take in the connections that chunks define; what contradicts them is told when it is read."""
+        """Take in the connections that chunks define.
+
+        What contradicts them is told when it is read.
+        """
         for part in self._layout.parts:
             try:
                 self._define(self._records(part)[1])
@@ -326,7 +359,10 @@ class Ros1Source(Source):
                 raise BagError(f"connection {number} is defined anew and differently")
 
     def works(self, steps: int) -> bool:
-        """Count steps of some microsecond each; False where no honest file of this size asks for so many."""
+        """Count steps of some microsecond each.
+
+        False where no honest file of this size asks for so many.
+        """
         self._left -= steps
         return self._left >= 0
 
@@ -339,7 +375,9 @@ class Ros1Source(Source):
         for part in self._layout.parts:
             if self._layout.agreed and not channels & part.indexes.keys():
                 continue
-            promised = sum(count for number, (_, count) in part.indexes.items() if number in channels)
+            promised = sum(
+                count for number, (_, count) in part.indexes.items() if number in channels
+            )
             place = f"(at byte {part.start})"
             try:
                 found, others = self._records(part)
@@ -360,12 +398,16 @@ class Ros1Source(Source):
 
     def _records(self, part: BagPart) -> tuple[ChunkMessages, Others]:
         """The messages of a part, and its connections."""
-        content = unpacked(self._file.read(part.start, part.end), part.packing, part.size, torn=part.torn)
+        content = unpacked(
+            self._file.read(part.start, part.end), part.packing, part.size, torn=part.torn
+        )
         offsets = [
             np.frombuffer(self._file.read(start, start + count * _INDEX_ENTRY), "<u4")[2::3]
             for start, count in part.indexes.values()
         ]
-        listed = np.sort(np.concatenate(offsets)).astype(np.int64) if offsets else np.empty(0, np.int64)
+        listed = (
+            np.sort(np.concatenate(offsets)).astype(np.int64) if offsets else np.empty(0, np.int64)
+        )
         return indexed(content, listed) or walked(content, self.works, torn=part.torn)
 
 

@@ -1,7 +1,8 @@
 """rosbag2's SQLite files: the table of messages is read row by row, in the order in which they were recorded.
 
-Only real tables are read, never a view, nor by an index: a view may run for ever, an index may leave rows out. What a
-query may do is bounded by the size of the file, since pages of a database may point to each other in circles.
+Only real tables are read, never a view, nor by an index: a view may run for ever, an index may
+leave rows out. What a query may do is bounded by the size of the file, since pages of a database
+may point to each other in circles.
 """
 
 from __future__ import annotations
@@ -77,7 +78,9 @@ def _telling(path: Path) -> Iterator[None]:
         reason = str(error).split("\n", maxsplit=1)[0][:200]
         if reason == "interrupted":
             reason = "it asks for more steps than any database of its size"
-        raise LogError(f"{path}: the bag cannot be read ({reason}); copy it again, or record it anew") from error
+        raise LogError(
+            f"{path}: the bag cannot be read ({reason}); copy it again, or record it anew"
+        ) from error
 
 
 def _connected(path: Path, size: int) -> sqlite3.Connection:
@@ -85,7 +88,9 @@ def _connected(path: Path, size: int) -> sqlite3.Connection:
     beside = [path.with_name(f"{path.name}{suffix}") for suffix in ("-wal", "-journal")]
     unfinished = any(one.exists() and one.stat().st_size for one in beside)
     base = sqlite3.connect(
-        f"{path.absolute().as_uri()}?{'mode=ro' if unfinished else 'immutable=1'}", uri=True, check_same_thread=False
+        f"{path.absolute().as_uri()}?{'mode=ro' if unfinished else 'immutable=1'}",
+        uri=True,
+        check_same_thread=False,
     )
     base.text_factory = lambda text: text.decode("utf-8", errors="replace")
     base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LIMITS.message_bytes)
@@ -109,7 +114,9 @@ def _contents(path: Path, base: sqlite3.Connection) -> Contents:
         _check_table(path, base, table, needed)
     columns = _columns(base, "topics")
     encoding = "serialization_format" if "serialization_format" in columns else "'cdr'"
-    rows = base.execute(f"SELECT id, name, type, {encoding} FROM topics NOT INDEXED LIMIT {LIMITS.bag_topics + 1}")
+    rows = base.execute(
+        f"SELECT id, name, type, {encoding} FROM topics NOT INDEXED LIMIT {LIMITS.bag_topics + 1}"
+    )
     topics = rows.fetchall()
     if len(topics) > LIMITS.bag_topics:
         raise LogError(f"{path}: more than {LIMITS.bag_topics} topics; expected a bag of rosbag2")
@@ -131,7 +138,9 @@ def _check_table(path: Path, base: sqlite3.Connection, table: str, needed: set[s
     found = base.execute("SELECT type, sql FROM sqlite_master WHERE name = ?", (table,)).fetchone()
     if found is None or found[0] != "table" or not str(found[1]).upper().startswith("CREATE TABLE"):
         there = "no such table" if found is None else f"a {found[0]} in its place"
-        raise LogError(f"{path}: expected the table {table!r} of a rosbag2 file, found {there}; record it anew")
+        raise LogError(
+            f"{path}: expected the table {table!r} of a rosbag2 file, found {there}; record it anew"
+        )
     columns = _columns(base, table)
     wrong = [name for name in sorted(needed) if not columns.get(name)]
     if wrong:
@@ -147,22 +156,31 @@ def _columns(base: sqlite3.Connection, table: str) -> dict[str, bool]:
 
 def _definitions(path: Path, base: sqlite3.Connection) -> dict[str, tuple[str, bytes]]:
     """By type the encoding and the text of its definition, where a file of newer rosbag2 holds them."""
-    if not base.execute("SELECT 1 FROM sqlite_master WHERE name = 'message_definitions'").fetchone():
+    if not base.execute(
+        "SELECT 1 FROM sqlite_master WHERE name = 'message_definitions'"
+    ).fetchone():
         return {}
-    _check_table(path, base, "message_definitions", {"topic_type", "encoding", "encoded_message_definition"})
+    _check_table(
+        path, base, "message_definitions", {"topic_type", "encoding", "encoded_message_definition"}
+    )
     query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions NOT INDEXED"
     rows = itertools.islice(base.execute(query), LIMITS.bag_topics)
     return {str(kind): (str(encoding), str(text).encode()) for kind, encoding, text in rows if text}
 
 
-def _channel(topic: str, kind: str, encoding: str, definitions: dict[str, tuple[str, bytes]]) -> MessageChannel:
+def _channel(
+    topic: str, kind: str, encoding: str, definitions: dict[str, tuple[str, bytes]]
+) -> MessageChannel:
     """A topic with the definition of its messages: the file's own, or that of every ROS 2."""
     own = definitions.get(kind) or usual_definition(kind)
     return MessageChannel(topic, kind, encoding, *own)
 
 
 def usual_definition(kind: str) -> tuple[str, bytes]:
-    """Encoding and text of the definition of a type that every ROS 2 knows; nothing where it is not known here."""
+    """Encoding and text of the definition of a type that every ROS 2 knows.
+
+    Nothing where it is not known here.
+    """
     if kind == JOINT_STATE:
         return "ros2msg", JOINT_STATE_DEFINITION.encode()
     try:
@@ -180,14 +198,21 @@ class SqliteSource(Source):
 
     def __init__(self, path: Path, size: int, base: sqlite3.Connection, contents: Contents) -> None:
         self.path = str(path)
-        self.channels, self.counts, self.span_ns = contents.channels, contents.counts, contents.span_ns
+        self.channels, self.counts, self.span_ns = (
+            contents.channels,
+            contents.counts,
+            contents.span_ns,
+        )
         self.notices = _said_of(contents.strays)
         self.damage: list[str] = []
         self._base = base
         self._left = LIMITS.free_work + LIMITS.work_a_byte * size
 
     def works(self, steps: int) -> bool:
-        """Count steps of some microsecond each; False where no honest file of this size asks for so many."""
+        """Count steps of some microsecond each.
+
+        False where no honest file of this size asks for so many.
+        """
         self._left -= steps
         return self._left >= 0
 
@@ -209,7 +234,9 @@ class SqliteSource(Source):
             size += len(data)
             if size > _BATCH_BYTES or len(stamps) == _BATCH_ROWS:
                 if not self.works(len(stamps) // 2):
-                    raise LogError(f"{self.path}: more messages than in any honest file of its size; copy it again")
+                    raise LogError(
+                        f"{self.path}: more messages than in any honest file of its size; copy it again"
+                    )
                 yield MessageBatch(_gathered(stamps, payloads), checked=True)
                 stamps, payloads, size = [], [], 0
         if stamps:

@@ -27,7 +27,8 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
     Raises
     ------
     LogError
-        If a message is encoded in an unknown way, or the file cannot be read or is damaged and holds no joints.
+        If a message is encoded in an unknown way, or the file cannot be read or is damaged and
+        holds no joints.
     NothingFoundError
         If no topic of a sound file holds the joints.
     """
@@ -35,7 +36,9 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
 
     known: Known = {}
     name = str(paths[0] if len(paths) == 1 else paths[0].parent)
-    return open_messages(name, "mcap", [partial(messages_in, path, known) for path in paths], profile)
+    return open_messages(
+        name, "mcap", [partial(messages_in, path, known) for path in paths], profile
+    )
 
 
 Known = dict[tuple[Path, int, int], Catalogue]
@@ -86,7 +89,10 @@ class McapSource(Source):
         return batches(self._file, self._found, channels)
 
     def works(self, steps: int) -> bool:
-        """Count steps of some microsecond each; False where no honest file of this size asks for so many."""
+        """Count steps of some microsecond each.
+
+        False where no honest file of this size asks for so many.
+        """
         return self._file.works(steps)
 
     def check(self, channels: frozenset[int]) -> None:
@@ -97,7 +103,9 @@ class McapSource(Source):
         """The channels that have messages, as far as the file tells."""
         spans = self._found.spans
         if self.counts is None and all(span.channels is not None for span in spans):
-            return frozenset(self.channels) & frozenset[int]().union(*(span.channels or () for span in spans))
+            return frozenset(self.channels) & frozenset[int]().union(
+                *(span.channels or () for span in spans)
+            )
         return super().used()
 
     def truth(self) -> Truth | None:

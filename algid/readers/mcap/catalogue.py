@@ -1,8 +1,8 @@
 """What an MCAP file holds and where: from its summary where that can be trusted, else by walking through it.
 
-The summary is trusted when its CRC, the counts of its statistics and the message indexes agree, and when nothing
-but other records lies between the chunks that it lists. Everything else, a file cut off for one, is walked from its
-start, record by record and past what is broken.
+The summary is trusted when its CRC, the counts of its statistics and the message indexes agree,
+and when nothing but other records lies between the chunks that it lists. Everything else, a file
+cut off for one, is walked from its start, record by record and past what is broken.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ _LOOSE, _TORN = -1, -2
 class Span:
     """Records side by side in the file: a chunk with the message indexes behind it, or loose records.
 
-    `channels` are those that the index names; None where nobody knows. `torn`: a chunk that breaks off.
+    `channels` are those that the index names; None where nobody knows. `torn`: a chunk that breaks
+    off.
     """
 
     start: int
@@ -60,8 +61,8 @@ class Span:
 class Catalogue:
     """Schemas and channels by id, spans in file order, messages by channel where counted.
 
-    `damage` names the places where bytes were met that are not what the format says. `redefined` says from which
-    byte on an id no longer means what it meant before.
+    `damage` names the places where bytes were met that are not what the format says. `redefined`
+    says from which byte on an id no longer means what it meant before.
     """
 
     schemas: dict[int, Any] = field(default_factory=dict)
@@ -110,7 +111,9 @@ class Catalogue:
         try:
             return loads(self.metadata[KEY].get(KEY, "")).truth
         except ValueError as error:
-            raise LogError(f"{path}: the truth in the file's metadata cannot be read ({error})") from error
+            raise LogError(
+                f"{path}: the truth in the file's metadata cannot be read ({error})"
+            ) from error
 
     def define(self, code: int, content: bytes) -> None:
         """Take in the content of a schema's or a channel's record; the first of an id holds.
@@ -131,11 +134,17 @@ class Catalogue:
 
         if (code, content) in self._agreed:  # recorders repeat them in every chunk
             return self._agreed[code, content]
-        kind, known = (records.Schema, self.schemas) if code == framing.SCHEMA else (records.Channel, self.channels)
+        kind, known = (
+            (records.Schema, self.schemas)
+            if code == framing.SCHEMA
+            else (records.Channel, self.channels)
+        )
         one = parse(kind, content)
         if known.get(one.id, one) != one:
             text = f"{kind.__name__.lower()} {one.id} is defined anew and differently"
-            using = (channel.id for channel in self.channels.values() if channel.schema_id == one.id)
+            using = (
+                channel.id for channel in self.channels.values() if channel.schema_id == one.id
+            )
             raise RedefinedError(text, [one.id] if code == framing.CHANNEL else using)
         if one.id in known:
             self._agreed[code, content] = one
@@ -160,7 +169,9 @@ def catalogue(file: File) -> Catalogue:
     except DamagedError as error:
         found = None
         damage = [f"its summary: {error}"]
-        notice = Notice("DAMAGED_SUMMARY", f"the file's summary cannot be used ({error}); read by scanning")
+        notice = Notice(
+            "DAMAGED_SUMMARY", f"the file's summary cannot be used ({error}); read by scanning"
+        )
     if found is not None:
         return found
     walked = _walked(file)
@@ -198,15 +209,20 @@ def _from_summary(file: File) -> Catalogue | None:
         found.spans.append(Span(place, length, chunk.message_index_length, channels))
     for one in metadata:
         if one.name == KEY and KEY not in found.metadata:
-            _keep_metadata(file, framing.Record(framing.METADATA, one.offset + 9, one.length - 9), found)
+            _keep_metadata(
+                file, framing.Record(framing.METADATA, one.offset + 9, one.length - 9), found
+            )
     return found
 
 
-def _check_listed(file: File, chunks: list[ChunkIndex], statistics: Any, channels: Collection[int], end: int) -> None:
+def _check_listed(
+    file: File, chunks: list[ChunkIndex], statistics: Any, channels: Collection[int], end: int
+) -> None:
     """Hold what a summary lists against its own counts and against the file, up to the summary at `end`.
 
-    Chunks lie in the file and do not overlap, their indexes list as many messages as the statistics count, for every
-    channel, all of which are among those defined, and no message, chunk or index stands beside those that are listed.
+    Chunks lie in the file and do not overlap, their indexes list as many messages as the
+    statistics count, for every channel, all of which are among those defined, and no message,
+    chunk or index stands beside those that are listed.
 
     Raises
     ------
@@ -225,8 +241,12 @@ def _check_listed(file: File, chunks: list[ChunkIndex], statistics: Any, channel
         for channel, count in _indexed(file, chunk):
             counts[channel] = counts.get(channel, 0) + count
     if undefined := counts.keys() - channels:
-        raise DamagedError(f"it lists messages of a channel {min(undefined)} that it does not define")
-    promised = {channel: count for channel, count in statistics.channel_message_counts.items() if count}
+        raise DamagedError(
+            f"it lists messages of a channel {min(undefined)} that it does not define"
+        )
+    promised = {
+        channel: count for channel, count in statistics.channel_message_counts.items() if count
+    }
     if all(chunk.message_index_length for chunk in chunks) and counts != promised:
         raise DamagedError("its indexes and its statistics count different numbers of messages")
     indexed = {_end(chunk) for chunk in chunks if chunk.message_index_length}
@@ -245,7 +265,8 @@ def _indexed(file: File, chunk: ChunkIndex) -> Iterator[tuple[int, int]]:
     Raises
     ------
     DamagedError
-        If one that is listed is not there, or one that is there is not listed: its messages would not be read.
+        If one that is listed is not there, or one that is there is not listed: its messages would
+        not be read.
     """
     listed = 0
     for channel, offset in chunk.message_index_offsets.items():
@@ -257,9 +278,13 @@ def _indexed(file: File, chunk: ChunkIndex) -> Iterator[tuple[int, int]]:
     if listed == chunk.message_index_length:
         return
     start = chunk.chunk_start_offset + chunk.chunk_length
-    for record in framing.walk(file, start, _end(chunk)):  # what stands there though it is not listed
+    for record in framing.walk(
+        file, start, _end(chunk)
+    ):  # what stands there though it is not listed
         channel, size = struct.unpack("<HI", file.read(record.start, 6))
-        if record.code != framing.MESSAGE_INDEX or (size and channel not in chunk.message_index_offsets):
+        if record.code != framing.MESSAGE_INDEX or (
+            size and channel not in chunk.message_index_offsets
+        ):
             raise DamagedError(f"it does not list what stands at byte {record.start - 9}")
 
 
@@ -272,7 +297,11 @@ def between(chunks: list[ChunkIndex], end: int) -> list[tuple[int, int]]:
     """Bytes [start, end) around chunks in file order, up to the summary at `end`: neither these nor their indexes."""
     ends = [_end(chunk) for chunk in chunks]
     starts = [chunk.chunk_start_offset for chunk in chunks]
-    return [pair for pair in zip([len(framing.MAGIC), *ends], [*starts, end], strict=True) if pair[0] != pair[1]]
+    return [
+        pair
+        for pair in zip([len(framing.MAGIC), *ends], [*starts, end], strict=True)
+        if pair[0] != pair[1]
+    ]
 
 
 def _walked(file: File) -> Catalogue:
@@ -288,7 +317,10 @@ def _walked(file: File) -> Catalogue:
                     spans.append(record.torn.start, record.end - record.torn.start, _TORN)
             elif record.code == framing.DATA_END:
                 ended = record.start
-            elif record.code in (framing.SCHEMA, framing.CHANNEL) and record.length <= LIMITS.record_bytes:
+            elif (
+                record.code in (framing.SCHEMA, framing.CHANNEL)
+                and record.length <= LIMITS.record_bytes
+            ):
                 _define(found, record.code, file.read(record.start, record.length), record.start)
             elif record.code == framing.METADATA:
                 _keep_metadata(file, record, found)
@@ -329,14 +361,18 @@ class _Spans:
                 last[1] += record.length + 9
             else:
                 self.append(record.start - 9, record.length + 9, _LOOSE)
-        elif record.code == framing.MESSAGE_INDEX and last[2] >= 0 and sum(last) == record.start - 9:
+        elif (
+            record.code == framing.MESSAGE_INDEX and last[2] >= 0 and sum(last) == record.start - 9
+        ):
             last[2] += record.length + 9
         return record.code in (framing.CHUNK, framing.MESSAGE)
 
     def append(self, start: int, length: int, kind: int) -> None:
         """Take in a span of its own."""
         if len(self._places) == LIMITS.spans:
-            raise DamagedError(f"more than {LIMITS.spans} chunks, or messages apart from each other")
+            raise DamagedError(
+                f"more than {LIMITS.spans} chunks, or messages apart from each other"
+            )
         self._places.append([start, length, kind])
 
     def all(self) -> list[Span]:
@@ -348,7 +384,10 @@ class _Spans:
 
 
 def _missing(file: File, gaps: list[Gap], ended: int | None, found: Catalogue) -> list[Notice]:
-    """What to say of gaps in the data, and of a file that breaks off; `ended` is where the data end, if they do."""
+    """What to say of gaps in the data, and of a file that breaks off.
+
+    `ended` is where the data end, if they do.
+    """
     inside = [gap for gap in gaps if ended is None or gap.start < ended]
     last = inside.pop() if inside and inside[-1].end == file.size else None
     said = []
@@ -362,17 +401,26 @@ def _missing(file: File, gaps: list[Gap], ended: int | None, found: Catalogue) -
         found.damage += [f"no record at byte {gap.start}" for gap in inside]
     if last is not None:
         length = counted(last.end - last.start, "byte")
-        piece = f"chunk of {length}, read as far as it goes" if last.torn else f"record of {length}, left out"
+        piece = (
+            f"chunk of {length}, read as far as it goes"
+            if last.torn
+            else f"record of {length}, left out"
+        )
         text = f"the file breaks off: an unfinished {piece}"
         said.append(Notice("CUT_OFF", text, lossy=True))
         found.damage.append(f"it breaks off at byte {last.start}")
     elif ended is None:
-        said.append(Notice("CUT_OFF", "the file breaks off behind its last whole record", lossy=True))
+        said.append(
+            Notice("CUT_OFF", "the file breaks off behind its last whole record", lossy=True)
+        )
     return said
 
 
 def _define(found: Catalogue, code: int, content: bytes, place: int) -> None:
-    """Take in a schema or a channel; from `place` on nothing is read of what it gives another meaning."""
+    """Take in a schema or a channel.
+
+    From `place` on nothing is read of what it gives another meaning.
+    """
     try:
         found.define(code, content)
     except RedefinedError as error:

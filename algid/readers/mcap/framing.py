@@ -1,8 +1,9 @@
 """The frame of an MCAP file: records, each with an operation code and a length, read by their offsets.
 
-The content of the small records is parsed by the `mcap` package; what it raises on damaged bytes is turned into
-`DamagedError` here and nowhere else. Chunks are unpacked with a bound on what they claim, and always checked
-against their CRC. By hand, since the package's readers parse every record on the way.
+The content of the small records is parsed by the `mcap` package; what it raises on damaged bytes
+is turned into `DamagedError` here and nowhere else. Chunks are unpacked with a bound on what they
+claim, and always checked against their CRC. By hand, since the package's readers parse every
+record on the way.
 """
 
 from __future__ import annotations
@@ -47,7 +48,10 @@ class DamagedError(Exception):
 
 
 class BrokenOffError(DamagedError):
-    """A record that reaches past the end; `record` is what its head says, None where even that breaks off."""
+    """A record that reaches past the end.
+
+    `record` is what its head says, None where even that breaks off.
+    """
 
     def __init__(self, start: int, record: Record | None = None) -> None:
         super().__init__(f"a record at byte {start} breaks off")
@@ -84,7 +88,10 @@ class File:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         os.close(self._handle)
 
@@ -107,7 +114,10 @@ class File:
             )
 
     def works(self, steps: int) -> bool:
-        """Count steps of some microsecond each; False where no honest file of this size asks for so many."""
+        """Count steps of some microsecond each.
+
+        False where no honest file of this size asks for so many.
+        """
         self._work += steps
         return self._work <= LIMITS.free_work + LIMITS.work_a_byte * self.size
 
@@ -129,7 +139,8 @@ class Record:
 def walk(file: File, start: int, end: int) -> Iterator[Record]:
     """The records between two offsets of the file, in order.
 
-    Neighbours are read a window at a time where they are messages, and by their heads alone where they are chunks.
+    Neighbours are read a window at a time where they are messages, and by their heads alone where
+    they are chunks.
 
     Raises
     ------
@@ -143,7 +154,10 @@ def walk(file: File, start: int, end: int) -> Iterator[Record]:
         if start + FRAME.size > end:
             raise BrokenOffError(start)
         if not base <= start <= base + len(window) - min(PEEK, end - start):
-            window, base = file.read(start, min(_WINDOW if last == MESSAGE else PEEK, end - start)), start
+            window, base = (
+                file.read(start, min(_WINDOW if last == MESSAGE else PEEK, end - start)),
+                start,
+            )
         code, length = FRAME.unpack_from(window, start - base)
         record = Record(code, start + FRAME.size, length)
         if not sound(record, window, start - base):
@@ -155,18 +169,26 @@ def walk(file: File, start: int, end: int) -> Iterator[Record]:
 
 
 def sound(record: Record, content: bytes | memoryview, place: int) -> bool:
-    """Whether a record's length, and the lengths within, are what its code asks for; its bytes start at `place`."""
+    """Whether a record's length, and the lengths within, are what its code asks for.
+
+    Its bytes start at `place`.
+    """
     least, most = SIZES.get(record.code, (0, 1 << 62 if record.code >= 0x80 else -1))
     if not least <= record.length <= most:
         return False
     start = place + FRAME.size
     if record.code == MESSAGE_INDEX and start + 6 <= len(content):
-        return bool(struct.unpack_from("<I", content, start + 2)[0] == record.length - 6 and record.length % 16 == 6)
+        return bool(
+            struct.unpack_from("<I", content, start + 2)[0] == record.length - 6
+            and record.length % 16 == 6
+        )
     if record.code == CHUNK and start + 40 <= len(content):
         (name,) = struct.unpack_from("<I", content, start + 28)
         if name > 32 or start + 40 + name > len(content):
             return False
-        return bool(struct.unpack_from("<Q", content, start + 32 + name)[0] == record.length - 40 - name)
+        return bool(
+            struct.unpack_from("<Q", content, start + 32 + name)[0] == record.length - 40 - name
+        )
     return True
 
 
@@ -187,7 +209,9 @@ def walk_bytes(content: bytes | memoryview, start: int, end: int) -> Iterator[Re
 
 
 def summary(file: File) -> tuple[int, bytes]:
-    """Where the summary starts, and its bytes, none where the footer names no summary; its checksum is verified.
+    """Where the summary starts, and its bytes, none where the footer names no summary.
+
+    Its checksum is verified.
 
     Raises
     ------
@@ -218,7 +242,15 @@ def parse(kind: Any, content: bytes) -> Any:
 
     try:
         return kind.read(ReadDataStream(io.BytesIO(content)))
-    except (McapError, struct.error, ValueError, KeyError, EOFError, OverflowError, MemoryError) as error:
+    except (
+        McapError,
+        struct.error,
+        ValueError,
+        KeyError,
+        EOFError,
+        OverflowError,
+        MemoryError,
+    ) as error:
         raise DamagedError(f"a {kind.__name__} record cannot be read ({error})") from error
 
 
@@ -247,7 +279,9 @@ def chunk_index(content: bytes) -> ChunkIndex:
         _, _, start, length, size = _INDEX_HEAD.unpack_from(content)
         end = _INDEX_HEAD.size + size
         (indexes,) = struct.unpack_from("<Q", content, end)
-        return ChunkIndex(start, length, dict(_INDEX_PAIR.iter_unpack(content[_INDEX_HEAD.size : end])), indexes)
+        return ChunkIndex(
+            start, length, dict(_INDEX_PAIR.iter_unpack(content[_INDEX_HEAD.size : end])), indexes
+        )
     except struct.error as error:
         raise DamagedError(f"a ChunkIndex record cannot be read ({error})") from error
 
@@ -264,19 +298,24 @@ def claimed(content: bytes) -> int:
         raise DamagedError("a chunk breaks off")
     (size,) = struct.unpack_from("<Q", content, 16)
     if size > LIMITS.chunk_bytes:
-        raise DamagedError(f"a chunk claims {counted(size, 'byte')} unpacked, more than {LIMITS.chunk_bytes}")
+        raise DamagedError(
+            f"a chunk claims {counted(size, 'byte')} unpacked, more than {LIMITS.chunk_bytes}"
+        )
     return int(size)
 
 
 def unpack(content: bytes, *, torn: bool = False) -> bytes:
-    """The records within a chunk record's content; of a `torn` one that breaks off the whole records at its start.
+    """The records within a chunk record's content.
+
+    Of a `torn` one that breaks off the whole records at its start.
 
     Those of a torn chunk can be checked only where all are there: its CRC covers all of it.
 
     Raises
     ------
     DamagedError
-        If the chunk is larger than `FileLimits.chunk_bytes`, packed in an unknown way, or not what its CRC says.
+        If the chunk is larger than `FileLimits.chunk_bytes`, packed in an unknown way, or not what
+        its CRC says.
     """
     size = claimed(content)
     crc, name_length = struct.unpack_from("<II", content, 24)
@@ -310,7 +349,9 @@ def _decompressed(name: bytes, packed: memoryview, size: int, torn: bool) -> byt
     if name == b"":
         return bytes(packed[:size] if torn else packed)
     if name not in (b"zstd", b"lz4"):
-        raise DamagedError(f"a chunk is packed with {name.decode(errors='replace')!r}; expected zstd, lz4 or nothing")
+        raise DamagedError(
+            f"a chunk is packed with {name.decode(errors='replace')!r}; expected zstd, lz4 or nothing"
+        )
     import lz4.frame
     import zstandard
 
@@ -327,7 +368,9 @@ def _decompressed(name: bytes, packed: memoryview, size: int, torn: bool) -> byt
         # the frame's own claim is what the library would allocate
         frame_size = zstandard.frame_content_size(packed) if size else -1
         if frame_size > size:
-            raise DamagedError(f"a chunk of {counted(size, 'byte')} holds a zstd frame of {frame_size}")
+            raise DamagedError(
+                f"a chunk of {counted(size, 'byte')} holds a zstd frame of {frame_size}"
+            )
         return zstandard.ZstdDecompressor().decompress(packed, max_output_size=size or 1)
     except (zstandard.ZstdError, RuntimeError, EOFError, ValueError) as error:
         raise DamagedError(f"a chunk cannot be unpacked ({error})") from error

@@ -54,7 +54,9 @@ def look_beside(file: File, catalogue: Catalogue, channels: frozenset[int]) -> N
         before, catalogue.redefined = catalogue.redefined, {}
         with executor(2) as pool:
             spans = spans_beside(catalogue, channels)
-            for span, others in zip(spans, pool.map(lambda span: _others(file, span), spans), strict=True):
+            for span, others in zip(
+                spans, pool.map(lambda span: _others(file, span), spans), strict=True
+            ):
                 with suppress(DamagedError):
                     catalogue.redefines(others, span.start)
         catalogue.beside[channels], catalogue.redefined = catalogue.redefined, before
@@ -63,7 +65,10 @@ def look_beside(file: File, catalogue: Catalogue, channels: frozenset[int]) -> N
 
 
 def _others(file: File, span: Span) -> tuple[tuple[int, bytes], ...]:
-    """Code and content of a span's records that are no messages; none of one that is damaged, which is not read."""
+    """Code and content of a span's records that are no messages.
+
+    None of one that is damaged, which is not read.
+    """
     try:
         return span.records(file, file.read(span.start, span.length + span.index_length)).others
     except DamagedError:
@@ -71,7 +76,10 @@ def _others(file: File, span: Span) -> tuple[tuple[int, bytes], ...]:
 
 
 def batches(file: File, catalogue: Catalogue, channels: frozenset[int]) -> Iterator[MessageBatch]:
-    """The messages of `channels` in file order, many small spans at once; a damaged span yields its reason."""
+    """The messages of `channels` in file order, many small spans at once.
+
+    a damaged span yields its reason.
+    """
     waiting: deque[Future[_Loaded]] = deque()
 
     def first() -> Iterator[MessageBatch]:
@@ -120,7 +128,9 @@ class _Sound:
     torn: int | None = None
 
 
-def _load(file: File, catalogue: Catalogue, spans: Sequence[Span], channels: frozenset[int]) -> _Loaded:
+def _load(
+    file: File, catalogue: Catalogue, spans: Sequence[Span], channels: frozenset[int]
+) -> _Loaded:
     """Batches of spans: a damaged or torn one by itself, those between two of them as one."""
     found: list[MessageBatch] = []
     sound: list[_Sound] = []
@@ -150,7 +160,9 @@ def _joined(sound: Sequence[_Sound], channels: frozenset[int]) -> list[MessageBa
     return [MessageBatch(messages, checked, torn=None if size is None else (held, size))]
 
 
-def _opened(file: File, catalogue: Catalogue, span: Span, channels: frozenset[int]) -> _Sound | MessageBatch:
+def _opened(
+    file: File, catalogue: Catalogue, span: Span, channels: frozenset[int]
+) -> _Sound | MessageBatch:
     """What a span holds, or the batch that says why it is lost.
 
     No message is read behind a record that gives its channel another meaning.
@@ -160,11 +172,19 @@ def _opened(file: File, catalogue: Catalogue, span: Span, channels: frozenset[in
         content = file.read(span.start, span.length + span.index_length)
         records = span.records(file, content)
         catalogue.redefines(records.others, span.start)
-        if any(catalogue.redefined.get(channel, span.start + 1) <= span.start for channel in channels):
+        if any(
+            catalogue.redefined.get(channel, span.start + 1) <= span.start for channel in channels
+        ):
             raise DamagedError("a channel or its schema is defined anew and differently")
     except DamagedError as error:
-        lost = sum(places.size for channel, places in entries(content[span.length :]) if channel in channels)
+        lost = sum(
+            places.size
+            for channel, places in entries(content[span.length :])
+            if channel in channels
+        )
         return MessageBatch(None, checked=True, reason=f"{error} (at byte {span.start})", lost=lost)
     size = claimed(content) if span.torn else None
     broken = size is not None and size != records.content.size
-    return _Sound(records, not span.loose and (has_checksum(content) or broken), size if broken else None)
+    return _Sound(
+        records, not span.loose and (has_checksum(content) or broken), size if broken else None
+    )

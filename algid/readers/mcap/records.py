@@ -1,7 +1,7 @@
 """Where a channel's messages lie within unpacked records: given by the message indexes, proved by the records.
 
-An index has no checksum of its own, so it is believed only where the records it names, with the few others
-in between, tile the chunk without a gap. Otherwise the records are walked one by one.
+An index has no checksum of its own, so it is believed only where the records it names, with the
+few others in between, tile the chunk without a gap. Otherwise the records are walked one by one.
 """
 
 from __future__ import annotations
@@ -44,7 +44,9 @@ class Records:
         if not self.offsets.size:
             return frozenset()
         channels = self.channels
-        return frozenset(channels.tolist() if channels.size < _FEW else np.unique(channels).tolist())
+        return frozenset(
+            channels.tolist() if channels.size < _FEW else np.unique(channels).tolist()
+        )
 
     @property
     def channels(self) -> NDArray[np.generic]:
@@ -58,7 +60,11 @@ class Records:
             return Messages(self.content, offsets, offsets, offsets)
         lengths = gather(self.content, offsets + 1, "<u8").astype(np.int64)
         channels = self.channels
-        ours = np.isin(channels, list(wanted)) if len(wanted) > 1 else channels == next(iter(wanted), -1)
+        ours = (
+            np.isin(channels, list(wanted))
+            if len(wanted) > 1
+            else channels == next(iter(wanted), -1)
+        )
         if not ours.all():
             offsets, lengths = offsets[ours], lengths[ours]
         log_ns = gather(self.content, offsets + 15, "<i8").astype(np.int64, copy=False)
@@ -66,7 +72,10 @@ class Records:
 
 
 def joined(several: Sequence[Records]) -> Records:
-    """The records of many small chunks as those of one; what stands between messages is left out."""
+    """The records of many small chunks as those of one.
+
+    What stands between messages is left out.
+    """
     if len(several) == 1:
         return several[0]
     bases = np.cumsum([0, *(one.content.size for one in several[:-1])])
@@ -74,7 +83,9 @@ def joined(several: Sequence[Records]) -> Records:
     return Records(np.concatenate([one.content for one in several]), np.concatenate(offsets))
 
 
-def records_in(content: bytes, index: bytes = b"", works: Callable[[int], bool] = lambda _: True) -> Records:
+def records_in(
+    content: bytes, index: bytes = b"", works: Callable[[int], bool] = lambda _: True
+) -> Records:
     """The records within unpacked bytes.
 
     Parameters
@@ -88,8 +99,8 @@ def records_in(content: bytes, index: bytes = b"", works: Callable[[int], bool] 
     Raises
     ------
     DamagedError
-        If the records do not tile the bytes, a message is shorter than its head, or they are more than in any
-        honest file.
+        If the records do not tile the bytes, a message is shorter than its head, or they are more
+        than in any honest file.
     """
     octets = np.frombuffer(content, np.uint8)
     if len(content) < _SMALL:  # sooner walked than compared with its index
@@ -122,7 +133,11 @@ def _walked(octets: NDArray[np.uint8], content: bytes, works: Callable[[int], bo
         if code == framing.MESSAGE and not len(offsets) & _SOME and not works(_SOME // 2):
             raise DamagedError("more small messages than in any honest file of this size")
         place = start + length
-    return Records(octets, np.frombuffer(offsets, np.int64) if offsets else np.empty(0, np.int64), tuple(others))
+    return Records(
+        octets,
+        np.frombuffer(offsets, np.int64) if offsets else np.empty(0, np.int64),
+        tuple(others),
+    )
 
 
 def alike(octets: NDArray[np.uint8]) -> IntArray | None:
@@ -148,7 +163,11 @@ def _indexed(octets: NDArray[np.uint8], content: bytes, index: bytes) -> Records
     if records.size == 0 or records[0] < 0 or records[-1] > octets.size - HEAD:
         return None
     lengths = gather(octets, records + 1, "<u8")
-    if not np.all(octets[records] == framing.MESSAGE) or lengths.max() > octets.size or lengths.min() < _LEAST:
+    if (
+        not np.all(octets[records] == framing.MESSAGE)
+        or lengths.max() > octets.size
+        or lengths.min() < _LEAST
+    ):
         return None
     ends = records + 9 + lengths.astype(np.int64)
     gaps = np.flatnonzero(ends[:-1] != records[1:])
@@ -165,7 +184,11 @@ def _indexed(octets: NDArray[np.uint8], content: bytes, index: bytes) -> Records
             others += [(record.code, content[record.start : record.end]) for record in between]
     except DamagedError:
         return None
-    return None if any(code == framing.MESSAGE for code, _ in others) else Records(octets, records, tuple(others))
+    return (
+        None
+        if any(code == framing.MESSAGE for code, _ in others)
+        else Records(octets, records, tuple(others))
+    )
 
 
 def entries(index: bytes) -> list[tuple[int, IntArray]]:

@@ -1,7 +1,7 @@
 """A file walked from its start past what is broken: behind a broken record the next whole one is looked for.
 
-A place is taken for a record where its code and length fit, a chunk's head agrees with its length, and the same
-holds for the records that follow, as far as these are looked at.
+A place is taken for a record where its code and length fit, a chunk's head agrees with its length,
+and the same holds for the records that follow, as far as these are looked at.
 """
 
 from __future__ import annotations
@@ -32,12 +32,18 @@ _FOLLOWERS = 3
 _OUTER = (framing.CHUNK, framing.MESSAGE_INDEX, framing.DATA_END)
 """What cannot stand within a chunk."""
 _ANY = (*_OUTER, framing.SCHEMA, framing.CHANNEL, framing.MESSAGE, framing.METADATA)
-_LEAST, _MOST = (np.array([framing.SIZES.get(code, (1, 0))[side] for code in range(256)], np.uint64) for side in (0, 1))
+_LEAST, _MOST = (
+    np.array([framing.SIZES.get(code, (1, 0))[side] for code in range(256)], np.uint64)
+    for side in (0, 1)
+)
 
 
 @dataclass(frozen=True)
 class Gap:
-    """Bytes [start, end) that are no records; `torn` is the chunk that they begin with where it claims to go on."""
+    """Bytes [start, end) that are no records.
+
+    `torn` is the chunk that they begin with where it claims to go on.
+    """
 
     start: int
     end: int
@@ -61,7 +67,9 @@ def salvaged(file: File, start: int) -> Iterator[Record | Gap]:
                 start = record.end
                 others += record.code not in (framing.MESSAGE, framing.CHUNK, framing.MESSAGE_INDEX)
                 if others > LIMITS.file_records:
-                    raise DamagedError(f"more than {LIMITS.file_records} records that are neither messages nor chunks")
+                    raise DamagedError(
+                        f"more than {LIMITS.file_records} records that are neither messages nor chunks"
+                    )
                 yield record
                 if record.code == framing.FOOTER:
                     break
@@ -73,13 +81,20 @@ def salvaged(file: File, start: int) -> Iterator[Record | Gap]:
 
 
 def _next(file: File, start: int, tried: int, among: Collection[int]) -> tuple[int, int]:
-    """Where the next record stands that has one of the codes `among`, else the end; and the places tried so far."""
+    """Where the next record stands that has one of the codes `among`, else the end.
+
+    And the places tried so far.
+    """
     for base in range(start, file.size - FRAME.size + 1, _WINDOW):
         octets = np.frombuffer(file.read(base, min(_WINDOW + 8, file.size - base)), np.uint8)
         codes = octets[:-8]
         lengths: NDArray[np.uint64] = np.ndarray(codes.size, np.dtype("<u8"), octets.data, 1, (1,))
-        room = np.arange(file.size - base - FRAME.size, file.size - base - FRAME.size - codes.size, -1)
-        fits = (lengths >= _LEAST[codes]) & (lengths <= np.minimum(_MOST[codes], room.astype(np.uint64)))
+        room = np.arange(
+            file.size - base - FRAME.size, file.size - base - FRAME.size - codes.size, -1
+        )
+        fits = (lengths >= _LEAST[codes]) & (
+            lengths <= np.minimum(_MOST[codes], room.astype(np.uint64))
+        )
         for place in np.flatnonzero(fits).tolist():
             if int(codes[place]) not in among:
                 continue

@@ -28,7 +28,9 @@ class Messages:
 def gather(octets: NDArray[np.uint8], places: IntArray, kind: str) -> NDArray[np.generic]:
     """The numbers of type `kind` at byte `places` (N,), aligned or not."""
     width = np.dtype(kind).itemsize
-    window: NDArray[np.generic] = np.ndarray(max(0, octets.size - width + 1), np.dtype(kind), octets.data, strides=(1,))
+    window: NDArray[np.generic] = np.ndarray(
+        max(0, octets.size - width + 1), np.dtype(kind), octets.data, strides=(1,)
+    )
     return window[places]
 
 
@@ -81,8 +83,14 @@ class Account:
         said = []
         if self.spans:
             missing = self.lost if promised is None else promised - self.found
-            text = f"{counted(self.spans, f'damaged {self.what}')} left out; the first: {self.reason}"
-            counting = f"; {counted(missing, 'message is missing', 'messages are missing')}" if missing else ""
+            text = (
+                f"{counted(self.spans, f'damaged {self.what}')} left out; the first: {self.reason}"
+            )
+            counting = (
+                f"; {counted(missing, 'message is missing', 'messages are missing')}"
+                if missing
+                else ""
+            )
             said.append(Notice("DAMAGED_CHUNK", text + counting, lossy=True))
         elif promised is not None and promised != self.found:
             text = f"the file counts {counted(promised, 'message')} and holds {self.found}"
@@ -101,5 +109,7 @@ class Account:
             )
             said.append(Notice("TORN_CHUNK", text, lossy=True))
         if self.unchecked:
-            said.append(Notice("NO_CHECKSUM", "the file has no checksums: damaged values would go unseen"))
+            said.append(
+                Notice("NO_CHECKSUM", "the file has no checksums: damaged values would go unseen")
+            )
         return said

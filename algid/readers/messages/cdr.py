@@ -1,7 +1,7 @@
 """CDR, the encoding of ROS 2 messages (XCDR version 1, either byte order): the shape of one message.
 
-Numbers are aligned to their own size, counted from behind the four bytes of the encapsulation. Messages of ROS 1 have
-neither: their numbers, little endian, stand one behind the other.
+Numbers are aligned to their own size, counted from behind the four bytes of the encapsulation.
+Messages of ROS 1 have neither: their numbers, little endian, stand one behind the other.
 """
 
 from __future__ import annotations
@@ -63,7 +63,9 @@ class _Walk:
         width = int(code[1])
         if count:
             self.align(width)
-        self.shape.numbers[path] = Numbers(self.place, f"{self.order}{code}" if width > 1 else f"|{code}", count)
+        self.shape.numbers[path] = Numbers(
+            self.place, f"{self.order}{code}" if width > 1 else f"|{code}", count
+        )
         self.advance(count * width)
 
     def length(self) -> int:
@@ -96,7 +98,9 @@ class _Walk:
 
     def possible(self, count: int, least: int) -> int:
         if count * least > len(self.payload) - self.place:
-            raise MisfitError(f"a message of {counted(len(self.payload), 'byte')} that claims a list of {count}")
+            raise MisfitError(
+                f"a message of {counted(len(self.payload), 'byte')} that claims a list of {count}"
+            )
         return count
 
 
@@ -121,7 +125,9 @@ def walk(payload: bytes, root: str, types: Types) -> Shape:
     walk = _Walk(payload, types, shape, _ENDINGS[representation])
     walk.structure(root, "")
     if len(payload) - walk.place > _PADDING:
-        raise MisfitError(f"a message of {counted(len(payload), 'byte')} where its schema ends at {walk.place}")
+        raise MisfitError(
+            f"a message of {counted(len(payload), 'byte')} where its schema ends at {walk.place}"
+        )
     return shape
 
 
@@ -136,5 +142,7 @@ def walk_ros1(payload: bytes, root: str, types: Types) -> Shape:
     walk = _Walk(payload, types, Shape(), head=0, aligned=False)
     walk.structure(root, "")
     if len(payload) != walk.place:
-        raise MisfitError(f"a message of {counted(len(payload), 'byte')} where its schema ends at {walk.place}")
+        raise MisfitError(
+            f"a message of {counted(len(payload), 'byte')} where its schema ends at {walk.place}"
+        )
     return walk.shape

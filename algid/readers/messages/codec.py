@@ -51,8 +51,12 @@ def walk_for(path: str, channel: MessageChannel) -> Walk:
     )
 
 
-def decoder_for(path: str, channel: MessageChannel, wanted: Mapping[str, str], works: Callable[[int], bool]) -> Decoder:
-    """What reads the numbers `wanted`, by name a path each, out of a channel's messages; `works` as in `Decoder`.
+def decoder_for(
+    path: str, channel: MessageChannel, wanted: Mapping[str, str], works: Callable[[int], bool]
+) -> Decoder:
+    """What reads the numbers `wanted`, by name a path each, out of a channel's messages.
+
+    `works` as in `Decoder`.
 
     Raises
     ------

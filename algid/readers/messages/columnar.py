@@ -1,7 +1,7 @@
 """The shape of one message: where its numbers stand, which bytes fix that, and what its strings say.
 
-Messages of one size whose fixing bytes are equal have the same shape, so what one walk over one message
-found holds for all of them: that is what makes reading by columns possible.
+Messages of one size whose fixing bytes are equal have the same shape, so what one walk over one
+message found holds for all of them: that is what makes reading by columns possible.
 
 Columns out of messages: one scalar walk for each layout, NumPy for every message that has it.
 """
@@ -89,7 +89,11 @@ class Shape:
             if not part.startswith("["):
                 place += part
                 continue
-            lists = (texts for one, texts in self.texts.items() if one.rpartition(".")[0] == parent and name in texts)
+            lists = (
+                texts
+                for one, texts in self.texts.items()
+                if one.rpartition(".")[0] == parent and name in texts
+            )
             names = next(lists, ())  # a name first: joints may be called "1" and "2"
             if names.count(name) > 1 or not (names or name.isdigit()):
                 return None
@@ -108,9 +112,12 @@ class Shape:
     def of_others(self, paths: Iterable[str]) -> bool:
         """Whether the message is of other joints than those that `paths` such as ``effort[elbow]`` name.
 
-        A message that names one of them, or numbers without any name, is no other publisher's: it lacks something.
+        A message that names one of them, or numbers without any name, is no other publisher's: it
+        lacks something.
         """
-        joints = {found[1] for path in paths if (found := _NAMED.match(path)) and not found[1].isdigit()}
+        joints = {
+            found[1] for path in paths if (found := _NAMED.match(path)) and not found[1].isdigit()
+        }
         lists = [texts for texts in self.texts.values() if texts]
         if not joints or any(joints.intersection(texts) for texts in lists):
             return False
@@ -154,16 +161,24 @@ class Layout:
         octets, columns = table.view(np.uint8), Fields()
         for name, at in (self.fields or {}).items():
             start, rows = self.lead + at.offset, octets.shape[0]
-            if at.kind in ("varint", "unsigned", "zigzag"):  # in base 128, the lowest seven bits first
+            if at.kind in (
+                "varint",
+                "unsigned",
+                "zigzag",
+            ):  # in base 128, the lowest seven bits first
                 digits = (octets[:, start : start + at.width] & 0x7F).astype(np.uint64)
-                total = np.bitwise_or.reduce(digits << (7 * np.arange(at.width, dtype=np.uint64)), axis=1)
+                total = np.bitwise_or.reduce(
+                    digits << (7 * np.arange(at.width, dtype=np.uint64)), axis=1
+                )
                 if at.kind == "zigzag":
                     total = (total >> np.uint64(1)) ^ (np.uint64(0) - (total & np.uint64(1)))
                 columns[name] = total if at.kind == "unsigned" else total.view(np.int64)
             elif at.kind == "zero":  # a number that protobuf leaves out because it is zero
                 columns[name] = np.zeros(rows)
             else:
-                columns[name] = np.ndarray(rows, np.dtype(at.kind), octets.data, start, (octets.strides[0],))
+                columns[name] = np.ndarray(
+                    rows, np.dtype(at.kind), octets.data, start, (octets.strides[0],)
+                )
         return columns
 
 
@@ -180,7 +195,9 @@ def layout(payload: bytes, shape: Shape, wanted: Mapping[str, str]) -> Layout:
     found = {name: at for name, path in wanted.items() if (at := shape.find(path)) is not None}
     if len(found) == len(wanted):
         return Layout(lead, words, masks[words], whole[words] & masks[words], found)
-    return Layout(lead, words, masks[words], whole[words] & masks[words], None, missing(shape, wanted))
+    return Layout(
+        lead, words, masks[words], whole[words] & masks[words], None, missing(shape, wanted)
+    )
 
 
 def missing(shape: Shape, wanted: Mapping[str, str]) -> tuple[str, ...]:
@@ -209,8 +226,8 @@ class Decoder(ABC):
     Attributes
     ----------
     skipped, lacking, misfits : int
-        Messages left out so far: those of other joints, those that lack a number wanted, and those that do not fit
-        their schema.
+        Messages left out so far: those of other joints, those that lack a number wanted, and those
+        that do not fit their schema.
     lacks : tuple of str
         Names of the numbers that one of those messages lacks.
     misfit : str
@@ -236,12 +253,17 @@ class Decoder(ABC):
         before = self.misfits + self.lacking
         held = np.zeros(len(messages), np.bool_)
         fields = self.read(messages, held)
-        self.skipped += int(held.size - np.count_nonzero(held)) - (self.misfits + self.lacking - before)
+        self.skipped += int(held.size - np.count_nonzero(held)) - (
+            self.misfits + self.lacking - before
+        )
         return held, fields
 
     @abstractmethod
     def read(self, messages: Messages, held: NDArray[np.bool_]) -> Fields:
-        """The numbers of the messages that hold what is wanted, by name; notes in `held` (N,) which do."""
+        """The numbers of the messages that hold what is wanted, by name.
+
+        Notes in `held` (N,) which do.
+        """
 
     def misfitting(self, why: str, messages: int = 1) -> None:
         """Count messages that do not fit their schema."""
@@ -262,7 +284,9 @@ class Decoder(ABC):
 
 @dataclass
 class ColumnDecoder(Decoder):
-    """The decoder of encodings in which a number's place is known by its message's layout; remembers those it met.
+    """The decoder of encodings in which a number's place is known by its message's layout.
+
+    Remembers those it met.
 
     `walk` gives the shape of one payload, or raises `MisfitError`.
     """
@@ -272,10 +296,15 @@ class ColumnDecoder(Decoder):
     _words: int = 0
 
     def read(self, messages: Messages, held: NDArray[np.bool_]) -> Fields:
-        """The numbers of the messages that hold what is wanted, by name; notes in `held` (N,) which do."""
+        """The numbers of the messages that hold what is wanted, by name.
+
+        Notes in `held` (N,) which do.
+        """
         parts: list[tuple[NDArray[np.intp], Fields]] = []
         order = np.argsort(messages.sizes, kind="stable")
-        for rows in filter(len, np.split(order, np.flatnonzero(np.diff(messages.sizes[order])) + 1)):
+        for rows in filter(
+            len, np.split(order, np.flatnonzero(np.diff(messages.sizes[order])) + 1)
+        ):
             size = int(messages.sizes[rows[0]])
             self.spend(_WORK_A_SIZE, _TOO_MANY)
             if size > LIMITS.message_bytes:
@@ -287,7 +316,10 @@ class ColumnDecoder(Decoder):
         if len(parts) < 2:
             return parts[0][1] if parts else {name: np.empty(0) for name in self.wanted}
         places = np.argsort(np.concatenate([chosen for chosen, _ in parts]))
-        return {name: np.concatenate([fields[name] for _, fields in parts])[places] for name in parts[0][1]}
+        return {
+            name: np.concatenate([fields[name] for _, fields in parts])[places]
+            for name in parts[0][1]
+        }
 
     def _of_one_size(
         self, messages: Messages, size: int, rows: NDArray[np.intp]
@@ -314,7 +346,9 @@ class ColumnDecoder(Decoder):
                         self.without(one.lacks)
                     else:
                         yield rows[left[:1]], one.read(table[left[:1]])
-                    left = left[1:]  # one by one from here: what is remembered must not grow with the file
+                    left = left[
+                        1:
+                    ]  # one by one from here: what is remembered must not grow with the file
                     continue
                 known.append(one)
                 self._words += one.words.size
@@ -324,7 +358,11 @@ class ColumnDecoder(Decoder):
                 self.without(one.lacks, int(np.count_nonzero(fits)))
             elif fits.any():
                 whole = fits.all() and left.size == rows.size
-                yield (rows, one.read(table)) if whole else (rows[left[fits]], one.read(table[left[fits]]))
+                yield (
+                    (rows, one.read(table))
+                    if whole
+                    else (rows[left[fits]], one.read(table[left[fits]]))
+                )
             left = left[~fits]
 
     def _new(self, messages: Messages, row: int) -> Layout | None:

@@ -1,11 +1,12 @@
 """ROS 2 message definitions as recorders store them: one text, every nested type behind a line of ``=``.
 
-Either .msg text, or IDL as rosidl makes it: modules, structures, sequences, arrays, typedefs. What rosidl never makes
-(unions, enumerations, optional members, lists of lists) is refused.
+Either .msg text, or IDL as rosidl makes it: modules, structures, sequences, arrays, typedefs. What
+rosidl never makes (unions, enumerations, optional members, lists of lists) is refused.
 
-Both are read by hand. rosbags' parser, the oracle of the tests, stops at the ``#include`` that every IDL file of rosidl
-begins with; it takes 200 ms for the IDL of JointState where this one takes 0.3 ms, and 1 ms for its .msg text where
-this one takes 0.05 ms; and modules nested a hundred times end it in a RecursionError.
+Both are read by hand. rosbags' parser, the oracle of the tests, stops at the ``#include`` that
+every IDL file of rosidl begins with; it takes 200 ms for the IDL of JointState where this one
+takes 0.3 ms, and 1 ms for its .msg text where this one takes 0.05 ms; and modules nested a hundred
+times end it in a RecursionError.
 """
 
 from __future__ import annotations
@@ -81,7 +82,10 @@ def parse_msg(root: str, text: str, known: Types | None = None) -> Types:
         if found is None:
             raise DefinitionError(f"{root}: expected 'MSG: package/Type', found {head[:60]!r}")
         types[found[1]] = _fields(found[1], body)
-    resolved = {name: tuple(_resolved(field, name, types) for field in fields) for name, fields in types.items()}
+    resolved = {
+        name: tuple(_resolved(field, name, types) for field in fields)
+        for name, fields in types.items()
+    }
     _check_depth(root, resolved, {})
     return resolved
 
@@ -120,7 +124,12 @@ def _resolved(field: Field, owner: str, types: Types) -> Field:
         return field
     wanted = field.type if "/" in field.type else f"{owner.split('/')[0]}/{field.type}"
     package, _, rest = wanted.partition("/")
-    for name in (wanted, wanted.replace("/msg/", "/"), f"{package}/msg/{rest}", _SHORT.get(field.type, wanted)):
+    for name in (
+        wanted,
+        wanted.replace("/msg/", "/"),
+        f"{package}/msg/{rest}",
+        _SHORT.get(field.type, wanted),
+    ):
         if name in types:
             return Field(field.name, name, field.count)
     raise DefinitionError(f"{owner}: the type {field.type!r} of {field.name!r} is not defined")
@@ -129,7 +138,11 @@ def _resolved(field: Field, owner: str, types: Types) -> Field:
 def _check_depth(name: str, types: Types, known: dict[str, int], above: int = 0) -> int:
     """Types below one another under `name`, each looked at once, however often it is used; too many are refused."""
     if name not in known and above <= LIMITS.definition_depth:
-        below = (_check_depth(field.type, types, known, above + 1) for field in types[name] if field.type in types)
+        below = (
+            _check_depth(field.type, types, known, above + 1)
+            for field in types[name]
+            if field.type in types
+        )
         known[name] = 1 + max(below, default=0)
     if above + known.get(name, 1) > LIMITS.definition_depth:
         raise DefinitionError(f"{name}: types nested more than {LIMITS.definition_depth} deep")
@@ -147,7 +160,9 @@ _NUMBERS = {
     "double": "float64",
 }  # fmt: skip
 _LONGER = frozenset(
-    " ".join(words[: size + 1]) for words in (name.split() for name in _NUMBERS) for size in range(1, len(words))
+    " ".join(words[: size + 1])
+    for words in (name.split() for name in _NUMBERS)
+    for size in range(1, len(words))
 )
 """Names of numbers that go on behind a blank: ``unsigned long`` and ``unsigned long long``."""
 
@@ -166,7 +181,9 @@ def parse_idl(root: str, text: str) -> Types:
         tokens = [one["token"] for one in _TOKEN.finditer(section) if one["token"]]
         _Parser(root, tokens, found).definitions(())
     if root not in found.structures:
-        raise DefinitionError(f"{root}: not defined; found {', '.join([*found.structures][:8]) or 'no structure'}")
+        raise DefinitionError(
+            f"{root}: not defined; found {', '.join([*found.structures][:8]) or 'no structure'}"
+        )
     types = {
         owner: tuple(found.resolved(owner, name, spec) for name, spec in members)
         for owner, members in found.structures.items()
@@ -187,7 +204,10 @@ class _Spec:
         """Names it may mean, parts joined by ``/``, the innermost first."""
         name = self.name.removeprefix("::").replace("::", "/")
         outermost = len(self.scope) if self.name.startswith("::") else 0
-        return ["/".join((*self.scope[: len(self.scope) - up], name)) for up in range(outermost, len(self.scope) + 1)]
+        return [
+            "/".join((*self.scope[: len(self.scope) - up], name))
+            for up in range(outermost, len(self.scope) + 1)
+        ]
 
 
 @dataclass
@@ -202,7 +222,14 @@ class _Definitions:
         for _ in range(LIMITS.definition_depth):
             if spec.name in PRIMITIVES or spec.name in TEXTS:
                 return Field(name, spec.name, spec.count)
-            meant = next((one for one in spec.candidates() if one in self.structures or one in self.typedefs), None)
+            meant = next(
+                (
+                    one
+                    for one in spec.candidates()
+                    if one in self.structures or one in self.typedefs
+                ),
+                None,
+            )
             if meant is None:
                 raise DefinitionError(f"{owner}: the type {spec.name!r} of {name!r} is not defined")
             if meant in self.structures:
@@ -211,7 +238,9 @@ class _Definitions:
             if alias.count is not None and spec.count is not None:
                 raise DefinitionError(f"{owner}: {name!r} is a list of lists")
             spec = _Spec(alias.name, alias.scope, alias.count if spec.count is None else spec.count)
-        raise DefinitionError(f"{owner}: typedefs of {name!r} nested more than {LIMITS.definition_depth} deep")
+        raise DefinitionError(
+            f"{owner}: typedefs of {name!r} nested more than {LIMITS.definition_depth} deep"
+        )
 
 
 @dataclass
@@ -226,7 +255,9 @@ class _Parser:
     def definitions(self, scope: tuple[str, ...]) -> None:
         """Definitions up to the end, or to the brace that closes a module."""
         if len(scope) > LIMITS.definition_depth:
-            raise DefinitionError(f"{self.root}: modules nested more than {LIMITS.definition_depth} deep")
+            raise DefinitionError(
+                f"{self.root}: modules nested more than {LIMITS.definition_depth} deep"
+            )
         while self.place < len(self.tokens) and not (scope and self.tokens[self.place] == "}"):
             self._annotations()
             kind = self._next()
@@ -238,7 +269,9 @@ class _Parser:
             elif kind == "struct":
                 self._structure(scope)
             elif kind == "typedef":
-                self.found.typedefs |= {"/".join((*scope, name)): spec for name, spec in self._declared(scope)}
+                self.found.typedefs |= {
+                    "/".join((*scope, name)): spec for name, spec in self._declared(scope)
+                }
             elif kind == "const":
                 while self._next() != ";":
                     pass
@@ -272,7 +305,9 @@ class _Parser:
             if token == ";":
                 return declared
             if token != ",":
-                raise DefinitionError(f"{self.root}: {token[:40]!r} behind {name!r}; expected ',' or ';'")
+                raise DefinitionError(
+                    f"{self.root}: {token[:40]!r} behind {name!r}; expected ',' or ';'"
+                )
 
     def _type(self) -> tuple[str, int | None]:
         """The name of a type, and -1 for a sequence of it."""
@@ -289,7 +324,9 @@ class _Parser:
             return inner, -1
         if name in TEXTS and self._taken("<"):
             self._number(">")
-        while f"{name} {self.tokens[self.place] if self.place < len(self.tokens) else ''}" in _LONGER:
+        while (
+            f"{name} {self.tokens[self.place] if self.place < len(self.tokens) else ''}" in _LONGER
+        ):
             name = f"{name} {self._next()}"
         return _NUMBERS.get(name, name), None
 

@@ -40,7 +40,9 @@ def walk(payload: bytes) -> Shape:
 
 def _object(payload: bytes) -> dict[str, Any]:
     if len(payload) > LIMITS.json_bytes:
-        raise MisfitError(f"a JSON message of {counted(len(payload), 'byte')}; expected {LIMITS.json_bytes} at most")
+        raise MisfitError(
+            f"a JSON message of {counted(len(payload), 'byte')}; expected {LIMITS.json_bytes} at most"
+        )
     try:
         found = json.loads(payload)
     except (ValueError, RecursionError) as error:
@@ -69,13 +71,19 @@ class JsonDecoder(Decoder):
     """The decoder of JSON messages."""
 
     def read(self, messages: Messages, held: NDArray[np.bool_]) -> Fields:
-        """The numbers of the messages that hold what is wanted, by name; notes in `held` (N,) which do."""
+        """The numbers of the messages that hold what is wanted, by name.
+
+        Notes in `held` (N,) which do.
+        """
         self.spend(int(messages.sizes.sum()) // _BYTES_A_STEP, _TOO_MUCH)
         paths = [_PART.findall(path) for path in self.wanted.values()]
         rows: list[list[Any]] = []
         for row, (start, size) in enumerate(zip(messages.starts, messages.sizes, strict=True)):
             payload = messages.content[start : start + size].tobytes()
-            self.spend(payload.count(b":") * _STEPS_A_COLON + payload.count(b",") // _COMMAS_A_STEP, _TOO_MUCH)
+            self.spend(
+                payload.count(b":") * _STEPS_A_COLON + payload.count(b",") // _COMMAS_A_STEP,
+                _TOO_MUCH,
+            )
             try:
                 found = _object(payload)
             except MisfitError as error:
@@ -87,7 +95,9 @@ class JsonDecoder(Decoder):
                 rows.append(values)
             else:
                 self._without(found, values)
-        return {name: _column([row[place] for row in rows]) for place, name in enumerate(self.wanted)}
+        return {
+            name: _column([row[place] for row in rows]) for place, name in enumerate(self.wanted)
+        }
 
     def _without(self, found: dict[str, Any], values: list[int | float | None]) -> None:
         shape = Shape()
@@ -102,12 +112,17 @@ class JsonDecoder(Decoder):
 
 
 def _column(values: list[int | float]) -> NDArray[np.int64] | NDArray[np.float64]:
-    """Numbers as int64 where all of them are whole and that small; infinite where beyond float64."""
+    """Numbers as int64 where all of them are whole and that small.
+
+    Infinite where beyond float64.
+    """
     if values and all(isinstance(value, int) and abs(value) < 2**63 for value in values):
         return np.array(values, np.int64)
     with suppress(OverflowError):
         return np.array(values, np.float64)
-    beyond = [math.inf if isinstance(value, int) and abs(value) >= _BEYOND else value for value in values]
+    beyond = [
+        math.inf if isinstance(value, int) and abs(value) >= _BEYOND else value for value in values
+    ]
     return np.array(beyond, np.float64)
 
 
@@ -133,11 +148,17 @@ class _Paths:
             name, index = part[1:-1], None
             if isinstance(parent, dict):
                 if id(parent) not in self._lists:
-                    self._lists[id(parent)] = [one for one in parent.values() if isinstance(one, list)]
+                    self._lists[id(parent)] = [
+                        one for one in parent.values() if isinstance(one, list)
+                    ]
                 names = next((one for one in self._lists[id(parent)] if name in one), None)
                 if names is not None:  # one that stands there twice has no place
                     index = names.index(name) if names.count(name) == 1 else len(names)
             if index is None and name.isdigit():
                 index = int(name)
-            found = found[index] if isinstance(found, list) and index is not None and index < len(found) else None
+            found = (
+                found[index]
+                if isinstance(found, list) and index is not None and index < len(found)
+                else None
+            )
         return found if isinstance(found, (int, float)) and not isinstance(found, bool) else None

@@ -49,7 +49,8 @@ class NothingFoundError(LogError):
 class Plan:
     """The topics to read, the main one first, where each channel comes from, and what was decided.
 
-    `others` has by joint the path of its position, of those that the main topic names and nobody asked for.
+    `others` has by joint the path of its position, of those that the main topic names and nobody
+    asked for.
     """
 
     topics: tuple[Topic, ...]
@@ -68,7 +69,9 @@ def plan(source: Source, profile: Profile | None) -> Plan:
     LogError
         If no topic holds the joints, several do, or a message cannot be read.
     """
-    places = {name: profile.place(name) for name in (*JOINT_CHANNELS, *VELOCITIES)} if profile else {}
+    places = (
+        {name: profile.place(name) for name in (*JOINT_CHANNELS, *VELOCITIES)} if profile else {}
+    )
     named = {name: (topic, source) for name, (topic, source) in places.items() if source}
     usual = _usual_topic(source, profile) if len(named) < len(JOINT_CHANNELS) else None
     sources: dict[str, tuple[str, str]] = {}
@@ -98,7 +101,11 @@ def plan(source: Source, profile: Profile | None) -> Plan:
     clock = topics[0].fields.stamp if topics[0].clock != "log" else None
     mapping["t"] = f"{homes[0]}: {clock[0].rpartition('.')[0]}" if clock else "log time"
     reading = replace(reading, topics=tuple(homes), clock="header" if clock else "log")
-    units = {} if usual is None else {name: one for name, one in usual.units.items() if name not in named}
+    units = (
+        {}
+        if usual is None
+        else {name: one for name, one in usual.units.items() if name not in named}
+    )
     others = usual.others if usual is not None and usual.topic == topics[0].name else {}
     return Plan(topics, mapping, reading, notices, units, others)
 
@@ -113,7 +120,9 @@ def _choice_notice(usual: _Usual) -> tuple[Notice, ...]:
     return (Notice("TOPIC_CHOICE", text, note=True, remedies=(other,)),)
 
 
-def _topic(source: Source, name: str, sources: dict[str, tuple[str, str]], profile: Profile | None) -> Topic:
+def _topic(
+    source: Source, name: str, sources: dict[str, tuple[str, str]], profile: Profile | None
+) -> Topic:
     """A topic by its name, with those of `sources` that are its own, of the type that misses the fewest of them."""
     paths = {channel: path for channel, (topic, path) in sources.items() if topic == name}
     best: tuple[str, list[str], list[str], tuple[str, str] | None] | None = None
@@ -128,7 +137,9 @@ def _topic(source: Source, name: str, sources: dict[str, tuple[str, str]], profi
             best = (kind, missing, known, stamp)
     if best is None:
         mend = '--topic NAME, or --set CHANNEL.topic=NAME for one channel (profile: topic = "NAME")'
-        text = f"there is no message on topic {name!r}; found {listed(source)}; name another: {mend}"
+        text = (
+            f"there is no message on topic {name!r}; found {listed(source)}; name another: {mend}"
+        )
         raise NothingFoundError(f"{source.path}: {text}")
     kind, missing, known, stamp = best
     for channel in missing:
@@ -138,7 +149,9 @@ def _topic(source: Source, name: str, sources: dict[str, tuple[str, str]], profi
         )
     clock = profile.clock if profile else None
     if clock == "header" and stamp is None:
-        raise LogError(f'{source.path}: messages on {name!r} carry no stamp: --clock log (profile: clock = "log")')
+        raise LogError(
+            f'{source.path}: messages on {name!r} carry no stamp: --clock log (profile: clock = "log")'
+        )
     return Topic(name, kind, Fields(paths, stamp), clock)
 
 
@@ -177,7 +190,11 @@ def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
                     many.setdefault(name, {}).update(dict.fromkeys(joints))
                 elif len(joints) < 2 and names:
                     last = len(names) - 1
-                    short = [what for what in ("position", "effort") if shape.find(f"{what}[{last}]") is None]
+                    short = [
+                        what
+                        for what in ("position", "effort")
+                        if shape.find(f"{what}[{last}]") is None
+                    ]
                     stays = f", whose {' and '.join(short)} stay empty" if short else ""
                     lacking.append(f"{name!r} with the joints {', '.join(names[:8])}{stays}")
         except LogError as error:  # another topic may still hold the joints
@@ -198,14 +215,23 @@ def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
         raise refused[0]
     if profile is not None and all(profile.channel(name).source for name in JOINT_CHANNELS):
         return None
-    wanted = f"the joints {profile.joints}" if profile and profile.joints else "positions and efforts of two joints"
+    wanted = (
+        f"the joints {profile.joints}"
+        if profile and profile.joints
+        else "positions and efforts of two joints"
+    )
     mend = "--topic NAME --joints A,B, or --set tau1.topic=NAME --set tau1.source=FIELD … (profile: topic, joints, …)"
     there = "; ".join([*dict.fromkeys(lacking)][:4]) or listed(source)
-    raise NothingFoundError(f"{source.path}: no topic holds {wanted}; found {there}; name topics and fields: {mend}")
+    raise NothingFoundError(
+        f"{source.path}: no topic holds {wanted}; found {there}; name topics and fields: {mend}"
+    )
 
 
 def _fitting(topic: str, shape: Shape, joints: list[str], profile: Profile | None) -> _Usual | None:
-    """Two of a message's `joints` and their fields; None where it has not both, or of more nobody chose two."""
+    """Two of a message's `joints` and their fields.
+
+    None where it has not both, or of more nobody chose two.
+    """
     if profile is not None and profile.joints is not None:
         chosen = profile.joints if set(profile.joints) <= set(joints) else None
     else:
@@ -213,7 +239,9 @@ def _fitting(topic: str, shape: Shape, joints: list[str], profile: Profile | Non
     if chosen:
         there = (joints[0], joints[1]) if len(joints) == 2 else chosen
         named = bool(names_in(shape))
-        return _Usual(topic, there, named, joint_fields(shape, chosen), others=other_positions(shape, chosen))
+        return _Usual(
+            topic, there, named, joint_fields(shape, chosen), others=other_positions(shape, chosen)
+        )
     if joints or repeated_name(shape):
         return None
     # plain numbers by their names: {"q1": …, "tau1": …} or {"q": […], "tau": […]}
@@ -225,10 +253,18 @@ def _fitting(topic: str, shape: Shape, joints: list[str], profile: Profile | Non
     found = {name: path for name, path in choice.columns.items() if name != "t"}
     if not all(name in found for name in VELOCITIES):
         found = {name: path for name, path in found.items() if name not in VELOCITIES}
-    if not set(JOINT_CHANNELS) <= found.keys() or not all(shape.find(path) for path in found.values()):
+    if not set(JOINT_CHANNELS) <= found.keys() or not all(
+        shape.find(path) for path in found.values()
+    ):
         return None
     currents = {name: "A" for name, path in found.items() if take_apart(path).stem in CURRENTS}
-    return _Usual(topic, choice.joints or ("1", "2"), choice.joints is not None, found, {**choice.units, **currents})
+    return _Usual(
+        topic,
+        choice.joints or ("1", "2"),
+        choice.joints is not None,
+        found,
+        {**choice.units, **currents},
+    )
 
 
 def _candidates(source: Source, profile: Profile | None) -> list[tuple[str, str]]:
@@ -260,14 +296,19 @@ def fields_shown(source: Source, number: int) -> tuple[tuple[str, ...], tuple[st
     if shape is None:
         return (), ()
     joints = names_in(shape)
-    return joints, tuple(path for name, one in shape.numbers.items() for path in _paths_of(name, one.count, joints))
+    return joints, tuple(
+        path for name, one in shape.numbers.items() for path in _paths_of(name, one.count, joints)
+    )
 
 
 def _paths_of(name: str, count: int, joints: tuple[str, ...]) -> list[str]:
     """The paths of a field's numbers: one, none, or one a place."""
     if count < 2:
         return [name if count else f"{name} (empty)"]
-    return [f"{name}[{place}]" for place in (joints if len(joints) == count else range(min(count, LIMITS.joint_cells)))]
+    return [
+        f"{name}[{place}]"
+        for place in (joints if len(joints) == count else range(min(count, LIMITS.joint_cells)))
+    ]
 
 
 def _shapes(source: Source, topic: str, type_name: str) -> Iterator[Shape]:
@@ -294,7 +335,9 @@ def _shapes(source: Source, topic: str, type_name: str) -> Iterator[Shape]:
         for start, size in zip(messages.starts[:_SAMPLES], messages.sizes[:_SAMPLES], strict=True):
             _work(source, topic, size // _BYTES_A_STEP)
             try:
-                shape = walk(messages.content[start : start + min(size, LIMITS.message_bytes)].tobytes())
+                shape = walk(
+                    messages.content[start : start + min(size, LIMITS.message_bytes)].tobytes()
+                )
             except MisfitError as error:
                 misfit = error
                 continue
@@ -302,10 +345,14 @@ def _shapes(source: Source, topic: str, type_name: str) -> Iterator[Shape]:
             _work(source, topic, shape.parts)
             yield shape
         if misfit and not fitting:
-            raise LogError(f"{source.path}: topic {topic!r}: {misfit}; it cannot be read") from misfit
+            raise LogError(
+                f"{source.path}: topic {topic!r}: {misfit}; it cannot be read"
+            ) from misfit
         return
 
 
 def _work(source: Source, topic: str, steps: int) -> None:
     if not source.works(steps):
-        raise LogError(f"{source.path}: topic {topic!r}: messages or definitions of more parts than any recorder's")
+        raise LogError(
+            f"{source.path}: topic {topic!r}: messages or definitions of more parts than any recorder's"
+        )

@@ -1,11 +1,13 @@
 """Protocol buffers: the shape of one message, and the message types out of a FileDescriptorSet.
 
-A varint's width is fixed by the highest bits of its bytes, so those are the bytes that fix a shape, beside
-keys and lengths. A plain number of proto3 that is zero is left out of its message: it is read as zero. A number that
-can be told to be unset is not: one of a oneof, an ``optional`` one, one of proto2, one of a message that is not there.
+A varint's width is fixed by the highest bits of its bytes, so those are the bytes that fix a
+shape, beside keys and lengths. A plain number of proto3 that is zero is left out of its message:
+it is read as zero. A number that can be told to be unset is not: one of a oneof, an ``optional``
+one, one of proto2, one of a message that is not there.
 
-google.protobuf reads the descriptors. Messages are walked by hand, since it does not tell where in a message a number
-stands: that is what lets a hundred thousand be read at once (`make bench-ingest` has the figure).
+google.protobuf reads the descriptors. Messages are walked by hand, since it does not tell where in
+a message a number stands: that is what lets a hundred thousand be read at once (`make
+bench-ingest` has the figure).
 """
 
 from __future__ import annotations
@@ -32,7 +34,8 @@ _IMPLICIT = 2
 class ProtobufField:
     """A field: its name, type number, message type where it is one, and whether it repeats.
 
-    `implicit`: it is left out where it is zero. `oneof`: the number of the oneof that it is of, None if of none.
+    `implicit`: it is left out where it is zero. `oneof`: the number of the oneof that it is of,
+    None if of none.
     """
 
     name: str
@@ -91,12 +94,19 @@ def _implicit(file: Any) -> bool:
 
 
 def _field(one: Any, implicit: bool) -> ProtobufField:
-    oneof = one.oneof_index if one.HasField("oneof_index") else None  # an optional field of proto3 has one of its own
+    oneof = (
+        one.oneof_index if one.HasField("oneof_index") else None
+    )  # an optional field of proto3 has one of its own
     presence = int(one.options.features.field_presence)
     implicit = presence == _IMPLICIT if presence else implicit
     message = one.type_name.lstrip(".")
     return ProtobufField(
-        one.name, one.type, message, one.label == _REPEATED, implicit=implicit and oneof is None, oneof=oneof
+        one.name,
+        one.type,
+        message,
+        one.label == _REPEATED,
+        implicit=implicit and oneof is None,
+        oneof=oneof,
     )
 
 
@@ -153,8 +163,9 @@ def walk(payload: bytes, root: str, types: Types) -> Shape:
 class _Walk:
     """A walk over one message.
 
-    `counts` has by path of a repeated field how many of it there are so far, `there` the paths of messages. A field
-    that comes again goes on where it ended, wherever it stands: so do the parts of a message that comes again.
+    `counts` has by path of a repeated field how many of it there are so far, `there` the paths of
+    messages. A field that comes again goes on where it ended, wherever it stands: so do the parts
+    of a message that comes again.
     """
 
     def __init__(self, data: bytes, types: Types, root: str) -> None:
@@ -205,7 +216,9 @@ class _Walk:
             self._field(field, wire, first, stop, f"{prefix}{field.name}", depth)
         self.shape.fix(last, end)
 
-    def _field(self, field: ProtobufField, wire: int, first: int, stop: int, path: str, depth: int) -> None:
+    def _field(
+        self, field: ProtobufField, wire: int, first: int, stop: int, path: str, depth: int
+    ) -> None:
         if wire == 2 and field.type == _MESSAGE:
             place = f"{path}[{self._next(path)}]" if field.repeated else path
             self.there.add(place)
@@ -213,7 +226,9 @@ class _Walk:
         elif wire == 2 and field.type == _STRING:
             if field.repeated:
                 self.shape.fix(first, stop)
-                self.texts.setdefault(path, []).append(self.data[first:stop].decode("utf-8", errors="replace"))
+                self.texts.setdefault(path, []).append(
+                    self.data[first:stop].decode("utf-8", errors="replace")
+                )
         elif wire == 2 and field.type != _BYTES:
             self._packed(first, stop, field, path)
         elif field.repeated:
@@ -231,7 +246,9 @@ class _Walk:
     def _unset(self, path: str) -> None:
         """Forget what was found of a field."""
         for known in (self.shape.numbers, self.texts, self.counts):
-            for one in [one for one in known if one == path or one.startswith((f"{path}.", f"{path}["))]:
+            for one in [
+                one for one in known if one == path or one.startswith((f"{path}.", f"{path}["))
+            ]:
                 del known[one]
         self.there = {one for one in self.there if one != path and not one.startswith(f"{path}.")}
 
@@ -242,14 +259,24 @@ class _Walk:
             self.shape.count(block.count)
             width = int(block.kind[-1])
             for index in range(block.count):
-                self.shape.numbers[f"{path}[{index}]"] = Numbers(block.offset + index * width, block.kind)
+                self.shape.numbers[f"{path}[{index}]"] = Numbers(
+                    block.offset + index * width, block.kind
+                )
 
     def _number(self, first: int, stop: int, wire: int, field: ProtobufField, path: str) -> None:
         if wire == 0 and field.type in _VARINTS:
             self.shape.flags.extend(range(first, stop))
-            kind = "zigzag" if field.type in _ZIGZAG else "unsigned" if field.type == _UINT64 else "varint"
+            kind = (
+                "zigzag"
+                if field.type in _ZIGZAG
+                else "unsigned"
+                if field.type == _UINT64
+                else "varint"
+            )
             self.shape.numbers[path] = Numbers(first, kind, 1, stop - first)
-        elif wire in (1, 5) and field.type in _FIXED and int(_FIXED[field.type][-1]) == stop - first:
+        elif (
+            wire in (1, 5) and field.type in _FIXED and int(_FIXED[field.type][-1]) == stop - first
+        ):
             self.shape.numbers[path] = Numbers(first, _FIXED[field.type])
         elif wire != 2:
             raise MisfitError(f"the field {field.name!r} is not encoded as its type says")

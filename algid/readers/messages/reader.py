@@ -27,7 +27,11 @@ _LOOKED = 1 << 14
 
 
 def open_messages(
-    name: str, form: str, parts: Sequence[Opener], profile: Profile | None, said: tuple[Notice, ...] = ()
+    name: str,
+    form: str,
+    parts: Sequence[Opener],
+    profile: Profile | None,
+    said: tuple[Notice, ...] = (),
 ) -> TableReader:
     """Open a log of messages, or the parts of one in their order.
 
@@ -45,7 +49,8 @@ def open_messages(
     Raises
     ------
     LogError
-        If a message is encoded in an unknown way, or the file cannot be read or is damaged and holds no joints.
+        If a message is encoded in an unknown way, or the file cannot be read or is damaged and
+        holds no joints.
     NothingFoundError
         If no topic of a sound file holds the joints.
     """
@@ -67,7 +72,9 @@ def open_messages(
         rows = main.count(source)
         beside = moving_joints(
             wanted.others,
-            lambda paths: Topic(main.name, main.type, Fields(paths, None), "log").tables(source, _LOOKED),
+            lambda paths: Topic(main.name, main.type, Fields(paths, None), "log").tables(
+                source, _LOOKED
+            ),
         )
     origin = Origin(name, form, wanted.mapping, truth, wanted.reading)
 
@@ -80,7 +87,9 @@ def open_messages(
         samples, others = read(main, rows), wanted.topics[1:]
         if not others:
             return samples
-        series = [whole_topic(name, one.name, one.fields.paths, read(one, BLOCK_ROWS)) for one in others]
+        series = [
+            whole_topic(name, one.name, one.fields.paths, read(one, BLOCK_ROWS)) for one in others
+        ]
         return aligned(samples, series)
 
     return reader_of(origin, tables, profile, wanted.units, (*said, *wanted.notices, *beside), rows)

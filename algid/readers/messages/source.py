@@ -1,6 +1,7 @@
 """What every file of messages offers: its channels, how many messages each has, and these in batches.
 
-MCAP files, ROS 1 bags and rosbag2's SQLite files differ in how they hold messages; what is in a message is read alike.
+MCAP files, ROS 1 bags and rosbag2's SQLite files differ in how they hold messages; what is in a
+message is read alike.
 """
 
 from __future__ import annotations
@@ -60,7 +61,10 @@ class Source(ABC):
 
     @abstractmethod
     def works(self, steps: int) -> bool:
-        """Count steps of some microsecond each; False where no honest file of this size asks for so many."""
+        """Count steps of some microsecond each.
+
+        False where no honest file of this size asks for so many.
+        """
 
     def check(self, channels: frozenset[int]) -> None:  # noqa: B027  # most files have nothing to check
         """Look for what would change the meaning of `channels`, before all of their messages are read."""

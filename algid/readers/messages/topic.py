@@ -32,7 +32,10 @@ _PARTS = (("sec", "nanosec"), ("sec", "nsec"), ("seconds", "nanos"), ("secs", "n
 
 @dataclass(frozen=True)
 class Fields:
-    """By canonical channel the path of its number; and the paths of a stamp's seconds and nanoseconds."""
+    """By canonical channel the path of its number.
+
+    And the paths of a stamp's seconds and nanoseconds.
+    """
 
     paths: Mapping[str, str]
     stamp: tuple[str, str] | None
@@ -68,12 +71,17 @@ def repeated_name(shape: Shape) -> str | None:
 
 def names_in(shape: Shape) -> tuple[str, ...]:
     """The joints that a message of this shape names."""
-    lists = [texts for path, texts in shape.texts.items() if path in ("name", "names", "joint_names")]
+    lists = [
+        texts for path, texts in shape.texts.items() if path in ("name", "names", "joint_names")
+    ]
     return lists[0][: LIMITS.joints] if lists else ()
 
 
 def joint_fields(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:
-    """By canonical channel the path of its number for two joints; without velocities where one lacks them."""
+    """By canonical channel the path of its number for two joints.
+
+    Without velocities where one lacks them.
+    """
     found = {
         f"{quantity}{number}": path
         for quantity in _QUANTITIES
@@ -144,9 +152,13 @@ class Topic:
             try:
                 held, columns = decoder.columns(batch.messages)
             except ExcessError as error:
-                raise LogError(f"{path}: topic {self.name!r} has {error}; write it anew with fewer") from error
+                raise LogError(
+                    f"{path}: topic {self.name!r} has {error}; write it anew with fewer"
+                ) from error
             if decoder.misfits > account.found / 2:
-                raise LogError(f"{path}: topic {self.name!r}: {decoder.misfit}; it cannot be read without guessing")
+                raise LogError(
+                    f"{path}: topic {self.name!r}: {decoder.misfit}; it cannot be read without guessing"
+                )
             log_ns = batch.messages.log_ns
             parts.append(SampleTable(log_ns if held.all() else log_ns[held], columns))  # type: ignore[arg-type]
             size += len(parts[-1])
@@ -154,12 +166,19 @@ class Topic:
                 yield self._clocked(path, parts)
                 parts, size = [], 0
         last = self._clocked(path, parts) if parts else SampleTable(np.empty(0, np.int64), {})
-        promised = sum(source.counts.get(channel, 0) for channel in channels) if source.counts else None
-        yield last.noting(*source.notices, *account.notices(promised), *self._left_out(decoder, source, channels))
+        promised = (
+            sum(source.counts.get(channel, 0) for channel in channels) if source.counts else None
+        )
+        yield last.noting(
+            *source.notices, *account.notices(promised), *self._left_out(decoder, source, channels)
+        )
 
     def count(self, source: Source) -> int:
         """Messages that the file counts, 0 where it does not."""
-        return sum((source.counts or {}).get(channel, 0) for channel in channels_of(source, self.name, self.type))
+        return sum(
+            (source.counts or {}).get(channel, 0)
+            for channel in channels_of(source, self.name, self.type)
+        )
 
     def _clocked(self, path: str, parts: list[SampleTable]) -> SampleTable:
         """The tables as one, with the stamps of the chosen clock and float64 columns."""
@@ -170,7 +189,9 @@ class Topic:
         if _STAMP[0] in columns:
             header = self._nanoseconds(path, *(columns.pop(part) for part in _STAMP))
             if self._chosen is None and len(table):
-                still = self.clock != "header" and len(table) > 1 and not np.any(header != header[0])
+                still = (
+                    self.clock != "header" and len(table) > 1 and not np.any(header != header[0])
+                )
                 self._chosen = "log" if still else "header"
                 if still:
                     text = f"header stamps of {self.name!r} stand still at {header[0]} ns"
@@ -187,7 +208,10 @@ class Topic:
 
     def _nanoseconds(self, path: str, seconds: NDArray[Any], nanoseconds: NDArray[Any]) -> IntArray:
         """Stamps (N,) of headers in ns."""
-        for values, largest in ((seconds, LIMITS.stamp_seconds), (nanoseconds, LIMITS.largest_time_ns)):
+        for values, largest in (
+            (seconds, LIMITS.stamp_seconds),
+            (nanoseconds, LIMITS.largest_time_ns),
+        ):
             wrong = np.flatnonzero(~(np.abs(values.astype(np.float64)) < largest))
             if wrong.size:
                 raise LogError(
@@ -196,7 +220,11 @@ class Topic:
                     '--clock log (profile: clock = "log")'
                 )
         whole = np.floor(seconds)
-        rest = nanoseconds + np.rint((seconds - whole) * 1e9) if seconds.dtype.kind == "f" else nanoseconds
+        rest = (
+            nanoseconds + np.rint((seconds - whole) * 1e9)
+            if seconds.dtype.kind == "f"
+            else nanoseconds
+        )
         return whole.astype(np.int64) * 1_000_000_000 + rest.astype(np.int64)
 
     def _left_out(self, decoder: Decoder, source: Source, channels: frozenset[int]) -> list[Notice]:
@@ -207,7 +235,9 @@ class Topic:
             text = f"{counted(decoder.lacking, 'message')} on {self.name!r} left out for want of {lacks}"
             said.append(Notice("LACKING_MESSAGES", text, lossy=True))
         if decoder.skipped:
-            text = f"{counted(decoder.skipped, 'message')} on {self.name!r} left out: of other joints"
+            text = (
+                f"{counted(decoder.skipped, 'message')} on {self.name!r} left out: of other joints"
+            )
             said.append(Notice("OTHER_MESSAGES", text))
         if decoder.misfits:
             text = (
@@ -215,9 +245,15 @@ class Topic:
                 f"schema says; the first: {decoder.misfit}"
             )
             said.append(Notice("MISFIT_MESSAGES", text, lossy=True))
-        others = {one for one in source.used() - channels if source.channels[one].topic == self.name}
+        others = {
+            one for one in source.used() - channels if source.channels[one].topic == self.name
+        }
         if others:
-            types = ", ".join(sorted({source.channels[one].type or "no schema" for one in others})[:4])
-            text = f"topic {self.name!r} also carries messages of another type or definition ({types})"
+            types = ", ".join(
+                sorted({source.channels[one].type or "no schema" for one in others})[:4]
+            )
+            text = (
+                f"topic {self.name!r} also carries messages of another type or definition ({types})"
+            )
             said.append(Notice("OTHER_TYPE", f"{text}; they were not read", lossy=True))
         return said

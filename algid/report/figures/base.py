@@ -1,7 +1,7 @@
 """What every figure is made of, and how its numbers travel to plotly.
 
-Colours are written as tokens, ``@name`` or ``@name/opacity``; the page replaces them by the colours of the
-light or dark theme whenever it draws. Foreign text passes through `label`.
+Colours are written as tokens, ``@name`` or ``@name/opacity``; the page replaces them by the
+colours of the light or dark theme whenever it draws. Foreign text passes through `label`.
 """
 
 from __future__ import annotations
@@ -31,7 +31,10 @@ class Legend:
 
 @dataclass(frozen=True)
 class Panel:
-    """One drawing area. `says` is what a screen reader reads out; `sync` names panels that zoom together."""
+    """One drawing area.
+
+    `says` is what a screen reader reads out; `sync` names panels that zoom together.
+    """
 
     traces: list[Trace]
     layout: Layout
@@ -84,7 +87,14 @@ def times(x: FloatArray) -> dict[str, str]:
 
 
 def line(
-    x: FloatArray, y: FloatArray, colour: str, name: str, group: str, *, width: float = 1.4, hover: str = ""
+    x: FloatArray,
+    y: FloatArray,
+    colour: str,
+    name: str,
+    group: str,
+    *,
+    width: float = 1.4,
+    hover: str = "",
 ) -> Trace:
     """A line without markers."""
     return {
@@ -158,8 +168,19 @@ def stretch(first: float, last: float, colour: str) -> Layout:
     return {"type": "rect", **place, "fillcolor": colour, "line": {"width": 0}, "layer": "below"}
 
 
-def between(x: FloatArray, low: FloatArray, high: FloatArray, colour: str, group: str = "") -> list[Trace]:
+def between(
+    x: FloatArray, low: FloatArray, high: FloatArray, colour: str, group: str = ""
+) -> list[Trace]:
     """The area between two series, as their unseen edges."""
-    edge = {"type": "scatter", "mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "x": times(x)}
+    edge = {
+        "type": "scatter",
+        "mode": "lines",
+        "line": {"width": 0},
+        "hoverinfo": "skip",
+        "x": times(x),
+    }
     edge |= {"legendgroup": group} if group else {}
-    return [{**edge, "y": packed(low)}, {**edge, "y": packed(high), "fill": "tonexty", "fillcolor": colour}]
+    return [
+        {**edge, "y": packed(low)},
+        {**edge, "y": packed(high), "fill": "tonexty", "fillcolor": colour},
+    ]

@@ -62,7 +62,9 @@ def convergence(path: Path, result: Result, loaded: bool = False) -> Figure | Mi
 
 
 def _target(name: str, result: Result, loaded: bool) -> Target:
-    groups = [result.loaded, result.paper_payload, result.payload] if loaded else [result.parameters]
+    groups = (
+        [result.loaded, result.paper_payload, result.payload] if loaded else [result.parameters]
+    )
     found = next((group[name] for group in groups if name in group), None)
     row = next((row for row in result.table4 if row.parameter == name), None)
     unit = found.unit if found is not None else row.unit if row is not None else ""
@@ -79,9 +81,13 @@ def _panel(read: SeriesLog, name: str, target: Target, sync: str) -> Panel:
         "shapes": [*_marks(target), *_epsilons(read)],
         "hovermode": "closest",
     }
-    final = "" if found is None else f"; final estimate {resolved(found.estimate, found.std)} {unit}"
+    final = (
+        "" if found is None else f"; final estimate {resolved(found.estimate, found.std)} {unit}"
+    )
     truth = "" if target.truth is None else f"; truth {significant(target.truth)} {unit}"
-    return Panel(_traces(read, name, unit), layout, f"{name} over time{final}{truth}", name, HEIGHT, sync)
+    return Panel(
+        _traces(read, name, unit), layout, f"{name} over time{final}{truth}", name, HEIGHT, sync
+    )
 
 
 def _traces(read: SeriesLog, name: str, unit: str) -> list[Trace]:
@@ -89,16 +95,30 @@ def _traces(read: SeriesLog, name: str, unit: str) -> list[Trace]:
     where, share = read.singular[name]
     traces: list[Trace] = []
     if share.any():
-        area = {"fill": "tozeroy", "fillcolor": "@amber/0.35", "line": {"width": 0, "shape": "hv"}, "hoverinfo": "skip"}
+        area = {
+            "fill": "tozeroy",
+            "fillcolor": "@amber/0.35",
+            "line": {"width": 0, "shape": "hv"},
+            "hoverinfo": "skip",
+        }
         traces.append(
-            {"type": "scatter", "mode": "lines", "x": times(where), "y": packed(share), "yaxis": "y2", **area}
+            {
+                "type": "scatter",
+                "mode": "lines",
+                "x": times(where),
+                "y": packed(share),
+                "yaxis": "y2",
+                **area,
+            }
         )
         traces[-1] |= {"legendgroup": "singular", "name": "singular"}
     hover = f"{label(name)} %{{y:.5g}} {label(unit)}<br>at %{{x:.4g}} s<extra></extra>"
     colour = "@blue/0.3" if read.coarse else "@blue"
     traces.append(line(*read.lines[name], colour, label(name), "series", width=1.2, hover=hover))
     if read.coarse:
-        traces.append(line(*read.middles[name], "@blue", label(name), "middle", width=1.6, hover=hover))
+        traces.append(
+            line(*read.middles[name], "@blue", label(name), "middle", width=1.6, hover=hover)
+        )
     return traces
 
 
@@ -111,7 +131,14 @@ def _condition(read: SeriesLog, condition: Series, sync: str) -> Panel:
         "hovermode": "closest",
     }
     trace = line(*condition, "@muted", "condition number", "", width=1.2, hover=hover)
-    return Panel([trace], layout, "Condition number of the linear system over time", "condition number", HEIGHT, sync)
+    return Panel(
+        [trace],
+        layout,
+        "Condition number of the linear system over time",
+        "condition number",
+        HEIGHT,
+        sync,
+    )
 
 
 def _view(samples: FloatArray, target: Target) -> list[float] | None:
@@ -122,7 +149,10 @@ def _view(samples: FloatArray, target: Target) -> list[float] | None:
         return None
     found = target.found
     known = [target.truth] if found is None else [target.truth, found.estimate, *(found.ci95 or ())]
-    ends = [*np.percentile(settled, [4, 96]).tolist(), *(value for value in known if value is not None)]
+    ends = [
+        *np.percentile(settled, [4, 96]).tolist(),
+        *(value for value in known if value is not None),
+    ]
     low, high = min(ends), max(ends)
     space = 0.25 * (high - low) or 0.05 * abs(high) or 1.0
     return [low - space, high + space]
@@ -161,5 +191,7 @@ def _legend(read: SeriesLog, targets: Mapping[str, Target]) -> tuple[Legend, ...
     if _epsilons(read):
         entries.append(Legend("", "ε, before which estimates are arbitrary", "@muted", "dot"))
     if read.any_singular:
-        entries.append(Legend("singular", "singular: condition number past 1e10", "@amber/0.35", "area"))
+        entries.append(
+            Legend("singular", "singular: condition number past 1e10", "@amber/0.35", "area")
+        )
     return tuple(entries)

@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from algid.arm import FloatArray, mass_matrix
-from algid.report.figures.base import Figure, Legend, Missing, Panel, Trace, axis, line, packed, stretch
+from algid.report.figures.base import (
+    Figure,
+    Legend,
+    Missing,
+    Panel,
+    Trace,
+    axis,
+    line,
+    packed,
+    stretch,
+)
 from algid.report.series import TorqueLog
 from algid.results import Result
 
@@ -29,7 +39,9 @@ def inertia(result: Result, found: TorqueLog | None) -> Figure | Missing:
     parts, stds = _parts(known, theta2), _stds(result, theta2)
     m11, m12, m22 = parts
     smallest = float((0.5 * (m11 + m22) - np.hypot(0.5 * (m11 - m22), m12)).min())  # eigenvalue
-    reading = "Read: M11 and M22 must stay above zero; outside the grey stretch the curves extrapolate."
+    reading = (
+        "Read: M11 and M22 must stay above zero; outside the grey stretch the curves extrapolate."
+    )
     definite = "M is positive definite for every θ2"
     if smallest <= 0:
         definite = "M is not positive definite for every θ2, which no arm is"
@@ -45,7 +57,12 @@ def inertia(result: Result, found: TorqueLog | None) -> Figure | Missing:
     }
     panel = Panel(_traces(theta2, parts, stds), layout, f"{TITLE} over θ2. {definite}", height=300)
     return Figure(
-        "inertia", TITLE, (panel,), reading, LEGEND, f"{definite}; its smallest eigenvalue is {smallest:.3g} kg m²."
+        "inertia",
+        TITLE,
+        (panel,),
+        reading,
+        LEGEND,
+        f"{definite}; its smallest eigenvalue is {smallest:.3g} kg m².",
     )
 
 
@@ -66,7 +83,9 @@ def _stds(result: Result, theta2: FloatArray) -> FloatArray | None:
         return None
     place = [fit.covariance_names.index(name) for name in NAMES]
     chosen = [[fit.covariance[i][j] for j in place] for i in place]
-    covariance = np.array([[np.nan if value is None else value for value in row] for row in chosen], dtype=np.float64)
+    covariance = np.array(
+        [[np.nan if value is None else value for value in row] for row in chosen], dtype=np.float64
+    )
     if not np.isfinite(covariance).all():
         return None
     slopes = np.stack([_parts([float(i == j) for j in range(3)], theta2) for i in range(3)])
@@ -83,7 +102,12 @@ def _traces(theta2: FloatArray, parts: FloatArray, stds: FloatArray | None) -> l
         middle = parts[place]
         if stds is not None:
             half = 1.96 * stds[place]
-            area = {"fill": "toself", "fillcolor": f"{colour}/0.22", "line": {"width": 0}, "hoverinfo": "skip"}
+            area = {
+                "fill": "toself",
+                "fillcolor": f"{colour}/0.22",
+                "line": {"width": 0},
+                "hoverinfo": "skip",
+            }
             edge = packed(np.concatenate([middle + half, (middle - half)[::-1]]))
             traces.append({"type": "scatter", "mode": "lines", "x": both, "y": edge, **area})
             traces[-1] |= {"legendgroup": name, "name": name}

@@ -32,11 +32,15 @@ def information(path: Path, result: Result) -> Figure | Missing:
     total = gained.sum(axis=1, keepdims=True)
     shares = 100 * np.divide(gained, total, out=np.zeros_like(gained), where=total > 0)
     reading = "Read: strongly coloured seconds tell most; a row with colour in one place only rests on that moment."
-    panel = information_panel(names, x, shares, SCALE, separators(ranges, offsets(ranges), result.logs))
+    panel = information_panel(
+        names, x, shares, SCALE, separators(ranges, offsets(ranges), result.logs)
+    )
     return Figure("information", TITLE, (panel,), reading, note=_note(names, x, shares))
 
 
-def _summed(names: list[str], found: list[tuple[int, Block]]) -> tuple[FloatArray, FloatArray, dict[int, LogRange]]:
+def _summed(
+    names: list[str], found: list[tuple[int, Block]]
+) -> tuple[FloatArray, FloatArray, dict[int, LogRange]]:
     """Middles of the stretches on the running time, information (names, m) in them, each log's range.
 
     Information adds up, so that the seconds of a long log are summed, not thinned.
@@ -47,17 +51,30 @@ def _summed(names: list[str], found: list[tuple[int, Block]]) -> tuple[FloatArra
         span.last = float(block["t"][-1]) + 1.0
     moved = offsets(ranges)
     x = np.concatenate([block["t"] + 0.5 + moved[log] for log, block in found])
-    gained = np.concatenate([np.stack([block[name] for name in names]) for _, block in found], axis=1)
+    gained = np.concatenate(
+        [np.stack([block[name] for name in names]) for _, block in found], axis=1
+    )
     step = int(np.ceil(x.size / MOST_CELLS))
     starts = np.arange(0, x.size, step)
     counts = np.diff(starts, append=x.size)
-    return np.add.reduceat(x, starts) / counts, np.add.reduceat(np.nan_to_num(gained), starts, axis=1), ranges
+    return (
+        np.add.reduceat(x, starts) / counts,
+        np.add.reduceat(np.nan_to_num(gained), starts, axis=1),
+        ranges,
+    )
 
 
 def information_panel(
-    names: Sequence[str], x: FloatArray, shares: FloatArray, scale: Scale, more: Layout | None = None
+    names: Sequence[str],
+    x: FloatArray,
+    shares: FloatArray,
+    scale: Scale,
+    more: Layout | None = None,
 ) -> Panel:
-    """Percent `shares` (Q, n) of each parameter's information at times `x` (n,) in s; `more` joins the layout."""
+    """Percent `shares` (Q, n) of each parameter's information at times `x` (n,) in s.
+
+    `more` joins the layout.
+    """
     trace = {
         "type": "heatmap",
         "x": times(x),
@@ -75,7 +92,12 @@ def information_panel(
         "yaxis": axis(type="category", autorange="reversed", showgrid=False),
         **(more or {}),
     }
-    return Panel([trace], layout, "Share of each parameter's information by time", height=120 + 28 * len(names))
+    return Panel(
+        [trace],
+        layout,
+        "Share of each parameter's information by time",
+        height=120 + 28 * len(names),
+    )
 
 
 def _note(names: list[str], x: FloatArray, shares: FloatArray) -> str:

@@ -8,12 +8,27 @@ from pathlib import Path
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.report.figures.base import Figure, Legend, Missing, Panel, axis, band, between, level, line
+from algid.report.figures.base import (
+    Figure,
+    Legend,
+    Missing,
+    Panel,
+    axis,
+    band,
+    between,
+    level,
+    line,
+)
 from algid.report.reduce import table_of
 from algid.results import Result
 
 TITLE = "Innovations: what the estimator left"
-WHITENED, SPECTRUM, TORQUE, CORRELATION = "whitened spectrum", "spectrum", "torque spectrum", "autocorrelation"
+WHITENED, SPECTRUM, TORQUE, CORRELATION = (
+    "whitened spectrum",
+    "spectrum",
+    "torque spectrum",
+    "autocorrelation",
+)
 COLUMNS = ("quantity", "joint", "x", "value", "low", "high")
 FAINT = 0.02  # a correlation below which the estimator's test takes colour not to matter
 HEIGHT = 260
@@ -55,15 +70,29 @@ def innovations(path: Path, result: Result) -> Figure | Missing:
     if not joints:
         return Missing("innovations", TITLE, "the logs are too short to tell noise from colour")
     whitened = any(quantity == WHITENED for quantity, _ in curves)
-    panels = tuple(panel for joint in joints for panel in (_spectrum(curves, joint), _correlation(curves, joint)))
+    panels = tuple(
+        panel
+        for joint in joints
+        for panel in (_spectrum(curves, joint), _correlation(curves, joint))
+    )
     faint = any(_is_faint(curves[CORRELATION, joint]) for joint in joints)
     legend, reading = [RESIDUAL, BAND], WHITE_READING
     if not whitened:
         reading = RAW_READING
         legend.insert(1, Legend("torque", "measured torque, through the same windows", "@measured"))
     if faint:
-        legend.append(Legend("", f"±{FAINT:g}: fainter colour moves no error bar", "@muted", "dash"))
-    return Figure("innovations", TITLE, panels, reading, tuple(legend), _note(curves, joints, result), columns=2)
+        legend.append(
+            Legend("", f"±{FAINT:g}: fainter colour moves no error bar", "@muted", "dash")
+        )
+    return Figure(
+        "innovations",
+        TITLE,
+        panels,
+        reading,
+        tuple(legend),
+        _note(curves, joints, result),
+        columns=2,
+    )
 
 
 def read_curves(path: Path) -> Curves:
@@ -90,19 +119,27 @@ def _spectrum(curves: Curves, joint: int) -> Panel:
             line(white.x, white.value, "@orange", "residual", "residual", hover=hover),
         ]
         y = axis("share of white noise", type="log", **_round_ticks(white))
-        return Panel(traces, _layout(white.x, y), f"{says}; {_count(white)} inside the band", title, HEIGHT)
+        return Panel(
+            traces, _layout(white.x, y), f"{says}; {_count(white)} inside the band", title, HEIGHT
+        )
     hover = "%{y:.3g} (N m)²/Hz at %{x:.3g} Hz<extra></extra>"
     torque, own = curves.get((TORQUE, joint)), curves.get((SPECTRUM, joint))
     traces = []
     if torque is not None:
-        traces.append(line(torque.x, torque.value, "@measured", "torque", "torque", width=2, hover=hover))
+        traces.append(
+            line(torque.x, torque.value, "@measured", "torque", "torque", width=2, hover=hover)
+        )
     if own is not None:
         traces.append(line(own.x, own.value, "@orange", "residual", "residual", hover=hover))
-    density = np.concatenate([np.empty(0), *(curve.value for curve in (torque, own) if curve is not None)])
+    density = np.concatenate(
+        [np.empty(0), *(curve.value for curve in (torque, own) if curve is not None)]
+    )
     positive = density[density > 0]
     x = own.x if own is not None else np.ones(1)
     # ticks at every other power of ten where there are many; plotly's own where there are few
-    ticks = {"dtick": 2} if positive.size and positive.max() > 1e4 * positive.min() else {"nticks": 5}
+    ticks = (
+        {"dtick": 2} if positive.size and positive.max() > 1e4 * positive.min() else {"nticks": 5}
+    )
     y = axis("(N m)²/Hz", type="log", tickfont={"size": 10}, **ticks)
     return Panel(traces, _layout(x, y), says, title, HEIGHT)
 
@@ -143,11 +180,16 @@ def _correlation(curves: Curves, joint: int) -> Panel:
     )
     half = 0.5 * float(x[0])
     steps = [
-        band(low, high, "@blue/0.25") | {"xref": "x", "x0": float(at - half), "x1": float(at + half)}
+        band(low, high, "@blue/0.25")
+        | {"xref": "x", "x0": float(at - half), "x1": float(at + half)}
         for at, low, high in zip(x, curve.low.tolist(), curve.high.tolist(), strict=True)
     ]
-    shapes = [level(sign * FAINT, "@muted", "dash", 1.0) for sign in (-1, 1)] if _is_faint(curve) else []
-    reach = 1.15 * max(float(np.abs(curve.value).max()), 2 * float(curve.high.max()), FAINT if shapes else 0.0)
+    shapes = (
+        [level(sign * FAINT, "@muted", "dash", 1.0) for sign in (-1, 1)] if _is_faint(curve) else []
+    )
+    reach = 1.15 * max(
+        float(np.abs(curve.value).max()), 2 * float(curve.high.max()), FAINT if shapes else 0.0
+    )
     layout = {
         "xaxis": axis(f"lag, {unit}", range=[0.0, float(x[-1]) + 2 * half]),
         "yaxis": axis("correlation", range=[max(-reach, -1.05), min(reach, 1.05)]),
@@ -176,7 +218,11 @@ def _note(curves: Curves, joints: list[int], result: Result) -> str:
     fit = result.fit
     if fit is None:
         return note
-    allow = "the intervals allow for colour" if fit.intervals != "likelihood" else "the intervals do not allow for that"
+    allow = (
+        "the intervals allow for colour"
+        if fit.intervals != "likelihood"
+        else "the intervals do not allow for that"
+    )
     if not fit.whiteness:
         return f"{note} The {result.estimator} estimator takes no noise to be white: {allow}."
     if all(test.white for test in fit.whiteness.values()):

@@ -9,7 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
-from algid.report.figures.base import Figure, Layout, Legend, Missing, Panel, axis, between, label, level, line
+from algid.report.figures.base import (
+    Figure,
+    Layout,
+    Legend,
+    Missing,
+    Panel,
+    axis,
+    between,
+    label,
+    level,
+    line,
+)
 from algid.report.figures.timeline import offsets, separators, views
 from algid.report.reduce import blocks, by_log, columns_of
 from algid.report.series import LogRange
@@ -60,7 +71,11 @@ def running(path: Path, result: Result) -> Figure | Missing:
     def whole(name: str) -> FloatArray:
         return np.concatenate([block[name] for _, block in found])
 
-    courses = [RunningCourse(name, whole(name), whole(name + HALF)) for name in names if name in result.estimates]
+    courses = [
+        RunningCourse(name, whole(name), whole(name + HALF))
+        for name in names
+        if name in result.estimates
+    ]
     courses = [
         course
         for course in courses
@@ -105,8 +120,16 @@ def _note(courses: list[RunningCourse], t: FloatArray, result: Result) -> str:
         latest = max(late, key=lambda name: late[name])
         when = f"{significant(late[latest], 3)} s of {significant(float(t[-1]), 3)} s"
         note = f"The last band to miss its final estimate was that of {latest}, at {when}."
-    truth = {row.parameter: row.truth for row in result.table4 if row.truth is not None} | result.truth
+    truth = {
+        row.parameter: row.truth for row in result.table4 if row.truth is not None
+    } | result.truth
     known = [course for course in courses if course.name in truth]
-    held = sum(int(np.sum(np.abs(course.value - truth[course.name]) <= course.half)) for course in known)
+    held = sum(
+        int(np.sum(np.abs(course.value - truth[course.name]) <= course.half)) for course in known
+    )
     count = sum(int(np.isfinite(course.half).sum()) for course in known)
-    return note + (f" The bands hold the truth {significant(100 * held / count, 3)} % of the time." if count else "")
+    return note + (
+        f" The bands hold the truth {significant(100 * held / count, 3)} % of the time."
+        if count
+        else ""
+    )

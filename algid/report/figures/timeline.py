@@ -14,7 +14,9 @@ from algid.text import file_name
 
 SPACE = 0.01  # of the whole time, between two logs
 MOST_NAMES = 6
-ROOM = 40  # pixels above a panel: names, and the buttons above them where a screen has no pointer to show them by
+# pixels above a panel: names, and the buttons above them where a screen has no pointer to show
+# them by
+ROOM = 40
 
 
 def offsets(ranges: Mapping[int, LogRange]) -> dict[int, float]:
@@ -39,23 +41,34 @@ def chained(
     return (np.concatenate(x), np.concatenate(y)) if x else (np.empty(0), np.empty(0))
 
 
-def views(ranges: Mapping[int, LogRange], logs: list[LogSummary]) -> tuple[tuple[str, float, float], ...]:
+def views(
+    ranges: Mapping[int, LogRange], logs: list[LogSummary]
+) -> tuple[tuple[str, float, float], ...]:
     """Name, start and end of each log on the common axis; nothing for a single one."""
     moved = offsets(ranges)
     spans = [
-        (_words(log, logs), moved[log] + span.first, moved[log] + span.last) for log, span in sorted(ranges.items())
+        (_words(log, logs), moved[log] + span.first, moved[log] + span.last)
+        for log, span in sorted(ranges.items())
     ]
     return tuple(spans) if len(spans) > 1 else ()
 
 
-def separators(ranges: Mapping[int, LogRange], moved: Mapping[int, float], logs: list[LogSummary]) -> Layout:
+def separators(
+    ranges: Mapping[int, LogRange], moved: Mapping[int, float], logs: list[LogSummary]
+) -> Layout:
     """Shapes and annotations that tell the logs apart; none for a single one."""
     if len(ranges) < 2:
         return {}
     starts = {log: moved[log] + span.first for log, span in sorted(ranges.items())}
     shapes = [upright(start, "@muted/0.6") for start in list(starts.values())[1:]]
     named = starts if len(starts) <= MOST_NAMES else {}
-    name: Layout = {"y": 1, "yref": "paper", "xanchor": "left", "yanchor": "bottom", "showarrow": False}
+    name: Layout = {
+        "y": 1,
+        "yref": "paper",
+        "xanchor": "left",
+        "yanchor": "bottom",
+        "showarrow": False,
+    }
     name["font"] = {"size": 11, "color": "@muted"}
     names = [{**name, "x": start, "text": _words(log, logs)} for log, start in named.items()]
     room = {"margin": {"t": ROOM}} if names else {}

@@ -61,7 +61,9 @@ def torque(found: TorqueLog, logs: list[LogSummary]) -> Figure:
         note += " The prediction differentiates angles twice, and with them their noise: see Torque prediction above."
     reading = "Read: blue should cover grey, and orange should look like noise without a trace of the motion."
     legend = (MEASURED, PREDICTED, Legend("residual", "residual: measured − predicted", "@orange"))
-    return Figure("torque", TITLE, tuple(panels), reading, legend, note, views=views(found.ranges, logs))
+    return Figure(
+        "torque", TITLE, tuple(panels), reading, legend, note, views=views(found.ranges, logs)
+    )
 
 
 def closeup(path: Path, found: TorqueLog) -> Figure | Missing:
@@ -69,9 +71,7 @@ def closeup(path: Path, found: TorqueLog) -> Figure | Missing:
     panels = tuple(_closeup_panel(path, found, joint) for joint in (1, 2) if joint in found.worst)
     if not panels:
         return Missing("closeup", CLOSEUP, "no torque is predicted")
-    reading = (
-        "Read: a residual that stands out once is an event, such as a knock; one like the rest is the model's limit."
-    )
+    reading = "Read: a residual that stands out once is an event, such as a knock; one like the rest is the model's limit."
     legend = (MEASURED, PREDICTED, Legend("residual", "residual", "@orange"))
     return Figure("closeup", CLOSEUP, panels, reading, legend, columns=2)
 
@@ -86,8 +86,12 @@ def _closeup_panel(path: Path, found: TorqueLog, joint: int) -> Panel:
     try:
         rows = pl.scan_parquet(path).filter(near).select(names).collect()
     except (OSError, pl.exceptions.PolarsError) as error:
-        raise ResultError(f"{path}: cannot read it ({error}); identify again with this version") from error
-    t, measured, predicted = (rows[name].cast(pl.Float64).fill_null(float("nan")).to_numpy() for name in names)
+        raise ResultError(
+            f"{path}: cannot read it ({error}); identify again with this version"
+        ) from error
+    t, measured, predicted = (
+        rows[name].cast(pl.Float64).fill_null(float("nan")).to_numpy() for name in names
+    )
     residual = measured - predicted
     traces = [
         line(t, measured, "@measured", "measured", "measured", width=3.6),
@@ -112,9 +116,13 @@ def signals(found: TorqueLog, logs: list[LogSummary]) -> Figure:
     ):
         traces: list[Trace] = []
         for joint, colour in enumerate(COLOURS, start=1):
-            x, y = chained({log: series[f"{name}{joint}"] for log, series in found.series.items()}, moved)
+            x, y = chained(
+                {log: series[f"{name}{joint}"] for log, series in found.series.items()}, moved
+            )
             hover = f"joint {joint} %{{y:.4g}} {unit} at %{{x:.4f}} s<extra></extra>"
-            traces.append(line(x, y, colour, f"joint {joint}", f"joint{joint}", width=1.2, hover=hover))
+            traces.append(
+                line(x, y, colour, f"joint {joint}", f"joint{joint}", width=1.2, hover=hover)
+            )
         layout = {
             "xaxis": axis("time, s"),
             "yaxis": axis(f"{words.lower()}, {unit}"),
@@ -125,5 +133,10 @@ def signals(found: TorqueLog, logs: list[LogSummary]) -> Figure:
         says = f"{words} of both joints, {min(lows):.4g} to {max(highs):.4g} {unit}"
         panels.append(Panel(traces, layout, says, words, 200, "torque"))
     reading = "Read: look for jumps, flat stretches and clipped tops; what is odd here is odd in every number above."
-    legend = tuple(Legend(f"joint{joint}", f"joint {joint}", colour) for joint, colour in enumerate(COLOURS, start=1))
-    return Figure("signals", "Signals", tuple(panels), reading, legend, views=views(found.ranges, logs))
+    legend = tuple(
+        Legend(f"joint{joint}", f"joint {joint}", colour)
+        for joint, colour in enumerate(COLOURS, start=1)
+    )
+    return Figure(
+        "signals", "Signals", tuple(panels), reading, legend, views=views(found.ranges, logs)
+    )

@@ -24,7 +24,9 @@ from algid.signals.segments import Segment
 from algid.synth.cases import load_case
 
 
-def _by_sympy(t: FloatArray, q1: sp.Expr, q2: sp.Expr, torques: tuple[sp.Expr, sp.Expr]) -> dict[str, FloatArray]:
+def _by_sympy(
+    t: FloatArray, q1: sp.Expr, q2: sp.Expr, torques: tuple[sp.Expr, sp.Expr]
+) -> dict[str, FloatArray]:
     """∫∫ t² of what stands beside each unknown of eq. (1), twice from nought, with no integration by parts."""
     s = sp.Symbol("s")
     v1, v2 = sp.diff(q1, s), sp.diff(q2, s)
@@ -40,7 +42,9 @@ def _by_sympy(t: FloatArray, q1: sp.Expr, q2: sp.Expr, torques: tuple[sp.Expr, s
     for name, signal in signals.items():
         once = sp.integrate(sp.expand(s**2 * signal), s)
         twice[name] = sp.integrate(sp.expand(once - once.subs(s, 0)), s)
-    return {name: sp.lambdify(s, found - found.subs(s, 0), "numpy")(t) for name, found in twice.items()}
+    return {
+        name: sp.lambdify(s, found - found.subs(s, 0), "numpy")(t) for name, found in twice.items()
+    }
 
 
 @pytest.mark.parametrize("start", [0.0, 0.8])
@@ -53,12 +57,16 @@ def test_columns_are_the_integrals_of_polynomial_motions(start: float) -> None:
     exact = _by_sympy(t, q1, q2, torques)
 
     def at(expression: sp.Expr) -> FloatArray:
-        return np.asarray(np.broadcast_to(sp.lambdify(s, expression, "numpy")(t), t.shape), dtype=np.float64)
+        return np.asarray(
+            np.broadcast_to(sp.lambdify(s, expression, "numpy")(t), t.shape), dtype=np.float64
+        )
 
     theta, omega = np.stack([at(q1), at(q2)]), np.stack([at(sp.diff(q1, s)), at(sp.diff(q2, s))])
     found = columns(theta, omega, np.stack([at(one) for one in torques]), dt)
     for name, expected in exact.items():
-        np.testing.assert_allclose(getattr(found, name), expected, atol=1e-8)  # Simpson's dt⁴ and rounding
+        np.testing.assert_allclose(
+            getattr(found, name), expected, atol=1e-8
+        )  # Simpson's dt⁴ and rounding
 
 
 def test_coupling_and_gravity_are_integrated_to_fourth_order() -> None:
@@ -83,7 +91,9 @@ def test_rows_are_integrals_of_the_row_before() -> None:
     rows = stack_rows(np.stack([np.ones_like(t), t**2]), dt, 4)
     for n in range(4):
         np.testing.assert_allclose(rows[n, 0], t**n / float(sp.factorial(n)), atol=1e-9)
-        np.testing.assert_allclose(rows[n, 1], 2 * t ** (n + 2) / float(sp.factorial(n + 2)), atol=1e-9)
+        np.testing.assert_allclose(
+            rows[n, 1], 2 * t ** (n + 2) / float(sp.factorial(n + 2)), atol=1e-9
+        )
 
 
 def test_the_payload_is_that_of_table_2() -> None:
@@ -101,7 +111,12 @@ def test_joint_2_at_rest_leaves_k7_open_and_its_condition_infinite() -> None:
     still = np.zeros_like(t)
     theta, omega = np.stack([np.sin(5 * t), still]), np.stack([5 * np.cos(5 * t), still])
     alpha = np.stack([-25 * np.sin(5 * t), still])
-    found = paper.stage1(theta, omega, inverse_dynamics(load_case("case1").arm.constants(), theta, omega, alpha), 1e-3)
+    found = paper.stage1(
+        theta,
+        omega,
+        inverse_dynamics(load_case("case1").arm.constants(), theta, omega, alpha),
+        1e-3,
+    )
     assert np.isinf(found.k7_condition).all()
     assert np.isnan(found.k[6]).all()
 
@@ -111,11 +126,20 @@ def _log(duration: float) -> Segment:
     theta = np.stack([np.sin(5 * t) - 1, 0.8 * np.sin(9 * t)])
     omega = np.stack([5 * np.cos(5 * t), 7.2 * np.cos(9 * t)])
     alpha = np.stack([-25 * np.sin(5 * t), -64.8 * np.sin(9 * t)])
-    return Segment(0.0, 1e-3, theta, inverse_dynamics(load_case("case1").arm.constants(), theta, omega, alpha), omega)
+    return Segment(
+        0.0,
+        1e-3,
+        theta,
+        inverse_dynamics(load_case("case1").arm.constants(), theta, omega, alpha),
+        omega,
+    )
 
 
 def test_windows_are_what_they_are_alone_and_together(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By twos in a block or one by one; a segment's last window is what is left of it; crumbs are left out."""
+    """By twos in a block or one by one; a segment's last window is what is left of it.
+
+    Crumbs are left out.
+    """
     log = _log(2.4)
     k = load_case("case1").arm.constants()
     found = {}
@@ -127,7 +151,9 @@ def test_windows_are_what_they_are_alone_and_together(monkeypatch: pytest.Monkey
         for alone, together in zip(found[600], found[several], strict=True):
             np.testing.assert_array_equal(alone.t, together.t)
             # rounding times condition numbers of up to 1e10, beyond which there is no estimate
-            np.testing.assert_allclose(np.minimum(alone.values, 1e10), np.minimum(together.values, 1e10), rtol=1e-5)
+            np.testing.assert_allclose(
+                np.minimum(alone.values, 1e10), np.minimum(together.values, 1e10), rtol=1e-5
+            )
     ends = [one.t[-1] for one in found[600][:4]]
     assert np.allclose(np.diff(ends), 0.6, atol=2e-3)
     for before, after in pairwise(found[600][:4]):
@@ -149,7 +175,9 @@ def test_an_estimate_is_the_median_of_medians_and_wanders_by_half_its_quartiles(
     nothing = summary.estimates()
     assert np.isnan(nothing).all()
     nan = np.nan
-    summary.add(_series([99, 1, 2, 3, 4], [9, nan, 5, 5, 5], [nan] * 5))  # what is not settled counts nothing
+    summary.add(
+        _series([99, 1, 2, 3, 4], [9, nan, 5, 5, 5], [nan] * 5)
+    )  # what is not settled counts nothing
     estimate, wander = summary.estimates()
     np.testing.assert_allclose(estimate, [2.5, 5, nan])
     np.testing.assert_allclose(wander, [0.5 * (3.25 - 1.75), 0, nan])
@@ -157,6 +185,8 @@ def test_an_estimate_is_the_median_of_medians_and_wanders_by_half_its_quartiles(
     summary.add(_series([0, 3, 3, 3, 3], [0, 1, 1, 1, 1], [nan] * 5))
     estimate, wander = summary.estimates()
     np.testing.assert_allclose(estimate, [3, 3, nan])  # medians 2.5, 7, 3 and 5, 1
-    np.testing.assert_allclose(wander, [0.5 * (5 - 2.75), 0.5 * (4 - 2), nan])  # between windows more than within
+    np.testing.assert_allclose(
+        wander, [0.5 * (5 - 2.75), 0.5 * (4 - 2), nan]
+    )  # between windows more than within
     assert wanders(estimate, wander).tolist() == [False, False, True]
     assert wanders(np.array([-1.0, 1.0]), np.array([1.0, 1.1])).tolist() == [False, True]

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from algid.arm import with_payload
-from algid.estimators.paper import EPSILON, STAGE1_SERIES, Summary, solve_scaled, stage1, stage1_series, stage2, wanders
+from algid.estimators.paper import (
+    EPSILON,
+    STAGE1_SERIES,
+    Summary,
+    solve_scaled,
+    stage1,
+    stage1_series,
+    stage2,
+    wanders,
+)
 from algid.signals.segments import Segment
 from algid.synth.cases import Case, load_case
 from algid.synth.excitation import no_torque, wide_multi_sine
@@ -55,7 +64,9 @@ def test_initial_conditions_do_not_matter() -> None:
     k = case.arm.constants()
     moving = simulate(k, wide_multi_sine(case.arm), T, np.array([0.4, -1.0]), np.array([2.0, -3.0]))
     found = stage1(moving.theta, moving.omega, moving.tau, DT)
-    np.testing.assert_allclose(found.k[:, -1], k, rtol=1e-3)  # fast motion at 1 kHz: the integrals' own error
+    np.testing.assert_allclose(
+        found.k[:, -1], k, rtol=1e-3
+    )  # fast motion at 1 kHz: the integrals' own error
 
 
 def test_an_arm_that_hangs_still_is_singular_everywhere() -> None:
@@ -69,7 +80,13 @@ def test_an_arm_that_hangs_still_is_singular_everywhere() -> None:
 def test_noise_alone_wanders() -> None:
     draw = np.random.default_rng(0)
     shape = (2, 4001)
-    still = Segment(0.0, DT, draw.normal(0, 1e-3, shape), draw.normal(0, 1e-2, shape), draw.normal(0, 0.1, shape))
+    still = Segment(
+        0.0,
+        DT,
+        draw.normal(0, 1e-3, shape),
+        draw.normal(0, 1e-2, shape),
+        draw.normal(0, 0.1, shape),
+    )
     summary = Summary(len(STAGE1_SERIES))
     for series in stage1_series([still], 2.0):
         summary.add(series)
@@ -83,7 +100,9 @@ def test_systems_of_any_scale_are_solved_alike() -> None:
     scaled = matrix * rows[:, None, None] * columns[None, :, None]
     rhs = rows[:, None] * np.einsum("ijn,jn->in", matrix, x)
     found = solve_scaled(scaled, rhs)
-    np.testing.assert_allclose(found.x * columns[:, None], x, rtol=1e-10)  # condition numbers to 1e3, times rounding
+    np.testing.assert_allclose(
+        found.x * columns[:, None], x, rtol=1e-10
+    )  # condition numbers to 1e3, times rounding
     expected = np.linalg.cond(np.moveaxis(matrix, -1, 0))
     assert np.all(found.condition < 200 * expected)
 
@@ -98,7 +117,10 @@ def test_singular_systems_are_told_apart() -> None:
 
 
 def test_a_condition_that_leaves_less_than_a_percent_is_singular() -> None:
-    """[[1, 1], [1, 1 + e]] has the condition (2 + e)² / e in the 1-norm; nested sums round by 1e-12."""
+    """[[1, 1], [1, 1 + e]] has the condition (2 + e)² / e in the 1-norm.
+
+    Nested sums round by 1e-12.
+    """
     e = np.array([1e-3, 1e-8, 1e-9, 5e-10, 3e-10, 1e-11])
     ones = np.ones_like(e)
     found = solve_scaled(np.array([[ones, ones], [ones, 1 + e]]), np.array([2 * ones, 2 + e]))
