@@ -28,7 +28,7 @@ import numpy as np
 import polars as pl
 
 from algid.api import synthesise
-from algid.batch.workers import THREADS
+from algid.batches.workers import THREADS
 from algid.identification.identify import identify
 from algid.runtime import keep_freed, keep_to_one_core
 from algid.writers import write_log

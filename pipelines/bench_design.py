@@ -23,13 +23,13 @@ from typing import Any
 import numpy as np
 
 from algid.arm import Arm, FloatArray, with_payload
-from algid.design.belief import Asked, asked_for
-from algid.design.campaign import Campaign, plan
-from algid.design.information import Experiment, Information, Slopes
-from algid.design.limits import Limits, resting
-from algid.design.optimise import Stage, kept, optimise
-from algid.design.position import JUDGED_RATE, PositionProblem
-from algid.design.prior import KnownBefore, of_case
+from algid.designs.belief import Asked, asked_for
+from algid.designs.campaign import Campaign, plan
+from algid.designs.information import Experiment, Information, Slopes
+from algid.designs.limits import Limits, resting
+from algid.designs.optimise import Stage, kept, optimise
+from algid.designs.position import JUDGED_RATE, PositionProblem
+from algid.designs.prior import KnownBefore, of_case
 from algid.estimators import refined
 from algid.estimators.whitening import NoiseLevels
 from algid.signals.segments import Segment

@@ -27,8 +27,8 @@ from algid.signals.segments import segments
 from algid.synth.cases import load_case
 from algid.synth.run import Recording, excitation, synthesise, with_schedule
 from algid.synth.simulator import simulate
-from algid.track.bins import IdentifiedArm, arm_of
-from algid.track.payload import Track, track
+from algid.tracks.bins import IdentifiedArm, arm_of
+from algid.tracks.payload import Track, track
 
 CASE = load_case("case1")
 DRIVE = excitation(CASE, "wide")

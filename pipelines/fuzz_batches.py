@@ -30,10 +30,10 @@ from typing import Any, NoReturn
 
 import polars as pl
 
-from algid.batch.discover import jobs_of
-from algid.batch.job import failed_record
-from algid.batch.records import End, stat_of
-from algid.batch.run import Batch, Recipe, sweep
+from algid.batches.discover import jobs_of
+from algid.batches.job import failed_record
+from algid.batches.records import End, stat_of
+from algid.batches.run import Batch, Recipe, sweep
 from algid.errors import AlgidError
 from algid.files import whole_folder
 from algid.settings import Settings

@@ -24,8 +24,8 @@ from pathlib import Path
 from pipelines.mutants_trial import PYTEST
 
 CODE = (
-    *("arm", "model", "units", "check", "batch/jobs"),
-    *(f"{room}/*" for room in ("estimators", "signals", "track", "fleet", "inspection")),
+    *("arm", "model", "units", "check", "batches/jobs"),
+    *(f"{room}/*" for room in ("estimators", "signals", "tracks", "fleet", "inspection")),
 )
 TESTS = (
     *(
@@ -34,15 +34,15 @@ TESTS = (
         "test_units.py",
         "estimators",
         "signals",
-        "track",
+        "tracks",
         "fleet",
         "inspection",
     ),
     *(
         "identification/test_identify.py",
         "readers/test_profile.py",
-        "batch/test_run.py",
-        "batch/test_discover.py",
+        "batches/test_run.py",
+        "batches/test_discover.py",
     ),
 )
 COPIED = ("tests", "pipelines", "data", "README.md", "CHANGELOG.md", "LICENSE", "constraints.txt")

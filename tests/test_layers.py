@@ -60,26 +60,26 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "numpy pyarrow",
     ),
     "api": room("log synth"),
-    "batch": room(
+    "batches": room(
         "construction errors files identification limits profile readers results runtime settings stores verdict",
         "distributed mcap polars pyarrow pydantic",
     ),
-    "track": room(
+    "tracks": room(
         "arm errors estimators files identification model notices profile report results runtime signals text verdict "
         "words",
         "mcap numpy polars pyarrow pydantic",
     ),
-    "design": room(
+    "designs": room(
         "arm compiled errors estimators files identification log model notices progress report results "
         "signals synth text verdict writers",
         "numpy polars pydantic scipy",
     ),
-    "export": room("arm errors files identification model notices physics results text words", "numpy scipy"),
+    "exports": room("arm errors files identification model notices physics results text words", "numpy scipy"),
     "fleet": room("errors files limits model notices progress report text verdict words", "numpy polars scipy"),
     "cli": room(
-        "batch check design errors estimators example exits export faults files fleet identification "
+        "batches check designs errors estimators example exits exports faults files fleet identification "
         "inspection limits log model notices physics profile progress readers report results runtime "
-        "settings stores synth text track words writers",
+        "settings stores synth text tracks words writers",
         "numpy rich typer",
     ),
 }  # fmt: skip

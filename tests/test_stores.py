@@ -9,14 +9,14 @@ import polars as pl
 import pytest
 
 import algid
-from algid.batch.discover import jobs_of
-from algid.batch.records import End
-from algid.batch.run import Batch, Recipe
+from algid.batches.discover import jobs_of
+from algid.batches.records import End
+from algid.batches.run import Batch, Recipe
 from algid.errors import LogError, OutputError
 from algid.settings import Settings
 from algid.stores import list_urls, object_stat, open_store, reading
 from algid.synth.sensors import Sensors
-from tests.batch.test_run import Here
+from tests.batches.test_run import Here
 from tests.objects import Served, s3
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from algid.batch.manifest import read_manifest
-from algid.design.request import request
+from algid.batches.manifest import read_manifest
+from algid.designs.request import request
 from algid.errors import SettingError
 from algid.files import parsed_toml
 from algid.profile import load_profile

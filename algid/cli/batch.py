@@ -18,7 +18,7 @@ from algid.exits import Exit
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from algid.batch.run import Batch, Ended, Progress
+    from algid.batches.run import Batch, Ended, Progress
 
 
 @takes_settings
@@ -82,9 +82,9 @@ def batch(
         If workers or their memory are given beside a scheduler, there is no OUT, or the sources
         hold no log.
     """
-    from algid.batch.discover import jobs_of
-    from algid.batch.lock import locked
-    from algid.batch.run import Batch, Recipe, stopped_by_signals, sweep
+    from algid.batches.discover import jobs_of
+    from algid.batches.lock import locked
+    from algid.batches.run import Batch, Recipe, stopped_by_signals, sweep
     from algid.errors import SettingError
     from algid.results import read_result
     from algid.stores import absolute, open_store, shown
@@ -137,11 +137,11 @@ def _workers(
     out: str, scheduler: str | None, workers: int | None, memory_limit: int | None, timeout: float
 ) -> Iterator[tuple[Executor, int]]:
     """The workers, and how many jobs to hand out at once; they end with the block."""
-    from algid.batch.workers import Workers
+    from algid.batches.workers import Workers
     from algid.runtime import OPEN_FILES, OPEN_FILES_A_WORKER, cores, may_open
 
     if scheduler is not None:
-        from algid.batch.cluster import cluster
+        from algid.batches.cluster import cluster
 
         with cluster(scheduler, out, timeout) as found:
             yield found
@@ -196,8 +196,8 @@ def _progress(quiet: bool) -> Iterator[Callable[[Progress], None]]:
 
 def _watch(running: Batch, sources: list[str], out: str, alone: str, retry_failed: bool) -> Ended:
     """Look for logs until stopped; nothing but settled ones are taken."""
-    from algid.batch.discover import jobs_of
-    from algid.batch.run import LOOK_EVERY, Settling
+    from algid.batches.discover import jobs_of
+    from algid.batches.run import LOOK_EVERY, Settling
     from algid.errors import AlgidError
 
     settling = Settling()
@@ -219,7 +219,7 @@ def _watch(running: Batch, sources: list[str], out: str, alone: str, retry_faile
 
 def _conclude(ended: Ended, stopped: bool, out: str, quiet: bool) -> None:
     """Print what came of the jobs, and leave with the exit code that tells it."""
-    from algid.batch.records import FAILURES, End
+    from algid.batches.records import FAILURES, End
     from algid.stores import shown
     from algid.text import visible
 

@@ -15,9 +15,9 @@ from algid.cli.settings import two_names
 from algid.exits import Exit
 
 if TYPE_CHECKING:
-    from algid.design.campaign import Campaign
-    from algid.design.prior import BelievedArm
-    from algid.design.request import Request
+    from algid.designs.campaign import Campaign
+    from algid.designs.prior import BelievedArm
+    from algid.designs.request import Request
     from algid.estimators.whitening import NoiseLevels
 
 RATE, DURATION = 1000.0, 10.0
@@ -142,11 +142,11 @@ def design(
     """
     import shlex
 
-    from algid.design.campaign import plan
-    from algid.design.page import design_document
-    from algid.design.prior import KnownBefore, prior_of
-    from algid.design.request import request
-    from algid.design.write import Provenance, design_json, write_design
+    from algid.designs.campaign import plan
+    from algid.designs.page import design_document
+    from algid.designs.prior import KnownBefore, prior_of
+    from algid.designs.request import request
+    from algid.designs.write import Provenance, design_json, write_design
     from algid.files import refuse_existing, whole_folder
     from algid.report.progress import progress
     from algid.report.terminal import print_document
@@ -198,10 +198,10 @@ def _campaign(
     margin: float,
     seed: int,
 ) -> Campaign:
-    from algid.design.belief import asked_for
-    from algid.design.campaign import Campaign
-    from algid.design.information import Experiment
-    from algid.design.request import limits_of
+    from algid.designs.belief import asked_for
+    from algid.designs.campaign import Campaign
+    from algid.designs.information import Experiment
+    from algid.designs.request import limits_of
 
     shared = prior.belief.shared
     runs = asked.get("runs", (1, 1) if shared.payload else (1, 0))

@@ -60,8 +60,8 @@ def export(
 
     Example: algid export case1-unloaded.algid --to mjcf --l2 0.5
     """
-    from algid.export.formats import FORMATS, exported
-    from algid.export.links import Knowns
+    from algid.exports.formats import FORMATS, exported
+    from algid.exports.links import Knowns
     from algid.files import refuse_existing, whole_file
     from algid.results import read_result
 

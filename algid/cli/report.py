@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from algid.report.document import Document
     from algid.report.figures.base import Figure, Missing
     from algid.results import Result
-    from algid.track.result import TrackResult
+    from algid.tracks.result import TrackResult
 
     Written = tuple[list[Path], Callable[[], Sequence[Figure | Missing]]]
     """The files that were written, and what gives the figures."""
@@ -80,7 +80,7 @@ def report(
 
     Example: algid report case1-unloaded.algid --save-plots figures
     """
-    from algid.track.read import is_track
+    from algid.tracks.read import is_track
 
     for folder in results:
         if is_track(folder):
@@ -118,9 +118,9 @@ def _identification(
 
 def _track(folder: Path, form: ResultFormat, *, mcap: bool) -> Written:
     """Write a track's pages and print it."""
-    from algid.track.figures import figures
-    from algid.track.page import write_pages
-    from algid.track.read import read_track
+    from algid.tracks.figures import figures
+    from algid.tracks.page import write_pages
+    from algid.tracks.read import read_track
 
     result = read_track(folder)
     written = write_pages(result, folder, mcap)
@@ -130,8 +130,8 @@ def _track(folder: Path, form: ResultFormat, *, mcap: bool) -> Written:
 
 def print_track(result: TrackResult, form: ResultFormat) -> None:
     """Print a track to stdout."""
-    from algid.track.page import track_document
-    from algid.track.result import track_json
+    from algid.tracks.page import track_document
+    from algid.tracks.result import track_json
 
     print_report(track_document(result), lambda: track_json(result), form)
 

@@ -58,9 +58,9 @@ def track(
 
     from algid.files import refuse_existing, whole_folder
     from algid.report.progress import progress
-    from algid.track.page import track_folder, write_track
-    from algid.track.run import track_log
-    from algid.track.tables import verdict
+    from algid.tracks.page import track_folder, write_track
+    from algid.tracks.run import track_log
+    from algid.tracks.tables import verdict
 
     folder = track_folder(str(log), out)
     refuse_existing(folder, force)

@@ -72,7 +72,7 @@ def validate(
 
     known, meaning = None, choice.profile()
     if result.suffix == ".urdf":
-        from algid.export.read_urdf import read_urdf
+        from algid.exports.read_urdf import read_urdf
 
         model, warnings = read_urdf(result)
     else:

@@ -12,14 +12,14 @@ import polars as pl
 import pytest
 import typer
 
-from algid.batch.jobs import Job
-from algid.batch.records import End, JobRecord
-from algid.batch.run import Ended, Progress
+from algid.batches.jobs import Job
+from algid.batches.records import End, JobRecord
+from algid.batches.run import Ended, Progress
 from algid.cli import batch as command
 from algid.cli.compare import labels
 from algid.cli.design import Drive, _campaign, _noise
-from algid.design.prior import KnownBefore, prior_of
-from algid.design.request import request
+from algid.designs.prior import KnownBefore, prior_of
+from algid.designs.request import request
 from algid.errors import SettingError
 from algid.estimators.whitening import NoiseLevels
 from algid.synth.cases import load_case
@@ -141,9 +141,9 @@ def test_a_watch_complains_once_and_retries_what_failed_once(
             raise found
         return found
 
-    monkeypatch.setattr("algid.batch.discover.jobs_of", jobs_of)
+    monkeypatch.setattr("algid.batches.discover.jobs_of", jobs_of)
     monkeypatch.setattr(
-        "algid.batch.run.Settling", lambda: SimpleNamespace(settled=lambda jobs: jobs)
+        "algid.batches.run.Settling", lambda: SimpleNamespace(settled=lambda jobs: jobs)
     )
     running: Any = Watched(6)
     ended = command._watch(running, ["logs"], "out", "logs", True)

@@ -17,7 +17,7 @@ from algid.estimators.rollout import (
 from algid.model import Model
 from algid.signals.segments import Segment
 from algid.synth.simulator import simulate
-from tests.export.arms import ODD
+from tests.exports.arms import ODD
 
 K = ODD.constants()
 DT = 0.005

@@ -13,9 +13,9 @@ import pytest
 from scipy.stats import norm
 from typer.testing import CliRunner
 
-from algid.batch.jobs import Job
-from algid.batch.records import End, JobRecord
-from algid.batch.table import write_jobs
+from algid.batches.jobs import Job
+from algid.batches.records import End, JobRecord
+from algid.batches.table import write_jobs
 from algid.errors import ResultError
 from algid.fleet.history import history_of
 from algid.fleet.page import _figures, drift_table, finding_table, robot_table, verdict

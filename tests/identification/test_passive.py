@@ -23,8 +23,8 @@ from algid.signals.segments import Segment
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
-from algid.track.result import track_json
-from algid.track.run import track_log
+from algid.tracks.result import track_json
+from algid.tracks.run import track_log
 from tests.cli.commands import app
 from tests.intervals import holds_at_least_95, in_axes
 

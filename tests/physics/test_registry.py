@@ -40,8 +40,8 @@ import algid
 from algid.cli.completion import terms
 from algid.cli.guide import text_of
 from algid.errors import SettingError
-from algid.export.formats import exported
-from algid.export.links import Knowns
+from algid.exports.formats import exported
+from algid.exports.links import Knowns
 from algid.identification.identify import identify
 from algid.model import Model, Motion, torque
 from algid.profile import Profile

@@ -15,7 +15,7 @@ from algid.physics.expressions import Expression
 from algid.physics.terms import ALWAYS, OPTIONAL
 from algid.signals.segments import Segment
 from tests.estimators.test_model import VALUES
-from tests.export.test_peers import compiled, each, text_of
+from tests.exports.test_peers import compiled, each, text_of
 
 DT = 1e-3
 IN_MODELS = [*(term.name for term in ALWAYS), *TERMS]

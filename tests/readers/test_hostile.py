@@ -27,7 +27,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyarrow.parquet import encryption
 
-from algid.batch.manifest import is_manifest
+from algid.batches.manifest import is_manifest
 from algid.errors import LogError
 from algid.files import read_whole
 from algid.identification.source import sha256_of

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray, energy, forward_dynamics, mass_matrix
-from algid.export.formats import exported
-from algid.export.links import Knowns
+from algid.exports.formats import exported
+from algid.exports.links import Knowns
 from algid.model import Model
 from algid.synth.excitation import no_torque
 from algid.synth.simulator import HANGING, simulate
-from tests.export.arms import ODD, result_of, values_of
+from tests.exports.arms import ODD, result_of, values_of
 
 FREE = np.array([0.05, 1.0, 0.03, 4.0, 0.2, 0.0, 0.0])  # without friction
 START = np.array([0.5, -1.0]), np.array([2.0, -3.0])

@@ -1,0 +1,285 @@
+"""From sources to jobs: files, folders, globs and manifests.
+
+X-unloaded.* and X-loaded.* make one job X.
+
+A log that cannot be a job, by its name or because another has it too, is one that fails alone: see
+`Job.trouble`.
+"""
+
+from __future__ import annotations
+
+import glob
+import os
+import re
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from pathlib import Path
+from urllib.parse import unquote
+
+from algid.batches.jobs import TABLE, Job, kept_path, name_fault, safe_name
+from algid.batches.manifest import is_manifest, read_manifest
+from algid.errors import SettingError
+from algid.readers.formats import SUFFIXES
+from algid.stores import is_url, list_urls, shown
+
+BAG = "metadata.yaml"
+"""What makes a folder a bag."""
+MOST_NAMED = 8
+"""Logs of one name that are listed."""
+_ROLE = re.compile(r"(?P<base>.+)[-_](?P<role>unloaded|loaded)")
+
+
+def jobs_of(sources: Sequence[str], out: str, alone: str = "logs") -> list[Job]:
+    """The jobs that sources hold, sorted by name.
+
+    Parameters
+    ----------
+    sources : paths of logs, folders, globs, manifests, or URLs of an object store
+    out : where results go; logs are not looked for within it
+    alone : 'logs' or 'loaded'
+        What a log is whose name does not tell.
+
+    Raises
+    ------
+    SettingError
+        If a source is not there or cannot be looked at, or a manifest is wrong.
+    """
+    jobs: dict[str, Job] = {}
+    for source in sources:
+        try:
+            manifest = not is_url(source) and is_manifest(Path(source))
+            found = read_manifest(Path(source)) if manifest else _paired(_logs(source, out), alone)
+        except (OSError, ValueError) as error:  # ValueError: a NUL in a path
+            raise SettingError(
+                f"{source}: cannot look there ({error}); check its name and rights"
+            ) from error
+        for job in found:
+            before = jobs.get(job.name, job)
+            jobs[job.name] = job if before == job else _of_one_name(before, job)
+    return [jobs[name] for name in sorted(jobs)]
+
+
+Found = tuple[str, str, str | None]
+"""A log's path or URL, its name below its source without suffix, and what it cannot be looked at for."""
+
+
+def _logs(source: str, out: str) -> list[Found]:
+    """The logs of a source."""
+    if is_url(source):
+        own = _written_by_batch(source, out)
+        found = [(url, name) for url, name in list_urls(source) if _is_log(name) and not own(name)]
+        return [(url, _stem(name), None) for url, name in found]
+    path = Path(source)
+    if path.is_dir() and not _is_bag(path):
+        return [
+            _below(path, one)
+            for one in _walk(path, out)
+            if one.trouble or one.bag or _is_log(one.name)
+        ]
+    matches = [_File(source, _is_bag(path))] if path.exists() else list(_matches(source, out))
+    if not matches:
+        raise SettingError(f"{source}: there is no such file, folder or match; check the name")
+    return [
+        (one.path, _stem(one.name), one.trouble)
+        for one in matches
+        if one.bag or not Path(one.path).is_dir()
+    ]
+
+
+def _written_by_batch(source: str, out: str) -> Callable[[str], bool]:
+    """Whether an object of that name below `source` is hidden, part of a result, or lies in `out`."""
+    below, place = f"{shown(source)}/", f"{shown(out)}/"
+    inside = unquote(place.removeprefix(below)) if is_url(out) and place.startswith(below) else None
+
+    def own(name: str) -> bool:
+        *folders, _ = parts = name.split("/")
+        if any(part.startswith(".") for part in parts) or any(
+            part.endswith(".algid") for part in folders
+        ):
+            return True
+        return inside is not None and (name.startswith(inside) if inside else name == TABLE)
+
+    return own
+
+
+@dataclass(frozen=True)
+class _File:
+    """A file or a bag that was come by, or a folder in which nobody may look, for its `trouble`."""
+
+    path: str
+    bag: bool = False
+    trouble: str | None = None
+
+    @property
+    def name(self) -> str:
+        return self.path.rpartition("/")[2]
+
+
+def _below(folder: Path, one: _File) -> Found:
+    name = one.path[len(str(folder)) + 1 :]
+    return one.path, name if one.trouble else _stem(name), one.trouble
+
+
+def _walk(folder: Path, out: str) -> Iterator[_File]:
+    """Files below a folder; hidden ones, results and what lies in `out` are passed over.
+
+    Each folder is looked through once, whatever links lead there, and those above `folder` are
+    not; a name that goes through no link comes first.
+
+    Raises
+    ------
+    OSError
+        If nobody may look into `folder` itself.
+    """
+    results = _mark(out) if Path(out).is_dir() else None
+    above = {
+        _mark(str(one)) for one in folder.resolve().parents
+    }  # a link there leads to all that there is
+    seen = above | ({results} if results != _mark(str(folder)) else set())
+    pending, links = [str(folder)], deque[str]()
+    while pending or links:
+        place = pending.pop() if pending else links.popleft()
+        try:
+            mark = _mark(place)
+            if mark in seen:
+                continue
+            seen.add(mark)
+            files, folders, linked = _entries(place)
+        except OSError as error:
+            if place == str(folder):
+                raise
+            yield _File(
+                place,
+                trouble=f"{kept_path(place)}: cannot look there ({error.strerror}); check its rights",
+            )
+            continue
+        if BAG in files and place != str(folder):
+            yield _File(place, bag=True)
+            continue
+        yield from (_File(f"{place}/{name}") for name in files if mark != results or name != TABLE)
+        pending += [f"{place}/{name}" for name in folders if not name.endswith(".algid")]
+        links += [f"{place}/{name}" for name in linked if not name.endswith(".algid")]
+
+
+def _mark(folder: str) -> tuple[int, int]:
+    found = Path(folder).stat()
+    return found.st_dev, found.st_ino
+
+
+def _entries(folder: str) -> tuple[list[str], list[str], list[str]]:
+    """Names of what lies in a folder and is not hidden: files, folders, and links to folders."""
+    files, folders, links = list[str](), list[str](), list[str]()
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            if not entry.name.startswith("."):
+                (
+                    files if not _is_folder(entry) else links if entry.is_symlink() else folders
+                ).append(entry.name)
+    return sorted(files), sorted(folders), sorted(links)
+
+
+def _is_folder(entry: os.DirEntry[str]) -> bool:
+    try:
+        return entry.is_dir()
+    except OSError:  # a link to itself
+        return False
+
+
+def _matches(pattern: str, out: str) -> Iterator[_File]:
+    """Files and bags that a pattern names.
+
+    ``**`` goes through folders as `_walk` does, and follows links once.
+    """
+    parts = Path(pattern).parts
+    first = parts.index("**") if "**" in parts else len(parts)
+    found = sorted(glob.glob(str(Path(*parts[:first]))))  # noqa: PTH207  # a pattern may be absolute
+    if first == len(parts):
+        yield from (_File(match, _is_bag(Path(match))) for match in found)
+        return
+    for folder in (Path(match) for match in found if Path(match).is_dir()):
+        files = (one for one in _walk(folder, out) if not one.trouble)
+        yield from (
+            one for one in files if _fits(Path(one.path).relative_to(folder).parts, parts[first:])
+        )
+
+
+def _fits(parts: Sequence[str], pattern: Sequence[str]) -> bool:
+    """Whether a path's parts fit a pattern's, of which ``**`` stands for any number of folders."""
+    places = {0}  # of the pattern, after the parts so far
+    for part in parts:
+        places = _onward(places, pattern)
+        fitting = {
+            n
+            for n in places
+            if n < len(pattern) and (pattern[n] == "**" or fnmatchcase(part, pattern[n]))
+        }
+        places = {n if pattern[n] == "**" else n + 1 for n in fitting}
+    return len(pattern) in _onward(places, pattern)
+
+
+def _onward(places: set[int], pattern: Sequence[str]) -> set[int]:
+    """Those places, and what follows each ``**`` there."""
+    reached = set(places)
+    for place in sorted(places):
+        while place < len(pattern) and pattern[place] == "**":
+            place += 1
+            reached.add(place)
+    return reached
+
+
+def _is_bag(path: Path) -> bool:
+    return path.is_dir() and (path / BAG).is_file()
+
+
+def _is_log(name: str) -> bool:
+    return name.lower().endswith(SUFFIXES)
+
+
+def _stem(name: str) -> str:
+    suffix = max((end for end in SUFFIXES if name.lower().endswith(end)), key=len, default="")
+    return name[: len(name) - len(suffix)]
+
+
+def _paired(logs: Iterable[Found], alone: str) -> list[Job]:
+    """A job for each name of logs that differ in their role alone."""
+    jobs: dict[str, Job] = {}
+    for path, stem, trouble in logs:
+        match = _ROLE.fullmatch(stem)
+        name = match["base"] if match else stem
+        loaded = (match["role"] if match else alone) == "loaded"
+        job = _job(name, path, loaded=loaded, trouble=trouble)
+        before = jobs.get(job.name)
+        jobs[job.name] = job if before is None else _together(before, job)
+    return list(jobs.values())
+
+
+def _job(name: str, path: str, *, loaded: bool, trouble: str | None) -> Job:
+    """The job of one log, under a name that can stand for its own where that is unfit."""
+    fault = trouble or name_fault(name)
+    if fault is not None:
+        told = trouble or f"{kept_path(path)}: a log's name becomes a folder's: {fault}; rename it"
+        return Job(safe_name(name), logs=(path,), trouble=told)
+    robot = name.rpartition("/")[0] or None
+    return (
+        Job(name, loaded=(path,), robot=robot) if loaded else Job(name, logs=(path,), robot=robot)
+    )
+
+
+def _together(first: Job, second: Job) -> Job:
+    """One job of the arm's logs without and with payload."""
+    if first.trouble or (first.logs and second.logs) or (first.loaded and second.loaded):
+        return _of_one_name(first, second)
+    return replace(first, logs=first.logs + second.logs, loaded=first.loaded + second.loaded)
+
+
+def _of_one_name(first: Job, second: Job) -> Job:
+    """What stands for two jobs of one name: it cannot be run."""
+    logs, loaded = (
+        tuple(dict.fromkeys(one))
+        for one in (first.logs + second.logs, first.loaded + second.loaded)
+    )
+    paths = ", ".join(map(kept_path, [*logs, *loaded][:MOST_NAMED]))
+    trouble = f"{first.name}: two jobs of one name ({paths}); rename a log, or name the jobs in a manifest"
+    return replace(first, logs=logs, loaded=loaded, trouble=trouble)

@@ -1,0 +1,205 @@
+"""What a worker does with one job: identify, and say how it ended.
+
+No exception leaves this file.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from algid import __version__
+from algid.batches.fetch import naming, staged
+from algid.batches.jobs import Job, kept_path
+from algid.batches.records import End, Input, JobRecord, estimates_of, hash_of, stat_of
+from algid.errors import AlgidError, chain_of, text_of
+from algid.files import refuse_links, temporary_folder
+from algid.identification.identify import identify
+from algid.identification.source import Staged
+from algid.results import Result
+from algid.runtime import keep_freed, keep_to_one_core
+from algid.settings import Settings
+from algid.stores import is_url, open_store, put_folder
+
+if TYPE_CHECKING:
+    from algid.profile import Profile
+    from algid.verdict import Verdict
+
+NO_SPACE = {errno.ENOSPC, errno.EDQUOT}
+NO_SPACE_LEFT = "No space left on device"  # what libraries say that raise exceptions of their own
+TOO_LARGE = "it needs more memory than a worker has; raise --memory-limit"
+
+
+@dataclass(frozen=True)
+class DiskFull:
+    """There is no space left where results go: no job's fault, and reason to stop."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
+class Task:
+    """A job with all that decides its outcome; travels to the worker."""
+
+    job: Job
+    basis: str
+    settings: Settings
+    profile: Profile | None
+    parameters: Result | None
+    out: str
+    report: bool
+
+
+def run_task(task: Task) -> JobRecord | DiskFull:
+    """Identify one job and write its result folder.
+
+    Whatever is raised on the way is the job's end: libraries panic by exceptions of any base.
+    """
+    keep_freed()
+    keep_to_one_core()
+    start = time.perf_counter()
+    inputs = inputs_of(task.job)
+    try:
+        result = _identified(task)
+    except BaseException as error:
+        if is_full(error):
+            return DiskFull(text_of(error))
+        reason = TOO_LARGE if isinstance(error, MemoryError) else text_of(error)
+        inputs = tuple(replace(one, sha256=hash_of(one.path)) for one in inputs)
+        return failed_record(task, reason, inputs=inputs, seconds=time.perf_counter() - start)
+    judged = result.verdict
+    lacking = ["samples were lost"] if result.data_lost else []
+    lacking += [
+        f"{name} {one.status.value}" for name, one in result.estimates.items() if not one.usable
+    ]
+    hashes = {log.path: log.sha256 for log in result.logs}
+    return _record(
+        task,
+        inputs=tuple(replace(one, sha256=hashes.get(one.path)) for one in inputs),
+        status=End.FAILED if judged.failed else End.INCOMPLETE if lacking else End.OK,
+        reason=_first_reason(judged) if judged.failed else "; ".join(lacking),
+        seconds=time.perf_counter() - start,
+        start_ns=result.log.start_ns,
+        log_seconds=sum(log.duration for log in result.logs),
+        estimator=result.estimator,
+        verdict=judged.grade,
+        headline=judged.headline,
+        reasons=tuple(f"{one.code}: {one.sentence}" for one in judged.reasons),
+        command=judged.command,
+        estimates=estimates_of(result),
+    )
+
+
+def _first_reason(judged: Verdict) -> str:
+    """Why a result must not be used."""
+    first = judged.reasons[0].text if judged.reasons else ""
+    return judged.sentence if first in judged.sentence else f"{judged.sentence} {first}"
+
+
+def is_full(error: BaseException) -> bool:
+    """Whether there was no space left, as an exception or what it came from says."""
+    chain = list(chain_of(error))
+    numbers = {one.errno for one in chain if isinstance(one, OSError)}
+    return not numbers.isdisjoint(NO_SPACE) or any(NO_SPACE_LEFT in text_of(one) for one in chain)
+
+
+def failed_record(task: Task, reason: str, status: End = End.FAILED, **known: Any) -> JobRecord:
+    """The record of a task without result; `known` are other fields of it."""
+    return _record(task, status=status, reason=reason, **{"inputs": inputs_of(task.job), **known})
+
+
+def kept(job: Job) -> Job:
+    """A job as records hold it: its URLs without credentials."""
+    logs, loaded = (tuple(map(kept_path, paths)) for paths in (job.logs, job.loaded))
+    return replace(
+        job,
+        logs=logs,
+        loaded=loaded,
+        profile=None if job.profile is None else kept_path(job.profile),
+    )
+
+
+def _record(task: Task, **known: Any) -> JobRecord:
+    return JobRecord(
+        job=kept(task.job),
+        basis=task.basis,
+        settings=task.settings.as_json(),
+        version=__version__,
+        **known,
+    )
+
+
+def inputs_of(job: Job) -> tuple[Input, ...]:
+    """The job's logs as they are now, not hashed."""
+    return tuple(map(_looked_at, (*job.logs, *job.loaded)))
+
+
+def _looked_at(path: str) -> Input:
+    """A log as it is now.
+
+    As one that is not there where it cannot be looked at: its reader says why.
+    """
+    try:
+        return stat_of(path)
+    except AlgidError:
+        return Input(kept_path(path), 0, 0)
+
+
+def _identified(task: Task) -> Result:
+    """Identify; what lies in an object store is fetched before and put there after."""
+    paths = (*task.job.logs, *task.job.loaded, task.out)
+    if not is_url(task.out):
+        refuse_links(Path(task.out), task.job.name)
+    with temporary_folder() if any(map(is_url, paths)) else nullcontext(Path()) as stage:
+        place = (stage if is_url(task.out) else Path(task.out)) / task.job.name
+        logs = _here(task.job.logs, stage / "logs", task.profile)
+        loaded = _here(task.job.loaded, stage / "loaded", task.profile)
+        with naming({log.path: log.url for log in (*logs, *loaded) if isinstance(log, Staged)}):
+            result = identify(
+                logs,
+                loaded,
+                task.settings,
+                parameters=task.parameters,
+                profile=task.profile,
+                out=place.parent,
+                name=place.name,
+                force=True,
+                report=task.report,
+                shared_library=not is_url(task.out),
+            )
+        if is_url(task.out):
+            put_folder(
+                open_store(task.out),
+                f"{task.job.name}.algid",
+                place.with_name(f"{place.name}.algid"),
+            )
+        return result
+
+
+def _here(paths: Sequence[str], folder: Path, profile: Profile | None) -> list[str | Staged]:
+    """Logs as they can be read on this machine."""
+    return [
+        staged(path, folder / str(n), profile) if is_url(path) else path
+        for n, path in enumerate(paths)
+    ]
+
+
+def basis_of(
+    settings: Mapping[str, Any], profile: Profile | None, parameters: Result | None, report: bool
+) -> str:
+    """A hash of everything but the logs that decides a job's outcome."""
+    content = {
+        "settings": settings,
+        "profile": None if profile is None else profile.model_dump(mode="json"),
+        "parameters": None if parameters is None else parameters.model_dump(mode="json"),
+        "report": report,
+        "version": __version__,
+    }
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -1,0 +1,218 @@
+"""From what is believed and allowed to a planned motion: what `algid design` does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.designs.belief import Asked, Belief
+from algid.designs.information import Experiment, Slopes, informations
+from algid.designs.limits import HANGING, Limits, Row, Usage, resting, usage
+from algid.designs.optimise import optimise
+from algid.designs.position import JUDGED_RATE, PositionProblem
+from algid.designs.swing import sampled
+from algid.designs.torque import TorqueProblem, search
+from algid.model import Motion
+from algid.progress import Progress
+
+Drive = Literal["position", "torque"]
+MARGIN = (
+    0.05  # of each limit, kept for what a controller overshoots while its model is a fifth wrong
+)
+ARMS = 20  # of the belief, of which the worst is reported
+OPEN = 0.5  # relative bound from which on an estimate would be called not identifiable
+SECOND = 1.0  # s: for how long each stretch of the motion is, of which it is said what it teaches
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign:
+    """A campaign to plan.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    belief : Belief
+    limits : Limits
+    asked : Asked
+    duration : float, s, of one run
+    drive : 'position' or 'torque'
+    margin : float
+        Share of each limit that the plan leaves.
+    seed : int
+    """
+
+    experiment: Experiment
+    belief: Belief
+    limits: Limits
+    asked: Asked
+    duration: float
+    drive: Drive = "position"
+    margin: float = MARGIN
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """A planned motion and what it will tell.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    t : (N,), s
+    motions : dict of Motion
+        The believed arm's, without and with the payload: the same under position control.
+    torque : dict of (2, N), N m
+        What the believed arm needs for them.
+    std : (Q,)
+        Predicted standard deviations for the believed arm, of all runs together.
+    worst : (Q,)
+        The largest among arms drawn from the belief.
+    usage : Usage
+        Of the limits as they were given, by all arms of the belief.
+    interrupted : bool
+        Whether the search was broken off.
+    """
+
+    campaign: Campaign
+    t: FloatArray
+    motions: dict[bool, Motion]
+    torque: dict[bool, FloatArray]
+    std: FloatArray
+    worst: FloatArray
+    shares: FloatArray
+    usage: Usage
+    interrupted: bool
+
+    @property
+    def motion(self) -> Motion:
+        """The motion without payload, or with it where there is no other."""
+        return self.motions[min(self.motions)]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return self.campaign.experiment.shared.names
+
+    @property
+    def relative(self) -> FloatArray:
+        """Predicted standard deviations (Q,) over the parameters' sizes."""
+        return self.std / self.campaign.asked.size
+
+    @cached_property
+    def largest(self) -> float:
+        """The largest relative bound among the parameters asked for."""
+        return float(self.relative[self.campaign.asked.wanted].max())
+
+    @property
+    def open_parameters(self) -> list[str]:
+        """Names of those asked for whose error bar is as large as they are."""
+        lost = self.campaign.asked.wanted & (self.relative > OPEN)
+        return [name for name, yes in zip(self.names, lost, strict=True) if yes]
+
+    @property
+    def binding(self) -> list[tuple[Row, float]]:
+        """Each limit with the share of it that is used, the tightest first."""
+        pairs = zip(self.usage.rows, self.usage.most.tolist(), strict=True)
+        return sorted(pairs, key=lambda pair: -pair[1])
+
+
+def plan(campaign: Campaign, progress: Progress | None = None) -> Design:
+    """Plan the motion of a campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    progress : callable
+        Called as the search goes on.
+
+    Raises
+    ------
+    SettingError
+        If no motion keeps the limits.
+    KeyboardInterrupt
+        If it is interrupted before there is a motion; later, the best so far is the plan.
+    """
+    t = (
+        np.arange(round(campaign.duration * campaign.experiment.rate) + 1)
+        / campaign.experiment.rate
+    )
+    return (
+        _swung(campaign, t, progress)
+        if campaign.drive == "torque"
+        else _guided(campaign, t, progress)
+    )
+
+
+def _guided(campaign: Campaign, t: FloatArray, progress: Progress | None) -> Design:
+    """The plan under position control: one motion, whatever the arm."""
+    kept = campaign.limits.within(campaign.margin)
+    experiment, belief = campaign.experiment, campaign.belief
+    loads = [belief.load(loaded) for loaded in experiment.kinds]
+    rest = resting(kept, experiment.shared.model, loads)
+    problem = PositionProblem(experiment, belief, kept, campaign.asked, campaign.duration, rest)
+    found = optimise(problem, experiment.rate, campaign.seed, progress)
+    motion = problem.family.motion(found.x, problem.family.basis(t))
+    slopes = Slopes(experiment.shared.model, motion, experiment.rate)
+    kinds = (False, True) if experiment.shared.payload else (False,)
+    torque = {loaded: np.einsum("aqn,q->an", slopes.Y, belief.load(loaded).c) for loaded in kinds}
+    used = usage(campaign.limits, slopes, loads, derivatives=False)
+    return _judged(campaign, t, dict.fromkeys(kinds, motion), torque, used, found.interrupted)
+
+
+def _swung(campaign: Campaign, t: FloatArray, progress: Progress | None) -> Design:
+    """The plan of an open loop: one torque, under which every arm and load moves in its own way."""
+    limits = campaign.limits.within(campaign.margin)
+    start = limits.middle if campaign.experiment.shared.model.gravity == 0 else np.array(HANGING)
+    problem = TorqueProblem(
+        campaign.experiment,
+        campaign.belief,
+        limits,
+        campaign.asked,
+        campaign.duration,
+        start,
+        campaign.seed,
+    )
+    x, interrupted = search(problem, campaign.seed, progress)
+    swung = problem.checked(x)
+    motions = {loaded: sampled(swung.t, motion, t) for loaded, motion in swung.motions.items()}
+    torque = dict.fromkeys(motions, problem.torques(swung.x, t))
+    used = Usage(swung.usage.rows, swung.usage.u * (1 - campaign.margin))
+    return _judged(campaign, t, motions, torque, used, interrupted)
+
+
+def _judged(
+    campaign: Campaign,
+    t: FloatArray,
+    motions: dict[bool, Motion],
+    torque: dict[bool, FloatArray],
+    used: Usage,
+    interrupted: bool,
+) -> Design:
+    """What a plan tells, at the times `t` (N,) of its log."""
+    experiment, belief = campaign.experiment, campaign.belief
+    recorded = {loaded: motions[loaded] for loaded in experiment.kinds}
+    every = max(1, round(experiment.rate / JUDGED_RATE))
+    whole = informations(experiment, recorded, belief.mean, 1, experiment.rate)
+    drawn = [
+        informations(experiment, recorded, arm, every, experiment.rate)
+        for arm in belief.draws(ARMS, campaign.seed)
+    ]
+    C, *others = (
+        campaign.asked.covariance(np.sum([one.S for one in arm], axis=0)) for arm in [whole, *drawn]
+    )
+    parts = np.sum([one.parts(round(SECOND * experiment.rate)) for one in whole], axis=0)
+    return Design(
+        campaign=campaign,
+        t=t,
+        motions=motions,
+        torque=torque,
+        std=np.sqrt(np.diag(C)),
+        worst=np.sqrt(np.max([np.diag(one) for one in [C, *others]], axis=0)),
+        shares=np.einsum("pi,bij,jp->pb", C, parts, C) / np.diag(C)[:, None],
+        usage=used,
+        interrupted=interrupted,
+    )

@@ -1,0 +1,222 @@
+"""What a motion must keep within, and how much of each limit it uses.
+
+A usage is what is used of a limit, one where it is reached: the angle's distance from the middle
+of its range over half the range, speed, acceleration and torque over their limits, and the depth
+of the tip below the height of a stretched arm over what is allowed of it. A posture that the arm
+can be held in within all of them is where a motion rests; without one there is no motion either.
+
+======  ============================================  =========
+symbol  name                                          shape
+======  ============================================  =========
+u       usages, a row a limit and side                (m, N)
+τ̂       largest torque of any arm of the belief       (2, N)
+======  ============================================  =========
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.designs.belief import Load
+from algid.designs.information import COMPONENTS, Slopes
+from algid.errors import SettingError
+from algid.model import Model, Motion
+
+HANGING = (-np.pi / 2, 0.0)
+_STEPS = 41  # postures of each joint that are tried
+_WIDE = np.pi  # rad to either side, where a range is not limited
+_EASY = 0.7  # usage up to which the middle of the range will do
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """Limits of a motion, each (2,) a joint; infinite where there is none.
+
+    Parameters
+    ----------
+    low, high : rad; a joint has both or neither
+    speed : rad/s
+    acceleration : rad/s^2
+    torque : N m
+    height : float, m
+        Lowest height of the tip over joint 1; minus infinity where there is none.
+    lengths : (2,), m
+        Of the links; NaN where they are not known.
+    """
+
+    low: FloatArray
+    high: FloatArray
+    speed: FloatArray
+    acceleration: FloatArray
+    torque: FloatArray
+    height: float
+    lengths: FloatArray
+
+    @property
+    def middle(self) -> FloatArray:
+        """Middle (2,) of the range; hanging where there is none."""
+        bounded = np.isfinite(self.half)
+        return np.where(
+            bounded,
+            0.5 * (np.where(bounded, self.low, 0.0) + np.where(bounded, self.high, 0.0)),
+            HANGING,
+        )
+
+    @property
+    def half(self) -> FloatArray:
+        """Half the width (2,) of the range; infinite where there is none."""
+        return 0.5 * (self.high - self.low)
+
+    def within(self, margin: float) -> Limits:
+        """These limits less a share `margin` of each."""
+        taken = np.where(np.isfinite(self.half), margin * self.half, 0.0)
+        kept = {
+            name: (1 - margin) * getattr(self, name) for name in ("speed", "acceleration", "torque")
+        }
+        height = (
+            self.height + margin * (self.lengths.sum() - self.height)
+            if np.isfinite(self.height)
+            else self.height
+        )
+        return replace(self, low=self.low + taken, high=self.high - taken, height=height, **kept)
+
+    def height_of(self, theta: FloatArray) -> FloatArray:
+        """Height of the tip (...) in m at angles (2, ...)."""
+        return self.lengths[0] * np.sin(theta[0]) + self.lengths[1] * np.sin(theta[0] + theta[1])
+
+
+@dataclass(frozen=True)
+class Row:
+    """A limit and its side: its flag, its joint, whether at its upper end, and for a torque whether loaded."""
+
+    limit: str
+    joint: int | None
+    upper: bool = True
+    loaded: bool | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Usage:
+    """Usages u (m, N) along a motion, the rows they belong to, and their derivatives (m, 6, N) by the motion."""
+
+    rows: tuple[Row, ...]
+    u: FloatArray
+    by_motion: FloatArray | None = None
+
+    @property
+    def most(self) -> FloatArray:
+        """Largest usage (m,) of each row."""
+        return self.u.max(axis=1)
+
+
+_Found = tuple[Row, FloatArray, FloatArray]
+
+
+def usage(limits: Limits, slopes: Slopes, loads: Sequence[Load], derivatives: bool = True) -> Usage:
+    """How much of each limit the motion of `slopes` uses, for every arm of the belief behind `loads`.
+
+    Parameters
+    ----------
+    limits : Limits
+        Those that are infinite have no row.
+    slopes : Slopes
+        Of the motion, at N instants.
+    loads : sequence of Load
+    derivatives : bool
+        Whether the derivatives by the motion are asked for too.
+    """
+    found = list(_kinematic(limits, slopes.motion))
+    for load in loads:
+        found += _torque(limits.torque, slopes, load, derivatives)
+    rows = tuple(row for row, _, _ in found)
+    u = np.array([values for _, values, _ in found])
+    return Usage(rows, u, np.array([slope for _, _, slope in found]) if derivatives else None)
+
+
+def _kinematic(limits: Limits, motion: Motion) -> Iterator[_Found]:
+    kinds = (
+        ("range", motion.theta - limits.middle[:, None], limits.half),
+        ("speed", motion.omega, limits.speed),
+        ("acceleration", motion.alpha, limits.acceleration),
+    )
+    for order, (name, values, limit) in enumerate(kinds):
+        for joint in np.flatnonzero(np.isfinite(limit)).tolist():
+            for sign in (1.0, -1.0):
+                slope = np.zeros((COMPONENTS, values.shape[1]))
+                slope[2 * order + joint] = sign / limit[joint]
+                yield Row(name, joint, sign > 0), sign * values[joint] / limit[joint], slope
+    if np.isfinite(limits.height):
+        l1, l2 = limits.lengths
+        room = l1 + l2 - limits.height
+        both = motion.theta[0] + motion.theta[1]
+        slope = np.zeros((COMPONENTS, both.size))
+        slope[0] = -(l1 * np.cos(motion.theta[0]) + l2 * np.cos(both)) / room
+        slope[1] = -l2 * np.cos(both) / room
+        yield (
+            Row("tip-height", None, upper=False),
+            (l1 + l2 - limits.height_of(motion.theta)) / room,
+            slope,
+        )
+
+
+def _torque(limit: FloatArray, slopes: Slopes, load: Load, derivatives: bool) -> Iterator[_Found]:
+    torque, more, by_Y = load.largest(slopes.Y)
+    for joint in np.flatnonzero(np.isfinite(limit)).tolist():
+        for sign in (1.0, -1.0):
+            values = (sign * torque[joint] + more[joint]) / limit[joint]
+            slope = np.zeros((COMPONENTS, values.size))
+            if derivatives:
+                to_Y = (sign * load.c[:, None] + by_Y[joint]) / limit[joint]
+                slope = np.einsum("qn,cqn->cn", to_Y, slopes.dY[:, joint])
+            yield Row("torque", joint, sign > 0, load.loaded), values, slope
+
+
+def resting(limits: Limits, model: Model, loads: Sequence[Load]) -> FloatArray:
+    """A posture (2,) that keeps the limits: the middle of the range, or the one that uses the least of them.
+
+    Raises
+    ------
+    SettingError
+        If there is none; it names the limit, and by how much it is missed.
+    """
+    middle = limits.middle
+    low = np.where(np.isfinite(limits.low), limits.low, middle - _WIDE)
+    high = np.where(np.isfinite(limits.high), limits.high, middle + _WIDE)
+    grid = np.meshgrid(
+        *(np.linspace(low[joint], high[joint], _STEPS) for joint in range(2)), indexing="ij"
+    )
+    theta = np.stack([axis.ravel() for axis in grid])
+    still = Motion(theta, np.zeros_like(theta), np.zeros_like(theta))
+    used = usage(limits, Slopes(model, still, 1.0), loads, derivatives=False)
+    most = used.u.max(axis=0)
+    central, best = theta.shape[1] // 2, int(np.argmin(most))
+    if most[central] <= _EASY:
+        return theta[:, central]
+    if most[best] < 1:
+        return theta[:, best]
+    other = np.array([row.limit != "range" for row in used.rows])
+    most = np.where(other[:, None], used.u, -np.inf).max(axis=0)
+    best = int(np.argmin(most))
+    row = used.rows[int(np.argmax(np.where(other, used.u[:, best], -np.inf)))]
+    raise SettingError(_missed(row, limits, float(most[best])))
+
+
+def _missed(row: Row, limits: Limits, most: float) -> str:
+    if row.limit == "tip-height":
+        reach = float(limits.lengths.sum())
+        lowest = reach - most * (reach - limits.height)
+        return (
+            f"--tip-height: within the range the tip rises no higher than {lowest:.3g} m, the limit asks for "
+            f"{limits.height:.3g} m (margin included); lower it, or widen --range"
+        )
+    assert row.joint is not None
+    limit = limits.torque[row.joint]
+    with_load = "loaded " if row.loaded else ""
+    return (
+        f"--torque: the {with_load}arm asks for {most * limit:.3g} N m at joint {row.joint + 1} even at rest, the "
+        f"limit is {limit:.3g} N m (margin included); raise it, or move --range to where gravity pulls less"
+    )

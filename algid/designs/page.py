@@ -1,0 +1,55 @@
+"""A design's `report.html`: one file that opens offline."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from algid import __version__
+from algid.designs.campaign import Design
+from algid.designs.figures import figures
+from algid.designs.tables import bound_table, limit_table, verdict
+from algid.notices import Notice
+from algid.report.arm import ArmDrawing
+from algid.report.document import Document, Section
+from algid.report.frame import page
+from algid.text import file_name, significant
+
+_READING = "Play the motion: is the space around the arm free? The grey line is the tip's path, the red one its limit."
+
+
+def page_html(design: Design, source: str, doubts: Sequence[Notice] = ()) -> str:
+    """The page's text."""
+    return page(design_document(design, source, doubts))
+
+
+def design_document(design: Design, source: str, doubts: Sequence[Notice] = ()) -> Document:
+    """The report of a design for the arm that `source` tells of."""
+    campaign, name = design.campaign, file_name(source)
+    return Document(
+        title=f"Design for {name}",
+        verdict=verdict(design, doubts),
+        sections=(
+            Section((bound_table(design), limit_table(design), *_arm(design), *figures(design))),
+        ),
+        kicker="a planned identification",
+        name=name,
+        facts=f"{significant(campaign.duration, 4)} s under {campaign.drive} control · logged at "
+        f"{significant(campaign.experiment.rate, 4)} Hz · prior {name}",
+        made=f"Made by algid {__version__}.",
+        tab=f"Design for {name}",
+    )
+
+
+def _arm(design: Design) -> list[ArmDrawing]:
+    """The arm's drawing; nothing where its lengths are not known."""
+    limits = design.campaign.limits
+    if not np.all(np.isfinite(limits.lengths)):
+        return []
+    l1, l2 = limits.lengths.tolist()
+    payload = ""
+    if design.campaign.experiment.runs[1]:
+        mass = float(design.campaign.belief.mean[list(design.names).index("m_p")])
+        payload = f"payload of {significant(mass, 3)} kg"
+    return [ArmDrawing(l1, l2, design.t, design.motion.theta, _READING, payload, limits.height)]

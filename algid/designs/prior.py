@@ -1,0 +1,218 @@
+"""What is known of an arm before its run: from a result's folder, a shipped case, or a TOML file of the arm."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from algid.arm import Arm, FloatArray
+from algid.designs.belief import SURE, Belief
+from algid.errors import ResultError, SettingError
+from algid.estimators.parametrisation import Shared
+from algid.estimators.whitening import NoiseLevels
+from algid.identification.known import contradictions, has_error_bar, model_of
+from algid.model import TERMS, Model
+from algid.notices import Notice
+from algid.results import Result, read_result
+from algid.synth.cases import Case, load_case
+
+WRONG = 0.2  # share by which masses and friction of a drawing may be wrong
+# the torque is not linear in them, or they are not of one instant
+_UNPLANNED = tuple(name for name, term in TERMS.items() if not term.linear or term.timing)
+NOISE = ("theta1", "theta2", "tau1", "tau2")
+
+
+@dataclass(frozen=True, eq=False)
+class BelievedArm:
+    """An arm as it is believed to be.
+
+    Parameters
+    ----------
+    source : str
+        The file or case that it comes from.
+    belief : Belief
+    lengths : (2,), m
+        Of the links; NaN where they are not known.
+    noise : NoiseLevels or None
+        Of the logs behind a result.
+    doubts : what does not fit
+    """
+
+    source: str
+    belief: Belief
+    lengths: FloatArray
+    noise: NoiseLevels | None
+    doubts: tuple[Notice, ...] = ()
+
+
+@dataclass(frozen=True)
+class KnownBefore:
+    """What the user knows better than the prior: link lengths and payload, and how wrong the rest may be."""
+
+    l1: float | None = None
+    l2: float | None = None
+    payload: float | None = None
+    error: float | None = None
+
+    @property
+    def lengths(self) -> dict[str, float]:
+        """The link lengths that are given, in m."""
+        return {
+            name: value for name, value in (("l1", self.l1), ("l2", self.l2)) if value is not None
+        }
+
+
+def prior_of(source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedArm:
+    """The prior that `source` describes.
+
+    Parameters
+    ----------
+    source : str
+        A result's folder or file, the name of a shipped case, or a TOML file of an arm.
+    loaded : bool or None
+        Whether there are to be runs with the payload; None where there are if a payload is known.
+    knowns : KnownBefore
+
+    Raises
+    ------
+    ResultError
+        If a result has no error bars where they are needed.
+    SettingError
+        If no arm has such an inertia matrix, or a payload is to be carried of which nothing is
+        known.
+    """
+    path = Path(source)
+    if path.is_dir() or path.suffix == ".json":
+        prior = _of_result(read_result(path), source, loaded, knowns)
+    else:
+        prior = of_case(load_case(source), source, loaded, knowns)
+    value = dict(zip(prior.belief.shared.names, prior.belief.mean.tolist(), strict=True))
+    k1, k3, k5 = value["k1"], value["k3"], value["k5"]
+    if min(k3, k5) <= 0 or k3 * k5 <= k1**2:
+        raise SettingError(
+            f"{source}: its inertia matrix is not positive definite (k1 {k1:.3g}, k3 {k3:.3g}, k5 {k5:.3g} "
+            "kg m²); no arm is like that: identify it anew, or describe the arm in a TOML file"
+        )
+    return prior
+
+
+def of_case(case: Case, source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedArm:
+    """The prior of a simulated or drawn arm: its masses and friction may be wrong, its lengths are right.
+
+    Raises
+    ------
+    SettingError
+        If there are to be loaded runs without a payload.
+    """
+    arm = replace(case.arm, **knowns.lengths)
+    mass = case.payload if knowns.payload is None else knowns.payload
+    shared = _shared(Model(gravity=arm.g), mass or None, loaded, source, knowns)
+    more = 1 + (WRONG if knowns.error is None else knowns.error)
+    wrong = [  # the parameters are linear in each mass and friction
+        (replace(arm, m1=more * arm.m1, I1=more * arm.I1), mass),
+        (replace(arm, m2=more * arm.m2, I2=more * arm.I2), mass),
+        (replace(arm, b1=more * arm.b1), mass),
+        (replace(arm, b2=more * arm.b2), mass),
+        (arm, more * mass),
+    ]
+    mean = _parameters(shared, arm, mass)
+    spread = np.stack([_parameters(shared, *other) - mean for other in wrong], axis=1)
+    return BelievedArm(
+        source, Belief(shared, mean, spread, box=True), np.array([arm.l1, arm.l2]), None
+    )
+
+
+def _shared(
+    model: Model, mass: float | None, loaded: bool | None, source: str, knowns: KnownBefore
+) -> Shared:
+    if loaded and not mass:
+        raise SettingError(
+            f"{source}: it knows no payload for the loaded runs; give --payload KG, or --runs 1,0"
+        )
+    return Shared(model, payload=bool(mass) if loaded is None else loaded, lengths=knowns.lengths)
+
+
+def _parameters(shared: Shared, arm: Arm, mass: float) -> FloatArray:
+    """Parameters (Q,) of an arm and its payload."""
+    value = {f"k{place}": float(k) for place, k in enumerate(arm.constants(), start=1)}
+    value |= {"m_p": mass, "l1": arm.l1, "l2": arm.l2}
+    return np.array([value[name] for name in shared.names])
+
+
+def _of_result(
+    result: Result, source: str, loaded: bool | None, knowns: KnownBefore
+) -> BelievedArm:
+    model, left_out = _planned(model_of(result))
+    before = {
+        name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None
+    }
+    lengths = before | knowns.lengths
+    value = {name: found.estimate for name, found in result.estimates.items()} | lengths
+    mass = value.get("m_p") if knowns.payload is None else knowns.payload
+    shared = _shared(model, mass, loaded, source, replace(knowns, **lengths))
+    value |= {} if mass is None else {"m_p": mass}
+    missing = next((name for name in shared.names if value.get(name) is None), None)
+    if missing is not None:
+        remedy = (
+            f"give --{missing}" if missing in ("l1", "l2") else "identify it from logs that tell it"
+        )
+        raise ResultError(f"{source}: the result has no {missing}; {remedy}")
+    mean = np.array([value[name] for name in shared.names], dtype=np.float64)
+    given = {"m_p"} if knowns.payload is not None else set()
+    spread = _spread(result, source, shared.names, mean, given, knowns.error)
+    reach = np.array(
+        [np.nan if value.get(name) is None else value[name] for name in ("l1", "l2")],
+        dtype=np.float64,
+    )
+    levels = [0.0 if result.fit is None else result.fit.noise.get(name) or 0.0 for name in NOISE]
+    noise = NoiseLevels(np.array(levels[:2]), np.array(levels[2:])) if min(levels) > 0 else None
+    doubts = (*left_out, *contradictions(result, knowns.lengths))
+    return BelievedArm(source, Belief(shared, mean, spread, box=False), reach, noise, doubts)
+
+
+def _planned(model: Model) -> tuple[Model, tuple[Notice, ...]]:
+    """The model less the terms that no regressor holds, and a notice of them."""
+    spare = [term for term in model.terms if term in _UNPLANNED]
+    if not spare:
+        return model, ()
+    left = Notice("TERMS_LEFT_OUT", numbers={"terms": [TERMS[term].title for term in spare]})
+    return replace(model, terms=tuple(term for term in model.terms if term not in spare)), (left,)
+
+
+def _spread(
+    result: Result,
+    source: str,
+    names: Sequence[str],
+    mean: FloatArray,
+    given: set[str],
+    error: float | None,
+) -> FloatArray:
+    """F (Q, Q): a root of the result's covariance; what has no error bar is wrong by `error` at `SURE` deviations."""
+    covariance = np.zeros((len(names), len(names)))
+    known = [name for name in names if name not in given and has_error_bar(result, name)]
+    if known and result.fit is not None:
+        places = [result.fit.covariance_names.index(name) for name in known]
+        rows = [names.index(name) for name in known]
+        covariance[np.ix_(rows, rows)] = np.array(result.fit.covariance, dtype=np.float64)[
+            np.ix_(places, places)
+        ]
+    bare = [name for name in names if name not in known]
+    without = [name for name in bare if name not in given]
+    if without and error is None:
+        why = (
+            f"the result of --estimator {result.estimator} has no error bars"
+            if result.fit is None
+            else f"the result leaves {', '.join(without)} without error bars"
+        )
+        raise ResultError(
+            f"{source}: {why}; identify from logs that tell, or say how wrong it may be: --prior-error"
+        )
+    for name in bare:
+        row = names.index(name)
+        covariance[row, row] = ((WRONG if error is None else error) * mean[row] / SURE) ** 2
+    size = np.maximum(np.abs(mean), 1e-12)
+    eigenvalues, vectors = np.linalg.eigh(covariance / np.outer(size, size))
+    return size[:, None] * vectors * np.sqrt(np.maximum(eigenvalues, 0.0))

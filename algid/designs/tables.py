@@ -1,0 +1,158 @@
+"""A design's tables: what every parameter will be known to, and what of the limits is used."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from algid.designs.campaign import Design
+from algid.designs.limits import Row
+from algid.designs.torque import END
+from algid.model import UNITS
+from algid.notices import Notice, Remedy
+from algid.report.document import Column, Table
+from algid.text import ABSENT, percent, resolved, significant, unit_text
+from algid.verdict import Verdict, graded
+
+# of what the margin leaves: a limit that is used as far is what keeps the error bars from being
+# less
+BINDS = 0.98
+SIGNS = {
+    "range": "rad",
+    "speed": "rad/s",
+    "acceleration": "rad/s²",
+    "torque": "N m",
+    "tip-height": "m",
+    "rest": "rad/s",
+}
+
+
+def bound_table(design: Design) -> Table:
+    """Every parameter with the error bar that the campaign will give it."""
+    asked = design.campaign.asked
+    mean = design.campaign.belief.mean
+    rows = []
+    for place, name in enumerate(design.names):
+        relative = percent(design.std[place], asked.size[place]) if asked.known[place] else ABSENT
+        worst = percent(design.worst[place], asked.size[place]) if asked.known[place] else ABSENT
+        rows.append(
+            (
+                name,
+                resolved(float(mean[place]), float(design.std[place])),
+                significant(float(design.std[place]), 2),
+                unit_text(UNITS[name]),
+                relative,
+                worst,
+                "yes" if asked.wanted[place] else "",
+            )
+        )
+    columns = (
+        Column("Parameter", "name"),
+        Column("Believed", "number"),
+        Column("Predicted ±", "number"),
+        Column("Unit", "text", 2),
+        Column("± %", "number"),
+        Column("Worst arm ± %", "number", 1),
+        Column("Asked for", "text", 3),
+    )
+    runs = design.campaign.experiment.runs
+    note = (
+        f"One standard deviation, from {_runs(runs)} together, if sensors are as noisy as told. The worst arm is the "
+        "worst of 20 drawn from what is believed."
+    )
+    return Table("What the campaign will tell", columns, tuple(rows), note)
+
+
+def _runs(runs: tuple[int, int]) -> str:
+    words = [
+        f"{count} {kind} run{'s' * (count > 1)}"
+        for count, kind in zip(runs, ("unloaded", "loaded"), strict=True)
+    ]
+    return " and ".join(word for word, count in zip(words, runs, strict=True) if count)
+
+
+def limit_table(design: Design) -> Table:
+    """Each limit with what is used of it, the tightest first."""
+    most = 1 - design.campaign.margin
+    rows = []
+    for row, used in design.binding:
+        limit, value = amounts(design, row, used)
+        rows.append(
+            (
+                limit_name(row),
+                significant(value, 4),
+                significant(limit, 4),
+                SIGNS[row.limit],
+                percent(used, 1.0, 3),
+                "yes" if used >= BINDS * most else "",
+            )
+        )
+    columns = (
+        Column("Limit", "name"),
+        Column("Used", "number", 2),
+        Column("Allowed", "number"),
+        Column("Unit", "text", 3),
+        Column("%", "number"),
+        Column("Binds", "text"),
+    )
+    note = (
+        f"A margin of {percent(design.campaign.margin, 1.0)} % is left for what a controller overshoots. Torque is the "
+        "largest that any arm of those believed possible asks for."
+    )
+    return Table("What limits bind", columns, tuple(rows), note)
+
+
+def limit_name(row: Row) -> str:
+    """A limit and its side in words."""
+    if row.limit == "rest":
+        return f"velocity of joint {(row.joint or 0) + 1} at the end"
+    joint = "" if row.joint is None else f" of joint {row.joint + 1}"
+    side = "" if row.joint is None else ", up" if row.upper else ", down"
+    load = "" if row.loaded is None else ", loaded" if row.loaded else ", unloaded"
+    return f"{row.limit.replace('-', ' ')}{joint}{side}{load}"
+
+
+def amounts(design: Design, row: Row, used: float) -> tuple[float, float]:
+    """A limit and the most extreme value of the motion, in the limit's unit and with its sign."""
+    limits = design.campaign.limits
+    if row.joint is None:
+        reach = float(limits.lengths.sum())
+        return limits.height, reach - used * (reach - limits.height)
+    if row.limit == "rest":
+        limit = END * float(np.abs(design.motion.omega[row.joint]).max())
+        return limit, used * limit
+    sign = 1.0 if row.upper else -1.0
+    if row.limit == "range":
+        low, high = float(limits.low[row.joint]), float(limits.high[row.joint])
+        middle = 0.5 * (low + high)
+        return (high if row.upper else low), middle + sign * used * 0.5 * (high - low)
+    limit = float(getattr(limits, row.limit)[row.joint])
+    return sign * limit, sign * used * limit
+
+
+def verdict(design: Design, doubts: Sequence[Notice] = ()) -> Verdict:
+    """The design in one clause, and what is against it: `doubts` about its prior, what no motion reaches."""
+    reasons = [*doubts]
+    if design.open_parameters:
+        wider = tuple(
+            Remedy({name: None}, "widen") for name in ("range", "speed", "torque", "runs")
+        )
+        reasons.insert(
+            0,
+            Notice("NOT_REACHED", numbers={"names": list(design.open_parameters)}, remedies=wider),
+        )
+    if design.interrupted:
+        reasons.append(Notice("BROKEN_OFF"))
+    return graded(_headline(design), reasons)
+
+
+def _headline(design: Design) -> str:
+    asked = design.campaign.asked
+    relative = np.where(asked.wanted, design.relative, -np.inf)
+    name = design.names[int(np.argmax(relative))]
+    row, used = design.binding[0]
+    return (
+        f"every parameter asked for to within {percent(design.largest, 1.0)} % (one σ; {name} is the least certain); "
+        f"{limit_name(row)} is used to {percent(used, 1.0, 3)} %"
+    )

@@ -1,0 +1,276 @@
+"""All that an export writes: the arm's coefficients, its links, and where each of its numbers comes from.
+
+k1 = m2 l1 lc2 and k2 = m2 g lc2 leave l1 = g k1 / k2 to a model made of links. Where l1 is known,
+the estimates are conditioned on it: with their covariance C and a the gradient of g k1 - l1 k2,
+
+    c' = c - C a (g k1 - l1 k2) / (aᵀ C a),   C' = C - C a aᵀ C / (aᵀ C a)
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.errors import ResultError, SettingError
+from algid.exports.links import Knowns, Link, links_of
+from algid.identification.known import (
+    contradictions,
+    first_length,
+    has_error_bar,
+    model_of,
+    torque_constants,
+)
+from algid.model import TERMS, UNITS, Model
+from algid.notices import Notice
+from algid.results import Estimate, Result
+from algid.text import joined
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """The torque's model, its coefficients by name, and the standard deviation of each that has one.
+
+    `value` holds a zero for every coefficient that the model lacks; `conditioned` says whether l1
+    moved them.
+    """
+
+    model: Model
+    value: Mapping[str, float]
+    std: Mapping[str, float]
+    conditioned: bool = False
+
+
+def coefficients_of(result: Result, file: str, l1: float | None = None) -> Coefficients:
+    """The coefficients of the result in `file`, conditioned on the length `l1` in m of link 1 where it is given.
+
+    Raises
+    ------
+    ResultError
+        If a coefficient has no estimate, or no arm has such an inertia matrix.
+    """
+    model = model_of(result)
+    c = torque_constants(result, model, "unloaded", file)
+    C: FloatArray = np.zeros((c.size, c.size))  # nothing where the result has no error bar
+    known = [name for name in model.names if has_error_bar(result, name)]
+    if known and result.fit is not None:
+        places = [result.fit.covariance_names.index(name) for name in known]
+        rows = [model.names.index(name) for name in known]
+        C[np.ix_(rows, rows)] = np.array(result.fit.covariance, dtype=np.float64)[
+            np.ix_(places, places)
+        ]
+    conditioned = l1 is not None and model.gravity > 0
+    if l1 is not None and conditioned:
+        c, C = _conditioned(model, c, C, l1)
+    value = model.values(c)
+    spread = dict(zip(model.names, np.sqrt(np.maximum(np.diag(C), 0.0)).tolist(), strict=True))
+    k1, k3, k5 = value["k1"], value["k3"], value["k5"]
+    if min(k3, k5) <= 0 or k3 * k5 <= k1**2:
+        raise ResultError(
+            f"{file}: its inertia matrix is not positive definite (k1 {k1:.3g}, k3 {k3:.3g}, k5 {k5:.3g} kg m²), so "
+            "that masses would come out negative; "
+            + ("check --l1" if conditioned else "identify it from logs that tell more")
+        )
+    return Coefficients(model, value, {name: spread[name] for name in known}, conditioned)
+
+
+def _conditioned(
+    model: Model, c: FloatArray, C: FloatArray, l1: float
+) -> tuple[FloatArray, FloatArray]:
+    first, second = model.names.index("k1"), model.names.index("k2")
+    a = np.zeros(c.size)
+    a[first], a[second] = model.gravity, -l1
+    if a @ C @ a > 0:
+        gain = C @ a / (a @ C @ a)
+        return c - gain * (a @ c), C - np.outer(gain, a @ C)
+    equally = np.zeros(
+        c.size
+    )  # without error bars, k1 and k2 are taken as equally wrong for their size
+    equally[[first, second]] = c[[first, second]] ** 2 * a[[first, second]]
+    return c - equally * (a @ c) / (a @ equally), C
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number of the exported model: who says it (identified, given or chosen), and how."""
+
+    name: str
+    value: float
+    unit: str
+    origin: str
+
+    def __str__(self) -> str:
+        return f"{self.name:7} {self.value!r:24} {self.unit:10} {self.origin}"
+
+
+@dataclass(frozen=True)
+class Description:
+    """An arm to be written.
+
+    Parameters
+    ----------
+    name : str, a word of letters, digits and underscores
+    source : str, the result's file and estimator
+    coefficients : Coefficients
+    delay : float or None, s, estimated between torque and angle
+    links : two of Link, or None where the format needs none
+    rotor1 : float, kg m^2
+    numbers : where each number comes from
+    warnings : what does not fit
+    """
+
+    name: str
+    source: str
+    coefficients: Coefficients
+    delay: float | None
+    links: tuple[Link, Link] | None
+    rotor1: float
+    numbers: tuple[Number, ...]
+    warnings: tuple[Notice, ...]
+
+
+def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Description:
+    """The arm of the result in `file`, with links chosen from what is known where `links` are asked for.
+
+    Raises
+    ------
+    ResultError
+        If the result lacks an estimate, or no arm is like it.
+    SettingError
+        If what is known leaves no positive mass or inertia.
+    """
+    before = {
+        name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None
+    }
+    given = before | {name: value for name, value in knowns.given.items() if name in ("l1", "l2")}
+    coefficients = coefficients_of(result, file, given.get("l1"))
+    numbers = _identified(coefficients)
+    chosen = None
+    if links:
+        known = Knowns(**{**knowns.given, **given})
+        full = replace(known, l2=given.get("l2", _length(result.payload.get("l2"))))
+        l1 = _first_length(coefficients, file) if known.l1 is None else known.l1
+        chosen = links_of(coefficients.value, coefficients.model.gravity, l1, full, file)
+        numbers += _chosen(chosen, coefficients, known, result)
+    delay = result.parameters.get("delay")
+    return Description(
+        name=re.sub(
+            r"\W|^(?=\d)",
+            "_",
+            Path(file if Path(file).name != "result.json" else Path(file).parent).stem,
+        ),
+        source=f"{file}, estimator {result.estimator}",
+        coefficients=coefficients,
+        delay=None if delay is None else delay.estimate,
+        links=chosen,
+        rotor1=knowns.rotor1 or 0.0,
+        numbers=numbers,
+        warnings=contradictions(result, given),
+    )
+
+
+def _length(found: Estimate | None) -> float | None:
+    return None if found is None or not found.usable else found.estimate
+
+
+def _first_length(coefficients: Coefficients, file: str) -> float:
+    gravity = coefficients.model.gravity
+    if gravity == 0:
+        raise SettingError(
+            f"--l1: {file}: an arm in a horizontal plane does not tell its length; give --l1"
+        )
+    k1, k2 = coefficients.value["k1"], coefficients.value["k2"]
+    if k1 * k2 <= 0:
+        raise ResultError(
+            f"{file}: k1 {k1:.4g} and k2 {k2:.4g} make l1 = g k1 / k2 no positive length; "
+            "give --l1, or identify it from logs that tell more"
+        )
+    return gravity * k1 / k2
+
+
+def _identified(coefficients: Coefficients) -> tuple[Number, ...]:
+    after = ", conditioned on the given l1" if coefficients.conditioned else ""
+    found = []
+    for name in coefficients.model.names:
+        std = "" if name not in coefficients.std else f", ± {coefficients.std[name]:.2g}"
+        found.append(Number(name, coefficients.value[name], UNITS[name], f"identified{std}{after}"))
+    return (*found, Number("g", coefficients.model.gravity, "m/s^2", "given"))
+
+
+def _chosen(
+    links: tuple[Link, Link], coefficients: Coefficients, knowns: Knowns, result: Result
+) -> tuple[Number, ...]:
+    first, second = links
+    masses = {name: "given" if getattr(knowns, name) is not None else "" for name in ("m1", "m2")}
+    nearest = "chosen, nearest to a uniform link"
+    horizontal = coefficients.model.gravity == 0
+    by_constants = first_length(result)
+    l1 = (
+        "given"
+        if knowns.l1
+        else f"identified, g k1 / k2{'' if by_constants is None else f', ± {by_constants[1]:.2g}'}"
+    )
+    l2 = (
+        "given"
+        if knowns.l2
+        else "identified with the payload"
+        if _length(result.payload.get("l2"))
+        else nearest
+    )
+    both = masses["m1"] and masses["m2"]
+    by2 = "identified, given m2" if masses["m2"] else "chosen with m2"
+    by1 = "identified, given m1 and m2" if both and not horizontal else "chosen with the masses"
+    return (
+        Number("l1", first.length, "m", l1),
+        Number("m1", first.mass, "kg", masses["m1"] or nearest),
+        Number(
+            "lc1", first.centre, "m", f"{by1}: k4 = g (m1 lc1 + m2 l1)" if not horizontal else by1
+        ),
+        Number("I1", first.inertia, "kg m^2", f"{by1}: k5 = I1 + rotor1 + m1 lc1^2 + m2 l1^2"),
+        Number(
+            "rotor1",
+            knowns.rotor1 or 0.0,
+            "kg m^2",
+            "chosen: k5 holds it" if knowns.rotor1 is None else "given",
+        ),
+        Number("l2", second.length, "m", l2),
+        Number("m2", second.mass, "kg", masses["m2"] or nearest),
+        Number(
+            "lc2",
+            second.centre,
+            "m",
+            f"{by2}: k2 = g m2 lc2" if not horizontal else f"{by2}: k1 = m2 l1 lc2",
+        ),
+        Number("I2", second.inertia, "kg m^2", f"{by2}: k3 = I2 + m2 lc2^2"),
+    )
+
+
+def lacking(arm: Description, held: frozenset[str]) -> list[str]:
+    """Sentences about the torque's terms that a format, which holds those of `held`, lacks."""
+    value, found = arm.coefficients.value, []
+    for term in arm.coefficients.model.terms:
+        if term not in held:
+            numbers = joined(
+                [f"{name} {value[name]:.6g} {TERMS[term].unit}" for name in TERMS[term].names]
+            )
+            found.append(f"lacks {TERMS[term].title}, {TERMS[term].equation}: {numbers}")
+    if arm.delay is not None:
+        found.append(f"lacks the delay from torque to angle: {arm.delay:.6g} s")
+    return found
+
+
+def header(arm: Description, remarks: list[str]) -> list[str]:
+    """Lines of the comment at the top of a file."""
+    return [
+        f"Two-link arm by algid export, from {arm.source}.",
+        "theta1 from the horizontal, theta2 from link 1, counterclockwise; gravity pulls down; SI units.",
+        "",
+        *(str(number).rstrip() for number in arm.numbers),
+        *([""] if remarks or arm.warnings else []),
+        *(f"This file {remark}." for remark in remarks),
+        *(f"Warning: {warning.text}." for warning in arm.warnings),
+    ]

@@ -1,0 +1,181 @@
+"""URDF (ROS, MoveIt, Pinocchio, Drake), SDF (Gazebo) and MJCF (MuJoCo).
+
+The arm moves in the world's x-z plane: a turn about -y is counterclockwise there, so that the
+joints' angles are θ1 and θ2 themselves and gravity pulls along -z. Without gravity it moves in the
+x-y plane about z.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from algid.exports.description import Description, header, lacking
+from algid.exports.links import Link
+
+HYPHENS = "\N{HYPHEN}\N{HYPHEN}"
+JUMP = "holds Coulomb friction as a jump at standstill, where algid has f tanh(omega / {width:g} rad/s)"
+TIMESTEP = 5e-4  # s: Runge-Kutta of fourth order errs far below 1e-5 rad a second with it
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint as the formats know it: damping in N m s/rad, Coulomb friction in N m, rotor inertia in kg m^2."""
+
+    name: str
+    damping: float
+    friction: float
+    rotor: float
+
+
+def urdf(arm: Description) -> str:
+    """The arm as a URDF robot.
+
+    Joint 1's rotor stays in link 1's inertia, which turns about the same axis.
+    """
+    (first, second), joints, remarks = _rotorless(arm, "URDF")
+
+    def joint(one: Joint, parent: str, child: str, at: float) -> str:
+        return (
+            f'  <joint name="{one.name}" type="continuous">\n    <parent link="{parent}"/>\n'
+            f'    <child link="{child}"/>\n    <origin xyz="{_numbers(at, 0, 0)}"/>\n    <axis xyz="{_axis(arm)}"/>\n'
+            f'    <dynamics damping="{_numbers(one.damping)}" friction="{_numbers(one.friction)}"/>\n  </joint>\n'
+        )
+
+    def link(name: str, one: Link) -> str:
+        xx, yy, zz = map(_numbers, one.tensor)
+        return (
+            f'  <link name="{name}">\n    <inertial>\n      <origin xyz="{_numbers(one.centre, 0, 0)}"/>\n'
+            f'      <mass value="{_numbers(one.mass)}"/>\n'
+            f'      <inertia ixx="{xx}" iyy="{yy}" izz="{zz}" ixy="0" ixz="0" iyz="0"/>\n'
+            f'    </inertial>\n    <visual>\n      <origin xyz="{_numbers(one.length / 2, 0, 0)}"/>\n'
+            f'      <geometry><box size="{_box(one)}"/></geometry>\n    </visual>\n  </link>\n'
+        )
+
+    return (
+        f'<?xml version="1.0"?>\n{_comment(arm, remarks)}\n<robot name="{arm.name}">\n  <link name="base"/>\n'
+        + joint(joints[0], "base", "link1", 0.0)
+        + link("link1", first)
+        + joint(joints[1], "link1", "link2", first.length)
+        + link("link2", second)
+        + '  <joint name="tip_mount" type="fixed">\n    <parent link="link2"/>\n    <child link="tip"/>\n'
+        f'    <origin xyz="{_numbers(second.length, 0, 0)}"/>\n  </joint>\n  <link name="tip"/>\n</robot>\n'
+    )
+
+
+def sdf(arm: Description) -> str:
+    """The arm as an SDF model, joint 1 on the world; its rotor stays in link 1's inertia."""
+    (first, second), joints, remarks = _rotorless(arm, "SDF")
+
+    def joint(one: Joint, parent: str, child: str) -> str:
+        return (
+            f'    <joint name="{one.name}" type="revolute">\n      <parent>{parent}</parent>\n'
+            f"      <child>{child}</child>\n      <axis>\n        <xyz>{_axis(arm)}</xyz>\n"
+            f"        <dynamics><damping>{_numbers(one.damping)}</damping>"
+            f"<friction>{_numbers(one.friction)}</friction></dynamics>\n      </axis>\n    </joint>\n"
+        )
+
+    def link(name: str, base: str, at: float, one: Link) -> str:
+        xx, yy, zz = map(_numbers, one.tensor)
+        inertia = (
+            f"<ixx>{xx}</ixx><iyy>{yy}</iyy><izz>{zz}</izz><ixy>0</ixy><ixz>0</ixz><iyz>0</iyz>"
+        )
+        return (
+            f'    <link name="{name}">\n      <pose relative_to="{base}">{_numbers(at, 0, 0, 0, 0, 0)}</pose>\n'
+            f"      <inertial>\n        <pose>{_numbers(one.centre, 0, 0, 0, 0, 0)}</pose>\n"
+            f"        <mass>{_numbers(one.mass)}</mass>\n        <inertia>{inertia}</inertia>\n      </inertial>\n"
+            f'      <visual name="{name}">\n        <pose>{_numbers(one.length / 2, 0, 0, 0, 0, 0)}</pose>\n'
+            f"        <geometry><box><size>{_box(one)}</size></box></geometry>\n      </visual>\n    </link>\n"
+        )
+
+    return (
+        f'<?xml version="1.0"?>\n{_comment(arm, remarks)}\n<sdf version="1.9">\n  <model name="{arm.name}">\n'
+        + link("link1", "__model__", 0.0, first)
+        + link("link2", "link1", first.length, second)
+        + f'    <frame name="tip" attached_to="link2"><pose>{_numbers(second.length, 0, 0, 0, 0, 0)}</pose></frame>\n'
+        + joint(joints[0], "world", "link1")
+        + joint(joints[1], "link1", "link2")
+        + "  </model>\n</sdf>\n"
+    )
+
+
+def mjcf(arm: Description) -> str:
+    """The arm as an MJCF model with a torque motor at each joint."""
+    assert arm.links is not None
+    joints, remarks = _joints(arm, rotors=True)
+    first, second = arm.links
+
+    def joint(one: Joint) -> str:
+        return (
+            f'<joint name="{one.name}" axis="{_axis(arm)}" damping="{_numbers(one.damping)}" '
+            f'frictionloss="{_numbers(one.friction)}" armature="{_numbers(one.rotor)}"/>'
+        )
+
+    def link(one: Link, indent: str) -> str:
+        return (
+            f'{indent}<inertial pos="{_numbers(one.centre, 0, 0)}" mass="{_numbers(one.mass)}" '
+            f'diaginertia="{_numbers(*one.tensor)}"/>\n'
+            f'{indent}<geom type="capsule" fromto="{_numbers(0, 0, 0, one.length, 0, 0)}" '
+            f'size="{_numbers(0.03 * one.length)}" contype="0" conaffinity="0"/>\n'
+        )
+
+    return (
+        f'{_comment(arm, remarks)}\n<mujoco model="{arm.name}">\n  <compiler angle="radian"/>\n'
+        f'  <option gravity="{_numbers(0, 0, -arm.coefficients.model.gravity)}" integrator="RK4" '
+        f'timestep="{_numbers(TIMESTEP)}"/>\n  <worldbody>\n    <body name="link1">\n      {joint(joints[0])}\n'
+        f'{link(first, "      ")}      <body name="link2" pos="{_numbers(first.length, 0, 0)}">\n'
+        f"        {joint(joints[1])}\n"
+        f'{link(second, "        ")}        <site name="tip" pos="{_numbers(second.length, 0, 0)}"/>\n'
+        "      </body>\n    </body>\n  </worldbody>\n  <actuator>\n"
+        '    <motor name="motor1" joint="joint1"/>\n    <motor name="motor2" joint="joint2"/>\n'
+        "  </actuator>\n</mujoco>\n"
+    )
+
+
+def _joints(arm: Description, *, rotors: bool) -> tuple[tuple[Joint, Joint], list[str]]:
+    """The joints, and remarks about what a format, with or without rotors, cannot hold: nothing negative, for one."""
+    value, model = arm.coefficients.value, arm.coefficients.model
+    remarks = lacking(arm, frozenset({"coulomb", "rotor"} if rotors else {"coulomb"}))
+    if "coulomb" in model.terms:
+        remarks.insert(0, JUMP.format(width=model.coulomb_speed))
+    names = ("k6", "k7", "f1", "f2", *(["j2"] if rotors else []))
+    remarks += [
+        f"leaves out {name}, which is negative: {value[name]:.6g}"
+        for name in names
+        if value[name] < 0
+    ]
+    kept = {name: max(value[name], 0.0) for name in names}
+    first = Joint("joint1", kept["k6"], kept["f1"], arm.rotor1)
+    return (first, Joint("joint2", kept["k7"], kept["f2"], kept.get("j2", 0.0))), remarks
+
+
+def _rotorless(
+    arm: Description, form: str
+) -> tuple[tuple[Link, Link], tuple[Joint, Joint], list[str]]:
+    """Links, joints and remarks for the format `form`, which has no rotors: joint 1's stays in link 1's inertia."""
+    assert arm.links is not None
+    joints, remarks = _joints(arm, rotors=False)
+    if arm.rotor1:
+        remarks.append(f"holds rotor1 within the inertia of link 1, as {form} has no rotors")
+    first, second = arm.links
+    return (replace(first, inertia=first.inertia + arm.rotor1), second), joints, remarks
+
+
+def _axis(arm: Description) -> str:
+    """The joints' axis in the world."""
+    return "0 -1 0" if arm.coefficients.model.gravity else "0 0 1"
+
+
+def _box(link: Link) -> str:
+    """Sides of the box that a link is drawn as."""
+    return _numbers(link.length, 0.06 * link.length, 0.06 * link.length)
+
+
+def _comment(arm: Description, remarks: list[str]) -> str:
+    """An XML comment, in which two hyphens may not stand together."""
+    text = "\n".join(f"  {line}".rstrip() for line in header(arm, remarks))
+    return f"<!--\n{text.replace('--', HYPHENS)}\n-->"
+
+
+def _numbers(*values: float) -> str:
+    """Numbers that read back as they are."""
+    return " ".join(repr(float(value)) for value in values)

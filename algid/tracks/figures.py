@@ -1,0 +1,190 @@
+"""The figures of a track: the payload in time, and what it leaves of the torque."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.report.figures.base import (
+    Figure,
+    Layout,
+    Legend,
+    Panel,
+    Trace,
+    axis,
+    level,
+    line,
+    packed,
+    stretch,
+    times,
+)
+from algid.report.reduce import MinMax, broken_at_gaps, bucket_size
+from algid.text import joined
+from algid.tracks.bins import CELL
+from algid.tracks.payload import HALF_BAND, HOLE, QUANTILE, Track
+from algid.tracks.result import TrackResult
+from algid.tracks.tables import mass_text
+
+POINTS = 4_000
+MOST_MARKS = 60  # changes beyond which lines over the whole panel would hide it
+SPACE = 0.08  # of the masses' range, above and below
+SYNC = "track"
+
+
+def figures(result: TrackResult) -> list[Figure]:
+    """Every figure of the page."""
+    return [_payload(result), _left(result)]
+
+
+def _payload(result: TrackResult) -> Figure:
+    found = result.track
+    hover = "m_p %{y:.5g} kg at %{x:.3f} s<extra></extra>"
+    traces = [
+        *_band(found),
+        line(*_curve(found, found.m_p), "@blue", "m_p(t)", "curve", width=1.2, hover=hover),
+    ]
+    ends = np.array([end for one in found.stretches for end in (one.start, one.end)])
+    masses = np.repeat([one.m_p for one in found.stretches], 2)
+    traces.append(_steps(ends, masses, "@green", "stretch", "solid", 2.6))
+    legend = [
+        Legend("curve", f"m_p(t) from ± {HALF_BAND:g} s around, within its stretch", "@blue"),
+        Legend("band", "its 95 % band", "@blue/0.25", "area"),
+        Legend("stretch", "mass of each stretch", "@green"),
+    ]
+    if result.schedule is not None:
+        traces.append(_steps(*_true_steps(result), "@ink", "truth", "dash", 1.3))
+        legend.append(Legend("truth", "true schedule", "@ink", "dash"))
+    if 0 < len(found.changes) <= MOST_MARKS:
+        legend.append(Legend("", "times between which a change lies", "@orange/0.2", "area"))
+    layout = {
+        "xaxis": axis("time, s", range=_span(found)),
+        "yaxis": axis("payload, kg", range=_view(result)),
+        "shapes": _marks(found),
+        "hovermode": "closest",
+    }
+    reading = (
+        "Read: blue should run level, green within its band; orange is where it may step. "
+        "A band that opens wide tells that the arm moved too little; double-click shows all of it."
+    )
+    words = joined([mass_text(one) for one in found.stretches[:6]])
+    panel = Panel(
+        traces, layout, f"Payload over time; stretches of {words} kg", height=380, sync=SYNC
+    )
+    return Figure("payload", "Payload in time", (panel,), reading, tuple(legend))
+
+
+def _left(result: TrackResult) -> Figure:
+    found = result.track
+    hover = "%{y:.3g} times the noise at %{x:.3f} s<extra></extra>"
+    trace = line(*_curve(found, found.left), "@orange", "residual", "left", width=1.0, hover=hover)
+    layout = {
+        "xaxis": axis("time, s", range=_span(found)),
+        "yaxis": axis("residual / noise", rangemode="tozero"),
+        "shapes": [*_marks(found), level(1.0, "@ink", "dash", 1.2)],
+        "hovermode": "closest",
+    }
+    reading = (
+        "Read: about 1 all along is the sensors' noise; anything that stands out is torque that neither arm nor "
+        "payload explains. Changes are left out: a grasp jolts the arm."
+    )
+    middle = float(np.median(found.left))
+    panel = Panel(
+        [trace],
+        layout,
+        f"Residual over the sensors' noise; median {middle:.2f}",
+        height=240,
+        sync=SYNC,
+    )
+    legend = (
+        Legend("", f"RMS of each {CELL:g} s, over the sensors' noise", "@orange"),
+        Legend("", "noise alone", "@ink", "dash"),
+    )
+    return Figure("left", "What arm and payload leave of the torque", (panel,), reading, legend)
+
+
+def _span(found: Track) -> list[float]:
+    return [found.stretches[0].start, found.stretches[-1].end]
+
+
+def _view(result: TrackResult) -> list[float]:
+    """Masses, their intervals and the truth; m_p(t) where it is as certain as usual."""
+    found = result.track
+    certain = found.std <= 3 * np.median(found.std)
+    ends = [end for one in found.stretches for end in one.ci95]
+    band = QUANTILE * found.std[certain]
+    # percentiles: a jolt's spike may leave the frame
+    ends += np.percentile(found.m_p[certain] - band, [1]).tolist()
+    ends += np.percentile(found.m_p[certain] + band, [99]).tolist()
+    ends += [mass for _, mass in result.schedule or ()]
+    low, high = min(ends), max(ends)
+    space = SPACE * (high - low) or 0.05
+    return [low - space, high + space]
+
+
+def _marks(found: Track) -> list[Layout]:
+    """Each change, over the whole panel, as wide as it is uncertain."""
+    if len(found.changes) > MOST_MARKS:
+        return []
+    return [stretch(low, high, "@orange/0.2") for _, low, high in found.changes.tolist()]
+
+
+def _curve(found: Track, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A series, short enough to draw, broken where the log has no samples and between stretches."""
+    size = bucket_size(found.t.size, POINTS)
+    parts = []
+    for place in range(len(found.stretches)):
+        own = found.stretch == place
+        reducer = MinMax(size)
+        reducer.feed(found.t[own], values[own])
+        x, y = broken_at_gaps(*reducer.result(), HOLE + size * CELL)
+        parts += [(x, y), (x[-1:], np.full(x[-1:].size, np.nan))]
+    return np.concatenate([x for x, _ in parts]), np.concatenate([y for _, y in parts])
+
+
+def _band(found: Track) -> list[Trace]:
+    """The band as one closed area a stretch, between holes."""
+    size = bucket_size(found.t.size, POINTS)
+    xs, ys = [], []
+    apart = (np.diff(found.stretch) != 0) | (np.diff(found.t) > HOLE + CELL)
+    edges = [0, *(np.flatnonzero(apart) + 1).tolist(), found.t.size]
+    for first, last in pairwise(edges):
+        starts = np.arange(first, last, size)
+        low = np.minimum.reduceat(found.m_p[:last] - QUANTILE * found.std[:last], starts)
+        high = np.maximum.reduceat(found.m_p[:last] + QUANTILE * found.std[:last], starts)
+        x = found.t[starts]
+        xs += [x, x[::-1], x[:1], x[:1]]
+        ys += [high, low[::-1], high[:1], np.full(1, np.nan)]
+    area = {
+        "mode": "lines",
+        "fill": "toself",
+        "fillcolor": "@blue/0.25",
+        "line": {"width": 0, "color": "@blue/0.25"},
+    }
+    drawn = {"x": times(np.concatenate(xs)), "y": packed(np.concatenate(ys))}
+    return [
+        {
+            "type": "scatter",
+            **area,
+            **drawn,
+            "name": "band",
+            "legendgroup": "band",
+            "hoverinfo": "skip",
+        }
+    ]
+
+
+def _true_steps(result: TrackResult) -> tuple[FloatArray, FloatArray]:
+    first, last = _span(result.track)
+    changes = [(0.0, 0.0), *(change for change in result.schedule or () if change[0] < last)]
+    inner = [max(time, first) for time, _ in changes[1:] for _ in range(2)]
+    return np.array([first, *inner, last]), np.repeat([mass for _, mass in changes], 2)
+
+
+def _steps(x: FloatArray, y: FloatArray, colour: str, name: str, dash: str, width: float) -> Trace:
+    trace = line(
+        x, y, colour, name, name, width=width, hover=f"{name} %{{y:.6g}} kg<extra></extra>"
+    )
+    trace["line"] |= {"dash": dash}
+    return trace

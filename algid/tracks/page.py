@@ -1,0 +1,145 @@
+"""The report of a track: what it contains, and its folder's files.
+
+``track.json``, ``track.parquet``, ``stretches.parquet``, the pages `report.html` and `report.md`,
+and ``track.mcap``.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from algid.files import whole_file
+from algid.report.document import Bullets, Document, Section, filled
+from algid.report.export import START_KEY, write_series
+from algid.report.frame import page
+from algid.report.markdown import markdown
+from algid.report.tables import settings_table
+from algid.text import file_name, significant
+from algid.tracks.figures import figures
+from algid.tracks.payload import QUANTILE
+from algid.tracks.result import TrackResult, track_json
+from algid.tracks.tables import (
+    change_table,
+    quality_tables,
+    stretch_table,
+    track_provenance,
+    verdict,
+)
+from algid.words import counted
+
+
+def track_document(result: TrackResult) -> Document:
+    """The report of a track."""
+    name = file_name(result.log.path)
+    seconds, rate = significant(result.log.duration, 4), significant(result.log.rate, 4)
+    warnings = Bullets(
+        tuple(one.sentence for one in result.notices), "The readers gave no warning."
+    )
+    sections = (
+        Section((stretch_table(result), *figures(result), *filled(change_table(result)))),
+        Section((warnings, *quality_tables(result)), "data", "Data quality"),
+        Section(
+            (settings_table(result.settings), track_provenance(result)),
+            "settings",
+            "Settings and provenance",
+        ),
+    )
+    return Document(
+        title=f"Payload in time of {name}",
+        verdict=verdict(result),
+        sections=sections,
+        kicker="a payload in time",
+        name=name,
+        facts=f"arm of {file_name(result.arm)} · {seconds} s of log at {rate} Hz · "
+        f"{counted(result.log.rows, 'sample')}",
+        made=f"Made by algid {result.version}.",
+    )
+
+
+TOPIC = "/algid/payload"
+
+
+def track_folder(log: str, parent: Path) -> Path:
+    """Where the track of a log goes: `parent/STEM.track`."""
+    return parent / f"{Path(log).stem or 'log'}.track"
+
+
+def write_track(result: TrackResult, folder: Path, mcap: bool = False) -> None:
+    """Write everything into `folder`, `track.mcap` where asked. Raises `OutputError`."""
+    _write_curve(result, folder / "track.parquet")
+    _write_stretches(result, folder / "stretches.parquet")
+    _write_text(folder / "track.json", track_json(result))
+    write_pages(result, folder, mcap)
+
+
+def write_pages(result: TrackResult, folder: Path, mcap: bool = False) -> list[Path]:
+    """Write the pages of a track into its `folder`, `track.mcap` where asked.
+
+    Raises `OutputError`.
+    """
+    document = track_document(result)
+    pages = {"report.html": page(document), "report.md": markdown(document)}
+    for name, text in pages.items():
+        _write_text(folder / name, text)
+    if mcap:
+        _write_mcap(result, folder)
+    return [folder / name for name in (*pages, *(["track.mcap"] if mcap else []))]
+
+
+def _write_text(path: Path, text: str) -> None:
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _write_curve(result: TrackResult, path: Path) -> None:
+    """A row each 20 ms: m_p(t) and its band, and the stretch's number, mass and interval."""
+    import polars as pl
+    import pyarrow.parquet as pq
+
+    found = result.track
+    number = found.stretch.astype(np.int64)
+    masses = np.array([(s.m_p, *s.ci95) for s in found.stretches])[number].T
+    curve = pl.DataFrame(
+        {
+            "t": found.t,
+            "m_p": found.m_p,
+            "low": found.m_p - QUANTILE * found.std,
+            "high": found.m_p + QUANTILE * found.std,
+            "left": found.left,
+            "stretch": number,
+            **dict(zip(("stretch_m_p", "stretch_low", "stretch_high"), masses, strict=True)),
+        }
+    )
+    with whole_file(path) as temporary:
+        table = curve.to_arrow()
+        pq.write_table(
+            table.replace_schema_metadata({START_KEY: f"[{result.log.start_ns}]"}), temporary
+        )
+
+
+def _write_stretches(result: TrackResult, path: Path) -> None:
+    import polars as pl
+
+    stretches = result.track.stretches
+    rows = [
+        (s.start, s.end, s.m_p, s.std, *s.ci95, status.value)
+        for s, status in zip(stretches, result.statuses, strict=True)
+    ]
+    frame = pl.DataFrame(
+        rows, schema=["start", "end", "m_p", "m_p_std", "low", "high", "status"], orient="row"
+    )
+    with whole_file(path) as temporary:
+        frame.write_parquet(temporary)
+
+
+def _write_mcap(result: TrackResult, folder: Path) -> None:
+    """The curve as a ROS 2 log with the log's own stamps, for Foxglove and PlotJuggler."""
+    from mcap.writer import CompressionType, Writer
+
+    with whole_file(folder / "track.mcap") as temporary, temporary.open("wb") as stream:
+        writer = Writer(stream, compression=CompressionType.ZSTD)
+        writer.start(profile="ros2", library=f"algid {result.version}")
+        write_series(writer, folder / "track.parquet", TOPIC)
+        writer.finish()  # type: ignore[no-untyped-call]

@@ -1,0 +1,133 @@
+"""A track read back from its folder, so that its pages can be made again."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, Field, ValidationError
+
+from algid.errors import ResultError
+from algid.files import first_misfit, read_text
+from algid.notices import Notice
+from algid.report.reduce import Block, blocks
+from algid.results import LogSummary, misfit_of_numbers
+from algid.tracks.payload import QUANTILE, Stretch, Track
+from algid.tracks.result import TrackResult
+
+FILE, CURVE = "track.json", "track.parquet"
+COLUMNS = ("t", "m_p", "high", "stretch", "left")
+
+
+def is_track(folder: Path) -> bool:
+    """Whether a folder is a track's, and not a result's."""
+    return (folder / FILE).is_file()
+
+
+def read_track(folder: Path) -> TrackResult:
+    """The track in `folder`.
+
+    Raises
+    ------
+    ResultError
+        If its files are missing, damaged, or of a version that did not keep all that its pages
+        show.
+    """
+    path = folder / FILE
+    again = "run algid track again with this version"
+    try:
+        content = json.loads(read_text(path))
+        wrong = misfit_of_numbers(content)
+        if wrong is not None:
+            raise ResultError(f"{path}: {wrong}; {again}")
+        found = _File.model_validate(content)
+    except OSError as error:
+        raise ResultError(f"{path}: cannot read it ({error.strerror})") from error
+    except ValidationError as error:
+        raise ResultError(f"{path}: {first_misfit(error)}; {again}") from error
+    except (ValueError, RecursionError) as error:
+        reason = str(error).partition("\n")[0]
+        raise ResultError(
+            f"{path}: not JSON ({reason}); expected a track of algid track"
+        ) from error
+    curve = list(blocks(folder / CURVE, COLUMNS))
+    if not curve:
+        raise ResultError(f"{folder / CURVE}: it holds no rows; {again}")
+    return _result(
+        found, {name: np.concatenate([part[name] for part in curve]) for name in COLUMNS}
+    )
+
+
+class _Stretch(BaseModel):
+    start: float
+    end: float
+    m_p: float
+    std: Annotated[float, Field(ge=0)]
+
+
+class _Change(BaseModel):
+    t: float
+    before: float = Field(alias="from")
+    to: float
+
+
+class _Arm(BaseModel):
+    path: str
+    sha256: str
+    sentence: str | None = None
+
+
+class _File(BaseModel):
+    """What is read of ``track.json``; it holds more, which follows from this."""
+
+    version: str
+    stretches: list[_Stretch]
+    changes: list[_Change]
+    explained: float
+    excess: float
+    bare: float
+    holes: list[tuple[float, float]]
+    schedule: list[tuple[float, float]] | None
+    arm: _Arm
+    settings: dict[str, Any]
+    log: LogSummary
+    data_lost: bool
+    warnings: list[str] = []
+    notices: list[Notice] | None = None
+
+
+def _result(found: _File, curve: Block) -> TrackResult:
+    changes = [(one.t, one.before, one.to) for one in found.changes]
+    return TrackResult(
+        track=Track(
+            stretches=[Stretch(one.start, one.end, one.m_p, one.std) for one in found.stretches],
+            t=curve["t"],
+            m_p=curve["m_p"],
+            std=(curve["high"] - curve["m_p"]) / QUANTILE,
+            stretch=curve["stretch"],
+            left=curve["left"],
+            changes=np.array(changes, dtype=np.float64).reshape(-1, 3),
+            colour=found.excess,
+            explained=found.explained,
+            holes=np.array(found.holes, dtype=np.float64).reshape(-1, 2),
+            tip_equivalent=found.bare,
+        ),
+        log=found.log,
+        arm=found.arm.path,
+        arm_sha256=found.arm.sha256,
+        settings=found.settings,
+        version=found.version,
+        schedule=None if found.schedule is None else tuple(found.schedule),
+        notices=_notices(found),
+        data_lost=found.data_lost,
+    )
+
+
+def _notices(found: _File) -> tuple[Notice, ...]:
+    """What was noticed; of a track of schema version 1 its sentences."""
+    if found.notices is not None:
+        return tuple(found.notices)
+    arm = [] if found.arm.sentence is None else [f"the arm's own result: {found.arm.sentence}"]
+    return tuple(Notice("EARLIER", text) for text in [*arm, *found.warnings])

@@ -1,0 +1,106 @@
+"""What a track found, judged stretch by stretch: the one source of its table, pages and `track.json`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from typing import Any
+
+from algid.notices import Notice
+from algid.results import LogSummary
+from algid.tracks.payload import Stretch, Track
+
+SCHEMA_VERSION = 2
+UNDETERMINED = 0.5  # standard deviation over the payload or link 2, whichever is heavier
+FAR = 4.0  # standard deviations below nothing; by chance one stretch in 30,000
+
+
+class StretchStatus(StrEnum):
+    """How far the mass of a stretch can be trusted."""
+
+    OK = "OK"
+    WEAK_EXCITATION = "WEAK_EXCITATION"
+    NEGATIVE_MASS = "NEGATIVE_MASS"
+
+
+@dataclass(frozen=True, eq=False)
+class TrackResult:
+    """A track, and what it came from.
+
+    `arm` names the result of the arm and `arm_sha256` its file. `start_ns` is the log's first
+    stamp. `schedule` is the truth of a synthetic log: times in s and kg.
+    """
+
+    track: Track
+    log: LogSummary
+    arm: str
+    arm_sha256: str
+    settings: Mapping[str, Any]
+    version: str
+    schedule: tuple[tuple[float, float], ...] | None = None
+    notices: tuple[Notice, ...] = ()
+    data_lost: bool = False
+
+    @property
+    def statuses(self) -> list[StretchStatus]:
+        """Of each stretch."""
+        return [_status(stretch, self.track.tip_equivalent) for stretch in self.track.stretches]
+
+    @property
+    def complete(self) -> bool:
+        """Whether every stretch has status OK."""
+        return all(status is StretchStatus.OK for status in self.statuses)
+
+    def truth(self, stretch: Stretch) -> float | None:
+        """True payload in kg amid a stretch, where the log tells."""
+        if self.schedule is None:
+            return None
+        middle = (stretch.start + stretch.end) / 2
+        return next((mass for time, mass in reversed(self.schedule) if time <= middle), 0.0)
+
+
+def _status(stretch: Stretch, tip_equivalent: float) -> StretchStatus:
+    if not stretch.std < UNDETERMINED * max(abs(stretch.m_p), tip_equivalent):
+        return StretchStatus.WEAK_EXCITATION
+    if stretch.m_p + FAR * stretch.std < 0:
+        return StretchStatus.NEGATIVE_MASS
+    return StretchStatus.OK
+
+
+def track_json(result: TrackResult) -> str:
+    """The text of `track.json`: times in s since the log's first sample, masses in kg."""
+    stretches = [
+        {
+            "start": stretch.start,
+            "end": stretch.end,
+            "m_p": stretch.m_p,
+            "std": stretch.std,
+            "ci95": list(stretch.ci95),
+            "unit": "kg",
+            "status": status.value,
+            "truth": result.truth(stretch),
+        }
+        for stretch, status in zip(result.track.stretches, result.statuses, strict=True)
+    ]
+    content = {
+        "schema_version": SCHEMA_VERSION,
+        "version": result.version,
+        "stretches": stretches,
+        "changes": [
+            dict(zip(("t", "from", "to"), row, strict=True))
+            for row in result.track.changes.tolist()
+        ],
+        "explained": result.track.explained,
+        "excess": result.track.colour,
+        "bare": result.track.tip_equivalent,
+        "holes": result.track.holes.tolist(),
+        "schedule": result.schedule,
+        "arm": {"path": result.arm, "sha256": result.arm_sha256},
+        "settings": dict(result.settings),
+        "log": result.log.model_dump(mode="json"),
+        "data_lost": result.data_lost,
+        "notices": [asdict(notice) for notice in result.notices],
+    }
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"

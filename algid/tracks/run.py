@@ -1,0 +1,91 @@
+"""From a log and an arm's result to a judged track."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from algid import __version__
+from algid.errors import LogError
+from algid.estimators.too_short import TooShortError
+from algid.files import read_whole
+from algid.identification.identify import reused
+from algid.identification.source import LogLike, open_source, read_otherwise
+from algid.identification.survey import Survey
+from algid.notices import Notice, merged
+from algid.results import read_result
+from algid.runtime import one_blas_thread
+from algid.tracks.bins import arm_of
+from algid.tracks.payload import track
+from algid.tracks.result import TrackResult
+
+if TYPE_CHECKING:
+    from algid.profile import Profile
+
+
+def track_log(
+    log: LogLike,
+    parameters: Path,
+    *,
+    l1: float | None = None,
+    l2: float | None = None,
+    profile: Profile | None = None,
+    settings: Mapping[str, Any] | None = None,
+) -> TrackResult:
+    """Find when the payload changed during a log and what each stretch weighs.
+
+    Parameters
+    ----------
+    log : path or `Log`
+    parameters : Path
+        Result folder of the arm, or its `result.json`.
+    l1, l2 : float, m
+        Link lengths; the result's by default.
+    profile : Profile
+        What the log's names, units and signs mean; where it is silent, what was said of the
+        result's logs.
+    settings : mapping
+        What else the result should tell of the call.
+
+    Raises
+    ------
+    LogError
+        If the log cannot be used or is too short.
+    ResultError
+        If the result cannot be read, or leaves a constant or a link length open.
+    """
+    result = read_result(parameters)
+    source = open_source(
+        log, "loaded", reused(profile, result), result.settings.get("gravity", 9.81), changing=True
+    )
+    survey = Survey([source])
+    first = next(survey.segments(source), None)
+    if first is None:
+        raise LogError(f"{source.name}: it holds no samples; record longer")
+    arm, covariance = arm_of(result, first, l1, l2)
+    try:
+        with one_blas_thread():
+            found = track(partial(survey.segments, source), arm, covariance)
+    except TooShortError as error:
+        raise LogError(f"{source.name}: {error}; record longer") from error
+    otherwise = read_otherwise([survey.summary(source)], result, str(parameters))
+    truth, notices = source.origin.truth, survey.seen(source).notices
+    judged = result.verdict
+    doubt = Notice(
+        "ARM_DOUBTFUL", numbers={"grade": judged.word.lower(), "headline": judged.headline}
+    )
+    file = parameters / "result.json" if parameters.is_dir() else parameters
+    return TrackResult(
+        track=found,
+        log=survey.summary(source),
+        arm=str(parameters),
+        arm_sha256=hashlib.sha256(read_whole(file)).hexdigest(),
+        settings={"l1": arm.l1, "l2": arm.l2, "gravity": arm.model.gravity, **(settings or {})},
+        version=__version__,
+        schedule=None if truth is None else truth.schedule or ((0.0, truth.payload),),
+        notices=(*(() if judged.grade == "good" else (doubt,)), *otherwise, *merged(notices)),
+        data_lost=any(notice.lossy for notice in notices),
+    )

@@ -1,0 +1,227 @@
+"""The tables of a track: finished text that terminal, Markdown and HTML merely set.
+
+Whether to trust a track: one sentence, and the reasons behind it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from algid.notices import Notice
+from algid.report.document import Column, Depth, Table, filled
+from algid.report.tables import log_tables, provenance_table
+from algid.results.verdict import LEAST_R2, WORST_R2, share_text
+from algid.text import ABSENT, file_name, joined, significant
+from algid.tracks.payload import Stretch
+from algid.tracks.result import StretchStatus, TrackResult
+from algid.verdict import Verdict, graded
+from algid.words import counted
+
+COLUMNS = (
+    Column("Stretch", "name"),
+    Column("From, s", "number"),
+    Column("To, s", "number"),
+    Column("Payload", "number"),
+    Column("± 95 %", "number"),
+    Column("Unit", "text"),
+    Column("Status", "status"),
+    Column("95 % interval", "number", rank=1),
+    Column("Truth", "number", rank=3),
+    Column("Error", "number", rank=2),
+)
+
+
+def stretch_table(result: TrackResult) -> Table:
+    """The stretches, their masses and intervals."""
+    rows = []
+    for place, (stretch, status) in enumerate(
+        zip(result.track.stretches, result.statuses, strict=True), start=1
+    ):
+        low, high = (fixed(end, stretch.std) for end in stretch.ci95)
+        truth = result.truth(stretch)
+        rows.append(
+            (
+                str(place),
+                f"{stretch.start:.3f}",
+                f"{stretch.end:.3f}",
+                mass_text(stretch),
+                half_text(stretch),
+                "kg",
+                status.value,
+                f"[{low}, {high}]",
+                ABSENT if truth is None else fixed(truth, stretch.std),
+                ABSENT if truth is None else fixed(stretch.m_p - truth, stretch.std),
+            )
+        )
+    table = Table("Payload by stretch", COLUMNS, tuple(rows)).without_empty()
+    return table.doubted() if verdict(result).failed else table
+
+
+def change_table(result: TrackResult) -> Table:
+    """When the payload changed, and by how much."""
+    columns = (
+        Column("Change", "name"),
+        Column("At, s", "number"),
+        Column("Between, s", "number", rank=1),
+        Column("By", "number"),
+        Column("Unit", "text"),
+        Column("Truth at, s", "number", rank=2),
+    )
+    times = [time for time, _ in result.schedule or () if time > 0]
+    rows = []
+    for place, (moment, low, high) in enumerate(result.track.changes.tolist()):
+        before, after = result.track.stretches[place : place + 2]
+        step = fixed(after.m_p - before.m_p, max(before.std, after.std))
+        true = min(times, key=lambda time: abs(time - moment), default=None)
+        rows.append(
+            (
+                str(place + 1),
+                f"{moment:.3f}",
+                f"[{low:.3f}, {high:.3f}]",
+                step if step.startswith("-") else f"+{step}",
+                "kg",
+                ABSENT if true is None else f"{true:.3f}",
+            )
+        )
+    note = "Times between tell neither mass: a grasp jolts the arm."
+    return Table("Changes", columns, tuple(rows), note).without_empty()
+
+
+def quality_tables(result: TrackResult) -> tuple[Table, ...]:
+    """What the track leaves of the torque, the log, its channels, and where it has no samples."""
+    fit = (
+        ("torque explained by arm and payload, noise aside", share_text(result.track.explained)),
+        (
+            "slow errors and noise over the sensors' noise",
+            significant(math.sqrt(result.track.colour), 3),
+        ),
+    )
+    log, channels = log_tables([result.log])
+    holes = tuple((f"{start:.3f}", f"{end:.3f}") for start, end in result.track.holes.tolist())
+    ends = (Column("From, s", "name"), Column("To, s", "number"))
+    return (
+        Table(
+            "Fit", (Column("What", "name"), Column("Value", "number")), fit, depth=Depth.MARKDOWN
+        ),
+        log.without(["Arm"]),
+        channels.without(["Log"]),
+        *filled(Table("Times without samples", ends, holes, depth=Depth.PAGE)),
+    )
+
+
+def track_provenance(result: TrackResult) -> Table:
+    """What the track was made from."""
+    return provenance_table(
+        [
+            ("algid", result.version),
+            ("arm's result", result.arm),
+            ("sha256 of the arm's result", result.arm_sha256),
+            ("path of the log", result.log.path),
+            (
+                f"sha256 of {file_name(result.log.path)}",
+                result.log.sha256 or "unknown, fetched in part",
+            ),
+        ]
+    )
+
+
+def mass_text(stretch: Stretch) -> str:
+    """A stretch's mass in kg, down to the second digit of its standard deviation."""
+    return fixed(stretch.m_p, stretch.std)
+
+
+def half_text(stretch: Stretch) -> str:
+    """Half the 95 % interval in kg, with the mass's digits."""
+    return fixed(stretch.ci95[1] - stretch.m_p, stretch.std)
+
+
+def fixed(value: float, std: float) -> str:
+    """`value` with as many decimals as its standard deviation resolves, so that a column lines up."""
+    decimals = (
+        3
+        if not (math.isfinite(std) and std > 0)
+        else min(max(1 - math.floor(math.log10(std)), 0), 9)
+    )
+    text = f"{value:.{decimals}f}"
+    return text.removeprefix("-") if float(text) == 0 else text
+
+
+COLOURED = 4.0  # of the rows' variance: intervals twice as wide as the sensors' noise asks for
+STRANGE = (
+    1e4  # of the rows' variance: a real arm with friction reaches 6e3, another arm 5e4 and more
+)
+ALL_BUT = 0.99  # explained of the torque, beyond which such errors are those of very quiet sensors
+MOST_NAMED = 4
+
+STATUS_CODES = {
+    StretchStatus.WEAK_EXCITATION: "STRETCHES_WEAK",
+    StretchStatus.NEGATIVE_MASS: "STRETCHES_NEGATIVE",
+}
+
+
+def verdict(result: TrackResult) -> Verdict:
+    """Judge a track by its stretches, what it explains of the torque, and the arm's own result."""
+    notes = [one for one in result.notices if one.note]
+    return graded(
+        _weighed(result), list(_reasons(result)), notes, failure=_failure(result), things="masses"
+    )
+
+
+def _weighed(result: TrackResult) -> str:
+    stretches, changes = result.track.stretches, result.track.changes
+    if len(stretches) == 1:
+        return f"the payload does not change: {mass_text(stretches[0])} ± {half_text(stretches[0])} kg throughout"
+    widest = max(stretches, key=lambda stretch: stretch.std)
+    times = [f"{moment:.2f}" for moment in changes[:, 0]]
+    when = f" at {joined(times)} s" if len(times) <= MOST_NAMED else ""
+    how_often = (
+        "once" if len(times) == 1 else "twice" if len(times) == 2 else counted(len(times), "time")
+    )
+    masses = [mass_text(stretch) for stretch in stretches]
+    what = (
+        f"weighing {joined(masses)} kg"
+        if len(masses) <= MOST_NAMED + 1
+        else f"in {counted(len(masses), 'stretch', 'stretches')}"
+    )
+    return f"the payload changes {how_often}{when}, {what}, the least certain to ± {half_text(widest)} kg (95 %)"
+
+
+def _failure(result: TrackResult) -> str | None:
+    if result.track.explained < WORST_R2:
+        share = f"{max(100 * result.track.explained, 0):.0f} %"
+        return (
+            f"arm and payload explain only {share} of the torque: is it this arm, in these units?"
+        )
+    if result.track.colour > STRANGE and result.track.explained < ALL_BUT:
+        times = f"{significant(float(result.track.colour) ** 0.5, 2)} times"
+        return f"arm and payload miss the torque by {times} its sensors' noise: is it this arm, in these units?"
+    statuses = result.statuses
+    negative = sum(status is StretchStatus.NEGATIVE_MASS for status in statuses)
+    if 2 * negative >= len(statuses):
+        share = f"{negative} of {counted(len(statuses), 'stretch', 'stretches')} weigh"
+        share = "the payload weighs" if len(statuses) == 1 else share
+        return f"{share} less than nothing: the arm's constants do not fit this log"
+    if all(status is StretchStatus.WEAK_EXCITATION for status in statuses):
+        return "the arm moves too little to weigh anything"
+    return None
+
+
+def _reasons(result: TrackResult) -> Iterator[Notice]:
+    for status, code in STATUS_CODES.items():
+        numbers = [
+            str(place) for place, found in enumerate(result.statuses, start=1) if found is status
+        ]
+        if numbers:
+            yield Notice(code, numbers={"numbers": numbers})
+    if result.track.explained < LEAST_R2:
+        yield Notice(
+            "TORQUE_UNEXPLAINED", numbers={"percent": max(100 * result.track.explained, 0.0)}
+        )
+    if result.track.colour > COLOURED:
+        yield Notice(
+            "TORQUE_ERRORS", numbers={"times": significant(float(result.track.colour) ** 0.5, 2)}
+        )
+    if result.data_lost and not any(one.lossy for one in result.notices):
+        yield Notice("DATA_LOST")
+    yield from (one for one in result.notices if not one.note)

@@ -1,0 +1,472 @@
+"""Which jobs sources hold."""
+
+from __future__ import annotations
+
+import errno
+import math
+import os
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from algid.batches.discover import jobs_of
+from algid.batches.job import kept
+from algid.batches.jobs import Job, checked_name, name_fault
+from algid.batches.manifest import is_manifest, label_of, read_manifest
+from algid.batches.run import sweep
+from algid.errors import SettingError
+from algid.readers.formats import SUFFIXES
+from algid.stores import open_store
+
+JOB = "[[job]]\nname = 'x'\nlogs = 'a.csv'\n"
+
+
+def _touch(folder: Path, *names: str) -> None:
+    for name in names:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text("x")
+
+
+def test_unloaded_and_loaded_logs_pair_up(tmp_path: Path) -> None:
+    _touch(
+        tmp_path,
+        "r1/a-unloaded.mcap",
+        "r1/a-loaded.csv.zst",
+        "b_loaded.parquet",
+        "plain.csv",
+        "notes.txt",
+    )
+    found = jobs_of([str(tmp_path)], str(tmp_path / "out"))
+    assert [(job.name, len(job.logs), len(job.loaded), job.robot) for job in found] == [
+        ("b", 0, 1, None),
+        ("plain", 1, 0, None),
+        ("r1/a", 1, 1, "r1"),
+    ]
+
+
+def test_results_and_hidden_files_are_passed_over(tmp_path: Path) -> None:
+    _touch(tmp_path, "a.mcap", "a.algid/torque.parquet", "out/jobs.parquet", "out/b.csv", ".c.csv")
+    assert [job.name for job in jobs_of([str(tmp_path)], str(tmp_path / "out"))] == ["a"]
+
+
+def test_a_glob_and_a_file_name_jobs_by_their_stems(tmp_path: Path) -> None:
+    _touch(tmp_path, "x/a.mcap", "y/b.mcap")
+    assert [job.name for job in jobs_of([str(tmp_path / "*/*.mcap")], "out")] == ["a", "b"]
+    (job,) = jobs_of([str(tmp_path / "x/a.mcap")], "out")
+    assert job == Job("a", logs=(str(tmp_path / "x/a.mcap"),))
+    (job,) = jobs_of([str(tmp_path / "x/a.mcap")], "out", alone="loaded")
+    assert job == Job("a", loaded=(str(tmp_path / "x/a.mcap"),))
+
+
+def test_a_folder_is_searched_for_every_format_that_is_read(tmp_path: Path) -> None:
+    _touch(
+        tmp_path,
+        *(f"log{number}{suffix.upper()}" for number, suffix in enumerate(SUFFIXES)),
+        "readme.md",
+    )
+    assert [job.name for job in jobs_of([str(tmp_path)], "out")] == sorted(
+        f"log{one}" for one in range(len(SUFFIXES))
+    )
+    assert {".npz", ".mat", ".feather", ".bag", ".db3"} < set(SUFFIXES)
+
+
+def test_two_logs_of_one_name_fail_alone(tmp_path: Path) -> None:
+    _touch(tmp_path, "a.mcap", "a.csv", "a.parquet", "b.csv", "c-loaded.csv", "c_loaded.mcap")
+    first, second, third = jobs_of([str(tmp_path)], "out")
+    names = ", ".join(str(tmp_path / name) for name in ("a.csv", "a.mcap", "a.parquet"))
+    assert (
+        first.trouble
+        == f"a: two jobs of one name ({names}); rename a log, or name the jobs in a manifest"
+    )
+    assert (second.name, second.trouble) == ("b", None)
+    assert third.trouble is not None
+    assert third.trouble.startswith("c: two jobs of one name")
+
+
+@pytest.mark.parametrize(
+    "name", ["bad\nname", "a\\b", "\x1b[2J", "caf\udce9", "a\u202eb", "x" * 201, "\x7f"]
+)
+def test_a_log_of_an_odd_name_fails_alone_and_is_told_in_visible_letters(
+    tmp_path: Path, name: str
+) -> None:
+    _touch(tmp_path, "good.csv", f"{name}.csv")
+    odd, good = sorted(jobs_of([str(tmp_path)], "out"), key=lambda job: job.trouble is None)
+    assert (good.name, good.trouble) == ("good", None)
+    assert name_fault(odd.name) is None
+    assert odd.trouble is not None
+    assert (
+        "a log's name becomes a folder's: expected parts of 1 to 200 printable characters"
+        in odd.trouble
+    )
+    assert odd.logs == (f"{tmp_path}/{name}.csv",)
+    assert all(path.encode() for path in kept(odd).logs)
+    assert jobs_of([str(tmp_path)], "out") == jobs_of([str(tmp_path)], "out")
+
+
+def test_each_folder_is_looked_through_once_whatever_links_lead_there(tmp_path: Path) -> None:
+    _touch(tmp_path, "logs/a.csv", "logs/z/b.csv", "elsewhere/c.csv")
+    for number in range(3):
+        (tmp_path / f"logs/{number}").symlink_to(tmp_path / "logs")
+        (tmp_path / f"logs/z/{number}").symlink_to("..")
+        (tmp_path / f"elsewhere/{number}").symlink_to(tmp_path)
+        (tmp_path / f"logs/far{number}").symlink_to(tmp_path / "elsewhere")
+    (tmp_path / "logs/all").symlink_to("/")
+    (tmp_path / "logs/itself.csv").symlink_to(tmp_path / "logs/itself.csv")
+    names = ["a", "far0/c", "itself", "z/b"]
+    assert [job.name for job in jobs_of([str(tmp_path / "logs")], "out")] == names
+    assert [job.name for job in jobs_of([f"{tmp_path}/logs/**/*.csv"], "out")] == [
+        "a",
+        "b",
+        "c",
+        "itself",
+    ]
+
+
+def test_a_pattern_of_two_stars_goes_through_folders_and_not_through_results(
+    tmp_path: Path,
+) -> None:
+    _touch(
+        tmp_path,
+        "x/a.mcap",
+        "x/y/b.mcap",
+        "x/y/c.csv",
+        "b.algid/d.mcap",
+        "x/bag/metadata.yaml",
+        ".h/e.mcap",
+        "f.txt",
+    )
+    for pattern, names in (
+        ("**/*.mcap", ["a", "b"]),
+        ("**/y/*", ["b", "c"]),
+        ("x/**", ["a", "b", "bag", "c"]),
+        ("**/x/**/*.csv", ["c"]),
+        ("**/**/[ab].*", ["a", "b"]),
+        ("*.txt", ["f.txt"]),
+        ("**/f.*", ["f.txt"]),
+    ):
+        assert [job.name for job in jobs_of([str(tmp_path / pattern)], "out")] == names, pattern
+    with pytest.raises(SettingError, match="no such file, folder or match"):
+        jobs_of([f"{tmp_path}/**/*.bag"], "out")
+
+
+def _nested(folder: Path, names: Sequence[str]) -> None:
+    """Make folders within each other, further than a path reaches, with an empty log in the last one."""
+    place = os.open(folder, os.O_RDONLY)
+    for name in names:
+        os.mkdir(name, dir_fd=place)
+        inner = os.open(name, os.O_RDONLY, dir_fd=place)
+        os.close(place)
+        place = inner
+    os.close(os.open("log.csv", os.O_CREAT, dir_fd=place))
+    os.close(place)
+
+
+@pytest.mark.parametrize(
+    ("names", "trouble"),
+    [
+        (["d"] * 100, None),
+        pytest.param(
+            ["d"] * 1500,
+            "a log's name becomes a folder's: expected at most 1000 bytes; rename it",
+            marks=pytest.mark.slow,
+        ),
+        (["d" * 200] * 25, "cannot look there (File name too long); check its rights"),
+    ],
+)
+def test_folders_may_be_nested_as_deep_as_the_system_takes_them(
+    tmp_path: Path, names: Sequence[str], trouble: str | None
+) -> None:
+    _touch(tmp_path, "good.csv")
+    _nested(tmp_path, names)
+    try:
+        found = {job.name: job.trouble for job in jobs_of([str(tmp_path)], str(tmp_path))}
+        sweep(open_store(str(tmp_path)))
+        assert open_store(str(tmp_path)).names("")[-1] == "good.csv"
+    finally:
+        subprocess.run(
+            ["rm", "-rf", tmp_path / names[0]], check=True
+        )  # shutil.rmtree ends at a thousand
+    assert found.pop("good") is None
+    ((name, told),) = found.items()
+    if trouble is None:
+        assert (name, told) == ("/".join([*names, "log"]), None)
+    else:
+        assert told is not None
+        assert told.endswith(trouble)
+
+
+def test_a_source_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SettingError, match="no such file, folder or match"):
+        jobs_of([str(tmp_path / "absent*.csv")], "out")
+
+
+def test_manifests_in_csv_and_toml_say_the_same(tmp_path: Path) -> None:
+    rows = (
+        "name,logs,loaded,profile,robot,time,payload,site\n"
+        "d1,a.csv;b.csv,/l/c.csv,arm.toml,r1,2026-01-31T12:00:00Z,0.5,Ulm\n"
+    )
+    (tmp_path / "m.csv").write_text(rows)
+    (tmp_path / "m.toml").write_text(
+        '[[job]]\nname="d1"\nlogs=["a.csv", "b.csv"]\nloaded="/l/c.csv"\nprofile="arm.toml"\nrobot="r1"\n'
+        'time=2026-01-31T12:00:00Z\npayload=0.5\nsite="Ulm"\n'
+    )
+    assert is_manifest(tmp_path / "m.csv")
+    (first,) = read_manifest(tmp_path / "m.csv")
+    (second,) = read_manifest(tmp_path / "m.toml")
+    assert first == second
+    assert first.logs == (str(tmp_path / "a.csv"), str(tmp_path / "b.csv"))
+    assert first.profile == str(tmp_path / "arm.toml")
+    assert first.labels == {"payload": 0.5, "site": "Ulm"}
+    assert first.time == "2026-01-31T12:00:00+00:00"
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("name,logs\n../x,a.csv\n", "row 1: a job's name becomes a folder's"),
+        ("name,logs\nx,\n", "row 1: expected a name and logs"),
+        ("name,logs,time\nx,a.csv,yesterday\n", "row 1: time: expected ISO 8601"),
+        (
+            "name,logs,time\nx,a.csv,0001-01-01T00:00+23:59\n",
+            "row 1: time: expected ISO 8601.* from 1970 to 2261",
+        ),
+        (
+            "name,logs,time\nx,a.csv,9999-12-31T23:59-23:59\n",
+            "row 1: time: expected ISO 8601.* from 1970 to 2261",
+        ),
+        ("name,logs,time\nx,a.csv,1969-12-31T23:59:59Z\n", "row 1: time: expected ISO 8601"),
+        ("name,logs\na.algid/b,a.csv\n", "row 1: a job's name .* no folder that ends in .algid"),
+        ("name,logs\njobs.parquet/b,a.csv\n", "row 1: a job's name .* none that is jobs.parquet"),
+        (f"name,logs\n{'abc/' * 250}d,a.csv\n", "row 1: a job's name .* at most 1000 bytes"),
+        ("name,logs,logs\nx,a.csv,b.csv\n", "two columns are named 'logs'; rename one"),
+        (
+            "name,logs," + ",".join(map(str, range(5000))) + "\nx,a" + ",1" * 5000,
+            "expected labels of at most 4096 names, found 5002",
+        ),
+        ("name,logs\nx,a,b,c\n", "a row has more cells"),
+        ("name,logs\nx,a.csv;;b.csv\n", "row 1: logs: expected paths, found 'a.csv;;b.csv'"),
+        ("name,logs\ny,a.csv\nx,a\0.csv\n", "row 2: logs: expected paths, found"),
+        (
+            "name,logs\n" + "x" * 140_000 + ",a.csv\n",
+            "the manifest cannot be read \\(field larger than",
+        ),
+    ],
+)
+def test_a_bad_manifest_is_refused_by_its_place(tmp_path: Path, text: str, told: str) -> None:
+    (tmp_path / "m.csv").write_text(text)
+    with pytest.raises(SettingError, match=rf"^{tmp_path}/m\.csv: {told}"):
+        read_manifest(tmp_path / "m.csv")
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", r"expected tables \[\[job\]\] alone, found nothing"),
+        ("job = 1", r"expected tables \[\[job\]\] alone, found job"),
+        ("job = [1]", r"expected tables \[\[job\]\] alone, found job"),
+        (
+            "more = 1\n[[job]]\nname = 'x'\nlogs = 'a.csv'",
+            r"expected tables \[\[job\]\] alone, found more, job",
+        ),
+        ("[[job]]\nlogs = 'a.csv'", "job 1: expected a name and logs, found logs"),
+        ("[[job]]\nname = 'x'\nlogs = 5", "job 1: logs: expected paths, found 5"),
+        (
+            "[[job]]\nname = 'x'\nlogs = ['a.csv', 5]",
+            r"job 1: logs: expected paths, found \['a.csv', 5\]",
+        ),
+        (
+            "[[job]]\nname = 'x'\nlogs = ['a.csv', ' ']",
+            r"job 1: logs: expected paths, found \['a.csv', ' '\]",
+        ),
+        ("[[job]]\nname = 'x'\nloaded = \"a\\u0000.csv\"", "job 1: loaded: expected paths"),
+        ("[[job]]\nname = 'x'\nlogs = 'a.csv'\ntime = 07:32:00", "job 1: time: expected ISO 8601"),
+        (
+            "a = " + "[" * 5000 + "]" * 5000,
+            r"the manifest cannot be read \(maximum recursion depth",
+        ),
+        ("[[job", "the manifest cannot be read"),
+        (
+            f"{JOB}payload = 1{'0' * 400}",
+            "job 1: payload: expected text, a date, true, .* 64 bits, found another int",
+        ),
+        (f"{JOB}payload = 1{'0' * 5000}", "the manifest cannot be read"),
+        (
+            f"{JOB}payload = 0x1{'0' * 5000}",
+            "job 1: payload: expected text, a date, true, .* 64 bits, found another int",
+        ),
+        (f"{JOB}payload = nan", "job 1: payload: .* finite number"),
+        (f"{JOB}payload = {{a = 1}}", "job 1: payload: .* found another dict"),
+        (f"{JOB}robot = [1]", "job 1: robot: .* found another list"),
+        (f"{JOB}time = 9999-12-31T23:59:59-23:59", "job 1: time: expected ISO 8601"),
+    ],
+)
+def test_a_bad_manifest_in_toml_is_refused_by_its_place(
+    tmp_path: Path, text: str, told: str
+) -> None:
+    (tmp_path / "m.toml").write_text(text)
+    with pytest.raises(SettingError, match=rf"^{tmp_path}/m\.toml: {told}"):
+        jobs_of([str(tmp_path / "m.toml")], "out")
+
+
+def test_a_manifest_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(
+        SettingError, match=r"m\.toml: the manifest cannot be read .*No such file.*mend it$"
+    ):
+        jobs_of([str(tmp_path / "m.toml")], "out")
+    (tmp_path / "m.csv").write_bytes(b"name,logs\nx,\xff.csv\n")
+    with pytest.raises(
+        SettingError, match=r"m\.csv: the manifest cannot be read .*utf-8.*mend it$"
+    ):
+        jobs_of([str(tmp_path / "m.csv")], "out")
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_a_csv_file_is_a_manifest_by_its_columns_whatever_ends_its_lines(
+    tmp_path: Path, end: str
+) -> None:
+    path = tmp_path / "m.csv"
+    for header, expected in (
+        *(("name,logs", True), ("loaded,payload,name", True), ("\ufeffname,loaded", True)),
+        *(("name,log", False), ("logs,loaded", False), ("t,theta1", False), ("", False)),
+    ):
+        path.write_bytes(f"{header}{end}x,a.csv{end}".encode())
+        assert is_manifest(path) == expected, header
+    assert [job.name for job in jobs_of([str(path)], "out")] == ["m"]
+    path.write_bytes(f"name,logs{end}x,a.csv{end}y,b.csv{end}".encode())
+    assert [job.name for job in jobs_of([str(path)], "out")] == ["x", "y"]
+
+
+def test_bytes_of_any_kind_in_a_csv_file_make_it_a_log(tmp_path: Path) -> None:
+    path = tmp_path / "random.csv"
+    for seed in range(64):
+        content = bytes((seed * 37 + 11 * n * n) % 256 for n in range(512))
+        path.write_bytes(content)
+        assert jobs_of([str(path)], "out") == [Job("random", logs=(str(path),))]
+
+
+def test_what_else_a_row_holds_is_a_label(tmp_path: Path) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text(
+        "[[job]]\nname = 'x'\nlogs = 's3://lab/a.csv'\nrobot = 7\npayload = 0.5\nruns = 3\ngood = true\nat = 2026-01-31"
+    )
+    (job,) = read_manifest(path)
+    assert job.logs == ("s3://lab/a.csv",)
+    assert job.robot == "7"
+    assert job.labels == {"payload": 0.5, "runs": 3, "good": True, "at": "2026-01-31"}
+    assert (job.profile, job.time, job.loaded) == (None, None, ())
+
+
+@given(st.floats())
+def test_a_label_that_reads_like_a_finite_number_is_one(value: float) -> None:
+    found = label_of(repr(value))
+    assert found == (value if math.isfinite(value) else repr(value))
+    assert type(found) is (float if math.isfinite(value) else str)
+
+
+@pytest.mark.parametrize(
+    "name", ["", "/a", "a/", "a//b", "../a", "a/..", ".a", "a\\b", "a\nb", "a\x7f", "ä" * 101]
+)
+def test_a_name_that_could_leave_the_folder_of_results_is_refused(name: str) -> None:
+    with pytest.raises(SettingError, match=r"^here: a job's name becomes a folder's"):
+        checked_name(name, "here")
+
+
+def test_a_name_may_hold_slashes_and_any_printable_character() -> None:
+    for name in ("a", "r1/day 2/a.b", "ä" * 100, "…", "a" * 200 + "/" + "b" * 200):
+        assert checked_name(name, "here") == name
+
+
+def test_a_folder_where_nobody_may_look_fails_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _touch(tmp_path, "a.csv", "locked/b.csv")
+    scan = os.scandir
+
+    def refused(path: str) -> Any:
+        if path.endswith("locked"):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), path)
+        return scan(path)
+
+    monkeypatch.setattr(os, "scandir", refused)
+    locked, good = jobs_of([str(tmp_path)], "out")
+    assert (
+        locked.trouble
+        == f"{tmp_path}/locked: cannot look there (Permission denied); check its rights"
+    )
+    assert (good.name, good.trouble) == ("a", None)
+    with pytest.raises(
+        SettingError,
+        match=rf"^{tmp_path}/locked: cannot look there \(.*denied: .*\); check its name",
+    ):
+        jobs_of([str(tmp_path / "locked")], "out")
+    for source in ("x" * 5000, "a\0b"):
+        with pytest.raises(
+            SettingError, match=r": cannot look there \(.*\); check its name|no such file"
+        ):
+            jobs_of([source], "out")
+
+
+def test_a_bag_is_one_log_and_its_folder_no_place_to_look_in(tmp_path: Path) -> None:
+    _touch(
+        tmp_path,
+        "run-loaded/metadata.yaml",
+        "run-loaded/0.mcap",
+        "plain/0.mcap",
+        "x.MCAP",
+        "y.csv.gz",
+    )
+    found = jobs_of([str(tmp_path)], "out")
+    assert [(job.name, job.logs, job.loaded) for job in found] == [
+        ("plain/0", (str(tmp_path / "plain/0.mcap"),), ()),
+        ("run", (), (str(tmp_path / "run-loaded"),)),
+        ("x", (str(tmp_path / "x.MCAP"),), ()),
+        ("y", (str(tmp_path / "y.csv.gz"),), ()),
+    ]
+    (job,) = jobs_of([str(tmp_path / "run-loaded")], "out")
+    assert job == Job("run", loaded=(str(tmp_path / "run-loaded"),))
+
+
+def test_the_table_of_results_is_no_log_where_results_go_and_one_elsewhere(tmp_path: Path) -> None:
+    _touch(tmp_path, "jobs.parquet", "a.csv", "sub/jobs.parquet")
+    assert [job.name for job in jobs_of([str(tmp_path)], str(tmp_path))] == ["a", "sub/jobs"]
+    assert [job.name for job in jobs_of([str(tmp_path)], "out")] == ["a", "jobs", "sub/jobs"]
+
+
+def test_a_source_that_is_given_twice_counts_once(tmp_path: Path) -> None:
+    _touch(tmp_path, "a.csv", "b.csv")
+    assert [job.name for job in jobs_of([str(tmp_path), str(tmp_path / "a.csv")], "out")] == [
+        "a",
+        "b",
+    ]
+    _touch(tmp_path, "other/a.csv")
+    both, other = jobs_of([str(tmp_path / "*.csv"), str(tmp_path / "other/a.csv")], "out")
+    assert both.trouble is not None
+    assert both.trouble.startswith(
+        f"a: two jobs of one name ({tmp_path}/a.csv, {tmp_path}/other/a.csv)"
+    )
+    assert (other.name, other.trouble) == ("b", None)
+
+
+@pytest.mark.parametrize(
+    ("stem", "name", "loaded"),
+    [
+        ("a-loaded", "a", True),
+        ("a_unloaded", "a", False),
+        ("a-b_loaded", "a-b", True),
+        ("a-loaded-2", "a-loaded-2", False),
+        ("loaded", "loaded", False),
+        ("a.loaded", "a.loaded", False),
+        ("a-Loaded", "a-Loaded", False),
+    ],
+)
+def test_a_role_is_the_last_word_of_a_name(
+    tmp_path: Path, stem: str, name: str, *, loaded: bool
+) -> None:
+    _touch(tmp_path, f"{stem}.csv")
+    (job,) = jobs_of([str(tmp_path)], "out")
+    assert (job.name, bool(job.loaded)) == (name, loaded)

@@ -1,0 +1,232 @@
+"""The command under signals: killed at random instants, it ends as if nothing had happened."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+import algid
+from algid.synth.sensors import Sensors
+from tests.batches.clusters import Dask, dask
+
+__all__ = ["dask"]
+
+JOBS = 6
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("logs")
+    exact, _ = algid.synthesise(
+        "case1", duration=2.0, excitation="wide", sensors=Sensors(1e-4, 1e-3)
+    )
+    rng = np.random.default_rng(0)
+    for number in range(JOBS):
+        noisy = replace(exact, theta=exact.theta + rng.normal(0, 1e-3, exact.theta.shape))
+        algid.write_log(folder / f"d{number}-unloaded.mcap", noisy)
+    return folder
+
+
+@dataclass(frozen=True)
+class Undisturbed:
+    """What a batch that nothing happens to leaves, and the seconds that it takes."""
+
+    digest: dict[str, str]
+    lasts: float
+
+
+@pytest.fixture(scope="module")
+def undisturbed(logs: Path, tmp_path_factory: pytest.TempPathFactory) -> Undisturbed:
+    out = tmp_path_factory.mktemp("undisturbed") / "out"
+    start = time.monotonic()
+    running = _start(logs, out)
+    running.communicate()
+    assert running.returncode == 0
+    return Undisturbed(_digest(out), time.monotonic() - start)
+
+
+# The command, and in each of its workers a reader that never ends on what is named so.
+HANGING = """
+import algid.readers as readers
+opened = readers.open_log
+def open_log(path, *more):
+    while "hangs" in str(path):
+        pass
+    return opened(path, *more)
+readers.open_log = open_log
+if __name__ == "__main__":
+    from algid.cli import main
+    main()
+"""
+
+
+def _start(
+    logs: Path, out: Path, *flags: str, program: Sequence[str] = ("-m", "algid")
+) -> subprocess.Popen[str]:
+    where = flags or ("--workers", "2")
+    quick = ("--no-report", "--estimator", "weak", "--model", "plain")
+    command = [sys.executable, *program, "batch", str(logs), "-o", str(out), *quick, *where]
+    root = str(Path(__file__).parents[2])
+    return subprocess.Popen(
+        command,
+        env={**os.environ, "PYTHONPATH": root},
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+
+
+def _digest(out: Path) -> dict[str, str]:
+    files = {
+        str(p.relative_to(out)): hashlib.sha256(p.read_bytes()).hexdigest()
+        for p in out.rglob("result.json")
+    }
+    left = [str(p) for p in out.rglob(".*") if p.name != ".jobs"]
+    return files | {
+        "left": str(left),
+        "jobs": pl.read_parquet(out / "jobs.parquet").drop("seconds").write_json(),
+    }
+
+
+def _wait_for_records(out: Path, count: int) -> None:
+    end = time.monotonic() + 60
+    while len(list((out / ".jobs").glob("*.json"))) < count and time.monotonic() < end:
+        time.sleep(0.005)
+
+
+def test_a_batch_killed_again_and_again_ends_as_an_undisturbed_one(
+    logs: Path, tmp_path: Path, undisturbed: Undisturbed
+) -> None:
+    instants = random.Random(1)
+    for _ in range(4):
+        running = _start(logs, tmp_path / "out")
+        time.sleep(instants.uniform(0.4, 1.0) * undisturbed.lasts)
+        running.kill()
+        running.communicate()
+    last = _start(logs, tmp_path / "out")
+    told, _ = last.communicate()
+    assert last.returncode == 0
+    assert f"{JOBS} ok" in told
+    assert _digest(tmp_path / "out") == undisturbed.digest
+
+
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+def test_a_stop_ends_at_once_even_where_a_job_hangs_and_keeps_what_is_finished(
+    logs: Path, tmp_path: Path, sent: signal.Signals
+) -> None:
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "logs/d0-unloaded.mcap").symlink_to(logs / "d0-unloaded.mcap")
+    (tmp_path / "logs/hangs.csv").write_text("t,theta1,theta2,tau1,tau2\n")
+    script = tmp_path / "hanging.py"
+    script.write_text(HANGING)
+    running = _start(tmp_path / "logs", tmp_path / "out", "--workers", "2", program=[str(script)])
+    _wait_for_records(tmp_path / "out", 1)
+    running.send_signal(sent)
+    told, errors = running.communicate(timeout=60)
+    assert (running.returncode, errors) == (130, "")
+    assert "1 ok; 1 run now, 1 left" in told
+    assert pl.read_parquet(tmp_path / "out/jobs.parquet")["job"].to_list() == ["d0"]
+    assert not [path for path in (tmp_path / "out").rglob(".*") if path.name != ".jobs"]
+
+
+def test_a_job_past_its_time_fails_until_its_log_changes(tmp_path: Path) -> None:
+    log, out = tmp_path / "logs/hangs.csv", tmp_path / "out"
+    log.parent.mkdir()
+    log.write_text("t,theta1,theta2,tau1,tau2\n")
+    script = tmp_path / "hanging.py"
+    script.write_text(HANGING)
+    running = _start(log.parent, out, "--workers", "1", "--timeout", "0.5", program=[str(script)])
+    told, errors = running.communicate(timeout=120)
+    assert (running.returncode, errors) == (1, "")
+    assert told.startswith(
+        "hangs: failed: it took longer than 0.5 s; raise --timeout, and run it again with --retry-"
+    )
+    for text, ran in (
+        ("t,theta1,theta2,tau1,tau2\n", 0),
+        ("t,theta1,theta2,tau1,tau3\n", 1),
+    ):  # equally long
+        if log.read_text() != text:
+            log.write_text(text)
+        told, _ = _start(log.parent, out, "--workers", "1").communicate()
+        assert f"1 failed; {ran} run now, 0 left" in told
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of 64 kB; skips where none may be mounted."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    if not _mounts("-t", "tmpfs", "-o", "size=64k", "tmpfs", str(place)):
+        pytest.skip("no small file system can be mounted here")
+    yield place
+    subprocess.run(["umount", str(place)], check=True)
+
+
+def _mounts(*flags: str) -> bool:
+    try:
+        return subprocess.run(["mount", *flags], capture_output=True, check=False).returncode == 0
+    except OSError:
+        return False
+
+
+def test_a_full_disk_stops_a_batch_that_ends_as_undisturbed_once_there_is_room(
+    logs: Path, small_disk: Path, undisturbed: Undisturbed
+) -> None:
+    out = small_disk / "out"
+    first = _start(logs, out)
+    told, errors = first.communicate()
+    assert first.returncode == 1
+    assert "No space left on device" in errors
+    assert "make room and run again" in errors
+    assert "Traceback" not in errors
+    finished = [path.parent.stem for path in out.rglob("result.json")]
+    assert 0 < len(finished) < JOBS
+    assert "failed" not in told
+    assert not [path for path in out.rglob(".*") if path.name != ".jobs"]
+    assert _mounts("-o", "remount,size=16m", str(small_disk))
+    second = _start(logs, out)
+    told, errors = second.communicate()
+    assert (second.returncode, errors) == (0, "")
+    assert f"{JOBS} ok" in told
+    assert _digest(out) == undisturbed.digest
+
+
+def test_on_dask_the_death_of_a_worker_changes_no_result(
+    logs: Path, tmp_path: Path, dask: Dask, undisturbed: Undisturbed
+) -> None:
+    victim, _ = dask.worker(), dask.worker()
+    first = _start(logs, tmp_path / "out", "--scheduler", dask.address)
+    _wait_for_records(tmp_path / "out", 1)
+    victim.kill()
+    told, errors = first.communicate()
+    assert first.returncode == 0, errors
+    assert f"{JOBS} ok" in told
+    assert _digest(tmp_path / "out") == undisturbed.digest
+
+
+def test_on_dask_the_death_of_the_batch_changes_no_result(
+    logs: Path, tmp_path: Path, dask: Dask, undisturbed: Undisturbed
+) -> None:
+    dask.worker()
+    second = _start(logs, tmp_path / "again", "--scheduler", dask.address)
+    _wait_for_records(tmp_path / "again", 2)
+    second.kill()
+    second.communicate()
+    last = _start(logs, tmp_path / "again", "--scheduler", dask.address)
+    _, errors = last.communicate()
+    assert last.returncode == 0, errors
+    assert _digest(tmp_path / "again") == undisturbed.digest

@@ -1,0 +1,397 @@
+"""Objects with any name, rights and fate: what is read is what was named, and one that is amiss fails alone."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+import pytest
+
+import algid
+from algid.batches.discover import jobs_of
+from algid.batches.fetch import staged
+from algid.batches.records import End
+from algid.batches.run import Batch, Ended, Recipe
+from algid.cli import batch as command
+from algid.errors import AlgidError, LogError, OutputError, without_credentials
+from algid.settings import Settings
+from algid.stores import connect, list_urls, open_store, put_folder
+from algid.synth.sensors import Sensors
+from tests.batches.test_run import Here
+from tests.objects import Served, s3
+from tests.processes import Outcome
+
+ODD = (
+    "run%41.csv",
+    "runA.csv",
+    "a b.csv",
+    'q".csv',
+    "<x>.csv",
+    "[y].csv",
+    "ü µ.csv",
+    "q?.csv",
+    "h#.csv",
+    "100%.csv",
+)
+KEY, SECRET = "AKIAEXAMPLE", "sEcReT%2FwIth%2BsLash"
+USER = f"{KEY}:{SECRET}@"
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Served]:
+    with pytest.MonkeyPatch.context() as monkeypatch, s3(monkeypatch) as running:
+        yield running
+
+
+@pytest.fixture
+def served(server: Served) -> Iterator[Served]:
+    """The server with an empty bucket, every request allowed."""
+    connect(server.url(""))[0].delete_dir_contents(server.bucket)
+    server.asked.clear()
+    yield server
+    server.denied, server.after = lambda _method, _path: False, lambda _path: None
+
+
+@pytest.fixture(scope="module")
+def log() -> bytes:
+    """A second at 200 Hz as CSV."""
+    unloaded, _ = algid.synthesise(
+        "case1", rate=200.0, duration=1.0, excitation="wide", sensors=Sensors(1e-4, 1e-3)
+    )
+    columns = {"t": unloaded.stamp_ns * 1e-9}
+    columns |= {
+        f"{name}{n + 1}": row[n]
+        for name, row in (("theta", unloaded.theta), ("tau", unloaded.tau))
+        for n in (0, 1)
+    }
+    return pl.DataFrame(columns).write_csv().encode()
+
+
+RECIPE = Recipe("", Settings(estimator="weak", model="plain"), lambda _file: None, report=False)
+
+
+def _run(served: Served, place: str | None = None, user: str = "", **recipe: Any) -> Ended:
+    out = served.url("out", user) if place is None else place
+    jobs = jobs_of([served.url("logs", user)], out)
+    return Batch(
+        open_store(out), replace(RECIPE, out=out, **recipe), Here(), 1, lambda _progress: None
+    ).run(jobs)
+
+
+def _ends(ended: Ended) -> dict[str, End]:
+    return {record.job.name: record.status for record in ended.records}
+
+
+def test_keys_of_any_spelling_are_read_as_themselves(served: Served, tmp_path: Path) -> None:
+    store = open_store(served.url("logs"))
+    for key in ODD:
+        store.write(f"r 1/{key}", key.encode())
+    found = list_urls(served.url("logs"))
+    assert sorted(name for _, name in found) == sorted(f"r 1/{key}" for key in ODD)
+    for number, (url, name) in enumerate(found):
+        assert f"r 1/{staged(url, tmp_path / str(number)).path.read_text()}" == name
+    by_hand = served.url("logs/r 1/ü µ.csv")  # what no URL may hold needs no encoding by hand
+    assert staged(by_hand, tmp_path / "by hand").path.read_text() == "ü µ.csv"
+
+
+def test_a_batch_over_odd_keys_has_a_result_for_each(served: Served, log: bytes) -> None:
+    keys = ("run%41", "runA", "a b", "[ü]", "q?#")
+    for key in keys:
+        open_store(served.url("logs")).write(f"{key}.csv", log)
+    assert _ends(_run(served)) == dict.fromkeys(sorted(keys), End.OK)
+    assert _run(served).ran == 0
+    for key in keys:
+        assert open_store(served.url("out")).exists(f"{key}.algid/result.json")
+
+
+def test_a_hash_sign_in_a_url_is_refused_and_no_host_is_asked(served: Served) -> None:
+    """It would cut off the query, and with it the endpoint that the credentials are for."""
+    for text in (served.url("logs/a#b.csv", USER), served.url("logs#", USER)):
+        with pytest.raises(OutputError, match="write %23") as refused:
+            connect(text)
+        assert KEY not in str(refused.value)
+    assert served.asked == []
+
+
+@pytest.mark.parametrize(
+    ("text", "kept"),
+    [
+        (f"s3://{USER}lab/a@b.csv?region=x", "s3://lab/a@b.csv?region=x"),
+        ("'s3://KEY:half/slash@lab/a' is no URL", "'s3://lab/a' is no URL"),
+        ("s3://KEY:with@sign@lab/a", "s3://lab/a"),
+        ("s3:/KEY:SECRET@lab/a: no such file", "s3:/lab/a: no such file"),  # as a path writes it
+        ("s3://KEY@lab/a and gs://anonymous@lab/b", "s3://lab/a and gs://lab/b"),
+        (
+            "az://box:PASSWORD@account.dfs.core.windows.net/a",
+            "az://box@account.dfs.core.windows.net/a",
+        ),
+        (
+            "az://account/box/a?client_secret=SECRET&tenant_id=4",
+            "az://account/box/a?client_secret=&tenant_id=4",
+        ),
+        ("s3://lab/a@b.csv, folder/a@b.csv", "s3://lab/a@b.csv, folder/a@b.csv"),
+    ],
+)
+def test_credentials_are_left_out_of_every_message(text: str, kept: str) -> None:
+    assert without_credentials(text) == kept
+    assert str(AlgidError(text)) == kept
+
+
+def test_credentials_in_a_url_open_everything_below_it_and_are_kept_nowhere(
+    served: Served, log: bytes
+) -> None:
+    store = open_store(served.url("logs"))
+    store.write("r1/a.csv", log)
+    store.write("bad.csv", b"junk")
+    served.asked.clear()
+    assert _ends(_run(served, user=USER, report=True)) == {"bad": End.FAILED, "r1/a": End.OK}
+    assert {f"Credential={KEY}/" in authorization for _, _, authorization in served.asked} == {True}
+    out = open_store(served.url("out"))
+    names = [*out.names(""), ".jobs/bad.json", ".jobs/r1/a.json"]
+    assert "r1/a.algid/report.html" in names
+    text = json.dumps(
+        pl.read_parquet(io.BytesIO(out.read("jobs.parquet") or b"")).to_dicts(), default=str
+    )
+    for content in (text, *((out.read(name) or b"").decode("latin-1") for name in names)):
+        assert KEY not in content
+        assert SECRET not in content
+    assert (
+        _run(served, user="OTHER:KEYS@", report=True).ran == 0
+    )  # who may read it is no part of what it is
+
+
+@pytest.mark.parametrize(
+    ("source", "out", "code"),
+    [
+        pytest.param("lab/logs", "lab/out", 1, marks=pytest.mark.slow),
+        ("lab/empty", "lab/out", 2),
+        ("no-such-lab/logs", "lab/out", 2),
+        ("lab/logs", "no-such-lab/out", 2),
+        ("lab/logs#", "lab/out", 2),
+    ],
+)
+def test_credentials_are_not_printed(served: Served, source: str, out: str, code: int) -> None:
+    open_store(served.url("logs")).write("bad.csv", b"junk")
+    urls = (
+        f"s3://{USER}{place}{served.query}".replace("@lab/", f"@{served.bucket}/")
+        for place in (source, out)
+    )
+    done = Outcome("batch", next(urls), "-o", next(urls), "--workers", "1")
+    assert done.code == code, done.err
+    assert done.out or done.err
+    for word in ("Traceback", KEY, SECRET):
+        assert word not in done.out + done.err
+
+
+def test_a_bucket_that_is_not_there_is_named(served: Served) -> None:
+    absent = f"s3://no-such-lab/logs{served.query}"
+    with pytest.raises(OutputError, match="there is no bucket no-such-lab"):
+        jobs_of([absent], "out")
+    with pytest.raises(OutputError, match="there is no bucket no-such-lab"):
+        _run(served, absent)
+
+
+@pytest.mark.parametrize("method", ["HEAD", "GET"])
+def test_an_object_that_may_not_be_read_fails_alone(
+    served: Served, log: bytes, method: str
+) -> None:
+    for name in ("a", "b", "c"):
+        open_store(served.url("logs")).write(f"{name}.csv", log)
+    served.denied = lambda asked, path: path.endswith("/b.csv") and asked in ("GET", method)
+    ended = _run(served)
+    assert _ends(ended) == {"a": End.OK, "b": End.FAILED, "c": End.OK}
+    assert "it cannot be read" in ended.records[1].reason
+    assert "ACCESS_DENIED" in ended.records[1].reason
+    served.denied = lambda _method, _path: False
+    assert (_run(served).ran, _ends(_run(served))["b"]) == (
+        (1, End.OK) if method == "HEAD" else (0, End.FAILED)
+    )
+
+
+def test_a_log_that_cannot_be_looked_at_for_a_while_loses_no_result(
+    served: Served, log: bytes
+) -> None:
+    for name in ("a", "b"):
+        open_store(served.url("logs")).write(f"{name}.csv", log)
+    _run(served)
+    served.denied = lambda method, path: method == "HEAD" and path.endswith("/a.csv")
+    ended = _run(served)
+    assert (_ends(ended), ended.ran) == ({"a": End.FAILED, "b": End.OK}, 0)
+    served.denied = lambda _method, _path: False
+    ended = _run(served)
+    assert (_ends(ended), ended.ran) == ({"a": End.OK, "b": End.OK}, 0)
+
+
+def test_a_record_that_may_not_be_read_counts_as_none(served: Served, log: bytes) -> None:
+    for name in ("a", "b"):
+        open_store(served.url("logs")).write(f"{name}.csv", log)
+    _run(served)
+    served.denied = lambda method, path: method == "GET" and path.endswith(".jobs/a.json")
+    ended = _run(served)
+    assert (_ends(ended), ended.ran) == ({"a": End.OK, "b": End.OK}, 1)
+
+
+def test_a_result_that_may_not_be_written_says_so(served: Served, log: bytes) -> None:
+    for name in ("a", "b"):
+        open_store(served.url("logs")).write(f"{name}.csv", log)
+    served.denied = lambda method, path: method in ("PUT", "POST") and "a.algid" in path
+    ended = _run(served)
+    assert _ends(ended) == {"a": End.FAILED, "b": End.OK}
+    assert "cannot write there" in ended.records[0].reason
+    assert "ACCESS_DENIED" in ended.records[0].reason
+    served.denied = lambda method, path: method in ("PUT", "POST") and ".jobs" in path
+    open_store(served.url("logs")).write("c.csv", log)
+    ended = _run(served)
+    assert ended.left == 1
+    assert "ACCESS_DENIED" in str(ended.stopped)
+    assert "room" not in str(ended.stopped)
+
+
+@pytest.mark.parametrize("place", ["", "logs/r 1/out"])
+def test_what_a_batch_wrote_below_its_source_is_no_log(
+    served: Served, log: bytes, place: str
+) -> None:
+    open_store(served.url("logs")).write("r 1/a.csv", log)
+    open_store(served.url("logs")).write("jobs.parquet", b"a log of that name")
+    out = served.url(place)
+    for _ in range(2):
+        jobs = jobs_of([served.url("")], out)
+        assert [job.name for job in jobs] == ["logs/jobs", "logs/r 1/a"]
+        Batch(
+            open_store(out),
+            replace(RECIPE, out=out, report=True),
+            Here(),
+            1,
+            lambda _progress: None,
+        ).run(jobs)
+
+
+def test_a_store_that_is_away_for_a_while_does_not_end_a_watched_prefix(
+    served: Served,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr("algid.batches.run.LOOK_EVERY", 0.0)
+    open_store(served.url("logs")).write("bad.csv", b"junk")
+    out, looks = str(tmp_path / "out"), 0
+    batch = Batch(open_store(out), replace(RECIPE, out=out), Here(), 1, lambda _progress: None)
+
+    def denied(_method: str, path: str) -> bool:
+        """Listings 1 and 2 are refused; the batch is stopped once the log is done."""
+        nonlocal looks
+        looks += path.rstrip("/") == f"/{served.bucket}"
+        if "bad" in batch.records or looks > 20:
+            batch.stop.set()
+        return looks in (1, 2) and path.rstrip("/") == f"/{served.bucket}"
+
+    served.denied = denied
+    ended = command._watch(batch, [served.url("logs")], out, "logs", False)
+    assert _ends(ended) == {"bad": End.FAILED}
+    assert capsys.readouterr().err.count("its objects cannot be listed") == 1
+
+
+def _folder(place: Path, *names: str) -> Path:
+    for name in names:
+        (place / name).parent.mkdir(parents=True, exist_ok=True)
+        (place / name).write_text(f"{place.name} {name}")
+    return place
+
+
+def test_a_new_result_leaves_nothing_of_the_old_one(served: Served, tmp_path: Path) -> None:
+    store = open_store(served.url("out"))
+    put_folder(
+        store,
+        "a.algid",
+        _folder(tmp_path / "old", "result.json", "report.html", "figures/one.parquet"),
+    )
+    new = _folder(tmp_path / "new", "result.json", "report.md")
+    served.denied = lambda method, path: method != "DELETE" and path.endswith("report.md")
+    with pytest.raises(OutputError, match=r"a\.algid/report\.md: cannot write there"):
+        put_folder(store, "a.algid", new)
+    served.denied = lambda _method, _path: False
+    assert not store.exists("a.algid/result.json")  # it would vouch for what is no longer its own
+    put_folder(store, "a.algid", new)
+    assert store.names("a.algid") == ["a.algid/report.md", "a.algid/result.json"]
+    assert store.read("a.algid/result.json") == b"new result.json"
+    put_folder(store, "a.algid", _folder(tmp_path / "alone", "result.json"))
+    assert store.names("a.algid") == ["a.algid/result.json"]
+
+
+@pytest.mark.parametrize("kind", ["folder", "objects"])
+def test_a_log_that_fails_once_changed_keeps_no_result(
+    served: Served, log: bytes, tmp_path: Path, kind: str
+) -> None:
+    place = served.url("out") if kind == "objects" else str(tmp_path / "out")
+    logs = open_store(served.url("logs"))
+    for name in ("a", "b"):
+        logs.write(f"{name}.csv", log)
+    _run(served, place)
+    logs.write("a.csv", b"junk")
+    assert _ends(_run(served, place)) == {"a": End.FAILED, "b": End.OK}
+    assert [name for name in open_store(place).names("") if ".algid/" in name] == [
+        "b.algid/result.json"
+    ]
+
+
+def _settings_fail(_file: str | None) -> None:
+    raise algid.errors.SettingError("no such profile")
+
+
+def test_a_job_that_fails_for_its_settings_keeps_the_result_of_its_log(
+    served: Served, log: bytes
+) -> None:
+    open_store(served.url("logs")).write("a.csv", log)
+    _run(served)
+    assert _ends(_run(served, profile=_settings_fail)) == {"a": End.FAILED}
+    assert open_store(served.url("out")).exists("a.algid/result.json")
+
+
+def _replacing(served: Served, key: str, content: bytes, at: int) -> Callable[[str], None]:
+    """Replaces an object once its `at`-th GET is answered."""
+    answered = 0
+
+    def after(path: str) -> None:
+        nonlocal answered
+        answered += path.endswith(key)
+        if answered == at:
+            served.after = lambda _path: None
+            served.replace(f"logs/{key}", content)
+
+    return after
+
+
+@pytest.mark.parametrize("at", [1, 2, 3])
+@pytest.mark.parametrize("kind", ["as long", "shorter"])
+def test_an_object_replaced_while_it_is_read_fails(
+    served: Served, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, at: int
+) -> None:
+    """Whatever was fetched by then: its ends, the summary, a part of the whole."""
+    monkeypatch.setattr("algid.batches.fetch.SMALL", 0)
+    monkeypatch.setattr("algid.batches.fetch._PIECE", 1 << 17)
+    arrays = np.random.default_rng(0).normal(size=(2, 40000, 2)).astype("<f8")
+    first, second = (one.tobytes() for one in arrays)
+    open_store(served.url("logs")).write("a.csv", first)
+    served.after = _replacing(served, "a.csv", second if kind == "as long" else second[:100], at)
+    with pytest.raises(
+        LogError, match=r"logs/a\.csv.*: it was replaced while it was read; run again"
+    ):
+        staged(served.url("logs/a.csv"), tmp_path)
+
+
+def test_a_replaced_object_fails_its_job_and_is_done_by_the_next_run(
+    served: Served, log: bytes
+) -> None:
+    for name in ("a", "b"):
+        open_store(served.url("logs")).write(f"{name}.csv", log)
+    served.after = _replacing(served, "a.csv", log + log.splitlines()[-1] + b"\n", 1)
+    ended = _run(served)
+    assert _ends(ended) == {"a": End.FAILED, "b": End.OK}
+    assert "replaced while it was read" in ended.records[0].reason
+    assert _run(served).ran == 1

@@ -1,0 +1,341 @@
+"""Records are anybody's: whatever stands below ``.jobs``, a batch ends, and its table is right."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+import pytest
+
+from algid.batches.discover import jobs_of
+from algid.batches.job import failed_record
+from algid.batches.jobs import Job
+from algid.batches.manifest import read_manifest
+from algid.batches.records import (
+    End,
+    Input,
+    JobRecord,
+    hash_of,
+    prepare,
+    read_records,
+    record_name,
+    stat_of,
+    write_record,
+)
+from algid.batches.run import Batch, Ended, Recipe, sweep
+from algid.batches.table import jobs_frame, write_jobs
+from algid.errors import OutputError
+from algid.settings import Settings
+from algid.stores import open_store
+
+
+class Failing(Executor):
+    """Ends every job at once, as one that failed."""
+
+    def __init__(self) -> None:
+        self.ran = list[str]()
+
+    def submit(self, _fn: Callable[..., Any], /, *args: Any, **_more: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        (task,) = args
+        self.ran.append(task.job.name)
+        inputs = tuple(replace(stat_of(path), sha256=hash_of(path)) for path in task.job.logs)
+        future.set_result(failed_record(task, "as asked", inputs=inputs))
+        return future
+
+
+RECIPE = Recipe("", Settings(), lambda _file: None)
+
+
+def _batch(out: Path, executor: Executor | None = None) -> Batch:
+    return Batch(
+        open_store(str(out)),
+        replace(RECIPE, out=str(out)),
+        executor or Failing(),
+        1,
+        lambda _: None,
+    )
+
+
+def _run(logs: Path, out: Path, executor: Executor | None = None) -> Ended:
+    return _batch(out, executor).run(jobs_of([str(logs)], str(out)))
+
+
+@pytest.fixture
+def logs(tmp_path: Path) -> Path:
+    (tmp_path / "logs").mkdir()
+    for name in ("a", "b"):
+        (tmp_path / f"logs/{name}.csv").write_text("no log")
+    return tmp_path / "logs"
+
+
+def _sound() -> dict[str, Any]:
+    job = Job(
+        "other",
+        ("x.csv",),
+        robot="r",
+        time="2026-01-31T12:00:00+01:00",
+        labels={"payload": 0.5, "site": "Ulm"},
+    )
+    estimates = {"k1": (1.0, 0.1, "OK"), "k5+k3+z1": (None, None, "WEAK_EXCITATION")}
+    record = JobRecord(
+        job, End.OK, "", "b", (Input("x.csv", 1, 2),), {"a": [1]}, "0.1", estimates=estimates
+    )
+    return asdict(record)
+
+
+HUGE = 10**400
+WRONG: dict[str, Any] = {
+    "no object": lambda _r: [1],
+    "nothing": lambda _r: {},
+    "a name of another type": lambda r: r["job"].update(name=5),
+    "another job's": lambda r: r["job"].update(name="a"),
+    "a name that leaves": lambda r: r["job"].update(name="../other"),
+    "logs of another type": lambda r: r["job"].update(logs="x.csv"),
+    "no logs": lambda r: r["job"].update(logs=[]),
+    "inputs that are not its logs": lambda r: r["inputs"][0].update(path="/dev/zero"),
+    "labels of another type": lambda r: r["job"].update(labels=[1]),
+    "a label of another type": lambda r: r["job"]["labels"].update(payload={"a": 1}),
+    "a huge label": lambda r: r["job"]["labels"].update(payload=HUGE),
+    "no time": lambda r: r["job"].update(time="garbage"),
+    "a time in year 1": lambda r: r["job"].update(time="0001-01-01T00:00:00+23:59"),
+    "a time in year 9999": lambda r: r["job"].update(time="9999-12-31T23:59:59-23:59"),
+    "another end": lambda r: r.update(status="well"),
+    "seconds that are none": lambda r: r.update(seconds=float("nan")),
+    "a start that is none": lambda r: r.update(start_ns=HUGE),
+    "a size that is none": lambda r: r["inputs"][0].update(size=-HUGE),
+    "estimates of another type": lambda r: r.update(estimates={"k1": [1.0, 2.0]}),
+    "an estimate that is infinite": lambda r: r.update(estimates={"k1": [float("inf"), 2.0, "OK"]}),
+    "an estimate in another column": lambda r: r.update(estimates={"job": [1.0, 2.0, "OK"]}),
+    "an estimate in another's column": lambda r: r.update(estimates={"k1_std": [1.0, 2.0, "OK"]}),
+    "an estimate in a label's column": lambda r: r.update(
+        estimates={"label_site": [1.0, 2.0, "OK"]}
+    ),
+    "half a letter": lambda r: r.update(reason="\ud800"),
+    "more labels than a table has columns": lambda r: r["job"].update(
+        labels={str(n): n for n in range(5000)}
+    ),
+}
+
+
+@pytest.mark.parametrize("change", WRONG.values(), ids=WRONG)
+def test_a_record_that_is_none_counts_as_none_and_is_told(
+    logs: Path, change: Callable[[Any], Any]
+) -> None:
+    out = logs.parent / "out"
+    record = _sound()
+    (out / ".jobs").mkdir(parents=True)
+    (out / ".jobs/other.json").write_text(
+        json.dumps(record if (changed := change(record)) is None else changed),
+        encoding="utf-8",
+        errors="surrogatepass",
+    )
+    batch = _batch(out)
+    assert list(batch.unreadable) == [".jobs/other.json"]
+    assert "\n" not in batch.unreadable[".jobs/other.json"]
+    assert len(batch.run(jobs_of([str(logs)], str(out))).records) == 2
+    assert pl.read_parquet(out / "jobs.parquet")["job"].to_list() == ["a", "b"]
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"\xff", b"[" * 100_000, b"5" * 5000, b"\0" * 100])
+def test_bytes_that_are_no_record_count_as_none(logs: Path, content: bytes) -> None:
+    out = logs.parent / "out"
+    (out / ".jobs").mkdir(parents=True)
+    (out / ".jobs/a.json").write_bytes(content)
+    batch = _batch(out)
+    assert list(batch.unreadable) == [".jobs/a.json"]
+    batch.run(jobs_of([str(logs)], str(out)))
+    assert batch.unreadable == {}  # the job has run, and has a record
+    assert _batch(out).unreadable == {}
+
+
+def test_records_of_other_versions_keep_their_rows(logs: Path) -> None:
+    out = logs.parent / "out"
+    older, newer = _sound(), _sound()
+    del older["job"]["trouble"], older["start_ns"], older["inputs"][0]["ctime_ns"]
+    newer["job"]["name"] = "newer"
+    newer |= {"colour": "red", "version": "99"}
+    newer["job"]["mood"] = 1
+    (out / ".jobs").mkdir(parents=True)
+    for name, record in (("other", older), ("newer", newer)):
+        (out / f".jobs/{name}.json").write_text(json.dumps(record))
+    _run(logs, out)
+    table = pl.read_parquet(out / "jobs.parquet")
+    assert table["job"].to_list() == ["a", "b", "newer", "other"]
+    assert table["label_site"].to_list() == [None, None, "Ulm", "Ulm"]
+    assert [str(time) for time in table["time"]][2:] == ["2026-01-31 11:00:00+00:00"] * 2
+
+
+@pytest.mark.parametrize("kind", ["link", "pipe", "deep", "loop", "unreadable"])
+def test_what_else_lies_among_the_records_does_no_harm(logs: Path, kind: str) -> None:
+    out = logs.parent / "out"
+    (out / ".jobs").mkdir(parents=True)
+    place = out / ".jobs/c.json"
+    if kind == "link":
+        place.symlink_to("/dev/zero")
+    elif kind == "pipe":
+        os.mkfifo(place)
+    elif kind == "deep":
+        (out / ".jobs" / "/".join(["d"] * 900)).mkdir(parents=True)
+    elif kind == "loop":
+        (out / ".jobs/x").symlink_to(out / ".jobs")
+    else:
+        place.mkdir()
+    _run(logs, out)
+    sweep(open_store(str(out)))
+    assert pl.read_parquet(out / "jobs.parquet")["job"].to_list() == ["a", "b"]
+
+
+def test_no_job_takes_another_ones_place(tmp_path: Path) -> None:
+    names = [
+        "x",
+        "x.json/y",
+        "x.json~/y",
+        "x.json~~/y",
+        "x.json",
+        "x.json~",
+        "x.json/y.json/z",
+        "é/x",
+        "x.jobs/y",
+    ]
+    store = open_store(str(tmp_path))
+    for name in names:
+        write_record(store, replace(_record(name), reason=name))
+    known = read_records(store)
+    assert known.unreadable == {}
+    assert {name: record.reason for name, record in known.records.items()} == {
+        name: name for name in names
+    }
+    assert len({record_name(name) for name in names}) == len(names)
+
+
+def _record(name: str, **more: Any) -> JobRecord:
+    return JobRecord(
+        Job(name, ("x.csv",), **more), End.OK, "", "b", (Input("x.csv", 1, 2),), {}, "0.1"
+    )
+
+
+def test_a_link_in_the_output_is_not_followed(logs: Path) -> None:
+    out, elsewhere = logs.parent / "out", logs.parent / "elsewhere"
+    for place in (out, elsewhere, logs / "r1"):
+        place.mkdir()
+    (elsewhere / ".c.algid.algid-0123abcd").mkdir()
+    shutil.copy(logs / "a.csv", logs / "r1/c.csv")
+    (out / "r1").symlink_to(elsewhere)
+
+    class Real(Executor):
+        def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+            future: Future[Any] = Future()
+            future.set_result(fn(*args, **kwargs))
+            return future
+
+    sweep(open_store(str(out)))
+    reasons = {record.job.name: record.reason for record in _run(logs, out, Real()).records}
+    assert (
+        reasons["r1/c"]
+        == f"{out}/r1: a link, which is not followed; make it a folder, or choose another one with -o"
+    )
+    assert "no rows below it" in reasons["a"]
+    assert [path.name for path in elsewhere.iterdir()] == [".c.algid.algid-0123abcd"]
+
+
+@pytest.mark.parametrize("place", [".jobs", "jobs.parquet"])
+@pytest.mark.parametrize("kind", ["link", "file", "folder"])
+def test_an_output_where_no_record_can_be_kept_is_refused_before_any_work(
+    logs: Path, place: str, kind: str
+) -> None:
+    out = logs.parent / "out"
+    out.mkdir()
+    if kind == "link":
+        (logs.parent / "elsewhere").mkdir()
+        (out / place).symlink_to(logs.parent / "elsewhere")
+    elif kind == "file":
+        (out / place).touch()
+    else:
+        (out / place).mkdir()
+    if (place, kind) in ((".jobs", "folder"), ("jobs.parquet", "file")):
+        prepare(open_store(str(out)))
+        return
+    executor = Failing()
+    with pytest.raises(
+        OutputError,
+        match=rf"{place}: (a link, which is not followed|expected a (file|folder) of algid)",
+    ):
+        _run(logs, out, executor)
+    assert executor.ran == []
+
+
+@pytest.mark.parametrize("year", ["1970-01-01T00:00:00+00:00", "2261-12-31T23:59:59", "2026-01-31"])
+def test_odd_times_of_logs_stand_in_the_table(tmp_path: Path, year: str) -> None:
+    (tmp_path / "m.toml").write_text(
+        f"[[job]]\nname = 'x'\nlogs = 'x.csv'\ntime = '{year}'\npayload = {2**63 - 1}\n"
+    )
+    (job,) = read_manifest(tmp_path / "m.toml")
+    far = Input(str(tmp_path / "x.csv"), 1, 10**22)  # a file's time of change may be any
+    record = replace(_record("x"), job=job, inputs=(far,))
+    write_jobs(
+        open_store(str(tmp_path)),
+        [record, replace(record, start_ns=2**63 - 1, job=replace(job, time=None))],
+    )
+    table = pl.read_parquet(tmp_path / "jobs.parquet")
+    assert [str(time)[:4] for time in table["time"]] == [year[:4], "2262"]
+    assert table["changed"].to_list() == [[None], [None]]
+    assert jobs_frame([record])["label_payload"].to_list() == [float(2**63 - 1)]
+
+
+def test_touched_logs_are_hashed_once_and_the_table_is_written_for_changes_alone(
+    logs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = logs.parent / "out"
+    executor = Failing()
+    batch = _batch(out, executor)
+    jobs = jobs_of([str(logs)], str(out))
+
+    asked = list[str]()
+
+    def counted(path: str) -> str | None:
+        asked.append(path)
+        return hash_of(path)
+
+    monkeypatch.setattr("algid.batches.records.hash_of", counted)
+    batch.run(jobs)
+    written = (out / "jobs.parquet").stat().st_ino
+    records = {path.name: path.stat().st_ino for path in (out / ".jobs").iterdir()}
+    for _ in range(3):
+        batch.run(jobs)
+    assert (asked, executor.ran) == ([], ["a", "b"])
+    assert (out / "jobs.parquet").stat().st_ino == written
+    os.utime(logs / "a.csv", ns=(0, 10**18))
+    for _ in range(3):
+        batch.run(jobs)
+    assert _batch(out).run(jobs).ran == 0
+    assert asked == [str(logs / "a.csv")]
+    assert executor.ran == ["a", "b"]
+    assert (out / ".jobs/a.json").stat().st_ino != records["a.json"]
+    assert (out / ".jobs/b.json").stat().st_ino == records["b.json"]
+    (out / "jobs.parquet").unlink()
+    batch.run(jobs)
+    assert pl.read_parquet(out / "jobs.parquet")["changed"].to_list()[0][0].year == 2001
+
+
+def test_odd_names_fail_alone_and_are_written_once(logs: Path) -> None:
+    out = logs.parent / "out"
+    for name in ("bad\nname.csv", "caf\udce9.csv", "a.mcap", "x" * 240 + ".csv"):
+        (logs / name).write_text("no log")
+    ended = _run(logs, out)
+    told = sorted(record.reason[-30:] for record in ended.records)
+    assert len(told) == 5
+    assert told.count("as asked") == 1
+    before = {path: path.stat().st_ino for path in (out / ".jobs").iterdir()}
+    again = Failing()
+    assert _run(logs, out, again).records == ended.records
+    assert again.ran == []
+    assert {path: path.stat().st_ino for path in (out / ".jobs").iterdir()} == before
+    assert pl.read_parquet(out / "jobs.parquet").height == 5

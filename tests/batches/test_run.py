@@ -1,0 +1,279 @@
+"""Batches: what is run, what is kept, and what a fault leaves behind."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+import shutil
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+import pytest
+
+import algid
+from algid.batches.discover import jobs_of
+from algid.batches.lock import locked
+from algid.batches.records import End
+from algid.batches.run import Batch, Ended, Recipe, Settling, sweep
+from algid.batches.workers import WorkerDiedError
+from algid.errors import OutputError
+from algid.identification.identify import identify
+from algid.notices import Notice
+from algid.results import Result
+from algid.settings import Settings
+from algid.stores import open_store
+from algid.synth.sensors import Sensors
+from algid.verdict import Verdict
+
+
+class Here(Executor):
+    """Runs a call where it is submitted; `before` may raise instead."""
+
+    def __init__(self, before: Callable[[str], None] = lambda _name: None) -> None:
+        self.before, self.ran = before, list[str]()
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        self.ran.append(args[0].job.name)
+        try:
+            self.before(args[0].job.name)
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("logs")
+    unloaded, loaded = algid.synthesise(
+        "case1", duration=2.0, excitation="wide", sensors=Sensors(1e-4, 1e-3)
+    )
+    for name in ("r1/a", "r1/b"):
+        (folder / name).parent.mkdir(exist_ok=True)
+        algid.write_log(folder / f"{name}-unloaded.parquet", unloaded)
+        algid.write_log(folder / f"{name}-loaded.parquet", loaded)
+    (folder / "bad.csv").write_text("not,a,log\n1,2,3\n")
+    return folder
+
+
+@pytest.fixture
+def logs(made: Path, tmp_path: Path) -> Path:
+    shutil.copytree(made, tmp_path / "logs")
+    return tmp_path / "logs"
+
+
+WEAK = Settings(estimator="weak", model="plain")
+RECIPE = Recipe("", WEAK, lambda _file: None, report=False)
+
+
+def _run(
+    logs: Path, executor: Executor | None = None, recipe: Recipe = RECIPE, **more: bool
+) -> Ended:
+    out = logs.parent / "out"
+    store = open_store(str(out))
+    batch = Batch(
+        store, replace(recipe, out=str(out)), executor or Here(), 1, lambda _progress: None
+    )
+    return batch.run(jobs_of([str(logs)], str(out)), **more)
+
+
+def _digest(out: Path) -> dict[str, str]:
+    """Hashes of all results; jobs.parquet without its durations."""
+    files = {
+        str(p.relative_to(out)): hashlib.sha256(p.read_bytes()).hexdigest()
+        for p in out.rglob("result.json")
+    }
+    return files | {"jobs": pl.read_parquet(out / "jobs.parquet").drop("seconds").write_json()}
+
+
+def test_a_bad_log_fails_alone_and_the_table_has_a_row_a_job(logs: Path) -> None:
+    ended = _run(logs)
+    assert [record.status for record in ended.records] == [End.FAILED, End.OK, End.OK]
+    table = pl.read_parquet(logs.parent / "out/jobs.parquet")
+    assert table["job"].to_list() == ["bad", "r1/a", "r1/b"]
+    assert table["robot"].to_list() == [None, "r1", "r1"]
+    result = algid.read_result(logs.parent / "out/r1/a.algid")
+    row = table.row(1, named=True)
+    assert row["k1"] == result.parameters["k1"].estimate
+    assert row["m_p_std"] == result.payload["m_p"].std
+    assert row["sha256"] == [log.sha256 for log in result.logs]
+    assert row["size"] == [Path(log.path).stat().st_size for log in result.logs]
+    assert row["changed"][0].timestamp() == pytest.approx(
+        Path(result.log.path).stat().st_mtime, abs=1e-5
+    )
+    assert "no column for t, theta1" in str(table["reason"][0])
+
+
+def test_the_table_names_the_estimator_whose_numbers_are_reported(
+    logs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def handed_back(*args: Any, **more: Any) -> Any:
+        return identify(*args, **more).model_copy(update={"estimator": "weak"})
+
+    monkeypatch.setattr("algid.batches.job.identify", handed_back)
+    _run(logs, recipe=replace(RECIPE, settings=Settings(estimator="refined", model="plain")))
+    table = pl.read_parquet(logs.parent / "out/jobs.parquet")
+    assert table["estimator"].to_list() == [None, "weak", "weak"]
+    assert '"estimator": "refined"' in table["settings"][1]
+
+
+def test_what_is_done_is_not_done_again(logs: Path) -> None:
+    _run(logs)
+    again = Here()
+    assert _run(logs, again).ran == 0
+    assert again.ran == []
+    assert _run(logs, again, retry_failed=True).ran == 1
+    assert again.ran == ["bad"]
+
+
+def test_changed_logs_settings_and_lost_results_run_again(logs: Path) -> None:
+    _run(logs)
+    executor = Here()
+    unloaded = logs / "r1/a-unloaded.parquet"
+    shutil.copy2(
+        unloaded, logs / "r1/b-unloaded.parquet"
+    )  # the same bytes with another time of change
+    _run(logs, executor)
+    assert executor.ran == []
+    shutil.rmtree(logs.parent / "out/r1/b.algid")
+    _run(logs, executor)
+    assert executor.ran == ["r1/b"]
+    _run(logs, executor, replace(RECIPE, settings=replace(WEAK, window=0.3)))
+    assert executor.ran == ["r1/b", "bad", "r1/a", "r1/b"]
+
+
+@pytest.mark.parametrize("set_back", [False, True])
+def test_a_changed_log_of_equal_size_runs_again(logs: Path, *, set_back: bool) -> None:
+    """Whatever its time of change is set to: the file system keeps one of its own."""
+    _run(logs)
+    log = logs / "bad.csv"
+    before = log.stat()
+    log.write_text("not,a,log\n1,2,4\n")
+    if set_back:
+        os.utime(log, ns=(before.st_atime_ns, before.st_mtime_ns))
+        assert log.stat().st_mtime_ns == before.st_mtime_ns
+    assert log.stat().st_size == before.st_size
+    executor = Here()
+    _run(logs, executor)
+    assert executor.ran == ["bad"]
+
+
+def test_a_log_of_other_rights_alone_does_not_run_again(logs: Path) -> None:
+    _run(logs)
+    (logs / "r1/a-unloaded.parquet").chmod(0o600)
+    executor = Here()
+    _run(logs, executor)
+    assert executor.ran == []
+
+
+def test_a_job_that_kills_three_workers_is_set_aside(logs: Path) -> None:
+    def die(name: str) -> None:
+        if name == "r1/a":
+            raise WorkerDiedError("the worker was ended by SIGKILL")
+
+    executor = Here(die)
+    ended = _run(logs, executor)
+    assert executor.ran.count("r1/a") == 3
+    assert [record.status for record in ended.records] == [End.FAILED, End.KILLED, End.OK]
+
+
+def test_an_interrupted_batch_ends_as_an_undisturbed_one(logs: Path) -> None:
+    _run(logs)
+    undisturbed = _digest(logs.parent / "out")
+    shutil.rmtree(logs.parent / "out")
+
+    def vanish(name: str) -> None:
+        if name == "r1/b":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        _run(logs, Here(vanish))
+    (logs.parent / "out/r1/.b.algid.algid-0123abcd").mkdir()
+    sweep(open_store(str(logs.parent / "out")))
+    _run(logs)
+    assert _digest(logs.parent / "out") == undisturbed
+    assert not list((logs.parent / "out").rglob(".b.algid*"))
+
+
+def test_a_full_disk_stops_the_batch_and_keeps_what_is_finished(
+    logs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+
+    def full(*args: Any, **more: Any) -> Any:
+        if more["name"] == "a":
+            raise OutputError("r1/a: cannot write") from OSError(
+                errno.ENOSPC, "No space left on device"
+            )
+        return identify(*args, **more)
+
+    monkeypatch.setattr("algid.batches.job.identify", full)
+    ended = _run(logs)
+    assert (ended.ran, ended.left) == (1, 2)
+    assert ended.stopped is not None
+    monkeypatch.undo()
+    assert _run(logs).ran == 2
+
+
+def test_a_stopped_batch_hands_out_no_more_jobs(logs: Path) -> None:
+    out = logs.parent / "out"
+    store = open_store(str(out))
+    batch = Batch(
+        store, replace(RECIPE, out=str(out)), Here(), 1, lambda _progress: batch.stop.set()
+    )
+    ended = batch.run(jobs_of([str(logs)], str(out)))
+    assert (ended.ran, ended.left) == (1, 2)
+
+
+def test_two_batches_on_one_folder(tmp_path: Path) -> None:
+    with (
+        locked(str(tmp_path)),
+        pytest.raises(OutputError, match="another batch is at work"),
+        locked(str(tmp_path)),
+    ):
+        pass
+    with locked(str(tmp_path)):
+        pass
+
+
+def test_a_growing_log_is_left_alone(tmp_path: Path) -> None:
+    log = tmp_path / "a.csv"
+    settling = Settling()
+    found = []
+    for text in ("1", "12", "12"):
+        log.write_text(text) if not log.exists() or log.read_text() != text else None
+        found.append(len(settling.settled(jobs_of([str(tmp_path)], "out"))))
+    assert found == [0, 0, 1]
+
+
+def test_a_result_that_must_not_be_used_is_a_failure_with_its_first_reason_and_stays_to_be_looked_at(
+    logs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    failed = Verdict(
+        "failed", "no sense; do not use these numbers", (Notice("X", "X: the torque is none"),)
+    )
+    with monkeypatch.context() as patch:
+        patch.setattr(Result, "verdict", property(lambda _result: failed))
+        ended = _run(logs)
+    good, bad = ended.records[1], ended.records[0]
+    assert (good.status, good.verdict) == (End.FAILED, "failed")
+    assert good.reason == "Failed: no sense; do not use these numbers. X: the torque is none"
+    assert bad.verdict is None
+    table = pl.read_parquet(logs.parent / "out/jobs.parquet")
+    assert table["status"].to_list() == ["failed"] * 3
+    assert table["verdict"].to_list() == [None, "failed", "failed"]
+    assert (logs.parent / "out/r1/a.algid/result.json").exists()
+    again = Here()
+    assert _run(logs, again).ran == 0
+    shutil.rmtree(logs.parent / "out/r1/a.algid")
+    _run(logs, again)
+    assert again.ran == ["r1/a"]
+    assert pl.read_parquet(logs.parent / "out/jobs.parquet")["verdict"].to_list()[1] in (
+        "good",
+        "reservations",
+    )

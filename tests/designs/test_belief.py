@@ -1,0 +1,160 @@
+"""Beliefs and the figure that a design makes small, by closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from algid.arm import FloatArray
+from algid.designs.belief import SURE, UNKNOWN, Asked, Belief, asked_for
+from algid.errors import SettingError
+from algid.estimators.parametrisation import Shared
+from algid.model import Model
+
+SIZES = np.array([0.1, 1.0, 20.0])
+ALL = np.ones(3, bool)
+
+
+def asked(size: FloatArray = SIZES, wanted: FloatArray | None = None) -> Asked:
+    return Asked(size, ALL, ALL if wanted is None else wanted.astype(bool))
+
+
+def test_the_covariance_is_the_inverse_of_the_information_held_at_unknown_sizes() -> None:
+    S = np.diag([4e4, 25.0, 0.0])
+    C = asked().covariance(S)
+    held = 1 / (UNKNOWN * SIZES) ** 2
+    np.testing.assert_allclose(np.diag(C), 1 / (np.diag(S) + held), rtol=1e-12)
+    np.testing.assert_allclose(asked().relative(S)[2], UNKNOWN, rtol=1e-12)  # nothing is told of it
+    assert asked().largest(S) == pytest.approx(UNKNOWN)
+    assert asked(wanted=np.array([1, 1, 0])).largest(S) == pytest.approx(
+        np.sqrt(1 / 25.0), rel=1e-6
+    )
+
+
+def test_relative_bounds_of_correlated_parameters_are_those_of_cramer_and_rao() -> None:
+    J = np.random.default_rng(1).standard_normal((40, 3)) * 100 / SIZES
+    S = J.T @ J
+    covariance = np.linalg.inv(S)  # of least squares with unit noise
+    np.testing.assert_allclose(asked().relative(S), np.sqrt(np.diag(covariance)) / SIZES, rtol=1e-3)
+    np.testing.assert_allclose(asked().covariance(S), asked().covariance(S).T, rtol=1e-10)
+    # D-optimality's volume and A-optimality's sum are those of the same matrix
+    assert np.linalg.slogdet(asked().covariance(S))[1] == pytest.approx(
+        -np.linalg.slogdet(S)[1], rel=1e-3
+    )
+    relative = np.sum(asked().relative(S) ** 2)
+    assert relative == pytest.approx(np.trace(covariance / np.outer(SIZES, SIZES)), rel=1e-3)
+
+
+@pytest.mark.parametrize("sharpness", [1.0, 3.0, 40.0])
+def test_the_figure_is_the_p_norm_of_squared_relative_bounds(sharpness: float) -> None:
+    S = np.diag([4e4, 25.0, 1.0])
+    v = 1 / (np.diag(S) * SIZES**2 + 1 / UNKNOWN**2)
+    figure, _ = asked().figure(S, sharpness)
+    assert figure == pytest.approx(0.5 * np.log(np.sum(v**sharpness) ** (1 / sharpness)), rel=1e-10)
+    largest = np.log(asked().largest(S))
+    assert largest <= figure <= largest + 0.5 * np.log(3) / sharpness + 1e-12
+    only = asked(wanted=np.array([0, 0, 1])).figure(S, sharpness)[0]
+    assert only == pytest.approx(0.5 * np.log(v[2]), rel=1e-10)
+
+
+def test_the_figures_derivative_is_that_of_differences() -> None:
+    rng = np.random.default_rng(2)
+    J = rng.standard_normal((20, 3)) * 10 / SIZES
+    S, asks = J.T @ J, asked(wanted=np.array([1, 0, 1]))
+    _, A = asks.figure(S, 4.0)
+    np.testing.assert_allclose(A, A.T, rtol=1e-9)
+    for _ in range(5):
+        D = rng.standard_normal((3, 3)) / np.outer(SIZES, SIZES)
+        D = D + D.T
+        step = 1e-4
+        slope = (asks.figure(S + step * D, 4.0)[0] - asks.figure(S - step * D, 4.0)[0]) / (2 * step)
+        assert np.trace(A @ D) == pytest.approx(slope, rel=1e-6, abs=1e-10)
+
+
+def test_twice_the_information_takes_half_a_logarithm_of_two_off() -> None:
+    S = np.diag([4e4, 25.0, 1.0])
+    once, twice = (asked().figure(factor * S, 5.0)[0] for factor in (1.0, 2.0))
+    assert once - twice == pytest.approx(0.5 * np.log(2), rel=1e-5)
+
+
+def belief(box: bool) -> Belief:
+    shared = Shared(Model(), payload=True, lengths={"l1": 0.4, "l2": 0.3})
+    mean = np.array([0.05, 1.0, 0.03, 4.0, 0.2, 0.3, 0.2, 0.5])
+    spread = np.zeros((8, 3))
+    spread[3, 0], spread[3, 1], spread[7, 2] = 0.3, 0.4, 0.1
+    return Belief(shared, mean, spread, box)
+
+
+@pytest.mark.parametrize("box", [True, False])
+def test_drawn_arms_scatter_as_believed(box: bool) -> None:
+    one = belief(box)
+    drawn = one.draws(4000, seed=3)
+    std = np.sqrt(
+        np.diag(one.spread @ one.spread.T) / (3 if box else 1)
+    )  # a uniform number has variance a third
+    np.testing.assert_allclose(one.std, std, rtol=1e-12)
+    np.testing.assert_allclose(drawn.mean(axis=0), one.mean, atol=5 * std.max() / np.sqrt(4000))
+    np.testing.assert_allclose(drawn.std(axis=0), std, atol=5 * std.max() / np.sqrt(8000))
+    if box:
+        assert np.all(np.abs(drawn - one.mean) <= np.abs(one.spread).sum(axis=1))
+    np.testing.assert_array_equal(one.draws(5, 3), one.draws(5, 3))
+    assert np.any(one.draws(5, 3) != one.draws(5, 4))
+
+
+def test_the_loads_coefficients_vary_with_the_payload() -> None:
+    one = belief(True)
+    bare, loaded = one.load(False), one.load(True)
+    np.testing.assert_array_equal(bare.c, one.mean[:7])
+    # Table 2 by hand: k1 + m l1 l2, k2 + m g l2, k3 + m l2², k4 + m g l1, k5 + m l1²
+    more = 0.5 * np.array([0.12, 9.81 * 0.3, 0.09, 9.81 * 0.4, 0.16, 0, 0])
+    np.testing.assert_allclose(loaded.c, one.mean[:7] + more, rtol=1e-12)
+    np.testing.assert_array_equal(bare.F[:, 2], 0.0)
+    np.testing.assert_allclose(loaded.F[:, 2], 0.1 * more / 0.5, rtol=1e-12)
+    assert (bare.loaded, loaded.loaded) == (False, True)
+
+
+@pytest.mark.parametrize("box", [True, False])
+def test_the_slope_of_the_largest_torque_is_that_of_differences(box: bool) -> None:
+    load, rng = belief(box).load(True), np.random.default_rng(4)
+    Y, D = rng.standard_normal((2, 2, 7, 6))
+    slope = load.largest(Y)[2]
+    h = 1e-6
+    more = (load.largest(Y + h * D)[1] - load.largest(Y - h * D)[1]) / (2 * h)
+    np.testing.assert_allclose(np.einsum("aqn,aqn->an", slope, D), more, rtol=1e-5, atol=1e-8)
+    torque, most, _ = load.largest(Y)
+    np.testing.assert_allclose(torque, np.einsum("aqn,q->an", Y, load.c), rtol=1e-12)
+    varied = np.einsum("aqn,qr->arn", Y, load.F)
+    norm = np.abs(varied).sum(axis=1) if box else SURE * np.linalg.norm(varied, axis=1)
+    np.testing.assert_allclose(most, norm, rtol=1e-4, atol=1e-4)
+
+
+def test_what_is_asked_for_is_what_the_prior_knows_or_what_is_named() -> None:
+    one = belief(True)
+    assert asked_for(one, None, "it").wanted.all()
+    named = asked_for(one, ["k4", "m_p"], "it")
+    np.testing.assert_array_equal(np.flatnonzero(named.wanted), [3, 7])
+    np.testing.assert_array_equal(named.size, np.abs(one.mean))
+    vague = Belief(one.shared, one.mean, 6 * one.spread, True)
+    found = asked_for(vague, None, "it")
+    np.testing.assert_array_equal(
+        np.flatnonzero(~found.known), [7]
+    )  # of k4, 4 ± 1.73, it is two deviations sure
+    np.testing.assert_array_equal(found.wanted, found.known)
+    assert found.size[3] == 4.0
+    with pytest.raises(SettingError) as refused:
+        asked_for(vague, ["k4", "m_p"], "it")
+    assert str(refused.value) == (
+        "--for m_p: it cannot tell it from zero (0.5 ± 0.35), so that no error is large or small beside it; "
+        "leave it out"
+    )
+    with pytest.raises(SettingError) as refused:
+        asked_for(one, ["l1"], "it")
+    assert str(refused.value) == (
+        "--for l1: expected some of k1, k2, k3, k4, k5, k6, k7, m_p, found 'l1' (there are no loaded runs); "
+        "leave it out"
+    )
+
+
+def test_six_arms_in_a_hundred_thousand_lie_beyond_what_is_sure() -> None:
+    assert 2 * norm.sf(SURE) == pytest.approx(6.3e-5, rel=0.01)

@@ -1,0 +1,342 @@
+"""A whole campaign, small: limits, files, rehearsal, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from typer.testing import CliRunner
+
+from algid.arm import FloatArray, inverse_dynamics
+from algid.designs.belief import asked_for
+from algid.designs.campaign import Campaign, Design, plan
+from algid.designs.information import Experiment, Information
+from algid.designs.limits import resting
+from algid.designs.optimise import kept
+from algid.designs.position import PositionProblem
+from algid.designs.prior import KnownBefore, prior_of
+from algid.designs.request import limits_of, request
+from algid.errors import AlgidError, SettingError
+from algid.estimators.whitening import NoiseLevels
+from algid.progress import Progress
+from algid.readers import read_log
+from tests.cli.commands import app
+
+NOISE = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
+FLAGS: dict[str, str | float | None] = {
+    "range": "1.2",
+    "speed": "3",
+    "torque": "1.9,0.95",
+    "acceleration": "40",
+    "tip_height": -0.27,
+}
+LIMITS = [
+    "--range",
+    "1.2",
+    "--speed",
+    "3",
+    "--torque",
+    "1.9,0.95",
+    "--acceleration",
+    "40",
+    "--tip-height",
+    "-0.27",
+]
+SENSORS = ["--position-noise", "1e-3", "--torque-noise", "1e-2"]
+DURATION = 2.0
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_start() -> Iterator[None]:
+    """A short search: what it finds is good enough to be judged here."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("algid.designs.optimise.STARTS", 1)
+        yield
+
+
+def campaign(names: list[str] | None = None) -> Campaign:
+    prior = prior_of("case1", None, KnownBefore())
+    return Campaign(
+        experiment=Experiment(prior.belief.shared, (1, 1), NOISE, 500.0),
+        belief=prior.belief,
+        limits=limits_of(request(None, FLAGS), prior.lengths),
+        asked=asked_for(prior.belief, names, "case1"),
+        duration=DURATION,
+    )
+
+
+@pytest.fixture(scope="module")
+def design() -> Design:
+    return plan(campaign())
+
+
+def test_no_limit_breaks_for_any_arm_that_is_believed_possible(design: Design) -> None:
+    limits, motion, belief = design.campaign.limits, design.motion, design.campaign.belief
+    assert np.all(motion.theta >= limits.low[:, None])
+    assert np.all(motion.theta <= limits.high[:, None])
+    assert np.all(np.abs(motion.omega) <= limits.speed[:, None])
+    assert np.all(np.abs(motion.alpha) <= limits.acceleration[:, None])
+    heights = 0.1626 * np.sin(motion.theta[0]) + 0.1232 * np.sin(motion.theta.sum(axis=0))
+    assert heights.min() >= -0.27
+    for arm in belief.draws(100, seed=123):
+        for loaded in (False, True):
+            k = belief.shared.coefficients(arm, loaded)
+            torque = inverse_dynamics(k, motion.theta, motion.omega, motion.alpha)
+            assert np.all(np.abs(torque) <= limits.torque[:, None])
+
+
+def test_limits_are_used_up_to_the_margin(design: Design) -> None:
+    assert max(used for _, used in design.binding) == pytest.approx(
+        1 - design.campaign.margin, rel=1e-3
+    )
+
+
+def test_the_motion_is_at_rest_at_both_ends_and_as_long_as_asked(design: Design) -> None:
+    assert design.t[-1] == DURATION
+    np.testing.assert_allclose(design.motion.omega[:, [0, -1]], 0, atol=1e-9)
+    np.testing.assert_allclose(design.motion.alpha[:, [0, -1]], 0, atol=1e-9)
+
+
+def random_bounds(count: int) -> FloatArray:
+    asked = campaign()
+    kept_limits = asked.limits.within(asked.margin)
+    loads = [asked.belief.load(loaded) for loaded in (False, True)]
+    rest = resting(kept_limits, asked.belief.shared.model, loads)
+    problem = PositionProblem(
+        asked.experiment, asked.belief, kept_limits, asked.asked, DURATION, rest
+    )
+    rng = np.random.default_rng(5)
+    bounds = []
+    for _ in range(count):
+        x = kept(problem, problem.random(rng), 100.0, 0.999)
+        slopes = problem.slopes(x, 100.0)
+        bounds.append(
+            asked.asked.largest(Information(asked.experiment, asked.belief.mean, slopes).S)
+        )
+    return np.array(bounds)
+
+
+def test_error_bars_are_less_than_half_those_of_random_motions(design: Design) -> None:
+    assert design.largest <= 0.5 * np.median(random_bounds(15))
+
+
+def test_what_is_asked_for_is_what_becomes_certain(design: Design) -> None:
+    payload = plan(campaign(["m_p"]))
+    place = design.names.index("m_p")
+    assert payload.relative[place] < 0.9 * design.relative[place]
+    assert payload.largest == payload.relative[place]
+
+
+def test_shares_of_the_seconds_add_up(design: Design) -> None:
+    np.testing.assert_allclose(design.shares.sum(axis=1), 1.0, rtol=1e-6)
+
+
+def test_a_search_that_is_broken_off_keeps_the_best_so_far() -> None:
+    calls = 0
+
+    def impatient(_stage: str, _done: int, _total: int) -> None:
+        nonlocal calls
+        calls += 1
+        if calls == 20:
+            raise KeyboardInterrupt
+
+    progress: Progress = impatient
+    found = plan(campaign(), progress)
+    assert found.interrupted
+    assert np.isfinite(found.largest)
+    assert max(used for _, used in found.binding) <= 1.0
+    assert found.largest < 0.5 * np.median(random_bounds(5))
+
+
+def run(*arguments: str) -> tuple[int, str]:
+    done = CliRunner().invoke(app, ["design", *arguments])
+    if isinstance(done.exception, AlgidError):  # the entry point prints it and exits with 2
+        return 2, str(done.exception)
+    return done.exit_code, done.output
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("designs")
+    code, text = run(
+        "case1",
+        *LIMITS,
+        *SENSORS,
+        "--duration",
+        "2",
+        "--rate",
+        "500",
+        "--joints",
+        "a,b",
+        "-o",
+        str(out),
+    )
+    assert code == 0, text
+    return out / "case1.design"
+
+
+def test_the_folder_holds_the_trajectory_in_every_form(folder: Path) -> None:
+    table = pl.read_csv(folder / "trajectory.csv")
+    assert table.equals(pl.read_parquet(folder / "trajectory.parquet"))
+    assert table.height == 1001
+    for name in ("trajectory.csv", "trajectory.mcap"):
+        log = read_log(folder / name)
+        np.testing.assert_allclose(log.theta[0], table["theta1"], atol=1e-12)
+        np.testing.assert_allclose(log.tau[1], table["tau2"], atol=1e-12)
+        assert log.omega is not None
+    motion = [
+        table.select(f"{name}1", f"{name}2").to_numpy().T for name in ("theta", "omega", "alpha")
+    ]
+    k = prior_of("case1", None, KnownBefore()).belief.load(True).c
+    loaded = table.select("loaded_tau1", "loaded_tau2").to_numpy().T
+    np.testing.assert_allclose(inverse_dynamics(k, *motion), loaded, atol=1e-9)
+
+
+def test_the_joint_trajectory_is_what_a_controller_takes(folder: Path) -> None:
+    from ruamel.yaml import YAML
+
+    message = YAML(typ="safe").load((folder / "joint_trajectory.yaml").read_text(encoding="utf-8"))
+    assert message["joint_names"] == ["a", "b"]
+    table = pl.read_csv(folder / "trajectory.csv")
+    times = [
+        p["time_from_start"]["sec"] + 1e-9 * p["time_from_start"]["nanosec"]
+        for p in message["points"]
+    ]
+    assert np.all(np.diff(times) > 0)
+    assert times[-1] == 2.0
+    rows = np.round(np.array(times) * 500).astype(int)
+    for field, name in (
+        ("positions", "theta"),
+        ("velocities", "omega"),
+        ("accelerations", "alpha"),
+    ):
+        values = np.array([point[field] for point in message["points"]])
+        np.testing.assert_allclose(
+            values, table[rows].select(f"{name}1", f"{name}2").to_numpy(), atol=1e-8
+        )
+
+
+def test_the_report_states_every_parameter_and_runs_its_own_scripts_only(folder: Path) -> None:
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    content = json.loads((folder / "design.json").read_text(encoding="utf-8"))
+    assert all(f">{name}</th>" in text for name in content["parameters"])
+    assert '<svg viewBox="' in text
+    policy = text.split('http-equiv="Content-Security-Policy" content="')[1].split('"')[0]
+    assert policy.count("'sha256-") == 3
+    assert content["largest_relative_bound"] == max(
+        row["relative"] for row in content["parameters"].values()
+    )
+
+
+def test_the_campaign_can_be_rehearsed(folder: Path, tmp_path: Path) -> None:
+    arguments = [
+        "synth",
+        "case1",
+        "--motion",
+        str(folder),
+        "--rate",
+        "500",
+        "-o",
+        str(tmp_path),
+        *SENSORS,
+    ]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 0, done.output
+    plan_of = pl.read_csv(folder / "trajectory.csv")
+    for role in ("unloaded", "loaded"):
+        log = read_log(tmp_path / f"case1-{role}.mcap")
+        assert len(log) == 1001
+        # the true arm is the believed one: what is left is the sensors' noise
+        error = log.theta[0] - plan_of["theta1"].to_numpy()
+        assert np.sqrt(np.mean(error**2)) == pytest.approx(1e-3, rel=0.1)
+
+
+def test_an_open_loop_is_written_as_a_log_whose_torque_synth_replays(tmp_path: Path) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("algid.designs.torque.GENERATIONS", 3)
+        patch.setattr("algid.designs.torque.POPULATION", 8)
+        limits = ["--range", "1.5", "--speed", "9", "--torque", "1.9,0"]  # joint 2 has no drive
+        code, text = run(
+            "case1", *limits, *SENSORS, "--drive", "torque", "--duration", "2", "-o", str(tmp_path)
+        )
+    assert code in (0, 3), text
+    assert "velocity of joint 2 at the end" in text
+    folder = tmp_path / "case1.design"
+    assert not (folder / "joint_trajectory.yaml").exists()
+    log = read_log(folder / "trajectory.csv")
+    assert not log.tau[1].any()
+    assert np.abs(log.tau[0]).max() > 0
+
+
+REFUSED = [
+    (["case1", *SENSORS, "--speed", "3", "--torque", "2"], "--range: it must be given"),
+    (["case1", *LIMITS], "--position-noise: case1 does not tell"),
+    (["case1", *SENSORS, *LIMITS, "--range", "x"], "--range: expected rad like 1.2"),
+    (["case1", *SENSORS, *LIMITS, "--range", "1:-1,0:1"], "LOW below HIGH for joint 1"),
+    (["case1", *SENSORS, *LIMITS, "--speed=-3"], "--speed: expected rad/s"),
+    (
+        ["case1", *SENSORS, *LIMITS, "--range=-0.2:0.2,-0.1:0.1", "--torque", "0.2,0.2"],
+        "--torque: the loaded arm asks for",
+    ),
+    (
+        ["case1", *SENSORS, *LIMITS, "--tip-height", "0.1"],
+        "--tip-height: within the range the tip rises no higher",
+    ),
+    (
+        ["case1", *SENSORS, *LIMITS, "--tip-height", "5"],
+        "--tip-height: expected less than the arm's reach",
+    ),
+    (["case1", *SENSORS, *LIMITS, "--for", "k9"], "--for k9: expected some of k1"),
+    (["case1", *SENSORS, *LIMITS, "--runs", "1,0", "--for", "m_p"], "there are no loaded runs"),
+    (["case1", *SENSORS, *LIMITS, "--runs", "0,0"], "--runs: expected numbers of runs"),
+    (["case1", *SENSORS, *LIMITS, "--joints", "one"], "--joints: expected two names"),
+    (["nocase", *SENSORS, *LIMITS], "no such case"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "words"), REFUSED, ids=[words for _, words in REFUSED])
+def test_what_makes_no_sense_is_refused_in_one_line(
+    arguments: list[str], words: str, tmp_path: Path
+) -> None:
+    code, text = run(*arguments, "-o", str(tmp_path))
+    assert code == 2
+    assert words in text
+    assert "\n" not in text
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_limits_of_a_file_are_beaten_by_flags(tmp_path: Path) -> None:
+    file = tmp_path / "limits.toml"
+    file.write_text(
+        "range = [[-2.5, -0.5], [-1, 1]]\nspeed = 2\ntorque = [3, inf]\nruns = [2, 1]\n",
+        encoding="utf-8",
+    )
+    asked = request(file, {"speed": "4,5", "torque": None})
+    limits = limits_of(asked, np.array([0.2, 0.2]))
+    np.testing.assert_array_equal(limits.low, [-2.5, -1])
+    np.testing.assert_array_equal(limits.speed, [4, 5])
+    np.testing.assert_array_equal(limits.torque, [3, np.inf])
+    assert asked.get("runs", None) == (2, 1)
+    file.write_text("pace = 2\n", encoding="utf-8")
+    with pytest.raises(SettingError, match=r"limits\.toml: pace"):
+        request(file, {})
+
+
+def test_an_arm_of_lengths_and_masses_has_uniform_links(tmp_path: Path) -> None:
+    file = tmp_path / "arm.toml"
+    file.write_text("[arm]\nm1 = 2.0\nm2 = 1.0\nl1 = 0.4\nl2 = 0.3\n", encoding="utf-8")
+    belief = prior_of(str(file), None, KnownBefore()).belief
+    value = dict(zip(belief.shared.names, belief.mean, strict=True))
+    assert value["k3"] == pytest.approx(1.0 * 0.3**2 / 3)  # a rod about its end
+    assert value["k5"] == pytest.approx(2.0 * 0.4**2 / 3 + 1.0 * 0.4**2)
+    assert "m_p" not in value
+    asked = asked_for(belief, None, "arm")
+    assert not asked.wanted[
+        belief.shared.names.index("k6")
+    ]  # no friction is known, so none is asked for
+    with pytest.raises(SettingError, match="cannot tell it from zero"):
+        asked_for(belief, ["k6"], "arm")

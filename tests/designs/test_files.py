@@ -1,0 +1,223 @@
+"""What a design's files hold, of a design made up for it."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from ruamel.yaml import YAML
+
+from algid import __version__
+from algid.arm import FloatArray
+from algid.designs.belief import Asked, Belief
+from algid.designs.campaign import Campaign, Design
+from algid.designs.information import Experiment
+from algid.designs.limits import Limits, Row, Usage
+from algid.designs.write import Provenance, design_json, joint_trajectory, trajectory
+from algid.estimators.parametrisation import Shared
+from algid.estimators.whitening import NoiseLevels
+from algid.model import Model, Motion
+from algid.notices import Notice
+
+RATE, COUNT = 120.0, 61
+T = np.arange(COUNT) / RATE
+MEAN = np.array([0.05, 1.0, 0.03, 4.0, 0.2, 0.3, 0.0])
+
+
+def moved(shift: float) -> Motion:
+    wave = np.stack([np.sin(3 * T + shift), np.cos(2 * T + shift)])
+    return Motion(wave, wave + 1, wave + 2)
+
+
+def made_up(*, loaded: tuple[bool, ...] = (False, True), drive: str = "position") -> Design:
+    shared = Shared(Model())
+    asked = Asked(np.maximum(MEAN, 0.1), MEAN > 0, np.array([True] * 6 + [False]))
+    limits = Limits(
+        low=np.array([-np.inf, -1.0]),
+        high=np.array([np.inf, 3.0]),
+        speed=np.array([2.0, np.inf]),
+        acceleration=np.full(2, np.inf),
+        torque=np.array([5.0, 2.5]),
+        height=-np.inf,
+        lengths=np.array([0.4, 0.3]),
+    )
+    noise = NoiseLevels(np.array([1e-3, 2e-3]), np.array([1e-2, 3e-2]))
+    campaign = Campaign(
+        experiment=Experiment(shared, (2, 1), noise, RATE),
+        belief=Belief(shared, MEAN, np.diag(0.1 * np.maximum(MEAN, 0.1)), box=False),
+        limits=limits,
+        asked=asked,
+        duration=0.5,
+        drive="torque" if drive == "torque" else "position",
+        margin=0.1,
+        seed=3,
+    )
+    motions = {one: moved(0.5 * one * (drive == "torque")) for one in loaded}
+    if drive == "position":
+        motions = dict.fromkeys(loaded, motions[loaded[0]])
+    torque: dict[bool, FloatArray] = {one: np.stack([T + one, T - one]) for one in loaded}
+    rows = (Row("range", 1, False), Row("speed", 0), Row("torque", 0, False, loaded=True))
+    return Design(
+        campaign=campaign,
+        t=T,
+        motions=motions,
+        torque=torque,
+        std=0.02 * np.maximum(MEAN, 0.1) * np.array([1, 2, 3, 40, 5, 6, 7]),
+        worst=0.1 * np.ones(7),
+        shares=np.tile([0.25, 0.123456], (7, 1)),
+        usage=Usage(rows, np.array([[0.1, 0.5], [0.2, 0.9], [-0.4, 0.7]])),
+        interrupted=True,
+    )
+
+
+BASE = ["t", "theta1", "theta2", "omega1", "omega2", "alpha1", "alpha2", "tau1", "tau2"]
+
+
+@pytest.mark.parametrize(
+    ("loaded", "drive", "more"),
+    [
+        ((False,), "position", []),
+        ((True,), "position", []),
+        ((False, True), "position", ["loaded_tau1", "loaded_tau2"]),
+        ((False, True), "torque", ["loaded_theta1", "loaded_theta2", "loaded_tau1", "loaded_tau2"]),
+    ],
+)
+def test_a_trajectory_has_the_columns_that_its_runs_need(
+    loaded: tuple[bool, ...], drive: str, more: list[str]
+) -> None:
+    one = made_up(loaded=loaded, drive=drive)
+    columns = trajectory(one)
+    assert list(columns) == BASE + more
+    np.testing.assert_array_equal(columns["t"], T)
+    np.testing.assert_array_equal(columns["omega2"], one.motions[loaded[0]].omega[1])
+    np.testing.assert_array_equal(columns["alpha1"], one.motions[loaded[0]].alpha[0])
+    np.testing.assert_array_equal(columns["tau1"], one.torque[loaded[0]][0])
+    if more:
+        np.testing.assert_array_equal(columns["loaded_tau2"], one.torque[True][1])
+    if "loaded_theta1" in more:
+        np.testing.assert_array_equal(columns["loaded_theta1"], one.motions[True].theta[0])
+
+
+def test_points_of_the_joint_trajectory_come_fifty_times_a_second_and_at_the_end() -> None:
+    text = joint_trajectory(made_up(), ("schulter", 'a "b"'))
+    message = YAML(typ="safe").load(text)
+    assert message["joint_names"] == ["schulter", 'a "b"']
+    assert message["header"] == {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
+    places = [*range(0, 60, 2), 60]  # 120 Hz over 50: every other sample
+    assert len(message["points"]) == len(places)
+    for point, place in zip(message["points"], places, strict=True):
+        told = point["time_from_start"]
+        assert (told["sec"], told["nanosec"]) == divmod(round(place / 120 * 1e9), 10**9)
+        for name, values in (
+            ("positions", "theta"),
+            ("velocities", "omega"),
+            ("accelerations", "alpha"),
+        ):
+            expected = getattr(made_up().motion, values)[:, place]
+            np.testing.assert_allclose(point[name], expected, atol=0.5001e-9)
+
+
+def test_a_zero_of_a_joint_trajectory_has_no_sign_and_few_samples_are_all_taken() -> None:
+    one = made_up()
+    still = Motion(*(np.full((2, 3), -1e-12) for _ in range(3)))
+    slow = replace(one.campaign, experiment=replace(one.campaign.experiment, rate=2.0))
+    text = joint_trajectory(
+        replace(one, t=np.array([0.0, 0.5, 1.0]), motions={False: still}, campaign=slow), ("a", "b")
+    )
+    assert text.count("positions: [0.0, 0.0]") == 3
+    assert "-0.0" not in text
+    assert re.findall(r"time_from_start: (\{.*\})", text)[-1] == "{sec: 1, nanosec: 0}"
+
+
+def test_the_json_holds_what_decides_and_what_is_predicted() -> None:
+    one = made_up()
+    origin = Provenance(
+        "arm.algid", "algid design arm.algid", ("a", "b"), (Notice("DOUBT", "something"),)
+    )
+    text = design_json(one, origin)
+    assert text.endswith("}\n")
+    content = json.loads(text)
+    assert content["version"] == __version__
+    assert (content["prior"], content["command"]) == ("arm.algid", "algid design arm.algid")
+    assert (content["drive"], content["duration"], content["rate"], content["seed"]) == (
+        "position",
+        0.5,
+        RATE,
+        3,
+    )
+    assert content["runs"] == {"unloaded": 2, "loaded": 1}
+    assert content["interrupted"] is True
+    assert content["noise"] == {"theta1": 1e-3, "theta2": 2e-3, "tau1": 1e-2, "tau2": 3e-2}
+    assert content["gravity"] == 9.81
+    assert content["limits"] == {
+        "range": [[None, -1.0], [None, 3.0]],
+        "speed": [2.0, None],
+        "acceleration": [None, None],
+        "torque": [5.0, 2.5],
+        "tip_height": None,
+        "margin": 0.1,
+    }
+    assert [
+        (row["limit"], row["joint"], row["loaded"], row["share"]) for row in content["used"]
+    ] == [
+        ("speed", 1, None, 0.9),
+        ("torque", 1, True, 0.7),
+        ("range", 2, None, 0.5),
+    ]
+    # a share of the distance from the middle, 1, to the lower end, -1; of the speed; of the
+    # torque, the other way
+    expected = [(2.0, 1.8), (-5.0, -3.5), (-1.0, 0.0)]
+    np.testing.assert_allclose([(row["allowed"], row["most"]) for row in content["used"]], expected)
+    assert content["start"] == one.motion.theta[:, 0].tolist()
+    assert content["joints"] == ["a", "b"]
+    assert content["verdict"]["grade"] == "reservations"
+    assert "something" in [reason["text"] for reason in content["verdict"]["reasons"]]
+    k4, k7 = content["parameters"]["k4"], content["parameters"]["k7"]
+    assert (k4["believed"], k4["unit"], k4["asked"]) == (4.0, "N m", True)
+    np.testing.assert_allclose(
+        [k4["believed_std"], k4["std"], k4["relative"], k4["worst_std"]], [0.4, 3.2, 0.8, 0.1]
+    )
+    assert k4["information_by_second"] == [0.25, 0.1235]
+    assert (k7["relative"], k7["asked"]) == (None, False)  # what is zero has no relative error
+    assert content["largest_relative_bound"] == pytest.approx(0.8)
+
+
+def test_a_design_names_what_stays_open_and_what_binds_first() -> None:
+    one = made_up()
+    assert one.open_parameters == ["k4"]  # 80 % of itself
+    assert replace(one, std=0.499 * one.campaign.asked.size).open_parameters == []
+    assert len(replace(one, std=0.501 * one.campaign.asked.size).open_parameters) == 6
+    assert one.largest == pytest.approx(0.8)
+    assert [(row.limit, used) for row, used in one.binding] == [
+        ("speed", 0.9),
+        ("torque", 0.7),
+        ("range", 0.5),
+    ]
+    assert one.names == ("k1", "k2", "k3", "k4", "k5", "k6", "k7")
+    assert made_up(loaded=(True,)).motion is not None
+
+
+def test_a_height_stands_in_the_json_where_there_is_one() -> None:
+    one = made_up()
+    limited = replace(one.campaign, limits=replace(one.campaign.limits, height=-0.3))
+    usage = Usage((Row("tip-height", None, upper=False),), np.array([[0.25]]))
+    content = json.loads(
+        design_json(replace(one, campaign=limited, usage=usage), Provenance("a", "b"))
+    )
+    assert content["limits"]["tip_height"] == -0.3
+    (used,) = content["used"]
+    assert (used["limit"], used["joint"], used["allowed"]) == ("tip-height", None, -0.3)
+    assert used["most"] == pytest.approx(
+        0.7 - 0.25 * 1.0
+    )  # a quarter of the metre below the stretched arm's tip
+
+
+def test_points_are_a_fiftieth_of_a_second_apart_whatever_the_rate() -> None:
+    one = made_up()
+    fast = replace(one.campaign, experiment=replace(one.campaign.experiment, rate=600.0))
+    text = joint_trajectory(replace(one, campaign=fast, t=np.arange(COUNT) / 600), ("a", "b"))
+    stamps = [int(nanosec) for nanosec in re.findall(r"time_from_start: .*nanosec: (\d+)", text)]
+    assert stamps == [20_000_000 * place for place in range(6)]

@@ -1,0 +1,194 @@
+"""Fisher's information by hand: torques written out, derivatives by differences, covariances as whole matrices."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from algid.arm import FloatArray
+from algid.designs.information import Experiment, Information, Slopes, informations
+from algid.designs.position import Fourier, middles
+from algid.estimators.parametrisation import Shared
+from algid.estimators.whitening import NoiseLevels
+from algid.model import Model, Motion
+from algid.signals.differences import POINTS, Stencil
+
+RATE = 40.0
+FAMILY = Fourier(1.5)
+SHARED = Shared(Model(("coulomb",), coulomb_speed=0.5), payload=True, lengths={"l1": 0.4})
+BETA = np.array(
+    [0.05, 1.0, 0.03, 4.0, 0.2, 0.3, 0.2, 0.25, 0.15, 0.5, 0.3]
+)  # k1 … k7, f1, f2, m_p, l2
+
+
+def motion(seed: int = 1) -> Motion:
+    x = 0.5 * FAMILY.random(np.random.default_rng(seed), np.array([-0.8, 0.4]))
+    return FAMILY.motion(x, FAMILY.basis(middles(FAMILY.duration, RATE)))
+
+
+def torque_by_hand(
+    beta: FloatArray, q: FloatArray, v: FloatArray, a: FloatArray, loaded: bool
+) -> FloatArray:
+    """The torque of two links with Coulomb friction and a point mass at the tip, from Lagrange's equations."""
+    k1, k2, k3, k4, k5, k6, k7, f1, f2, m, l2 = beta
+    g, l1, m = 9.81, 0.4, m * loaded
+    inner, outer, mixed = k5 + m * l1**2, k3 + m * l2**2, k1 + m * l1 * l2
+    both = q[0] + q[1]
+    weight2 = (k2 + m * g * l2) * np.cos(both)
+    spin = v[0] + v[1]
+    # d/dt of the momenta of the angle in space (joint 2) and of joint 1, less the kinetic energy's
+    # slope
+    second = (
+        outer * (a[0] + a[1]) + mixed * (np.cos(q[1]) * a[0] + np.sin(q[1]) * v[0] ** 2) + weight2
+    )
+    turned = mixed * (np.cos(q[1]) * (a[0] + a[1]) - np.sin(q[1]) * spin**2)
+    first = inner * a[0] + turned + (k4 + m * g * l1) * np.cos(q[0])
+    friction = np.stack(
+        [k6 * v[0] + f1 * np.tanh(v[0] / 0.5), k7 * v[1] + f2 * np.tanh(v[1] / 0.5)]
+    )
+    return np.stack([first + second, second]) + friction
+
+
+def slopes_by(function: object, beta: FloatArray, step: float = 1e-6) -> FloatArray:
+    """Central differences (2 N, Q) by each parameter."""
+    columns = []
+    for place in range(beta.size):
+        moved = step * np.eye(beta.size)[place] * max(1.0, abs(beta[place]))
+        ahead, behind = (function(beta + sign * moved).ravel() for sign in (1, -1))  # type: ignore[operator]
+        columns.append((ahead - behind) / (2 * moved[place]))
+    return np.stack(columns, axis=1)
+
+
+def by_hand(noise: NoiseLevels, runs: tuple[int, int], one: Motion, rate: float) -> FloatArray:
+    """Σ Jᵀ V⁻¹ J of all runs, V = Σ_τ + G Σ_θ Gᵀ as a whole matrix."""
+    n, weights = one.theta.shape[1], Stencil(1 / RATE).weights
+    total = np.zeros((BETA.size, BETA.size))
+    for loaded in (False, True):
+        J = slopes_by(
+            lambda b, loaded=loaded: torque_by_hand(b, one.theta, one.omega, one.alpha, loaded),
+            BETA,
+        )
+        G = np.zeros((2 * n, 2 * (n + POINTS - 1)))
+        signals = [one.theta, one.omega, one.alpha]
+        for order in range(3):
+            for joint in range(2):
+                pair = []
+                for step in (1e-6, -1e-6):
+                    moved = [signal.copy() for signal in signals]
+                    moved[order][joint] += step
+                    pair.append(torque_by_hand(BETA, moved[0], moved[1], moved[2], loaded))
+                slope = (pair[0] - pair[1]) / 2e-6
+                for sample in range(n):
+                    for row in range(2):
+                        place = joint * (n + POINTS - 1) + sample
+                        G[row * n + sample, place : place + POINTS] += (
+                            slope[row, sample] * weights[order]
+                        )
+        V = (
+            np.diag(np.repeat(noise.tau**2, n))
+            + (G * np.repeat(noise.theta**2, n + POINTS - 1)) @ G.T
+        )
+        total += runs[loaded] * (rate / RATE) * J.T @ np.linalg.solve(V, J)
+    return total
+
+
+@pytest.mark.parametrize("runs", [(1, 1), (3, 1), (0, 2)])
+@pytest.mark.parametrize("sigma", [1e-12, 1e-3])
+def test_information_is_that_of_the_whole_covariance(sigma: float, runs: tuple[int, int]) -> None:
+    noise = NoiseLevels(np.array([sigma, 2 * sigma]), np.array([0.02, 0.05]))
+    one = motion()
+    experiment = Experiment(SHARED, runs, noise, 1000.0)
+    assert experiment.kinds == tuple(loaded for loaded in (False, True) if runs[loaded])
+    S = Information(experiment, BETA, Slopes(SHARED.model, one, RATE)).S
+    expected = by_hand(noise, runs, one, 1000.0)
+    scale = np.sqrt(np.diag(expected))
+    np.testing.assert_allclose(
+        S / np.outer(scale, scale), expected / np.outer(scale, scale), rtol=0, atol=1e-6
+    )
+    np.testing.assert_allclose(S, S.T, rtol=1e-9, atol=1e-9 * np.abs(S).max())
+
+
+def test_without_noise_of_the_angles_each_sample_adds_its_own() -> None:
+    noise = NoiseLevels(np.full(2, 1e-12), np.array([0.02, 0.05]))
+    one = motion()
+    J = slopes_by(
+        lambda b: torque_by_hand(b, one.theta, one.omega, one.alpha, False), BETA
+    ).reshape(2, -1, BETA.size)
+    information = Information(
+        Experiment(SHARED, (2, 0), noise, RATE), BETA, Slopes(SHARED.model, one, RATE)
+    )
+    parts = information.parts(25)
+    assert parts.shape[0] == 3  # 60 samples: two of 25 and one of 10
+    for place, part in enumerate(parts):
+        own = J[:, 25 * place : 25 * (place + 1)] / noise.tau[:, None, None]
+        expected = 2 * np.einsum("anq,anr->qr", own, own)
+        np.testing.assert_allclose(part, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+    np.testing.assert_allclose(
+        parts.sum(axis=0), information.S, rtol=0, atol=1e-9 * np.abs(information.S).max()
+    )
+
+
+def test_noise_takes_information_away_and_none_adds_any() -> None:
+    one = motion()
+    found = []
+    for sigma in (1e-5, 1e-3, 1e-2):
+        noise = NoiseLevels(np.full(2, sigma), np.full(2, 0.02))
+        found.append(
+            Information(
+                Experiment(SHARED, (1, 1), noise, RATE), BETA, Slopes(SHARED.model, one, RATE)
+            ).S
+        )
+    scale = np.sqrt(np.diag(found[0]))
+    for more, less in pairwise(found):
+        lost = np.linalg.eigvalsh((more - less) / np.outer(scale, scale))
+        assert lost.min() > -1e-9 * lost.max()  # the difference is positive semidefinite
+        assert lost.max() > 0.1
+
+
+def test_kinds_that_move_differently_each_tell_their_own() -> None:
+    noise = NoiseLevels(np.full(2, 1e-3), np.full(2, 0.02))
+    experiment = Experiment(SHARED, (2, 3), noise, RATE)
+    both = {False: motion(1), True: motion(2)}
+    bare, loaded = informations(experiment, both, BETA, 1, RATE)
+    for found, runs, one in ((bare, (2, 0), both[False]), (loaded, (0, 3), both[True])):
+        expected = by_hand(noise, runs, one, RATE)
+        np.testing.assert_allclose(found.S, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+    # every other sample weighs twice as much
+    thin = informations(experiment, {True: motion(2)}, BETA, 2, RATE)[0]
+    kept = Motion(
+        *(signal[:, ::2] for signal in (both[True].theta, both[True].omega, both[True].alpha))
+    )
+    whole = Information(
+        Experiment(SHARED, (0, 3), noise, RATE), BETA, Slopes(SHARED.model, kept, RATE / 2)
+    )
+    np.testing.assert_array_equal(thin.S, whole.S)
+    quiet = NoiseLevels(np.full(2, 1e-12), np.full(2, 0.02))
+    alone = Experiment(SHARED, (0, 1), quiet, RATE)
+    once, half = (
+        Information(alone, BETA, Slopes(SHARED.model, kept, rate)).S for rate in (RATE, RATE / 2)
+    )
+    np.testing.assert_allclose(half, 2 * once, rtol=1e-9, atol=1e-12 * half.max())
+
+
+def test_slopes_by_the_motion_are_those_of_the_torque_by_hand() -> None:
+    one = motion()
+    slopes = Slopes(SHARED.model, one, RATE)
+    c = BETA[:9]
+    signals = np.concatenate([one.theta, one.omega, one.alpha])
+    for component in range(6):
+        pair = []
+        for step in (1e-5, -1e-5):
+            moved = signals.copy()
+            moved[component] += step
+            pair.append(torque_by_hand(BETA, moved[:2], moved[2:4], moved[4:], False))
+        expected = (pair[0] - pair[1]) / 2e-5
+        found = np.einsum("aqn,q->an", slopes.dY[component], c)
+        np.testing.assert_allclose(found, expected, atol=1e-7 * np.abs(expected).max() + 1e-9)
+    # second derivatives are symmetric: ∂²τ/∂θ1∂ω2 by either road
+    second = slopes.dP(c)
+    for first in range(6):
+        for other in range(6):
+            one_way = second[first, other // 2, :, other % 2]
+            np.testing.assert_allclose(one_way, second[other, first // 2, :, first % 2], atol=1e-6)

@@ -1,0 +1,196 @@
+"""Limits by hand: what a motion uses of each, and the posture it rests in."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from algid.arm import FloatArray
+from algid.designs.belief import SURE, Load
+from algid.designs.information import Slopes
+from algid.designs.limits import HANGING, Limits, Row, resting, usage
+from algid.errors import SettingError
+from algid.model import Model, Motion
+
+FREE = Limits(
+    low=np.full(2, -np.inf),
+    high=np.full(2, np.inf),
+    speed=np.full(2, np.inf),
+    acceleration=np.full(2, np.inf),
+    torque=np.full(2, np.inf),
+    height=-np.inf,
+    lengths=np.array([0.4, 0.3]),
+)
+TIGHT = replace(
+    FREE,
+    low=np.array([-2.0, -1.0]),
+    high=np.array([0.0, 3.0]),
+    speed=np.array([2.0, 4.0]),
+    acceleration=np.array([10.0, 20.0]),
+    torque=np.array([5.0, 2.5]),
+    height=-0.3,
+)
+K = np.array([0.05, 1.0, 0.03, 4.0, 0.2, 0.3, 0.2])
+
+
+def at(
+    theta: tuple[float, float],
+    omega: tuple[float, float] = (0, 0),
+    alpha: tuple[float, float] = (0, 0),
+) -> Slopes:
+    return Slopes(
+        Model(),
+        Motion(*(np.array(pair, dtype=float)[:, None] for pair in (theta, omega, alpha))),
+        1.0,
+    )
+
+
+def load(spread: FloatArray, *, box: bool, loaded: bool = False) -> Load:
+    return Load(loaded, K, spread, box)
+
+
+def test_limits_that_are_not_there_have_no_rows() -> None:
+    only_speed = replace(FREE, speed=np.array([np.inf, 2.0]))
+    used = usage(only_speed, at((1, 2), (7, -3)), [load(np.zeros((7, 1)), box=True)])
+    assert used.rows == (Row("speed", 1, True), Row("speed", 1, False))
+    np.testing.assert_allclose(used.most, [-1.5, 1.5])
+
+
+def test_usages_by_hand() -> None:
+    used = usage(TIGHT, at((-0.5, 2.0), (1.0, -3.0), (-5.0, 4.0)), (), derivatives=False)
+    found = {
+        (row.limit, row.joint, row.upper): float(most)
+        for row, most in zip(used.rows, used.most, strict=True)
+    }
+    height = 0.4 * np.sin(-0.5) + 0.3 * np.sin(1.5)
+    expected = {
+        ("range", 0): 0.5,  # half way from the middle, -1, to the upper end, 0
+        ("range", 1): 0.5,  # from 1 to 3
+        ("speed", 0): 0.5,
+        ("speed", 1): -0.75,
+        ("acceleration", 0): -0.5,
+        ("acceleration", 1): 0.2,
+    }
+    for (limit, joint), share in expected.items():
+        assert found.pop((limit, joint, True)) == pytest.approx(share, rel=1e-12)
+        assert found.pop((limit, joint, False)) == pytest.approx(-share, rel=1e-12)
+    assert found == {
+        ("tip-height", None, False): pytest.approx((0.7 - height) / (0.7 + 0.3), rel=1e-12)
+    }
+    assert used.by_motion is None
+    assert TIGHT.height_of(np.array([-0.5, 2.0])) == pytest.approx(height)
+
+
+@pytest.mark.parametrize("box", [True, False])
+def test_the_torque_is_that_of_the_worst_arm_on_either_side(box: bool) -> None:
+    spread = np.zeros((7, 2))
+    spread[3, 0], spread[5, 1] = 0.4, 0.1  # k4 and k6, each by its own
+    slopes = at((0.0, 0.0), (2.0, 0.0), (0.0, 0.0))
+    used = usage(TIGHT, slopes, [load(spread, box=box, loaded=True)], derivatives=False)
+    torque = {
+        (row.joint, row.upper): float(most)
+        for row, most in zip(used.rows, used.most, strict=True)
+        if row.loaded
+    }
+    mean = 4.0 + 1.0 + 0.3 * 2.0  # k4 + k2 + k6 ω
+    more = 0.4 + 0.1 * 2.0 if box else SURE * np.hypot(0.4, 0.1 * 2.0)
+    # corners are rounded by a millionth of the largest torque, of as many arms
+    assert torque[0, True] == pytest.approx((mean + more) / 5.0, abs=1e-4)
+    assert torque[0, False] == pytest.approx((-mean + more) / 5.0, abs=1e-4)
+    assert torque[1, True] == pytest.approx(
+        1.0 / 2.5, abs=1e-4
+    )  # k2, and Coriolis without sin θ2 is nothing
+
+
+def test_a_margin_is_taken_off_each_side() -> None:
+    kept = TIGHT.within(0.1)
+    np.testing.assert_allclose([kept.low, kept.high], [[-1.9, -0.8], [-0.1, 2.8]])
+    np.testing.assert_allclose([kept.speed, kept.torque], [[1.8, 3.6], [4.5, 2.25]])
+    np.testing.assert_allclose(kept.acceleration, [9.0, 18.0])
+    assert kept.height == pytest.approx(-0.2)  # a tenth of the metre between it and the reach
+    np.testing.assert_array_equal(kept.lengths, TIGHT.lengths)
+    free = FREE.within(0.1)
+    np.testing.assert_array_equal([free.low, free.high], [[-np.inf] * 2, [np.inf] * 2])
+    assert free.height == -np.inf
+    # what uses all of the kept limits uses 0.9 of the whole ones
+    state = at((-0.1, 2.8), (1.8, 3.6), (9.0, 18.0))
+    whole, less = (usage(one, state, (), derivatives=False) for one in (TIGHT, kept))
+    upper = [row.upper and row.limit != "tip-height" for row in whole.rows]
+    np.testing.assert_allclose(whole.most[upper], 0.9)
+    np.testing.assert_allclose(less.most[upper], 1.0)
+
+
+def test_the_middle_of_the_range_is_where_a_motion_rests_if_it_is_easy() -> None:
+    strong = replace(TIGHT, torque=np.array([50.0, 25.0]), height=-np.inf)
+    np.testing.assert_allclose(
+        resting(strong, Model(), [load(np.zeros((7, 1)), box=True)]), [-1.0, 1.0]
+    )
+    np.testing.assert_allclose(resting(replace(FREE, speed=np.ones(2)), Model(), []), HANGING)
+
+
+def test_a_weak_arm_rests_where_it_needs_least() -> None:
+    loads = [load(0.05 * np.diag(K), box=True)]
+    weak = replace(TIGHT, torque=np.array([3.0, 2.5]), height=-np.inf)
+    rest = resting(weak, Model(), loads)
+    grid = np.stack(
+        np.meshgrid(np.linspace(-2, 0, 41), np.linspace(-1, 3, 41), indexing="ij")
+    ).reshape(2, -1)
+    weight2 = 1.05 * np.abs(np.cos(grid.sum(axis=0))) * K[1]
+    mean1 = K[3] * np.cos(grid[0]) + K[1] * np.cos(grid.sum(axis=0))
+    weight1 = np.abs(mean1) + 0.05 * (
+        K[3] * np.abs(np.cos(grid[0])) + K[1] * np.abs(np.cos(grid.sum(axis=0)))
+    )
+    worst = np.max(
+        [weight1 / 3.0, weight2 / 2.5, np.abs(grid[0] + 1), np.abs(grid[1] - 1) / 2], axis=0
+    )
+    np.testing.assert_allclose(rest, grid[:, np.argmin(worst)])
+    assert worst.min() < 1 < worst[grid.shape[1] // 2] / 0.7  # the middle would not have done
+
+
+def test_what_no_posture_keeps_is_named_with_what_it_misses() -> None:
+    high = replace(
+        TIGHT,
+        height=0.5,
+        torque=np.full(2, np.inf),
+        low=np.array([-2.0, -0.1]),
+        high=np.array([-0.5, 0.1]),
+    )
+    with pytest.raises(SettingError) as refused:
+        resting(high, Model(), [])
+    best = 0.4 * np.sin(-0.5) + 0.3 * np.sin(-0.4)
+    assert str(refused.value) == (
+        f"--tip-height: within the range the tip rises no higher than {best:.3g} m, the limit asks for 0.5 m "
+        "(margin included); lower it, or widen --range"
+    )
+    flat = replace(TIGHT, height=-np.inf, low=np.array([-0.1, -0.1]), high=np.array([0.1, 0.1]))
+    for loaded, words in ((False, ""), (True, "loaded ")):
+        with pytest.raises(SettingError) as refused:
+            resting(
+                replace(flat, torque=np.array([3.0, 9.0])),
+                Model(),
+                [load(np.zeros((7, 1)), box=True, loaded=loaded)],
+            )
+        least = 4 * np.cos(0.1) + np.cos(0.2)
+        assert str(refused.value) == (
+            f"--torque: the {words}arm asks for {least:.3g} N m at joint 1 even at rest, the limit is 3 N m "
+            "(margin included); raise it, or move --range to where gravity pulls less"
+        )
+    with pytest.raises(
+        SettingError,
+        match=r"^--torque: the arm asks for 0\.98 N m at joint 2 even at rest, .* 0\.5 N m",
+    ):
+        resting(
+            replace(flat, torque=np.array([9.0, 0.5])), Model(), [load(np.zeros((7, 1)), box=True)]
+        )
+
+
+@pytest.mark.parametrize(("limit", "central"), [(5.0 / 0.69, True), (5.0 / 0.71, False)])
+def test_the_middle_will_do_up_to_seven_tenths_of_a_limit(limit: float, central: bool) -> None:
+    """Outstretched, the middle of this range, the arm asks for k4 + k2 = 5 N m."""
+    around = replace(
+        FREE, low=np.full(2, -1.0), high=np.full(2, 1.0), torque=np.array([limit, np.inf])
+    )
+    rest = resting(around, Model(), [load(np.zeros((7, 1)), box=True)])
+    assert (np.abs(rest).max() < 1e-12) == central

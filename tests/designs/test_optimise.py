@@ -1,0 +1,181 @@
+"""The search on problems whose optimum is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.special import logsumexp
+
+from algid.arm import FloatArray
+from algid.designs import optimise as module
+from algid.designs.optimise import (
+    FIRST,
+    KEPT,
+    LATER,
+    STARTS,
+    Evaluation,
+    Stage,
+    kept,
+    optimise,
+    soft_maximum,
+)
+
+
+class Ball:
+    """The point of the box |x| ≤ 1 nearest to `target`: the target with its coordinates clipped."""
+
+    def __init__(self, target: FloatArray) -> None:
+        self.target = target
+        self.rest = np.zeros(target.size)
+        self.calls = 0
+
+    def random(self, rng: np.random.Generator) -> FloatArray:
+        return 3 * rng.standard_normal(self.target.size)
+
+    def evaluate(self, x: FloatArray, stage: Stage) -> Evaluation:  # noqa: ARG002 - the search passes it
+        self.calls += 1
+        eye = np.eye(x.size)
+        return Evaluation(
+            self.score(x),
+            2 * (x - self.target),
+            np.concatenate([1 - x, 1 + x]),
+            np.vstack([-eye, eye]),
+        )
+
+    def excess(self, x: FloatArray, rate: float) -> float:  # noqa: ARG002 - the search passes it
+        return float(np.abs(x).max())
+
+    def score(self, x: FloatArray) -> float:
+        return float(np.sum((x - self.target) ** 2))
+
+
+TARGET = np.array([2.0, -0.3, 0.5, -4.0])
+
+
+def test_the_search_finds_the_nearest_point_within_limits() -> None:
+    calls: list[tuple[str, int, int]] = []
+    found = optimise(Ball(TARGET), 100.0, 0, lambda *call: calls.append(call))
+    np.testing.assert_allclose(found.x, np.clip(TARGET, -1, 1), atol=1e-5)
+    assert np.abs(found.x).max() <= 1.0
+    assert found.score == Ball(TARGET).score(found.x)
+    assert not found.interrupted
+    total = STARTS * FIRST.iterations + KEPT * sum(stage.iterations for stage in LATER)
+    assert {stage for stage, _, _ in calls} == {"searching"}
+    assert {of for _, _, of in calls} == {total}
+    done = [count for _, count, _ in calls]
+    assert done == sorted(done)
+    assert done[-1] <= total
+
+
+def test_one_evaluation_serves_the_figure_and_its_gradient() -> None:
+    problem = Ball(TARGET)
+    asked: list[int] = []
+    optimise(problem, 100.0, 0, lambda *_: asked.append(problem.calls))
+    stages = STARTS + KEPT * len(LATER)
+    # at most a line search of two points a step: without the memory it would be four times as many
+    assert problem.calls <= 3 * len(asked) + 2 * stages
+
+
+@pytest.mark.parametrize("after", [0, 3])
+def test_a_search_that_is_broken_off_gives_the_best_so_far(after: int) -> None:
+    problem = Ball(TARGET)
+    count = 0
+
+    def impatient(*_: object) -> None:
+        nonlocal count
+        count += 1
+        if count > after:
+            raise KeyboardInterrupt
+
+    found = optimise(problem, 100.0, 0, impatient)
+    assert found.interrupted
+    assert np.abs(found.x).max() <= 1.0
+    assert found.score == problem.score(found.x)
+
+
+def test_a_search_that_is_broken_off_before_it_began_has_nothing_to_give() -> None:
+    class Stopped(Ball):
+        def evaluate(self, _x: FloatArray, _stage: Stage) -> Evaluation:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        optimise(Stopped(TARGET), 100.0, 0)
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        lambda e: Evaluation(np.nan, e.gradient, e.room, e.room_gradient),
+        lambda e: Evaluation(e.figure, e.gradient, np.full_like(e.room, np.inf), e.room_gradient),
+        None,
+    ],
+)
+def test_a_step_of_which_nothing_can_be_said_is_shortened(
+    broken: Callable[[Evaluation], Evaluation] | None,
+) -> None:
+    class Walled(Ball):
+        def evaluate(self, x: FloatArray, stage: Stage) -> Evaluation:
+            found = super().evaluate(x, stage)
+            if np.abs(x).max() <= 1.5:
+                return found
+            if broken is None:
+                raise np.linalg.LinAlgError("not positive definite")
+            return broken(found)
+
+    found = optimise(Walled(TARGET), 100.0, 0)
+    np.testing.assert_allclose(found.x, np.clip(TARGET, -1, 1), atol=1e-4)
+
+
+def test_a_motion_is_drawn_back_to_exactly_what_it_may_use() -> None:
+    problem = Ball(TARGET)
+    x = np.array([4.0, 1.0, 0.0, -2.0])
+    np.testing.assert_allclose(kept(problem, x, 100.0), x / 4, rtol=1e-6)
+    assert problem.excess(kept(problem, x, 100.0), 100.0) <= 1.0
+    np.testing.assert_array_equal(kept(problem, x / 10, 100.0), x / 10)  # within already
+    np.testing.assert_allclose(
+        kept(problem, x / 10, 100.0, 0.9), 0.9 * x / 4, rtol=1e-6
+    )  # enlarged to that
+    np.testing.assert_array_equal(
+        kept(problem, np.zeros(4), 100.0, 0.9), 0.0
+    )  # what cannot be enlarged stays
+
+
+def test_a_motion_is_drawn_back_towards_rest_not_towards_zero() -> None:
+    problem = Ball(TARGET)
+    problem.rest = np.array([0.5, 0.0, 0.0, 0.0])
+    found = kept(problem, np.array([2.5, 1.0, 0.0, 0.0]), 100.0)
+    np.testing.assert_allclose(found, [1.0, 0.25, 0.0, 0.0], rtol=1e-6)
+
+
+@pytest.mark.parametrize("hardness", [1.0, 50.0, 600.0])
+def test_the_soft_maximum_is_the_logarithm_of_a_sum_and_never_below_the_largest(
+    hardness: float,
+) -> None:
+    u = np.random.default_rng(0).normal(0, 2, (3, 40))
+    most, share = soft_maximum(u, hardness)
+    np.testing.assert_allclose(most, logsumexp(hardness * u, axis=1) / hardness, rtol=1e-12)
+    assert np.all(most >= u.max(axis=1))
+    assert np.all(most <= u.max(axis=1) + np.log(40) / hardness + 1e-12)
+    np.testing.assert_allclose(share.sum(axis=1), 1.0)
+    h = 1e-6
+    for place in (0, int(np.argmax(u[0]))):
+        step = np.zeros_like(u)
+        step[0, place] = h
+        slope = (soft_maximum(u + step, hardness)[0] - soft_maximum(u - step, hardness)[0]) / (
+            2 * h
+        )
+        np.testing.assert_allclose(slope, [share[0, place], 0, 0], rtol=1e-4, atol=1e-8)
+
+
+def test_an_end_that_is_no_number_leaves_the_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Ended:
+        x = np.full(4, np.nan)
+
+    monkeypatch.setattr("scipy.optimize.minimize", lambda *_args, **_options: Ended())
+    found = module.optimise(Ball(TARGET), 100.0, 0)
+    assert np.all(np.isfinite(found.x))
+    assert np.abs(found.x).max() == pytest.approx(
+        0.9, rel=1e-5
+    )  # a random start, halfway from 0.8 to 1

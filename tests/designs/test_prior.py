@@ -1,0 +1,103 @@
+"""Priors out of results: error bars, what is missing, and what contradicts itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import algid
+from algid.designs.belief import SURE, asked_for
+from algid.designs.prior import KnownBefore, prior_of
+from algid.errors import ResultError, SettingError
+from algid.results import Result, Status, write_result
+from algid.settings import Settings
+from algid.synth.sensors import Sensors
+
+
+@pytest.fixture(scope="module")
+def result() -> Result:
+    logs = algid.synthesise(
+        "case1", duration=2.0, rate=500.0, excitation="wide", sensors=Sensors(1e-3, 1e-2)
+    )
+    return algid.identify(*logs)
+
+
+def saved(result: Result, folder: Path, **changes: object) -> str:
+    path = folder / "result.json"
+    write_result(result.model_copy(update=changes), path)
+    return str(path)
+
+
+def test_a_result_is_believed_as_far_as_its_error_bars_go(result: Result, tmp_path: Path) -> None:
+    prior = prior_of(saved(result, tmp_path), None, KnownBefore())
+    assert prior.belief.shared.payload
+    assert prior.noise is not None
+    assert result.fit is not None
+    for name, std in zip(prior.belief.shared.names, prior.belief.std, strict=True):
+        assert std == pytest.approx(result.estimates[name].std, rel=1e-6)
+    # the largest torque told is that of arms SURE standard deviations away, in the direction that
+    # matters
+    load = prior.belief.load(False)
+    Y = np.zeros((2, load.c.size, 1))
+    Y[0, prior.belief.shared.names.index("k4")] = 1.0
+    _, more, _ = load.largest(Y)
+    assert more[0, 0] == pytest.approx(
+        SURE * prior.belief.std[prior.belief.shared.names.index("k4")], rel=1e-4
+    )
+
+
+def test_a_result_without_error_bars_needs_to_be_told_how_wrong_it_is(
+    result: Result, tmp_path: Path
+) -> None:
+    file = saved(result, tmp_path, fit=None)
+    with pytest.raises(ResultError, match=r"no error bars; .*--prior-error"):
+        prior_of(file, None, KnownBefore())
+    belief = prior_of(file, None, KnownBefore(error=0.2)).belief
+    np.testing.assert_allclose(SURE * belief.std, 0.2 * np.abs(belief.mean), rtol=1e-6)
+
+
+def test_what_a_result_leaves_open_is_named(result: Result, tmp_path: Path) -> None:
+    k7 = result.parameters["k7"].model_copy(update={"status": Status.NOT_IDENTIFIABLE, "std": None})
+    file = saved(result, tmp_path, parameters={**result.parameters, "k7": k7})
+    with pytest.raises(ResultError, match="leaves k7 without error bars"):
+        prior_of(file, None, KnownBefore())
+
+
+def test_a_length_far_from_the_results_is_a_warning(result: Result, tmp_path: Path) -> None:
+    file = saved(result, tmp_path)
+    (doubt,) = prior_of(file, None, KnownBefore(l2=0.2)).doubts
+    assert doubt.code == "LENGTH_CONTRADICTED"
+    assert (doubt.numbers["name"], doubt.numbers["given"]) == ("l2", 0.2)
+    assert prior_of(file, None, KnownBefore(l2=result.payload["l2"].estimate)).doubts == ()
+
+
+def test_an_impossible_arm_is_refused(result: Result, tmp_path: Path) -> None:
+    k1 = result.parameters["k1"].model_copy(update={"estimate": 0.1})
+    with pytest.raises(SettingError, match="not positive definite"):
+        prior_of(
+            saved(result, tmp_path, parameters={**result.parameters, "k1": k1}), None, KnownBefore()
+        )
+
+
+def test_friction_of_a_real_arm_is_planned_for_and_what_cannot_be_is_said(tmp_path: Path) -> None:
+    logs = algid.synthesise(
+        "case1", duration=2.0, rate=500.0, excitation="wide", sensors=Sensors(1e-3, 1e-2)
+    )
+    settings = Settings(model="coulomb,offset")
+    belief = prior_of(saved(algid.identify(*logs, settings), tmp_path), None, KnownBefore()).belief
+    assert {"f1", "f2", "o1", "o2"} <= set(belief.shared.names)
+    asked = asked_for(belief, None, "it")
+    places = [belief.shared.names.index(name) for name in ("o1", "o2")]
+    assert not asked.wanted[
+        places
+    ].all()  # the arm has no offsets: no error is large or small beside them
+
+
+def test_loaded_runs_need_a_payload(tmp_path: Path) -> None:
+    file = tmp_path / "arm.toml"
+    file.write_text("[arm]\nm1 = 2.0\nm2 = 1.0\nl1 = 0.4\nl2 = 0.3\n", encoding="utf-8")
+    with pytest.raises(SettingError, match="give --payload KG, or --runs 1,0"):
+        prior_of(str(file), True, KnownBefore())
+    assert prior_of(str(file), True, KnownBefore(payload=0.5)).belief.shared.payload

@@ -1,0 +1,169 @@
+"""Limits out of flags and files: every form that is taken, and the exact line that refuses what is not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from algid.designs.request import limits_of, request
+from algid.errors import SettingError
+
+LENGTHS = np.array([0.4, 0.3])
+LIMITS = "--limits; inf is no limit at all"
+GIVEN: dict[str, str | float | None] = {"range": "1.2", "speed": "3", "torque": "5"}
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "expected"),
+    [
+        ("speed", "3", 3.0),
+        ("speed", "3,4.5", (3.0, 4.5)),
+        ("speed", "inf,2", (np.inf, 2.0)),
+        ("acceleration", "1e1", 10.0),
+        ("torque", "0", 0.0),
+        ("torque", "5,0", (5.0, 0.0)),
+        ("range", " 1.2 , 1 ", (1.2, 1.0)),
+        ("range", "-2.7:-0.4,-1.2:1.2", ((-2.7, -0.4), (-1.2, 1.2))),
+        ("runs", "2,0", (2, 0)),
+        ("runs", "0,1.0", (0, 1)),
+    ],
+)
+def test_flags_are_numbers_pairs_or_spans(name: str, text: str, expected: Any) -> None:
+    found = request(None, {name: text}).content[name]
+    assert found == expected
+    assert type(found) is type(expected)
+
+
+LIKE = {
+    "range": "rad like 1.2 (to both sides of hanging), 1.2,1.0, or -2.7:-0.4,-1.2:1.2",
+    "speed": "rad/s like 3 or 3,4",
+    "acceleration": "rad/s² like 30 or 30,60",
+    "torque": "N m like 5 or 5,2; 0 is a joint without a drive",
+    "runs": "numbers of runs without and with the payload like 2,1",
+}
+WRONG = {
+    "range": [
+        "",
+        "x",
+        "0",
+        "-1",
+        "nan",
+        "1,2,3",
+        "1:2",
+        "1:2,3",
+        "1,2:3",
+        "1:2:3,1:2:3",
+        "nan:1,0:1",
+        "1,",
+    ],
+    "speed": ["0", "-3", "3,-3", "3,0", "1:2,3:4", "nan,1", "fast"],
+    "acceleration": ["0", "1,2,3", "-0.0"],
+    "torque": ["-1", "1,-1", "0:1,0:1", "nan"],
+    "runs": ["1", "1,1,1", "0,0", "1.5,1", "-1,1", "1:2,1:2", "inf,1", "nan,1"],
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "text"), [(name, text) for name, texts in WRONG.items() for text in texts]
+)
+def test_flags_that_mean_nothing_are_refused(name: str, text: str) -> None:
+    with pytest.raises(SettingError) as refused:
+        request(None, {name: text})
+    assert str(refused.value) == f"--{name}: expected {LIKE[name]}, found {text!r}"
+
+
+def test_numbers_pass_and_none_leaves_the_file_alone(tmp_path: Path) -> None:
+    file = tmp_path / "limits.toml"
+    file.write_text("tip_height = -0.1\nspeed = [1, 2]\nrate = 250\n", encoding="utf-8")
+    asked = request(file, {"tip_height": -0.3, "speed": None, "duration": 4.0})
+    assert asked.source == str(file)
+    assert asked.get("tip_height", 0.0) == -0.3
+    assert asked.get("speed", None) == (1.0, 2.0)
+    assert (asked.get("rate", 1.0), asked.get("duration", 1.0), asked.get("torque", 7)) == (
+        250.0,
+        4.0,
+        7,
+    )
+    assert request(None, {}).source == "the flags"
+
+
+@pytest.mark.parametrize(
+    ("line", "place"),
+    [
+        ("speed = 0", "speed"),
+        ("speed = [1, 2, 3]", "speed"),
+        ("torque = -1", "torque"),
+        ("runs = [1.5, 1]", "runs"),
+        ("runs = [-1, 1]", "runs"),
+        ("rate = inf", "rate"),
+        ("duration = 0", "duration"),
+        ("range = 'wide'", "range"),
+        ("pace = 1", "pace"),
+    ],
+)
+def test_a_line_of_a_file_that_means_nothing_is_named(
+    line: str, place: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "limits.toml"
+    file.write_text(f"{line}\n", encoding="utf-8")
+    with pytest.raises(SettingError) as refused:
+        request(file, {})
+    assert str(refused.value).startswith(f"{file}: {place}")
+    assert "\n" not in str(refused.value)
+
+
+def test_limits_are_a_pair_of_joints_and_infinite_where_none_is_told() -> None:
+    limits = limits_of(request(None, {**GIVEN, "torque": "5,0", "range": "1.2,0.7"}), LENGTHS)
+    np.testing.assert_allclose(limits.low, [-np.pi / 2 - 1.2, -0.7])
+    np.testing.assert_allclose(limits.high, [-np.pi / 2 + 1.2, 0.7])
+    np.testing.assert_array_equal(limits.speed, [3, 3])
+    np.testing.assert_array_equal(limits.torque, [5, 0])
+    np.testing.assert_array_equal(limits.acceleration, [np.inf, np.inf])
+    assert limits.height == -np.inf
+    np.testing.assert_array_equal(limits.lengths, LENGTHS)
+    whole = limits_of(request(None, {**GIVEN, "range": "inf", "tip_height": 0.1}), LENGTHS)
+    np.testing.assert_array_equal([whole.low, whole.high], [[-np.inf] * 2, [np.inf] * 2])
+    np.testing.assert_array_equal(whole.middle, [-np.pi / 2, 0])
+    assert whole.height == 0.1
+
+
+@pytest.mark.parametrize(
+    ("flags", "lengths", "message"),
+    [
+        *(
+            ({name: None}, LENGTHS, f"--{name}: it must be given, or `{name} = …` in the file of {LIMITS}")
+            for name in ("range", "speed", "torque")
+        ),
+        ({"range": "1:-1,0:1"}, LENGTHS, "--range: expected LOW:HIGH with LOW below HIGH for joint 1, found 1:-1"),
+        ({"range": "0:1,2:2"}, LENGTHS, "--range: expected LOW:HIGH with LOW below HIGH for joint 2, found 2:2"),
+        (
+            {"range": "-inf:1,-1:1"},
+            LENGTHS,
+            "--range: expected both ends of joint 1 or neither, found -inf:1; give a wide one in place of inf",
+        ),
+        (
+            {"range": "inf", "speed": "inf", "torque": "inf"},
+            LENGTHS,
+            "--range: without any limit no motion is the best, found inf for all; give one",
+        ),
+        ({"tip_height": 0.7}, LENGTHS, "--tip-height: expected less than the arm's reach, 0.7 m, found 0.7 m"),
+        (
+            {"tip_height": -0.1},
+            np.array([0.4, np.nan]),
+            "--tip-height: the link lengths are not known; give --l1 and --l2",
+        ),
+    ],
+)  # fmt: skip
+def test_limits_that_make_no_sense_are_refused(
+    flags: dict[str, Any], lengths: Any, message: str
+) -> None:
+    with pytest.raises(SettingError) as refused:
+        limits_of(request(None, {**GIVEN, **flags}), lengths)
+    assert str(refused.value) == message
+
+
+def test_lengths_that_nobody_needs_may_be_unknown() -> None:
+    assert limits_of(request(None, GIVEN), np.full(2, np.nan)).height == -np.inf

@@ -1,0 +1,309 @@
+"""What is chosen where the constants leave masses free, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from algid.arm import Arm
+from algid.errors import AlgidError, ResultError, SettingError
+from algid.exports.description import coefficients_of, describe
+from algid.exports.formats import FORMATS, exported
+from algid.exports.links import Knowns, Link, links_of
+from algid.model import Model
+from algid.results import Result, result_json
+from tests.cli.commands import app
+from tests.exports.arms import ODD, UNIFORM, result_of, values_of
+
+POSITIVE = st.floats(0.05, 20)
+
+
+def constants_of(links: tuple[Link, Link], rotor: float, arm: Arm) -> list[float]:
+    """k1 … k7 of two links, by Table 1."""
+    (first, second), inertia = links, links[0].inertia + rotor
+    made = Arm(
+        first.mass,
+        second.mass,
+        first.centre,
+        second.centre,
+        first.length,
+        second.length,
+        inertia,
+        second.inertia,
+        arm.b1,
+        arm.b2,
+        arm.g,
+    )
+    return list(made.constants())
+
+
+@pytest.mark.parametrize("l2", [None, 0.3])
+def test_uniform_links_are_found_from_their_constants(l2: float | None) -> None:
+    value = values_of(UNIFORM)
+    first, second = links_of(value, 9.81, 9.81 * value["k1"] / value["k2"], Knowns(l2=l2), "arm")
+    found = (
+        first.mass,
+        first.centre,
+        first.inertia,
+        second.length,
+        second.mass,
+        second.centre,
+        second.inertia,
+    )
+    expected = (
+        UNIFORM.m1,
+        UNIFORM.lc1,
+        UNIFORM.I1,
+        UNIFORM.l2,
+        UNIFORM.m2,
+        UNIFORM.lc2,
+        UNIFORM.I2,
+    )
+    np.testing.assert_allclose(
+        found, expected, rtol=1e-5
+    )  # a minimum is found to the root of rounding
+
+
+@given(
+    POSITIVE,
+    POSITIVE,
+    st.floats(-1, 2),
+    st.floats(-1, 2),
+    POSITIVE,
+    POSITIVE,
+    POSITIVE,
+    st.booleans(),
+)
+def test_every_possible_arm_gets_possible_links(
+    m1: float, m2: float, lc1: float, lc2: float, l1: float, I1: float, I2: float, long: bool
+) -> None:
+    assume(abs(lc2) > 0.01)
+    arm = Arm(m1, m2, lc1, lc2, l1, 0.5, I1, I2, 0.1, 0.1)
+    links = links_of(values_of(arm), 9.81, l1, Knowns(l2=0.5 if long else None), "arm")
+    for link in links:
+        along, across, other = link.tensor
+        assert min(link.mass, link.length, along) > 0
+        assert across <= along + other
+        assert along <= across + other
+    k = arm.constants()
+    np.testing.assert_allclose(constants_of(links, 0, arm), k, rtol=0, atol=1e-9 * np.abs(k).max())
+
+
+@pytest.mark.parametrize("name", ["m1", "m2"])
+def test_what_is_given_stands_and_the_rest_still_moves_as_identified(name: str) -> None:
+    given_mass = {"m1": 1.7, "m2": 0.75}[name]
+    links = links_of(values_of(ODD), 9.81, ODD.l1, Knowns(**{name: given_mass}, rotor1=0.01), "arm")
+    assert {"m1": links[0], "m2": links[1]}[name].mass == given_mass
+    np.testing.assert_allclose(constants_of(links, 0.01, ODD), ODD.constants(), rtol=1e-12)
+    (first, second), true = (
+        links_of(values_of(ODD), 9.81, ODD.l1, Knowns(m1=2.0, m2=0.7), "arm"),
+        ODD,
+    )
+    np.testing.assert_allclose(
+        (first.centre, second.centre, first.inertia, second.inertia),
+        (true.lc1, true.lc2, true.I1, true.I2),
+    )
+
+
+def test_nearest_is_nearest() -> None:
+    """The masses chosen have less divergence, by its definition from the matrices, than all others on a grid."""
+
+    def divergence(link: Link) -> float:
+        m, length = link.mass, link.length
+        s, h = m * link.centre, link.inertia + m * link.centre**2
+        P = np.array([[h, s], [s, m]])
+        masses = np.geomspace(m / 30, 30 * m, 20001)
+        U = np.array([[length**2 / 3, length / 2], [length / 2, 1]])
+        ratio = np.linalg.solve(U, P)
+        every = np.trace(ratio) / masses - np.log(np.linalg.det(ratio) / masses**2) - 2
+        return float(every.min())
+
+    k = values_of(ODD)
+    chosen = sum(map(divergence, links_of(k, 9.81, ODD.l1, Knowns(l2=0.3), "arm")))
+    others = []
+    for m2 in np.linspace(0.4, 0.9, 26):
+        for m1 in np.linspace(0.8, 4, 33):
+            try:
+                pair = links_of(k, 9.81, ODD.l1, Knowns(l2=0.3, m1=m1, m2=m2), "arm")
+            except SettingError:
+                continue
+            others.append(sum(map(divergence, pair)))
+    assert len(others) > 100
+    assert chosen <= min(others) + 1e-6
+
+
+def test_a_given_length_moves_the_constants_as_their_covariance_says() -> None:
+    result = result_of(values_of(ODD), std=1e-2)
+    l1 = 0.405
+    found = coefficients_of(result, "arm", l1)
+    c = np.array([ODD.constants()[0], ODD.constants()[1]])
+    assert found.value["k1"] * 9.81 / found.value["k2"] == pytest.approx(l1, rel=1e-12)
+    weights = 1 / (1e-2 * c)
+    line = np.array([l1 / 9.81, 1.0]) * weights  # k1 = l1 k2 / g, weighted least squares along it
+    k2 = line @ (c * weights) / (line @ line)
+    assert found.value["k2"] == pytest.approx(k2, rel=1e-12)
+    assert found.std["k1"] == pytest.approx(found.std["k2"] * l1 / 9.81, rel=1e-9)
+    assert found.std["k2"] == pytest.approx(1 / math.sqrt(line @ line), rel=1e-9)
+    assert found.value["k3"] == ODD.constants()[2]
+
+
+def test_without_error_bars_both_constants_give_way() -> None:
+    result = result_of(values_of(ODD)).model_copy(update={"fit": None, "estimator": "weak"})
+    found = coefficients_of(result, "arm", 0.44)
+    assert found.value["k1"] * 9.81 / found.value["k2"] == pytest.approx(0.44, rel=1e-12)
+    moved = found.value["k1"] / ODD.constants()[0] - 1, found.value["k2"] / ODD.constants()[1] - 1
+    assert moved[0] == pytest.approx(-moved[1] * ODD.l1 / 0.44 * 1.1, rel=0.11)
+    assert moved[0] > 0 > moved[1]
+
+
+def test_the_file_says_what_is_identified_given_and_chosen() -> None:
+    result = result_of(values_of(ODD), payload={"m_p": 0.5, "l1": 0.4, "l2": 0.3})
+    numbers = {
+        number.name: number
+        for number in describe(result, "a", Knowns(m2=0.7, rotor1=0.01), links=True).numbers
+    }
+    origins = {name: number.origin.split(",")[0].split(":")[0] for name, number in numbers.items()}
+    assert origins == dict.fromkeys(
+        ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "l1", "lc2", "I2"), "identified"
+    ) | {
+        "g": "given",
+        "m2": "given",
+        "rotor1": "given",
+        "m1": "chosen",
+        "lc1": "chosen with the masses",
+        "I1": "chosen with the masses",
+        "l2": "identified with the payload",
+    }
+    assert numbers["I2"].value == pytest.approx(ODD.I2)
+    for to in FORMATS:
+        text = exported(result, "a--b", to, Knowns())[0]
+        assert "identified, ± 0.00" in text
+        assert "a--b" in text or FORMATS[to].links
+
+
+@pytest.mark.parametrize(
+    ("to", "known", "message"),
+    [
+        (
+            "urdf",
+            Knowns(m2=5.0),
+            "--m2: arm: with link 2 of 5 kg an inertia comes out negative; between 0.",
+        ),
+        (
+            "urdf",
+            Knowns(m1=0.01),
+            "--m1: arm: with link 1 of 0.01 kg a mass or an inertia comes out negative",
+        ),
+        ("urdf", Knowns(rotor1=1.0), "--rotor1: arm: the rotor leaves link 1 no inertia"),
+        ("urdf", Knowns(l1=-0.1), "--l1: expected a positive number, found -0.1"),
+        ("urdf", Knowns(m1=math.nan), "--m1: expected a positive number, found nan"),
+        ("python", Knowns(m1=1.0), "--m1: python holds no such number; leave it out"),
+        ("yaml", Knowns(l1=1.0), "--l1: yaml holds no such number; leave it out"),
+        ("yaml", Knowns(), "arm: the result has no payload; identify with --loaded LOG"),
+    ],
+)
+def test_what_contradicts_physics_is_refused(to: str, known: Knowns, message: str) -> None:
+    with pytest.raises(AlgidError, match=message):
+        exported(result_of(values_of(ODD)), "arm", to, known)
+
+
+def sure_of_weights(result: Result) -> Result:
+    """The result with a k1 that it knows badly, so that a given l1 moves k1 alone."""
+    assert result.fit is not None
+    covariance = [list(row) for row in result.fit.covariance]
+    covariance[0][0] = 1.0
+    return result.model_copy(
+        update={"fit": result.fit.model_copy(update={"covariance": covariance})}
+    )
+
+
+def test_results_that_no_arm_explains_are_refused() -> None:
+    with pytest.raises(
+        ResultError, match=r"k1 .* and k2 .* make l1 = g k1 / k2 no positive length; give --l1"
+    ):
+        exported(result_of({**values_of(ODD), "k2": -0.1}), "arm", "urdf", Knowns())
+    with pytest.raises(ResultError, match="not positive definite"):
+        exported(result_of({**values_of(ODD), "k1": 3.0}), "arm", "c", Knowns())
+    with pytest.raises(
+        ResultError, match=r"not positive definite .* masses would come out negative; check --l1"
+    ):
+        exported(sure_of_weights(result_of(values_of(ODD))), "arm", "urdf", Knowns(l1=1.6))
+    with pytest.raises(
+        SettingError, match="--l1: arm: an arm in a horizontal plane does not tell its length"
+    ):
+        exported(result_of(values_of(ODD), Model(gravity=0.0)), "arm", "mjcf", Knowns())
+    with pytest.raises(ResultError, match=r"no load explains a payload of -0\.2 kg"):
+        exported(
+            result_of(values_of(ODD), payload={"m_p": -0.2, "l1": 0.4, "l2": 0.3}),
+            "arm",
+            "yaml",
+            Knowns(),
+        )
+
+
+def test_the_payload_comes_with_its_error_bars() -> None:
+    result = result_of(values_of(ODD), payload={"m_p": 0.5, "l1": 0.4, "l2": 0.3}, std=0.01)
+    text, warnings = exported(result, "arm", "yaml", Knowns())
+    assert warnings == ()
+    assert "  mass: 0.5  # kg\n  mass_std: 0.005\n" in text
+    assert (
+        "  centre_of_gravity: [0.3, 0.0, 0.0]  # m\n  centre_of_gravity_std: [0.003, 0.0, 0.0]\n"
+        in text
+    )
+    text, (warning,) = exported(result, "arm", "yaml", Knowns(l2=0.4))
+    assert "[0.4, 0.0, 0.0]" in text
+    assert "centre_of_gravity_std: [0.0," in text
+    assert warning.text.startswith("l2 of 0.4 m lies 33 σ from")
+
+
+def run(result: Result, folder: Path, *arguments: str) -> tuple[int, str, set[str]]:
+    """Exit code, what was said, and the files there are but for the result."""
+    file = folder / "arm.json"
+    file.write_text(result_json(result), encoding="utf-8")
+    done = CliRunner().invoke(app, ["export", str(file), *arguments])
+    said = (
+        done.output
+        if done.exception is None or isinstance(done.exception, SystemExit)
+        else str(done.exception)
+    )
+    code = 2 if isinstance(done.exception, AlgidError) else done.exit_code
+    return code, said, {path.name for path in folder.iterdir()} - {"arm.json"}
+
+
+def test_the_command_warns_refuses_and_never_overwrites(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = result_of(values_of(ODD))
+    code, said, files = run(result, tmp_path, "--to", "urdf", "--l1", "0.41")
+    assert (code, files) == (0, {"arm.urdf"})
+    assert "l1 of 0.41 m lies 18 σ from the result's 0.4 ± 0.00057 m; one is wrong" in said
+    assert "l1 of 0.41 m lies 18 σ" in (tmp_path / "arm.urdf").read_text(encoding="utf-8")
+    code, said, _ = run(result, tmp_path, "--to", "urdf")
+    assert code == 2
+    assert "arm.urdf: exists already" in said
+    assert run(result, tmp_path, "--to", "urdf", "--force")[0] == 0
+    assert run(result, tmp_path, "--to", "stl")[0] == 2
+    bare = result.model_copy(update={"parameters": {}})
+    code, said, files = run(bare, tmp_path, "--to", "mjcf")
+    assert (code, said, files) == (
+        2,
+        f"{tmp_path / 'arm.json'}: the result has no k1; identify it from logs that tell it",
+        {"arm.urdf"},
+    )
+
+
+@pytest.mark.parametrize("to", ["c", "python"])
+def test_words_of_the_templates_stay_as_they_are_in_a_files_name(to: str) -> None:
+    for name in ("ROTOR.algid", "ANGLE1.algid", "$SIGNS.algid", "${M11}.algid", "K3ROTOR"):
+        text = exported(result_of(values_of(ODD, j2=0.004), Model(("rotor",))), name, to, Knowns())[
+            0
+        ]
+        assert f"Two-link arm by algid export, from {name}, estimator refined.\n" in text
+        assert "$" not in text.replace(name, "")

@@ -1,0 +1,284 @@
+"""Exported models in the hands of others: MuJoCo, Pinocchio, a C compiler and Python."""
+
+from __future__ import annotations
+
+import ctypes
+import itertools
+import subprocess
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from algid.arm import Arm, FloatArray, inverse_dynamics
+from algid.exports.formats import exported
+from algid.exports.links import Knowns
+from algid.model import TERMS, Model, Motion, acceleration, torque
+from algid.synth.excitation import SampledTorque
+from algid.synth.simulator import simulate
+from tests.estimators.test_model import FULL, VALUES
+from tests.exports.arms import ODD, UNIFORM, result_of, states, values_of
+
+CLOSE = (
+    1e-9  # of the largest torque: some hundred roundings of 2e-16 and of the numbers' decimal form
+)
+THETA, OMEGA, ALPHA = states()
+ROTOR = values_of(ODD, j2=0.004)
+
+
+def text_of(to: str, value: dict[str, float], model: Model | None = None, **known: float) -> str:
+    """What algid exports of an arm with these coefficients."""
+    return exported(result_of(value, model), "arm.algid", to, Knowns(**known))[0]
+
+
+def wanted(value: dict[str, float], model: Model | None = None) -> FloatArray:
+    """Torques (2, N) of algid's model at the random states."""
+    model = model or Model()
+    return torque(
+        model, np.array([value[name] for name in model.names]), Motion(THETA, OMEGA, ALPHA)
+    )
+
+
+def assert_close(found: FloatArray, expected: FloatArray, tolerance: float) -> None:
+    np.testing.assert_allclose(found, expected, rtol=0, atol=tolerance * np.abs(expected).max())
+
+
+KNOWN: list[dict[str, float]] = [
+    {},
+    {"l2": 0.35},
+    {"m1": 2.5},
+    {"m2": 0.9, "l2": 0.2},
+    {"m1": 2.0, "m2": 0.7, "rotor1": 0.01},
+    {"rotor1": 0.02},
+]
+
+
+@pytest.mark.parametrize("known", KNOWN, ids=str)
+@pytest.mark.parametrize("arm", [UNIFORM, ODD], ids=["uniform", "odd"])
+def test_mujocos_inverse_dynamics_is_algids(arm: Arm, known: dict[str, float]) -> None:
+    value = values_of(arm, j2=0.004)
+    model = Model(("rotor",))
+    assert_close(by_mujoco(text_of("mjcf", value, model, **known)), wanted(value, model), CLOSE)
+
+
+def test_an_arm_without_gravity_lies_in_mujocos_plane() -> None:
+    model = Model(gravity=0.0)
+    value = values_of(Arm(**{**vars(ODD), "g": 0.0}))
+    assert_close(by_mujoco(text_of("mjcf", value, model, l1=0.4)), wanted(value, model), CLOSE)
+    assert_close(by_pinocchio(text_of("urdf", value, model, l1=0.4)), wanted(value, model), CLOSE)
+
+
+def by_mujoco(text: str) -> FloatArray:
+    """Torques (2, N) that MuJoCo wants at the random states."""
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    found = []
+    for data.qpos[:], data.qvel[:], data.qacc[:] in zip(THETA.T, OMEGA.T, ALPHA.T, strict=True):
+        mujoco.mj_inverse(model, data)
+        found.append(data.qfrc_inverse.copy())
+    return np.array(found).T
+
+
+@pytest.mark.parametrize("known", KNOWN, ids=str)
+@pytest.mark.parametrize("arm", [UNIFORM, ODD], ids=["uniform", "odd"])
+def test_pinocchios_inverse_dynamics_is_algids(arm: Arm, known: dict[str, float]) -> None:
+    value = values_of(arm)
+    assert_close(by_pinocchio(text_of("urdf", value, None, **known)), wanted(value), CLOSE)
+
+
+def by_pinocchio(text: str) -> FloatArray:
+    """Torques (2, N) that Pinocchio wants at the random states: its inverse dynamics, and the damping that it read."""
+    pin = pytest.importorskip("pinocchio")
+    model = pin.buildModelFromXML(text)
+    data = model.createData()
+    damping, model.damping = np.array(model.damping), np.zeros(2)
+    found = []
+    for theta, omega, alpha in zip(THETA.T, OMEGA.T, ALPHA.T, strict=True):
+        q = np.stack([np.cos(theta), np.sin(theta)], axis=1).ravel()  # joints without limits
+        found.append(pin.rnea(model, data, q, omega, alpha) + damping * omega)
+    return np.array(found).T
+
+
+def test_mujocos_simulation_follows_algids() -> None:
+    mujoco = pytest.importorskip("mujoco")
+    value = values_of(ODD)
+    model = mujoco.MjModel.from_xml_string(text_of("mjcf", value))
+    data = mujoco.MjData(model)
+    t = np.arange(round(1 / model.opt.timestep) + 1) * model.opt.timestep
+    tau = np.stack([9 * np.sin(5 * t), 3 * np.cos(7 * t)])
+    ours = simulate(
+        np.array(list(value.values())), SampledTorque(t, tau, "zoh"), t, np.array([-1.0, 0.4])
+    )
+    data.qpos[:] = ours.theta[:, 0]
+    found = [data.qpos.copy()]
+    for data.ctrl[:] in tau.T[:-1]:
+        mujoco.mj_step(model, data)
+        found.append(data.qpos.copy())
+    assert np.ptp(ours.theta, axis=1).min() > 0.5
+    np.testing.assert_allclose(np.array(found).T, ours.theta, rtol=0, atol=1e-5)
+
+
+def test_mujoco_slides_against_coulomb_friction() -> None:
+    mujoco = pytest.importorskip("mujoco")
+    value = values_of(ODD, f1=0.4, f2=0.3)
+    text = text_of("mjcf", value, Model(("coulomb",)))
+    assert "as a jump at standstill" in text
+    model = mujoco.MjModel.from_xml_string(text)
+    np.testing.assert_array_equal(model.dof_frictionloss, [0.4, 0.3])
+    data = mujoco.MjData(model)
+    data.qvel[:] = (3.0, -2.0)
+    mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(
+        data.qfrc_constraint, [-0.4, 0.3], rtol=1e-3
+    )  # MuJoCo's contact solver
+
+
+SETS = [
+    Model(),
+    Model(("coulomb",)),
+    Model(("coulomb", "stribeck", "asymmetry", "rotor")),
+    Model(("offset", "gain", "phases")),
+    Model(("load",), coulomb_speed=0.5),
+    FULL,
+    Model(("coulomb", "load", "rotor", "gain"), gravity=0.0),
+]
+
+
+@pytest.mark.parametrize("model", SETS, ids=lambda model: "+".join(model.terms) or "plain")
+@pytest.mark.parametrize("to", ["python", "c"])
+def test_modules_of_both_languages_are_algids(to: str, model: Model, tmp_path: Path) -> None:
+    text = text_of(to, VALUES, model)
+    arm = compiled(text, tmp_path) if to == "c" else imported(text)
+    c = np.array([VALUES[name] for name in model.names])
+    tau = torque(model, c, Motion(THETA, OMEGA, ALPHA))
+    assert_close(each(arm.inverse_dynamics, THETA, OMEGA, ALPHA), tau, 1e-12)
+    left = acceleration(model, c, THETA, OMEGA, tau)
+    np.testing.assert_allclose(
+        left, ALPHA, rtol=0, atol=1e-10 * np.abs(ALPHA).max()
+    )  # condition of M: some hundred
+    np.testing.assert_allclose(
+        each(arm.forward_dynamics, THETA, OMEGA, tau), left, rtol=0, atol=1e-10 * 60
+    )
+    assert ("lacks first-order low-pass" in text) == ("lag" in model.terms)
+
+
+@pytest.mark.parametrize("to", ["python", "c"])
+def test_gravity_and_inertia_of_both_languages(to: str, tmp_path: Path) -> None:
+    model = Model(("rotor",))
+    arm = (compiled if to == "c" else lambda text, _: imported(text))(
+        text_of(to, ROTOR, model), tmp_path
+    )
+    k = ODD.constants()
+    still = np.zeros_like(THETA)
+    assert_close(each(arm.gravity, THETA), inverse_dynamics(k, THETA, still, still), 1e-12)
+    matrix = np.array([arm.inertia(theta) for theta in THETA.T.tolist()])
+    for joint, row in enumerate(np.eye(2)):
+        pushed = np.broadcast_to(row[:, None], THETA.shape)
+        column = inverse_dynamics(k, THETA, still, pushed) - inverse_dynamics(
+            k, THETA, still, still
+        )
+        column[1] += 0.004 * row[1]
+        assert_close(
+            matrix[:, :, joint].T, column, 1e-11
+        )  # differences of torques ten times as large
+
+
+def each(function: Any, *arguments: FloatArray) -> FloatArray:
+    """A function of pairs at every state: (2, N)."""
+    return np.array(
+        [
+            function(*pairs)
+            for pairs in zip(*(argument.T.tolist() for argument in arguments), strict=True)
+        ]
+    ).T
+
+
+def imported(text: str) -> SimpleNamespace:
+    """The Python module of that text."""
+    content: dict[str, Any] = {}
+    exec(compile(text, "arm.py", "exec"), content)
+    return SimpleNamespace(**content)
+
+
+def compiled(text: str, folder: Path) -> SimpleNamespace:
+    """The functions of a C file, built strictly and called by ctypes.
+
+    It stands beside a file that declares them.
+    """
+    (folder / "arm.c").write_text(text)
+    (folder / "user.c").write_text(
+        '#define ARM_DECLARATIONS_ONLY\n#include "arm.c"\nvoid (*used)() = gravity;\n'.replace(
+            "()", "(const double[2], double[2])"
+        )
+    )
+    flags = ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-O2", "-ffp-contract=off"]
+    subprocess.run(
+        ["cc", *flags, "-shared", "-fPIC", "-o", "arm.so", "arm.c", "user.c", "-lm"],
+        cwd=folder,
+        check=True,
+    )
+    library = ctypes.CDLL(str(folder / "arm.so"))
+    pair = ctypes.c_double * 2
+
+    def function(name: str, result: Any) -> Any:
+        def called(*pairs: list[float]) -> list[Any]:
+            found = result()
+            getattr(library, name)(*(pair(*one) for one in pairs), found)
+            return [list(row) if isinstance(row, ctypes.Array) else row for row in found]
+
+        return called
+
+    names = ("gravity", "inverse_dynamics", "forward_dynamics")
+    return SimpleNamespace(
+        **{name: function(name, pair) for name in names}, inertia=function("inertia", pair * 2)
+    )
+
+
+def test_sdf_tells_the_same_links() -> None:
+    value = values_of(ODD, f1=0.4, f2=0.3)
+    root = ET.fromstring(text_of("sdf", value, Model(("coulomb",)), l2=0.3))
+
+    def number(path: str) -> float:
+        found = root.findtext(path)
+        assert found is not None, path
+        return float(found.split()[0])
+
+    link = "model/link[@name='link{}']/".format
+    arm = Arm(
+        m1=number(link(1) + "inertial/mass"),
+        m2=number(link(2) + "inertial/mass"),
+        lc1=number(link(1) + "inertial/pose"),
+        lc2=number(link(2) + "inertial/pose"),
+        l1=number(link(2) + "pose"),
+        l2=number("model/frame/pose"),
+        I1=number(link(1) + "inertial/inertia/iyy"),
+        I2=number(link(2) + "inertial/inertia/iyy"),
+        b1=number("model/joint[@name='joint1']/axis/dynamics/damping"),
+        b2=number("model/joint[@name='joint2']/axis/dynamics/damping"),
+    )
+    np.testing.assert_allclose(arm.constants(), ODD.constants(), rtol=1e-12)
+    assert number("model/joint[@name='joint2']/axis/dynamics/friction") == 0.3
+    assert root.findtext("model/joint[@name='joint1']/axis/xyz") == "0 -1 0"
+
+
+@pytest.mark.parametrize(
+    ("to", "term"), list(itertools.product(["urdf", "mjcf", "sdf", "python", "c"], TERMS))
+)
+def test_a_file_says_which_terms_it_lacks(to: str, term: str) -> None:
+    held = {
+        "urdf": {"coulomb"},
+        "sdf": {"coulomb"},
+        "mjcf": {"coulomb", "rotor"},
+        "python": set(TERMS) - {"lag"},
+        "c": set(TERMS) - {"lag"},
+    }[to]
+    value = {
+        **values_of(ODD),
+        **{name: VALUES[name] for one in TERMS.values() for name in one.names},
+    }
+    text = text_of(to, value, Model((term,)))
+    assert (f"lacks {TERMS[term].title}" in text) == (term not in held)

@@ -1,0 +1,15 @@
+from __future__ import annotations
+
+import pytest
+
+from algid.log import Log
+from algid.synth.run import Recording, excitation, with_schedule
+from tests.tracks.folders import CASE
+
+
+@pytest.fixture(scope="session")
+def picking() -> Log:
+    """50 g picked and placed, without noise."""
+    return with_schedule(
+        CASE, excitation(CASE, "wide"), Recording(duration=4.5), [(1.5, 0.05), (3.0, 0.0)]
+    )

@@ -1,0 +1,148 @@
+"""The arm that a track weighs with: what it takes from a result, from the call, and from the log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import algid
+from algid.errors import ResultError
+from algid.estimators.noise import first_guess
+from algid.identification.identify import identify
+from algid.profile import Angle, Profile
+from algid.results import Result, read_result
+from algid.signals.segments import Segment, segments
+from algid.synth.sensors import Sensors
+from algid.tracks.bins import arm_of
+from algid.tracks.run import track_log
+from algid.writers import write_log
+from tests.tracks.folders import CASE, noisy
+
+
+@pytest.fixture(scope="module")
+def weighed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Result of an arm with its payload, which tells the lengths of its links."""
+    folder = tmp_path_factory.mktemp("weighed")
+    logs = algid.synthesise("case1", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
+    assert logs[1] is not None
+    names = [folder / "bare.mcap", folder / "loaded.mcap"]
+    for path, log in zip(names, logs, strict=True):
+        write_log(path, log)
+    identify(
+        names[0],
+        loaded=names[1],
+        out=folder,
+        name="arm",
+        report=False,
+        settings=algid.Settings(model="plain"),
+    )
+    return folder / "arm.algid"
+
+
+@pytest.fixture
+def result(weighed: Path) -> Result:
+    return read_result(weighed)
+
+
+@pytest.fixture(scope="module")
+def first(picking: algid.Log) -> Segment:
+    return next(iter(segments(iter([noisy(picking, np.random.default_rng(4))]))))
+
+
+def _with(result: Result, **settings: Any) -> Result:
+    return result.model_copy(update={"settings": {**result.settings, **settings}})
+
+
+def test_lengths_that_were_estimated_come_with_their_errors(result: Result, first: Segment) -> None:
+    arm, covariance = arm_of(result, first)
+    assert arm.l1 == result.payload["l1"].estimate == pytest.approx(CASE.arm.l1, rel=0.05)
+    assert arm.l2 == result.payload["l2"].estimate == pytest.approx(CASE.arm.l2, rel=0.05)
+    assert result.fit is not None
+    stds = [
+        result.estimates[name].std
+        for name in ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "l1", "l2")
+    ]
+    np.testing.assert_allclose(
+        np.sqrt(np.diag(covariance)), np.array(stds, dtype=np.float64), rtol=1e-6
+    )
+    full, names = np.array(result.fit.covariance), result.fit.covariance_names
+    assert covariance[0, 7] == full[names.index("k1"), names.index("l1")]
+    assert covariance[8, 7] == full[names.index("l2"), names.index("l1")]
+
+
+def test_a_length_that_is_given_goes_before_the_results_and_is_exact(
+    result: Result, first: Segment
+) -> None:
+    arm, covariance = arm_of(result, first, l1=0.4)
+    assert (arm.l1, arm.l2) == (0.4, result.payload["l2"].estimate)
+    assert not covariance[7].any()
+    assert covariance[8, 8] > 0
+    told = _with(result, l1=0.5, l2=0.6).model_copy(update={"payload": {}})
+    arm, _ = arm_of(told, first, l2=0.3)
+    assert (arm.l1, arm.l2) == (0.5, 0.3)
+
+
+def test_without_a_length_or_error_bars_it_is_refused(result: Result, first: Segment) -> None:
+    with pytest.raises(ResultError, match=r"has no l1; give the link's length with --l1"):
+        arm_of(result.model_copy(update={"payload": {}}), first)
+    with pytest.raises(ResultError, match=r"has no l2; give the link's length with --l2"):
+        arm_of(result.model_copy(update={"payload": {}}), first, l1=0.3)
+    with pytest.raises(ResultError, match="has no error bars"):
+        arm_of(result.model_copy(update={"fit": None}), first)
+
+
+def test_noise_is_the_results_or_else_the_logs(result: Result, first: Segment) -> None:
+    assert result.fit is not None
+    noise = result.fit.noise
+    arm, _ = arm_of(result, first)
+    np.testing.assert_array_equal(arm.noise.theta, [noise["theta1"], noise["theta2"]])
+    np.testing.assert_array_equal(arm.noise.tau, [noise["tau1"], noise["tau2"]])
+    guess = first_guess(first.theta, first.tau)
+    for lacking in ({}, {**noise, "tau2": 0.0}):
+        bare = result.model_copy(update={"fit": result.fit.model_copy(update={"noise": lacking})})
+        arm, _ = arm_of(bare, first)
+        np.testing.assert_array_equal(arm.noise.theta, guess.theta)
+        np.testing.assert_array_equal(arm.noise.tau, guess.tau)
+
+
+def test_the_torque_acts_after_its_delay_and_half_its_hold(result: Result, first: Segment) -> None:
+    assert arm_of(_with(result, delay=0.0, torque_hold="foh"), first)[0].shift == 0.0
+    assert arm_of(_with(result, delay=0.004, torque_hold="foh"), first)[0].shift == 0.004
+    assert arm_of(_with(result, delay=0.004, torque_hold="zoh"), first)[0].shift == pytest.approx(
+        0.004 + first.dt / 2
+    )
+    found = _with(result, model="delay", torque_hold="foh")
+    assert arm_of(found, first)[0].shift == 0.0
+    delay = result.parameters["k1"].model_copy(update={"estimate": 0.007, "unit": "s"})
+    estimated = found.model_copy(update={"parameters": {**result.parameters, "delay": delay}})
+    assert arm_of(estimated, first)[0].shift == 0.007
+
+
+def test_a_delay_that_the_logs_chose_shifts_the_torque_as_one_that_was_asked_for(
+    result: Result, first: Segment
+) -> None:
+    delay = result.parameters["k1"].model_copy(update={"estimate": 0.007, "unit": "s"})
+    chosen = result.model_copy(update={"parameters": {**result.parameters, "delay": delay}})
+    assert chosen.settings["delay"] == 0.0
+    assert arm_of(chosen, first)[0].shift == 0.007
+
+
+def test_what_the_log_tells_stands_in_the_track(
+    weighed: Path, picking: algid.Log, tmp_path: Path
+) -> None:
+    log = noisy(picking, np.random.default_rng(4))
+    write_log(tmp_path / "log.mcap", log, truth=log.origin.truth)
+    plain = track_log(tmp_path / "log.mcap", weighed)
+    assert not plain.data_lost
+    assert "READ_OTHERWISE" not in [one.code for one in plain.notices]
+    whole = (tmp_path / "log.mcap").read_bytes()
+    (tmp_path / "torn.mcap").write_bytes(whole[: int(0.9 * len(whole))])
+    broken = track_log(tmp_path / "torn.mcap", weighed)
+    assert broken.data_lost
+    assert "CUT_OFF" in [one.code for one in broken.notices]
+    other = track_log(tmp_path / "log.mcap", weighed, profile=Profile(theta1=Angle(offset=0.01)))
+    (read,) = (one for one in other.notices if one.code == "READ_OTHERWISE")
+    assert read.numbers["file"] == str(weighed)

@@ -1,0 +1,266 @@
+"""Sums over a log's cells, and what a track makes of them, by hand and by the simulator's truth."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from algid.arm import with_payload
+from algid.errors import LogError
+from algid.estimators.whitening import NoiseLevels
+from algid.identification.identify import identify
+from algid.log import Log, Origin
+from algid.model import Model
+from algid.notices import Notice
+from algid.results import LogSummary
+from algid.settings import Settings
+from algid.signals.segments import segments
+from algid.synth.excitation import wide_multi_sine
+from algid.synth.simulator import simulate
+from algid.tracks.bins import CELL, Cells, IdentifiedArm, cells_of, joined
+from algid.tracks.payload import HALF_BAND, HOLE, QUANTILE, Stretch, Track, track
+from algid.tracks.result import StretchStatus, TrackResult, track_json
+from algid.tracks.run import track_log
+from tests.tracks.folders import CASE, noisy
+
+NOISE = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
+ARM = IdentifiedArm(Model(), CASE.arm.constants(), CASE.arm.l1, CASE.arm.l2, NOISE)
+NOTHING = np.zeros((9, 9))
+
+
+def numbered(count: int) -> Cells:
+    n = np.arange(1.0, count + 1)
+    return Cells(
+        n, n + 0.5, 2 * n, 6 * n, np.outer(n, np.arange(7.0)), 20 * n, 30 * n, np.full(count, 4.0)
+    )
+
+
+def loaded(mass: float, duration: float = 3.0, seed: int = 3) -> Log:
+    """The first case's arm with `mass` kg at its tip, without noise, at 500 Hz."""
+    k = with_payload(CASE.arm.constants(), CASE.arm.payload_constants(mass))
+    t = 2e-3 * np.arange(round(500 * duration) + 1)
+    motion = simulate(k, wide_multi_sine(CASE.arm, seed), t)
+    log = Log(
+        np.rint(t * 1e9).astype(np.int64),
+        motion.theta,
+        motion.tau,
+        Origin("picking.csv", "csv", {}),
+    )
+    return noisy(log, np.random.default_rng(seed))
+
+
+def test_parts_and_joins_keep_every_sum_in_its_place() -> None:
+    cells = numbered(9)
+    assert len(cells) == 9
+    both = joined([cells.part(0, 4), cells.part(4, 9)])
+    for name in Cells.__dataclass_fields__:
+        np.testing.assert_array_equal(getattr(both, name), getattr(cells, name))
+    assert cells.part(2, 5).start.tolist() == [3, 4, 5]
+    assert cells.part(2, 5).S.shape == (3, 7)
+
+
+def test_the_mass_is_the_least_squares_one_and_its_squares_are_those_it_leaves() -> None:
+    cells = numbered(5)
+    assert cells.mass == pytest.approx(3.0)
+    # e² − 2 m g e + m² g²: 20 − 2·3·6 + 9·2 = 2
+    np.testing.assert_allclose(cells.squares(3.0), 2 * np.arange(1.0, 6))
+    np.testing.assert_allclose(
+        cells.squares(np.array([0.0, 1.0, 2.0, 3.0, 4.0])), [20, 20, 12, 8, 20]
+    )
+    empty = numbered(2)
+    assert replace(empty, A=np.zeros(2), B=np.zeros(2)).mass == 0.0
+
+
+def test_a_kilogram_at_the_tip_adds_table_2_to_the_constants() -> None:
+    l1, l2, g = CASE.arm.l1, CASE.arm.l2, 9.81
+    assert ARM.unit.tolist() == pytest.approx([l1 * l2, g * l2, l2**2, g * l1, l1**2, 0, 0])
+    assert ARM.tip_equivalent == pytest.approx(CASE.arm.constants()[2] / l2**2)
+
+
+def test_scores_shift_with_constants_and_lengths_by_their_derivatives() -> None:
+    """Against central differences of the change that a mass makes to the constants."""
+    cells, mass = numbered(3), np.array([0.2, 0.5, 1.1])
+    T = cells.sensitivity(ARM, mass)
+    assert T.shape == (3, 9)
+    np.testing.assert_array_equal(T[:, :7], cells.S)
+    step = 1e-5
+    for column, name in ((7, "l1"), (8, "l2")):
+        more, less = (replace(ARM, **{name: getattr(ARM, name) + sign * step}) for sign in (1, -1))
+        slope = (more.unit - less.unit) / (2 * step)
+        np.testing.assert_allclose(T[:, column], mass * (cells.S @ slope), rtol=1e-8)
+
+
+@pytest.mark.parametrize("mass", [0.0, 0.3])
+@pytest.mark.parametrize("about", [0.0, 0.25])
+def test_cells_weigh_the_payload_wherever_they_are_linearised(mass: float, about: float) -> None:
+    log = loaded(mass)
+    for _ in range(4):  # noisy angles bias a mass that is linearised far from itself
+        cells = joined(cells_of(segments([log]), ARM, about))
+        about = cells.mass
+    std = 1 / np.sqrt(cells.A.sum())
+    assert abs(cells.mass - mass) < 4.5 * std < 0.01
+    assert np.diff(cells.start) == pytest.approx(CELL, abs=1e-9)
+    np.testing.assert_allclose(cells.end - cells.start, CELL, atol=1e-9)
+    assert cells.rows.tolist() == [20.0] * len(cells)
+    # what the payload leaves is white noise of variance one: χ² of as many rows
+    left, rows = cells.squares(cells.mass).sum(), cells.rows.sum()
+    assert abs(left - rows) < 5 * np.sqrt(2 * rows)
+
+
+def test_pieces_too_short_for_the_stencil_are_left_out() -> None:
+    log = loaded(0.0)
+    assert cells_of(segments([log.part(0, 26)]), ARM, 0.0) == []
+    assert len(cells_of(segments([log.part(0, 27)]), ARM, 0.0)) == 1
+
+
+def test_a_track_is_the_weighted_mean_over_its_neighbourhood_and_its_band_that_ones_error() -> None:
+    log = loaded(0.3)
+    found = track(lambda: segments([log]), ARM, NOTHING)
+    (stretch,) = found.stretches
+    assert found.colour == pytest.approx(1, abs=0.1)
+    assert abs(stretch.m_p - 0.3) < 4.5 * stretch.std
+    assert np.unique(found.stretch).tolist() == [0.0]
+    assert np.all(np.abs(found.m_p - 0.3) < 5 * found.std)
+    assert np.all(found.std > stretch.std)
+    inner = (found.t > found.t[0] + HALF_BAND) & (found.t < found.t[-1] - HALF_BAND)
+    # m_p(t) rests on half a second of the three: its variance is about six times the stretch's
+    share = (2 * HALF_BAND + CELL) / (found.t[-1] - found.t[0])
+    assert np.mean(1 / found.std[inner] ** 2) * stretch.std**2 == pytest.approx(share, rel=0.2)
+    assert found.explained > 0.99
+    assert np.mean(found.left**2) == pytest.approx(1, abs=0.1)
+    assert found.holes.shape == (0, 2)
+    assert found.changes.shape == (0, 3)
+
+
+def test_an_uncertain_arm_adds_its_share_to_the_variance() -> None:
+    """var m_p = 1/ΣA + (ΣT/ΣA)ᵀ Σ (ΣT/ΣA): sums by NumPy over the cells of the same log."""
+    log = loaded(0.3)
+    k = CASE.arm.constants()
+    covariance = np.diag(np.append((1e-3 * k) ** 2, [1e-8, 4e-8]))
+    sure, wide = (
+        track(lambda: segments([log]), ARM, one).stretches[0] for one in (NOTHING, covariance)
+    )
+    cells = joined(cells_of(segments([log]), ARM, sure.m_p))
+    J = cells.sensitivity(ARM, sure.m_p).sum(axis=0) / cells.A.sum()
+    assert sure.std**2 == pytest.approx(
+        1 / cells.A.sum(), rel=0.1
+    )  # cells at both ends are left out
+    assert wide.std**2 - sure.std**2 == pytest.approx(float(J @ covariance @ J), rel=0.1)
+
+
+def test_a_hole_in_a_log_is_told_and_cuts_no_stretch() -> None:
+    log = loaded(0.3, 4.0)
+    stamps = log.stamp_ns + np.where(np.arange(len(log)) >= 1000, 2_000_000_000, 0)
+    found = track(lambda: segments([replace(log, stamp_ns=stamps)]), ARM, NOTHING)
+    (hole,) = found.holes
+    assert hole == pytest.approx([2.0, 4.0], abs=2 * CELL + 0.02)  # a whole cell and the stencil
+    assert hole[1] - hole[0] > HOLE
+    assert len(found.stretches) == 1
+    assert not np.any((found.t > 2.02) & (found.t < 3.98))
+
+
+def test_a_log_too_short_to_hold_a_change_is_refused(weighed_arm: Path) -> None:
+    log = loaded(0.0)
+    with pytest.raises(ValueError, match=r"^the log is too short: expected 0.4 s at least$"):
+        track(lambda: segments([log.part(0, 150)]), ARM, NOTHING)
+    with pytest.raises(
+        LogError, match=r"^picking\.csv: the log is too short: expected 0\.4 s at least; record"
+    ):
+        track_log(log.part(0, 150), weighed_arm)
+    with pytest.raises(LogError, match=r"^picking\.csv: it holds no samples; record longer$"):
+        track_log(log.part(0, 0), weighed_arm)
+
+
+@pytest.fixture(scope="module")
+def weighed_arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Result of an arm whose links' lengths are known."""
+    folder = tmp_path_factory.mktemp("arm")
+    lengths = Settings(estimator="weak", model="plain", l1=CASE.arm.l1, l2=CASE.arm.l2)
+    identify(loaded(0.0, seed=5), None, lengths, out=folder, name="arm", report=False)
+    return folder / "arm.algid"
+
+
+def judged(
+    *stretches: Stretch, bare: float = 0.1, schedule: tuple[tuple[float, float], ...] | None = None
+) -> TrackResult:
+    nothing = np.zeros(0)
+    found = Track(
+        list(stretches), nothing, nothing, nothing, nothing, nothing, np.array([[2.0, 1.9, 2.1]]), 1.5, 0.99,
+        np.array([[5.0, 6.0]]), bare,
+    )  # fmt: skip
+    log = LogSummary(
+        path="a",
+        sha256=None,
+        role="loaded",
+        format="csv",
+        rows=2,
+        start_ns=0,
+        duration=1.0,
+        rate=1.0,
+        mapping={},
+    )
+    return TrackResult(
+        found, log, "arm", "0" * 64, {"l1": 0.3}, "1", schedule, (Notice("A", "a warning"),), True
+    )
+
+
+@pytest.mark.parametrize(
+    ("m_p", "std", "status"),
+    [
+        (0.0, 0.049, StretchStatus.OK),  # half of link 2's own weight at the tip
+        (0.0, 0.051, StretchStatus.WEAK_EXCITATION),
+        (1.0, 0.49, StretchStatus.OK),  # half of the payload, which is heavier
+        (1.0, 0.51, StretchStatus.WEAK_EXCITATION),
+        (0.0, np.nan, StretchStatus.WEAK_EXCITATION),
+        (-0.099, 0.025, StretchStatus.OK),  # four deviations
+        (-0.101, 0.025, StretchStatus.NEGATIVE_MASS),
+    ],
+)
+def test_a_stretchs_status_goes_by_its_deviation_and_its_sign(
+    m_p: float, std: float, status: StretchStatus
+) -> None:
+    found = judged(Stretch(0.0, 2.0, 0.0, 0.01), Stretch(2.0, 4.0, m_p, std))
+    assert found.statuses == [StretchStatus.OK, status]
+    assert found.complete is (status is StretchStatus.OK)
+
+
+def test_the_truth_of_a_stretch_is_that_amid_it() -> None:
+    schedule = ((1.0, 0.5), (3.0, 0.2))
+    one, other, last = Stretch(0.0, 1.9, 0, 1), Stretch(1.1, 4.8, 0, 1), Stretch(2.0, 4.0, 0, 1)
+    found = judged(one, other, last, schedule=schedule)
+    assert [found.truth(stretch) for stretch in (one, other, last)] == [0.0, 0.5, 0.2]
+    assert judged(one).truth(one) is None
+
+
+def test_track_json_holds_what_was_found() -> None:
+    found = judged(Stretch(0.0, 2.0, 0.5, 0.01), schedule=((0.0, 0.5),))
+    content = json.loads(track_json(found))
+    (stretch,) = content["stretches"]
+    assert stretch["ci95"] == pytest.approx([0.5 - 0.01 * QUANTILE, 0.5 + 0.01 * QUANTILE])
+    assert (stretch["status"], stretch["truth"], stretch["unit"]) == ("OK", 0.5, "kg")
+    assert content["changes"] == [{"t": 2.0, "from": 1.9, "to": 2.1}]
+    assert content["holes"] == [[5.0, 6.0]]
+    assert (content["excess"], content["explained"], content["bare"]) == (1.5, 0.99, 0.1)
+    assert content["arm"] == {"path": "arm", "sha256": "0" * 64}
+    assert content["data_lost"] is True
+    assert [one["text"] for one in content["notices"]] == ["a warning"]
+
+
+def test_an_object_is_shaped_like_the_payload_that_was_identified() -> None:
+    """What a kilogram adds to the coefficients, with its offset and its inertia, in the complex form."""
+    model = Model(("phases",))
+    k = np.array(
+        [0.1, 0.5, 0.2, 0.9, 0.4, 0.1, 0.1, 0.02, 0.1, 0.05]
+    )  # arg K1 = arg K2: θ1's zero is right
+    noise = NoiseLevels(np.full(2, 1e-4), np.full(2, 1e-2))
+    arm = IdentifiedArm(model, k, 0.4, 0.3, noise, 0.0, 0.05, 0.07)
+    added = dict(zip(model.names, arm.unit.tolist(), strict=True))
+    r = complex(0.3, 0.05)
+    assert added["k3"] == pytest.approx(abs(r) ** 2 + 0.07**2)
+    assert complex(added["k1"], added["k1s"]) == pytest.approx(0.4 * r)
+    assert complex(added["k2"], added["k2s"]) == pytest.approx(9.81 * r)
+    assert complex(added["k4"], added["k4s"]) == pytest.approx(9.81 * 0.4)

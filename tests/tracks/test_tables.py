@@ -1,0 +1,213 @@
+"""A track's tables and figures against stretches made by hand, without any log."""
+
+from __future__ import annotations
+
+import base64
+import html
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from algid.arm import FloatArray
+from algid.notices import Notice
+from algid.report.document import Depth
+from algid.report.frame import page
+from algid.report.markdown import markdown
+from algid.results import LogSummary
+from algid.tracks.figures import MOST_MARKS, figures
+from algid.tracks.page import track_document
+from algid.tracks.payload import Stretch, Track
+from algid.tracks.result import TrackResult
+from algid.tracks.tables import change_table, fixed, quality_tables, stretch_table, verdict
+
+
+def values(typed: dict[str, str]) -> FloatArray:
+    return np.frombuffer(base64.b64decode(typed["bdata"]), dtype=f"<{typed['dtype']}").astype(
+        np.float64
+    )
+
+
+LOG = LogSummary(
+    path="logs/pick.csv",
+    sha256="0" * 64,
+    role="loaded",
+    format="csv",
+    rows=3000,
+    duration=3.0,
+    rate=1000.0,
+    mapping={"theta1": "q1", "tau1": "t1"},
+)
+
+
+def track(masses: list[float], std: float = 0.001, **changes: object) -> TrackResult:
+    """A second of each mass; a change lies a tenth of a second either side."""
+    t = np.arange(0.01, len(masses), 0.02)
+    stretch = np.minimum(t.astype(np.int64), len(masses) - 1)
+    m_p = np.array(masses)[stretch]
+    found = Track(
+        t=t,
+        m_p=m_p,
+        std=np.full(t.size, std),
+        left=np.ones(t.size),
+        stretch=stretch,
+        stretches=[
+            Stretch(float(place), place + 1.0, mass, std) for place, mass in enumerate(masses)
+        ],
+        changes=np.array(
+            [[place, place - 0.1, place + 0.1] for place in range(1, len(masses))]
+        ).reshape(-1, 3),
+        holes=np.zeros((0, 2)),
+        explained=0.999,
+        colour=1.0,
+        tip_equivalent=0.05,
+    )
+    made = TrackResult(
+        track=found,
+        log=LOG,
+        arm="arm.algid",
+        arm_sha256="1" * 64,
+        settings={"l1": 0.2},
+        version="1",
+    )
+    return replace(made, **changes)  # type: ignore[arg-type]
+
+
+@given(st.floats(-50, 50), st.floats(1e-8, 10))
+def test_a_mass_is_written_to_the_second_digit_of_its_error(value: float, std: float) -> None:
+    text = fixed(value, std)
+    decimals = len(text.partition(".")[2])
+    assert float(text) == pytest.approx(value, abs=0.5000001 * 10.0**-decimals)
+    assert decimals == 0 or std >= 0.999 * 10.0**-decimals  # no more digits than the error leaves
+    assert decimals == 9 or std * 10**decimals > 9.99  # and no fewer than two of its own
+    assert text not in ("-0", "-0.0", "-0.00")
+
+
+def test_a_mass_without_an_error_has_three_decimals_and_zero_no_sign() -> None:
+    assert [fixed(0.12345, std) for std in (0.0, float("nan"), float("inf"))] == ["0.123"] * 3
+    assert fixed(-0.00004, 0.001) == "0.0000"
+    assert fixed(-1.0, 30.0) == "-1"
+
+
+def test_changes_have_their_sign_and_the_nearest_true_moment() -> None:
+    made = track([0.1, 0.35, 0.2], schedule=((0.0, 0.1), (1.02, 0.35), (1.9, 0.2)))
+    rows = change_table(made).rows
+    assert [row[3] for row in rows] == ["+0.2500", "-0.1500"]
+    assert [row[1:3] for row in rows] == [("1.000", "[0.900, 1.100]"), ("2.000", "[1.900, 2.100]")]
+    assert [row[5] for row in rows] == [
+        "1.020",
+        "1.900",
+    ]  # what the arm held at the start is no change
+    assert "Truth at, s" not in [
+        column.heading for column in change_table(track([0.1, 0.2])).columns
+    ]
+    uneven = track([0.1, 0.2])
+    coarse = replace(uneven.track.stretches[1], std=0.04)
+    made = replace(
+        uneven, track=replace(uneven.track, stretches=[uneven.track.stretches[0], coarse])
+    )
+    assert change_table(made).rows[0][3] == "+0.100"  # as fine as the coarser of both
+
+
+def test_stretches_stand_against_the_schedule() -> None:
+    made = track([0.1, 0.35], schedule=((0.0, 0.09), (1.0, 0.35)))
+    rows = {row[0]: row for row in stretch_table(made).rows}
+    assert rows["1"] == (
+        *("1", "0.000", "1.000", "0.1000", "0.0020", "kg", "OK", "[0.0980, 0.1020]"),
+        *("0.0900", "0.0100"),
+    )
+    assert rows["2"][-2:] == ("0.3500", "0.0000")
+    bare = [column.heading for column in stretch_table(track([0.1])).columns]
+    assert bare[-1] == "95 % interval"
+    assert [column.kind for column in stretch_table(track([-0.1])).columns][6] == "doubtful status"
+
+
+def test_a_report_shows_changes_and_holes_where_there_are_any() -> None:
+    assert verdict(track([0.1])).grade == "good"
+    still = track([0.1], notices=(Notice("JITTER", "it jitters"), Notice("CUT", "cut", note=True)))
+    assert [one.code for one in verdict(still).reasons] == ["JITTER"]
+    assert [one.code for one in verdict(still).notes] == ["CUT"]
+    titles = [table.title for table in track_document(still).tables(*Depth)]
+    assert titles == ["Payload by stretch", "Fit", "Logs", "Channels", "Settings", "Provenance"]
+    moving = track([0.1, 0.3])
+    holey = replace(moving, track=replace(moving.track, holes=np.array([[0.25, 0.5]])))
+    document = track_document(holey)
+    titles = [table.title for table in document.tables(*Depth)]
+    assert titles == ["Payload by stretch", "Changes", "Fit", "Logs", "Channels", "Times without samples", "Settings",
+                      "Provenance"]  # fmt: skip
+    assert quality_tables(holey)[-1].rows == (("0.250", "0.500"),)
+    log, channels = quality_tables(holey)[1:3]
+    assert [column.heading for column in log.columns] == [
+        "Log",
+        "Format",
+        "Samples",
+        "Duration, s",
+        "Rate, Hz",
+    ]
+    assert channels.rows == (("theta1", "q1"), ("tau1", "t1"))
+    shown = html.unescape(page(document, shared_library=True))
+    assert (
+        shown.index("Payload by stretch")
+        < shown.index('id="payload"')
+        < shown.index("<caption>Changes</caption>")
+    )
+    assert "The readers gave no warning." in shown
+    assert "<li>it jitters</li>" in page(track_document(still), shared_library=True)
+    assert re.findall(r"^\*\*(.+)\*\*$", markdown(document), re.M) == [
+        "Payload by stretch", "Changes", "Fit", "Logs", "Provenance",
+    ]  # fmt: skip
+    assert document.facts == "arm of arm.algid · 3.000 s of log at 1000 Hz · 3,000 samples"
+
+
+def test_the_figure_steps_where_the_payload_does() -> None:
+    made = track([0.1, 0.35, 0.2], schedule=((0.0, 0.1), (1.02, 0.35), (1.9, 0.2), (9.0, 5.0)))
+    payload, left = figures(made)
+    by_name = {trace["name"]: trace for trace in payload.panels[0].traces}
+    np.testing.assert_allclose(values(by_name["stretch"]["x"]), [0, 1, 1, 2, 2, 3])
+    np.testing.assert_allclose(
+        values(by_name["stretch"]["y"]), [0.1, 0.1, 0.35, 0.35, 0.2, 0.2], rtol=1e-6
+    )
+    np.testing.assert_allclose(
+        values(by_name["truth"]["x"]), [0, 0, 0, 1.02, 1.02, 1.9, 1.9, 3], rtol=1e-6
+    )
+    np.testing.assert_allclose(
+        values(by_name["truth"]["y"]), [0, 0, 0.1, 0.1, 0.35, 0.35, 0.2, 0.2], rtol=1e-6
+    )
+    marks = [(shape["x0"], shape["x1"]) for shape in payload.panels[0].layout["shapes"]]
+    assert marks == [(0.9, 1.1), (1.9, 2.1)]
+    noise = left.panels[0].layout["shapes"][-1]
+    assert (noise["y0"], noise["y1"], noise["line"]["dash"]) == (1.0, 1.0, "dash")
+    low, high = payload.panels[0].layout["yaxis"]["range"]
+    assert low < 0.1 < 0.35 < 5.0 < high  # the whole schedule
+    band = values(by_name["band"]["y"])
+    assert np.count_nonzero(np.isnan(band)) == 3  # one closed area a stretch
+    inside = band[np.isfinite(band)]
+    assert (inside.min(), inside.max()) == pytest.approx(
+        (0.1 - 1.96 * 0.001, 0.35 + 1.96 * 0.001), rel=1e-4
+    )
+
+
+def test_many_changes_do_not_hide_the_payload() -> None:
+    few, many = track([0.1, 0.2] * (MOST_MARKS // 2)), track([0.1, 0.2] * (MOST_MARKS // 2 + 1))
+    assert len(few.track.changes) < MOST_MARKS < len(many.track.changes)
+    words = "times between which a change lies"
+    for made, marked in ((few, True), (many, False)):
+        payload, _ = figures(made)
+        assert (words in [entry.words for entry in payload.legend]) is marked
+        assert bool(payload.panels[0].layout["shapes"]) is marked
+
+
+def test_a_jolt_leaves_the_frame_and_a_still_arm_does_too() -> None:
+    made = track([0.1, 0.35] * 3)
+    m_p, std = made.track.m_p.copy(), made.track.std.copy()
+    m_p[40] = 90.0  # a jolt: one sample in three hundred
+    std[10:20] = 40.0  # the arm stood still
+    low, high = (
+        figures(replace(made, track=replace(made.track, m_p=m_p, std=std)))[0]
+        .panels[0]
+        .layout["yaxis"]["range"]
+    )
+    assert -1 < low < 0.1 < 0.35 < high < 2

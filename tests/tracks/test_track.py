@@ -1,0 +1,191 @@
+"""Payloads in time: found where they change, weighed within their intervals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from typer.testing import CliRunner
+
+import algid
+from algid.arm import FloatArray
+from algid.errors import LogError
+from algid.estimators.whitening import NoiseLevels
+from algid.identification.identify import identify
+from algid.log import Log
+from algid.model import Model
+from algid.signals.segments import segments
+from algid.synth.run import Recording, excitation, with_schedule
+from algid.synth.sensors import Sensors
+from algid.tracks.bins import CELL, IdentifiedArm
+from algid.tracks.change_points import cuts
+from algid.tracks.payload import HALF_BAND, Track, track
+from algid.writers import write_log
+from tests.cli.commands import app
+from tests.intervals import holds_95
+from tests.tracks.folders import CASE, noisy
+
+MASSES = (0.0, 0.05, 0.0)
+NOISE = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
+
+
+def _track(log: Log, k: FloatArray | None = None, covariance: FloatArray | None = None) -> Track:
+    arm = IdentifiedArm(
+        Model(), CASE.arm.constants() if k is None else k, CASE.arm.l1, CASE.arm.l2, NOISE
+    )
+    return track(
+        lambda: segments([log]), arm, np.zeros((9, 9)) if covariance is None else covariance
+    )
+
+
+def test_changes_of_50_g_are_found(picking: Log) -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        found = _track(noisy(picking, rng))
+        assert [stretch.end for stretch in found.stretches] == pytest.approx(
+            [1.5, 3.0, 4.5], abs=0.1
+        )
+        for stretch, mass in zip(found.stretches, MASSES, strict=True):
+            assert abs(stretch.m_p - mass) < 4.5 * stretch.std < 0.01
+
+
+@pytest.mark.slow
+def test_masses_lie_within_their_intervals() -> None:
+    """Those of stretches, and those of m_p(t) at two instants a stretch that have no cell in common."""
+    log = with_schedule(
+        CASE,
+        excitation(CASE, "wide"),
+        Recording(rate=500.0, duration=4.5),
+        [(1.5, 0.05), (3.0, 0.0)],
+    )
+    rng = np.random.default_rng(0)
+    stretches, instants = [], []
+    for _ in range(240):
+        found = _track(noisy(log, rng))
+        assert len(found.stretches) == 3
+        stretches += [
+            (s.m_p - m) / (1.959964 * s.std) for s, m in zip(found.stretches, MASSES, strict=True)
+        ]
+        for number, mass in enumerate(MASSES):
+            own = np.flatnonzero(found.stretch == number)
+            apart = own[[own.size // 4, 3 * own.size // 4]]
+            assert np.diff(found.t[apart]) > 2 * HALF_BAND + CELL
+            instants += [*(found.m_p[apart] - mass) / (1.959964 * found.std[apart])]
+    holds_95(np.array(stretches))
+    holds_95(np.array(instants))
+
+
+def test_an_uncertain_arm_widens_the_intervals_by_what_moves_the_masses(picking: Log) -> None:
+    """Constants and lengths off by a standard deviation in two directions: the masses' moves, squared and added."""
+    log = noisy(picking, np.random.default_rng(1))
+    known = np.array([*CASE.arm.constants(), CASE.arm.l1, CASE.arm.l2])
+    spread = 1e-3 * known * np.random.default_rng(2).standard_normal((2, 9))
+    before = _track(log)
+    moves = []
+    for k, (l1, l2) in ((known[:7] + step[:7], known[7:] + step[7:]) for step in spread):
+        after = track(
+            lambda: segments([log]), IdentifiedArm(Model(), k, l1, l2, NOISE), np.zeros((9, 9))
+        )
+        moves.append(
+            [a.m_p - b.m_p for a, b in zip(after.stretches, before.stretches, strict=True)]
+        )
+    wider = _track(log, covariance=spread.T @ spread)
+    found = [a.std**2 - b.std**2 for a, b in zip(wider.stretches, before.stretches, strict=True)]
+    np.testing.assert_allclose(found, np.square(moves).sum(axis=0), rtol=0.05)
+
+
+def test_a_constant_payload_is_one_stretch(picking: Log) -> None:
+    found = _track(noisy(picking.part(0, 1400), np.random.default_rng(2)))
+    assert len(found.stretches) == 1
+    assert np.all(np.abs(found.m_p) < 5 * found.std)
+
+
+def test_slow_errors_of_the_torque_pass_for_no_payload(picking: Log) -> None:
+    """As unmodelled friction does, they alternate between the joints' turning points."""
+    log = picking.part(0, 1500)
+    slow = 0.05 * np.sin(2 * np.pi * 1.7 * log.t + np.array([[0.0], [1.0]]))
+    found = _track(replace(noisy(log, np.random.default_rng(5)), tau=log.tau + slow))
+    assert len(found.stretches) == 1
+    assert found.colour > 5
+    low, high = found.stretches[0].ci95
+    assert low < 0 < high
+
+
+def test_stretches_follow_one_another_without_a_hole(picking: Log) -> None:
+    found = _track(noisy(picking, np.random.default_rng(6)))
+    assert [s.end for s in found.stretches[:-1]] == pytest.approx(
+        [s.start for s in found.stretches[1:]], abs=1e-9
+    )
+    for stretch in range(3):
+        assert np.diff(found.t[found.stretch == stretch]) == pytest.approx(0.02, abs=1e-9)
+
+
+def test_errors_of_the_constants_are_no_colour(picking: Log) -> None:
+    rng = np.random.default_rng(7)
+    k = CASE.arm.constants()
+    covariance = np.zeros((9, 9))
+    covariance[:7, :7] = np.diag((1e-2 * k) ** 2)
+    wrong = k * (1 + 1e-2 * rng.standard_normal(7))
+    log = noisy(picking, rng)
+    assert _track(log, wrong, covariance).colour < _track(log, wrong).colour / 3
+
+
+def test_cuts_are_the_best_ones() -> None:
+    rng = np.random.default_rng(3)
+    A = rng.uniform(1, 3, 24)
+    B = A * np.repeat([0.0, 4.0, 1.0], 8) + np.sqrt(A) * rng.standard_normal(24)
+
+    def cost(edges: list[int]) -> float:
+        both = list(pairwise(edges))
+        return sum(10.0 - B[a:b].sum() ** 2 / A[a:b].sum() for a, b in both)
+
+    best = min(
+        ([0, a, b, 24] for a in range(3, 22) for b in range(a + 3, 22)), key=cost
+    )  # by trying every pair
+    assert cuts(A, B, penalty=10.0, shortest=3) == best[1:-1] == [8, 16]
+
+
+def test_the_command_writes_both_tables(picking: Log, tmp_path: Path) -> None:
+    unloaded, _ = algid.synthesise(
+        "case1", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2)
+    )
+    identify(unloaded, out=tmp_path, name="arm", report=False)
+    write_log(tmp_path / "picking.parquet", noisy(picking, np.random.default_rng(4)))
+    lengths = ["--l1", str(CASE.arm.l1), "--l2", str(CASE.arm.l2)]
+    command = [
+        "track",
+        str(tmp_path / "picking.parquet"),
+        "--parameters",
+        str(tmp_path / "arm.algid"),
+        *lengths,
+    ]
+    done = CliRunner().invoke(app, [*command, "-o", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    stretches = pl.read_parquet(tmp_path / "picking.track/stretches.parquet")
+    assert stretches["m_p"].to_list() == pytest.approx(MASSES, abs=0.005)
+    assert pl.read_parquet(tmp_path / "picking.track/track.parquet").columns[:4] == [
+        "t",
+        "m_p",
+        "low",
+        "high",
+    ]
+
+
+@pytest.mark.parametrize("suffix", ["mcap", "parquet", "csv"])
+def test_a_log_carries_its_schedule(picking: Log, tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"picking.{suffix}"
+    write_log(path, picking.part(0, 50), truth=picking.origin.truth)
+    truth = algid.read_log(path).origin.truth
+    assert truth is not None
+    assert truth.schedule == ((1.5, 0.05), (3.0, 0.0))
+    with pytest.raises(LogError, match="the payload changes; weigh it with algid track"):
+        identify(path)
+
+
+def test_a_schedule_that_runs_backwards_is_refused() -> None:
+    with pytest.raises(ValueError, match="increasing times"):
+        with_schedule(CASE, excitation(CASE, "wide"), Recording(), [(2.0, 0.1), (1.0, 0.0)])
