@@ -96,5 +96,10 @@ def table4(
 
 
 def finite(value: float | None) -> float | None:
-    """The value as a result holds it: None where it is not a finite number, or beyond all bounds."""
-    return None if value is None or not abs(value) <= LIMITS.largest_value else float(value)
+    """The value as a result holds it: None where it is not a finite number, or beyond all bounds.
+
+    One whose inverse is beyond them is rounding, and zero.
+    """
+    if value is None or not abs(value) <= LIMITS.largest_value:
+        return None
+    return float(value) if abs(value) * LIMITS.largest_value >= 1 else 0.0

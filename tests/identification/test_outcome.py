@@ -353,3 +353,12 @@ def test_a_bound_is_mentioned_from_the_level_of_the_intervals_on() -> None:
         outcome = outcome_of(fit, {}, survey(), Settings(), Selection(Model(), False))
         assert outcome.fit is not None
         assert bool(outcome.fit.broken_bounds) is mentioned
+
+
+def test_that_what_is_only_rounding_is_zero_and_can_be_read_back() -> None:
+    """A term that its prior holds at nothing comes out as 1e-31, by which nobody can divide."""
+    found = estimate(-8.9628e-31, 0.1, 0.2, "N m", "OK")
+    assert found.estimate == 0.0
+    assert found.ci95 == (-0.2, 0.2)
+    assert estimate(2e-30, 1e-31, 0.2, "N m", "OK").estimate == 2e-30
+    assert estimate(2e-30, 1e-31, 0.2, "N m", "OK").std == 0.0
