@@ -2,7 +2,8 @@
 
 The best cut into stretches comes by pruned dynamic programming. A stretch from cell a to b costs
 −(ΣB)²/ΣA, twice its log likelihood ratio against nothing; each cut costs a penalty. Cuts that can
-never be the last one again are dropped (Killick, Fearnhead & Eckley 2012).
+never be the last one again, whatever the mass, are dropped (Maidstone, Hocking, Rigaill & Fearnhead
+2017): cost grows linearly with the cells, also where nothing changes.
 
 A penalty holds for white rows; what the arm's model lacks makes neighbouring cells err alike.
 Masses of neighbouring blocks of cells differ by 1/A + 1/A' in variance where rows are white. Slow
@@ -19,6 +20,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.tracks.bins import Cells, IdentifiedArm
@@ -41,6 +43,8 @@ NARROW = 20  # cells: changes this close may be one with its jolt
 SHORTEST = 10  # cells: no object is carried for less than 0.2 s
 PENALTY = 60.0  # of a change: 7.7 standard deviations, far beyond what white rows reach
 MOST_ROUNDS = 6
+
+_ROUNDING = 1e-12  # of sums of squares, in comparisons that drop a start
 
 
 @dataclass(frozen=True)
@@ -149,41 +153,99 @@ def cuts(A: FloatArray, B: FloatArray, penalty: float, shortest: int) -> list[in
     A, B : (C,) float64
         Information and score of each cell.
     penalty : float, in units of twice the log likelihood
+
+    Notes
+    -----
+    Ends come in blocks of `shortest`: the best cut before an end of a block rests on starts before
+    the block alone. Starts that are the best at no mass are dropped after each block (`Starts`).
     """
     count = A.size
     a, b = np.concatenate([[0.0], np.cumsum(A)]), np.concatenate([[0.0], np.cumsum(B)])
     last = np.zeros(count + 1, dtype=np.int64)
     best = np.full(count + 1, np.inf)
     best[0] = -penalty
-    # Of each start that may serve: the start, a, b and best there, and until which end it may. A
-    # start that a cut at
-    # `end` would serve as well is of no more use where that cut may stand: `shortest` later.
-    start, until = np.empty(count + 1, dtype=np.int64), np.empty(count + 1, dtype=np.int64)
-    sums = np.empty((3, count + 1))
-    size, soonest = 0, count + 1
-    for end in range(shortest, count + 1):
-        if end == shortest or end - shortest >= shortest:
-            new = end - shortest
-            start[size], until[size], sums[:, size] = new, count + 1, (a[new], b[new], best[new])
-            size += 1
-        if soonest <= end:
-            kept = np.flatnonzero(until[:size] > end)
-            size = kept.size
-            start[:size], until[:size], sums[:, :size] = start[kept], until[kept], sums[:, kept]
-            soonest = int(until[:size].min())
-        information = np.maximum(a[end] - sums[0, :size], 1e-300)
-        score = b[end] - sums[1, :size]
-        value = sums[2, :size] - score * score / information
-        place = int(np.argmin(value))
-        best[end], last[end] = value[place] + penalty, start[place]
-        beaten = np.flatnonzero(value > best[end])
-        if beaten.size:
-            until[beaten] = np.minimum(until[beaten], end + shortest)
-            soonest = min(soonest, end + shortest)
+    starts = Starts(penalty)
+    for block in range(shortest, count + 1, shortest):
+        ends = np.arange(block, min(block + shortest, count + 1))
+        new = ends - shortest
+        starts.add(new[(new == 0) | (new >= shortest)], a, b, best)
+        # the block's own starts serve only the ends that lie `shortest` later
+        value = starts.values(a[ends], b[ends])
+        value[starts.place[:, None] > new] = np.inf
+        rows = np.argmin(value, axis=0)
+        best[ends], last[ends] = value[rows, np.arange(ends.size)] + penalty, starts.place[rows]
+        starts.prune(int(rows[-1]))
     found = [int(last[-1])]
     while found[-1] > 0:
         found.append(int(last[found[-1]]))
     return found[-2::-1]
+
+
+class Starts:
+    """Starts of the last stretch that may serve an end to come.
+
+    Up to an end with the sums a and b, a stretch from start s that holds a mass m costs
+
+        a m² − 2 b m + f_s(m),    f_s(m) = best_s − a_s m² + 2 b_s m,
+
+    so a start whose f is the least of all at no m is never used again (Maidstone et al. 2017).
+    An older start o beats a newer one s between the roots of f_s − f_o, a concave parabola in m,
+    and nowhere else. Of each start the masses are kept at which it beats every newer one.
+    """
+
+    def __init__(self, penalty: float) -> None:
+        self.place = np.empty(0, dtype=np.int64)
+        self._penalty = penalty
+        self._sums = np.empty((3, 0))  # a, b and best at each start
+        self._masses = np.empty((2, 0))  # from and to which it beats the newer ones
+        self._fresh = 0
+
+    def add(self, place: NDArray[np.int64], a: FloatArray, b: FloatArray, best: FloatArray) -> None:
+        """Take in starts that are newer than all before."""
+        self._fresh = self.place.size
+        everywhere = np.broadcast_to([[-np.inf], [np.inf]], (2, place.size))
+        self.place = np.concatenate([self.place, place])
+        self._sums = np.hstack([self._sums, [a[place], b[place], best[place]]])
+        self._masses = np.hstack([self._masses, everywhere])
+
+    def values(self, a: FloatArray, b: FloatArray) -> FloatArray:
+        """What the best cut up to ends of the sums a and b (E,) costs by last start (S, E)."""
+        own_a, own_b, best = self._sums[:, :, None]
+        return np.asarray(best - (b - own_b) ** 2 / np.maximum(a - own_a, 1e-300))
+
+    def prune(self, leading: int) -> None:
+        """Drop the starts that the newest ones, or the `leading` one, beat at every mass."""
+        low, high = self._won(
+            np.arange(self.place.size), np.arange(self._fresh, self.place.size), _ROUNDING
+        )
+        newer = self.place[self._fresh :] > self.place[:, None]
+        self._masses[0] = np.maximum(self._masses[0], np.where(newer, low, -np.inf).max(axis=1))
+        self._masses[1] = np.minimum(self._masses[1], np.where(newer, high, np.inf).min(axis=1))
+        beaten = self._masses[0] > self._masses[1]
+        after = np.arange(leading + 1, self.place.size)
+        (low,), (high,) = self._won(np.array([leading]), after, -_ROUNDING)
+        beaten[after] |= (low <= self._masses[0, after]) & (self._masses[1, after] <= high)
+        self.place = self.place[~beaten]
+        self._sums, self._masses = self._sums[:, ~beaten], self._masses[:, ~beaten]
+
+    def _won(
+        self, older: NDArray[np.int64], newer: NDArray[np.int64], rounding: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """From and to which mass each older start beats each newer one (O, N).
+
+        The first lies above the second where it never does. Sums of squares are off by `rounding`, in its favour.
+        """
+        a, b, best = self._sums[:, None, newer] - self._sums[:, older, None]
+        slack = rounding * (self._penalty + np.abs(self._sums[2, newer]))
+        square = b * b + np.maximum(a, 1e-300) * (best + slack)
+        reach = np.sqrt(np.maximum(square, 0.0)) / np.maximum(a, 1e-300)
+        middle = b / np.maximum(a, 1e-300)
+        # between starts without information the older one is better throughout, or the newer one
+        flat = a <= 0.0
+        low = np.where(flat, -np.inf, middle - reach)
+        high = np.where(flat, np.inf, middle + reach)
+        never = np.where(flat, best < -slack, square < 0.0)
+        return np.where(never, np.inf, low), np.where(never, -np.inf, high)
 
 
 def fused(places: list[int], cells: Cells, penalty: float) -> list[int]:
