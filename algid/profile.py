@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError
 
 from algid.errors import SettingError
 from algid.files import first_misfit, read_toml
-from algid.units import unit_of
+from algid.units import names_of, unit_of
 
 
 def _usual(unit: object) -> object:
@@ -22,16 +22,16 @@ def _usual(unit: object) -> object:
     return (unit_of(unit) or unit) if isinstance(unit, str) else unit
 
 
-AngleUnit = Annotated[Literal["rad", "mrad", "deg", "rev", "counts"], BeforeValidator(_usual)]
-VelocityUnit = Annotated[
-    Literal["rad", "mrad", "deg", "rev", "counts", "rpm"], BeforeValidator(_usual)
-]
-TorqueUnit = Annotated[
-    Literal[
-        "N m", "mN m", "N cm", "kN m", "kgf m", "kgf cm", "lbf ft", "lbf in", "ozf in", "A", "mA"
-    ],
-    BeforeValidator(_usual),
-]
+if TYPE_CHECKING:  # a type checker cannot read a registry
+    AngleUnit: TypeAlias = str
+    VelocityUnit: TypeAlias = str
+    TorqueUnit: TypeAlias = str
+    TimeUnit: TypeAlias = str
+else:
+    AngleUnit = Annotated[Literal[names_of("angle")], BeforeValidator(_usual)]
+    VelocityUnit = Annotated[Literal[names_of("velocity")], BeforeValidator(_usual)]
+    TorqueUnit = Annotated[Literal[names_of("torque", "current")], BeforeValidator(_usual)]
+    TimeUnit = Annotated[Literal[names_of("time")], BeforeValidator(_usual)]
 Check = Literal[
     "EFFORT_ZERO",
     "EFFORT_DENORMAL",
@@ -43,7 +43,6 @@ Check = Literal[
     "NOT_FINITE",
 ]
 """Checks of a log that refuse it, or its result, unless they are accepted."""
-TimeUnit = Annotated[Literal["s", "ms", "us", "ns"], BeforeValidator(_usual)]
 
 
 def _parts(text: object) -> object:

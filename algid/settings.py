@@ -10,12 +10,16 @@ import reprlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from functools import cache
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
 
 from algid.errors import SettingError
 from algid.limits import PHYSICAL, Range
+from algid.methods import ESTIMATORS, NAMES, Estimator, estimator_of
 
-Estimator = Literal["refined", "weak", "instruments", "paper"]
+if TYPE_CHECKING:  # a type checker cannot read a registry
+    EstimatorName = str
+else:
+    EstimatorName = Literal[NAMES]
 
 
 def flag(name: str) -> str:
@@ -69,9 +73,9 @@ class Settings:
 
     Parameters
     ----------
-    estimator : 'refined' (maximum likelihood, the default), 'weak' (least squares on windows), 'instruments' or 'paper'
-        Instruments are for arms whose unmodelled torque drives the motion: see
-        `algid.estimators.instruments`.
+    estimator : name in `algid.methods.ESTIMATORS`
+        'refined' (maximum likelihood, the default), 'weak' (least squares on windows),
+        'instruments' (for arms whose unmodelled torque drives the motion) or 'paper'.
     velocity : 'observer' or 'measured'
         Where joint velocities come from. The refined estimator needs none.
     observer : 'luenberger' (eq. 6), 'zero-phase', or None
@@ -100,7 +104,7 @@ class Settings:
         If a number has no meaning, or the paper's method lacks what is set.
     """
 
-    estimator: Estimator = field(default="refined", metadata={"help": "How to estimate."})
+    estimator: EstimatorName = field(default=NAMES[0], metadata={"help": "How to estimate."})
     velocity: Literal["observer", "measured"] = field(
         default="observer", metadata={"help": "Observe velocities, or use the log's own."}
     )
@@ -136,8 +140,8 @@ class Settings:
     model: str = field(
         default="auto",
         metadata={
-            "help": "Terms of the torque: auto (chosen by the logs), plain (none), or some of coulomb, stribeck, "
-            "asymmetry, load, offset, rotor, gain, zero, lag, delay, like coulomb,rotor.",
+            "help": "Terms of the torque: auto (chosen by the logs), plain (none), or some of "
+            "<terms>, like coulomb,rotor.",
         },
     )
     torque_hold: Literal["foh", "zoh"] = field(
@@ -182,8 +186,7 @@ class Settings:
                 )
         if self.model not in ("auto", "plain"):
             self._check_terms()
-        if self.estimator == "paper":
-            self._refuse_what_the_paper_lacks()
+        self._refuse_what_it_lacks(estimator_of(self.estimator))
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> Settings:
@@ -220,9 +223,7 @@ class Settings:
     @property
     def luenberger(self) -> bool:
         """Whether velocities come from the paper's observer."""
-        return (
-            self.observer or ("luenberger" if self.estimator == "paper" else "zero-phase")
-        ) == "luenberger"
+        return (self.observer or estimator_of(self.estimator).observer) == "luenberger"
 
     @property
     def lengths(self) -> dict[str, float]:
@@ -265,22 +266,21 @@ class Settings:
                 "--model: no log tells a delay from a lag beside it; leave one of them out"
             )
 
-    def _refuse_what_the_paper_lacks(self) -> None:
-        if self.model not in ("auto", "plain"):
-            raise SettingError(
-                f"--model {self.model}: the paper's method has no such terms; use --estimator refined or weak"
-            )
-        ours = {f.name: f.default for f in fields(self)}
-        lacking = ("delay", "l1", "l2", "payload_mass")
-        for name in (*lacking, "constrain", "cross_validate"):
-            if getattr(self, name) != ours[name]:
-                raise SettingError(
-                    f"{flag(name)}: the paper's method has no such term; use --estimator refined or weak"
-                )
-        if self.gravity == 0:
-            raise SettingError(
-                "--gravity 0: the paper's payload needs gravity; use --estimator refined or weak"
-            )
+    def _refuse_what_it_lacks(self, estimator: Estimator) -> None:
+        default = {f.name: f.default for f in fields(self)}
+        for name in estimator.lacks:
+            value = getattr(self, name)
+            others = [one.name for one in ESTIMATORS if name not in one.lacks]
+            use = f"use --estimator {' or '.join(others[:2])}"
+            if name == "model" and value not in ("auto", "plain"):
+                what = f"--model {value}: {estimator.title} has no such terms"
+            elif name == "gravity" and value == 0:
+                what = f"--gravity 0: without gravity {estimator.title} has no payload"
+            elif name not in ("model", "gravity") and value != default[name]:
+                what = f"{flag(name)}: {estimator.title} has no such term"
+            else:
+                continue
+            raise SettingError(f"{what}; {use}")
 
 
 _SHORT_FORMS = {

@@ -46,7 +46,7 @@ def algid_by(estimator: str) -> Callable[[Sequence[Segment]], Answer]:
             stamps = np.round(np.arange(len(log)) * log.dt * 1e9).astype(np.int64)
             read.append(Log(stamps, log.theta, log.tau, Origin(str(place), "csv", {})))
         settings = (
-            algid.Settings() if estimator == "default" else algid.Settings(estimator=estimator)  # type: ignore[arg-type]
+            algid.Settings() if estimator == "default" else algid.Settings(estimator=estimator)
         )
         result = algid.identify(read, settings=settings, report=False)
         rows = [result.parameters.get(name) for name in CONSTANT_NAMES]

@@ -35,10 +35,11 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "log": room("arm notices", "numpy"),
     "signals": room("arm compiled log", "numpy scipy", PURE),
     "estimators": room("arm compiled model notices physics progress signals", "numpy scipy", PURE),
+    "methods": room("estimators progress"),
     "files": room("construction errors limits", "pydantic"),
     "stores": room("construction errors files", "pyarrow"),
     "profile": room("errors files units", "pydantic"),
-    "settings": room("errors limits model signals"),
+    "settings": room("errors limits methods model signals"),
     "results": room("errors files limits log model notices settings text verdict words", "numpy polars pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
     "table4": room("arm limits log results synth"),
@@ -48,15 +49,15 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "arm errors faults files limits log notices profile ros2 runtime units words",
         "google h5py lz4 mcap numpy polars pyarrow rosbags scipy zstandard",
     ),
-    "inspection": room("arm errors estimators faults log notices profile readers signals words", "numpy"),
+    "inspection": room("arm errors estimators faults log notices profile readers signals units words", "numpy"),
     "report": room(
-        "arm errors files model notices progress results ros2 text verdict words",
+        "arm errors files methods model notices progress results ros2 text verdict words",
         "matplotlib mcap numpy plotly polars pyarrow rich"
     ),
     "check": room("errors files results", "pydantic"),
     "identification": room(
-        "arm errors estimators files inspection log model notices physics profile progress readers report results "
-        "runtime settings signals table4",
+        "arm errors estimators files inspection log methods model notices physics profile progress readers report "
+        "results runtime settings signals table4",
         "numpy pyarrow",
     ),
     "api": room("log synth"),
@@ -78,8 +79,8 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "fleet": room("errors files limits model notices progress report text verdict words", "numpy polars scipy"),
     "cli": room(
         "batches check designs errors estimators example exits exports faults files fleet identification "
-        "inspection limits log model notices physics profile progress readers report results runtime "
-        "settings stores synth text tracks words writers",
+        "inspection limits log methods model notices physics profile progress readers report results runtime "
+        "settings stores synth text tracks units words writers",
         "numpy rich typer",
     ),
 }  # fmt: skip

@@ -13,6 +13,7 @@ import typer
 from typer.core import TyperCommand
 
 from algid import __version__
+from algid.cli.completion import with_lists
 from algid.cli.output import say
 from algid.errors import SettingError
 from algid.exits import epilog
@@ -38,7 +39,16 @@ COMMANDS: dict[str, Callable[[], Callable[..., Any]]] = {
 
 
 class FiniteCommand(TyperCommand):
-    """A command whose numbers are finite: no flag of any has a meaning for nan or inf."""
+    """A command whose numbers are finite: no flag of any has a meaning for nan or inf.
+
+    Its help holds the names of registries.
+    """
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Show its help."""
+        for option in self.params:
+            option.help = with_lists(getattr(option, "help", None) or "")  # type: ignore[attr-defined]
+        super().format_help(ctx, formatter)
 
     def invoke(self, ctx: Any) -> Any:
         """Run it.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import glob
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
@@ -41,6 +41,27 @@ def terms() -> list[str]:
     from algid.model import CHOICES
 
     return ["auto", "plain", *CHOICES]
+
+
+def written() -> list[str]:
+    """Ends of the names of logs that algid writes."""
+    from algid.writers import FORMATS
+
+    return [f".{name}" for name in FORMATS]
+
+
+LISTS: Mapping[str, Callable[[], list[str]]] = {
+    "<terms>": lambda: terms()[2:],
+    "<written>": written,
+}
+"""What stands in a help for names that only a registry tells, which is read where help is shown."""
+
+
+def with_lists(text: str) -> str:
+    """A help with the names that its marks stand for."""
+    for mark, known in LISTS.items():
+        text = text.replace(mark, ", ".join(known())) if mark in text else text
+    return text
 
 
 def of_profile(setting: str, channel: str | None = None) -> Completion:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from algid.cli.completion import written
 from algid.cli.output import remark
 from algid.cli.settings import Choice, takes_profile
 from algid.exits import exit_of
@@ -22,14 +23,12 @@ if TYPE_CHECKING:
 def convert(
     choice: Choice,
     source: Annotated[Path, typer.Argument(metavar="IN", help="The log to read.")],
-    target: Annotated[
-        Path, typer.Argument(metavar="OUT", help="The log to write: .mcap, .parquet or .csv.")
-    ],
+    target: Annotated[Path, typer.Argument(metavar="OUT", help="The log to write: <written>.")],
     force: Annotated[bool, typer.Option(help="Overwrite OUT.")] = False,
 ) -> None:
     """Write a log in another format, in SI units, with canonical names.
 
-    a synthetic log keeps its truth.
+    A synthetic log keeps its truth.
 
     Example: algid convert rosbag2_2026/ arm.parquet --joints shoulder,elbow --zero hanging
 
@@ -47,7 +46,7 @@ def convert(
     from algid.writers import FORMATS, write_log
 
     if target.suffix.lstrip(".").lower() not in FORMATS:
-        raise OutputError(f"{target}: expected a name that ends in .mcap, .parquet or .csv")
+        raise OutputError(f"{target}: expected a name that ends in {', '.join(written())}")
     refuse_existing(target, force)
     reader = open_log(source, choice.profile())
     notices: list[Notice] = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from enum import StrEnum
 from importlib import resources
 from typing import Annotated
@@ -51,9 +52,6 @@ SUMMARIES = {
 }
 
 
-TERMS_MARK = "<!-- terms -->"
-
-
 def guide(
     topic: Annotated[
         GuideTopic | None, typer.Argument(help="One of the topics; the list of them without.")
@@ -77,22 +75,59 @@ def guide(
 
 
 def text_of(topic: str) -> str:
-    """A topic's Markdown; what the registry of terms holds stands in place of its mark."""
+    """A topic's Markdown; what the registries hold stands in place of their marks."""
     text = (resources.files("algid") / "guide" / f"{topic}.md").read_text(encoding="utf-8")
-    return text.replace(TERMS_MARK, _table_of_terms()) if TERMS_MARK in text else text
+    for mark, table in TABLES.items():
+        if mark in text:
+            text = text.replace(mark, _markdown(*table()))
+    return text
 
 
-def _table_of_terms() -> str:
-    """The torque's terms as a table of Markdown."""
+def _markdown(*rows: Sequence[str]) -> str:
+    """A table; the first row is its head."""
+    head, *others = (f"| {' | '.join(cells)} |" for cells in rows)
+    return "\n".join((head, "|---" * len(rows[0]) + "|", *others))
+
+
+def _terms() -> Iterator[Sequence[str]]:
     from algid.physics.terms import OPTIONAL
 
-    rows = [
-        "| term | what it is | what it adds to the torque | its parameters |",
-        "|---|---|---|---|",
-    ]
+    yield "term", "what it is", "what it adds to the torque", "its parameters"
     for term in OPTIONAL:
         meanings = "; ".join(f"{one.name}, {one.unit}: {one.meaning}" for one in term.parameters)
         needs = f", beside `{term.needs}`" if term.needs else ""
-        equation = term.equation.replace("|", "\\|")
-        rows.append(f"| `{term.name}` | {term.title}{needs} | {equation} | {meanings} |")
-    return "\n".join(rows)
+        yield f"`{term.name}`", f"{term.title}{needs}", term.equation.replace("|", "\\|"), meanings
+
+
+def _estimators() -> Iterator[Sequence[str]]:
+    from algid.methods import ESTIMATORS
+
+    yield "`--estimator`", "what it does", "when"
+    for one in ESTIMATORS:
+        default = " (default)" if one is ESTIMATORS[0] else ""
+        yield f"`{one.name}`{default}", one.does, one.when
+
+
+def _formats() -> Iterator[Sequence[str]]:
+    from algid.readers.formats import FORMATS
+
+    yield "format", "names end in"
+    for form in FORMATS:
+        yield form.title, ", ".join(f"`{suffix}`" for suffix in form.suffixes) or "a folder"
+
+
+def _units() -> Iterator[Sequence[str]]:
+    from algid.units import UNITS
+
+    yield "unit", "of", "also written"
+    for unit in UNITS:
+        yield f"`{unit.name}`", ", ".join(unit.quantities), unit.spellings.replace(" ", ", ")
+
+
+TABLES: Mapping[str, Callable[[], Iterable[Sequence[str]]]] = {
+    "<!-- terms -->": _terms,
+    "<!-- estimators -->": _estimators,
+    "<!-- formats -->": _formats,
+    "<!-- units -->": _units,
+}
+"""Rows of a table by the mark in whose place it stands."""

@@ -27,6 +27,7 @@ from algid.errors import SettingError
 from algid.files import parsed_toml
 from algid.limits import LIMITS
 from algid.settings import Settings, flag
+from algid.units import names_of
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -39,12 +40,19 @@ MODELLED = ("gravity", "model", "torque_hold", "delay", "l1", "l2")
 COMPLETED = {"model": listed(terms)}
 """Settings that are text and take some words."""
 
+
+def _words(names: Sequence[str]) -> str:
+    """Names as a command line takes them, the last behind "or"."""
+    *most, last = (f'"{name}"' if " " in name else name for name in names)
+    return f"{', '.join(most)} or {last}"
+
+
 OF_PROFILE: Mapping[str, tuple[Any, str, Completion | None]] = {
     "profile": (Path, "algid.toml that says what the log's names and units mean.", None),
     "topic": (str, "Topic with the joint states.", None),
     "joints": (str, "The two joints, as NAME,NAME.", None),
-    "angle_unit": (str, "rad, deg, rev or counts.", of_profile("unit", "theta1")),
-    "torque_unit": (str, '"N m", "mN m", A or mA.', of_profile("unit", "tau1")),
+    "angle_unit": (str, f"{_words(names_of('angle'))}.", of_profile("unit", "theta1")),
+    "torque_unit": (str, f"{_words(names_of('torque', 'current'))}.", of_profile("unit", "tau1")),
     "zero": (str, "Where θ1 is zero: horizontal or hanging.", of_profile("zero")),
     "second_angle": (str, "θ2 is relative (to link 1) or absolute.", of_profile("second_angle")),
     "drive": (

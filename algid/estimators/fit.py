@@ -26,7 +26,6 @@ from algid.estimators.whitening import NoiseLevels
 from algid.notices import Notice
 
 Status = Literal["OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED", "WEAK_EXCITATION"]
-Estimator = Literal["weak", "instruments", "refined"]
 Intervals = Literal["likelihood", "sandwich", "jackknife"]
 
 
@@ -36,7 +35,7 @@ class Fit:
 
     Parameters
     ----------
-    estimator : "weak", "instruments" or "refined"
+    estimator : name of the estimator
     shared : Shared
         Which parameters, in which order.
     values : (Q,), in `algid.model.UNITS`
@@ -63,7 +62,7 @@ class Fit:
     shrinkage : the prior's part on the torque's terms; None where none is shrunk
     """
 
-    estimator: Estimator
+    estimator: str
     shared: Shared
     values: FloatArray
     covariance: FloatArray
@@ -177,7 +176,7 @@ def own_estimates(fit: Fit) -> tuple[OwnEstimate, ...]:
 
 
 def conclude(
-    estimator: Estimator,
+    estimator: str,
     shared: Shared,
     logs: Sequence[LogInformation],
     beta: FloatArray,
@@ -192,7 +191,7 @@ def conclude(
 
     Parameters
     ----------
-    estimator : "weak", "instruments" or "refined"
+    estimator : name of the estimator
     shared : Shared
     logs : each log's quadratic likelihood
     beta : (Q,)

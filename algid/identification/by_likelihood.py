@@ -1,4 +1,4 @@
-"""The weak and the refined estimator on logs."""
+"""The estimators that give a fit, on logs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from algid.errors import LogError
-from algid.estimators import instruments, refined, shrunk, weak
+from algid.estimators import instruments, shrunk, weak
 from algid.estimators.body import with_body
 from algid.estimators.combine import Prior
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, constrained
@@ -31,6 +31,7 @@ from algid.identification.series import torque_coefficients
 from algid.identification.source import LogSource
 from algid.identification.survey import Survey
 from algid.identification.velocities import with_velocities
+from algid.methods import estimator_of
 from algid.model import CHOICES, DELAYS, EVERY_TERM, Model, without_delay
 from algid.notices import Notice
 from algid.results import Result
@@ -108,7 +109,12 @@ def run_fit(
     ------
     LogError
         If no log is long enough.
+    ValueError
+        If the settings' estimator gives time series.
     """
+    estimator = estimator_of(settings.estimator)
+    if estimator.fit is None:
+        raise ValueError(f"{estimator.name} gives time series, not a fit")
     sums: dict[LogSource, PredictionSums] = {}
     ours = _weak_settings(settings, chosen)
     scored = (
@@ -118,24 +124,10 @@ def run_fit(
         survey, settings, partial(_scored, chosen.model, settings, sums) if scored else None
     )
     try:
-        if settings.estimator == "weak":
-            fit = weak.fit(unloaded, loaded, ours, settings.lengths, prior)
-        elif settings.estimator == "instruments":
-            fit = instruments.fit(unloaded, loaded, ours, settings.lengths, prior)
-        else:
-            refining = refined.RefinedSettings(
-                model=ours.model,
-                hold=ours.hold,
-                delay=ours.delay,
-                estimate_delay=ours.estimate_delay,
-                lengths=settings.lengths,
-                prior=prior,
-                weak=ours,
-            )
-            fit = refined.fit(unloaded, loaded, refining, survey.progress)
-            if fit.refuted and settings.chooses:
-                fit, chosen = _shrunk(fit, unloaded, loaded, ours, settings, chosen, prior)
-                sums.clear()
+        fit = estimator.fit(unloaded, loaded, ours, settings.lengths, prior, survey.progress)
+        if fit.refuted and settings.chooses:
+            fit, chosen = _shrunk(fit, unloaded, loaded, ours, settings, chosen, prior)
+            sums.clear()
     except TooShortError as error:
         raise LogError(
             f"{', '.join(log.name for log in survey.logs)}: {error}; record longer"

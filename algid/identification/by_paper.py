@@ -27,6 +27,7 @@ from algid.identification.series import series_blocks, write_columns
 from algid.identification.source import LogSource
 from algid.identification.survey import Survey
 from algid.identification.velocities import with_velocities
+from algid.methods import settles
 from algid.results import Estimate, Status
 from algid.settings import Settings
 from algid.table4 import UNITS, finite, unloaded_rows
@@ -89,14 +90,11 @@ def _estimate(
     survey: Survey, log: LogSource, settings: Settings, k: FloatArray | None, folder: Path | None
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
     """Estimates from one log's series, how far they wander, and which can be used; writes the series on the way."""
-    window = (
-        settings.window
-        if settings.window is not None and settings.estimator == "paper"
-        else STAGE1_WINDOW
-    )
-    moving = with_velocities(
-        survey, log, settings, luenberger=settings.luenberger or settings.estimator != "paper"
-    )
+    asked = settles(
+        settings.estimator
+    )  # else beside another estimator, whose settings are not its own
+    window = settings.window if asked and settings.window is not None else STAGE1_WINDOW
+    moving = with_velocities(survey, log, settings, luenberger=settings.luenberger or not asked)
     names: Sequence[str] = STAGE1_SERIES if k is None else STAGE2_SERIES
     series = (
         stage1_series(moving, window)

@@ -26,6 +26,7 @@ from algid.identification.source import (
 )
 from algid.identification.summary import result_of
 from algid.identification.survey import Survey
+from algid.methods import estimator_of, settles
 from algid.progress import Progress
 from algid.results import Result, read_result, write_result
 from algid.runtime import one_blas_thread
@@ -186,7 +187,7 @@ def _identified(
     them.
     """
     with one_blas_thread():
-        if settings.estimator == "paper":
+        if settles(settings.estimator):
             outcome = _by_the_paper(survey, settings, earlier, folder)
         else:
             outcome = _by_likelihood(survey, settings, earlier, folder if series else None)
@@ -244,7 +245,7 @@ def _by_likelihood(
     if folder is not None:
         survey.begin("series")
         write_fit_series(folder, fit, survey, settings, residual_of(survey, settings, chosen, fit))
-        if settings.estimator == "refined":
+        if estimator_of(settings.estimator).beside_paper:
             outcome = _with_the_papers(outcome, survey, settings, folder)
     return outcome
 

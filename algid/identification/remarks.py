@@ -10,6 +10,7 @@ from algid import results
 from algid.estimators.diagnostics import broken_bounds, length_by_constants, payload_distance
 from algid.estimators.fit import Fit
 from algid.estimators.instruments import ENDOGENEOUS
+from algid.methods import estimator_of
 from algid.notices import Notice, Remedy
 
 ONE_SIDED = 1.645  # standard deviations of a one-sided bound at 95 %
@@ -35,7 +36,7 @@ def fit_warnings(fit: Fit) -> Iterator[Notice]:
     if (
         fit.endogeneity is not None
         and fit.endogeneity > ENDOGENEOUS
-        and fit.estimator != "instruments"
+        and estimator_of(fit.estimator).endogenous
     ):
         instruments = Remedy({"estimator": "instruments"}, "to compare")
         yield Notice("ENDOGENEITY", numbers={"distance": fit.endogeneity}, remedies=(instruments,))

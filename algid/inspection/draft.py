@@ -8,7 +8,9 @@ from pathlib import Path
 from algid.inspection.report import look
 from algid.log import Origin, Reading
 from algid.readers import open_log
+from algid.readers.formats import FORMATS
 from algid.readers.table import CHANNELS
+from algid.units import names_of
 
 _HEAD = """\
 # What the log's names, units and signs mean. Lines behind # are defaults or not known: edit what is wrong.
@@ -25,14 +27,17 @@ _HEAD = """\
 # accept = ["DEGREES"]       # codes of checks that may warn, but not refuse
 """
 _ENCODER = "# gear_ratio = 1.0  # turns of the encoder in one of the joint\n# counts = 4096.0  # encoder counts in one turn\n"
+_ANGLES = ", ".join(names_of("angle"))
+_VELOCITIES = ", ".join(names_of("velocity"))
+_TORQUES = ", ".join(names_of("torque", "current"))
 _UNITS = {
-    "theta": f'# unit = "deg"  # rad, mrad, deg, rev, counts\n{_ENCODER}# unwrap = true  # where it jumps by a turn\n',
-    "omega": f'# unit = "deg"  # a second; or rpm\n{_ENCODER}',
-    "tau": '# unit = "N m"  # or mN m, N cm, kN m, kgf m, kgf cm, lbf ft, lbf in, ozf in, A, mA\n'
+    "theta": f'# unit = "deg"  # {_ANGLES}\n{_ENCODER}# unwrap = true  # where it jumps by a turn\n',
+    "omega": f'# unit = "deg"  # {_VELOCITIES}; angles a second\n{_ENCODER}',
+    "tau": f'# unit = "N m"  # {_TORQUES}\n'
     "# torque_constant = 0.1  # N m/A at the motor, of a current\n"
     "# gear_ratio = 1.0  # turns of the motor in one of the joint\n",
 }
-_ON_TOPICS = ("mcap", "rosbag2", "bag", "db3")
+_ON_TOPICS = tuple(form.name for form in FORMATS if form.messages)
 
 
 def draft_profile(path: Path) -> str:

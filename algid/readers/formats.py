@@ -63,6 +63,8 @@ class FileFormat:
         Opens a log of it as a profile says.
     entries : callable
         What a log of it holds, by name.
+    messages : bool
+        Whether it holds messages on topics, not columns.
     """
 
     name: str
@@ -71,6 +73,7 @@ class FileFormat:
     fits: Callable[[Path, bytes], bool]
     open: Callable[[Path, Profile], TableReader]
     entries: Callable[[Path], Entries]
+    messages: bool = False
 
 
 def begins(magic: bytes) -> Callable[[Path, bytes], bool]:
@@ -255,13 +258,27 @@ def _csv(name: str, title: str, suffix: str, fits: Callable[[Path, bytes], bool]
 
 def _bag(name: str, title: str, suffix: str, magic: bytes) -> FileFormat:
     return FileFormat(
-        name, title, (suffix,), begins(magic), partial(_open_bag, name), partial(_bag_entries, name)
+        name,
+        title,
+        (suffix,),
+        begins(magic),
+        partial(_open_bag, name),
+        partial(_bag_entries, name),
+        messages=True,
     )
 
 
 FORMATS: tuple[FileFormat, ...] = (
-    FileFormat("mcap", "MCAP", (".mcap",), begins(MCAP), _open_mcap, _mcap_entries),
-    FileFormat("rosbag2", "rosbag2 folder", (), _is_bag_folder, _open_folder, _folder_entries),
+    FileFormat("mcap", "MCAP", (".mcap",), begins(MCAP), _open_mcap, _mcap_entries, messages=True),
+    FileFormat(
+        "rosbag2",
+        "rosbag2 folder",
+        (),
+        _is_bag_folder,
+        _open_folder,
+        _folder_entries,
+        messages=True,
+    ),
     _bag("db3", "rosbag2 SQLite file", ".db3", b"SQLite format 3\x00"),
     _bag("bag", "ROS 1 bag", ".bag", b"#ROSBAG V"),
     FileFormat(

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from algid.files import whole_file
+from algid.methods import settles
 from algid.progress import Progress
 from algid.report.arm import arm_of
 from algid.report.document import Bullets, Document, Drawn, Fold, ReadingAid, Section, Table
@@ -102,7 +103,7 @@ def result_document(result: Result, shown: Gallery | None = None) -> Document:
     notes = Bullets(
         noted, "What the readers and the estimator warn of stands at the top of the page."
     )
-    opened: Fold = "open" if result.estimator == "paper" or _truth(result) else "closed"
+    opened: Fold = "open" if settles(result.estimator) or _truth(result) else "closed"
     sections = (
         Section(
             (

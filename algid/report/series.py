@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.methods import settles
 from algid.progress import Progress
 from algid.report.reduce import (
     Block,
@@ -92,7 +93,7 @@ class _SeriesGathering:
     def __init__(self, names: list[str], total: int, settings: Mapping[str, Any]) -> None:
         self.names = names
         self._total = total
-        window = settings.get("window") if settings.get("estimator") == "paper" else None
+        window = settings.get("window") if settles(settings.get("estimator")) else None
         usable = isinstance(window, int | float) and not isinstance(window, bool) and window > 0
         self._window = float(window) if usable else WINDOW  # type: ignore[arg-type]
         self._start: float | None = None

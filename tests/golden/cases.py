@@ -67,7 +67,7 @@ def _identified(**settings: Any) -> Callable[[Path], Summary]:
 
 def _of_case(name: str, estimator: str, exact: bool) -> Callable[[Path], Summary]:
     def run(_folder: Path) -> Summary:
-        settings = algid.Settings(estimator=estimator)  # type: ignore[arg-type]
+        settings = algid.Settings(estimator=estimator)
         return summary(algid.identify(*logs(name, exact=exact), settings, report=False))
 
     return run

@@ -51,7 +51,7 @@ def test_paper_observer_and_poles_stay_within_the_paper_s_own_bound() -> None:
 @pytest.mark.parametrize("estimator", ["paper", "weak", "refined"])
 def test_exact_logs_give_the_arm_and_the_payload(estimator: str, wide: tuple[Log, Log]) -> None:
     settings = Settings(
-        estimator=estimator,  # type: ignore[arg-type]
+        estimator=estimator,
         velocity="measured" if estimator == "paper" else "observer",
     )
     result = identify(*wide, settings)
@@ -246,7 +246,7 @@ def test_a_result_names_the_estimator_whose_numbers_it_holds(shared_data: Path) 
     own = identify(
         logs[:2],
         None,
-        Settings(model="coulomb", estimator=result.estimator),  # type: ignore[arg-type]
+        Settings(model="coulomb", estimator=result.estimator),
         profile=profile,
     )
     for name, found in own.parameters.items():
@@ -276,7 +276,7 @@ def test_an_impossible_arm_has_no_status_ok(
 ) -> None:
 
     log = (noisy if estimator == "weak" else wide)[0]
-    result = identify(flipped(log), None, Settings(estimator=estimator))  # type: ignore[arg-type]
+    result = identify(flipped(log), None, Settings(estimator=estimator))
     assert result.parameters["k7"].estimate is not None
     assert result.parameters["k7"].estimate < 0
     statuses = {found.status for found in result.estimates.values()}

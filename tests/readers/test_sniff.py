@@ -14,7 +14,7 @@ import zstandard
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import algid
+from algid.cli.guide import text_of
 from algid.errors import LogError
 from algid.readers import read_log
 from algid.readers.csv import counted_rows
@@ -232,7 +232,7 @@ def test_each_format_is_one_entry() -> None:
 
 
 def test_the_guide_lists_every_format() -> None:
-    guide = (Path(algid.__file__).parent / "guide" / "logs.md").read_text(encoding="utf-8")
+    guide = text_of("logs")
     for form in FORMATS:
         ends = ", ".join(f"`{suffix}`" for suffix in form.suffixes) or "a folder"
         assert f"| {form.title} | {ends} |" in guide

@@ -43,7 +43,7 @@ def test_verdict_reasons_estimates_terms_and_fit_stand_in_25_lines(result: Resul
 @pytest.mark.parametrize("estimator", ["weak", "paper"])
 def test_a_simulated_log_shows_its_errors(estimator: str) -> None:
     logs = algid.synthesise("case1", duration=3.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
-    text = held(algid.identify(*logs, settings=Settings(estimator=estimator)))  # type: ignore[arg-type]
+    text = held(algid.identify(*logs, settings=Settings(estimator=estimator)))
     assert " % " in text
 
 

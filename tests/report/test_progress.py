@@ -111,7 +111,7 @@ def test_nobody_is_told_where_nobody_looks(capsys: pytest.CaptureFixture[str]) -
 @pytest.mark.parametrize("estimator", ["refined", "weak", "paper"])
 def test_every_stage_comes_to_its_end(estimator: str, log: Log, tmp_path: Path) -> None:
     calls: list[tuple[str, int, int]] = []
-    settings = Settings(estimator=estimator)  # type: ignore[arg-type]
+    settings = Settings(estimator=estimator)
     other = replace(log, theta=log.theta + 1e-9)  # the same log twice would be one
     logs = [log, other] if estimator != "paper" else log
     identify(logs, None, settings, out=tmp_path, progress=lambda *c: calls.append(c))

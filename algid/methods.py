@@ -1,0 +1,169 @@
+"""The estimators, one entry each: what each is, what it cannot take, and its function.
+
+Whatever must know the estimators reads this table: settings, the command line and its completion,
+identification, reports and the guide. Adding one is a module and an entry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from algid.estimators.combine import Prior
+    from algid.estimators.fit import Fit
+    from algid.estimators.weak import WeakSettings
+    from algid.progress import Progress
+
+
+@dataclass(frozen=True)
+class Estimator:
+    """An estimator.
+
+    Parameters
+    ----------
+    name : str
+        As ``--estimator`` has it.
+    title : str
+        What it is called in a sentence.
+    does, when : str
+        What it does and when to take it, for the guide.
+    fit : callable or None
+        ``fit(unloaded, loaded, windows, lengths, prior, progress)`` gives a `Fit`. None where
+        estimates are what time series settle to: the paper's method.
+    observer : "zero-phase" or "luenberger"
+        Where its velocities come from, unless the settings say otherwise.
+    lacks : names of settings
+        That mean nothing to it: of the model its terms, of gravity that it is zero.
+    endogenous : bool
+        Whether torque that the model lacks biases it where that torque drives the motion.
+    beside_paper : bool
+        Whether its report shows the paper's convergence too.
+    """
+
+    name: str
+    title: str
+    does: str
+    when: str
+    fit: Callable[..., Fit] | None
+    observer: Literal["zero-phase", "luenberger"] = "zero-phase"
+    lacks: tuple[str, ...] = ()
+    endogenous: bool = True
+    beside_paper: bool = False
+
+
+def _refined(
+    unloaded: Sequence[Any],
+    loaded: Sequence[Any],
+    windows: WeakSettings,
+    lengths: dict[str, float],
+    prior: Prior | None,
+    progress: Progress | None,
+) -> Fit:
+    from algid.estimators import refined
+
+    settings = refined.RefinedSettings(
+        model=windows.model,
+        hold=windows.hold,
+        delay=windows.delay,
+        estimate_delay=windows.estimate_delay,
+        lengths=lengths,
+        prior=prior,
+        weak=windows,
+    )
+    return refined.fit(unloaded, loaded, settings, progress)
+
+
+def _weak(
+    unloaded: Sequence[Any],
+    loaded: Sequence[Any],
+    windows: WeakSettings,
+    lengths: dict[str, float],
+    prior: Prior | None,
+    _: Progress | None,
+) -> Fit:
+    from algid.estimators import weak
+
+    return weak.fit(unloaded, loaded, windows, lengths, prior)
+
+
+def _instruments(
+    unloaded: Sequence[Any],
+    loaded: Sequence[Any],
+    windows: WeakSettings,
+    lengths: dict[str, float],
+    prior: Prior | None,
+    _: Progress | None,
+) -> Fit:
+    from algid.estimators import instruments
+
+    return instruments.fit(unloaded, loaded, windows, lengths, prior)
+
+
+ESTIMATORS: tuple[Estimator, ...] = (
+    Estimator(
+        "refined",
+        "maximum likelihood",
+        "maximum likelihood with noise in angles and torques; noise levels from the data; banded "
+        "Gauss-Newton",
+        "always, first",
+        _refined,
+        beside_paper=True,
+    ),
+    Estimator(
+        "weak",
+        "the weak form",
+        "momentum form under sliding modulating functions, weighted least squares; no acceleration "
+        "anywhere",
+        "very long logs, a first look",
+        _weak,
+    ),
+    Estimator(
+        "instruments",
+        "instrumental variables",
+        "the same windows, with regressors simulated from the measured torque as instruments",
+        "where unmodelled torque drives the motion",
+        _instruments,
+        endogenous=False,
+    ),
+    Estimator(
+        "paper",
+        "the paper's method",
+        "the paper's observer and nested integrals, as time series",
+        "to compare with the paper",
+        None,
+        observer="luenberger",
+        lacks=(
+            "model",
+            "delay",
+            "l1",
+            "l2",
+            "payload_mass",
+            "constrain",
+            "cross_validate",
+            "gravity",
+        ),
+    ),
+)
+"""The default first."""
+NAMES = tuple(one.name for one in ESTIMATORS)
+
+
+def estimator_of(name: str) -> Estimator:
+    """The entry of a name.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
+    found = next((one for one in ESTIMATORS if one.name == name), None)
+    if found is None:
+        raise ValueError(f"estimator must be one of {', '.join(NAMES)}, got {name!r}")
+    return found
+
+
+def settles(name: object) -> bool:
+    """Whether the estimates of the estimator of that name are what time series settle to."""
+    return any(one.name == name and one.fit is None for one in ESTIMATORS)
