@@ -41,15 +41,15 @@ def with_body(fit: Fit) -> Fit:
     across = bool(set(SINES) & set(fit.shared.log_names))  # an offset shows in the sine parts alone
     names = [one.name for one in BODY if across or one.sign == "+"]
     for count in range(len(names), 0, -1):
-        found = [_with(fit, chosen) for chosen in combinations(names, count)]
+        found = [with_body_of(fit, chosen) for chosen in combinations(names, count)]
         worthy = [one for one in found if _least_worth(one) > WORTH]
         if worthy:
             return max(worthy, key=_least_worth)
-    return _with(fit, ()) if fit.shared.body else fit
+    return with_body_of(fit, ()) if fit.shared.body else fit
 
 
-def _with(fit: Fit, body: Sequence[str]) -> Fit:
-    """The fit with these parameters of the body, from the same likelihoods."""
+def with_body_of(fit: Fit, body: Sequence[str]) -> Fit:
+    """The fit with the parameters `body` of the payload, from the same likelihoods."""
     if tuple(body) == fit.shared.body:
         return fit
     shared = replace(fit.shared, body=tuple(body))

@@ -249,8 +249,7 @@ class _Search:
 
     def evidence(self, terms: Sequence[str], beside: Sequence[str]) -> float:
         """Evidence of `terms` less its price."""
-        wald, stretches = self.grams.wald(terms, [*beside, *terms])
-        count = sum(len(term_names(term)) for term in terms)
+        wald, count, stretches = self.grams.wald(terms, [*beside, *terms])
         price = count * (np.log(stretches) + 2 * np.log(max(2, len(self.candidates))))
         # The noise is estimated too, from as many stretches.
         return float(stretches * np.log1p(max(wald, 0.0) / stretches) - price)

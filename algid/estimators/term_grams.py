@@ -171,13 +171,7 @@ class Grams:
         """Places in p of eq. (1) and of `terms`."""
         names = {name for term in terms for name in term_names(term)}
         names |= {name for term in ALWAYS for name in term.names}
-        basic = [place for place, name in enumerate(self.names) if name in names]
-        loaded = [
-            len(self.names) + row
-            for row, place in enumerate(self._rigid)
-            if self.names[place] in names
-        ]
-        return np.array([*basic, *(loaded if self._both else [])])
+        return np.array(self._named(names))
 
     def coefficients(self, terms: Iterable[str]) -> dict[bool, dict[str, float]]:
         """Coefficients by name of the sub-model with `terms`, of unloaded (False) and of loaded logs (True).
@@ -203,13 +197,15 @@ class Grams:
             self._squares[key] = value
         return self._squares[key]
 
-    def wald(self, terms: Sequence[str], among: Sequence[str]) -> tuple[float, float]:
+    def wald(self, terms: Sequence[str], among: Sequence[str]) -> tuple[float, int, float]:
         """How far the coefficients of `terms` are from nothing in the sub-model with the terms `among`.
+
+        Loaded logs have some of their own: a payload may lie off a link's line that is straight.
 
         Returns
         -------
         The smaller of the Wald statistics bᵀ V⁻¹ b by the plain and by the sandwich covariance V,
-        and the independent stretches of log behind them.
+        the coefficients b, and the independent stretches of log behind them.
         """
         columns = self._columns(among)
         key = tuple(columns.tolist())  # each sub-model is asked for by every term that it has
@@ -217,13 +213,21 @@ class Grams:
             self._spreads[key] = self._spread(columns)
         value, covariances, stretches = self._spreads[key]
         names = {name for term in terms for name in term_names(term)}
-        own = np.flatnonzero(
-            np.isin(columns, [place for place, name in enumerate(self.names) if name in names])
-        )
+        own = np.flatnonzero(np.isin(columns, self._named(names)))
         found = [
             float(value[own] @ scaled_pinv(S[np.ix_(own, own)]) @ value[own]) for S in covariances
         ]
-        return min(found), float(stretches)
+        return min(found), own.size, float(stretches)
+
+    def _named(self, names: set[str]) -> list[int]:
+        """Places in p of coefficients by name, the loaded arm's with them."""
+        basic = [place for place, name in enumerate(self.names) if name in names]
+        loaded = [
+            len(self.names) + row
+            for row, place in enumerate(self._rigid)
+            if self.names[place] in names
+        ]
+        return [*basic, *(loaded if self._both else [])]
 
     def _spread(self, columns: IntArray) -> tuple[FloatArray, tuple[FloatArray, FloatArray], int]:
         """Least squares with `columns`, its covariance by white noise and as a sandwich, and independent stretches."""

@@ -223,6 +223,7 @@ def without_nothing(chosen: Selection, fit: Fit, settings: Settings) -> Selectio
         if (term in chosen.model.terms or set(EVERY_TERM[term].names) & set(fit.names))
         and term not in settings.terms
         and all(size.get(name, 0.0) < NOTHING for name in EVERY_TERM[term].names)
+        and not (EVERY_TERM[term].sines and "y_p" in fit.shared.body)  # what tells the payload's
     }
     trials = tuple(
         replace(trial, kept=False, reason="the fit finds it to be zero within its error")

@@ -156,11 +156,12 @@ def test_a_term_that_is_there_predicts_what_was_left_out_and_is_far_from_nothing
         return float(G[-1, -1] - G[kept, -1] @ np.linalg.solve(own, G[kept, -1]))
 
     plain = squares(()) - squares(("coulomb",))
-    wald, stretches = grams.wald(("coulomb",), ("coulomb",))
+    wald, count, stretches = grams.wald(("coulomb",), ("coulomb",))
+    assert count == 2
     assert wald <= plain * (1 + 1e-9)  # the smaller of two
     assert wald > 100
     assert 2 < stretches < 60
-    nothing, _ = grams.wald(("offset",), ("coulomb", "offset"))
+    nothing, *_ = grams.wald(("offset",), ("coulomb", "offset"))
     assert nothing < 15  # χ² of two degrees: beyond once in 1800
 
 

@@ -1,0 +1,207 @@
+"""Arms whose centres of mass lie off the links' lines, and payloads that are bodies: `make planar`.
+
+Five arms, each link's centre of mass 0, 10 or 30° off its line, carry a payload of radius of
+gyration 0, 2, 5 or 15 cm, on link 2's line and 20° off it. Every pair of logs is identified with no
+flag. The first table has what phases and body cost: standard deviations with them over those
+without, on a straight arm. A row of the second gives how many of the 95 % intervals hold the truth,
+by parameter, and how many results failed; phases and inertias of 1 to 3 of their own standard
+deviations, where the logs choose one or the other, are its last rows. Writes `planar.md` into the
+output folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import chain, product
+from math import radians
+from pathlib import Path
+
+import numpy as np
+
+from algid.arm import CONSTANT_NAMES, Arm, FloatArray
+from algid.estimators import refined
+from algid.estimators.body import with_body_of
+from algid.identification.identify import identify
+from algid.log import Log, Origin, Reading
+from algid.model import Model
+from algid.results import Result
+from algid.signals.segments import Segment
+from algid.synth.excitation import wide_multi_sine
+from algid.synth.simulator import SimulatedMotion, simulate
+from pipelines.accuracy_scenes import case_of
+
+ARMS = ("case1", "case2", "arm21", "arm22", "arm23")
+RATE, DURATION = 250.0, 6.0
+SIGMA_THETA, SIGMA_TAU = 3e-4, 1e-2  # rad, N m
+NAMES = (*CONSTANT_NAMES, "k1s", "k2s", "k4s")
+PAYLOAD = ("m_p", "l1", "l2", "y_p", "J_p")
+
+
+@dataclass(frozen=True)
+class Row:
+    """How far centres of mass are off (°), the payload's radius of gyration (m) and direction (°)."""
+
+    centre: float = 0.0
+    radius: float = 0.0
+    off: float = 0.0
+    small: float = 0.0
+    """Phases and inertia are so many of their own standard deviations (`SMALL`)."""
+
+    @property
+    def title(self) -> str:
+        """Its cells."""
+        if self.small:
+            return f"{self.small:g} σ | {self.small:g} σ | 0°"
+        return f"{self.centre:g}° | {100 * self.radius:g} cm | {self.off:g}°"
+
+
+ROWS = (
+    *(Row(*each) for each in product((0.0, 10.0, 30.0), (0.0, 0.02, 0.05, 0.15), (0.0, 20.0))),
+    *(Row(small=size) for size in (1.0, 2.0, 3.0)),
+)
+SMALL = {
+    "case1": (0.1, 4.2e-3),
+    "case2": (0.045, 3.4e-3),
+    "arm21": (0.01, 3.0e-3),
+    "arm22": (0.0084, 5.6e-3),
+    "arm23": (0.0084, 2.9e-3),
+}
+"""Standard deviations of a phase in ° and of a radius of gyration in m, as logs of `Row()` tell them."""
+
+
+def scene(name: str, row: Row) -> tuple[Arm, FloatArray]:
+    """The arm of a row, and m_p, l1, x, y, J of its payload."""
+    case = case_of(name)
+    if row.small:
+        phase, radius = SMALL[name]
+        row = Row(row.small * phase, row.small**0.5 * radius)
+    arm = replace(case.arm, delta1=radians(row.centre), delta2=radians(row.centre))
+    radius = min(row.radius, 0.9 * arm.l2)  # no object reaches past joint 2
+    place = arm.l2 * np.exp(1j * radians(row.off))
+    own = case.payload * radius**2
+    return arm, np.array([case.payload, arm.l1, place.real, place.imag, own])
+
+
+def truth(arm: Arm, payload: FloatArray) -> dict[str, float]:
+    """Every parameter's true value by name."""
+    return dict(zip((*NAMES, *PAYLOAD), [*arm.phasors(), *payload], strict=True))
+
+
+@cache
+def motions(name: str, row: Row) -> tuple[SimulatedMotion, SimulatedMotion]:
+    """The motion of the arm without and with its payload."""
+    arm, payload = scene(name, row)
+    m_p, _, x, y, J = payload.tolist()
+    t = np.arange(round(DURATION * RATE) + 1) / RATE
+    seed = sum(name.encode())
+    straight = case_of(name).arm
+    return (
+        simulate(arm.phasors(), wide_multi_sine(straight, seed), t),
+        simulate(arm.phasors(m_p, x, y, J), wide_multi_sine(straight, seed + 1), t),
+    )
+
+
+def noisy(motion: SimulatedMotion, rng: np.random.Generator, name: str) -> Log:
+    """One draw of a log; a joint may turn as often as it will."""
+    origin = Origin(name, "csv", {}, reading=Reading(accepted=("DEGREES",)))
+    theta = motion.theta + SIGMA_THETA * rng.standard_normal(motion.theta.shape)
+    tau = motion.tau + SIGMA_TAU * rng.standard_normal(motion.tau.shape)
+    return Log(np.round(motion.t * 1e9).astype(np.int64), theta, tau, origin)
+
+
+def drawn(name: str, row: Row, seed: int) -> Result:
+    """The result of one draw."""
+    rng = np.random.default_rng([seed, sum(name.encode())])
+    unloaded, loaded = motions(name, row)
+    logs = noisy(unloaded, rng, "unloaded.csv"), noisy(loaded, rng, "loaded.csv")
+    return identify(*logs, report=False)
+
+
+def judged(job: tuple[str, Row, int]) -> dict[str, bool]:
+    """By parameter whether its interval holds the truth; what is left out is nothing, exactly."""
+    name, row, draws = job[0], job[1], job[2]
+    found: Counter[str] = Counter()
+    true = truth(*scene(name, row))
+    for seed in range(draws):
+        result = drawn(name, row, seed)
+        found["draws"] += 1
+        found["failed"] += result.verdict.failed
+        for parameter, value in true.items():
+            estimate = result.estimates.get(parameter)
+            if estimate is None:
+                found[f"without {parameter}"] += 1
+                continue
+            low, high = estimate.ci95 or (None, None)
+            found[f"held {parameter}"] += low is None or high is None or low <= value <= high
+    return dict(found)
+
+
+def lines(draws: int, rows: tuple[Row, ...], processes: int) -> Iterator[str]:
+    """The table of coverage, row by row."""
+    shown = (*NAMES, *PAYLOAD)
+    yield f"| centres | radius | direction | draws | failed | {' | '.join(shown)} |"
+    yield f"|{'---|' * (5 + len(shown))}"
+    with ProcessPoolExecutor(processes) as pool:
+        for row in rows:
+            total: Counter[str] = Counter()
+            for found in pool.map(judged, [(name, row, draws) for name in ARMS]):
+                total.update(found)
+            cells = []
+            for name in shown:
+                there = total["draws"] - total[f"without {name}"]
+                cells.append(f"{total[f'held {name}']}/{there}" if there else "–")
+            yield f"| {row.title} | {total['draws']} | {total['failed']} | {' | '.join(cells)} |"
+
+
+def costs() -> Iterator[str]:
+    """Standard deviations with phases and the body, over those of the straight arm with a point."""
+    shown = (*CONSTANT_NAMES, "m_p")
+    yield f"| arm | {' | '.join(shown)} |"
+    yield f"|{'---|' * (1 + len(shown))}"
+    for name in ARMS:
+        rng = np.random.default_rng(0)
+        unloaded, loaded = (_segment(motion, rng) for motion in motions(name, Row()))
+        plain, general = (
+            refined.fit(
+                [lambda: [unloaded]],
+                [lambda: [loaded]],
+                refined.RefinedSettings(model=Model(terms)),
+            )
+            for terms in ((), ("phases",))
+        )
+        general = with_body_of(general, ("y_p", "J_p"))
+        ratios = [
+            general.std[general.names.index(one)] / plain.std[plain.names.index(one)]
+            for one in shown
+        ]
+        yield f"| {name} | {' | '.join(f'{ratio:.3f}' for ratio in ratios)} |"
+
+
+def _segment(motion: SimulatedMotion, rng: np.random.Generator) -> Segment:
+    log = noisy(motion, rng, "log")
+    return Segment(0.0, 1 / RATE, log.theta, log.tau)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--draws", type=int, default=40, help="of each arm and row")
+    parser.add_argument("--rows", type=int, nargs="*", help="numbers of rows, by default all")
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("-o", "--output", type=Path, default=Path("build/planar"))
+    given = parser.parse_args()
+    rows = ROWS if given.rows is None else tuple(ROWS[number] for number in given.rows)
+    text = []
+    for line in chain(costs(), [""], lines(given.draws, rows, given.processes)):
+        print(line, flush=True)
+        text.append(line)
+    given.output.mkdir(parents=True, exist_ok=True)
+    (given.output / "planar.md").write_text("\n".join([*text, ""]), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,49 @@
+"""Planar arms in general: centres of mass off the links' lines, payloads that are bodies."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.identification.identify import identify
+from algid.log import Log, Origin
+from algid.synth.cases import load_case
+from algid.synth.excitation import wide_multi_sine
+from algid.synth.simulator import simulate
+
+RATE, DURATION = 250.0, 4.0
+SIGMA_THETA, SIGMA_TAU = 3e-4, 1e-2  # rad, N m
+CHANCE = 4.5  # standard deviations: once in 150 000
+
+
+def moved(constants: FloatArray, seed: int) -> Log:
+    """A log of the paper's first arm with these constants, under a wide torque."""
+    t = np.arange(round(DURATION * RATE) + 1) / RATE
+    motion = simulate(constants, wide_multi_sine(load_case("case1").arm, seed), t)
+    rng = np.random.default_rng(seed)
+    return Log(
+        np.round(t * 1e9).astype(np.int64),
+        motion.theta + SIGMA_THETA * rng.standard_normal(motion.theta.shape),
+        motion.tau + SIGMA_TAU * rng.standard_normal(motion.tau.shape),
+        Origin(f"{seed}.csv", "csv", {}),
+    )
+
+
+def test_a_payload_off_the_line_of_a_straight_arm_is_found() -> None:
+    case = load_case("case1")
+    x, y, J = 0.9 * case.arm.l2, 0.3 * case.arm.l2, 2e-4
+    result = identify(
+        moved(case.arm.phasors(), 1),
+        moved(case.arm.phasors(case.payload, x, y, J), 2),
+        report=False,
+    )
+    assert result.fit is not None
+    assert result.fit.model is not None
+    assert result.fit.model.terms == ["phases"]
+    assert result.fit.intervals == "likelihood"  # not refuted
+    truth = {"m_p": case.payload, "l1": case.arm.l1, "l2": x, "y_p": y, "J_p": J, "k1s": 0.0}
+    for name, value in truth.items():
+        found = result.estimates[name]
+        assert found.estimate is not None
+        assert found.std
+        assert abs(found.estimate - value) < CHANCE * found.std, name
