@@ -26,6 +26,7 @@ import numpy as np
 from algid.arm import CONSTANT_NAMES, Arm, FloatArray
 from algid.estimators import refined
 from algid.estimators.body import with_body_of
+from algid.estimators.fit import Fit
 from algid.identification.identify import identify
 from algid.log import Log, Origin, Reading
 from algid.model import Model
@@ -122,7 +123,7 @@ def drawn(name: str, row: Row, seed: int) -> Result:
     return identify(*logs, report=False)
 
 
-def judged(job: tuple[str, Row, int]) -> dict[str, bool]:
+def judged(job: tuple[str, Row, int]) -> dict[str, int]:
     """By parameter whether its interval holds the truth; what is left out is nothing, exactly."""
     name, row, draws = job[0], job[1], job[2]
     found: Counter[str] = Counter()
@@ -165,21 +166,20 @@ def costs() -> Iterator[str]:
     yield f"|{'---|' * (1 + len(shown))}"
     for name in ARMS:
         rng = np.random.default_rng(0)
-        unloaded, loaded = (_segment(motion, rng) for motion in motions(name, Row()))
-        plain, general = (
-            refined.fit(
-                [lambda: [unloaded]],
-                [lambda: [loaded]],
-                refined.RefinedSettings(model=Model(terms)),
-            )
-            for terms in ((), ("phases",))
-        )
-        general = with_body_of(general, ("y_p", "J_p"))
+        logs = [_segment(motion, rng) for motion in motions(name, Row())]
+        plain = _fitted(logs, Model())
+        general = with_body_of(_fitted(logs, Model(("phases",))), ("y_p", "J_p"))
         ratios = [
             general.std[general.names.index(one)] / plain.std[plain.names.index(one)]
             for one in shown
         ]
         yield f"| {name} | {' | '.join(f'{ratio:.3f}' for ratio in ratios)} |"
+
+
+def _fitted(logs: list[Segment], model: Model) -> Fit:
+    unloaded, loaded = logs
+    settings = refined.RefinedSettings(model=model)
+    return refined.fit([lambda: [unloaded]], [lambda: [loaded]], settings)
 
 
 def _segment(motion: SimulatedMotion, rng: np.random.Generator) -> Segment:
