@@ -1,4 +1,7 @@
-"""A term added, and terms left out, in a copy of the package: everything that names terms follows by itself."""
+"""Entries added and left out in a copy of the package: everything that names them follows by itself.
+
+A term, a unit, a format, a check with its notice, and an estimator are added, three terms left out.
+"""
 
 from __future__ import annotations
 
@@ -32,8 +35,65 @@ TOY = Term(
     columns=(TorqueColumn("g6", f=(NOTHING, Expression({(SINE,): 1.0}))),),
 )
 '''
+READER = '''"""Logs that begin with a line TOYLOG: a table of text."""
+
+from algid.readers.arrays import Content, open_content
+from algid.readers.formats import Entry
+
+
+def table(path):
+    import polars as pl
+
+    return pl.read_csv(path, skip_rows=1)
+
+
+def opened(path, profile):
+    frame = table(path)
+    return open_content(str(path), "toy", Content(frame, len(frame)), profile)
+
+
+def entries(path):
+    frame = table(path)
+    return tuple(Entry(name, str(kind), len(frame)) for name, kind in frame.schema.items())
+'''
+FORMAT = """    FileFormat(
+        "toy",
+        "Toy log",
+        (".toy",),
+        begins(b"TOYLOG"),
+        lambda path, profile: import_module("algid.readers.toy").opened(path, profile),
+        lambda path: import_module("algid.readers.toy").entries(path),
+    ),
+"""
+CHECK = '''"""A check that always finds something."""
+
+from algid.notices import Notice, Remedy
+
+
+def toys(log):
+    yield Notice(
+        "TOY_SEEN", numbers={"count": len(log)}, remedies=(Remedy({"zero": "hanging"}),)
+    )
+'''
+ESTIMATOR = '''"""The weak form under another name."""
+
+from dataclasses import replace
+
+from algid.estimators import weak
+
+
+def fit(unloaded, loaded, windows, lengths, prior, progress):
+    return replace(weak.fit(unloaded, loaded, windows, lengths, prior), estimator="toy")
+'''
+ENTRY = """    Estimator(
+        "toy",
+        "the toy's form",
+        "what the weak form does",
+        "in tests",
+        lambda *given: import_module("algid.estimators.toy").fit(*given),
+    ),
+"""
 TRIAL = """
-import subprocess, sys
 import numpy as np
 from typer.testing import CliRunner
 import algid
@@ -84,12 +144,76 @@ c = np.array([result.parameters[name].estimate for name in model.names])
 one = np.array([[0.3], [0.4]])
 ours = torque(model, c, Motion(one, one, one))[:, 0]
 np.testing.assert_allclose(module["inverse_dynamics"]([0.3, 0.4], [0.3, 0.4], [0.3, 0.4]), ours, rtol=1e-12)
+
+# the command line
+from pathlib import Path
+from algid.cli.app import COMMANDS, gathered
+def called(*words):
+    return CliRunner().invoke(gathered(COMMANDS), [*map(str, words)])
+shown = " ".join(called("identify", "--help").stdout.replace("│", " ").split())
+assert "coulomb, toy, offset" in shown and "toy" in shown.split("--estimator")[1][:60], shown
+assert '"N mm"' in shown and "stribeck" not in shown and "gain," not in shown, shown
+for page, row in (
+    ("logs", "| Toy log | `.toy` |"),
+    ("logs", "| `N mm` | torque |"),
+    ("estimators", "| `toy` | what the weak form does | in tests |"),
+):
+    assert row in text_of(page), row
+
+# a log in the added format, its torques in the added unit, identified by the added estimator
+table = np.column_stack([log.t, *log.theta, *(1e3 * log.tau)])[::4]
+head = "t,theta1,theta2,tau1 [N mm],tau2 [N mm]"
+toy = Path("arm.toy")
+toy.write_text("TOYLOG\\n" + head + "\\n" + "\\n".join(",".join(map(repr, map(float, row))) for row in table) + "\\n")
+from algid.batches.discover import jobs_of
+assert [job.name for job in jobs_of([str(toy.parent.absolute())], "results")] == ["arm"]
+from algid.cli.completion import of_profile
+assert of_profile("unit", "tau1")("N m") == ["N m", "N mm"]
+assert called("convert", toy, "arm.csv").exit_code == 0
+assert abs(np.loadtxt("arm.csv", delimiter=",", skiprows=1)[0, 3] - log.tau[0, 0]) < 1e-12
+seen = called("inspect", toy, "--set", 'tau1.unit="N mm"').stdout
+assert "toy" in seen and f"{len(table):d} toys" in seen and "--zero hanging" in seen, seen
+done = called("identify", toy, "--estimator", "toy", "--model", "plain", "--no-report")
+assert done.exit_code == 0, done.output
+found = algid.read_result("arm.algid")
+assert found.estimator == "toy" and [n.code for n in found.notices].count("TOY_SEEN") == 1, found.notices
 print("all follow", here)
 """
 
 
+def inserted(path: Path, before: str, text: str) -> None:
+    """Put `text` before the one place where `before` stands."""
+    content = path.read_text(encoding="utf-8")
+    assert content.count(before) == 1, (path, before)
+    path.write_text(content.replace(before, text + before), encoding="utf-8")
+
+
+def add_toys(package: Path) -> None:
+    """An entry in each registry but that of terms: a module, and a line or an entry."""
+    inserted(
+        package / "units.py",
+        '    Unit("N cm"',
+        '    Unit("N mm", ("torque",), 1e-3, "nmm n-mm"),\n',
+    )
+    (package / "readers" / "toy.py").write_text(READER)
+    formats = package / "readers" / "formats.py"
+    inserted(formats, '    FileFormat("mcap"', FORMAT)
+    inserted(formats, "from pathlib import Path\n", "from importlib import import_module\n")
+    (package / "inspection" / "toy.py").write_text(CHECK)
+    checks = package / "inspection" / "checks.py"
+    inserted(checks, "        *rests(log, whole),\n", "        *toys(log),\n")
+    inserted(checks, "from algid.log import", "from algid.inspection.toy import toys\n")
+    inserted(
+        package / "notices.py", "    # of tracks\n", '    "TOY_SEEN": "{count:# toy|toys} seen",\n'
+    )
+    (package / "estimators" / "toy.py").write_text(ESTIMATOR)
+    methods = package / "methods.py"
+    inserted(methods, '    Estimator(\n        "paper"', ENTRY)
+    inserted(methods, "from typing import TYPE", "from importlib import import_module\n")
+
+
 @pytest.mark.slow
-def test_terms_added_and_left_out_need_nothing_else_touched(tmp_path: Path) -> None:
+def test_entries_added_and_left_out_need_nothing_else_touched(tmp_path: Path) -> None:
     package = tmp_path / "algid"
     shutil.copytree(
         Path(algid.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__")
@@ -101,12 +225,14 @@ def test_terms_added_and_left_out_need_nothing_else_touched(tmp_path: Path) -> N
     for name in ("stribeck", "gain", "delay"):
         (folder / f"{name}.py").unlink()
         text = text.replace(f"from algid.physics.terms.{name} import {name.upper()}\n", "")
-        text = text.replace(f"{name.upper()}, ", "").replace(f", {name.upper()}", "")
+        assert f"    {name.upper()},\n" in text
+        text = text.replace(f"    {name.upper()},\n", "")
     text = text.replace(
         "from algid.physics.terms.viscous",
         "from algid.physics.terms.toy import TOY\nfrom algid.physics.terms.viscous",
     )
-    registry.write_text(text.replace("(COULOMB, ", "(COULOMB, TOY, "))
+    registry.write_text(text.replace("    COULOMB,\n", "    COULOMB,\n    TOY,\n"))
+    add_toys(package)
     environment = {**os.environ, "PYTHONPATH": str(tmp_path), "OPENBLAS_NUM_THREADS": "1"}
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", TRIAL],
