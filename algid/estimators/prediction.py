@@ -16,8 +16,9 @@ gram    X Xᵀ by joint: the residual of any c is (−c, 1) gram (−c, 1)ᵀ   
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from algid.arm import FloatArray
 from algid.estimators.combine import left_out
 from algid.estimators.fit import Fit
 from algid.estimators.weak import Source
-from algid.model import Model, Motion, regressor
+from algid.model import Model, Motion, regressor, torque
 from algid.signals.filters import butterworth, correlate, smoother
 from algid.signals.segments import Cutter, Segment
 
@@ -152,9 +153,11 @@ class PredictionSums:
 
     def _add(self, piece: Segment) -> None:
         shift = seconds(self._shift, piece.dt)
-        if self._at is not None:  # a logged torque that lags shows at its stamp what acted before
+        if self._at is not None:
             shift -= self._model.lag(self._at)
-        X = _filtered(self._model, piece, shift, self._by, self._at)
+        _, X = _filtered(partial(regressor, self._model, c=self._at), piece, shift, self._by)
+        if not X.size:
+            return
         self._count += X.shape[2]
         self._torque = self._torque + X[:, -1].sum(axis=1)
         self._gram += X @ X.swapaxes(1, 2)
@@ -166,15 +169,18 @@ def seconds(shift: Shift, dt: float) -> float:
 
 
 def _filtered(
-    model: Model, piece: Segment, shift: float, by: PredictionFilter, at: FloatArray | None
-) -> FloatArray:
-    """X (2, q + 1, n) of a piece: see the module's table."""
-    signals, dt = _decimated(piece, by)
+    rows: Callable[[Motion], FloatArray], piece: Segment, shift: float, by: PredictionFilter
+) -> tuple[FloatArray, FloatArray]:
+    """Times (n,) in s and X (2, q + 1, n) of a piece, out of `rows` (2, q, n) of its motion: see the module's table.
+
+    Empty where the piece is too short.
+    """
+    signals, dt, first = _decimated(piece, by)
     edge = round(by.dropped / dt)
     if signals.shape[1] <= max(2 * edge + 2, 6 * (by.order + 1)):
-        return np.zeros((2, len(model.names) + 1, 0))
+        return np.zeros(0), np.zeros((2, 0, 0))
     theta = butterworth(signals[:2], dt, min(by.motion, 0.45 / dt), by.order)
-    Y = regressor(model, motion_of(theta, dt), at)
+    Y = rows(motion_of(theta, dt))
     if shift:
         place = np.arange(signals.shape[1]) + shift / dt
         whole = np.clip(np.floor(place).astype(np.int64), 0, signals.shape[1] - 2)
@@ -182,17 +188,56 @@ def _filtered(
     X = np.concatenate([Y, signals[2:, None]], axis=1)
     felt = X.any(axis=2)  # k4 is nothing to joint 2, k7 to joint 1
     X[felt] = butterworth(X[felt], dt, min(by.cutoff, 0.45 / dt), by.order)
-    return X[:, :, edge : signals.shape[1] - edge]
+    kept = np.arange(edge, signals.shape[1] - edge)
+    return first + dt * kept, X[:, :, edge : signals.shape[1] - edge]
 
 
-def _decimated(piece: Segment, by: PredictionFilter) -> tuple[FloatArray, float]:
-    """Angles and torques (4, n) at the rate that the filter asks for, and the time between them in s."""
+def _decimated(piece: Segment, by: PredictionFilter) -> tuple[FloatArray, float, float]:
+    """Angles and torques (4, n) at the rate that the filter asks for, the time between them and of the first, in s."""
     step = int(1 / (_PER_CUTOFF * by.motion * piece.dt))
     signals = np.concatenate([piece.theta, piece.tau])
     kernel = smoother(piece.dt, _SHARPER * by.motion)
     if step < 2 or signals.shape[1] < kernel.size:
-        return signals, piece.dt
-    return correlate(signals, kernel, step), step * piece.dt
+        return signals, piece.dt, piece.start
+    first = piece.start + piece.dt * (kernel.size // 2)
+    return correlate(signals, kernel, step), step * piece.dt, first
+
+
+@dataclass(frozen=True, eq=False)
+class ScoredTorque:
+    """Times (n,) in s, the torque that is scored and its prediction (2, n) in N m."""
+
+    t: FloatArray
+    measured: FloatArray
+    predicted: FloatArray
+
+
+def scored_torque(
+    model: Model,
+    c: FloatArray,
+    segments: Iterable[Segment],
+    shift: Shift = 0.0,
+    by: PredictionFilter | None = None,
+) -> Iterator[ScoredTorque]:
+    """What `score` scores, piece by piece: both torques as the filters leave them.
+
+    A piece that is too short to be scored is left out.
+    """
+    by = by or PredictionFilter()
+    cutter: Cutter | None = None
+
+    def scored(piece: Segment) -> Iterator[ScoredTorque]:
+        lag = seconds(shift, piece.dt) - model.lag(c)
+        t, X = _filtered(lambda motion: torque(model, c, motion)[:, None], piece, lag, by)
+        if X.size:
+            yield ScoredTorque(t, X[:, 1], X[:, 0])
+
+    for segment in segments:
+        cutter = cutter or Cutter(max(1, round(_PIECE_SECONDS / segment.dt)))
+        for piece in cutter.push(segment):
+            yield from scored(piece)
+    for piece in cutter.finish() if cutter else ():
+        yield from scored(piece)
 
 
 def motion_of(theta: FloatArray, dt: float) -> Motion:

@@ -17,7 +17,7 @@ from algid.estimators.fit import Fit
 from algid.estimators.innovations import ResidualSums, autocorrelation, spectra, whiteness_of
 from algid.estimators.noise import first_guess
 from algid.estimators.paper import PaperSeries
-from algid.estimators.prediction import PredictionFilter
+from algid.estimators.prediction import PredictionFilter, scored_torque
 from algid.estimators.running import has_running, running
 from algid.identification.survey import Survey
 from algid.model import Model, Motion, inertia, torque
@@ -98,6 +98,34 @@ def _bandwidth(piece: Segment, model: Model, c: FloatArray) -> float:
     )
     sharpest = (allowed / np.maximum(noise, 1e-300)) ** 0.4
     return float(np.clip(sharpest.min(), LOWEST, min(HIGHEST, 0.1 / piece.dt)))
+
+
+SCORED_RATE = 10.0
+"""Samples a period of the highest frequency that is scored."""
+
+
+def scored_blocks(
+    survey: Survey,
+    model: Model,
+    coefficients: Mapping[str, FloatArray],
+    shift: Callable[[float], float],
+) -> Iterator[dict[str, FloatArray]]:
+    """The torque that is scored and its prediction, of every log; arguments as `torque_blocks`."""
+    by = PredictionFilter()
+    for number, log in enumerate(survey.logs):
+        for piece in scored_torque(model, coefficients[log.role], survey.segments(log), shift, by):
+            dt = float(piece.t[1] - piece.t[0]) if piece.t.size > 1 else 1.0
+            each = slice(None, None, max(1, int(1 / (SCORED_RATE * by.cutoff * dt))))
+            measured, predicted = piece.measured[:, each], piece.predicted[:, each]
+            t = piece.t[each]
+            yield {
+                "log": np.full(t.size, number, dtype=np.int32),
+                "t": t,
+                "tau1": measured[0],
+                "tau2": measured[1],
+                "tau1_predicted": predicted[0],
+                "tau2_predicted": predicted[1],
+            }
 
 
 START_KEY = b"start_ns"
@@ -226,7 +254,8 @@ def write_fit_series(
 ) -> None:
     """Write the time series of a fit, and what its `residual` looks like.
 
-    `torque.parquet`, `information.parquet`, `running.parquet` (not of a fit that was held within
+    `torque.parquet`, `scored.parquet` (of logs long enough to be scored), `information.parquet`,
+    `running.parquet` (not of a fit that was held within
     bounds or did not converge) and, where there is a residual, `innovations.parquet`.
     """
     summaries = [survey.summary(log) for log in survey.logs]
@@ -234,8 +263,12 @@ def write_fit_series(
     coefficients: dict[str, FloatArray] = {
         role: torque_coefficients(fit, role) for role in {log.role for log in survey.logs}
     }
-    torques = torque_blocks(survey, fit.shared.model, coefficients, torque_shift(settings, fit))
+    model, shift = fit.shared.model, torque_shift(settings, fit)
+    torques = torque_blocks(survey, model, coefficients, shift)
     write_columns(folder / "torque.parquet", torques, starts)
+    write_columns(
+        folder / "scored.parquet", scored_blocks(survey, model, coefficients, shift), starts
+    )
     durations = [summary.duration for summary in summaries]
     every = len(fit.logs) == len(
         summaries

@@ -21,10 +21,10 @@ from algid.report.figures.innovations import TITLE as INNOVATIONS
 from algid.report.figures.innovations import innovations
 from algid.report.figures.running import TITLE as RUNNING
 from algid.report.figures.running import running
-from algid.report.figures.torque import CLOSEUP, closeup, signals, torque
+from algid.report.figures.torque import CLOSEUP, Scored, closeup, signals, torque
 from algid.report.figures.torque import TITLE as TORQUE
 from algid.report.reduce import LARGEST
-from algid.report.series import TorqueLog, read_torque
+from algid.report.series import TorqueLog, read_scored, read_torque
 from algid.results import Estimate, Result
 
 T = TypeVar("T")
@@ -62,7 +62,7 @@ def gallery(folder: Path, result: Result, progress: Progress | None = None) -> G
     if isinstance(found, Missing):
         figures.append(found)
     else:
-        figures.append(torque(found, result.logs))
+        figures.append(torque(found, result.logs, _scored(folder / "scored.parquet", result)))
         if found.reduced:
             figures.append(_try("closeup", CLOSEUP, torques, lambda: closeup(torques, found)))
     figures.append(_try("innovations", INNOVATIONS, left, lambda: innovations(left, result)))
@@ -78,6 +78,14 @@ def gallery(folder: Path, result: Result, progress: Progress | None = None) -> G
             _try("loaded", LOADED, loaded, lambda: convergence(loaded, result, loaded=True))
         )
     return Gallery(read, figures, paper)
+
+
+def _scored(path: Path, result: Result) -> Scored | None:
+    """The torque that is scored; None of a result that scores none, or one of an earlier version."""
+    score = None if result.fit is None else result.fit.residual
+    if score is None or not path.is_file():
+        return None
+    return Scored(read_scored(path), score)
 
 
 def drawable(result: Result) -> Result:

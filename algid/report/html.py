@@ -247,7 +247,7 @@ def _legend(figure: Figure) -> str:
         words = f'{swatch}<span class="words">{escaped(entry.words)}</span>'
         data = f'data-figure="{figure.key}" data-group="{escaped(entry.group)}"'
         entries.append(
-            f'<button type="button" aria-pressed="true" {data}>{words}</button>'
+            f'<button type="button" aria-pressed="{str(entry.shown).lower()}" {data}>{words}</button>'
             if entry.group
             else f'<span class="entry">{words}</span>'
         )

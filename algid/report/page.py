@@ -21,8 +21,8 @@ from algid.report.tables import (
     log_tables,
     quality_tables,
     result_provenance,
-    settings_table,
     terms_tables,
+    used_settings,
 )
 from algid.results import Result, read_result
 from algid.text import file_name, significant
@@ -122,7 +122,7 @@ def result_document(result: Result, shown: Gallery | None = None) -> Document:
         Section(fit_tables(result), "fit", "What the estimator knows of the logs"),
         Section((notes, *data), "data", "Data quality"),
         Section(
-            (settings_table(result.settings), result_provenance(result)),
+            (used_settings(result), result_provenance(result)),
             "settings",
             "Settings and provenance",
         ),

@@ -6,6 +6,7 @@ import base64
 import html
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -71,9 +72,12 @@ def _save(figure: Figure, stream: Any, form: Form) -> None:
     )
     colours = Colours()
     cells = sheet.add_gridspec(rows, columns)
-    for place, panel in enumerate(figure.panels):
+    hidden = {entry.group for entry in figure.legend if not entry.shown}
+    for place, whole in enumerate(figure.panels):
+        seen = [trace for trace in whole.traces if trace.get("legendgroup") not in hidden]
+        panel = replace(whole, traces=seen)
         _panel(sheet, cells[place // columns, place % columns], panel, colours)
-    marks = [_mark(entry, colours) for entry in figure.legend]
+    marks = [_mark(entry, colours) for entry in figure.legend if entry.shown]
     if marks:
         sheet.legend(
             handles=marks, loc="outside upper left", ncols=min(len(marks), 3), frameon=False

@@ -172,6 +172,8 @@ COLUMNS = (
     "tau2_predicted",
 )
 SERIES = (*COLUMNS[2:], "residual1", "residual2")
+SCORED = ("tau1", "tau2", "tau1_predicted", "tau2_predicted")
+SCORED_POINTS = 1_200  # of a curve without anything fast in it
 POINTS = 2_400  # a series; twice what the page is wide
 DOTS = 2_000
 LONGEST_GAP = 5  # sampling periods; longer breaks the line
@@ -300,3 +302,29 @@ class _Gathering:
             worst={joint: (log, moment) for joint, (_, log, moment) in self.worst.items()},
             reduced=self.size > 2,
         )
+
+
+def read_scored(path: Path) -> dict[int, dict[str, Series]]:
+    """The torque that is scored, its prediction and their difference, by log and name as in a `TorqueLog`.
+
+    Raises `ResultError` where `path` cannot be read or lacks a column.
+    """
+    size = bucket_size(row_count(path), SCORED_POINTS)
+    reducers: dict[int, dict[str, MinMax]] = {}
+    steps: dict[int, float] = {}
+    for log, block in by_log(blocks(path, ("log", "t", *SCORED))):
+        block |= {f"residual{j}": block[f"tau{j}"] - block[f"tau{j}_predicted"] for j in (1, 2)}
+        own = reducers.setdefault(
+            log, {name: MinMax(size) for name in (*SCORED, "residual1", "residual2")}
+        )
+        for name, reducer in own.items():
+            reducer.feed(block["t"], block[name])
+        if block["t"].size > 1:
+            steps.setdefault(log, float(np.median(np.diff(block["t"]))))
+    return {
+        log: {
+            name: broken_at_gaps(*reducer.result(), LONGEST_GAP * size * steps.get(log, np.inf))
+            for name, reducer in own.items()
+        }
+        for log, own in reducers.items()
+    }

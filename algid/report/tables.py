@@ -159,6 +159,45 @@ def settings_table(settings: Mapping[str, Any]) -> Table:
     )
 
 
+def used_settings(result: Result) -> Table:
+    """The settings as they were used, and what was asked for where that is something else.
+
+    How the first log of each kind was read stands below them.
+    """
+    used, asked = flat_settings(result.settings), {}
+    for name, value in _found(result).items():
+        if value != used.get(name):
+            asked[name], used[name] = used.get(name, ABSENT), value
+    for log in {log.role: log for log in reversed(result.logs)}.values():
+        if log.reading is not None:
+            used |= {
+                f"{log.role} log: {name.replace('_', ' ')}": setting_text(
+                    getattr(log.reading, name)
+                )
+                for name in CONVENTIONS
+            }
+    rows = tuple(
+        (visible(name), visible(value, LONGEST_VALUE), visible(asked.get(name, ABSENT)))
+        for name, value in used.items()
+    )
+    columns = (Column("Setting", "name"), Column("Used", "text"), Column("Asked for", "text"))
+    return Table("Settings", columns, rows, depth=Depth.PAGE).without_empty()
+
+
+def _found(result: Result) -> dict[str, str]:
+    """The settings that the logs decided: estimator, terms of the torque, delay."""
+    found = {"estimator": result.estimator}
+    model = None if result.fit is None else result.fit.model
+    delay = result.parameters.get("delay")
+    if model is not None:
+        terms = [*model.terms, *(["delay"] if delay is not None else [])]
+        shape = f" (Coulomb friction over {significant(model.coulomb_speed, 2)} rad/s)"
+        found["model"] = (", ".join(terms) or "plain") + (shape if "coulomb" in terms else "")
+    if delay is not None and delay.estimate is not None:
+        found["delay"] = f"{1e3 * delay.estimate:.3g} ms".replace("-", "−")
+    return found
+
+
 def flat_settings(settings: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
     """Settings by dotted name, each value as text."""
     flat: dict[str, str] = {}
@@ -234,6 +273,8 @@ def quality_tables(torque: TorqueLog | None, result: Result) -> tuple[Table, ...
     return (Table("Samples that were used", columns, rows, note, Depth.PAGE),)
 
 
+CONVENTIONS = ("zero", "second_angle", "drive", "signs", "offsets")
+"""How the angles and torques of a log were taken."""
 ESTIMATE_COLUMNS = (
     Column("Parameter", "name"),
     Column("Estimate", "number"),

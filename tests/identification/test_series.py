@@ -10,16 +10,19 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from scipy.signal import butter, filtfilt
 
 from algid.arm import FloatArray, with_payload
 from algid.estimators.combine import LogInformation
 from algid.estimators.innovations import residual_sums
 from algid.estimators.paper import PaperSeries
+from algid.estimators.prediction import score
 from algid.identification import series
 from algid.identification.series import (
     START_KEY,
     information_blocks,
     innovation_rows,
+    scored_blocks,
     series_blocks,
     torque_blocks,
     torque_coefficients,
@@ -249,13 +252,24 @@ def test_a_fits_series_stand_in_its_folder(
         np.random.default_rng(0).standard_normal((4, 4000)), DT
     )  # torques beside it
     write_fit_series(tmp_path, fit, survey, Settings(), residual)
-    names = ["information.parquet", "innovations.parquet", "running.parquet", "torque.parquet"]
+    names = [
+        "information.parquet",
+        "innovations.parquet",
+        "running.parquet",
+        "scored.parquet",
+        "torque.parquet",
+    ]
     assert sorted(path.name for path in tmp_path.iterdir()) == names
     for name in names:
         assert json.loads(pq.read_schema(tmp_path / name).metadata[START_KEY]) == [
             7_000_000_000,
             90_000_000_000,
         ]
+    scored = pq.read_table(tmp_path / "scored.parquet").to_pydict()
+    assert set(scored["log"]) == {0, 1}
+    assert min(scored["t"]) == pytest.approx(0.3, abs=0.05)  # what is dropped at the ends
+    assert max(scored["t"]) == pytest.approx(3.7, abs=0.05)
+    assert len(scored["t"]) < 2 * 3.4 * 70  # 50 Hz tell all that lies below 5 Hz
     torques = pq.read_table(tmp_path / "torque.parquet")
     assert torques.num_rows == 2 * 2001
     running = pq.read_table(tmp_path / "running.parquet").to_pydict()
@@ -267,13 +281,34 @@ def test_a_fits_series_stand_in_its_folder(
     assert set(running) == {"log", "t", *fit.names, *(f"{name}_half" for name in fit.names)}
 
 
+def test_the_torque_in_the_file_is_the_one_that_is_scored(
+    both: tuple[tuple[Log, FloatArray], tuple[Log, FloatArray]],
+) -> None:
+    """Its residual's RMS is the score's, which a regressor made on another way; a wrong arm leaves one."""
+    survey = Survey([open_source(both[0][0], "unloaded")])
+    wrong = K * np.array([1, 1, 1.1, 0.9, 1, 1, 1.05])
+    (block,) = scored_blocks(survey, Model(), {"unloaded": wrong}, lambda _: 0.0)
+    found = score(Model(), wrong, survey.segments(survey.logs[0]))
+    for joint in (1, 2):
+        residual = block[f"tau{joint}"] - block[f"tau{joint}_predicted"]
+        assert np.sqrt(np.mean(residual**2)) == pytest.approx(found.rmse[joint - 1], rel=0.02)
+        spectrum = np.abs(np.fft.rfft(block[f"tau{joint}"] * np.hanning(block["t"].size))) ** 2
+        frequency = np.fft.rfftfreq(block["t"].size, float(np.diff(block["t"]).mean()))
+        assert spectrum[frequency > 10].sum() < 1e-3 * spectrum.sum()
+    tau, t = both[0][0].tau, DT * np.arange(2001)
+    slow = filtfilt(*butter(3, 5.0, fs=1 / DT), tau, axis=1)  # of another library
+    np.testing.assert_allclose(
+        block["tau1"], np.interp(block["t"], t, slow[0]), atol=0.01 * np.abs(tau).max()
+    )
+
+
 def test_a_fit_held_within_bounds_or_of_fewer_logs_lacks_what_it_cannot_tell(
     both: tuple[tuple[Log, FloatArray], tuple[Log, FloatArray]], tmp_path: Path
 ) -> None:
     survey = Survey([open_source(both[0][0], "unloaded"), open_source(both[1][0], "loaded")])
     fit = fit_of()
     write_fit_series(tmp_path, replace(fit, logs=fit.logs[:1]), survey, Settings(), None)
-    assert [path.name for path in tmp_path.iterdir()] == ["torque.parquet"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["scored.parquet", "torque.parquet"]
 
 
 def test_innovations_of_white_noise_lie_in_their_band() -> None:

@@ -24,10 +24,10 @@ from algid.report.figures.information import information
 from algid.report.figures.innovations import CORRELATION, SPECTRUM, TORQUE, innovations
 from algid.report.figures.running import running
 from algid.report.figures.timeline import chained, offsets, separators, views
-from algid.report.figures.torque import closeup, signals, torque
+from algid.report.figures.torque import Scored, closeup, signals, torque
 from algid.report.gallery import drawable
-from algid.report.series import LogRange, TorqueLog, read_torque
-from algid.results import Estimate, Result
+from algid.report.series import LogRange, TorqueLog, read_scored, read_torque
+from algid.results import Estimate, Result, TorquePrediction
 
 
 def values(typed: dict[str, str]) -> FloatArray:
@@ -384,6 +384,42 @@ def test_torques_and_signals_hold_the_extremes_of_their_logs(
     assert [trace.get("yaxis", "y") for trace in first.traces] == ["y", "y", "y2"]
     rms = float(np.sqrt(np.mean(rows["tau1"].to_numpy() ** 2)))
     assert f"RMS {rms:.3g} N m; residual" in first.says
+
+
+def test_the_first_figure_draws_what_is_scored_and_hides_what_was_recorded(
+    case_folder: Path, result: Result, tmp_path: Path
+) -> None:
+    found = read_torque(case_folder / "torque.parquet")
+    t = np.arange(0.3, 9.7, 0.02)
+    predicted = {f"tau{j}_predicted": np.sin(t + j) for j in (1, 2)}
+    measured = {f"tau{j}": np.sin(t + j) + 0.1 * j for j in (1, 2)}
+    path = _parquet(
+        tmp_path / "scored.parquet", log=np.zeros(t.size, np.int32), t=t, **measured, **predicted
+    )
+    score = TorquePrediction(
+        rmse=(0.1, 0.2), nrmse=(0.1, 0.2), r2=(0.99, 0.98), filter="", bandwidth=5.0
+    )
+    made = torque(found, result.logs, Scored(read_scored(path), score))
+    assert made.title == "Measured and predicted torque below 5 Hz"
+    assert [(entry.group, entry.shown) for entry in made.legend] == [
+        ("measured", True),
+        ("predicted", True),
+        ("residual", True),
+        ("as recorded", False),
+    ]
+    for joint, panel in enumerate(made.panels, start=1):
+        by_group = {}
+        for trace in panel.traces:
+            by_group.setdefault(trace["legendgroup"], []).append(trace)
+        (residual,) = by_group["residual"]
+        drawn = values(residual["y"])
+        np.testing.assert_allclose(drawn[np.isfinite(drawn)], 0.1 * joint, rtol=1e-5)
+        raw = values(by_group["as recorded"][1]["y"])
+        assert np.nanmax(np.abs(raw)) == pytest.approx(
+            max(map(abs, found.extremes[f"residual{joint}"])), rel=1e-6
+        )
+    assert "below 5 Hz, which the table of predictions scores: joint 1 0.100 N m RMS" in made.note
+    assert "As recorded: joint 1" in made.note
 
 
 def test_a_noisy_prediction_says_why() -> None:

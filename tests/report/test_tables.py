@@ -18,9 +18,18 @@ from algid.report.tables import (
     log_tables,
     settings_table,
     terms_tables,
+    used_settings,
 )
 from algid.report.terminal import print_document
-from algid.results import Estimate, Result, Status, TermCriterion, TorquePrediction, result_json
+from algid.results import (
+    Estimate,
+    Result,
+    Status,
+    TermCriterion,
+    TorqueModel,
+    TorquePrediction,
+    result_json,
+)
 from algid.text import digits_of, resolved, significant
 from tests.report.folders import estimate, hostile
 
@@ -217,6 +226,32 @@ def test_settings_table_keeps_a_table_whole() -> None:
     table = settings_table({"a\nb": "x|y"})
     assert isinstance(table, Table)
     assert table.rows == (("a\\x0ab", "x|y"),)
+
+
+def test_settings_are_those_that_were_used_with_the_request_beside_them(result: Result) -> None:
+    assert result.fit is not None
+    chosen = TorqueModel(terms=["coulomb"], coulomb_speed=0.2, stribeck_speed=0.3, chosen_by="logs")
+    delay = Estimate(estimate=-0.0038, std=1e-4, unit="s")
+    other = result.model_copy(
+        update={
+            "estimator": "weak",
+            "settings": {"estimator": "refined", "model": "auto", "delay": 0.0, "window": None},
+            "parameters": {**result.parameters, "delay": delay},
+            "fit": result.fit.model_copy(update={"model": chosen}),
+        }
+    )
+    table = used_settings(other)
+    assert [column.heading for column in table.columns] == ["Setting", "Used", "Asked for"]
+    assert table.rows[:4] == (
+        ("estimator", "weak", "refined"),
+        ("model", "coulomb, delay (Coulomb friction over 0.20 rad/s)", "auto"),
+        ("delay", "−3.8 ms", "0"),
+        ("window", "–", "–"),
+    )
+    as_asked = used_settings(
+        other.model_copy(update={"settings": {"estimator": "weak"}, "fit": None, "parameters": {}})
+    )
+    assert [column.heading for column in as_asked.columns] == ["Setting", "Used"]
 
 
 def test_estimates_that_are_not_ok_stand_out(result: Result) -> None:

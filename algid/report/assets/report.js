@@ -12,7 +12,8 @@
   };
   const [NAME, CELL, FRAME, BARRED] = [110, 34, 70, 190]; // pixels: a log's name, a number; axes, with a colour bar
   const drawn = new Map();
-  const hidden = new Set();
+  const off = [...document.querySelectorAll('.legend button[aria-pressed="false"]')];
+  const hidden = new Set(off.map(({ dataset }) => dataset.figure + " " + dataset.group));
   let syncing = false;
 
   // A token @name/opacity under a key that names a colour becomes the theme's colour.

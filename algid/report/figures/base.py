@@ -21,12 +21,16 @@ Layout = dict[str, Any]
 
 @dataclass(frozen=True)
 class Legend:
-    """An entry of a figure's legend, which shows and hides the traces of its `group`."""
+    """An entry of a figure's legend, which shows and hides the traces of its `group`.
+
+    They are hidden at first where not `shown`.
+    """
 
     group: str
     words: str
     colour: str
     mark: str = "line"
+    shown: bool = True
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -9,61 +11,134 @@ import numpy as np
 from algid.errors import ResultError
 from algid.report.figures.base import Figure, Legend, Missing, Panel, Trace, axis, line
 from algid.report.figures.timeline import chained, offsets, separators, views
-from algid.report.series import TorqueLog
-from algid.results import LogSummary
+from algid.report.series import Series, TorqueLog
+from algid.results import LogSummary, TorquePrediction
+from algid.results.verdict import share_text
 from algid.text import significant
 
 TITLE = "Measured and predicted torque"
 CLOSEUP = "The worst moment, at full rate"
 HALF = 0.5  # s before and after the worst moment
 COLOURS = ("@blue", "@orange")
+RAW = "as recorded"
+READING = (
+    "Read: blue should cover grey, and orange should look like noise without a trace of the motion."
+)
+DIFFERENTIATED = "The prediction differentiates angles twice, and with them their noise: see Torque prediction above."
 MEASURED, PREDICTED = (
     Legend("measured", "measured", "@measured"),
     Legend("predicted", "predicted by the model", "@blue"),
 )
 
 
-def torque(found: TorqueLog, logs: list[LogSummary]) -> Figure:
-    """Measured against predicted torque of all logs one after another, and the residual below it, a panel a joint."""
-    moved = offsets(found.ranges)
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """The torque that is scored, by log and name as in a `TorqueLog`, and how well it is predicted."""
+
+    series: Mapping[int, Mapping[str, Series]]
+    score: TorquePrediction
+
+
+def torque(found: TorqueLog, logs: list[LogSummary], scored: Scored | None = None) -> Figure:
+    """Measured and predicted torque of all logs one after another, and the residual below it, a panel a joint.
+
+    With `scored` they are drawn as they are scored, and as recorded on demand.
+    """
+    if scored is not None and scored.series:
+        return _scored(found, logs, scored)
     panels = []
     for joint in (1, 2):
-        traces = [
-            line(
-                *chained({log: series[name] for log, series in found.series.items()}, moved),
-                colour,
-                group,
-                group,
-                width=width,
-                hover=f"{group} %{{y:.4g}} N m at %{{x:.4f}} s<extra></extra>",
-            )
-            for name, colour, group, width in (
-                (f"tau{joint}", "@measured", "measured", 3.6),
-                (f"tau{joint}_predicted", "@blue", "predicted", 1.3),
-                (f"residual{joint}", "@orange", "residual", 1.0),
-            )
-        ]
-        traces[2]["yaxis"] = "y2"
-        layout = {
-            "xaxis": axis("time, s", anchor="y2"),
-            "yaxis": axis("torque, N m", domain=[0.42, 1]),
-            "yaxis2": axis("residual, N m", domain=[0, 0.32], anchor="x"),
-            "hovermode": "closest",
-            **separators(found.ranges, moved, logs),
-        }
+        lines = (
+            (found.series, f"tau{joint}", "@measured", "measured", 3.6),
+            (found.series, f"tau{joint}_predicted", "@blue", "predicted", 1.3),
+            (found.series, f"residual{joint}", "@orange", "residual", 1.0),
+        )
         rms, left = (significant(both[joint - 1], 3) for both in (found.rms, found.residual_rms))
         says = f"Torque of joint {joint}: RMS {rms} N m; residual RMS {left} N m"
-        panels.append(Panel(traces, layout, says, f"Joint {joint}", 340, "torque"))
+        panels.append(_torque_panel(found, logs, joint, lines, says))
     pairs = list(zip(found.residual_rms, found.rms, strict=True))
-    shares = [f"{significant(left, 3)} of {significant(rms, 3)} N m RMS" for left, rms in pairs]
-    note = f"Residual of joint 1: {shares[0]}; of joint 2: {shares[1]}."
+    note = f"Residual of joint 1: {_shares(found)[0]}; of joint 2: {_shares(found)[1]}."
     if any(2 * left > rms for left, rms in pairs):
-        note += " The prediction differentiates angles twice, and with them their noise: see Torque prediction above."
-    reading = "Read: blue should cover grey, and orange should look like noise without a trace of the motion."
+        note += f" {DIFFERENTIATED}"
     legend = (MEASURED, PREDICTED, Legend("residual", "residual: measured − predicted", "@orange"))
     return Figure(
-        "torque", TITLE, tuple(panels), reading, legend, note, views=views(found.ranges, logs)
+        "torque", TITLE, tuple(panels), READING, legend, note, views=views(found.ranges, logs)
     )
+
+
+def _scored(found: TorqueLog, logs: list[LogSummary], scored: Scored) -> Figure:
+    """What is scored, and behind it what was recorded, which a click shows."""
+    score = scored.score
+    band = "" if score.bandwidth is None else f" below {score.bandwidth:g} Hz"
+    panels, shares = [], []
+    for joint in (1, 2):
+        rms = score.rmse[joint - 1]
+        shares.append(f"{significant(rms, 3)} N m RMS, R² {share_text(score.r2[joint - 1])}")
+        lines = (
+            (found.series, f"tau{joint}", "@measured/0.6", RAW, 1.0),
+            (found.series, f"residual{joint}", "@orange/0.45", RAW, 1.0),
+            (scored.series, f"tau{joint}", "@measured", "measured", 3.6),
+            (scored.series, f"tau{joint}_predicted", "@blue", "predicted", 1.3),
+            (scored.series, f"residual{joint}", "@orange", "residual", 1.3),
+        )
+        says = f"Torque of joint {joint}{band}; residual {shares[-1]}"
+        panels.append(_torque_panel(found, logs, joint, lines, says))
+    whole = _shares(found)
+    note = (
+        f"Residual{band}, which the table of predictions scores: joint 1 {shares[0]}; joint 2 {shares[1]}. "
+        f"As recorded: joint 1 {whole[0]}; joint 2 {whole[1]}."
+    )
+    if any(2 * left > rms for left, rms in zip(found.residual_rms, found.rms, strict=True)):
+        note += f" {DIFFERENTIATED}"
+    legend = (
+        MEASURED,
+        PREDICTED,
+        Legend("residual", f"residual{band}: measured − predicted", "@orange"),
+        Legend(
+            RAW, "as recorded: torque and residual of all frequencies", "@orange/0.45", shown=False
+        ),
+    )
+    return Figure(
+        "torque",
+        f"{TITLE}{band}",
+        tuple(panels),
+        READING,
+        legend,
+        note,
+        views=views(found.ranges, logs),
+    )
+
+
+def _torque_panel(
+    found: TorqueLog,
+    logs: list[LogSummary],
+    joint: int,
+    lines: Sequence[tuple[Mapping[int, Mapping[str, Series]], str, str, str, float]],
+    says: str,
+) -> Panel:
+    """Lines of series, name, colour, group and width; residuals below the torques."""
+    moved = offsets(found.ranges)
+    traces = []
+    for series, name, colour, group, width in lines:
+        of_log = {log: own[name] for log, own in series.items()}
+        hover = f"{group} %{{y:.4g}} N m at %{{x:.4f}} s<extra></extra>"
+        traces.append(line(*chained(of_log, moved), colour, group, group, width=width, hover=hover))
+        if name.startswith("residual"):
+            traces[-1]["yaxis"] = "y2"
+    layout = {
+        "xaxis": axis("time, s", anchor="y2"),
+        "yaxis": axis("torque, N m", domain=[0.42, 1]),
+        "yaxis2": axis("residual, N m", domain=[0, 0.32], anchor="x"),
+        "hovermode": "closest",
+        **separators(found.ranges, moved, logs),
+    }
+    return Panel(traces, layout, says, f"Joint {joint}", 340, "torque")
+
+
+def _shares(found: TorqueLog) -> list[str]:
+    """The residual as recorded, beside the torque, a joint."""
+    pairs = zip(found.residual_rms, found.rms, strict=True)
+    return [f"{significant(left, 3)} of {significant(rms, 3)} N m RMS" for left, rms in pairs]
 
 
 def closeup(path: Path, found: TorqueLog) -> Figure | Missing:
