@@ -237,11 +237,12 @@ class Starts:
         """
         a, b, best = self._sums[:, None, newer] - self._sums[:, older, None]
         slack = rounding * (self._penalty + np.abs(self._sums[2, newer]))
-        square = b * b + np.maximum(a, 1e-300) * (best + slack)
-        reach = np.sqrt(np.maximum(square, 0.0)) / np.maximum(a, 1e-300)
-        middle = b / np.maximum(a, 1e-300)
         # between starts without information the older one is better throughout, or the newer one
-        flat = a <= 0.0
+        flat = a <= 1e-300
+        divisor = np.where(flat, 1.0, a)
+        square = b * b + divisor * (best + slack)
+        reach = np.sqrt(np.maximum(square, 0.0)) / divisor
+        middle = b / divisor
         low = np.where(flat, -np.inf, middle - reach)
         high = np.where(flat, np.inf, middle + reach)
         never = np.where(flat, best < -slack, square < 0.0)
