@@ -408,7 +408,7 @@ def test_the_first_figure_draws_what_is_scored_and_hides_what_was_recorded(
         ("as recorded", False),
     ]
     for joint, panel in enumerate(made.panels, start=1):
-        by_group = {}
+        by_group: dict[str, list[Any]] = {}
         for trace in panel.traces:
             by_group.setdefault(trace["legendgroup"], []).append(trace)
         (residual,) = by_group["residual"]
