@@ -61,9 +61,11 @@ def true_parameters(truth: Truth | None, payload: float | None) -> dict[str, flo
 
 def paper_errors(truth: Truth | None) -> dict[str, float]:
     """The paper's errors in percent, where the log comes from one of its cases unchanged."""
+    if truth is None or not truth.case:
+        return {}
     from algid.synth.cases import case_names, load_case
 
-    if truth is None or truth.case not in case_names():
+    if truth.case not in case_names():
         return {}
     case = load_case(truth.case)
     return case.paper_error_percent if case.arm == truth.arm else {}

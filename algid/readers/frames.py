@@ -6,7 +6,7 @@ float64 seconds since 1970 resolve 0.24 µs, so whole and fractional seconds are
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -28,8 +28,22 @@ if TYPE_CHECKING:
 
     from algid.profile import Profile
 
-    Frames = Callable[[Columns, int, int | None], Iterator[pl.DataFrame]]
-    """A fresh pass over columns in frames of so many rows, one column a channel; over the first rows only if given."""
+
+@dataclass(frozen=True, eq=False)
+class WholeRows:
+    """Channels (N,) of the rows that have every value; how many more had not, among them the last one."""
+
+    columns: Mapping[str, NDArray[Any]]
+    lost: int = 0
+    cut_off: bool = False
+
+
+if TYPE_CHECKING:
+    Frame = pl.DataFrame | WholeRows
+    """One column a channel: of polars, or as arrays."""
+
+    Frames = Callable[[Columns, int, int | None], Iterator[Frame]]
+    """A fresh pass over columns in frames of so many rows; over the first rows only if given."""
 
 NO_COMPANION = Companion(None, {})
 _LOOKED = 1 << 14
@@ -215,7 +229,7 @@ def to_nanoseconds(times: NDArray[Any], unit: str) -> IntArray:
 
 
 def tables(
-    path: str, frames: Iterator[pl.DataFrame], columns: Columns, sums: Mapping[str, int]
+    path: str, frames: Iterator[Frame], columns: Columns, sums: Mapping[str, int]
 ) -> Iterator[SampleTable]:
     """Tables out of frames that hold one column a channel, and "t"; `sums` are of words by column.
 
@@ -228,8 +242,8 @@ def tables(
     unit, seen, done = columns.time_unit, dict.fromkeys(expected, 0), 0
     for frame, cut_off in _complete(path, frames):
         for name in seen:
-            seen[name] = add(seen[name], word_sum(frame[name].to_numpy()))
-        times = frame["t"].to_numpy()
+            seen[name] = add(seen[name], word_sum(frame[name]))
+        times = frame["t"]
         notices = list(cut_off)
         if unit is None and times.size:
             if not np.all(np.isfinite(times)):
@@ -249,8 +263,8 @@ def tables(
             ) from error
         if unit and not (done or columns.time_stated):
             notices += _slow(columns.sources["t"], stamps, unit)
-        channels = {name: frame[name].to_numpy() for name in frame.columns if name != "t"}
-        done += frame.height
+        channels = {name: values for name, values in frame.items() if name != "t"}
+        done += times.size
         yield SampleTable(stamps, channels, tuple(notices))
     wrong = [name for name, total in seen.items() if total != expected[name]]
     if wrong:
@@ -273,18 +287,26 @@ def _slow(column: str, stamps: IntArray, unit: str) -> list[Notice]:
     return [Notice("SLOW_CLOCK", text)]
 
 
+def _whole_rows(frame: pl.DataFrame) -> WholeRows:
+    cut_off = bool(frame.height) and any(value is None for value in frame.row(-1))
+    whole = frame.drop_nulls() if any(frame.null_count().row(0)) else frame
+    columns = {name: whole[name].to_numpy() for name in whole.columns}
+    return WholeRows(columns, frame.height - whole.height, cut_off)
+
+
 def _complete(
-    path: str, frames: Iterator[pl.DataFrame]
-) -> Iterator[tuple[pl.DataFrame, tuple[Notice, ...]]]:
-    """Frames without nulls: rows that lack a value are dropped and counted; the last row may break off."""
-    rows, lost, held = 0, 0, None
+    path: str, frames: Iterator[Frame]
+) -> Iterator[tuple[Mapping[str, NDArray[Any]], tuple[Notice, ...]]]:
+    """Frames without gaps: rows that lack a value are dropped and counted; the last row may break off."""
+    rows, lost, cut_off = 0, 0, False
+    held: Mapping[str, NDArray[Any]] | None = None
     for frame in frames:
         if held is not None:
             yield held, ()
-        rows += frame.height
-        cut_off = bool(frame.height) and any(value is None for value in frame.row(-1))
-        held = frame.drop_nulls() if any(frame.null_count().row(0)) else frame
-        lost += frame.height - held.height
+        read = frame if isinstance(frame, WholeRows) else _whole_rows(frame)
+        held, cut_off = read.columns, read.cut_off
+        rows += held["t"].size + read.lost
+        lost += read.lost
     if held is None:
         return
     if lost == 1 and cut_off:

@@ -1,30 +1,37 @@
-"""Parquet logs, a row group at a time: flat columns, or list columns as robots' drivers write them."""
+"""Parquet logs, a row group at a time: flat columns, or list columns as robots' drivers write them.
+
+Columns of plain numbers, the usual case, are read by pyarrow alone: importing polars takes longer
+than a short log does as a whole. Lists, dates and rarer types are polars'.
+"""
 
 from __future__ import annotations
 
 import zlib
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
+import numpy as np
+
 from algid.errors import LogError
 from algid.limits import LIMITS
-from algid.log import CANONICAL_COLUMNS, KEY, loads
+from algid.log import CANONICAL_COLUMNS, KEY, Companion, loads
 from algid.notices import Notice
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign
 from algid.readers.footer import Footer, FooterError, Pages, page_header, parsed
-from algid.readers.frames import NO_COMPANION, cells, flat_reader, number, of_numbers
+from algid.readers.frames import NO_COMPANION, WholeRows, cells, flat_reader, number, of_numbers
 from algid.readers.stated import in_metadata
 from algid.words import counted
 
 if TYPE_CHECKING:
     import polars as pl
     import pyarrow as pa
+    import pyarrow.parquet as pq
 
     from algid.profile import Profile
 
@@ -42,15 +49,53 @@ def open_parquet(path: Path, profile: Profile) -> TableReader:
     LogError
         If the file is damaged, or columns are missing or hold no numbers.
     """
+    _refuse_encrypted(path)
+    return _of_plain_numbers(path, profile) or _of_any_cells(path, profile)
+
+
+def _of_plain_numbers(path: Path, profile: Profile) -> TableReader | None:
+    """A reader by pyarrow; None where polars is wanted, also to say what is wrong with the file."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        metadata = pq.read_metadata(path)
+        schema = metadata.schema.to_arrow_schema()
+    except (pa.ArrowException, OSError, ValueError):
+        return None
+    names = list(schema.names)
+    nested = any(pa.types.is_nested(kind) for kind in schema.types)
+    if nested or len(set(names)) < len(names):
+        return None
+    _refuse_wide(path, names)
+    companion = _companion(path, metadata)
+    rows = counted_rows(path)
+    units = units_of_schema(schema, {name: name for name in names})
+    columns = _assigned(path, names, profile, units, companion)
+    kinds = dict(zip(names, schema.types, strict=True))
+    wanted = {*columns.sources.values(), *columns.others.values()}
+    if not all(_plain(kinds[name]) for name in wanted):
+        return None
+    groups = _PlainGroups(path, metadata, companion.sums)
+    return flat_reader(str(path), "parquet", columns, groups.frames, profile, rows, companion)
+
+
+def _plain(kind: pa.DataType) -> bool:
+    """Whether NumPy has the type and int64 or float64 all of its numbers."""
+    import pyarrow as pa
+
+    whole = pa.types.is_integer(kind) and not pa.types.is_uint64(kind)
+    return whole or pa.types.is_float32(kind) or pa.types.is_float64(kind)
+
+
+def _of_any_cells(path: Path, profile: Profile) -> TableReader:
+    """A reader by polars."""
     import polars as pl
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     schema = schema_of(path)
-    if len(schema) > LIMITS.columns:
-        raise LogError(
-            f"{path}: {counted(len(schema), 'column')}; expected {LIMITS.columns} at most"
-        )
+    _refuse_wide(path, schema)
 
     def width(column: str) -> int:
         _check_pages(path, {column}, most=1)
@@ -59,13 +104,7 @@ def open_parquet(path: Path, profile: Profile) -> TableReader:
 
     with _readable(path):
         metadata = pq.read_metadata(path)
-        try:
-            text = (metadata.metadata or {}).get(KEY.encode())
-            companion = NO_COMPANION if text is None else loads(text)
-        except ValueError as error:
-            raise LogError(
-                f"{path}: the truth in the file's metadata cannot be read ({error})"
-            ) from error
+        companion = _companion(path, metadata)
         found = cells(schema, width)
         rows = counted_rows(path)
     roots = {name: cell.meta.root_names()[0] for name, (cell, _) in found.items()}
@@ -73,12 +112,49 @@ def open_parquet(path: Path, profile: Profile) -> TableReader:
         units = units_of_schema(metadata.schema.to_arrow_schema(), roots)
     except (pa.ArrowException, OSError, ValueError):  # types that polars reads and pyarrow does not
         units = {}
-    columns = assign(str(path), list(found), profile, units, companion.sums)
-    if not companion.sums and "stamp_ns" in schema and set(CANONICAL_COLUMNS) <= schema.keys():
-        columns = replace(columns, notices=(*columns.notices, _NO_SUMS))
+    columns = _assigned(path, list(found), profile, units, companion)
     columns = of_numbers(str(path), columns, {name: kind for name, (_, kind) in found.items()})
     groups = _Groups(path, found, roots, companion.sums)
     return flat_reader(str(path), "parquet", columns, groups.frames, profile, rows, companion)
+
+
+def _refuse_encrypted(path: Path) -> None:
+    if _footer(path).encrypted:
+        raise LogError(
+            f"{path}: the Parquet file holds encrypted columns; write it anew without encryption"
+        )
+
+
+def _refuse_wide(path: Path, names: Collection[str]) -> None:
+    if len(names) > LIMITS.columns:
+        raise LogError(
+            f"{path}: {counted(len(names), 'column')}; expected {LIMITS.columns} at most"
+        )
+
+
+def _companion(path: Path, metadata: pq.FileMetaData) -> Companion:
+    """The truth and the sums that algid wrote into the file."""
+    try:
+        text = (metadata.metadata or {}).get(KEY.encode())
+        return NO_COMPANION if text is None else loads(text)
+    except ValueError as error:
+        raise LogError(
+            f"{path}: the truth in the file's metadata cannot be read ({error})"
+        ) from error
+
+
+def _assigned(
+    path: Path,
+    names: Sequence[str],
+    profile: Profile,
+    units: Mapping[str, str],
+    companion: Companion,
+) -> Columns:
+    """The columns of the channels, with a word where algid's own columns have no sums."""
+    columns = assign(str(path), names, profile, units, companion.sums)
+    if not companion.sums and {"stamp_ns", *CANONICAL_COLUMNS} <= set(names):
+        return replace(columns, notices=(*columns.notices, _NO_SUMS))
+    return columns
 
 
 def schema_of(path: Path) -> dict[str, pl.DataType]:
@@ -91,10 +167,7 @@ def schema_of(path: Path) -> dict[str, pl.DataType]:
     """
     import polars as pl
 
-    if _footer(path).encrypted:
-        raise LogError(
-            f"{path}: the Parquet file holds encrypted columns; write it anew without encryption"
-        )
+    _refuse_encrypted(path)
     with _readable(path):
         return dict(pl.scan_parquet(path, glob=False).collect_schema())
 
@@ -243,6 +316,52 @@ class _Groups:
                 *(lot.collect_batches(chunk_size=rows) for lot in lots), strict=True
             ):
                 yield first.hstack(rest[0]) if rest else first
+
+
+@dataclass
+class _PlainGroups:
+    """A Parquet file of plain numbers; the pages are `checked` by the first pass."""
+
+    path: Path
+    metadata: pq.FileMetaData
+    sums: Mapping[str, int]
+    checked: bool = False
+
+    def frames(self, columns: Columns, rows: int, most: int | None) -> Iterator[WholeRows]:
+        """Columns of `rows` rows, the last of fewer, over the first `most` rows where that is given."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        sources = list(dict.fromkeys(columns.sources.values()))
+        if not self.checked:
+            _check_pages(self.path, sources, self.sums, most)
+            self.checked = most is None
+        left = self.metadata.num_rows if most is None else most
+        try:
+            with pq.ParquetFile(self.path, metadata=self.metadata) as file:
+                for batch in file.iter_batches(rows, columns=sources, use_threads=False):
+                    kept = batch.slice(0, left)
+                    left -= kept.num_rows
+                    if kept.num_rows:
+                        yield _of_batch(columns, kept)
+                    if left <= 0:
+                        return
+        except (pa.ArrowException, OSError) as error:
+            raise _damaged(self.path, error) from error
+
+
+def _of_batch(columns: Columns, batch: pa.RecordBatch) -> WholeRows:
+    """Numbers by channel as float64, whole times as int64, of the rows that have them all."""
+    read, cut_off = batch.num_rows, False
+    if any(column.null_count for column in batch.columns):
+        cut_off = not all(column[-1].is_valid for column in batch.columns)
+        batch = batch.drop_null()
+    found = {}
+    for name, source in columns.sources.items():
+        values = batch.column(source).to_numpy()
+        whole = name == "t" and np.issubdtype(values.dtype, np.integer)
+        found[name] = values.astype(np.int64 if whole else np.float64, copy=False)
+    return WholeRows(found, read - batch.num_rows, cut_off)
 
 
 def _check_pages(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import struct
+import subprocess
+import sys
 from collections.abc import Callable
 from datetime import UTC, date, datetime, time, timedelta
 from pathlib import Path
@@ -254,3 +256,43 @@ def test_an_angle_that_is_a_date_holds_no_number(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("\n".join(["t,q1,q2,tau1,tau2", *rows]) + "\n")
     with pytest.raises(LogError, match="no row has a value in every column that is needed"):
         read_log(tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize("gaps", [[], [7], [ROWS - 1], [0, 5, 16_999, 17_000]])
+@pytest.mark.parametrize("kind", [pl.Float64, pl.Float32, pl.Int16])
+@pytest.mark.parametrize("clock", [pl.Float64, pl.Int64])
+def test_plain_columns_are_read_alike_without_polars(
+    gaps: list[int], kind: type[pl.DataType], clock: type[pl.DataType], tmp_path: Path
+) -> None:
+    """A column of lists beside them makes polars read the same numbers."""
+    frame = arm(joints=2).with_row_index()
+    whole = pl.when(~pl.col("index").is_in(gaps))
+    frame = frame.select(
+        (1000 * pl.col("t")).round().cast(clock).alias("t"),
+        whole.then(100 * pl.col("q1")).cast(kind).alias("q1"),
+        *(pl.col(name) for name in ("q2", "tau1", "tau2")),
+    )
+    frame.write_parquet(tmp_path / "plain.parquet", row_group_size=17_000)
+    lists = frame.with_columns(pl.concat_list("q2", "tau1").alias("more"))
+    lists.write_parquet(tmp_path / "lists.parquet", row_group_size=17_000)
+    plain, other = (read_log(tmp_path / f"{name}.parquet") for name in ("plain", "lists"))
+    assert len(plain) == ROWS - len(gaps)
+    np.testing.assert_array_equal(plain.stamp_ns, other.stamp_ns)
+    np.testing.assert_array_equal(plain.theta, other.theta)
+    np.testing.assert_array_equal(plain.tau, other.tau)
+    assert plain.notices == other.notices
+
+
+def test_polars_is_not_imported_for_plain_parquet(tmp_path: Path) -> None:
+    arm(joints=2).write_parquet(tmp_path / "log.parquet")
+    script = (
+        "import sys; from algid.readers import read_log; "
+        "print(len(read_log(sys.argv[1])), 'polars' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, tmp_path / "log.parquet"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split() == [str(ROWS), "False"]
