@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from algid.physics.motion import Motion, Widths, sine_cosine
 from algid.physics.parameters import BODY, PAYLOAD, Parameter
 from algid.physics.signals import ACCELERATIONS, rate
 from algid.physics.terms import ALWAYS, OPTIONAL, Term
+from algid.physics.terms.base import TorqueColumn
 
 __all__ = ["Model", "Motion", "Term", "sine_cosine"]
 
@@ -152,35 +153,91 @@ Weighted = Mapping[Product, tuple[tuple[int, float], ...]]
 """An expression that is linear in the coefficients: for each product their places and factors."""
 
 
+Entry = tuple[int, int, Expression]
+"""A joint, the place of a column, and what that column adds to the joint's torque."""
+
+
 @dataclass(frozen=True, eq=False)
 class Compiled:
-    """The columns of a model in order, and what derives from them.
+    """The columns of a model in order, and what derives from them, each once it is asked for.
 
     Parameters
     ----------
     names : of the columns
-    s, p, f : entries (joint, place, expression) of τ = d²s/dt² + dp/dt + f
-    regressor : entries of Y
+    columns : of all terms; several may belong to one name
     loads : places of the columns that are the joints' load
-    partials : by order of θ's derivative, torque's joint and angle's joint
-    inertia : by torque's joint and angle's joint: what multiplies the accelerations
-    rest : by joint: the torque without accelerations
     """
 
     names: tuple[str, ...]
-    s: tuple[tuple[int, int, Expression], ...]
-    p: tuple[tuple[int, int, Expression], ...]
-    f: tuple[tuple[int, int, Expression], ...]
-    regressor: tuple[tuple[int, int, Expression], ...]
+    columns: tuple[TorqueColumn, ...]
     loads: tuple[int, ...]
-    partials: Mapping[tuple[int, int, int], Weighted]
-    inertia: Mapping[tuple[int, int], Weighted]
-    rest: tuple[Weighted, Weighted]
 
     @cached_property
     def place(self) -> dict[str, int]:
         """Where each column stands."""
         return {name: number for number, name in enumerate(self.names)}
+
+    @cached_property
+    def s(self) -> tuple[Entry, ...]:
+        """Entries of s in τ = d²s/dt² + dp/dt + f."""
+        return self._entries(lambda column, joint: column.s[joint])
+
+    @cached_property
+    def p(self) -> tuple[Entry, ...]:
+        """Entries of p in τ = d²s/dt² + dp/dt + f."""
+        return self._entries(lambda column, joint: column.p[joint])
+
+    @cached_property
+    def f(self) -> tuple[Entry, ...]:
+        """Entries of f in τ = d²s/dt² + dp/dt + f."""
+        return self._entries(lambda column, joint: column.f[joint])
+
+    @cached_property
+    def regressor(self) -> tuple[Entry, ...]:
+        """Entries of Y."""
+        return self._entries(_whole)
+
+    @cached_property
+    def partials(self) -> Mapping[tuple[int, int, int], Weighted]:
+        """Derivatives by order of θ's derivative, torque's joint and angle's joint."""
+        return {
+            (order, row, angle): self._derivative(f"{signal}{angle + 1}", row)
+            for order, signal in enumerate(("theta", "omega", "alpha"))
+            for row in range(2)
+            for angle in range(2)
+        }
+
+    @cached_property
+    def inertia(self) -> Mapping[tuple[int, int], Weighted]:
+        """What multiplies the accelerations, by torque's joint and angle's joint."""
+        return {
+            (row, angle): self._derivative(f"alpha{angle + 1}", row)
+            for row in range(2)
+            for angle in range(2)
+        }
+
+    @cached_property
+    def rest(self) -> tuple[Weighted, Weighted]:
+        """The torque without accelerations, by joint."""
+        return self._weighted(_at_rest, 0), self._weighted(_at_rest, 1)
+
+    def _entries(self, of: Callable[[TorqueColumn, int], Expression]) -> tuple[Entry, ...]:
+        return tuple(
+            (joint, self.place[column.parameter], entry)
+            for column in self.columns
+            for joint in range(2)
+            if (entry := of(column, joint))
+        )
+
+    def _derivative(self, signal: str, joint: int) -> Weighted:
+        return self._weighted(lambda column, row: _slope(column, row, signal), joint)
+
+    def _weighted(self, of: Callable[[TorqueColumn, int], Expression], joint: int) -> Weighted:
+        found: dict[Product, list[tuple[int, float]]] = {}
+        for column in self.columns:
+            for product, factor in of(column, joint).products.items():
+                found.setdefault(product, []).append((self.place[column.parameter], factor))
+        return {product: tuple(pairs) for product, pairs in found.items()}
 
     def only(self, weighted: Weighted, places: Iterable[int]) -> Weighted:
         """What the columns at `places` give of it."""
@@ -191,57 +248,30 @@ class Compiled:
         return {product: pairs for product, pairs in kept.items() if pairs}
 
 
+@cache
+def _whole(column: TorqueColumn, joint: int) -> Expression:
+    """What a column adds to a joint's torque."""
+    return rate(rate(column.s[joint])) + rate(column.p[joint]) + column.f[joint]
+
+
+@cache
+def _slope(column: TorqueColumn, joint: int, signal: str) -> Expression:
+    return _whole(column, joint).by(signal)
+
+
+@cache
+def _at_rest(column: TorqueColumn, joint: int) -> Expression:
+    return _whole(column, joint).without(ACCELERATIONS)
+
+
 @lru_cache(maxsize=256)
 def _compiled(terms: tuple[str, ...], gravity: bool) -> Compiled:
     own = [*ALWAYS, *(TERMS[term] for term in terms)]
     parameters = [one for term in own for one in term.parameters if gravity or not one.weighs]
     names = tuple(one.name for one in parameters)
-    place = {name: number for number, name in enumerate(names)}
-    columns = [column for term in own for column in term.columns if column.parameter in place]
-    parts = {
-        part: tuple(
-            (joint, place[column.parameter], getattr(column, part)[joint])
-            for column in columns
-            for joint in range(2)
-            if getattr(column, part)[joint]
-        )
-        for part in ("s", "p", "f")
-    }
-    Y: list[tuple[int, int, Expression]] = []
-    for column in columns:
-        for joint in range(2):
-            entry = rate(rate(column.s[joint])) + rate(column.p[joint]) + column.f[joint]
-            if entry:
-                Y.append((joint, place[column.parameter], entry))
-
-    def weighted(joint: int, of: Callable[[Expression], Expression]) -> Weighted:
-        found: dict[Product, list[tuple[int, float]]] = {}
-        for row, column, entry in Y:
-            for product, factor in of(entry).products.items() if row == joint else ():
-                found.setdefault(product, []).append((column, factor))
-        return {product: tuple(pairs) for product, pairs in found.items()}
-
-    signals = ("theta", "omega", "alpha")
-    partials = {
-        (order, row, angle): weighted(row, lambda e, s=f"{signal}{angle + 1}": e.by(s))  # type: ignore[misc]
-        for order, signal in enumerate(signals)
-        for row in range(2)
-        for angle in range(2)
-    }
-    return Compiled(
-        names,
-        parts["s"],
-        parts["p"],
-        parts["f"],
-        tuple(Y),
-        tuple(place[name] for term in own if term.inertial for name in term.names if name in place),
-        partials,
-        {(row, angle): partials[2, row, angle] for row in range(2) for angle in range(2)},
-        (
-            weighted(0, lambda e: e.without(ACCELERATIONS)),
-            weighted(1, lambda e: e.without(ACCELERATIONS)),
-        ),
-    )
+    columns = tuple(column for term in own for column in term.columns if column.parameter in names)
+    loads = [name for term in own if term.inertial for name in term.names]
+    return Compiled(names, columns, tuple(names.index(name) for name in loads if name in names))
 
 
 def summed(weighted: Weighted, c: FloatArray, values: Values) -> FloatArray | float:
