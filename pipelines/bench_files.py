@@ -13,7 +13,7 @@ from algid.files import whole_file
 from algid.log import Log, Origin
 from algid.ros2 import HEADER, JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.writers import write_log
-from algid.writers.mcap import payloads
+from algid.writers.mcap import messages
 
 ROWS = 1_000_000
 START_NS = 1_700_000_000_000_000_000
@@ -63,9 +63,9 @@ def joint_and_imu(path: Path) -> None:
         imu = _channel(writer, "/imu/data", _IMU, _IMU_DEFINITION)
         other = imu_payloads(ROWS // 5)
         for row, (stamp, payload) in enumerate(
-            zip(log.stamp_ns.tolist(), payloads(log), strict=True)
+            zip(log.stamp_ns.tolist(), messages(log), strict=True)
         ):
-            writer.add_message(joints, stamp, payload, stamp, row)
+            writer.add_message(joints, stamp, payload.tobytes(), stamp, row)
             if row % 5 == 0:
                 writer.add_message(imu, stamp + 1000, next(other), stamp + 1000, row // 5)
         writer.finish()  # type: ignore[no-untyped-call]
@@ -95,9 +95,9 @@ def with_cameras(path: Path, gigabytes: float = 2.0) -> None:
         )
         head = struct.pack("<BBBBI", 0, 1, 0, 0, len(image))
         for row, (stamp, payload) in enumerate(
-            zip(log.stamp_ns.tolist(), payloads(log), strict=True)
+            zip(log.stamp_ns.tolist(), messages(log), strict=True)
         ):
-            writer.add_message(joints, stamp, payload, stamp, row)
+            writer.add_message(joints, stamp, payload.tobytes(), stamp, row)
             if row % 16 == 0:
                 writer.add_message(camera, stamp, head + image, stamp, row // 16)
         writer.finish()  # type: ignore[no-untyped-call]

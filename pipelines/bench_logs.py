@@ -20,7 +20,7 @@ from algid.log import Log, Origin
 from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.synth.cases import load_case
 from algid.writers import write_log
-from algid.writers.mcap import TOPIC, payloads
+from algid.writers.mcap import TOPIC, messages
 
 RATE = 1000
 PERIOD = 10.0  # s
@@ -138,8 +138,8 @@ def _write_chunk(
 
 def _messages(part: Log, sequence: int) -> tuple[bytes, int]:
     """The samples of `part` as message records, and the bytes of one."""
-    payload = list(payloads(part))
-    size = len(payload[0])
+    content = messages(part)
+    size = content.dtype.itemsize
     fields = [
         ("code", "u1"),
         ("length", "<u8"),
@@ -151,7 +151,7 @@ def _messages(part: Log, sequence: int) -> tuple[bytes, int]:
     rows["code"], rows["length"] = 5, 22 + size
     rows["sequence"] = sequence + np.arange(len(part))
     rows["log"] = rows["publish"] = part.stamp_ns
-    rows["data"] = np.frombuffer(b"".join(payload), f"V{size}")
+    rows["data"] = content.view(f"V{size}")
     return rows.tobytes(), rows.itemsize
 
 
@@ -174,6 +174,6 @@ def bag(path: Path, rows: int) -> Path:
         with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
             connection = writer.add_connection(TOPIC, JOINT_STATE, typestore=store)
             for block in blocks(rows):
-                for stamp, payload in zip(block.stamp_ns.tolist(), payloads(block), strict=True):
-                    writer.write(connection, stamp, payload)
+                for stamp, payload in zip(block.stamp_ns.tolist(), messages(block), strict=True):
+                    writer.write(connection, stamp, payload.tobytes())
     return path

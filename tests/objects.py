@@ -19,7 +19,7 @@ from mcap.writer import CompressionType, Writer
 from algid.log import Log
 from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.stores import connect
-from algid.writers.mcap import payloads
+from algid.writers.mcap import messages
 
 DENIED = (
     b"<?xml version='1.0'?><Error><Code>AccessDenied</Code><Message>Access Denied</Message></Error>"
@@ -112,7 +112,7 @@ def with_cameras(path: Path, log: Log, images: int, size: int = 1 << 20, every: 
         writer.add_metadata("calibration", {"camera": "none"})
         shots = images * every // len(log)
         for row, (stamp, payload) in enumerate(
-            zip(log.stamp_ns.tolist(), payloads(log), strict=True)
+            zip(log.stamp_ns.tolist(), messages(log), strict=True)
         ):
             if row % every == 0:
                 for _ in range(shots):
@@ -124,7 +124,7 @@ def with_cameras(path: Path, log: Log, images: int, size: int = 1 << 20, every: 
                         stamp,
                     )
                 close_chunk()
-            writer.add_message(joints, stamp, payload, stamp, row)
+            writer.add_message(joints, stamp, payload.tobytes(), stamp, row)
         writer.finish()  # type: ignore[no-untyped-call]
 
 

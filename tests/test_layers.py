@@ -21,7 +21,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "limits": room(),
     "faults": room("errors"),
     "progress": room(),
-    "ros2": room(),
+    "ros2": room("errors", "numpy"),
     "runtime": room("errors", "threadpoolctl"),
     "units": room(),
     "words": room(),
@@ -43,7 +43,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "results": room("errors files limits log model notices settings text verdict words", "numpy polars pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
     "table4": room("arm limits log results synth"),
-    "writers": room("errors files log ros2", "mcap numpy polars pyarrow"),
+    "writers": room("errors files log ros2", "mcap numpy polars pyarrow zstandard"),
     "example": room("arm files log synth writers", "numpy"),
     "readers": room(
         "arm errors faults files limits log notices profile ros2 runtime units words",

@@ -41,31 +41,34 @@ def in_order(path: str, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
         still in half of them.
     """
     pending: SampleTable | None = None
-    late = repeated = 0
+    counts = np.zeros(3, dtype=np.int64)
     for table in tables:
         if len(table) == 0 and pending is not None:
             pending = pending.noting(*table.notices)
             continue
-        ordered, came_late, came_twice = _sorted(path, table)
-        late, repeated = late + came_late, repeated + came_twice
+        ordered, added = _sorted(path, table)
+        counts += added
         if pending is None or len(pending) == 0:
             pending = ordered if pending is None else ordered.noting(*pending.notices)
         elif ordered.stamp_ns[0] > pending.stamp_ns[-1]:
             yield pending
             pending = ordered
         else:
-            merged, came_late, came_twice = _sorted(path, stack([pending, ordered]))
-            late, repeated = late + came_late, repeated + came_twice
+            merged, added = _sorted(path, stack([pending, ordered]))
+            counts += added
             keep = max(0, len(merged) - max(HORIZON, len(ordered) // 2))
             if keep:
                 yield merged.part(0, keep)
             pending = merged.part(keep, len(merged)) if keep else merged
+    late, repeated, lost = counts.tolist()
     said = []
     if late:
         said.append(Notice("UNSORTED_STAMPS", f"{counted(late, 'sample')} came late, now in order"))
     if repeated:
         text = f"{counted(repeated, 'sample repeats', 'samples repeat')} a stamp; the first of each was kept"
-        said.append(Notice("DUPLICATE_STAMPS", text))
+        if lost:
+            text += f"; {counted(lost, 'with other values is', 'with other values are')} lost"
+        said.append(Notice("DUPLICATE_STAMPS", text, lossy=lost > 0))
     if pending is not None:
         yield pending.noting(*said)
 
@@ -87,11 +90,19 @@ def check_step(path: str, stamps: IntArray) -> None:
         )
 
 
-def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, int, int]:
-    """The table in time order, how many of its samples came late, and how many repeated a stamp and went."""
+def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, tuple[int, int, int]]:
+    """The table in time order, and how many of its samples came late, how many repeated a stamp and went.
+
+    The last count is of those among them whose values were not those of the sample that was kept.
+
+    Raises
+    ------
+    LogError
+        As `in_order`.
+    """
     stamps = table.stamp_ns
     if np.all(stamps[1:] > stamps[:-1]):
-        return table, 0, 0
+        return table, (0, 0, 0)
     rows = len(table)
     back = np.flatnonzero(np.diff(stamps) < 0)
     order = np.argsort(stamps, kind="stable")
@@ -112,7 +123,11 @@ def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, int, int]:
             'expected increasing stamps; name another time: --set time=NAME (profile: time = "NAME"), of messages '
             '--clock log (profile: clock = "log")'
         )
-    return table.take(order[fresh]), int(np.count_nonzero(moved > 0)), repeated
+    kept = order[fresh]
+    gone, instead = order[~fresh], kept[np.cumsum(fresh)[~fresh] - 1]
+    same = np.all([values[gone] == values[instead] for values in table.columns.values()], axis=0)
+    late, lost = np.count_nonzero(moved > 0), gone.size - np.count_nonzero(same)
+    return table.take(kept), (int(late), repeated, int(lost))
 
 
 def _set_back(table: SampleTable) -> int | None:

@@ -1,17 +1,14 @@
 """A result as a ROS 2 log, which Foxglove and PlotJuggler open beside the original.
 
-==========================  ==========================
-==================================================
-topic                       message                     holds
-==========================  ==========================
-==================================================
-/algid/measured             sensor_msgs/msg/JointState  position θ, rad; velocity ω, rad/s; effort τ, N m
-/algid/predicted            sensor_msgs/msg/JointState  effort: torque that the model predicts, N m
-/algid/residual             sensor_msgs/msg/JointState  effort: measured less predicted torque, N m
-/algid/estimates            algid_msgs/msg/Estimates    the paper's series, a field each, and condition
-/algid/loaded               algid_msgs/msg/Estimates    the same of the loaded log
-==========================  ==========================
-==================================================
+==================  ==========================  =============================================
+topic               message                     holds
+==================  ==========================  =============================================
+/algid/measured     sensor_msgs/msg/JointState  position θ, rad; velocity ω, rad/s; effort τ, N m
+/algid/predicted    sensor_msgs/msg/JointState  effort: torque that the model predicts, N m
+/algid/residual     sensor_msgs/msg/JointState  effort: measured less predicted torque, N m
+/algid/estimates    algid_msgs/msg/Estimates    the paper's series, a field each, and condition
+/algid/loaded       algid_msgs/msg/Estimates    the same of the loaded log
+==================  ==========================  =============================================
 
 Angles and torques are those of the log, velocities those that the estimator used: one file is
 enough in Foxglove. Several logs keep a topic each: the second one's are `/algid/log2/predicted`
@@ -35,7 +32,7 @@ from algid.files import whole_file
 from algid.progress import Progress
 from algid.report.reduce import blocks, by_log, columns_of, row_count
 from algid.results import read_result
-from algid.ros2 import HEADER, JOINT_STATE, JOINT_STATE_DEFINITION
+from algid.ros2 import HEADER, JOINT_STATE, JOINT_STATE_DEFINITION, check_stamps
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
@@ -94,7 +91,7 @@ def _write_torques(writer: Writer, path: Path, logs: int, progress: Progress | N
     channels: dict[str, int] = {}
     done, total = 0, row_count(path)
     for log, block in by_log(blocks(path, SIGNALS, ROWS)):
-        stamps = _stamps(block["t"], starts[log] if log < len(starts) else 0)
+        stamps = _stamps(path, block["t"], starts[log] if log < len(starts) else 0)
         place = "/algid" if log == 0 else f"/algid/log{log + 1}"
         names = ("theta{}", "omega{}", "tau{}", "tau{}_predicted")
         theta, omega, tau, predicted = (
@@ -132,17 +129,19 @@ def write_series(writer: Writer, path: Path, topic: str) -> None:
     channel = writer.register_channel(topic, "cdr", schema)
     for block in blocks(path, ["t", *names], ROWS):
         rows = np.stack([block[name] for name in names], axis=1).tolist()
-        for stamp, row in zip(_stamps(block["t"], start), rows, strict=True):
+        for stamp, row in zip(_stamps(path, block["t"], start), rows, strict=True):
             writer.add_message(channel, stamp, numbers_message(stamp, row), stamp)
 
 
-def _stamps(t: FloatArray, start: int) -> list[int]:
+def _stamps(path: Path, t: FloatArray, start: int) -> list[int]:
     """Stamps in ns.
 
     They are whole nanoseconds, which float64 seconds resolve for a hundred days.
     """
-    stamps: list[int] = (start + np.rint(t * 1e9).astype(np.int64)).tolist()
-    return stamps
+    stamps = start + np.rint(t * 1e9).astype(np.int64)
+    check_stamps(path, stamps)
+    listed: list[int] = stamps.tolist()
+    return listed
 
 
 ESTIMATES = "algid_msgs/msg/Estimates"

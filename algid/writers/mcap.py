@@ -1,19 +1,20 @@
 """MCAP logs as a ROS 2 recorder writes them: sensor_msgs/msg/JointState on /joint_states, CDR, zstd chunks.
 
-All messages of a block are laid out at once as rows of one structured array, since only the stamp
+All messages of a chunk are laid out at once as rows of one structured array, since only the stamp
 and the numbers differ between them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from algid.files import whole_file
 from algid.log import KEY, Companion, Log, Truth
-from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
+from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION, check_stamps
 from algid.writers.blocks import as_blocks
 
 TOPIC = "/joint_states"
@@ -37,47 +38,38 @@ def write(
 ) -> None:
     """Write a log, or the blocks of one; the truth goes into the metadata record "algid".
 
-    A chunk closes at `chunk_size` bytes.
+    A chunk holds `chunk_size` bytes of messages of one block at most.
 
     Raises
     ------
     OutputError
-        If the file cannot be written there.
-    ValueError
-        If a stamp is negative or beyond what a ROS 2 header holds (2^31 s).
+        If the file cannot be written there, or a stamp is none of a ROS 2 header's.
     """
-    from mcap.writer import Writer
+    from mcap.records import Channel, Schema
+
+    from algid.writers.chunks import ChunkedFile, message_bytes
 
     with whole_file(path) as temporary, temporary.open("wb") as stream:
-        writer = Writer(stream, chunk_size=chunk_size)
-        writer.start(profile="ros2", library="algid")
-        schema = writer.register_schema(JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode())
-        channel = writer.register_channel(
-            topic=TOPIC,
-            message_encoding="cdr",
-            schema_id=schema,
-            metadata={"offered_qos_profiles": _QOS},
+        file = ChunkedFile(
+            stream,
+            profile="ros2",
+            library="algid",
+            schema=Schema(1, JOINT_STATE_DEFINITION.encode(), "ros2msg", JOINT_STATE),
+            channel=Channel(1, TOPIC, "cdr", {"offered_qos_profiles": _QOS}, 1),
         )
-        sequence = 0
         for block in as_blocks(log):
-            for stamp, payload in zip(block.stamp_ns.tolist(), payloads(block), strict=True):
-                writer.add_message(channel, stamp, payload, stamp, sequence)
-                sequence += 1
+            check_stamps(path, block.stamp_ns)
+            rows = max(1, chunk_size // message_bytes(_layout(block.omega is not None)))
+            for first in range(0, len(block), rows):
+                part = block.part(first, min(first + rows, len(block)))
+                file.add(part.stamp_ns, messages(part))
         if truth is not None:
-            writer.add_metadata(KEY, {KEY: Companion(truth, {}).dumps()})
-        writer.finish()  # type: ignore[no-untyped-call]
+            file.add_metadata(KEY, {KEY: Companion(truth, {}).dumps()})
+        file.finish()
 
 
-def payloads(block: Log) -> Iterator[bytes]:
-    """The samples of a block as JointState messages in CDR, one at a time.
-
-    Raises
-    ------
-    ValueError
-        If a stamp is negative or beyond 2^31 s.
-    """
-    if block.stamp_ns.size and (block.stamp_ns[0] < 0 or block.stamp_ns[-1] >= 2**31 * 10**9):
-        raise ValueError(f"stamps must lie within 0 and 2^31 s, got {block.stamp_ns[0]} ns")
+def messages(block: Log) -> NDArray[np.void]:
+    """The samples of a block as JointState messages in CDR (N,), of stamps that `check_stamps` passes."""
     rows = np.zeros(len(block), _layout(block.omega is not None))
     rows["encapsulation"] = (0, 1, 0, 0)
     rows["sec"] = block.stamp_ns // 10**9
@@ -95,8 +87,7 @@ def payloads(block: Log) -> Iterator[bytes]:
         if values is not None:
             rows[f"{name}_count"] = 2
             rows[name] = values.T
-    size, data = rows.dtype.itemsize, rows.tobytes()
-    return (data[start : start + size] for start in range(0, len(data), size))
+    return rows
 
 
 def _layout(velocity: bool) -> np.dtype[np.void]:

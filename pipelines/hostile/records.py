@@ -15,7 +15,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from algid.log import Log
 from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
-from algid.writers.mcap import payloads
+from algid.writers.mcap import messages
 from pipelines.hostile import Hostile
 from pipelines.mutations import clean_log
 
@@ -90,8 +90,8 @@ def written(draw: random.Random) -> bytes:
         "/other", "cdr", writer.register_schema("std_msgs/msg/Int8", "ros2msg", b"int8 data")
     )
     log = log_of_records()
-    for row, (stamp, payload) in enumerate(zip(log.stamp_ns.tolist(), payloads(log), strict=True)):
-        writer.add_message(channel, stamp, payload, stamp, row)
+    for row, (stamp, payload) in enumerate(zip(log.stamp_ns.tolist(), messages(log), strict=True)):
+        writer.add_message(channel, stamp, payload.tobytes(), stamp, row)
         if row % 7 == 0:
             writer.add_message(other, stamp, b"\0\1\0\0\7", stamp, row)
     writer.finish()  # type: ignore[no-untyped-call]
@@ -265,11 +265,11 @@ def with_schemas(
             "cdr",
             writer.register_schema(JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode()),
         )
-        for stamp, payload in zip(log.stamp_ns.tolist(), payloads(replace(log)), strict=True):
-            writer.add_message(channel, stamp, payload, stamp)
-    for topic, encoding, name, kind, data, messages in topics:
+        for stamp, payload in zip(log.stamp_ns.tolist(), messages(replace(log)), strict=True):
+            writer.add_message(channel, stamp, payload.tobytes(), stamp)
+    for topic, encoding, name, kind, data, contents in topics:
         channel = writer.register_channel(topic, encoding, writer.register_schema(name, kind, data))
-        for row, message in enumerate(messages):
+        for row, message in enumerate(contents):
             writer.add_message(
                 channel, int(log.stamp_ns[0]) + row * 10**6, message, int(log.stamp_ns[0])
             )

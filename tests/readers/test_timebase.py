@@ -94,10 +94,31 @@ def test_half_of_the_stamps_may_repeat(repeats: int, fits: bool) -> None:
     stamps = np.concatenate([np.arange(40 - repeats), np.full(repeats, 39 - repeats)])
     if fits:
         (said,) = ordered(table(stamps)).notices
-        assert said.text == "20 samples repeat a stamp; the first of each was kept"
+        assert said.text.startswith("20 samples repeat a stamp; the first of each was kept; 20 ")
     else:
         with pytest.raises(LogError, match="time stands still: 21 of 40 stamps as the one before"):
             ordered(table(stamps))
+
+
+@pytest.mark.parametrize("cut", [None, 6])
+def test_a_repeated_stamp_is_a_loss_where_its_values_are_others(cut: int | None) -> None:
+    """In a table, and across two."""
+    stamps, values = [0, 1, 2, 3, 4, 5, 5, 6, 7, 8], np.array([0, 1, 2, 3, 4, 5, 5, 6, 7, 8.0])
+    for other, text in (
+        (5.0, "1 sample repeats a stamp; the first of each was kept"),
+        (5.5, "1 sample repeats a stamp; the first of each was kept; 1 with other values is lost"),
+    ):
+        values[6] = other
+        parts = [slice(0, cut), *([slice(cut, None)] if cut else [])]
+        (said,) = ordered(*(table(stamps[part], q=values[part]) for part in parts)).notices
+        assert (said.text, said.lossy) == (text, other != 5.0)
+
+
+def test_half_of_a_log_at_repeated_stamps_counts_as_lost() -> None:
+    stamps = np.repeat(np.arange(2500), 2)
+    (said,) = ordered(table(stamps, q=np.arange(5000.0))).notices
+    assert said.text.endswith("; 2,500 with other values are lost")
+    assert said.lossy
 
 
 def test_what_empty_tables_tell_is_kept() -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import shutil
 from collections import defaultdict
 from pathlib import Path
@@ -7,12 +8,13 @@ from typing import Any
 
 import numpy as np
 import polars as pl
+import pyarrow.parquet as pq
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from algid.errors import ResultError
-from algid.report.export import export_mcap
+from algid.errors import OutputError, ResultError
+from algid.report.export import START_KEY, export_mcap
 from tests.report.folders import START_NS
 
 
@@ -106,3 +108,18 @@ def test_without_a_first_stamp_time_counts_from_zero(case_folder: Path, tmp_path
 def test_a_folder_without_a_result_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ResultError, match=r"result\.json: cannot read it"):
         export_mcap(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["torque", "estimates"])
+def test_stamps_that_no_message_holds_are_refused(
+    name: str, case_folder: Path, tmp_path: Path
+) -> None:
+    folder = Path(shutil.copytree(case_folder, tmp_path / case_folder.name))
+    (folder / "estimates.mcap").unlink(missing_ok=True)
+    path = folder / f"{name}.parquet"
+    table = pq.read_table(path)
+    late = {START_KEY: json.dumps([2**31 * 10**9] * 2)}
+    pq.write_table(table.replace_schema_metadata({**(table.schema.metadata or {}), **late}), path)
+    with pytest.raises(OutputError, match=rf"{name}\.parquet: ROS 2 messages hold times from 1970"):
+        export_mcap(folder)
+    assert not (folder / "estimates.mcap").exists()
