@@ -187,6 +187,10 @@ MESSAGES: Mapping[str, str] = {
         "joint 1 by itself tells {name} as {first:.2g} {unit} and joint 2 as {second:.2g}: one of them is hardly "
         "driven, or a term is missing; give a log that drives both"
     ),
+    "BOUNDS_DOUBTED": (
+        "the estimates break {bounds}, though an arm that obeys physics explains the torques as well: a joint is hardly "
+        "driven, and the friction that moves it makes the constants; give logs that drive both joints"
+    ),
     "CONSTRAINED": "--constrain enforces {bounds}, which the logs contradict",
     "NOT_FEASIBLE": "--constrain cannot obey {bounds}: no estimates within the bounds were found",
     "REFINED_FAILED": "the refined estimator did not converge; the weak estimate is reported instead",

@@ -18,6 +18,7 @@ from itertools import islice, product
 from math import copysign, pi, remainder
 
 import numpy as np
+from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.estimators.convention_sums import (
@@ -26,9 +27,11 @@ from algid.estimators.convention_sums import (
     ZEROED,
     ConventionSums,
     ThinnedLog,
+    moving,
     solved,
     summed,
     thinned,
+    together,
 )
 from algid.estimators.conventions import AS_READ, Convention
 
@@ -38,6 +41,8 @@ _FINE, _COARSE = (
     (250.0, 40.0),
     (125.0, 12.0),
 )  # Hz and s: what is looked at, and what scales are sought in
+_EACH = 10.0  # s of each of several logs, at least
+_SHORTEST = 6 * WINDOW  # of motion
 _QUARTERS = (0.0, 0.5 * pi, pi, -0.5 * pi)
 _SHIFTED = 3  # conventions, of the best, whose zeros are set free
 _SCALES = (0.1, 400.0)  # from turns (0.16) to the motors behind large gears
@@ -48,6 +53,8 @@ _NEAR = 0.01  # of a scale: how near one of those it is tried for them
 
 _INERTIAL = ("M22 > 0", "k5 > 0", "det M > 0", "k1 k2 > 0")
 
+MOST_LOGS = 32
+"""Logs that are looked at, evenly spread."""
 BROKEN = -4.0
 """A demand of physics missed by more standard deviations than this is broken."""
 MET = 4.0
@@ -129,20 +136,43 @@ class Judgement:
     alone: bool
 
 
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """Angles and torques (2, N) of a log as it was read, in rad and N m, `dt` s apart."""
+
+    theta: FloatArray
+    tau: FloatArray
+    dt: float
+
+    @property
+    def usable(self) -> bool:
+        """Whether it is fast enough (ten samples a window), and its angles may be angles.
+
+        One that spans more than any scale makes a joint's is none, as a spike of 1e6 rad is none.
+        """
+        wide = np.ptp(self.theta, axis=1).max() > _SCALES[1] * _WIDEST
+        return self.theta.shape[1] * self.dt >= 2 * WINDOW and 10 * self.dt <= WINDOW and not wide
+
+
 def judge(
     theta: FloatArray, tau: FloatArray, dt: float, *, gravity: bool = True
 ) -> Judgement | None:
-    """Try every convention on angles (2, N) in rad and torques (2, N) in N m, `dt` s apart.
+    """Try every convention on angles (2, N) in rad and torques (2, N) in N m, `dt` s apart."""
+    return judge_together([Recorded(theta, tau, dt)], gravity=gravity)
 
-    None where the log is too short (six windows) or too slow (ten samples a window) to tell, a
-    torque is zero, or an angle spans more than any scale makes a joint's: such values are no
-    angles, as a spike of 1e6 rad is none.
+
+def judge_together(logs: Sequence[Recorded], *, gravity: bool = True) -> Judgement | None:
+    """Try every convention on logs of one arm that were read alike, on the stretches that move.
+
+    None where they do not move for six windows, or a torque is zero throughout.
     """
-    if theta.shape[1] * dt < 6 * WINDOW or 10 * dt > WINDOW or not np.all(np.any(tau != 0, axis=1)):
+    usable = [log for log in logs if log.usable]
+    usable = usable[:: -(-len(usable) // MOST_LOGS)] if usable else usable
+    if not usable or not all(any(np.any(log.tau[joint]) for log in usable) for joint in (0, 1)):
         return None
-    if np.ptp(theta, axis=1).max() > _SCALES[1] * _WIDEST:
+    log = _Trials(usable, gravity)
+    if log.seconds < _SHORTEST:
         return None
-    log = _Trials(theta, tau, dt, gravity)
     found = list(log.discrete())
     judged = _judged(found, log.apart)
     if judged.alone and judged.best.left.max() < _CLEAN:
@@ -166,19 +196,51 @@ def _judged(found: Sequence[Candidate], apart: float) -> Judgement:
     return Judgement(as_read, best, alone)
 
 
-class _Trials:
-    """One log, mapped and fitted under any convention."""
+def seconds_of_each(count: int, longest: float = _FINE[1]) -> float:
+    """How much of each of `count` logs is looked at, in s, where of one alone it is `longest`."""
+    return max(longest / count, _EACH)
 
-    def __init__(self, theta: FloatArray, tau: FloatArray, dt: float, gravity: bool) -> None:
-        self._fine = thinned(theta, tau, dt, *_FINE)
-        self._coarse = thinned(theta, tau, dt, *_COARSE)
+
+@dataclass(frozen=True, eq=False)
+class _Windowed:
+    """Logs thinned to one rate, and which of their windows move."""
+
+    logs: tuple[ThinnedLog, ...]
+    moving: tuple[NDArray[np.bool_], ...]
+
+    @classmethod
+    def of(cls, logs: Sequence[Recorded], rate: float, longest: float) -> _Windowed:
+        longest = seconds_of_each(len(logs), longest)
+        found = tuple(thinned(log.theta, log.tau, log.dt, rate, longest) for log in logs)
+        return cls(found, tuple(moving(found)))
+
+    @property
+    def seconds(self) -> float:
+        """How long the logs move, in s."""
+        each = zip(self.logs, self.moving, strict=True)
+        return sum(log.theta.shape[1] * log.dt * float(kept.mean()) for log, kept in each)
+
+    def summed(self, angles: Convention) -> tuple[ConventionSums, ConventionSums]:
+        """Sums with the second motor in its joint, and with it at the base."""
+        pairs = [summed(angles, *log) for log in zip(self.logs, self.moving, strict=True)]
+        joint, base = (together(sums) for sums in zip(*pairs, strict=True))
+        return joint, base
+
+
+class _Trials:
+    """Logs, mapped and fitted under any convention."""
+
+    def __init__(self, logs: Sequence[Recorded], gravity: bool) -> None:
+        self._fine = _Windowed.of(logs, *_FINE)
+        self._coarse = _Windowed.of(logs, *_COARSE)
+        self.seconds = self._fine.seconds
         kept = [not name.startswith(("k2", "k4")) or gravity for name in COLUMNS]
         self._free = np.eye(len(COLUMNS))[:, kept]
         self._zeros = [
             (turn, half) for half in (0.0, pi) for turn in (_QUARTERS if gravity else _QUARTERS[:1])
         ]
         self._names = tuple(name for name in ZEROED if name not in ("k2", "k4") or gravity)
-        self.apart = max(APART, 2 * EVIDENCE * WINDOW / (self._fine.theta.shape[1] * self._fine.dt))
+        self.apart = max(APART, 2 * EVIDENCE * WINDOW / max(self.seconds, _SHORTEST))
         """By how much the scores of two conventions differ that are told apart."""
         self._passes: dict[Convention, tuple[ConventionSums, ConventionSums]] = {}
 
@@ -227,7 +289,7 @@ class _Trials:
         if free.score < min(one.score for one in found if one.family == family) - self.apart:
             yield free
 
-    def _scores(self, families: Sequence[Convention], log: ThinnedLog) -> list[float]:
+    def _scores(self, families: Sequence[Convention], log: _Windowed) -> list[float]:
         """What is left with free zeros, sums of logarithms, for families of the same angles and drive."""
         return _sizes(solved(self._sums(families[0], log), families, self._free[None])[1]).tolist()
 
@@ -258,10 +320,11 @@ class _Trials:
         None where no scale leaves far less than none.
         """
 
-        def score(scale: float, log: ThinnedLog) -> float:
+        def score(scale: float, log: _Windowed) -> float:
             return self._scores([_scaled_by(scale, joints)], log)[0]
 
-        grid = _grid(np.ptp(self._coarse.theta, axis=1)[np.array(joints) == 1])
+        travel = np.max([np.ptp(log.theta, axis=1) for log in self._coarse.logs], axis=0)
+        grid = _grid(travel[np.array(joints) == 1])
         scale = min(grid, key=lambda scale: score(scale, self._coarse))
         if score(scale, self._coarse) > score(1.0, self._coarse) - self.apart:
             return None
@@ -286,16 +349,16 @@ class _Trials:
                 T[row : row + 2, column] = np.cos(turned[name]), np.sin(turned[name])
         return T
 
-    def _sums(self, family: Convention, log: ThinnedLog) -> ConventionSums:
+    def _sums(self, family: Convention, log: _Windowed) -> ConventionSums:
         """Sums for a family's angles and drive.
 
-        Those of the last pass over the log serve the next one too.
+        Those of the last pass over the logs serve the next one too.
         """
         angles = Convention(
             swapped=family.swapped, scale=family.scale, signs=family.signs, absolute=family.absolute
         )
         if angles not in self._passes or log is not self._fine:
-            passed = summed(angles, log)
+            passed = log.summed(angles)
             if log is not self._fine:
                 return passed[family.base]
             self._passes[angles] = passed

@@ -19,6 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.estimators.conventions import Convention
@@ -47,6 +48,7 @@ ZEROED = tuple(name for name in COLUMNS if not name.endswith("'"))
 WINDOW = 0.4  # s
 _BANDWIDTH = 40.0  # Hz, of the velocity beside k1
 _COULOMB_SPEED = 0.1  # rad/s
+AT_REST = 0.1  # of a joint's RMS speed
 _REWEIGHTINGS = 4
 _FLOOR = 1e-9  # of a torque's power: a residual below it is rounding
 
@@ -68,7 +70,10 @@ class ConventionSums:
 
 @dataclass(frozen=True, eq=False)
 class ThinnedLog:
-    """Angles and torques (2, N) as they were read, `dt` s apart, velocities (2, N - 2 `reach`) and windows' kernels."""
+    """Angles and torques (2, N) as they were read, `dt` s apart, velocities (2, N - 2 `reach`) and windows' kernels.
+
+    `squares` (2, R) are the joints' squared velocities, averaged over each window.
+    """
 
     theta: FloatArray
     omega: FloatArray
@@ -77,6 +82,7 @@ class ThinnedLog:
     reach: int
     windows: Windows
     kernels: FloatArray
+    squares: FloatArray
 
 
 def thinned(
@@ -91,12 +97,41 @@ def thinned(
     dt *= width
     bandwidth = max(min(_BANDWIDTH, 0.2 / dt), 6.0 / WINDOW)
     windows = Windows(dt, WINDOW, 0.0, bandwidth)
-    omega = correlate(theta, differentiator(dt, bandwidth))
-    return ThinnedLog(theta, omega, tau, dt, half_length(dt, bandwidth), windows, windows.kernels())
+    omega, kernels = correlate(theta, differentiator(dt, bandwidth)), windows.kernels()
+    squares = windows.moments(omega**2, kernels[0])
+    return ThinnedLog(theta, omega, tau, dt, half_length(dt, bandwidth), windows, kernels, squares)
 
 
-def summed(angles: Convention, log: ThinnedLog) -> tuple[ConventionSums, ConventionSums]:
-    """Sums for angles so mapped: with the second motor in its joint, and with it at the base."""
+def moving(logs: Sequence[ThinnedLog]) -> list[NDArray[np.bool_]]:
+    """Windows (R,) of each log in which a joint is faster than a share `AT_REST` of its speed, RMS over all logs.
+
+    Where both joints stand, dry friction may hold them, and no equation of motion holds.
+    """
+    every = np.concatenate([log.squares for log in logs], axis=1)
+    least = AT_REST**2 * np.mean(every, axis=1, keepdims=True)
+    return [np.any(log.squares >= least, axis=0) for log in logs]
+
+
+def together(sums: Sequence[ConventionSums]) -> ConventionSums:
+    """The sums of several logs of one arm."""
+    weight = np.array([one.independent for one in sums])
+    squares = np.array([one.speed**2 for one in sums])
+    return ConventionSums(
+        np.sum([one.gram for one in sums], axis=0),
+        np.sum([one.cross for one in sums], axis=0),
+        np.sum([one.power for one in sums], axis=0),
+        np.sqrt(weight @ squares / max(float(weight.sum()), 1e-300)),
+        float(weight.sum()),
+    )
+
+
+def summed(
+    angles: Convention, log: ThinnedLog, kept: NDArray[np.bool_]
+) -> tuple[ConventionSums, ConventionSums]:
+    """Sums over the windows `kept` (R,) for angles so mapped.
+
+    With the second motor in its joint, and with it at the base.
+    """
     theta, omega = (
         angles.angles(log.theta[:, log.reach : -log.reach]),
         angles.angles(log.omega),
@@ -139,8 +174,8 @@ def summed(angles: Convention, log: ThinnedLog) -> tuple[ConventionSums, Convent
         "o2": (zeros, one),
         "j2": (zeros, bend2),
     }
-    X = np.array([columns[name] for name in COLUMNS]).swapaxes(0, 1)
-    torques = np.array(b)
+    X = np.array([columns[name] for name in COLUMNS]).swapaxes(0, 1)[:, :, kept]
+    torques = np.array(b)[:, kept]
     speed = np.sqrt(np.mean(omega**2, axis=1))
     independent = X.shape[2] / OVERLAP
     drives = (X, np.stack([X[0] - X[1], X[1]]))

@@ -120,6 +120,11 @@ class Fit:
         """Whether the refined estimator found its likelihood refuted, and another estimate stands in its place."""
         return any(note.code == "REFUTED" for note in self.notes)
 
+    @property
+    def beyond_errors(self) -> bool:
+        """Whether bounds of physics are broken by what the error bars leave out: see `doubt`."""
+        return any(note.code == "BOUNDS_DOUBTED" for note in self.notes)
+
     def noted(self, note: Notice) -> Fit:
         """The fit with one more thing to say of it."""
         return replace(self, notes=(*self.notes, note))

@@ -61,12 +61,13 @@ class PredictionFilter:
 
 @dataclass(frozen=True, eq=False)
 class PredictionScore:
-    """Sums by joint (2,): samples, squared residuals, torque, squared torque."""
+    """Sums by joint (2,): samples, squared residuals, torque, squared torque, and squares of the model's parts."""
 
     count: float = 0.0
     residual: FloatArray = field(default_factory=lambda: np.zeros(2))
     torque: FloatArray = field(default_factory=lambda: np.zeros(2))
     square: FloatArray = field(default_factory=lambda: np.zeros(2))
+    parts: FloatArray = field(default_factory=lambda: np.zeros(2))
 
     def __add__(self, other: PredictionScore) -> PredictionScore:
         return PredictionScore(
@@ -74,6 +75,7 @@ class PredictionScore:
             self.residual + other.residual,
             self.torque + other.torque,
             self.square + other.square,
+            self.parts + other.parts,
         )
 
     @property
@@ -88,6 +90,16 @@ class PredictionScore:
         Of a joint without torque over the other joint's.
         """
         return np.sqrt(self.residual / np.maximum(self._of_drive(self.square), 1e-300))
+
+    @property
+    def of_load(self) -> FloatArray:
+        """RMSE over the torque's root mean square (2,), or over that of the model's parts where it is larger.
+
+        A joint that is hardly driven has little torque, since inertia, weight and friction make up
+        for one another there.
+        """
+        acts = np.maximum(self._of_drive(self.square), self.parts)
+        return np.sqrt(self.residual / np.maximum(acts, 1e-300))
 
     @property
     def r2(self) -> FloatArray:
@@ -147,9 +159,9 @@ class PredictionSums:
         """How well the coefficients `c` (q,) predict the torque."""
         v = np.append(-c, 1.0)
         residual = np.maximum(np.einsum("x,axy,y->a", v, self._gram, v), 0.0)
-        return PredictionScore(
-            float(self._count), residual, self._torque.copy(), self._gram[:, -1, -1].copy()
-        )
+        parts = np.einsum("x,axx->a", c**2, self._gram[:, :-1, :-1])
+        square = self._gram[:, -1, -1].copy()
+        return PredictionScore(float(self._count), residual, self._torque.copy(), square, parts)
 
     def _add(self, piece: Segment) -> None:
         shift = seconds(self._shift, piece.dt)

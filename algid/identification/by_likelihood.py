@@ -16,7 +16,7 @@ from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, constrained
 from algid.estimators.doubt import doubted
 from algid.estimators.fit import Fit
 from algid.estimators.innovations import ResidualSums, pooled
-from algid.estimators.prediction import PredictionSums
+from algid.estimators.prediction import PredictionScore, PredictionSums, score
 from algid.estimators.selection import (
     CHOICE,
     FIRST_TERMS,
@@ -27,12 +27,13 @@ from algid.estimators.selection import (
 )
 from algid.estimators.too_short import TooShortError
 from algid.identification.known import model_of
-from algid.identification.series import torque_coefficients
+from algid.identification.predicted import prediction
+from algid.identification.series import torque_coefficients, torque_shift
 from algid.identification.source import LogSource
 from algid.identification.survey import Survey
 from algid.identification.velocities import with_velocities
 from algid.methods import estimator_of
-from algid.model import CHOICES, DELAYS, EVERY_TERM, Model, without_delay
+from algid.model import CHOICES, DELAYS, EVERY_TERM, RIGID, Model, without_delay
 from algid.notices import Notice
 from algid.results import Result
 from algid.runtime import beside
@@ -41,6 +42,8 @@ from algid.signals.segments import Segment
 
 NOTHING = 2.0
 """Standard deviations: a coefficient nearer to zero is not distinguished from it."""
+MOST = 0.5
+"""R² below which most of a torque is not the model's."""
 Pass = Callable[[], Iterable[Segment]]
 Predictions = Mapping[LogSource, PredictionSums]
 """What scores a prediction of a log by any coefficients."""
@@ -186,15 +189,30 @@ def with_doubt(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) 
     """
     if not (fit.refuted and settings.chooses):
         return fit
-    if any(
-        bound.distance is not None and bound.distance > FAR_BEYOND for bound in broken_bounds(fit)
-    ):
-        return fit
+    far = [
+        b.bound for b in broken_bounds(fit) if b.distance is not None and b.distance > FAR_BEYOND
+    ]
+    if far:
+        lawful = constrained(fit)
+        if not lawful.converged or _explains_little(lawful, survey, settings):
+            return fit
+        doubt = Notice("BOUNDS_DOUBTED", numbers={"bounds": far})
+        return fit.marked("WEAK_EXCITATION", RIGID).noted(doubt)
     unloaded, loaded = _passes(survey, settings)
     common = _weak_settings(
         settings, replace(chosen, model=replace(chosen.model, terms=FIRST_TERMS))
     )
     return doubted(fit, unloaded, loaded, common)
+
+
+def _explains_little(fit: Fit, survey: Survey, settings: Settings) -> bool:
+    """Whether most of a joint's torque is not what the fit makes it."""
+    total = PredictionScore()
+    for log in survey.logs:
+        c, shift = torque_coefficients(fit, log.role), torque_shift(settings, fit)
+        total += score(fit.shared.model, c, survey.segments(log), shift)
+    found = prediction(total)
+    return found is not None and bool(found.unexplained(MOST))
 
 
 def with_endogeneity(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) -> Fit:

@@ -15,9 +15,14 @@ from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, repeatabilit
 from algid.estimators.fit import Fit, own_estimates
 from algid.estimators.instruments import ENDOGENEOUS
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
-from algid.estimators.prediction import PredictionFilter, PredictionScore, cross_validate, score
+from algid.estimators.prediction import (
+    PredictionScore,
+    cross_validate,
+    score,
+)
 from algid.estimators.selection import Selection
 from algid.identification.by_likelihood import Predictions
+from algid.identification.predicted import prediction
 from algid.identification.remarks import fit_notes, fit_warnings
 from algid.identification.series import torque_coefficients, torque_shift
 from algid.identification.survey import Survey
@@ -30,9 +35,6 @@ from algid.table4 import UNITS as TABLE_UNITS
 
 NEVER_ZERO = ("k3", "k5", "l1", "l2")
 """Inertias and lengths: any other parameter of an arm may be zero."""
-NEAR_CONSTANT = (
-    0.1  # of the torque's RMS: a residual this small passes, however little there was to explain
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,8 +92,8 @@ def is_implausible(summary: results.FitSummary) -> bool:
 
     Its estimates come from one solution: where one of them breaks a bound by more than chance
     explains, or a joint's torque is predicted worse than its mean would, none can be trusted. A
-    torque that hardly varies leaves R² nothing to explain; there the residual has to be a tenth of
-    the torque at least.
+    torque that hardly varies leaves R² nothing to explain, nor does a joint that is hardly driven;
+    there the residual has to be a tenth of what acts on the joint at least.
     """
     if any(
         bound.distance_sigma is not None and bound.distance_sigma > FAR_BEYOND
@@ -99,11 +101,7 @@ def is_implausible(summary: results.FitSummary) -> bool:
     ):
         return True
     judged = summary.cross_validation or summary.residual
-    if judged is None:
-        return False
-    return any(
-        r2 < 0 and nrmse > NEAR_CONSTANT for r2, nrmse in zip(judged.r2, judged.nrmse, strict=True)
-    )
+    return judged is not None and bool(judged.unexplained(least=0.0))
 
 
 def distrusted(group: Mapping[str, Estimate]) -> dict[str, Estimate]:
@@ -248,7 +246,11 @@ def fit_summary(
         ),
         terms=_terms(fit, chosen),
         broken_bounds=[
-            results.Bound(bound=b.bound, value=b.value, distance_sigma=b.distance)
+            results.Bound(
+                bound=b.bound,
+                value=b.value,
+                distance_sigma=None if fit.beyond_errors else b.distance,
+            )
             for b in broken_bounds(fit)
             if b.distance is None or b.distance > fit.quantile  # else its 95 % interval keeps it
         ],
@@ -322,20 +324,3 @@ def _torque_gain(fit: Fit, known: float | None) -> Estimate | None:
         return unknown("1")
     found = estimate(known / mass, known / mass * std / mass, 0.0, "1", fit.status[place])
     return found.model_copy(update={"ci95": (known / (mass + half), known / (mass - half))})
-
-
-def prediction(found: PredictionScore) -> results.TorquePrediction | None:
-    """As the result holds it; None where every log was too short to judge."""
-    if found.count == 0:
-        return None
-    rmse, nrmse, r2 = (
-        [float(value) for value in pair] for pair in (found.rmse, found.nrmse, found.r2)
-    )
-    by = PredictionFilter()
-    return results.TorquePrediction(
-        rmse=(rmse[0], rmse[1]),
-        nrmse=(nrmse[0], nrmse[1]),
-        r2=(r2[0], r2[1]),
-        filter=str(by),
-        bandwidth=by.cutoff,
-    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, islice
+from typing import TYPE_CHECKING
 
 from algid.identification.source import LogSource
 from algid.log import Log
@@ -13,6 +14,9 @@ from algid.progress import Progress
 from algid.results import LogSummary
 from algid.runtime import Beside
 from algid.signals.segments import Segment, segments
+
+if TYPE_CHECKING:
+    from algid.estimators.convention_search import Recorded
 
 EXAMINED = 1 << 16
 """Samples at the start of a long log that the named checks look at."""
@@ -49,6 +53,8 @@ class Survey:
         self.progress = progress
         self._seen: dict[LogSource, Seen] = {}
         self._findings: dict[LogSource, tuple[Notice, ...]] = {}
+        self._recorded: dict[LogSource, Recorded] = {}
+        self._conventions: dict[LogSource, Notice] | None = None
         self._digests: dict[LogSource, Beside[str]] = {}
         self._kept: dict[LogSource, tuple[Segment, ...]] = {}
         self._room = MOST_KEPT
@@ -102,6 +108,52 @@ class Survey:
                 pass
         return self._seen[log]
 
+    def notices(self, log: LogSource) -> tuple[Notice, ...]:
+        """What was noticed in a log.
+
+        Of several logs of a kind the conventions are judged together.
+        """
+        seen = self.seen(log).notices
+        if self._conventions is None:
+            self._conventions = {}
+            for kind in (self.unloaded, self.loaded):
+                self._conventions |= self._judged(kind)
+        found = self._conventions.get(log)
+        if found is None:
+            return seen
+        of_gravity = ("FLIPPED_SIGN", "WRONG_ZERO", "GRAVITY_COMPENSATED")  # found says it better
+        return (*(one for one in seen if one.code not in of_gravity), found)
+
+    def _judged(self, logs: Sequence[LogSource]) -> dict[LogSource, Notice]:
+        """What is wrong with the conventions of each of several logs."""
+        from algid.inspection.conventions import mends
+
+        for log in logs:
+            self.seen(log)
+        known = [(log, self._recorded.pop(log)) for log in logs if log in self._recorded]
+        if not known:
+            return {}
+        gravity = known[0][0].gravity > 0
+        found = zip(known, mends(known, gravity=gravity), strict=True)
+        return {log: one.notice for (log, _), one in found if one is not None}
+
+    def _checked(self, log: LogSource, begin: Log, *, whole: bool) -> tuple[Notice, ...]:
+        """What the named checks find at the `begin` of a log."""
+        from algid.estimators.convention_search import MOST_LOGS, seconds_of_each
+        from algid.inspection.checks import noticed
+        from algid.inspection.conventions import recorded
+
+        alike = [one for one in self.logs if one.role == log.role]
+        if len(alike) == 1:
+            return noticed(begin, gravity=log.gravity, whole=whole)
+        found = noticed(begin, gravity=log.gravity, whole=whole, alone=False)
+        kept = None
+        if log in alike[:: -(-len(alike) // MOST_LOGS)]:
+            kept = recorded(begin, seconds_of_each(len(alike)))
+        if kept is not None:
+            self._recorded[log] = kept
+        return found
+
     def summary(self, log: LogSource) -> LogSummary:
         """The log as a result names it."""
         seen = self.seen(log)
@@ -133,10 +185,8 @@ class Survey:
             if len(block) and not rows:
                 first_ns = int(block.stamp_ns[0])
                 if log not in self._findings:
-                    from algid.inspection.checks import noticed
-
                     begin = block if alone else block.part(0, EXAMINED)
-                    self._findings[log] = noticed(begin, gravity=log.gravity, whole=alone)
+                    self._findings[log] = self._checked(log, begin, whole=alone)
                 notices += self._findings[log]
             if len(block):
                 last_ns = int(block.stamp_ns[-1])

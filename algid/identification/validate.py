@@ -9,7 +9,7 @@ from algid.arm import FloatArray
 from algid.estimators.prediction import PredictionScore, Shift, score
 from algid.estimators.rollout import RolloutScore, rollouts
 from algid.identification.known import model_of, shift_of, torque_constants
-from algid.identification.outcome import prediction
+from algid.identification.predicted import prediction
 from algid.identification.source import Role
 from algid.identification.survey import Survey
 from algid.model import Model

@@ -15,7 +15,9 @@ from algid.log import Log
 from algid.notices import Notice
 
 
-def examine(log: Log, *, gravity: float = 9.81, whole: bool = True) -> tuple[Notice, ...]:
+def examine(
+    log: Log, *, gravity: float = 9.81, whole: bool = True, alone: bool = True
+) -> tuple[Notice, ...]:
     """Everything that the checks find in a log.
 
     Conventions are not sought in one that a check refuses.
@@ -27,6 +29,8 @@ def examine(log: Log, *, gravity: float = 9.81, whole: bool = True) -> tuple[Not
         0 for an arm in a horizontal plane.
     whole : bool
         False where `log` is the beginning of a longer one.
+    alone : bool
+        False where the conventions of several logs are judged together: see `mends`.
 
     Returns
     -------
@@ -48,17 +52,17 @@ def examine(log: Log, *, gravity: float = 9.81, whole: bool = True) -> tuple[Not
     found = [yielding(notice, log.origin.reading.accepted) for notice in every]
     if any(finding.refuse for finding in found):
         return tuple(found)
-    mended = mend(log, tried())
+    mended = mend(log, tried()) if alone else None
     if mended is not None:
-        code = "WRONG_CONVENTION" if mended.another else "ZERO_OFFSET"
-        numbers = {"wrong": mended.words, "contradiction": mended.contradiction}
-        found.append(Notice(code, numbers=numbers, remedies=(mended.remedy,)))
+        found.append(mended.notice)
     elif gravity > 0 and (figures := dynamic_figures(log)) is not None:
         found += gravity_findings(figures)
     return tuple(found)
 
 
-def noticed(log: Log, *, gravity: float = 9.81, whole: bool = True) -> tuple[Notice, ...]:
+def noticed(
+    log: Log, *, gravity: float = 9.81, whole: bool = True, alone: bool = True
+) -> tuple[Notice, ...]:
     """What `examine` finds, as notices.
 
     Raises
@@ -66,7 +70,7 @@ def noticed(log: Log, *, gravity: float = 9.81, whole: bool = True) -> tuple[Not
     LogError
         If a check forbids the use of a log that is all there.
     """
-    findings = examine(log, gravity=gravity, whole=whole)
+    findings = examine(log, gravity=gravity, whole=whole, alone=alone)
     refused = next((finding for finding in findings if finding.refuse), None)
     if refused is not None and whole:
         raise LogError(f"{log.origin.path}: {refused.code}: {refused.clause}")

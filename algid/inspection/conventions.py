@@ -6,17 +6,18 @@ that change the reading.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import degrees, isclose, pi, remainder
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from algid.estimators.convention_search import Judgement, judge
+from algid.estimators.convention_search import Judgement, Recorded, judge_together
 from algid.estimators.conventions import AS_READ, Convention
-from algid.log import Log, Reading
-from algid.notices import Remedy
+from algid.log import Log, Origin, Reading
+from algid.notices import Notice, Remedy
 from algid.signals.segments import Segment, append, segments
 from algid.words import counted
 
@@ -25,6 +26,15 @@ _SMALL = (
 )  # rad: a zero this close, or a centre of mass off its link, is a phase and no other convention
 _TOLD = 0.01  # rad: a zero closer than this is not worth a word
 _SAME = 1e-3  # of a scale or rad: as good as equal
+
+
+class Read(Protocol):
+    """A log, or what stands for one: how it was read."""
+
+    @property
+    def origin(self) -> Origin:
+        """Where its samples come from."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -43,6 +53,13 @@ class Mend:
     contradiction: str
     settings: dict[str, Any]
     another: bool
+
+    @property
+    def notice(self) -> Notice:
+        """What there is to say of the log."""
+        code = "WRONG_CONVENTION" if self.another else "ZERO_OFFSET"
+        numbers = {"wrong": self.words, "contradiction": self.contradiction}
+        return Notice(code, numbers=numbers, remedies=(self.remedy,))
 
     @property
     def remedy(self) -> Remedy:
@@ -66,6 +83,16 @@ def judged(log: Log, *, gravity: bool = True) -> Judgement | None:
     log : Log, as it was read
     gravity : False for an arm in a horizontal plane
     """
+    return judged_together([recorded(log)], gravity=gravity)
+
+
+def judged_together(logs: Iterable[Recorded | None], *, gravity: bool = True) -> Judgement | None:
+    """The same of logs of one arm, of which None tells nothing."""
+    return judge_together([log for log in logs if log is not None], gravity=gravity)
+
+
+def recorded(log: Log, seconds: float = math.inf) -> Recorded | None:
+    """The beginning of the longest stretch of a log without a gap; None of an empty one."""
     stretches: list[Segment] = []
     for segment in segments([log]):
         if segment.continues and stretches:
@@ -73,11 +100,10 @@ def judged(log: Log, *, gravity: bool = True) -> Judgement | None:
         else:
             stretches.append(segment)
     longest = max(stretches, key=len, default=None)
-    if longest is None or not np.all(
-        np.mean(longest.tau**2, axis=1) > 0
-    ):  # a torque that is none tells nothing
+    if longest is None:
         return None
-    return judge(longest.theta, longest.tau, longest.dt, gravity=gravity)
+    part = longest.part(0, int(min(len(longest), seconds / longest.dt)))
+    return Recorded(part.theta.copy(), part.tau.copy(), part.dt)
 
 
 def is_right(found: Judgement | None) -> bool:
@@ -85,7 +111,7 @@ def is_right(found: Judgement | None) -> bool:
     return found is not None and found.alone and found.best.convention == AS_READ
 
 
-def mend(log: Log, found: Judgement | None) -> Mend | None:
+def mend(log: Read, found: Judgement | None) -> Mend | None:
     """What sets a log right that physics contradicts as it was read.
 
     None where it is right, or the log does not tell.
@@ -121,6 +147,19 @@ def mend(log: Log, found: Judgement | None) -> Mend | None:
     )
 
 
+def mends(logs: Sequence[tuple[Read, Recorded]], *, gravity: bool = True) -> list[Mend | None]:
+    """What sets each of several logs of one arm right: see `mend`.
+
+    They are judged together. Where that does not tell, each is judged by itself, and accused of
+    another convention only: what a single run alleges of zeros may be friction.
+    """
+    found = judged_together([recording for _, recording in logs], gravity=gravity)
+    if found is not None and found.alone:
+        return [mend(log, found) for log, _ in logs]
+    own = [mend(log, judged_together([each], gravity=gravity)) for log, each in logs]
+    return [None if one is None or not one.another else one for one in own]
+
+
 def _clauses(convention: Convention) -> Iterator[str]:
     """What is wrong with a log that has to be read by `convention`."""
     if convention.swapped and convention.torques_swapped:
@@ -153,7 +192,7 @@ def _is_unit(scale: float) -> bool:
     return isclose(scale, 180 / pi) or isclose(scale, 1 / (2 * pi))
 
 
-def _settings(convention: Convention, log: Log) -> dict[str, Any]:
+def _settings(convention: Convention, log: Read) -> dict[str, Any]:
     """The settings that read the log by `convention`, over those that it was read by."""
     reading = log.origin.reading
     found: dict[str, Any] = dict(_sources(convention, log))
@@ -186,7 +225,7 @@ def _settings(convention: Convention, log: Log) -> dict[str, Any]:
     return {name: value for name, value in found.items() if value != {}}
 
 
-def _sources(convention: Convention, log: Log) -> Iterator[tuple[str, Any]]:
+def _sources(convention: Convention, log: Read) -> Iterator[tuple[str, Any]]:
     """Where the channels come from that have to change places."""
     joints = log.origin.reading.joints
     if convention.swapped and convention.torques_swapped and joints is not None:

@@ -161,10 +161,15 @@ class Bound(_Model):
     distance_sigma: float | None
 
 
+TRIFLE = 0.1
+"""Of what acts on a joint: a residual this small passes, however little there was to explain."""
+
+
 class TorquePrediction(_Model):
     """How well the model predicts the torque of logs: RMSE in N m, RMSE over the torque's RMS, and R², a joint.
 
-    Scored is what lies below `bandwidth`, in Hz; `filter` says how it is cut out.
+    Scored is what lies below `bandwidth`, in Hz; `filter` says how it is cut out. `of_load` is the
+    RMSE over what acts on a joint: its torque, or the model's parts where they are larger.
     """
 
     rmse: tuple[float, float]
@@ -172,6 +177,13 @@ class TorquePrediction(_Model):
     r2: tuple[float, float]
     filter: str
     bandwidth: float | None = None
+    of_load: tuple[float, float] | None = None
+
+    def unexplained(self, least: float) -> tuple[int, ...]:
+        """Joints, 1 or 2, whose R² is below `least`, and whose residual is no trifle beside what acts on them."""
+        of_load = self.nrmse if self.of_load is None else self.of_load
+        pairs = zip((1, 2), self.r2, of_load, strict=True)
+        return tuple(joint for joint, r2, of in pairs if r2 < least and of > TRIFLE)
 
 
 class Repeatability(_Model):

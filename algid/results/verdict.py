@@ -92,7 +92,7 @@ def _worst_bound(fit: FitSummary | None) -> Bound | None:
 def _contradiction(fit: FitSummary | None) -> str:
     """Why the statuses are IMPLAUSIBLE."""
     worst = _worst_bound(fit)
-    poor = next(_unexplained(fit, 0.0), None)
+    poor = next(_worse_than_constant(fit), None)
     if poor is not None and (worst is None or not worst.distance_sigma):
         return poor.text
     return (
@@ -126,8 +126,7 @@ def _failure(result: Result) -> str | None:
         return f"no parameter could be identified ({joined(words)})"
     if usable < LEAST_USABLE * count:
         return f"only {usable} of {counted(count, 'parameter')} could be identified"
-    poor = next(_unexplained(result.fit, WORST_R2), None)
-    return None if poor is None else poor.text
+    return next((one.text for one in _worse_than_constant(result.fit)), None)
 
 
 def _identified(result: Result) -> str:
@@ -218,8 +217,8 @@ def _reasons(result: Result, *, failed: bool) -> Iterator[Notice]:
     causes = sorted(
         (one for one in warnings if one.code in CAUSES), key=lambda one: CAUSES.index(one.code)
     )
-    unexplained = next(_unexplained(result.fit, WORST_R2), None)
-    if failed and not causes and (is_implausible(result) or unexplained is not None):
+    poor = any(_worse_than_constant(result.fit))
+    if failed and not causes and (is_implausible(result) or poor):
         yield Notice("UNKNOWN_CAUSE")
     yield from causes
     yield from _of_statuses(_chosen(result))
@@ -270,8 +269,15 @@ def _of_fit(fit: FitSummary, *, failed: bool) -> Iterator[Notice]:
     coloured = [visible(name) for name, test in fit.whiteness.items() if not test.white]
     if coloured and fit.intervals == "likelihood":
         yield Notice("NOT_WHITE", numbers={"names": coloured})
-    poor = list(_unexplained(fit, LEAST_R2))
-    yield from poor[1:] if failed else poor
+    shown = list(_worse_than_constant(fit))[:1] if failed else []
+    yield from (one for one in _unexplained(fit, LEAST_R2) if one not in shown)
+
+
+def _worse_than_constant(fit: FitSummary | None) -> Iterator[Notice]:
+    """The joints whose torque a constant would predict better, where there is something to explain."""
+    prediction = _prediction(fit)
+    for joint in () if prediction is None else prediction.unexplained(least=0.0):
+        yield Notice("WORSE_THAN_MEAN", numbers={"joint": joint})
 
 
 def _unexplained(fit: FitSummary | None, least: float) -> Iterator[Notice]:

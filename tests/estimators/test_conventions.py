@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.estimators.convention_search import Judgement, _demands, judge
+from algid.estimators.convention_search import (
+    Judgement,
+    Recorded,
+    _demands,
+    judge,
+    judge_together,
+)
 from algid.estimators.convention_sums import ZEROED
 from algid.estimators.conventions import AS_READ, Convention
 from algid.synth.simulator import SimulatedMotion
@@ -151,6 +157,33 @@ def test_what_no_log_can_tell(bench: Bench) -> None:
     assert louder.best.k == pytest.approx(
         6 * k, rel=1e-6
     )  # rounding, by the condition of the columns
+
+
+def test_a_rest_that_friction_holds_accuses_no_zero(bench: Bench) -> None:
+    """What the torque is there is not the weight: the stretch says nothing."""
+    theta, tau = measured(bench.bare)
+    noise = np.random.default_rng(3).standard_normal((2, *theta.shape))
+    still = theta[:, :1] + 3e-4 * noise[0]
+    held = np.array([[0.5], [-0.3]]) + 1e-2 * noise[1]
+    found = judge_together([Recorded(still, held, DT), Recorded(theta, tau, DT)])
+    assert found is not None
+    assert found.alone
+    assert found.best.convention == AS_READ
+
+
+def test_logs_of_an_arm_are_judged_together(bench: Bench) -> None:
+    """Halves of a motion tell together what the whole does: the mistake of both, or none."""
+    theta, tau = measured(bench.bare)
+    half = theta.shape[1] // 2
+    for mistake in (AS_READ, Convention(torque_signs=(1, -1))):
+        both = mistake.angles(theta), mistake.torques(tau)
+        parts = [
+            Recorded(both[0][:, own], both[1][:, own], DT) for own in (np.s_[:half], np.s_[half:])
+        ]
+        found = judge_together(parts)
+        assert found is not None
+        assert found.alone
+        assert found.best.convention == mistake
 
 
 def test_without_gravity_the_zero_of_the_first_joint_means_nothing(bench: Bench) -> None:

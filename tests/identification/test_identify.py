@@ -231,6 +231,18 @@ def test_numbers_without_a_meaning_are_refused(name: str, value: float) -> None:
         replace(Settings(), **{name: value})  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize(
+    "run", ["A0_sysid/run_07", "C1_sysid/20230629-143704", "C1_sysid/20230629-144115"]
+)
+def test_a_real_run_that_hardly_drives_a_joint_has_not_failed(shared_data: Path, run: str) -> None:
+    """One motor does next to nothing there: the run tells little, and contradicts nothing."""
+    result = identify(shared_data / "dfki" / f"{run}.csv", zero="hanging", report=False)
+    assert result.verdict.grade == "reservations"
+    assert not result.complete or any(
+        found.status is Status.WEAK_EXCITATION for found in result.parameters.values()
+    )
+
+
 def test_a_result_names_the_estimator_whose_numbers_it_holds(shared_data: Path) -> None:
 
     from algid.profile import Profile, with_settings

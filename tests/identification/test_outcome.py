@@ -20,10 +20,10 @@ from algid.identification.outcome import (
     distrusted,
     estimate,
     outcome_of,
-    prediction,
     table_rows,
     unknown,
 )
+from algid.identification.predicted import prediction
 from algid.identification.remarks import fit_notes, fit_warnings
 from algid.identification.source import open_source
 from algid.identification.survey import Survey
