@@ -22,22 +22,25 @@ window.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from algid.arm import FloatArray
 from algid.model import TERMS, Model, Motion, attributes, gains, loads_of, torque
-from algid.physics.expressions import Values
+from algid.physics.expressions import Product, Values
 from algid.signals.filters import correlate, differentiator, half_length
 from algid.signals.segments import Segment
 
 OVERLAP = 8
 _WINDOW = Polynomial([0, 1]) ** 4 * Polynomial([1, -1]) ** 4
 _WINDOW_INTEGRAL = 1 / 630  # Beta(5, 5)
+
+Known = dict[Hashable, FloatArray]
+"""Moments of one piece, and its velocities, by what they are of: those that a change of the model leaves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +73,11 @@ class Windows:
         return self.step * -(-max(reach, abs(self.whole)) // self.step)
 
     @property
+    def _own(self) -> Hashable:
+        """What of the windows changes the moments of a motion."""
+        return self.dt, self.step, self.margin, self.bandwidth
+
+    @property
     def overlap(self) -> int:
         """Samples that consecutive pieces must share, so that no window is lost between them."""
         return 2 * self.margin + (OVERLAP - 1) * self.step
@@ -81,19 +89,7 @@ class Windows:
         -------
         (3, L), in 1, 1/s and 1/s²
         """
-        length = OVERLAP * self.step
-        s = np.clip((np.arange(length) + offset) / length, 0, 1)
-        span = length * self.dt
-        window = _WINDOW / _WINDOW_INTEGRAL
-        return (
-            np.stack(
-                [
-                    window.deriv(order)(s) / span ** (order + 1) if order else window(s) / span
-                    for order in range(3)
-                ]
-            )
-            * self.dt
-        )
+        return _kernels(OVERLAP * self.step, self.dt, offset)
 
     @cached_property
     def _plain(self) -> FloatArray:
@@ -125,7 +121,12 @@ class Windows:
         return result
 
     def equations(
-        self, model: Model, piece: Segment, delay: bool, at: FloatArray | None = None
+        self,
+        model: Model,
+        piece: Segment,
+        delay: bool,
+        at: FloatArray | None = None,
+        known: Known | None = None,
     ) -> FloatArray:
         """X, the columns of both joints' equations and the torque's moment, window by window.
 
@@ -137,6 +138,8 @@ class Windows:
             Whether there is a column for a change of `shift`, last but the torque.
         at : (q,), in `algid.model.UNITS`
             Where terms that are not linear are linearised.
+        known : of the same piece and hold of the torque, by windows of any kind
+            Moments made before, to be used again; those that are made now join them.
 
         Returns
         -------
@@ -159,47 +162,85 @@ class Windows:
         if (len(piece) - 2 * margin) // self.step < OVERLAP:
             return np.zeros((2, size, 0))
         here = np.zeros(len(model.names)) if at is None else at
+        known = {} if known is None else known
         tau = piece.tau[:, margin - self.whole : len(piece) - margin - self.whole]
-        theta, omega = piece.theta[:, margin : len(piece) - margin], self._velocity(piece)
+        theta = piece.theta[:, margin : len(piece) - margin]
         X = np.zeros((2, size, (len(piece) - 2 * margin) // self.step - OVERLAP + 1))
-        self._fill(X, model, theta, omega)
-        if at is not None:
+        self._fill(X, model, piece, theta, known)
+        if at is not None and attributes(model, "by_load"):
             place = model.compiled.place
-            for name, joint, dissipated in self._dissipated(model, at, theta, omega):
+            for name, joint, dissipated in self._dissipated(
+                model, at, theta, self._velocity(piece)
+            ):
                 X[joint, place[name]] = self.moments(dissipated[None], self._plain[0])[0]
         X *= gains(model, here)[:, None, None]
-        X[:, -1] = self.moments(tau, self._shifted[0])
+        X[:, -1] = self._of_torque(tau, 0, known)
         if at is not None:
             _linearise_bilinear(X, model, at)
-        tau_slope = (
-            self.moments(tau, self._shifted[1]) if delay or model.lag_name is not None else 0.0
-        )
+        slope = delay or model.lag_name is not None
+        tau_slope = self._of_torque(tau, 1, known) if slope else 0.0
         if model.lag_name is not None:
             X[:, model.names.index(model.lag_name)] = tau_slope
         if delay:
             X[:, -2] = -tau_slope
         return X
 
-    def _fill(self, X: FloatArray, model: Model, theta: FloatArray, omega: FloatArray) -> None:
+    def _of_torque(self, tau: FloatArray, order: int, known: Known) -> FloatArray:
+        """Moments (2, R) of the torques (2, n) by φ or φ', as late as they act."""
+        key = (self._own, self.shift, order)
+        if key not in known:
+            known[key] = self.moments(tau, self._shifted[order])
+        return known[key]
+
+    def _fill(
+        self, X: FloatArray, model: Model, piece: Segment, theta: FloatArray, known: Known
+    ) -> None:
         """Write the moments of every column of τ = d²s/dt² + dp/dt + f into X: ∫φ″ s - ∫φ′ p + ∫φ f."""
-        values = Values(Motion(theta, omega, omega), model.shape)
-        compiled = model.compiled
-        for order, entries in enumerate((compiled.f, compiled.p, compiled.s)):
-            products = list(
-                dict.fromkeys(p for _, _, entry in entries for p in entry.products if p)
-            )
-            if products:
-                signals = np.stack(
-                    [np.broadcast_to(values.of(product), theta.shape[1:]) for product in products]
-                )
-                moments = dict(
-                    zip(products, self.moments(signals, self._plain[order]), strict=True)
-                )
+        compiled, shape = model.compiled, model.shape
+
+        def key(order: int, product: Product) -> Hashable:
+            shapes = sorted({name for atom in product for name in atom.shapes})
+            return self._own, order, product, tuple(getattr(shape, name) for name in shapes)
+
+        parts = tuple(enumerate((compiled.f, compiled.p, compiled.s)))
+        wanted = {
+            order: list(dict.fromkeys(p for _, _, entry in entries for p in entry.products if p))
+            for order, entries in parts
+        }
+        missing = {
+            order: [product for product in products if key(order, product) not in known]
+            for order, products in wanted.items()
+        }
+        if any(missing.values()):
+            speed = (self._own, "velocity")  # a change of friction's width asks for it again
+            omega = known[speed] = known[speed] if speed in known else self._velocity(piece)
+            values = Values(Motion(theta, omega, omega), shape)
+            for order, products in missing.items():
+                self._learn(products, order, values, theta.shape[1], known, key)
+        for order, entries in parts:
             for joint, place, entry in entries:
                 for product, factor in entry.products.items():
                     # a window's integral is one, its derivatives' are nothing
-                    moment = moments[product] if product else float(order == 0)
+                    moment = known[key(order, product)] if product else float(order == 0)
                     X[joint, place] += (-1) ** order * factor * moment
+
+    def _learn(
+        self,
+        products: list[Product],
+        order: int,
+        values: Values,
+        samples: int,
+        known: Known,
+        key: Callable[[int, Product], Hashable],
+    ) -> None:
+        """Add the moments of products of n samples, by one of the kernels, to those that are known."""
+        if not products:
+            return
+        signals = np.stack([np.broadcast_to(values.of(one), samples) for one in products])
+        for product, moment in zip(
+            products, self.moments(signals, self._plain[order]), strict=True
+        ):
+            known[key(order, product)] = moment
 
     def _dissipated(
         self, model: Model, c: FloatArray, theta: FloatArray, omega: FloatArray
@@ -232,6 +273,22 @@ class Windows:
         return correlate(
             piece.theta[:, self.margin - reach : len(piece) - self.margin + reach], kernel
         )
+
+
+@lru_cache(maxsize=32)
+def _kernels(length: int, dt: float, offset: float) -> FloatArray:
+    s = np.clip((np.arange(length) + offset) / length, 0, 1)
+    span = length * dt
+    window = _WINDOW / _WINDOW_INTEGRAL
+    found = np.stack(
+        [
+            window.deriv(order)(s) / span ** (order + 1) if order else window(s) / span
+            for order in range(3)
+        ]
+    )
+    found *= dt
+    found.setflags(write=False)
+    return found
 
 
 def row_weights(gram: FloatArray, v: FloatArray, rows: int | FloatArray) -> FloatArray:

@@ -14,8 +14,8 @@ together, log by log, whatever the sub-model, so that sub-models compare.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.estimators.combine import long_run_variance, scaled_pinv
-from algid.estimators.modulating_functions import OVERLAP, row_weights
+from algid.estimators.modulating_functions import OVERLAP, Known, row_weights
 from algid.estimators.too_short import TooShortError
 from algid.estimators.weak import Normal, Source, WeakSettings, normal_equations
 from algid.model import DELAYS, EVERY_TERM, loads_of
@@ -53,6 +53,8 @@ class Training:
 
     pieces: tuple[Segment, ...]
     loaded: bool
+    known: dict[Hashable, Known] = field(default_factory=dict)
+    """Moments that the models have in common."""
 
     @classmethod
     def of(cls, source: Source, loaded: bool) -> Training:
@@ -95,7 +97,8 @@ class Grams:
         normals = []
         for log in logs:
             here = np.array([at[log.loaded].get(name, 0.0) for name in settings.model.names])
-            if (normal := normal_equations(log.segments, settings, here)) is not None:
+            normal = normal_equations(log.segments, settings, here, log.known)
+            if normal is not None:
                 normals.append((log.loaded, normal))
         if not normals:
             raise TooShortError(

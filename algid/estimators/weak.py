@@ -19,7 +19,7 @@ beta    parameters that the logs share: the arm's, delay, payload       (Q,)    
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, TypeVar
 
@@ -37,7 +37,7 @@ from algid.estimators.combine import (
 )
 from algid.estimators.fit import Fit, conclude
 from algid.estimators.innovations import LAGS, ResidualSums, pooled, residual_sums
-from algid.estimators.modulating_functions import OVERLAP, Windows, row_weights
+from algid.estimators.modulating_functions import OVERLAP, Known, Windows, row_weights
 from algid.estimators.parametrisation import Shared
 from algid.estimators.too_short import TooShortError
 from algid.model import Model
@@ -249,12 +249,16 @@ class Normal:
 
 
 def normal_equations(
-    source: Source, settings: WeakSettings, at: FloatArray | None = None
+    source: Source,
+    settings: WeakSettings,
+    at: FloatArray | None = None,
+    known: dict[Hashable, Known] | None = None,
 ) -> Normal | None:
     """Normal equations of one log; None where it is too short for a window.
 
     A log without a stretch of four windows gets windows of a quarter of its longest stretch. Terms
-    that are not linear are linearised at the coefficients `at` (q,).
+    that are not linear are linearised at the coefficients `at` (q,). Of a log that is looked at
+    with several models, at one hold of the torque, `known` keeps the moments by piece.
     """
 
     def gather(window: float) -> tuple[Normal | None, float]:
@@ -262,13 +266,14 @@ def normal_equations(
         samples, rows = 0, np.zeros(2)
         longest = dt = 0.0
         low, high = np.full(2, np.inf), np.full(2, -np.inf)
-        for piece, windows, fresh in overlapping(source(), settings, window):
+        for number, (piece, windows, fresh) in enumerate(overlapping(source(), settings, window)):
             dt = piece.dt
             longest = max(longest, _seconds(piece))
             samples += fresh
             low = np.minimum(low, piece.theta.min(axis=1))
             high = np.maximum(high, piece.theta.max(axis=1))
-            X = windows.equations(settings.model, piece, settings.estimate_delay, at)
+            kept = None if known is None else known.setdefault((number, len(piece)), {})
+            X = windows.equations(settings.model, piece, settings.estimate_delay, at, kept)
             if not X.shape[2]:
                 continue
             moving = np.ones((2, X.shape[2]), dtype=bool)

@@ -45,6 +45,7 @@ class Atom:
         from sines, and back.
     constant : callable or None
         Its value from the shape alone, for one that no motion changes.
+    shapes : names of the widths that its value depends on, fields of `algid.physics.motion.Widths`
     """
 
     name: str
@@ -52,6 +53,7 @@ class Atom:
     source: str
     slopes: Callable[[], Mapping[str, Expression]]
     constant: Callable[[Widths], float] | None = None
+    shapes: tuple[str, ...] = ()
 
     def __lt__(self, other: Atom) -> bool:
         return self.name < other.name

@@ -70,7 +70,9 @@ def _width(name: str, which: str) -> Atom:
     def constant(shape: Widths) -> float:
         return 1 / float(getattr(shape, which))
 
-    return Atom(name, lambda _motion, shape: np.asarray(constant(shape)), "", _none, constant)
+    return Atom(
+        name, lambda _motion, shape: np.asarray(constant(shape)), "", _none, constant, (which,)
+    )
 
 
 COULOMB_RATE = expression(_width("COULOMB_RATE", "coulomb_speed"))
@@ -87,7 +89,8 @@ def _sign(joint: int) -> Atom:
     def value(motion: Motion, shape: Widths) -> FloatArray:
         return np.tanh(motion.omega[joint] / shape.coulomb_speed)
 
-    return Atom(f"t{joint + 1}", value, f"tanh(w{joint + 1} / COULOMB_SPEED)", slopes)
+    text = f"tanh(w{joint + 1} / COULOMB_SPEED)"
+    return Atom(f"t{joint + 1}", value, text, slopes, shapes=("coulomb_speed",))
 
 
 def _fading(joint: int) -> Atom:
@@ -107,7 +110,8 @@ def _fading(joint: int) -> Atom:
         return np.exp(-((motion.omega[joint] / shape.stribeck_speed) ** 2))
 
     part = f"(w{joint + 1} / STRIBECK_SPEED)"
-    return Atom(f"h{joint + 1}", value, f"exp(-{part} * {part})", slopes)
+    text = f"exp(-{part} * {part})"
+    return Atom(f"h{joint + 1}", value, text, slopes, shapes=("stribeck_speed",))
 
 
 _SIGNS, _FADINGS = (_sign(0), _sign(1)), (_fading(0), _fading(1))
