@@ -68,11 +68,11 @@ class Linearised:
 
     def solve(self, columns: FloatArray) -> FloatArray:
         """L⁻¹ of columns (m, 2 n)."""
-        return _triangular(self.factor, columns, "N")
+        return triangular(self.factor, columns, "N")
 
     def solve_transposed(self, columns: FloatArray) -> FloatArray:
         """L⁻ᵀ of columns (m, 2 n)."""
-        return _triangular(self.factor, columns, "T")
+        return triangular(self.factor, columns, "T")
 
     def smeared(self, torques: FloatArray) -> FloatArray:
         """F of torque noise (..., n)."""
@@ -83,7 +83,8 @@ class Linearised:
         return held_torque(padded)[..., 1:-1]
 
 
-def _triangular(factor: FloatArray, columns: FloatArray, transposed: str) -> FloatArray:
+def triangular(factor: FloatArray, columns: FloatArray, transposed: str) -> FloatArray:
+    """L⁻¹ of columns (m, 2 n), or L⁻ᵀ where `transposed` is "T" and not "N"; `factor` is L's band."""
     solution, info = lapack.dtbtrs(factor, columns.T, uplo="L", trans=transposed)
     if info != 0:
         raise np.linalg.LinAlgError(f"banded substitution failed with info {info}")
@@ -138,7 +139,7 @@ def linearise(
     extra = [np.gradient(modelled, stencil.dt, axis=1)[None]] if delay else []
     rows = np.concatenate([J.swapaxes(0, 1), *extra, error[None]])
     rows = np.ascontiguousarray((rows / noise.tau[None, :, None]).swapaxes(1, 2))
-    columns = _triangular(factor, rows.reshape(rows.shape[0], -1), "N")
+    columns = triangular(factor, rows.reshape(rows.shape[0], -1), "N")
     return Linearised(columns, factor, H, first, error, stencil.held)
 
 

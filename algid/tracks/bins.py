@@ -12,6 +12,8 @@ B       Σ g e, so that m_p = ΣB / ΣA                (C,)
 S       Σ g Y, how constants' errors enter          (C, q)
 E       Σ e²                                        (C,)
 Q       Σ of the whitened torques squared           (C,)
+N       Σ c Y, c the columns of friction            (C, f, q)
+D       Σ c e                                       (C, f)
 ======  ==========================================  =========
 
 The arm that a result describes, for tracking what it carries.
@@ -19,8 +21,8 @@ The arm that a result describes, for tracking what it carries.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -30,7 +32,7 @@ from algid.estimators.noise import first_guess
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
 from algid.identification.known import model_of, prior_of, shift_of
-from algid.model import SINES, Model
+from algid.model import SINES, TERMS, Model
 from algid.results import Result
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.filters import smoothed
@@ -38,7 +40,9 @@ from algid.signals.segments import Segment, pieces
 
 CELL = 0.02  # s
 _PIECE_SAMPLES = 16384
-_SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
+SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
+COULOMB = TERMS["coulomb"]
+FRICTION = ("k6", "k7", *COULOMB.names)
 _PAYLOAD_OF = {
     "k5": 0,
     "k3": 1,
@@ -73,9 +77,23 @@ class IdentifiedArm:
         return shared.coefficients(beta, True) - shared.coefficients(beta, False)
 
     @property
+    def friction(self) -> list[int]:
+        """Which coefficients are viscous or Coulomb friction's."""
+        return [self.model.names.index(name) for name in FRICTION if name in self.model.names]
+
+    @property
     def tip_equivalent(self) -> float:
         """Mass in kg that at the tip has the inertia k3 of link 2 about joint 2."""
         return abs(float(self.k[self.model.names.index("k3")])) / self.l2**2
+
+    @property
+    def by_lengths(self) -> tuple[FloatArray, FloatArray]:
+        """Derivatives (q,) by l1 and l2 of what a payload of 1 kg adds to the coefficients."""
+        g, l1, l2 = self.model.gravity, self.l1, self.l2
+        return (
+            self.added(np.array([2 * l1, 0.0, l2, g, 0.0])),
+            self.added(np.array([0.0, 2 * l2, l1, 0.0, g])),
+        )
 
     def added(self, z: FloatArray) -> FloatArray:
         """Payload constants z (5,) as changes of the coefficients (q,)."""
@@ -99,13 +117,34 @@ class Cells:
     E: FloatArray
     Q: FloatArray
     rows: FloatArray
+    N: FloatArray
+    D: FloatArray
+    friction: list[int] = field(default_factory=list)
+    """Which of the q columns are friction's."""
 
     def __len__(self) -> int:
         return int(self.start.size)
 
+    @property
+    def middle(self) -> FloatArray:
+        """Time (C,) in s amid each cell."""
+        return 0.5 * (self.start + self.end)
+
     def part(self, first: int, last: int) -> Cells:
         """Cells `first` to `last` - 1."""
-        return Cells(*(getattr(self, name)[first:last] for name in self.__dataclass_fields__))
+        return self._with({name: getattr(self, name)[first:last] for name in SUMS})
+
+    def weighted(self, weights: FloatArray) -> Cells:
+        """The cells with the sums of each times its weight (C,), rows and torques aside."""
+
+        def by_cell(x: FloatArray) -> FloatArray:
+            return np.asarray(weights.reshape(-1, *[1] * (x.ndim - 1)) * x)
+
+        return self._with({name: by_cell(getattr(self, name)) for name in "ABSEND"})
+
+    def _with(self, sums: Mapping[str, FloatArray]) -> Cells:
+        every = {name: getattr(self, name) for name in SUMS} | dict(sums)
+        return Cells(**every, friction=self.friction)
 
     @property
     def mass(self) -> float:
@@ -114,24 +153,26 @@ class Cells:
 
     def sensitivity(self, arm: IdentifiedArm, mass: float | FloatArray) -> FloatArray:
         """T (C, q + 2): how the scores of a payload of `mass` kg, one or (C,), shift with constants, l1 and l2."""
-        g, l1, l2 = arm.model.gravity, arm.l1, arm.l2
-        by_l1 = self.S @ arm.added(np.array([2 * l1, 0.0, l2, g, 0.0]))
-        by_l2 = self.S @ arm.added(np.array([0.0, 2 * l2, l1, 0.0, g]))
-        return np.column_stack([self.S, mass * by_l1, mass * by_l2])
+        by_l1, by_l2 = arm.by_lengths
+        return np.column_stack([self.S, mass * (self.S @ by_l1), mass * (self.S @ by_l2)])
+
+    def friction_sensitivity(self, arm: IdentifiedArm, mass: FloatArray) -> FloatArray:
+        """V (C, f, q + 2): how D shifts with constants, l1 and l2 where the payload has `mass` (C,) kg."""
+        lengths = [mass[:, None] * (self.N @ by_length) for by_length in arm.by_lengths]
+        return np.concatenate([self.N, *(one[..., None] for one in lengths)], axis=2)
 
     def squares(self, mass: float | FloatArray) -> FloatArray:
         """Σ (e − g m_p)² (C,): what a payload of `mass` kg, one or (C,), leaves."""
         return np.asarray(self.E - 2 * mass * self.B + mass**2 * self.A)
 
 
+SUMS = tuple(one.name for one in fields(Cells) if one.name != "friction")
+
+
 def joined(parts: Sequence[Cells]) -> Cells:
     """Cells one after another."""
-    return Cells(
-        *(
-            np.concatenate([getattr(part, name) for part in parts])
-            for name in Cells.__dataclass_fields__
-        )
-    )
+    sums = {name: np.concatenate([getattr(part, name) for part in parts]) for name in SUMS}
+    return Cells(**sums, friction=parts[0].friction)
 
 
 def cells_of(
@@ -143,7 +184,7 @@ def cells_of(
         if len(piece) < 3 * POINTS:
             continue
         stencil = Stencil(piece.dt, arm.shift)
-        theta = smoothed(piece.theta, piece.dt, min(_SMOOTHING, 0.1 / piece.dt))
+        theta = smoothed(piece.theta, piece.dt, min(SMOOTHING, 0.1 / piece.dt))
         linear = linearise(arm.model, c, theta, piece, stencil, arm.noise)
         for _ in range(settle):
             multiplier = linear.solve_transposed(linear.columns[-1:])[0]
@@ -176,6 +217,9 @@ def _sums(
         by_cell(e * e),
         by_cell(torque * torque),
         np.full(count, 2.0 * step),
+        np.stack([by_cell(c * Y) for c in Y[arm.friction]]).transpose(2, 0, 1),
+        by_cell(Y[arm.friction] * e).T,
+        arm.friction,
     )
 
 
@@ -222,6 +266,20 @@ def arm_of(
         *_body(result),
     )
     return known, covariance
+
+
+def with_friction(arm: IdentifiedArm, covariance: FloatArray) -> tuple[IdentifiedArm, FloatArray]:
+    """The arm and its covariance (q + 2, q + 2) with columns of Coulomb friction, of nothing where it had none."""
+    if COULOMB.name in arm.model.terms:
+        return arm, covariance
+    model = replace(arm.model, terms=(*arm.model.terms, COULOMB.name))
+    places = [model.names.index(name) for name in arm.model.names]
+    k = np.zeros(len(model.names))
+    k[places] = arm.k
+    places += [k.size, k.size + 1]
+    wider = np.zeros((k.size + 2,) * 2)
+    wider[np.ix_(places, places)] = covariance
+    return replace(arm, model=model, k=k), wider
 
 
 def _body(result: Result) -> tuple[float, float]:

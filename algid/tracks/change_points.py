@@ -9,36 +9,36 @@ A penalty holds for white rows; what the arm's model lacks makes neighbouring ce
 Masses of neighbouring blocks of cells differ by 1/A + 1/A' in variance where rows are white. Slow
 errors (friction that the model lacks, play, a gear's ripple) make long blocks differ by far more;
 the largest excess over block lengths up to a second is what intervals and changes have to stand up
-to. Medians are taken, so that a few changes of payload do not pass for errors.
+to. Blocks lie within stretches. While changes are sought medians are taken, so that a few that are
+not known do not pass for errors.
 
-A grasp jolts the cells it falls among: no stencil follows the jump of the acceleration. It is one
-change, wherever its jolt would put one; cells within `GUARD` of it tell neither mass.
+Whitened rows remember, so that a change shows late in cells, and may show twice. Cells tell that
+there is one; `algid.tracks.placing` has the rows around it say whether there is, and when.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
-from algid.tracks.bins import Cells, IdentifiedArm
+from algid.tracks.bins import Cells
+from algid.tracks.drift import BLOCK, Drift, drift_of
 
+FIRST_SPANS = (1, 2, 3, 5, 8)  # cells: blocks of which few hold a change, before any is known
 SPANS = (1, 2, 3, 5, 8, 12, 18, 25, 35, 50)  # cells: 0.02 to 1 s
 LIGHTEST = 1e-6  # information of a block that tells anything, of the largest
 FEWEST = 8  # pairs of blocks that tell a variance
 _MEDIAN = 0.454936  # of a squared standard normal
 _SPREAD = 2.33  # standard deviation of the median of n squares over _MEDIAN, times √n
+_MEAN_SPREAD = 1.73  # of the mean of n squares of neighbouring differences, times √n
 _SURE = 4.0  # of those standard deviations: white rows pass once in 30,000 spans
 
-GUARD = 3  # cells left out on both sides of a change, which lies somewhere among them
-# of a change's place: squares beyond those of the best one, noise of the cells left out included
-UNLIKELY = 25.0
-REACH = 15  # cells: how far a jolt may have put a change from its place
-# cells more on both sides of a change's surest ends, over which the smoothed trajectory settles
-CALM = 2
-NARROW = 20  # cells: changes this close may be one with its jolt
+# cells ahead of a cut and behind it that may hold both masses: whitened rows show a change late
+AHEAD, BEHIND = 8, 5
 
 SHORTEST = 10  # cells: no object is carried for less than 0.2 s
 PENALTY = 60.0  # of a change: 7.7 standard deviations, far beyond what white rows reach
@@ -51,67 +51,84 @@ _ROUNDING = 1e-12  # of sums of squares, in comparisons that drop a start
 class Edges:
     """Cells at which stretches begin, and the last one's end.
 
-    The cells between which each change surely lies.
+    How friction drifted, and the rows' variance that a change had to stand up to.
     """
 
     places: list[int]
-    spans: list[tuple[int, int]]
+    drift: Drift | None
+    variance: float
 
 
-def edges(cells: Cells, arm: IdentifiedArm) -> Edges:
+def edges(cells: Cells) -> Edges:
     """The changes of payload among `cells`.
 
-    What a change would explain counts as an error at first, and no longer once the change is
-    found: errors are estimated again from what the stretches leave, until the changes stay.
+    Before any change is known, errors are those of short blocks, of which few hold one. They are
+    estimated again within the stretches, over longer blocks too, until the changes stay.
     """
-    places: list[int] = [0, len(cells)]
-    spans: list[tuple[int, int]] = []
-    masses: FloatArray = np.zeros(len(cells))
-    exact = np.zeros((arm.k.size + 2,) * 2)
+    places = [0, len(cells)]
+    spans: Sequence[int] = FIRST_SPANS
     for _ in range(MOST_ROUNDS):
-        calm = np.ones(
-            len(cells)
-        )  # cells around changes: their jolts are no errors of the arm's model
-        for low, high in spans:
-            calm[max(low - GUARD - CALM, 0) : high + GUARD + CALM] = 0.0
-        still = replace(
-            cells, A=calm * cells.A, B=calm * cells.B, S=calm[:, None] * cells.S, E=calm * cells.E
-        )
+        calm = calm_parts(places)
+        # masses are free in short blocks, lest a change that is not found passes for friction
+        blocks = np.union1d(np.arange(0, len(cells), BLOCK), np.ravel(calm)[:-1])
+        drift = drift_of(cells, blocks, rough_variance(cells))
+        freed = cells if drift is None else drift.freed(cells)
         # a change must stand up to slow errors whatever their reason, wrong constants of the arm
         # included
-        penalty = PENALTY * variance(still, masses, arm, exact)
+        spread = variance(freed, calm, spans)
         before = places
-        places = [0, *cuts(cells.A, cells.B, penalty, SHORTEST), len(cells)]
-        places, spans = placed(_needed(fused(places, cells, penalty), cells, penalty), cells)
-        if places == before:
+        places = [0, *cuts(freed.A, freed.B, PENALTY * spread, SHORTEST), len(cells)]
+        if places == before and spans is SPANS:
             break
-        starts = places[:-1]
-        own = np.add.reduceat(cells.B, starts) / np.maximum(
-            np.add.reduceat(cells.A, starts), 1e-300
-        )
-        masses = np.repeat(own, np.diff(places))
-    return Edges(places, spans)
+        spans = SPANS
+    return Edges(places, drift, spread)
 
 
-def variance(cells: Cells, masses: FloatArray, arm: IdentifiedArm, covariance: FloatArray) -> float:
-    """Variance of the rows about `masses` (C,), of the constants' errors freed, one at least.
+def calm_parts(places: Sequence[int]) -> list[tuple[int, int]]:
+    """From which cell to which each stretch lies away from the changes at its ends."""
+    first, *inner, last = places
+    begins = [first, *(place + BEHIND for place in inner)]
+    ends = [*(place - AHEAD for place in inner), last]
+    return [(begin, max(begin, end)) for begin, end in zip(begins, ends, strict=True)]
+
+
+def variance(
+    cells: Cells,
+    parts: Sequence[tuple[int, int]],
+    spans: Sequence[int] = SPANS,
+    known: tuple[FloatArray, FloatArray] | None = None,
+    *,
+    robust: bool = True,
+) -> float:
+    """Variance of the rows about masses that are constant in each of `parts`; one at least.
 
     Rows scatter about masses that hold for a few cells, and err alike over longer blocks: the
-    larger of both.
+    larger of both. Parameters are those of `excess`.
     """
+    slow = excess(cells.A, cells.B, parts, spans, known, robust=robust)
+    return max(rough_variance(cells), slow)
+
+
+def rough_variance(cells: Cells) -> float:
+    """Variance of the rows about masses that hold for a few cells, one at least."""
     groups = len(cells) // SHORTEST
     A, B, E, rows = (
         x[: groups * SHORTEST].reshape(groups, -1).sum(axis=1)
         for x in (cells.A, cells.B, cells.E, cells.rows)
     )
-    rough = float(
-        np.median((E - B**2 / np.maximum(A, 1e-300)) / rows)
-    )  # groups that hold a change are few
-    T = cells.sensitivity(arm, masses)
-    return max(1.0, rough, excess(cells.A, cells.B - cells.A * masses, T, covariance))
+    # groups that hold a change are few
+    return max(1.0, float(np.median((E - B**2 / np.maximum(A, 1e-300)) / rows)))
 
 
-def excess(A: FloatArray, B: FloatArray, T: FloatArray, covariance: FloatArray) -> float:
+def excess(
+    A: FloatArray,
+    B: FloatArray,
+    parts: Sequence[tuple[int, int]],
+    spans: Sequence[int] = SPANS,
+    known: tuple[FloatArray, FloatArray] | None = None,
+    *,
+    robust: bool = True,
+) -> float:
     """Variance of the masses of neighbouring blocks over what white rows would give.
 
     1 where they pass for white.
@@ -119,30 +136,48 @@ def excess(A: FloatArray, B: FloatArray, T: FloatArray, covariance: FloatArray) 
     Parameters
     ----------
     A, B : (C,) float64
-        Information of each cell and its score, less what is known of the mass.
-    T : (C, p) float64
-        How the scores shift with the arm's constants.
-    covariance : (p, p) float64
-        Of these constants: their errors are no excess.
+        Information of each cell and its score.
+    parts : pairs of the cells from which and to which the mass is constant
+    spans : cells a block
+    known : (C, p) and (p, p) float64, or None
+        How the scores shift with constants of the arm, and the covariance of these: their errors
+        are no excess. None where they are to be one.
+    robust : bool
+        Whether a median stands for the mean. A few changes that are not known are no errors then,
+        nor are those of the few moments at which a joint turns back.
     """
+    typical, spread = (_median, _SPREAD) if robust else (np.mean, _MEAN_SPREAD)
     found = 1.0
-    for span in SPANS:
-        count = A.size // span
-        information, score, shift = (
-            x[: count * span].reshape(count, span, *x.shape[1:]).sum(axis=1) for x in (A, B, T)
-        )
+    for span in spans:
+        starts = np.concatenate([np.arange(a, b - span + 1, span) for a, b in parts])
+        part = np.repeat(np.arange(len(parts)), [max(0, (b - a) // span) for a, b in parts])
+        information, score = _blocks(A, starts, span), _blocks(B, starts, span)
         heavy = information > LIGHTEST * information.max(initial=0.0)
-        information, score, shift = information[heavy], score[heavy], shift[heavy]
-        if information.size <= FEWEST:
+        neighbours = heavy[1:] & heavy[:-1] & (np.diff(part) == 0)
+        if neighbours.sum() < FEWEST:
             continue
-        J = np.diff(shift / information[:, None], axis=0)
-        white = (
-            1 / information[1:] + 1 / information[:-1] + np.einsum("cx,xy,cy->c", J, covariance, J)
-        )
-        ratio = float(np.median(np.diff(score / information) ** 2 / white)) / _MEDIAN
-        if ratio > 1 + _SURE * _SPREAD / np.sqrt(information.size - 1):
+        information = np.maximum(information, 1e-300)
+        white = 1 / information[1:] + 1 / information[:-1]
+        if known is not None:
+            T, covariance = known
+            J = np.diff(_blocks(T, starts, span) / information[:, None], axis=0)
+            white += np.einsum("cx,xy,cy->c", J, covariance, J)
+        squares = np.diff(score / information)[neighbours] ** 2 / white[neighbours]
+        ratio = float(typical(squares))
+        if ratio > 1 + _SURE * spread / np.sqrt(squares.size):
             found = max(found, ratio)
     return found
+
+
+def _median(squares: FloatArray) -> float:
+    """Variance of normal numbers from their squares, of which a few may be those of others."""
+    return float(np.median(squares)) / _MEDIAN
+
+
+def _blocks(x: FloatArray, starts: NDArray[np.int64], span: int) -> FloatArray:
+    """Sums (N, ...) over `span` cells from each of `starts` (N,)."""
+    total = np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x, axis=0)])
+    return np.asarray(total[starts + span] - total[starts])
 
 
 def cuts(A: FloatArray, B: FloatArray, penalty: float, shortest: int) -> list[int]:
@@ -247,94 +282,3 @@ class Starts:
         high = np.where(flat, np.inf, middle + reach)
         never = np.where(flat, best < -slack, square < 0.0)
         return np.where(never, np.inf, low), np.where(never, -np.inf, high)
-
-
-def fused(places: list[int], cells: Cells, penalty: float) -> list[int]:
-    """Places with two close changes made one wherever the cells away from that one need no more."""
-    place = 1
-    while place < len(places) - 2:
-        first, left, right, last = places[place - 1 : place + 3]
-        close = right - left <= NARROW
-        one = left + int(np.argmin(_costs(cells, first, left, right, last))) if close else left
-        if (
-            close
-            and _gain(cells.part(first, last), left - first, right - first, one - first) < penalty
-        ):
-            places = [*places[:place], one, *places[place + 2 :]]
-        else:
-            place += 1
-    return places
-
-
-def _gain(cells: Cells, left: int, right: int, one: int) -> float:
-    """What the stretch between two changes explains beyond `one` change, cells around that one left out."""
-    kept = np.abs(np.arange(len(cells)) + 0.5 - one) > GUARD
-    A, B = np.where(kept, cells.A, 0.0), np.where(kept, cells.B, 0.0)
-    worths = [
-        np.sum(np.add.reduceat(B, cut) ** 2 / np.maximum(np.add.reduceat(A, cut), 1e-300))
-        for cut in ([0, left, right], [0, one])
-    ]
-    return float(worths[0] - worths[1])
-
-
-def _needed(places: list[int], cells: Cells, penalty: float) -> list[int]:
-    """Edges less those that cells away from them do not need: a grasp jolts the cells it falls among."""
-
-    def worth(first: int, cut: int, last: int) -> float:
-        """Squared difference of the masses on both sides of a cut over its variance."""
-        sides = (cells.part(first + GUARD, cut - GUARD), cells.part(cut + GUARD, last - GUARD))
-        A, B = (
-            np.maximum([side.A.sum() for side in sides], 1e-300),
-            np.array([side.B.sum() for side in sides]),
-        )
-        return float(np.diff(B / A)[0] ** 2 / np.sum(1 / A))
-
-    while len(places) > 2:
-        worths = [worth(*places[place : place + 3]) for place in range(len(places) - 2)]
-        weakest = int(np.argmin(worths))
-        if worths[weakest] > penalty:
-            break
-        places = places[: weakest + 1] + places[weakest + 2 :]
-    return places
-
-
-def placed(places: list[int], cells: Cells) -> tuple[list[int], list[tuple[int, int]]]:
-    """Each change moved to where the cells away from it fit best, and between which cells it may as well lie."""
-    moved, spans = list(places), []
-    for place in range(1, len(places) - 1):
-        first, cut, last = moved[place - 1], places[place], places[place + 1]
-        low, high = max(cut - REACH, first + 2 * GUARD + 1), min(cut + REACH, last - 2 * GUARD - 1)
-        if low <= high:
-            cost = _costs(cells, first, low, high, last)
-            moved[place] = low + int(np.argmin(cost))
-            likely = low + np.flatnonzero(cost < cost.min() + UNLIKELY)
-            spans.append((int(likely[0]), int(likely[-1])))
-        else:
-            spans.append((cut, cut))
-    return moved, spans
-
-
-def _costs(cells: Cells, first: int, low: int, high: int, last: int) -> FloatArray:
-    """How badly the cells away from a change at `low` to `high` fit the masses on both sides of it."""
-    before, after = (
-        _misfit(cells.part(first, last), *ends) for ends in ((0, low - first), (high - first, None))
-    )
-    left, right = (np.concatenate([[0.0], np.cumsum(misfit)]) for misfit in (before, after))
-    change = np.arange(low, high + 1) - first
-    return np.asarray(
-        left[np.maximum(change - GUARD, 0)]
-        + right[-1]
-        - right[np.minimum(change + GUARD, last - first)]
-    )
-
-
-def _misfit(cells: Cells, start: int, stop: int | None) -> FloatArray:
-    """Each cell's squares about the mass of those from `start` to `stop`, less what these usually have (C,)."""
-    # medians: the stretch's other end may hold a jolt too, and cells of the next mass
-    A, B, rows = cells.A[start:stop], cells.B[start:stop], cells.rows[start:stop]
-    own = B / np.maximum(A, 1e-300)
-    order = np.argsort(own)
-    running_sum = np.cumsum(A[order])
-    mass = float(own[order][min(np.searchsorted(running_sum, running_sum[-1] / 2), own.size - 1)])
-    squares = cells.squares(mass)
-    return np.asarray(squares - cells.rows * np.median(squares[start:stop] / rows))

@@ -19,15 +19,26 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.estimators.too_short import TooShortError
-from algid.signals.differences import Stencil
 from algid.signals.segments import Segment
-from algid.tracks.bins import CELL, Cells, IdentifiedArm, cells_of, joined
-from algid.tracks.change_points import CALM, GUARD, SHORTEST, Edges, edges, variance
+from algid.tracks.bins import CELL, Cells, IdentifiedArm, cells_of, joined, with_friction
+from algid.tracks.change_points import (
+    AHEAD,
+    BEHIND,
+    PENALTY,
+    SHORTEST,
+    Edges,
+    edges,
+    rough_variance,
+    variance,
+)
+from algid.tracks.drift import Drift, drift_of
+from algid.tracks.placing import Changes, Place, confirmed, cut_to
 
 QUANTILE = 1.959964  # of the normal distribution, for 95 %
 ROUNDS = 2  # of linearising each stretch at its own mass and looking for the changes again
 HOLE = 0.3  # s: cells this far apart have no log between them
 FEWEST = 4  # cells that weigh a stretch
+CALM = 1  # cells more on both sides of the times at which a payload may be changing
 HALF_BAND = 0.25  # s: m_p(t) rests on so much log on both sides of t
 
 Pass = Callable[[], Iterable[Segment]]
@@ -90,46 +101,90 @@ def track(source: Pass, arm: IdentifiedArm, covariance: FloatArray) -> Track:
     TooShortError
         If the log is too short.
     """
+    arm, covariance = with_friction(arm, covariance)
     parts = cells_of(source(), arm, mass=0.0, settle=0)
     if not parts or sum(map(len, parts)) < 2 * SHORTEST:
         raise TooShortError(f"the log is too short: expected {2 * SHORTEST * CELL:g} s at least")
     cells = joined(parts)
-    found = edges(cells, arm)
+    found = edges(cells)
     for _ in range(ROUNDS):
-        cells = joined(
-            _settled(source, arm, [cells.part(*ends) for ends in pairwise(found.places)])
-        )
-        found = edges(cells, arm)
+        rough = [cells.part(*ends) for ends in pairwise(found.places)]
+        cells = joined(_settled(source, arm, rough, _masses(rough, found.drift)))
+        found = edges(cells)
+    changes = _changes(source, arm, cells, found)
+    inner = _inner_parts(cells, changes)
     # whitening remembers: what a stretch is weighed by starts behind the jolt at its beginning
-    return _weigh(cells, found, _settled(source, arm, _inner_parts(cells, found)), arm, covariance)
+    settled = _settled(source, arm, inner, _masses(inner, found.drift))
+    return _weigh(cells, changes, settled, arm, covariance)
+
+
+def _masses(parts: Sequence[Cells], drift: Drift | None) -> list[float]:
+    """What each part's payload weighs, friction's drift freed."""
+    return [(part if drift is None else drift.freed(part)).mass for part in parts]
+
+
+def _changes(source: Pass, arm: IdentifiedArm, cells: Cells, found: Edges) -> list[Place]:
+    """When the payload changed, of the changes that cells show, as far as their rows bear them out."""
+    parts = [cells.part(*ends) for ends in pairwise(found.places)]
+    places = []
+    for place in found.places[1:-1]:
+        safe = float(cells.start[place - AHEAD]), float(cells.start[place]) + BEHIND * CELL
+        places.append(Place(float(cells.start[place]), safe, safe, np.inf))
+    rough = Changes(tuple(places), tuple(_masses(parts, found.drift)))
+    ends = (float(cells.start[0]), float(cells.end[-1]))
+    return confirmed(
+        source, arm, found.drift, rough, ends, PENALTY * found.variance, found.variance
+    )
 
 
 def _weigh(
-    cells: Cells, found: Edges, inner: Sequence[Cells], arm: IdentifiedArm, covariance: FloatArray
+    cells: Cells,
+    changes: Sequence[Place],
+    inner: Sequence[Cells],
+    arm: IdentifiedArm,
+    covariance: FloatArray,
 ) -> Track:
-    """The track whose stretches are `found` among `cells`, each weighed by its `inner` ones."""
-    counts, calm = [len(part) for part in inner], joined(inner)
-    masses = np.repeat([part.mass for part in inner], counts)
-    colour, squares = variance(calm, masses, arm, covariance), calm.squares(masses)
-    stds, curves = zip(*(_band(part, arm, covariance, colour) for part in inner), strict=True)
+    """The track of a log that changed its payload at `changes`, each stretch weighed by its `inner` cells."""
+    counts = [len(part) for part in inner]
+    starts = np.cumsum([0, *counts[:-1]])
+    whole = joined(inner)
+    drift = drift_of(whole, starts, rough_variance(whole))
+    calm = whole if drift is None else drift.freed(whole)
+    information = np.maximum(np.add.reduceat(calm.A, starts), 1e-300)
+    weights = np.add.reduceat(calm.B, starts) / information
+    masses = np.repeat(weights, counts)
+    T = calm.sensitivity(arm, masses)
+    if drift is not None:
+        T = drift.sensitivity(calm, starts, T, calm.friction_sensitivity(arm, masses))
+    parts = list(pairwise([*starts, len(whole)]))
+    colour = variance(calm, parts, known=(T, covariance), robust=False)
+    squares = calm.squares(masses)
+    own = np.add.reduceat(squares, starts) / (np.add.reduceat(calm.rows, starts) - 1)
+    noise = np.maximum(own, colour)  # a stretch's own, or the log's where that is larger
+    J = np.add.reduceat(T, starts) / information[:, None]
+    by_drift = 0.0 if drift is None else drift.variances(calm, starts)
+    stds = np.sqrt(
+        noise * (1 / information + by_drift) + np.einsum("kx,xy,ky->k", J, covariance, J)
+    )
+    curves = [
+        _band(calm.part(first, first + count), T[first : first + count], covariance, one, drift)
+        for first, count, one in zip(starts, counts, noise, strict=True)
+    ]
     t, m_p, std = np.concatenate(curves, axis=1)
     signal, left = calm.Q.sum() - calm.rows.sum(), max(squares.sum() - calm.rows.sum(), 0.0)
-    changes = [
-        (cells.start[at], cells.start[low - GUARD], cells.end[high + GUARD - 1])
-        for at, (low, high) in zip(found.places[1:-1], found.spans, strict=True)
-    ]
     wide = np.flatnonzero(cells.start[1:] - cells.end[:-1] > HOLE)
+    bounds = [float(cells.start[0]), *(one.time for one in changes), float(cells.end[-1])]
     return Track(
         stretches=[
-            Stretch(float(cells.start[first]), float(cells.end[last - 1]), part.mass, one)
-            for (first, last), part, one in zip(pairwise(found.places), inner, stds, strict=True)
+            Stretch(start, end, float(mass), float(one))
+            for (start, end), mass, one in zip(pairwise(bounds), weights, stds, strict=True)
         ],
         t=t,
         m_p=m_p,
         std=std,
         stretch=np.repeat(np.arange(len(inner)), counts).astype(np.float64),
         left=np.sqrt(np.maximum(squares, 0.0) / calm.rows),
-        changes=np.array(changes, dtype=np.float64).reshape(-1, 3),
+        changes=np.array([(one.time, *one.bracket) for one in changes]).reshape(-1, 3),
         colour=colour,
         explained=float(1 - left / signal) if signal > 0 else 0.0,
         holes=np.stack([cells.end[wide], cells.start[wide + 1]], axis=1),
@@ -137,11 +192,13 @@ def _weigh(
     )
 
 
-def _settled(source: Pass, arm: IdentifiedArm, rough: Sequence[Cells]) -> list[Cells]:
+def _settled(
+    source: Pass, arm: IdentifiedArm, rough: Sequence[Cells], masses: Sequence[float]
+) -> list[Cells]:
     """Each stretch's cells, linearised again at its own mass, in one pass over the log."""
     found = list(rough)
     for place, own in groupby(_by_stretch(source(), arm, rough), key=itemgetter(0)):
-        if cells := cells_of((segment for _, segment in own), arm, rough[place].mass):
+        if cells := cells_of((segment for _, segment in own), arm, masses[place]):
             found[place] = joined(cells)
     return found
 
@@ -159,48 +216,32 @@ def _by_stretch(
                     yield place, part
 
 
-def cut_to(segment: Segment, start: float, end: float, shift: float) -> Segment | None:
-    """The samples that give the torques from `start` to `end` s, their stencils' included.
-
-    None where it has none.
-
-    `shift` is the time in s after which a logged torque acts.
-    """
-    given = Stencil(segment.dt, shift).torques(len(segment))  # the others serve the stencil
-    first = round((start - segment.start) / segment.dt) - given.start
-    last = round((end - segment.start) / segment.dt) + len(segment) - given.stop
-    first, last = max(0, first), min(len(segment), last)
-    return segment.part(first, last) if last - first > 1 else None
-
-
-def _inner_parts(cells: Cells, found: Edges) -> list[Cells]:
-    """Each stretch's cells, less those around the changes at its ends.
-
-    At least some of its middle.
-    """
-    begins = [found.places[0], *(high + GUARD + CALM for _, high in found.spans)]
-    ends = [*(low - GUARD - CALM for low, _ in found.spans), found.places[-1]]
+def _inner_parts(cells: Cells, changes: Sequence[Place]) -> list[Cells]:
+    """Each stretch's cells between the times at which the payload may have been changing, some of its middle at least."""
+    begins = [-np.inf, *(one.safe[1] for one in changes)]
+    ends = [*(one.safe[0] for one in changes), np.inf]
+    bounds = [-np.inf, *(one.time for one in changes), np.inf]
     parts = []
-    for place, (first, last) in enumerate(pairwise(found.places)):
-        begin, end = begins[place], ends[place]
-        if end - begin < FEWEST:
-            begin, end = min(first + GUARD, last - FEWEST), max(last - GUARD, first + FEWEST)
-        parts.append(cells.part(begin, end))
+    for place, (start, end) in enumerate(pairwise(bounds)):
+        first = int(np.searchsorted(cells.start, begins[place])) + CALM * (place > 0)
+        last = int(np.searchsorted(cells.end, ends[place], side="right"))
+        last -= CALM * (place < len(changes))
+        if last - first < FEWEST:
+            own = np.searchsorted(cells.start, [start, end])
+            first = min(max(int(own.sum() - FEWEST) // 2, 0), len(cells) - FEWEST)
+            last = first + FEWEST
+        parts.append(cells.part(first, last))
     return parts
 
 
 def _band(
-    cells: Cells, arm: IdentifiedArm, covariance: FloatArray, colour: float
-) -> tuple[float, FloatArray]:
-    """The standard deviation of a stretch's mass.
+    cells: Cells, T: FloatArray, covariance: FloatArray, noise: float, drift: Drift | None
+) -> FloatArray:
+    """Times, masses and their standard deviations (3, C) along a stretch.
 
-    times, masses and their standard deviations (3, C) along it.
-
-    Along the stretch each cell's mass comes from its neighbourhood within the stretch.
+    Each cell's mass comes from its neighbourhood within the stretch; `noise` is the variance of the rows.
     """
-    # the stretch's own variance of rows, or the log's where that is larger
-    noise = max(colour, float(cells.squares(cells.mass).sum() / (cells.rows.sum() - 1)))
-    half, T = round(HALF_BAND / CELL), cells.sensitivity(arm, cells.mass)
+    half = round(HALF_BAND / CELL)
     low = np.clip(np.arange(len(cells)) - half, 0, None)
     high = np.clip(np.arange(len(cells)) + half + 1, None, len(cells))
 
@@ -208,10 +249,10 @@ def _band(
         total = np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x, axis=0)])
         return np.asarray(total[high] - total[low])
 
-    def std(A: FloatArray, T: FloatArray) -> FloatArray:
-        J = T / A[:, None]
-        return np.sqrt(noise / A + np.einsum("cx,xy,cy->c", J, covariance, J))
-
-    A, B = np.maximum(moving(cells.A), 1e-300), moving(cells.B)
-    whole = std(np.maximum([cells.A.sum()], 1e-300), T.sum(axis=0)[None])
-    return float(whole[0]), np.stack([(cells.start + cells.end) / 2, B / A, std(A, moving(T))])
+    A = np.maximum(moving(cells.A), 1e-300)
+    J, scatter = moving(T) / A[:, None], 1 / A
+    if drift is not None:
+        by_friction = moving(cells.S[:, cells.friction]) / A[:, None]
+        scatter = scatter + drift.variance_at(cells.middle, by_friction)
+    std = np.sqrt(noise * scatter + np.einsum("cx,xy,cy->c", J, covariance, J))
+    return np.stack([cells.middle, moving(cells.B) / A, std])

@@ -21,6 +21,7 @@ from algid.model import Model
 from algid.signals.segments import segments
 from algid.synth.run import Recording, excitation, with_schedule
 from algid.synth.sensors import Sensors
+from algid.tracks import drift
 from algid.tracks.bins import CELL, IdentifiedArm
 from algid.tracks.change_points import cuts
 from algid.tracks.payload import HALF_BAND, Track, track
@@ -79,9 +80,16 @@ def test_masses_lie_within_their_intervals() -> None:
     holds_95(np.array(instants))
 
 
-def test_an_uncertain_arm_widens_the_intervals_by_what_moves_the_masses(picking: Log) -> None:
-    """Constants and lengths off by a standard deviation in two directions: the masses' moves, squared and added."""
-    log = noisy(picking, np.random.default_rng(1))
+@pytest.mark.parametrize("drifts", [False, True])
+def test_an_uncertain_arm_widens_the_intervals_by_what_moves_the_masses(
+    picking: Log, drifts: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Constants and lengths off by a standard deviation in two directions: the masses' moves, squared and added.
+
+    Whether or not friction is free to follow.
+    """
+    monkeypatch.setattr(drift, "SURE", -np.inf if drifts else np.inf)
+    log = replace(picking, omega=None)  # without noise, so that the changes stay where they are
     known = np.array([*CASE.arm.constants(), CASE.arm.l1, CASE.arm.l2])
     spread = 1e-3 * known * np.random.default_rng(2).standard_normal((2, 9))
     before = _track(log)

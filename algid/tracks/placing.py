@@ -1,0 +1,368 @@
+"""When a payload changed, from the rows around the change as they are, whitened with all that they remember.
+
+Whitening remembers for as long as noise of the angles hides accelerations: a tenth of a second and more. So a step of
+the payload at s reaches the whitened rows as its own column L⁻¹ (g h_s), and a cell behind it holds both masses. Here
+each candidate s has its column, a mass before and a mass after, and the likelihood of s is exact.
+
+An acceleration that jumps at s is seen through the differences of the angles, and the torques' residual with it:
+
+    h_s(t) = Σ_p w_p ½ (t + p − s)₊²,  w the stencil's weights of the second derivative, p its points
+
+A bracket holds the times whose likelihood ratio ξ is not beyond its 95 % quantile, P(ξ ≤ x) = (1 − e^(−x/2))²
+(Hansen 2000, Econometrica 68).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from algid.arm import FloatArray
+from algid.estimators.whitening import (
+    adjoint,
+    along_stencil,
+    covariance_factor,
+    forward,
+    low_passed,
+    triangular,
+)
+from algid.model import Model, Motion, partials, sensitivity, torque
+from algid.signals.differences import POINTS, Stencil
+from algid.signals.filters import smoothed
+from algid.signals.segments import Segment, append
+from algid.tracks.bins import SMOOTHING, IdentifiedArm
+from algid.tracks.drift import Drift
+
+STEP = 5e-3  # s, between candidates
+REACH = 0.4  # s: how far a change may lie from where the cells have it
+WIDEST = 1.5  # s: of log on both sides of a change that tells when it was
+CLOSE = 0.8  # s: changes closer than that may be one with its jolt
+MARGIN = 0.04  # s: of log at least before the first and after the last candidate
+LIKELY = 7.352  # −2 ln(1 − √0.95)
+SAFE = 25.0  # ξ beyond which a time is out of the question
+_AT_ONCE = 32  # candidates whose columns are whitened together
+
+
+@dataclass(frozen=True)
+class Place:
+    """When a change was, in s: the best time, its 95 % bracket, and the times beyond which it cannot be.
+
+    `gain` is what two masses explain beyond one, in squares of the rows' noise.
+    """
+
+    time: float
+    bracket: tuple[float, float]
+    safe: tuple[float, float]
+    gain: float
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """The rows of a piece of log, n instants of two joints.
+
+    Parameters
+    ----------
+    t : (n,), s, when the torques act
+    dt : float, s
+    g : (2, n), what a kilogram at the tip adds, over the torques' noise
+    e : (2 n,), whitened, what the arm without payload leaves of the torque
+    factor : of the rows' covariance, `algid.estimators.whitening`
+    """
+
+    t: FloatArray
+    dt: float
+    g: FloatArray
+    e: FloatArray
+    factor: FloatArray
+
+    def whitened(self, rows: FloatArray) -> FloatArray:
+        """L⁻¹ (S, 2 n) of rows (S, 2, n)."""
+        flat = np.ascontiguousarray(rows.swapaxes(1, 2)).reshape(rows.shape[0], -1)
+        return triangular(self.factor, flat, "N")
+
+    def steps(self, moments: FloatArray) -> FloatArray:
+        """Columns (S, 2 n) of a kilogram that is grasped at each of `moments` (S,)."""
+        h = step_response((self.t - moments[:, None]) / self.dt)
+        return self.whitened(self.g * h[:, None])
+
+
+def step_response(u: FloatArray) -> FloatArray:
+    """h: what differences of a motion see, u samples behind a step of its acceleration."""
+    weights = Stencil(1.0).weights[2]
+    points = np.arange(POINTS) - POINTS // 2
+    h = np.zeros(u.shape)
+    for weight, point in zip(weights, points, strict=True):
+        h += weight * 0.5 * np.maximum(u + point, 0.0) ** 2
+    return np.where(u > POINTS, 1.0, h)
+
+
+def rows_of(
+    piece: Segment,
+    arm: IdentifiedArm,
+    drift: Drift | None,
+    moments: Sequence[float],
+    masses: Sequence[float],
+) -> Rows:
+    """The rows of a piece during which the payload has `masses` kg, changing at `moments` s as far as is known."""
+    stencil = Stencil(piece.dt, arm.shift)
+    torques = stencil.torques(len(piece))
+    t = piece.start + piece.dt * np.arange(torques.start, torques.stop) + arm.shift
+    which = np.searchsorted(np.asarray(moments), t, side="right")
+    friction = None if drift is None else drift.at(t).T
+    theta = smoothed(piece.theta, piece.dt, min(SMOOTHING, 0.1 / piece.dt))
+    for last in (False, True):
+        H, error, g = _linearised(piece, arm, stencil, theta, which, masses, friction)
+        rows = Rows(t, piece.dt, g, np.empty(0), covariance_factor(H))
+        e = rows.whitened(error[None])
+        if not last:
+            multiplier = triangular(rows.factor, e, "T")[0]
+            y = np.ascontiguousarray(multiplier.reshape(-1, 2).T)
+            first = stencil.first(len(piece))
+            theta = piece.theta + arm.noise.theta[:, None] * adjoint(H, y, first, len(piece))
+    mass = np.asarray(masses, dtype=np.float64)[which]
+    return replace(rows, e=(e + rows.whitened((mass * g)[None]))[0])
+
+
+def _linearised(
+    piece: Segment,
+    arm: IdentifiedArm,
+    stencil: Stencil,
+    theta: FloatArray,
+    which: NDArray[np.int64],
+    masses: Sequence[float],
+    friction: FloatArray | None,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """H, the torques' residual (2, n) and g (2, n), over the torques' noise, each row at its own mass."""
+    motion = Motion(*stencil.differences(theta))
+    coefficients = [arm.k + mass * arm.unit for mass in masses]
+
+    def each(function: Callable[[Model, FloatArray, Motion], FloatArray]) -> FloatArray:
+        found = function(arm.model, coefficients[0], motion)
+        for place, c in enumerate(coefficients[1:], start=1):
+            found[..., which == place] = function(arm.model, c, motion)[..., which == place]
+        return found
+
+    J, modelled = each(sensitivity), each(torque)
+    if arm.model.lag_name is not None:
+        J, modelled = (low_passed(one, piece.dt, arm.model.lag(arm.k)) for one in (J, modelled))
+    if friction is not None:
+        modelled = modelled + np.einsum("afn,fn->an", J[:, arm.friction], friction)
+    G = along_stencil(each(partials), stencil.weights)
+    first = stencil.first(len(piece))
+    error = piece.tau[:, stencil.torques(len(piece))] - modelled
+    error -= forward(G, piece.theta - theta, first)
+    H = G * (arm.noise.theta[None, :, None, None] / arm.noise.tau[:, None, None, None])
+    sigma = arm.noise.tau[:, None]
+    return H, error / sigma, np.einsum("q,aqn->an", arm.unit, J) / sigma
+
+
+def place(rows: Rows, low: float, high: float, variance: float) -> Place:
+    """When between `low` and `high` s the payload changed, a mass before it and another behind.
+
+    `variance` is that of the rows, at least.
+    """
+    moments = np.arange(low, high + STEP / 2, STEP)
+    a = rows.whitened(rows.g[None])[0]
+    information = max(float(a @ a), 1e-300)
+    left = rows.e - (a @ rows.e / information) * a
+    gains = np.empty(moments.size)
+    for first in range(0, moments.size, _AT_ONCE):
+        x = rows.steps(moments[first : first + _AT_ONCE])
+        alone = np.sum(x * x, axis=1) - (x @ a) ** 2 / information
+        gains[first : first + _AT_ONCE] = (x @ left) ** 2 / np.maximum(alone, 1e-9 * information)
+    best = int(np.argmax(gains))
+    gain = float(gains[best])
+    variance = max(variance, (float(left @ left) - gain) / max(left.size - 3, 1))
+    ratio = (gain - gains) / variance
+
+    def within(limit: float) -> tuple[float, float]:
+        likely = moments[ratio <= limit]
+        return float(likely[0]) - STEP, float(likely[-1]) + STEP
+
+    return Place(float(moments[best]), within(LIKELY), within(SAFE), gain)
+
+
+def explained(rows: Rows, moments: FloatArray) -> float:
+    """Squares of the rows that masses explain which change at `moments` (S,)."""
+    X = np.concatenate([rows.whitened(rows.g[None]), rows.steps(moments)])
+    fitted, *_ = np.linalg.lstsq(X.T, rows.e, rcond=None)
+    return float(np.sum((fitted @ X) ** 2))
+
+
+def cut_to(segment: Segment, start: float, end: float, shift: float) -> Segment | None:
+    """The samples that give the torques from `start` to `end` s, their stencils' included.
+
+    None where it has none.
+
+    `shift` is the time in s after which a logged torque acts.
+    """
+    given = Stencil(segment.dt, shift).torques(len(segment))  # the others serve the stencil
+    first = round((start - segment.start) / segment.dt) - given.start
+    last = round((end - segment.start) / segment.dt) + len(segment) - given.stop
+    first, last = max(0, first), min(len(segment), last)
+    return segment.part(first, last) if last - first > 1 else None
+
+
+@dataclass(frozen=True)
+class Changes:
+    """Changes of a log, and what it weighs between them: `masses` (kg) are one more."""
+
+    places: tuple[Place, ...]
+    masses: tuple[float, ...]
+
+    def one_for(self, first: int, last: int, place: Place | None) -> Changes:
+        """With `place`, or nothing, in place of the changes from `first` to `last`."""
+        kept = () if place is None else (place,)
+        masses = (*self.masses[: first + 1], *self.masses[last + 1 + (place is None) :])
+        return Changes((*self.places[:first], *kept, *self.places[last + 1 :]), masses)
+
+
+@dataclass(frozen=True)
+class _Log:
+    """What tells of changes: passes over the log, its arm, its friction's drift, and its ends in s."""
+
+    source: Callable[[], Iterable[Segment]]
+    arm: IdentifiedArm
+    drift: Drift | None
+    ends: tuple[float, float]
+
+    def rows(
+        self, changes: Changes, groups: Sequence[tuple[int, int]]
+    ) -> Iterator[tuple[tuple[int, int], Rows]]:
+        """The rows about each group of changes, from its first to its last, in one pass."""
+        spans = [self._window(changes, *group) for group in groups]
+        for place, piece in windows(self.source(), spans, self.arm.shift):
+            first, last = groups[place]
+            moments = [one.time for one in changes.places[first : last + 1]]
+            yield (
+                groups[place],
+                rows_of(piece, self.arm, self.drift, moments, changes.masses[first : last + 2]),
+            )
+
+    def _window(self, changes: Changes, first: int, last: int) -> tuple[float, float]:
+        """From where to where the log holds the masses about a group of changes, and no other."""
+        places = changes.places
+        start = places[first - 1].safe[1] if first else self.ends[0]
+        end = places[last + 1].safe[0] if last + 1 < len(places) else self.ends[1]
+        return max(start, places[first].time - WIDEST), min(end, places[last].time + WIDEST)
+
+
+def confirmed(
+    source: Callable[[], Iterable[Segment]],
+    arm: IdentifiedArm,
+    drift: Drift | None,
+    rough: Changes,
+    ends: tuple[float, float],
+    penalty: float,
+    variance: float,
+) -> list[Place]:
+    """The changes that the rows about them bear out, each where they have it.
+
+    Parameters
+    ----------
+    source : callable
+        Gives a fresh iterable of the log's `Segment`.
+    arm : IdentifiedArm
+    drift : Drift or None
+    rough : Changes
+        As cells have them.
+    ends : s, of the log
+    penalty : what a change has to explain, in squares of the rows' noise
+    variance : of the rows, one at least
+    """
+    log, changes = _Log(source, arm, drift, ends), rough
+    while changes.places:
+        before = len(changes.places)
+        changes = _merged(log, _placed(log, changes, variance), penalty, variance)
+        changes = _needed(_placed(log, changes, variance), penalty)
+        if len(changes.places) == before:
+            break
+    return list(changes.places)
+
+
+def _placed(log: _Log, changes: Changes, variance: float) -> Changes:
+    """Each change where the rows about it have it; where they are too few, as it was."""
+    places = list(changes.places)
+    for (at, _), rows in log.rows(changes, [(one, one) for one in range(len(places))]):
+        time = places[at].time
+        low = max(time - REACH, float(rows.t[0]) + MARGIN)
+        high = min(time + REACH, float(rows.t[-1]) - MARGIN)
+        if low < high:
+            places[at] = place(rows, low, high, variance)
+    return replace(changes, places=tuple(places))
+
+
+def _merged(log: _Log, changes: Changes, penalty: float, variance: float) -> Changes:
+    """Pairs of close changes made one where the rows about them need no more: a jolt is no payload."""
+    close = [
+        (at, at + 1)
+        for at, (one, other) in enumerate(pairwise(changes.places))
+        if other.time - one.time < CLOSE
+    ]
+    found: dict[tuple[int, int], Place] = {}
+    for (first, last), rows in log.rows(changes, close):
+        left, right = (changes.places[at].time for at in (first, last))
+        low = max(left - MARGIN, float(rows.t[0]) + MARGIN)
+        high = min(right + MARGIN, float(rows.t[-1]) - MARGIN)
+        if low < high:
+            one = place(rows, low, high, variance)
+            both = explained(rows, np.array([left, right]))
+            if both - explained(rows, np.array([one.time])) < penalty:
+                found[first, last] = one
+    following = len(changes.places)
+    for (first, last), one in sorted(found.items(), reverse=True):
+        if last < following:  # of pairs that share a change, the later one
+            changes, following = changes.one_for(first, last, one), first
+    return changes
+
+
+def _needed(changes: Changes, penalty: float) -> Changes:
+    """Changes less those that explain too little, of neighbours the least first."""
+    gains = [np.inf, *(one.gain for one in changes.places), np.inf]
+    for at in reversed(range(len(changes.places))):
+        before, own, after = gains[at : at + 3]
+        if own < penalty and own <= min(before, after):
+            changes = changes.one_for(at, at, None)
+    return changes
+
+
+def windows(
+    log: Iterable[Segment], spans: Sequence[tuple[float, float]], shift: float
+) -> Iterator[tuple[int, Segment]]:
+    """The pieces of a log within `spans` (s, both ends increasing), each with its number, in one pass.
+
+    What a gap cuts comes in parts.
+    """
+    held: Segment | None = None
+    todo = list(range(len(spans)))
+    for segment in log:
+        if held is not None and segment.continues:
+            held = append(held, segment)
+        else:
+            yield from _cut(held, spans, todo, shift)
+            held = segment
+        end = held.start + len(held) * held.dt
+        whole = [at for at in todo if spans[at][1] + POINTS * held.dt + abs(shift) < end]
+        yield from _cut(held, spans, whole, shift)
+        todo = [at for at in todo if at not in whole]
+        if not todo:
+            return
+        spare = round((spans[todo[0]][0] - held.start - abs(shift)) / held.dt) - POINTS
+        if spare > 0:
+            held = held.part(min(spare, len(held) - 1), len(held))
+    yield from _cut(held, spans, todo, shift)
+
+
+def _cut(
+    held: Segment | None, spans: Sequence[tuple[float, float]], which: Sequence[int], shift: float
+) -> Iterator[tuple[int, Segment]]:
+    if held is None:
+        return
+    for at in which:
+        piece = cut_to(held, *spans[at], shift)
+        if piece is not None and len(piece) > 2 * POINTS:
+            yield at, piece

@@ -1,0 +1,111 @@
+"""Friction that changes during a log: against least squares over all rows at once."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from algid.arm import FloatArray
+from algid.tracks.bins import CELL, Cells
+from algid.tracks.drift import Drift, between, drift_of, knots_of
+
+COUNT, ROWS = 600, 8
+STARTS = np.array([0, 180, 400])
+MASSES = np.repeat([0.3, 1.0, 0.2], [180, 220, 200])
+MIDDLE = CELL * (np.arange(COUNT) + 0.5)
+
+
+def rows(change: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    """Y (C, ROWS, 3), columns of the payload and of two frictions, and e (C, ROWS); friction is up by `change` (C, 2)."""
+    Y = rng.standard_normal((COUNT, ROWS, 3))
+    truth = np.column_stack([MASSES, change])
+    return Y, np.einsum("crq,cq->cr", Y, truth) + rng.standard_normal((COUNT, ROWS))
+
+
+def summed(Y: FloatArray, e: FloatArray) -> Cells:
+    """Cells whose columns of constants are the two frictions'."""
+    g, c = Y[..., 0], Y[..., 1:]
+    return Cells(
+        MIDDLE - CELL / 2,
+        MIDDLE + CELL / 2,
+        np.sum(g * g, axis=1),
+        np.sum(g * e, axis=1),
+        np.einsum("cr,crq->cq", g, c),
+        np.sum(e * e, axis=1),
+        np.sum(e * e, axis=1),
+        np.full(COUNT, float(ROWS)),
+        np.einsum("crf,crq->cfq", c, c),
+        np.einsum("crf,cr->cf", c, e),
+        [0, 1],
+    )
+
+
+def rising() -> FloatArray:
+    return np.stack([2 * MIDDLE / 12, 1 - 0.1 * MIDDLE], axis=1)
+
+
+def test_masses_and_friction_are_those_of_least_squares_over_all_rows() -> None:
+    Y, e = rows(rising(), np.random.default_rng(0))
+    cells = summed(Y, e)
+    found = drift_of(cells, STARTS, 1.0)
+    assert found is not None
+    hats = np.stack([np.interp(MIDDLE, found.knots, one) for one in np.eye(found.knots.size)])
+    group = np.searchsorted(STARTS, np.arange(COUNT), side="right") - 1
+    by_mass = [Y[..., 0] * (group == place)[:, None] for place in range(3)]
+    by_friction = [Y[..., 1 + f] * hat[:, None] for hat in hats for f in range(2)]
+    X = np.stack([*by_mass, *by_friction]).reshape(3 + 2 * len(hats), -1)
+    solution = np.linalg.solve(X @ X.T, X @ e.ravel())
+    covariance = np.linalg.inv(X @ X.T)
+    freed = found.freed(cells)
+    masses = [freed.part(*ends).mass for ends in ((0, 180), (180, 400), (400, COUNT))]
+    np.testing.assert_allclose(masses, solution[:3], rtol=1e-6)
+    np.testing.assert_allclose(found.phi.ravel(), solution[3:], rtol=1e-6)
+    np.testing.assert_allclose(found.covariance, covariance[3:, 3:], rtol=1e-5, atol=1e-12)
+    information = np.add.reduceat(cells.A, STARTS)
+    np.testing.assert_allclose(
+        1 / information + found.variances(cells, STARTS), np.diag(covariance)[:3], rtol=1e-6
+    )
+    left = e - np.einsum("crf,cf->cr", Y[..., 1:], found.at(MIDDLE))
+    np.testing.assert_allclose(freed.E, np.sum(left**2, axis=1), rtol=1e-9)
+    np.testing.assert_allclose(freed.D, np.einsum("crf,cr->cf", Y[..., 1:], left), atol=1e-9)
+
+
+def test_friction_as_it_was_is_left_alone() -> None:
+    """A limit of six deviations: none of 40 logs."""
+    rng = np.random.default_rng(1)
+    for _ in range(40):
+        assert drift_of(summed(*rows(np.zeros((COUNT, 2)), rng)), STARTS, 1.0) is None
+
+
+def test_an_arm_without_columns_of_friction_has_no_drift() -> None:
+    cells = summed(*rows(rising(), np.random.default_rng(2)))
+    none = Cells(
+        *(
+            getattr(cells, name)
+            for name in ("start", "end", "A", "B", "S", "E", "Q", "rows", "N", "D")
+        )
+    )
+    assert drift_of(none, STARTS, 1.0) is None
+
+
+def test_a_variance_between_knots_is_that_of_the_nearest() -> None:
+    blocks = np.diag([1.0, 4.0, 9.0, 16.0])
+    drift = Drift(np.array([0.0, 5.0]), np.zeros((2, 2)), blocks)
+    slope = np.array([[1.0, 0.0], [0.0, 2.0]])
+    assert drift.variance_at(np.array([1.0, 4.0]), slope).tolist() == [1.0, 64.0]
+
+
+@pytest.mark.parametrize("duration", [1.0, 12.0, 3600.0])
+def test_knots_span_the_log_and_lines_run_between_them(duration: float) -> None:
+    cells = summed(*rows(rising(), np.random.default_rng(3)))
+    stretched = Cells(
+        *(getattr(cells, name) * duration / 12 for name in ("start", "end")),
+        *(getattr(cells, name) for name in ("A", "B", "S", "E", "Q", "rows", "N", "D")),
+    )
+    knots = knots_of(stretched)
+    assert knots[[0, -1]] == pytest.approx([0, duration])
+    assert 2 <= knots.size <= 61
+    values = np.random.default_rng(4).standard_normal((knots.size, 3))
+    t = np.linspace(0, duration, 57)
+    expected = np.stack([np.interp(t, knots, one) for one in values.T], axis=1)
+    np.testing.assert_allclose(between(knots, values, t), expected, atol=1e-12)

@@ -1,0 +1,134 @@
+"""When a payload changed, told by the rows around it; and what a log is cut to for them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from algid.estimators.whitening import NoiseLevels
+from algid.log import Log
+from algid.model import Model
+from algid.signals.differences import POINTS, Stencil
+from algid.signals.segments import Segment, segments
+from algid.tracks.bins import IdentifiedArm
+from algid.tracks.placing import (
+    Changes,
+    Place,
+    confirmed,
+    cut_to,
+    place,
+    rows_of,
+    step_response,
+    windows,
+)
+from tests.tracks.folders import CASE, noisy
+
+ARM = IdentifiedArm(
+    Model(),
+    CASE.arm.constants(),
+    CASE.arm.l1,
+    CASE.arm.l2,
+    NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2)),
+)
+
+
+def rough(*moments: float) -> tuple[Place, ...]:
+    """Changes as cells have them."""
+    return tuple(Place(one, (one, one), (one - 0.1, one + 0.1), np.inf) for one in moments)
+
+
+def kept(log: Log, moments: tuple[float, ...], masses: tuple[float, ...]) -> list[Place]:
+    changes = Changes(rough(*moments), masses)
+    return confirmed(lambda: segments([log]), ARM, None, changes, (0.0, 4.5), 60.0, 1.0)
+
+
+def test_a_step_of_acceleration_is_seen_as_differences_see_it() -> None:
+    """Second differences of ½ (t − s)₊² itself, and of a motion whose acceleration has been there for long."""
+    dt, s = 2e-3, 0.0503
+    t = dt * np.arange(60)
+    seen = Stencil(dt).differences(np.tile(0.5 * np.maximum(t - s, 0.0) ** 2, (2, 1)))[2, 0]
+    inner = t[POINTS // 2 : -(POINTS // 2)]
+    np.testing.assert_allclose(step_response((inner - s) / dt), seen, atol=1e-9)
+    far = step_response(np.array([-5.0, 5.0, 1e4]))
+    np.testing.assert_allclose(far, [0.0, 1.0, 1.0], atol=1e-12)
+
+
+def test_brackets_hold_the_time_of_the_change(picking: Log) -> None:
+    rng, held, late = np.random.default_rng(0), [], []
+    for _ in range(12):
+        for found, moment in zip(
+            kept(noisy(picking, rng), (1.6, 2.9), (0, 0.05, 0)), (1.5, 3.0), strict=True
+        ):
+            held.append(found.bracket[0] <= moment <= found.bracket[1])
+            late.append(abs(found.time - moment))
+            assert (
+                found.safe[0] <= found.bracket[0] < found.time < found.bracket[1] <= found.safe[1]
+            )
+    assert sum(held) >= 20  # of 24 at 95 %: fewer are one chance in 200
+    assert np.median(late) < 0.02
+
+
+def test_a_sliver_beside_a_change_is_made_one_with_it_and_a_change_of_nothing_goes(
+    picking: Log,
+) -> None:
+    log = noisy(picking, np.random.default_rng(1))
+    found = kept(log, (1.55, 1.75, 2.3, 3.0), (0.0, 0.08, 0.05, 0.05, 0.0))
+    assert [one.time for one in found] == pytest.approx([1.5, 3.0], abs=0.05)
+
+
+def test_a_window_too_short_for_candidates_leaves_a_change_where_it_was(picking: Log) -> None:
+    log = noisy(picking.part(1460, 1530), np.random.default_rng(2))
+    changes = Changes(rough(0.04), (0.0, 0.05))
+    found = confirmed(lambda: segments([log]), ARM, None, changes, (0.0, 0.07), 60.0, 1.0)
+    assert found == list(changes.places)
+
+
+def test_changes_are_replaced_with_the_masses_between_them() -> None:
+    changes = Changes(rough(1.0, 2.0, 3.0), (0.0, 1.0, 2.0, 3.0))
+    (new,) = rough(1.5)
+    merged = changes.one_for(0, 1, new)
+    assert (merged.places, merged.masses) == ((new, changes.places[2]), (0.0, 2.0, 3.0))
+    less = changes.one_for(1, 1, None)
+    assert (less.places, less.masses) == ((changes.places[0], changes.places[2]), (0.0, 1.0, 3.0))
+
+
+def test_rows_do_not_depend_on_how_a_log_was_cut(picking: Log) -> None:
+    log = noisy(picking, np.random.default_rng(3))
+    spans = [(0.5, 1.9), (1.7, 3.4)]
+    whole = dict(windows(segments([log]), spans, 0.0))
+    blocks = [log.part(first, min(first + 700, len(log))) for first in range(0, len(log), 700)]
+    parts = dict(windows(segments(blocks), spans, 0.0))
+    assert list(whole) == list(parts) == [0, 1]
+    for at, piece in whole.items():
+        np.testing.assert_array_equal(piece.theta, parts[at].theta)
+        assert piece.start == pytest.approx(parts[at].start)
+
+
+def test_the_residual_of_the_arm_and_its_payload_is_white(picking: Log) -> None:
+    """Of variance one, on both sides of a change: its column explains what the payload adds, memory included."""
+    log = noisy(picking, np.random.default_rng(4))
+    (piece,) = (piece for _, piece in windows(segments([log]), [(0.5, 2.5)], 0.0))
+    rows = rows_of(piece, ARM, None, [1.5], [0.0, 0.05])
+    left = rows.e - 0.05 * rows.steps(np.array([1.5]))[0]
+    assert np.mean(left**2) == pytest.approx(1.0, abs=5 * np.sqrt(2 / left.size))
+    behind = left[np.repeat((rows.t > 1.45) & (rows.t < 1.7), 2)]
+    assert np.mean(behind**2) == pytest.approx(1.0, abs=5 * np.sqrt(2 / behind.size))
+    assert place(rows, 1.3, 1.7, 1.0).time == pytest.approx(1.5, abs=0.03)
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.004, 0.0125, -0.007])
+@pytest.mark.parametrize("dt", [1e-3, 2e-3])
+def test_the_torques_of_a_cut_are_those_of_its_stretch(dt: float, shift: float) -> None:
+    n = 2000
+    segment = Segment(5.0, dt, np.zeros((2, n)), np.arange(2.0 * n).reshape(2, n))
+    start, end = 5.0 + 300 * dt, 5.0 + 1100 * dt
+    part = cut_to(segment, start, end, shift)
+    assert part is not None
+    told = Stencil(dt, shift).torques(len(part))
+    assert part.start + told.start * dt == pytest.approx(start, abs=1e-9)
+    assert part.start + told.stop * dt == pytest.approx(end, abs=1e-9)
+    assert part.tau[0, told.start] == 300
+    whole = cut_to(segment, 0.0, 100.0, shift)
+    assert whole is not None
+    assert len(whole) == n
+    assert cut_to(segment, 0.0, 4.0, shift) is None
