@@ -146,13 +146,13 @@ def batch(source: str, seed: int, files: int) -> int:
     slowest = 0.0
     folder = Path(tempfile.mkdtemp(prefix="algid-fuzz-"))
     try:
-        for name, path, log in (
+        for name, path, log, rows in (
             _damaged(folder, seed, files) if source == "damaged" else _hostile(folder, seed, files)
         ):
             start = (
                 time.process_time()
             )  # a busy machine is no hang; one that waits is ended with its batch
-            kind, text = outcome(path, log)
+            kind, text = outcome(path, log, rows)
             seconds = time.process_time() - start
             slowest = max(slowest, seconds)
             kind = "hang" if seconds > _SECONDS else kind
@@ -169,27 +169,32 @@ def batch(source: str, seed: int, files: int) -> int:
     return 0
 
 
-def _damaged(folder: Path, seed: int, files: int) -> Iterator[tuple[str, Path, Log | None]]:
-    clean: list[tuple[Path, bytes, Log | None]] = []
-    clean += [(path, path.read_bytes(), read_log(path)) for path in clean_files(folder)]
-    clean += [(path, path.read_bytes(), None) for path in other_files(folder, clean_log(150))]
+_Case = tuple[str, Path, Log | None, int]
+"""A file's name for the report, its path, and what `outcome` is told of it."""
+
+
+def _damaged(folder: Path, seed: int, files: int) -> Iterator[_Case]:
+    clean: list[tuple[Path, bytes, Log | None, int]] = []
+    clean += [(path, path.read_bytes(), read_log(path), 0) for path in clean_files(folder)]
+    other = clean_log(150)
+    clean += [(path, path.read_bytes(), None, len(other)) for path in other_files(folder, other)]
     for number in range(files):
-        path, content, log = clean[number % len(clean)]
+        path, content, log, rows = clean[number % len(clean)]
         path.write_bytes(damage(content, random.Random(seed + number)))
-        yield f"{path.name} seed {seed + number} of batch {seed}", path, log
+        yield f"{path.name} seed {seed + number} of batch {seed}", path, log, rows
 
 
-def _hostile(folder: Path, seed: int, files: int) -> Iterator[tuple[str, Path, Log | None]]:
+def _hostile(folder: Path, seed: int, files: int) -> Iterator[_Case]:
     for path, one in corpus(folder, files, seed):
-        yield path.name, path, one.log
+        yield path.name, path, one.log, 0
         path.unlink()
 
 
-def outcome(path: Path, log: Log | None) -> tuple[str, str]:
+def outcome(path: Path, log: Log | None, rows: int = 0) -> tuple[str, str]:
     """What comes of a file: "same", "told", "refused", or one of `FAILURES`; and more of it.
 
     `log` is what stands in the file unless it is said otherwise; None where any answer is right
-    that is one.
+    that is one. Fewer samples than `rows` must be called a loss even there.
     """
     try:
         found = read_log(path)
@@ -198,7 +203,8 @@ def outcome(path: Path, log: Log | None) -> tuple[str, str]:
     except BaseException as error:
         return "traceback", f"{type(error).__name__}: {error}"[:400]
     if log is None:
-        return "read", ""
+        lost = len(found) < rows and not any(notice.lossy for notice in found.notices)
+        return ("silent", f"{len(found)} samples of {rows}") if lost else ("read", "")
     return _compared(found, log)
 
 

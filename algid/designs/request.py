@@ -99,6 +99,8 @@ def limits_of(asked: Request, lengths: FloatArray) -> Limits:
             f"--tip-height: expected less than the arm's reach, {reach:.4g} m, found {height:g} m"
         )
     others = {name: _both(asked.get(name, np.inf)) for name in ("speed", "acceleration", "torque")}
+    if not others["torque"].any():
+        raise SettingError("--torque: expected a drive at one joint at least, found 0 for both")
     if not np.any(np.isfinite([high - low, *others.values()])):
         raise SettingError(
             "--range: without any limit no motion is the best, found inf for all; give one"

@@ -49,7 +49,8 @@ def read_jobs(path: Path) -> pl.DataFrame:
             n for p in PARAMETERS if p in names and f"{p}_std" in names for n in (p, f"{p}_std")
         ]
         jobs = pl.read_parquet(path, columns=wanted)
-    except (OSError, pl.exceptions.PolarsError) as error:
+    # a panic of polars is no Exception
+    except (OSError, pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         reason = str(error).split("\n", maxsplit=1)[0]
         raise ResultError(
             f"{path}: cannot read it ({reason}); expected jobs.parquet of algid batch"

@@ -28,9 +28,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.errors import ResultError
 from algid.files import whole_file
 from algid.progress import Progress
-from algid.report.reduce import blocks, by_log, columns_of, row_count
+from algid.report.reduce import blocks, by_log, columns_of, metadata_of, row_count
 from algid.results import read_result
 from algid.ros2 import HEADER, JOINT_STATE, JOINT_STATE_DEFINITION, check_stamps
 
@@ -74,11 +75,20 @@ def export_mcap(folder: Path, progress: Progress | None = None) -> Path:
 
 
 def start_stamps(path: Path, logs: int) -> list[int]:
-    """First stamp in ns of each of the file's logs; zero where it does not tell."""
-    import pyarrow.parquet
+    """First stamp in ns of each of the file's logs; zero where it does not tell.
 
-    starts = (pyarrow.parquet.read_schema(path).metadata or {}).get(START_KEY)
-    known = [int(stamp) for stamp in json.loads(starts)] if starts else []
+    Raises
+    ------
+    ResultError
+        If the file cannot be read, or tells anything else.
+    """
+    starts = metadata_of(path, START_KEY)
+    try:
+        known = [int(stamp) for stamp in json.loads(starts)] if starts else []
+    except (ValueError, TypeError, OverflowError, RecursionError) as error:
+        raise ResultError(
+            f"{path}: {START_KEY.decode()}: expected stamps in ns, found {starts!r:.60}; identify again with this version"
+        ) from error
     return (known + [0] * logs)[:logs]
 
 

@@ -12,7 +12,7 @@ y        the samples                         (N,)
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
@@ -53,17 +53,25 @@ def columns_of(path: Path) -> list[str]:
         return list(pyarrow.parquet.read_schema(path).names)
 
 
-def blocks(path: Path, names: Sequence[str], rows: int = ROWS) -> Iterator[Block]:
+PLACES = frozenset({"log", "t", "x"})
+"""Columns that say where a row lies: each has a number in every row."""
+
+
+def blocks(
+    path: Path, names: Sequence[str], rows: int = ROWS, *, finite: Collection[str] = PLACES
+) -> Iterator[Block]:
     """Yield the columns `names` of `path`, `rows` samples at a time, missing values and those beyond `LARGEST` as NaN.
+
+    Columns that are `finite` may have none of these.
 
     Raises
     ------
     ResultError
-        If the file cannot be read or lacks a column.
+        If the file cannot be read, lacks a column, or a number in a `finite` one.
     """
     import pyarrow.parquet
 
-    _check_columns(path, names, numbers=True)
+    _check_columns(path, names, numbers=names)
     # without pre_buffer=False the file is kept in memory as it is read
     with _reading(path), pyarrow.parquet.ParquetFile(path, pre_buffer=False) as file:
         for batch in file.iter_batches(batch_size=rows, columns=list(names)):
@@ -74,24 +82,27 @@ def blocks(path: Path, names: Sequence[str], rows: int = ROWS) -> Iterator[Block
                 )
                 beyond = np.isfinite(values) & (np.abs(values) > LARGEST)
                 block[name] = np.where(beyond, np.nan, values) if beyond.any() else values
-            if "log" in block and not np.all(np.isfinite(block["log"])):
-                raise ResultError(
-                    f"{path}: column 'log': expected whole numbers; identify again with this version"
-                )
+            for name in (name for name in names if name in finite):
+                if not np.all(np.isfinite(block[name])):
+                    raise ResultError(
+                        f"{path}: column {name!r}: expected a number in every row; identify again with this version"
+                    )
             yield block
 
 
-def table_of(path: Path, names: Sequence[str]) -> dict[str, list[Any]]:
-    """The columns `names` of a small file, whatever they hold.
+def table_of(
+    path: Path, names: Sequence[str], *, numbers: Collection[str] = ()
+) -> dict[str, list[Any]]:
+    """The columns `names` of a small file, of which some hold `numbers` and the others anything.
 
     Raises
     ------
     ResultError
-        If the file cannot be read or lacks a column.
+        If the file cannot be read, lacks a column, or one holds no numbers that should.
     """
     import pyarrow.parquet
 
-    _check_columns(path, names)
+    _check_columns(path, names, numbers=numbers)
     with _reading(path):
         found: dict[str, list[Any]] = pyarrow.parquet.read_table(
             path, columns=list(names)
@@ -99,7 +110,7 @@ def table_of(path: Path, names: Sequence[str]) -> dict[str, list[Any]]:
         return found
 
 
-def _check_columns(path: Path, names: Sequence[str], *, numbers: bool = False) -> None:
+def _check_columns(path: Path, names: Sequence[str], *, numbers: Collection[str]) -> None:
     import pyarrow.parquet
     from pyarrow import types
 
@@ -112,11 +123,20 @@ def _check_columns(path: Path, names: Sequence[str], *, numbers: bool = False) -
             f"{path}: expected a column {absent[0]!r}, found none; identify again with this version"
         )
     of_numbers = (types.is_integer, types.is_floating, types.is_null, types.is_boolean)
-    for name in names if numbers else ():
+    for name in numbers:
         if not any(fits(kinds[name]) for fits in of_numbers):
             raise ResultError(
                 f"{path}: column {name!r}: expected numbers, found {kinds[name]}; identify again with this version"
             )
+
+
+def metadata_of(path: Path, key: bytes) -> bytes | None:
+    """What `path` tells under `key`; raises `ResultError` where it cannot be read."""
+    import pyarrow.parquet
+
+    with _reading(path):
+        found: bytes | None = (pyarrow.parquet.read_schema(path).metadata or {}).get(key)
+        return found
 
 
 def row_count(path: Path) -> int:

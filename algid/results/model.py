@@ -490,6 +490,10 @@ def misfit_of_numbers(content: Any) -> str | None:
     return None
 
 
+_ROUNDING = 1e-3
+"""Of correlations, far beyond what rounding makes of them."""
+
+
 def _check(result: Result) -> None:
     """What no field tells by itself.
 
@@ -532,6 +536,27 @@ def _check(result: Result) -> None:
         raise SettingError("fit.covariance_names: expected each once")
     for place, row in enumerate(fit.covariance):
         _check_size(f"fit.covariance.{place}.{place}", row[place], positive=True)
+    _check_covariance(fit)
+
+
+def _check_covariance(fit: FitSummary) -> None:
+    """Raises `SettingError` where no errors have such a covariance."""
+    import numpy as np
+
+    covariance = np.array(fit.covariance, dtype=np.float64).reshape(
+        (len(fit.covariance_names),) * 2
+    )
+    deviations = np.sqrt(np.diag(covariance))
+    known = deviations > 0  # what is not known has None
+    correlation = covariance[np.ix_(known, known)] / np.outer(deviations[known], deviations[known])
+    correlation = np.where(np.isnan(correlation), 0.0, correlation)
+    if not known.any():
+        return
+    one_sided = float(np.abs(correlation - correlation.T).max())
+    if one_sided > _ROUNDING or np.linalg.eigvalsh(correlation)[0] < -_ROUNDING:
+        raise SettingError(
+            "fit.covariance: expected a symmetric matrix without negative eigenvalues, as errors have"
+        )
 
 
 def _check_size(place: str, value: float | None, *, positive: bool = False) -> None:

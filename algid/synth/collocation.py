@@ -32,6 +32,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss, legvander
 
 from algid.arm import FloatArray
+from algid.limits import PHYSICAL
 
 Acceleration = Callable[[FloatArray, FloatArray], FloatArray]
 """Accelerations (n, M) from angles (n, M) and velocities (n, M), at times that are known already."""
@@ -126,7 +127,7 @@ def integrate(
     Raises
     ------
     ArithmeticError
-        If the motion grows without bound.
+        If the motion grows without bound, or is faster than any arm moves.
     """
     breaks = np.append(
         [] if corners is None else corners[(corners > t[0]) & (corners < t[-1])], t[-1]
@@ -149,6 +150,10 @@ def integrate(
                 raise ArithmeticError(f"the motion grows without bound beyond {now:.6g} s")
             continue
         now, state = float(window.edges[-1]), window.starts[:, -1]
+        if np.abs(state[state.size // 2 :]).max() > PHYSICAL.speed[1]:  # steps would become tiny
+            raise ArithmeticError(
+                f"the motion is faster than {PHYSICAL.speed[1]:g} rad/s beyond {now:.6g} s"
+            )
         until = int(np.searchsorted(t, now, side="right"))
         states[:, done:until] = window.between(t[done:until])
         done = until

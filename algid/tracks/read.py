@@ -52,7 +52,7 @@ def read_track(folder: Path) -> TrackResult:
         raise ResultError(
             f"{path}: not JSON ({reason}); expected a track of algid track"
         ) from error
-    curve = list(blocks(folder / CURVE, COLUMNS))
+    curve = list(blocks(folder / CURVE, COLUMNS, finite=COLUMNS))
     if not curve:
         raise ResultError(f"{folder / CURVE}: it holds no rows; {again}")
     return _result(
@@ -83,10 +83,10 @@ class _File(BaseModel):
     """What is read of ``track.json``; it holds more, which follows from this."""
 
     version: str
-    stretches: list[_Stretch]
+    stretches: Annotated[list[_Stretch], Field(min_length=1)]
     changes: list[_Change]
     explained: float
-    excess: float
+    excess: Annotated[float, Field(ge=0)]
     bare: float
     holes: list[tuple[float, float]]
     schedule: list[tuple[float, float]] | None

@@ -1,7 +1,11 @@
-"""A sound log in the formats whose bytes no checksum guards: Feather, NumPy, MATLAB, ROS 1 bag, SQLite rosbag2."""
+"""A sound log in the formats whose bytes no checksum guards.
+
+Feather, NumPy, MATLAB, HDF5, JSON lines, ROS 1 bag, SQLite rosbag2.
+"""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +43,8 @@ def other_files(folder: Path, log: Log) -> list[Path]:
     return [
         *paths,
         *(folder / name for name in names),
+        *_hdf5_files(folder, columns),
+        *_json_files(folder, columns),
         _bag(folder / "clean.bag", log),
         _db3(folder / "clean", log),
     ]
@@ -52,6 +58,52 @@ def _feather(path: Path, columns: dict[str, Any], packing: str | None) -> None:
         pa.ipc.new_file(sink, table.schema, options=options) as file,
     ):
         file.write_table(table, max_chunksize=100)
+
+
+def _hdf5_files(folder: Path, columns: dict[str, Any]) -> list[Path]:
+    """Arrays in one piece, in chunks, packed and with sums, and a table; none where h5py is missing."""
+    try:
+        import h5py
+    except ImportError:
+        return []
+    kinds: dict[str, dict[str, Any]] = {
+        "plain": {},
+        "chunked": {"chunks": (32,)},
+        "packed": {"chunks": (32,), "compression": "gzip"},
+        "summed": {"chunks": (32,), "fletcher32": True},
+    }
+    paths = [folder / f"clean.{kind}.h5" for kind in (*kinds, "table")]
+    for path, more in zip(paths, kinds.values(), strict=False):
+        with h5py.File(path, "w") as file:
+            for name, values in columns.items():
+                file.create_dataset(name, data=values, **more)
+    table = np.empty(len(columns["t"]), [(name, float) for name in columns])
+    for name, values in columns.items():
+        table[name] = values
+    with h5py.File(paths[-1], "w") as file:
+        file["run"] = table
+    return paths
+
+
+def _json_files(folder: Path, columns: dict[str, Any]) -> list[Path]:
+    """A flat object a line, and a nested one as a robot's driver prints it."""
+    flat, nested = folder / "clean.jsonl", folder / "clean.nested.jsonl"
+    rows = [
+        dict(zip(columns, row, strict=True))
+        for row in np.stack(list(columns.values()), axis=1).tolist()
+    ]
+    flat.write_text("".join(json.dumps(row) + "\n" for row in rows))
+    motors = [
+        [{"q": row[f"theta{joint}"], "tau_est": row[f"tau{joint}"]} for joint in (1, 2)]
+        for row in rows
+    ]
+    nested.write_text(
+        "".join(
+            json.dumps({"t": row["t"], "motor_state": motor}) + "\n"
+            for row, motor in zip(rows, motors, strict=True)
+        )
+    )
+    return [flat, nested]
 
 
 def _bag(path: Path, log: Log) -> Path:

@@ -178,7 +178,15 @@ def _change(holder: Any, key: Any, draw: random.Random) -> None:
         holder[key] = draw.choice((old.upper(), old + text(draw), old[:1], old * 200))
     elif isinstance(old, (int, float)) and not isinstance(old, bool) and kind < 9:
         holder[key] = draw.choice(
-            (number(draw), -old, old * 10.0 ** draw.choice((-30, -3, 3, 30)), str(old))
+            (number(draw), -old, _scaled(old, 10.0 ** draw.choice((-30, -3, 3, 30))), str(old))
         )
     else:
         holder[key] = anything(draw)
+
+
+def _scaled(old: int | float, by: float) -> int | float:
+    """Whole numbers may lie beyond all floats."""
+    try:
+        return old * by
+    except OverflowError:
+        return old * 10**30

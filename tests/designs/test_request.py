@@ -149,6 +149,7 @@ def test_limits_are_a_pair_of_joints_and_infinite_where_none_is_told() -> None:
             LENGTHS,
             "--range: without any limit no motion is the best, found inf for all; give one",
         ),
+        ({"torque": 0}, LENGTHS, "--torque: expected a drive at one joint at least, found 0 for both"),
         ({"tip_height": 0.7}, LENGTHS, "--tip-height: expected less than the arm's reach, 0.7 m, found 0.7 m"),
         (
             {"tip_height": -0.1},

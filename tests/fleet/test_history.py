@@ -260,6 +260,21 @@ def test_a_table_without_robots_is_refused(tmp_path: Path) -> None:
         history_of(tmp_path)
 
 
+def test_a_panic_of_the_library_is_a_refusal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A damaged bitmap ends in one, which is no Exception."""
+
+    def panics(*_: object, **__: object) -> None:
+        raise pl.exceptions.PanicException("assertion failed: offset + length <= self.length")
+
+    path = tmp_path / "jobs.parquet"
+    _jobs(1, 3, seed=1).write_parquet(path)
+    monkeypatch.setattr(pl, "read_parquet", panics)
+    with pytest.raises(ResultError, match=r"jobs\.parquet: cannot read it \(assertion failed"):
+        history_of(path)
+
+
 def test_each_parameter_is_told_as_it_is_followed(tmp_path: Path) -> None:
     _jobs(1, 40, seed=1).write_parquet(tmp_path / "jobs.parquet")
     calls: list[tuple[str, int, int]] = []

@@ -47,6 +47,15 @@ def test_the_judge_sees_what_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
         judged(Log(log.stamp_ns, log.theta + 1, log.tau, Origin("", "", {}), log.omega)) == "silent"
     )
 
+    def fewest(found: Log, rows: int) -> str:
+        """The judgement on a file of which only the number of its samples is known."""
+        monkeypatch.setattr(fuzz, "read_log", lambda _: found)
+        return fuzz.outcome(Path("log.h5"), None, rows)[0]
+
+    assert fewest(log, 20) == "read"
+    assert fewest(log, 21) == fewest(_noting(log, other), 21) == "silent"
+    assert fewest(_noting(log, lossy), 21) == "read"
+
     def fails(_: Path) -> Log:
         raise RuntimeError
 
@@ -71,4 +80,4 @@ def test_damaged_bytes_of_every_format_are_read_told_or_refused(
 def test_every_format_is_damaged(tmp_path: Path) -> None:
     log = clean_log(60)
     found = {read_log(path).origin.format for path in other_files(tmp_path, log)}
-    assert found >= {"feather", "npz", "npy", "mat", "bag"}
+    assert found >= {"feather", "npz", "npy", "mat", "bag", "hdf5", "jsonl"}

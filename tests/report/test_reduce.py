@@ -1,12 +1,26 @@
 from __future__ import annotations
 
+import math
+from pathlib import Path
+
 import numpy as np
+import polars as pl
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from algid.arm import FloatArray
-from algid.report.reduce import MinMax, Share, Thinned, broken_at_gaps, bucket_size
+from algid.errors import ResultError
+from algid.report.reduce import (
+    MinMax,
+    Share,
+    Thinned,
+    blocks,
+    broken_at_gaps,
+    bucket_size,
+    table_of,
+)
+from algid.report.text import script_json
 
 
 def reduced(y: FloatArray, size: int, cuts: list[int]) -> tuple[FloatArray, FloatArray]:
@@ -95,3 +109,29 @@ def test_a_line_breaks_where_samples_are_missing() -> None:
 def test_a_bucket_needs_a_sample() -> None:
     with pytest.raises(ValueError, match="at least 1, got 0"):
         MinMax(0)
+
+
+@pytest.mark.parametrize("column", ["log", "t", "x"])
+@pytest.mark.parametrize("value", [None, math.nan, math.inf, 1e300])
+def test_a_row_that_lies_nowhere_is_refused(
+    tmp_path: Path, column: str, value: float | None
+) -> None:
+    path = tmp_path / "series.parquet"
+    pl.DataFrame({column: [0.0, value], "k1": [1.0, math.nan]}).write_parquet(path)
+    with pytest.raises(ResultError, match=f"{column}': expected a number in every row"):
+        list(blocks(path, [column, "k1"]))
+    (block,) = blocks(path, ["k1"])
+    np.testing.assert_array_equal(block["k1"], [1.0, np.nan])
+
+
+def test_text_where_numbers_belong_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "series.parquet"
+    pl.DataFrame({"quantity": ["a"], "value": ["b"]}).write_parquet(path)
+    assert table_of(path, ["quantity", "value"]) == {"quantity": ["a"], "value": ["b"]}
+    with pytest.raises(ResultError, match="'value': expected numbers, found"):
+        table_of(path, ["quantity", "value"], numbers=["value"])
+
+
+def test_no_number_is_null_on_a_page() -> None:
+    panel = {"x": [1.0, math.nan], "range": (-math.inf, 2.0), "name": "NaN"}
+    assert script_json([panel]) == '[{"x":[1.0,null],"range":[null,2.0],"name":"NaN"}]'

@@ -72,6 +72,11 @@ def test_a_torque_that_no_arm_bears_is_refused() -> None:
         simulate(K, lambda now: np.full((2, now.size), 1e30), np.linspace(0, 1, 11))
 
 
+def test_an_arm_faster_than_any_is_refused_before_its_steps_become_tiny() -> None:
+    with pytest.raises(SettingError, match=r"faster than 10000 rad/s .* weaker torque"):
+        simulate(K, lambda now: np.full((2, now.size), 1e9), np.linspace(0, 1, 11))
+
+
 @pytest.mark.parametrize("hold", ["zoh", "foh"])
 def test_sampled_torque_is_integrated_from_corner_to_corner(hold: str) -> None:
     knots = np.linspace(0, 0.2, 21)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import shutil
 from collections.abc import Iterator
@@ -27,7 +28,7 @@ from algid.synth.sensors import Sensors
 from algid.tracks.figures import figures
 from algid.tracks.page import track_document, write_track
 from algid.tracks.payload import Stretch
-from algid.tracks.read import read_track
+from algid.tracks.read import COLUMNS, CURVE, read_track
 from algid.tracks.result import StretchStatus, TrackResult, track_json
 from algid.tracks.run import track_log
 from algid.tracks.tables import change_table, fixed, stretch_table, verdict
@@ -286,6 +287,35 @@ def test_a_damaged_track_is_refused_in_one_line(
     ) as refused:
         read_track(folder)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("stretches", []), ("excess", -1.0)], ids=["no stretch", "a negative square"]
+)
+def test_numbers_that_no_track_has_are_refused(
+    result: TrackResult, tmp_path: Path, key: str, value: Any
+) -> None:
+    folder = tmp_path / "picking.track"
+    write_track(result, folder)
+    file = folder / "track.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | {key: value}))
+    with pytest.raises(ResultError, match=rf"track\.json: .*{key}"):
+        read_track(folder)
+
+
+@pytest.mark.parametrize("column", COLUMNS)
+def test_a_curve_without_a_number_in_every_row_is_refused(
+    result: TrackResult, tmp_path: Path, column: str
+) -> None:
+    folder = tmp_path / "picking.track"
+    write_track(result, folder)
+    path = folder / CURVE
+    for value in (None, math.inf, -math.inf):
+        pl.read_parquet(path).with_columns(pl.lit(value, pl.Float64).alias(column)).write_parquet(
+            path
+        )
+        with pytest.raises(ResultError, match=rf"{column}.*expected a number in every row"):
+            read_track(folder)
 
 
 def test_what_a_track_cannot_explain_is_told_by_how_much(result: TrackResult) -> None:

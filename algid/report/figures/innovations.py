@@ -97,7 +97,7 @@ def innovations(path: Path, result: Result) -> Figure | Missing:
 
 def read_curves(path: Path) -> Curves:
     """What `path` holds, by quantity and joint. Raises `ResultError`."""
-    rows = table_of(path, COLUMNS)
+    rows = table_of(path, COLUMNS, numbers=COLUMNS[1:])
     quantity = np.array(rows.pop("quantity"))
     numbers = {name: np.array(values, dtype=np.float64) for name, values in rows.items()}
     found: Curves = {}

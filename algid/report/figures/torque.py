@@ -160,7 +160,7 @@ def _closeup_panel(path: Path, found: TorqueLog, joint: int) -> Panel:
     names = ["t", f"tau{joint}", f"tau{joint}_predicted"]
     try:
         rows = pl.scan_parquet(path).filter(near).select(names).collect()
-    except (OSError, pl.exceptions.PolarsError) as error:
+    except (OSError, pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         raise ResultError(
             f"{path}: cannot read it ({error}); identify again with this version"
         ) from error
