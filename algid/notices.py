@@ -10,6 +10,7 @@ Python's keywords.
 from __future__ import annotations
 
 import json
+import re
 import shlex
 import string
 from collections.abc import Iterable, Mapping, Sequence
@@ -51,7 +52,18 @@ OWN_FLAGS = (
 NO_PROFILE = ("estimator", "model", "delay", "l1", "l2", "range", "speed", "torque", "runs")
 """Settings that no profile has."""
 UNIT_OF = {"angle_unit": "[theta1] and [theta2]", "torque_unit": "[tau1] and [tau2]"}
-OPEN = {"source": "NAME", "gear_ratio": "N", "offset": "RAD", "torque_constant": "K"}
+OPEN = {
+    "source": "NAME",
+    "topic": "NAME",
+    "time": "NAME",
+    "joints": ("A", "B"),
+    "gear_ratio": "N",
+    "counts": "N",
+    "offset": "RAD",
+    "torque_constant": "K",
+    "start": "S",
+    "end": "S",
+}
 """What stands for a value that only the user knows, by the last part of a setting's name."""
 
 
@@ -78,17 +90,13 @@ class Remedy:
         words: list[str] = []
         for name, value in self.settings.items():
             if name in OWN_FLAGS:
-                plain = (
-                    ",".join(map(str, value))
-                    if isinstance(value, list | tuple)
-                    else str(_shown(name, value))
-                )
-                words += ["--" + name.replace("_", "-"), plain]
+                shown = _shown(name, value)
+                listed = ",".join(map(str, shown if isinstance(shown, list | tuple) else [shown]))
+                words += ["--" + name.replace("_", "-"), listed]
             else:
-                words += [
-                    "--set",
-                    f"{name}={_toml(name, value) if value is not None else _shown(name, value)}",
-                ]
+                shown = _shown(name, value)
+                plain = value is None or (isinstance(value, str) and value.isalpha())
+                words += ["--set", f"{name}={shown if plain else _toml(name, value)}"]
         return tuple(words)
 
     @property
@@ -122,8 +130,16 @@ class Remedy:
 
     def __str__(self) -> str:
         when = f"{self.when}: " if self.when else ""
-        flags, lines = " ".join(map(shlex.quote, self.flags)), self.lines
+        flags, lines = " ".join(map(_quoted, self.flags)), self.lines
         return f"{when}{flags} (profile: {lines})" if lines else f"{when}{flags}"
+
+
+def _quoted(word: str) -> str:
+    """A word as a shell takes it; what stands in plain quotation marks stays as it reads best."""
+    return word if _IN_MARKS.fullmatch(word) else shlex.quote(word)
+
+
+_IN_MARKS = re.compile(r'[\w.]+="[\w ]+"')
 
 
 def _shown(name: str, value: Any) -> Any:
@@ -132,11 +148,11 @@ def _shown(name: str, value: Any) -> Any:
 
 
 def _toml(name: str, value: Any) -> str:
-    if value is None and name.endswith("source"):
-        return f'"{_shown(name, value)}"'
-    if value is None:
-        return str(_shown(name, value))
-    return json.dumps(value, ensure_ascii=False)
+    if value is not None:
+        return json.dumps(value, ensure_ascii=False)
+    shown = _shown(name, value)
+    quoted = isinstance(shown, tuple) or name.endswith(("source", "topic", "time"))
+    return json.dumps(shown) if quoted else str(shown)
 
 
 class _Words(string.Formatter):
@@ -243,6 +259,90 @@ MESSAGES: Mapping[str, str] = {
         "{count:# step of the angles is|steps of the angles are} twice as long as usual, though the stamps are even: "
         "samples were lost and the others renumbered, so that no estimate can be right; take the stamps of the "
         "messages, or record without losses"
+    ),
+    # of readers
+    "COMMANDED_TORQUE": "torques are commanded ones ({columns}): no measured torque in the log",
+    "FOREIGN_UNIT": (
+        "the column {column!r} for {name} states the unit {unit!r}, and is taken for {given} as told"
+    ),
+    "CURRENT_AS_TORQUE": (
+        "{column!r} for {name} is a current by its name, and is taken for a torque in {given} as told"
+    ),
+    "MOTOR_SIDE": "{columns}: signals of motors, taken for those of joints",
+    "OTHER_UNIT": (
+        "the file states the unit {unit} for {name} ({column!r}), which is taken for {taken}, {why}"
+    ),
+    "JOINT_ORDER": "joint 1 is {first!r} and joint 2 {second!r}, {why}",
+    "OTHER_JOINTS": (
+        "{count:# other joint moves|other joints move} meanwhile: {joints} (in the first "
+        "{samples:# sample|samples}); what that does to the torques is in no two-link model: hold them still"
+    ),
+    "TOPIC_CHOICE": "the joints are taken from {topic!r}; there are two also on {others}",
+    "NO_TOPIC": "{file}: topic {topic!r} is not in this file",
+    "LOG_TIME": "header stamps of {topic!r} stand still at {stamp} ns: the recorder's times are taken",
+    "LACKING_MESSAGES": "{count:# message|messages} on {topic!r} left out for want of {fields}",
+    "OTHER_MESSAGES": "{count:# message|messages} on {topic!r} left out: of other joints",
+    "MISFIT_MESSAGES": (
+        "{count:# message|messages} on {topic!r} of another form than the schema says; the first: {first}"
+    ),
+    "OTHER_TYPE": (
+        "topic {topic!r} also carries messages of another type or definition ({types}); they were not read"
+    ),
+    "STRAY_MESSAGES": "{count:# message|messages} of no topic that the table 'topics' lists; left out",
+    "MISSING_MESSAGES": "the file counts {promised:# message|messages} and holds {found}",
+    "BROKEN_RECORD": (
+        "{bytes:# byte|bytes} in {places:# place|places}, the first at byte {first}, hold no whole record"
+    ),
+    "MISSING_SPLIT": "{missing} of {files:# file|files} of the bag missing: {names}",
+    "NO_INDEX": "the file has no usable index; read by scanning",
+    "DAMAGED_SUMMARY": "the file's summary cannot be used ({why}); read by scanning",
+    "DAMAGED_RECORD": "{why}; left out",
+    "DAMAGED_INDEX": (
+        "the bag's index does not agree with what stands in it ({why}); every chunk was read"
+    ),
+    "NOT_FINITE": "{count:# sample holds|samples hold} a number that is not finite; left out",
+    "CUT": "{count:# sample|samples} before {start:g} s or behind {end} left out, as told",
+    "UNSORTED_STAMPS": "{count:# sample|samples} came late, now in order",
+    "DUPLICATE_STAMPS": (
+        "{count:# sample repeats|samples repeat} a stamp; the first of each was kept{others}"
+    ),
+    "ALIGNED": (
+        "{topic!r} ({rate:.6g} Hz) was interpolated; error, root mean square, in the log's units: {error}"
+    ),
+    "NOT_COVERED": "{count:# sample was|samples were} dropped, where another topic has none",
+    "TIME_UNIT": "times are taken for {unit}, from their size and their steps",
+    "SLOW_CLOCK": (
+        "times in {column!r} are taken for {unit}, which makes {rate:.3g} Hz, too slow for an arm in motion"
+    ),
+    "EMPTY_CELLS": "{count} of {rows:# row|rows} dropped for want of a value",
+    # of checks
+    "EFFORT_ZERO": "{channel} is zero in every sample",
+    "EFFORT_DENORMAL": "{channel} never exceeds {largest:.3g} N m: no torque",
+    "EFFORT_CONSTANT": "{channel} is {value:.6g} N m in every sample",
+    "SATURATED_EFFORT": "{channel} stands at its limit in {percent:.3g} % of the samples",
+    "DEAD_EFFORT": (
+        "{channel} stands still for {seconds:.3g} s from t = {start:.6g} s; leave that out"
+    ),
+    "ANGLE_CONSTANT": "{channel} is {value:.6g} rad in every sample",
+    "WRAPPED_ANGLE": "{channel} jumps by a turn {count:# time|times}",
+    "STUCK_SENSOR": "{channel} freezes for {seconds:.3g} s from t = {start:.6g} s, then jumps",
+    "SPIKES": "{channel} has {count:# spike|spikes}, the first at t = {start:.6g} s",
+    "SHORT_LOG": (
+        "the log lasts {seconds:.3g} s; an estimate needs a second of motion at least, ten are better"
+    ),
+    "SLOW_SAMPLING": (
+        "{samples:.2g} samples in a period of the motion at {rate:.4g} Hz: too slow to tell its "
+        "acceleration; record faster, or move more slowly"
+    ),
+    "NEAR_STAMPS": (
+        "{count:# sample follows|samples follow} the one before by less than {share:g} of a period of "
+        "{period:.4g} ms, as receipt times do: late ones go back to the period they are missing from, "
+        "the mean stands for the others"
+    ),
+    "GAPS": "{count:# gap|gaps}, the longest {seconds:.4g} s; no window spans one",
+    "JITTER": (
+        "stamps jitter by {jitter:.3g} ms about a period of {period:.4g} ms; resampling moves angles "
+        "by {error:.2g} rad at most, linearly"
     ),
     # of tracks
     "STRETCHES_WEAK": "stretch{numbers:|es} {numbers} {numbers:moves|move} too little to be weighed",

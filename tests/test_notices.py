@@ -85,8 +85,6 @@ def test_every_flag_of_its_own_is_one() -> None:
     assert set(UNIT_OF) <= set(OWN_FLAGS)
     assert set(CAUSES) - set(MESSAGES) == {
         "EARLIER_CAUSE",
-        "STUCK_SENSOR",
-        "DEAD_EFFORT",
     }  # these bring their words
 
 

@@ -64,5 +64,5 @@ def convert(
     with progress("samples") as shown:
         write_log(target, noted(shown), truth=reader.origin.truth)
     for notice in notices:
-        remark(f"{notice.code}: {notice.text}")
+        remark(f"{notice.code}: {notice.clause}")
     raise typer.Exit(exit_of(failed=False, lost=any(notice.lossy for notice in notices)))

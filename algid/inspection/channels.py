@@ -11,7 +11,6 @@ from algid.inspection.candidates import torques_beside
 from algid.inspection.figures import robust_deviation, saturated_share, thinned
 from algid.log import Log
 from algid.notices import Notice, Remedy
-from algid.words import counted
 
 _DENORMAL = 1e-6
 _SPIKE = 30.0
@@ -37,19 +36,18 @@ def efforts(log: Log) -> Iterator[Notice]:
             motorless = Remedy({"passive": joint}, "for a joint without a motor")
             yield Notice(
                 "EFFORT_ZERO",
-                f"{what} is zero in every sample",
+                numbers={"channel": what},
                 refuse=True,
                 remedies=(other, *torques_beside(log, name), motorless),
             )
         elif largest < _DENORMAL:
-            text = f"{what} never exceeds {largest:.3g} N m: no torque"
-            yield Notice("EFFORT_DENORMAL", text, refuse=True, remedies=(other,))
+            seen = {"channel": what, "largest": largest}
+            yield Notice("EFFORT_DENORMAL", numbers=seen, refuse=True, remedies=(other,))
         elif tau.min() == tau.max():
-            text = f"{what} is {tau[0]:.6g} N m in every sample"
-            yield Notice("EFFORT_CONSTANT", text, refuse=True, remedies=(other,))
+            seen = {"channel": what, "value": float(tau[0])}
+            yield Notice("EFFORT_CONSTANT", numbers=seen, refuse=True, remedies=(other,))
         elif (share := saturated_share(tau)) > 0.01:
-            text = f"{what} stands at its limit in {100 * share:.3g} % of the samples"
-            yield Notice("SATURATED_EFFORT", text)
+            yield Notice("SATURATED_EFFORT", numbers={"channel": what, "percent": 100 * share})
 
 
 def dead_efforts(log: Log) -> Iterator[Notice]:
@@ -68,8 +66,8 @@ def dead_efforts(log: Log) -> Iterator[Notice]:
         usual = float(np.quantile(thinned(runs), 0.95))
         at_limit = tau[first] in (tau.max(), tau.min())
         if not at_limit and length * log.period >= _DEAD and length >= _DEAD_RUNS * usual:
-            span = f"for {length * log.period:.3g} s from t = {first * log.period:.6g} s"
-            yield Notice("DEAD_EFFORT", f"{_source(log, name)} stands still {span}; leave that out")
+            seen = {"seconds": length * log.period, "start": first * log.period}
+            yield Notice("DEAD_EFFORT", numbers={"channel": _source(log, name), **seen})
 
 
 def angles(log: Log) -> Iterator[Notice]:
@@ -78,15 +76,17 @@ def angles(log: Log) -> Iterator[Notice]:
         steps, what = np.diff(theta), _source(log, name)
         moving = np.flatnonzero(steps)
         if not moving.size:
-            yield Notice("ANGLE_CONSTANT", f"{what} is {theta[0]:.6g} rad in every sample")
+            yield Notice("ANGLE_CONSTANT", numbers={"channel": what, "value": float(theta[0])})
             continue
         sizes = np.abs(steps)
         wraps = int(np.count_nonzero(np.abs(sizes - _TURN) < 0.1 * _TURN))
         # at this rate the arm moves by far less than a turn between two samples
         if wraps and np.median(thinned(sizes)) < 0.5:
-            text = f"{what} jumps by a turn {counted(wraps, 'time')}"
             yield Notice(
-                "WRAPPED_ANGLE", text, refuse=True, remedies=(Remedy({f"{name}.unwrap": True}),)
+                "WRAPPED_ANGLE",
+                numbers={"channel": what, "count": wraps},
+                refuse=True,
+                remedies=(Remedy({f"{name}.unwrap": True}),),
             )
         if moving.size == steps.size:  # it never stands still
             continue
@@ -100,7 +100,7 @@ def angles(log: Log) -> Iterator[Notice]:
             )
             yield Notice(
                 "STUCK_SENSOR",
-                f"{what} freezes for {length:.3g} s from t = {start:.6g} s, then jumps",
+                numbers={"channel": what, "seconds": length, "start": start},
             )
 
 
@@ -173,8 +173,8 @@ def spikes(log: Log) -> Iterator[Notice]:
         found = found[np.abs(values[found + 2] - values[found]) < 0.2 * size[found]]
         if found.size:
             first = float(log.t[1:-1][found][0])
-            text = f"{_source(log, name)} has {counted(len(found), 'spike')}, the first at t = {first:.6g} s"
-            yield Notice("SPIKES", text)
+            seen = {"channel": _source(log, name), "count": len(found), "start": first}
+            yield Notice("SPIKES", numbers=seen)
 
 
 def _source(log: Log, name: str) -> str:

@@ -12,7 +12,6 @@ from algid.inspection.figures import ENOUGH, clock_figures, differences, signal_
 from algid.log import Log
 from algid.notices import Notice, Remedy
 from algid.signals.spacing import NEAR, near_stamps
-from algid.words import counted
 
 _LOST, _LOST_SHARE, _AGAINST = 0.3, 0.003, 5.0
 """Of a step: how near it lies to the double; of the samples: how many do; and over those as near to none at all."""
@@ -25,37 +24,25 @@ _REST, _STILL = 0.5, 1e-3
 def sampling(log: Log) -> Iterator[Notice]:
     """Logs too short or too slow for their motion; stamps that cluster, miss samples or jitter."""
     clock = clock_figures(log)
-    period = f"a period of {1e3 / clock.rate:.4g} ms"
+    period = 1e3 / clock.rate
     if clock.duration < _SHORTEST:
-        text = f"the log lasts {clock.duration:.3g} s; an estimate needs a second of motion at least, ten are better"
-        yield Notice("SHORT_LOG", text)
+        yield Notice("SHORT_LOG", numbers={"seconds": clock.duration})
     samples = samples_a_period(log)
     if samples < _FEWEST:
-        text = (
-            f"{samples:.2g} samples in a period of the motion at {clock.rate:.4g} Hz: too slow to tell its "
-            "acceleration; record faster, or move more slowly"
-        )
-        yield Notice("SLOW_SAMPLING", text)
+        yield Notice("SLOW_SAMPLING", numbers={"samples": samples, "rate": clock.rate})
     near = near_stamps(log.stamp_ns, log.period)
     if near:
-        text = (
-            f"{counted(near, 'sample follows', 'samples follow')} the one before by less than {NEAR:g} of {period}, as "
-            "receipt times do: late ones go back to the period they are missing from, the mean stands for the others"
-        )
-        yield Notice("NEAR_STAMPS", text)
+        yield Notice("NEAR_STAMPS", numbers={"count": near, "share": NEAR, "period": period})
     lost = lost_steps(log)
     if lost:
         override = Remedy({"accept": "LOST_SAMPLES"}, "to use it nevertheless")
         yield Notice("LOST_SAMPLES", numbers={"count": lost}, remedies=(override,))
     if clock.gaps:
-        text = f"{counted(clock.gaps, 'gap')}, the longest {clock.longest_gap:.4g} s; no window spans one"
-        yield Notice("GAPS", text)
+        yield Notice("GAPS", numbers={"count": clock.gaps, "seconds": clock.longest_gap})
     if clock.jitter * clock.rate > 0.01:
         bend = max(float(np.sqrt(np.mean(np.diff(row, 2) ** 2))) for row in log.theta) / 8
-        text = f"stamps jitter by {clock.jitter * 1e3:.3g} ms about {period}"
-        yield Notice(
-            "JITTER", f"{text}; resampling moves angles by {bend:.2g} rad at most, linearly"
-        )
+        seen = {"jitter": 1e3 * clock.jitter, "period": period, "error": bend}
+        yield Notice("JITTER", numbers=seen)
 
 
 def samples_a_period(log: Log) -> float:

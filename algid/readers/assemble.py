@@ -15,7 +15,7 @@ from algid.errors import LogError
 from algid.faults import during
 from algid.limits import LIMITS
 from algid.log import Log, Origin
-from algid.notices import Notice
+from algid.notices import Notice, Remedy
 from algid.readers.convert import ROWS, Conversion, Gatherer, channel_readings
 from algid.readers.table import BLOCK_ROWS, SampleTable, cut
 from algid.readers.timebase import in_order
@@ -138,8 +138,8 @@ class TableReader:
             held = table.take(inside)
         if held is not None:
             last = "the end" if end is None else f"{end:g} s"
-            text = f"{counted(left_out, 'sample')} before {start or 0:g} s or behind {last}"
-            yield held.noting(Notice("CUT", f"{text} left out, as told", note=True))
+            numbers = {"count": left_out, "start": start or 0.0, "end": last}
+            yield held.noting(Notice("CUT", numbers=numbers, note=True))
 
     def _finite(self, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
         """Tables of finite numbers.
@@ -167,8 +167,7 @@ class TableReader:
                     self._check(name, values, first)
             first += len(table)
         if held is not None and dropped:
-            text = f"{counted(dropped, 'sample holds', 'samples hold')} a number that is not finite; left out"
-            held = held.noting(Notice("NOT_FINITE", text, lossy=True))
+            held = held.noting(Notice("NOT_FINITE", numbers={"count": dropped}, lossy=True))
         if held is not None:
             yield held
 
@@ -185,11 +184,12 @@ class TableReader:
         if wrong.size:
             row = int(wrong[0])
             source = self.origin.mapping.get(name, name)
+            cut = Remedy({"start": None, "end": None}, "cut that part out")
+            accept = Remedy({"accept": "NOT_FINITE"}, "or leave such samples out")
             raise LogError(
                 f"{self.origin.path}: {name} ({source}) in sample {first + row + 1}: "
                 f"expected a finite number below {LIMITS.largest_value:g} in size, found {values[row]}; "
-                "cut that part out with --start and --end (profile: start, end), or leave such samples out: "
-                '--accept NOT_FINITE (profile: accept = ["NOT_FINITE"])'
+                f"{cut}; {accept}"
             )
 
 

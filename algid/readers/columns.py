@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from algid.errors import LogError
 from algid.log import Reading
-from algid.notices import Notice
+from algid.notices import Notice, Remedy
 from algid.readers.joints import reading_of
 from algid.readers.names import (
     COMMANDED,
@@ -99,8 +99,8 @@ def assign(
         reading, order = Reading(joints_told="profile" if all_named else "names"), ()
     said = []
     if take_apart(sources["tau1"]).stem in COMMANDED:
-        text = f"torques are commanded ones ({sources['tau1']}, {sources['tau2']}): no measured torque in the log"
-        said.append(Notice("COMMANDED_TORQUE", text))
+        both = f"{sources['tau1']}, {sources['tau2']}"
+        said.append(Notice("COMMANDED_TORQUE", numbers={"columns": both}))
     said += order
     said += _of_foreign_units(path, sources, foreign, profile)
     said += _of_motors(path, sources, currents, profile)
@@ -120,17 +120,16 @@ def _sources(
     """By canonical channel its column, and what the names alone would choose."""
     for name, column in named.items():
         if column not in available:
-            flags, lines = _naming([name])
             raise LogError(
-                f"{path}: {name} is to be taken from {column!r}, which is not there; found {_listed(available)}; name "
-                f"another: {flags} (profile: {lines})"
+                f"{path}: {name} is to be taken from {column!r}, which is not there; "
+                f"found {_listed(available)}; name another: {_naming([name])}"
             )
     try:
         choice = choose(available, profile.joints, named, profile.passive)
     except LookupError as error:
+        two = Remedy({"joints": None}, "choose two")
         raise LogError(
-            f"{path}: {error}; choose two with --joints NAME,NAME, or name each column: --set theta1.source=NAME … "
-            '(profile: joints = ["…", "…"], or source of [theta1] …)'
+            f"{path}: {error}; {two}; or name each column: {_naming(['theta1'])} …"
         ) from error
     sources = {**choice.columns, **named}
     if profile.passive and f"tau{3 - profile.passive}" in sources:
@@ -141,19 +140,14 @@ def _sources(
         sources = {name: column for name, column in sources.items() if name not in VELOCITIES}
     missing = [name for name in ("t", *JOINT_CHANNELS) if name not in sources]
     if missing:
-        flags, lines = _naming(missing)
         text = f"{path}: no column for {', '.join(missing)}; found {_listed(available)}"
-        raise LogError(f"{text}; name them: {flags} (profile: {lines})")
+        raise LogError(f"{text}; name them: {_naming(missing)}")
     return sources, choice
 
 
-def _naming(channels: Sequence[str]) -> tuple[str, str]:
-    """Flags that name the columns of channels, and lines of a profile."""
-    flags = [f"--set {'time' if name == 't' else name + '.source'}=NAME" for name in channels]
-    lines = [
-        'time = "NAME"' if name == "t" else f'source = "NAME" of [{name}]' for name in channels
-    ]
-    return " ".join(flags), "; ".join(lines)
+def _naming(channels: Sequence[str]) -> Remedy:
+    """Settings that name the columns of channels."""
+    return Remedy({"time" if name == "t" else f"{name}.source": None for name in channels})
 
 
 def _listed(available: Sequence[str]) -> str:
@@ -166,18 +160,16 @@ def _of_foreign_units(
 ) -> Iterator[Notice]:
     """What to say of units that no joint's signal has; they are refused unless the user names the right one."""
     for name in [name for name in foreign if name in CHANNELS]:
-        states = f"the column {sources[name]!r} for {name}"
         given = profile.channel(name).unit
         if given is None:
             usual = "N m" if name.startswith("tau") else "rad"
+            right = Remedy({f"{name}.unit": usual}, "say its unit if that is wrong")
             raise LogError(
-                f"{path}: {states} is in {foreign[name]!r}, which is no unit of a joint; say its "
-                f'unit if that is wrong: --set {name}.unit="{usual}" (profile: unit = "{usual}" of [{name}])'
+                f"{path}: the column {sources[name]!r} for {name} is in {foreign[name]!r}, which is no "
+                f"unit of a joint; {right}"
             )
-        yield Notice(
-            "FOREIGN_UNIT",
-            f"{states} states the unit {foreign[name]!r}, and is taken for {given} as told",
-        )
+        column = {"column": sources[name], "name": name}
+        yield Notice("FOREIGN_UNIT", numbers={**column, "unit": foreign[name], "given": given})
 
 
 def _of_motors(
@@ -187,27 +179,21 @@ def _of_motors(
     for name in currents:
         given = profile.channel(name).unit
         if given in TORQUE:
-            text = f"{sources[name]!r} for {name} is a current by its name, and is taken for a torque in {given} as told"
-            yield Notice("CURRENT_AS_TORQUE", text)
+            numbers = {"column": sources[name], "name": name, "given": given}
+            yield Notice("CURRENT_AS_TORQUE", numbers=numbers)
     motors = [name for name in JOINT_CHANNELS if on_motor_side(sources[name])]
     geared = [name for name in CHANNELS if "gear_ratio" in profile.channel(name).model_fields_set]
     open_ones = [name for name in motors if name not in currents and name not in geared]
     if not open_ones:
         return
     named = ", ".join(f"{name} ({sources[name]})" for name in open_ones)
-    flags, lines = (
-        " ".join(f"--set {name}.gear_ratio=N" for name in open_ones),
-        ", ".join(open_ones),
+    gears = Remedy(
+        {f"{name}.gear_ratio": None for name in open_ones},
+        "tell the gear, turns of the motor in one of the joint, 1 for a direct drive",
     )
-    mend = f"turns of the motor in one of the joint, 1 for a direct drive: {flags} (profile: gear_ratio of {lines})"
     if len(motors) < len(JOINT_CHANNELS):
-        raise LogError(
-            f"{path}: {named}: signals of motors beside those of joints; tell the gear, {mend}"
-        )
-    yield Notice(
-        "MOTOR_SIDE",
-        f"{named}: signals of motors, taken for those of joints; tell the gear, {mend}",
-    )
+        raise LogError(f"{path}: {named}: signals of motors beside those of joints; {gears}")
+    yield Notice("MOTOR_SIDE", numbers={"columns": named}, remedies=(gears,))
 
 
 def _of_other_units(
@@ -221,8 +207,9 @@ def _of_other_units(
         given = profile.time_unit if name == "t" else profile.channel(name).unit
         other = unit_of(beside.get(name, unit))
         if given not in (None, unit) and not (given in TORQUE and unit in CURRENT):
-            text = f"the file states the unit {unit} for {name} ({sources[name]!r}), which is taken for {given} as told"
-            yield Notice("OTHER_UNIT", text)
+            numbers = {"unit": unit, "taken": given, "why": "as told"}
         elif given is None and other not in (None, unit):
-            text = f"the file states the unit {other} beside {name}; its name, {sources[name]!r}, says {unit}, which holds"
-            yield Notice("OTHER_UNIT", text)
+            numbers = {"unit": other, "taken": unit, "why": "as its name says"}
+        else:
+            continue
+        yield Notice("OTHER_UNIT", numbers={"name": name, "column": sources[name], **numbers})

@@ -16,6 +16,7 @@ from algid.arm import FloatArray
 from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.log import ChannelReading, IntArray
+from algid.notices import Remedy
 from algid.readers.table import CHANNELS, JOINT_CHANNELS, VELOCITIES, SampleTable
 from algid.units import CURRENT, TORQUE, VELOCITY
 
@@ -169,26 +170,28 @@ def _factor(
     """What a value in `unit` at the channel's own side of the gear is in SI units at the joint."""
     known = (*TORQUE, *CURRENT) if name.startswith("tau") else (*VELOCITY, "counts")
     if unit not in known:
+        right = Remedy({f"{name}.unit": known[0]}, "say its unit")
         raise LogError(
-            f"{path}: {name} ({source}) is in {unit!r} by its name; expected one of {', '.join(known)}; say its unit: "
-            f'--set {name}.unit="{known[0]}" (profile: unit = "{known[0]}" of [{name}])'
+            f"{path}: {name} ({source}) is in {unit!r} by its name; expected one of {', '.join(known)}; "
+            f"{right}"
         )
     if unit in CURRENT:
         constant = getattr(channel, "torque_constant", None)
         if constant is None:
+            motor = Remedy({f"{name}.torque_constant": None, f"{name}.gear_ratio": None})
+            torque = Remedy({f"{name}.unit": "N m"}, "if it is a torque after all")
+            unknown = Remedy({f"{name}.torque_constant": 1}, "where the constant is not known")
             raise LogError(
-                f"{path}: {name} is a current; its torque needs the motor's constant in N m/A: "
-                f"--set {name}.torque_constant=… --set {name}.gear_ratio=… (profile: torque_constant and gear_ratio of "
-                f'[{name}]); if it is a torque after all: --set {name}.unit="N m" (profile: unit = "N m" of [{name}]); '
-                f"where the constant is not known: --set {name}.torque_constant=1 gives all constants up to a gain, "
-                "and a known payload that gain (--payload-mass)"
+                f"{path}: {name} is a current; its torque needs the motor's constant in N m/A: {motor}; "
+                f"{torque}; {unknown} gives all constants up to a gain, and a known payload that gain "
+                "(--payload-mass)"
             )
         return CURRENT[unit] * float(constant) * channel.gear_ratio
     if unit == "counts":
         counts = getattr(channel, "counts", None)
         if counts is None:
-            mend = f"--set {name}.counts=… (profile: counts of [{name}])"
-            raise LogError(f"{path}: {name} in encoder counts needs counts a turn: {mend}")
+            turn = Remedy({f"{name}.counts": None})
+            raise LogError(f"{path}: {name} in encoder counts needs counts a turn: {turn}")
         return 2 * math.pi / float(counts) / channel.gear_ratio
     return (
         TORQUE[unit] * channel.gear_ratio

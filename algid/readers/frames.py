@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.log import Companion, IntArray, Origin, add, word_sum
-from algid.notices import Notice
+from algid.notices import Notice, Remedy
 from algid.readers.assemble import TableReader, reader_of
 from algid.readers.columns import Columns
 from algid.readers.joints import moving_joints
 from algid.readers.table import SampleTable
 from algid.units import ANGLE, NANOSECONDS
-from algid.words import counted
 
 if TYPE_CHECKING:
     import polars as pl
@@ -250,11 +249,7 @@ def tables(
                 raise LogError(f"{path}: a time is not finite; expected a number in every row")
             unit = time_unit(times)
             if unit != "s":
-                notices.append(
-                    Notice(
-                        "TIME_UNIT", f"times are taken for {unit}, from their size and their steps"
-                    )
-                )
+                notices.append(Notice("TIME_UNIT", numbers={"unit": unit}))
         try:
             stamps = to_nanoseconds(times, unit or "s")
         except ValueError as error:
@@ -280,11 +275,9 @@ def _slow(column: str, stamps: IntArray, unit: str) -> list[Notice]:
     if step <= _SLOWEST_NS:
         return []
     likely = _unit_of_step(step / NANOSECONDS[unit])
-    text = (
-        f"times in {column!r} are taken for {unit}, which makes {1e9 / step:.3g} Hz, too slow for an arm in motion; "
-        f'if they are in {likely}: --set time_unit={likely} (profile: time_unit = "{likely}")'
-    )
-    return [Notice("SLOW_CLOCK", text)]
+    numbers = {"column": column, "unit": unit, "rate": 1e9 / step}
+    other = Remedy({"time_unit": likely}, f"if they are in {likely}")
+    return [Notice("SLOW_CLOCK", numbers=numbers, remedies=(other,))]
 
 
 def _whole_rows(frame: pl.DataFrame) -> WholeRows:
@@ -316,7 +309,7 @@ def _complete(
             raise LogError(
                 f"{path}: no row has a value in every column that is needed; put the signals on common stamps"
             )
-        text = f"{lost} of {counted(rows, 'row')} dropped for want of a value"
-        yield held, (Notice("EMPTY_CELLS", text, lossy=True),)
+        numbers = {"count": lost, "rows": rows}
+        yield held, (Notice("EMPTY_CELLS", numbers=numbers, lossy=True),)
     else:
         yield held, ()

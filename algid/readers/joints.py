@@ -14,9 +14,8 @@ import numpy as np
 
 from algid.errors import LogError
 from algid.log import Reading
-from algid.notices import Notice
+from algid.notices import Notice, Remedy
 from algid.readers.table import SampleTable
-from algid.words import counted
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -77,13 +76,15 @@ def order_notice(
     """What to say of the order: nothing where names and log agree."""
     first, second = chosen
     if told == "order":
-        text = f"joint 1 is {first!r} and joint 2 {second!r}, as they stand in the log: their names do not tell"
+        why = "as they stand in the log: their names do not tell"
     elif list(names) != list(chosen):
-        text = f"joint 1 is {first!r} and joint 2 {second!r} by their names; the log has them the other way round"
+        why = "by their names; the log has them the other way round"
     else:
         return ()
-    other = f'--joints {second},{first} swaps them (profile: joints = ["{second}", "{first}"])'
-    return (Notice("JOINT_ORDER", f"{text}; {other}", note=told == "names"),)
+    numbers = {"first": first, "second": second, "why": why}
+    swapped = Remedy({"joints": [second, first]}, "to swap them")
+    note = told == "names"
+    return (Notice("JOINT_ORDER", numbers=numbers, remedies=(swapped,), note=note),)
 
 
 def reading_of(names: Sequence[str], profile: Profile) -> tuple[Reading, tuple[Notice, ...]]:
@@ -160,8 +161,5 @@ def moving_joints(
     furthest = sorted(moved, key=lambda joint: -moved[joint])
     listed = ", ".join(f"{joint} by {moved[joint]:.2g} rad" for joint in furthest[:_NAMED])
     more = f" and {len(moved) - _NAMED} more" if len(moved) > _NAMED else ""
-    text = (
-        f"{counted(len(moved), 'other joint moves', 'other joints move')} meanwhile: {listed}{more} (in the first "
-        f"{counted(len(table), 'sample')}); what that does to the torques is in no two-link model: hold them still"
-    )
-    return (Notice("OTHER_JOINTS", text),)
+    numbers = {"count": len(moved), "joints": f"{listed}{more}", "samples": len(table)}
+    return (Notice("OTHER_JOINTS", numbers=numbers),)

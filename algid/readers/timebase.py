@@ -15,7 +15,7 @@ from algid.arm import FloatArray
 from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.log import IntArray
-from algid.notices import Notice
+from algid.notices import Notice, Remedy
 from algid.readers.table import SampleTable, stack
 from algid.words import counted
 
@@ -63,12 +63,11 @@ def in_order(path: str, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
     late, repeated, lost = counts.tolist()
     said = []
     if late:
-        said.append(Notice("UNSORTED_STAMPS", f"{counted(late, 'sample')} came late, now in order"))
+        said.append(Notice("UNSORTED_STAMPS", numbers={"count": late}))
     if repeated:
-        text = f"{counted(repeated, 'sample repeats', 'samples repeat')} a stamp; the first of each was kept"
-        if lost:
-            text += f"; {counted(lost, 'with other values is', 'with other values are')} lost"
-        said.append(Notice("DUPLICATE_STAMPS", text, lossy=lost > 0))
+        others = counted(lost, "with other values is", "with other values are")
+        numbers = {"count": repeated, "others": f"; {others} lost" if lost else ""}
+        said.append(Notice("DUPLICATE_STAMPS", numbers=numbers, lossy=lost > 0))
     if pending is not None:
         yield pending.noting(*said)
 
@@ -83,10 +82,11 @@ def check_step(path: str, stamps: IntArray) -> None:
     """
     step = float(np.median(np.diff(stamps))) if stamps.size > 2 else np.inf
     if step < LIMITS.shortest_step_ns:
+        unit = Remedy({"time_unit": "s"}, "say their unit (s, ms, us or ns)")
+        clock = Remedy({"clock": "log"}, "of messages take another clock")
         raise LogError(
-            f"{path}: its stamps are {step:g} ns apart in the median, {1e9 / max(step, 1.0):.3g} Hz, as no arm's log "
-            'is; say their unit: --set time_unit=s (profile: time_unit = "s"; ms, us or ns), of messages take another '
-            'clock: --clock log (profile: clock = "log")'
+            f"{path}: its stamps are {step:g} ns apart in the median, {1e9 / max(step, 1.0):.3g} Hz, "
+            f"as no arm's log is; {unit}; {clock}"
         )
 
 
@@ -118,10 +118,11 @@ def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, tuple[int, int,
     fresh = np.diff(stamps[order], prepend=stamps[order[0]] - 1) > 0
     repeated = rows - int(np.count_nonzero(fresh))
     if repeated > REPEATED_SHARE * rows:
+        time = Remedy({"time": None}, "name another time")
+        clock = Remedy({"clock": "log"}, "of messages take another clock")
         raise LogError(
             f"{path}: time stands still: {repeated} of {counted(rows, 'stamp')} as the one before; "
-            'expected increasing stamps; name another time: --set time=NAME (profile: time = "NAME"), of messages '
-            '--clock log (profile: clock = "log")'
+            f"expected increasing stamps; {time}; {clock}"
         )
     kept = order[fresh]
     gone, instead = order[~fresh], kept[np.cumsum(fresh)[~fresh] - 1]
@@ -216,10 +217,8 @@ def whole_topic(
     found = [table for table in in_order(path, tables) if len(table)]
     if not found:
         channel = next(iter(channels))
-        raise LogError(
-            f"{path}: topic {topic!r} holds no sample of {channel}; name another: --set {channel}.topic=NAME "
-            f"--set {channel}.source=FIELD (profile: topic and source of [{channel}])"
-        )
+        other = Remedy({f"{channel}.topic": None, f"{channel}.source": None}, "name another")
+        raise LogError(f"{path}: topic {topic!r} holds no sample of {channel}; {other}")
     return Series(topic, stack(found))
 
 
@@ -246,15 +245,15 @@ def aligned(main: Iterator[SampleTable], others: Sequence[Series]) -> Iterator[S
     said = [
         Notice(
             "ALIGNED",
-            f"{other.topic!r} ({1e9 / other.period if other.period else 0:.6g} Hz) was interpolated; "
-            f"error, root mean square, in the log's units: {other.error()}",
+            numbers={
+                "topic": other.topic,
+                "rate": 1e9 / other.period if other.period else 0.0,
+                "error": other.error(),
+            },
         )
         for other in others
     ]
     if lost:
-        text = (
-            f"{counted(lost, 'sample was', 'samples were')} dropped, where another topic has none"
-        )
-        said.append(Notice("NOT_COVERED", text, lossy=True))
+        said.append(Notice("NOT_COVERED", numbers={"count": lost}, lossy=True))
     if held is not None:
         yield held.noting(*said, *(notice for other in others for notice in other.table.notices))

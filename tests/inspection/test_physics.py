@@ -244,8 +244,8 @@ TORQUES_SWAPPED = '--set tau1.source="tau2" --set tau2.source="tau1"'
             "--second-angle absolute",
         ),
         (Convention(base=True), "the second motor stands at the base", "--drive base"),
-        (Convention(scale=(DEGREES, 1.0)), "θ1 is in degrees", '--set theta1.unit="deg"'),
-        (Convention(scale=(1.0, 1 / (2 * math.pi))), "θ2 is in turns", '--set theta2.unit="rev"'),
+        (Convention(scale=(DEGREES, 1.0)), "θ1 is in degrees", "--set theta1.unit=deg"),
+        (Convention(scale=(1.0, 1 / (2 * math.pi))), "θ2 is in turns", "--set theta2.unit=rev"),
         (
             Convention(scale=(1.0, 7.00001)),
             "θ2 is the motor's angle, 7 times the joint's",

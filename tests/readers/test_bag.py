@@ -324,7 +324,7 @@ def test_a_field_needs_a_topic_and_a_topic_its_field(tmp_path: Path) -> None:
         read_log(path, Profile.model_validate(named))
     log = read_log(path, Profile.model_validate({**named, "topic": "/joint_states"}))
     assert log.tau.tolist() == [[10] * 3, [20] * 3]
-    with pytest.raises(LogError, match=r"no message on topic '/other'; .*--set CHANNEL.topic=NAME"):
+    with pytest.raises(LogError, match=r"no message on topic '/other'; .*--set tau1.topic=NAME"):
         read_log(path, Profile.model_validate({"tau2": {"source": "effort[0]", "topic": "/other"}}))
     for wrong in ("effort[²]", "effort[2]", "header.frame_id"):
         with pytest.raises(

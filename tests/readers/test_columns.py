@@ -29,7 +29,7 @@ def refusal(header: str, settings: dict[str, Any] | None = None, **stated: str) 
 def test_columns_that_are_missing_are_named_with_the_flags_that_name_them() -> None:
     assert refusal("q1 q2 tau1") == (
         "no column for t, tau1, tau2; found 'q1', 'q2', 'tau1'; name them: --set time=NAME --set tau1.source=NAME "
-        '--set tau2.source=NAME (profile: time = "NAME"; source = "NAME" of [tau1]; source = "NAME" of [tau2])'
+        '--set tau2.source=NAME (profile: time = "NAME", source = "NAME" of [tau1], source = "NAME" of [tau2])'
     )
     many = " ".join(f"c{place:02d}" + "x" * 60 for place in range(18))
     told = refusal(many)
@@ -115,8 +115,8 @@ def said(found: Columns) -> list[tuple[str, str]]:
 
 def test_commanded_torques_are_told_and_taken_last() -> None:
     commanded = assigned("t q1 q2 tau_cmd1 tau_cmd2")
-    text = "torques are commanded ones (tau_cmd1, tau_cmd2): no measured torque in the log"
-    assert commanded.notices == (Notice("COMMANDED_TORQUE", text),)
+    columns = {"columns": "tau_cmd1, tau_cmd2"}
+    assert commanded.notices == (Notice("COMMANDED_TORQUE", numbers=columns),)
     assert assigned("t q1 q2 tau_cmd1 tau_cmd2 tau_meas1 tau_meas2").sources["tau1"] == "tau_meas1"
     assert assigned("t q1 q2 tau_cmd1 tau_cmd2 i_q1 i_q2").sources["tau1"] == "tau_cmd1"
 
@@ -139,19 +139,19 @@ def test_the_file_and_the_user_differ_about_a_unit() -> None:
     ) == [
         (
             "OTHER_UNIT",
-            "the file states the unit deg for theta1 ('q1_deg'), which is taken for rad as told",
+            "the file states the unit deg for theta1 ('q1_deg'), which is taken for rad, as told",
         )
     ]
     assert said(assigned("t q1_deg q2 tau1 tau2", None, q1_deg="rad", q2="deg")) == [
         (
             "OTHER_UNIT",
-            "the file states the unit rad beside theta1; its name, 'q1_deg', says deg, which holds",
+            "the file states the unit rad for theta1 ('q1_deg'), which is taken for deg, as its name says",
         )
     ]
     assert said(assigned("time_ms q1 q2 tau1 tau2", {"time_unit": "s"})) == [
         (
             "OTHER_UNIT",
-            "the file states the unit ms for t ('time_ms'), which is taken for s as told",
+            "the file states the unit ms for t ('time_ms'), which is taken for s, as told",
         )
     ]
 
@@ -159,7 +159,7 @@ def test_the_file_and_the_user_differ_about_a_unit() -> None:
 def test_a_unit_of_no_joint_is_refused_where_it_counts() -> None:
     assert refusal("t q1_inch q2 tau1 tau2") == (
         "the column 'q1_inch' for theta1 is in 'inch', which is no unit of a joint; say its unit if that is wrong: "
-        '--set theta1.unit="rad" (profile: unit = "rad" of [theta1])'
+        '--set theta1.unit=rad (profile: unit = "rad" of [theta1])'
     )
     assert '--set tau2.unit="N m"' in refusal(PLAIN, None, tau2="%")
     (foreign,) = said(assigned("t q1_inch q2 tau1 tau2", {"theta1": {"unit": "rev"}}))
@@ -175,7 +175,7 @@ def test_motors_beside_joints_need_a_gear() -> None:
     told = refusal("t q1 q2 motor1_torque motor2_torque", {"tau2": {"gear_ratio": 1}})
     assert told == (
         "tau1 (motor1_torque): signals of motors beside those of joints; tell the gear, turns of the motor in one of "
-        "the joint, 1 for a direct drive: --set tau1.gear_ratio=N (profile: gear_ratio of tau1)"
+        "the joint, 1 for a direct drive: --set tau1.gear_ratio=N (profile: gear_ratio = N of [tau1])"
     )
     motors = assigned("t motor1_pos motor2_pos motor1_torque motor2_torque")
     assert [code for code, _ in said(motors)] == ["MOTOR_SIDE"]

@@ -98,17 +98,17 @@ def test_signs_and_offsets_of_channels_and_joints_add_up() -> None:
         (
             {},
             {"theta2": "N m"},
-            r"theta2 .* expected one of rad, .*, rpm, counts; .*--set theta2.unit=\"rad\"",
+            r"theta2 .* expected one of rad, .*, rpm, counts; .*--set theta2.unit=rad",
         ),
         (
             {},
             {"tau2": "A"},
-            r"tau2 is a current; .*--set tau2.torque_constant=… .*tau2.unit=\"N m\".*up to a gain",
+            r"tau2 is a current; .*--set tau2.torque_constant=K .*tau2.unit=\"N m\".*up to a gain",
         ),
         (
             {},
             {"theta1": "counts"},
-            r"theta1 in encoder counts needs counts a turn: --set theta1.counts=…",
+            r"theta1 in encoder counts needs counts a turn: --set theta1.counts=N",
         ),
     ],
 )

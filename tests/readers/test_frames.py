@@ -181,10 +181,10 @@ def test_a_clock_too_slow_for_an_arm_is_told_once(slower: int, told: bool, tmp_p
     arm(30, 2).with_columns(t=pl.col("t") * slower).rename(OWN).write_csv(path)
     said = [notice for table in open_log(path).tables(10) for notice in table.notices]
     text = (
-        f"times in 't' are taken for s, which makes {1000 / slower:.3g} Hz, too slow for an arm in motion; "
+        f"times in 't' are taken for s, which makes {1000 / slower:.3g} Hz, too slow for an arm in motion: "
         'if they are in ms: --set time_unit=ms (profile: time_unit = "ms")'
     )
-    assert [(notice.code, notice.text) for notice in said] == [("SLOW_CLOCK", text)] * told
+    assert [(notice.code, notice.clause) for notice in said] == [("SLOW_CLOCK", text)] * told
     assert read_log(path, Profile(time_unit="s")).notices == ()
 
 

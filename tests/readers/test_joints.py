@@ -89,7 +89,7 @@ def states(path: Path, names: tuple[str, str]) -> Path:
 
 
 def told(log: Log) -> list[str]:
-    return [one.text for one in log.notices if one.code == "JOINT_ORDER"]
+    return [one.clause for one in log.notices if one.code == "JOINT_ORDER"]
 
 
 def test_joint_states_in_alphabetical_order_are_put_along_the_arm(tmp_path: Path) -> None:

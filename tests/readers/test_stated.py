@@ -65,7 +65,7 @@ def test_a_flag_beats_a_statement_and_says_so(tmp_path: Path) -> None:
     assert log.tau[:, 0].tolist() == [5, -0.005]
     said = [notice.text for notice in log.notices if notice.code == "OTHER_UNIT"]
     assert said == [
-        "the file states the unit mN m for tau1 ('tau1'), which is taken for N m as told"
+        "the file states the unit mN m for tau1 ('tau1'), which is taken for N m, as told"
     ]
 
 

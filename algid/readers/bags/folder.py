@@ -10,7 +10,6 @@ from algid.errors import LogError
 from algid.files import read_start
 from algid.limits import LIMITS
 from algid.notices import Notice
-from algid.words import counted
 
 
 @dataclass(frozen=True)
@@ -53,8 +52,8 @@ def bag_files(folder: Path) -> Bag:
             f"{folder}: the bag mixes files of {', '.join(sorted(kinds))}; read one file of it"
         )
     missing = [path.name for path in paths if path not in there]
-    text = f"{len(missing)} of {counted(len(paths), 'file')} of the bag missing: {', '.join(missing[:3])}"
-    notices = (Notice("MISSING_SPLIT", text, lossy=True),) if missing else ()
+    counts = {"missing": len(missing), "files": len(paths), "names": ", ".join(missing[:3])}
+    notices = (Notice("MISSING_SPLIT", numbers=counts, lossy=True),) if missing else ()
     return Bag(tuple(there), kinds.pop().lstrip("."), notices)
 
 

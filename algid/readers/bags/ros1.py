@@ -291,9 +291,9 @@ class _Outline:
         found = self._found
         wrong, lost = self._wrong()
         if wrong and not found.notices:
-            text = f"the bag's index does not agree with what stands in it ({wrong}); every chunk was read"
-            notice = Notice("CUT_OFF", text, lossy=True) if lost else Notice("DAMAGED_INDEX", text)
-            found.notices.append(notice)
+            damaged = Notice("DAMAGED_INDEX", numbers={"why": wrong})
+            cut = Notice("CUT_OFF", damaged.text, lossy=True)
+            found.notices.append(cut if lost else damaged)
         found.agreed = found.agreed and not wrong and not found.notices
         found.span_ns = (min(self._times), max(self._times)) if self._times else None
         return found

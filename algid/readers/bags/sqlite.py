@@ -23,7 +23,6 @@ from algid.notices import Notice
 from algid.readers.messages.batch import MessageBatch, Messages
 from algid.readers.messages.source import MessageChannel, Source
 from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
-from algid.words import counted
 
 _BATCH_BYTES, _BATCH_ROWS = 1 << 21, 1 << 14
 _PAD = 8
@@ -249,8 +248,7 @@ class SqliteSource(Source):
 def _said_of(strays: int) -> list[Notice]:
     if not strays:
         return []
-    text = f"{counted(strays, 'message')} of no topic that the table 'topics' lists; left out"
-    return [Notice("STRAY_MESSAGES", text, lossy=True)]
+    return [Notice("STRAY_MESSAGES", numbers={"count": strays}, lossy=True)]
 
 
 def _gathered(stamps: list[int], payloads: list[bytes]) -> Messages:

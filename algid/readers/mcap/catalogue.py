@@ -163,15 +163,13 @@ def catalogue(file: File) -> Catalogue:
     """The catalogue of an opened file; `DamagedError` only where not even the start can be read."""
     if file.size < len(framing.MAGIC) or file.read(0, len(framing.MAGIC)) != framing.MAGIC:
         raise DamagedError("the file does not begin as MCAP does")
-    notice, damage = Notice("NO_INDEX", "the file has no usable index; read by scanning"), []
+    notice, damage = Notice("NO_INDEX"), []
     try:
         found = _from_summary(file)
     except DamagedError as error:
         found = None
         damage = [f"its summary: {error}"]
-        notice = Notice(
-            "DAMAGED_SUMMARY", f"the file's summary cannot be used ({error}); read by scanning"
-        )
+        notice = Notice("DAMAGED_SUMMARY", numbers={"why": str(error)})
     if found is not None:
         return found
     walked = _walked(file)
@@ -393,11 +391,8 @@ def _missing(file: File, gaps: list[Gap], ended: int | None, found: Catalogue) -
     said = []
     if inside:
         size = sum(gap.end - gap.start for gap in inside)
-        text = (
-            f"{counted(size, 'byte')} in {counted(len(inside), 'place')}, the first at byte "
-            f"{inside[0].start}, hold no whole record"
-        )
-        said.append(Notice("BROKEN_RECORD", text, lossy=True))
+        numbers = {"bytes": size, "places": len(inside), "first": inside[0].start}
+        said.append(Notice("BROKEN_RECORD", numbers=numbers, lossy=True))
         found.damage += [f"no record at byte {gap.start}" for gap in inside]
     if last is not None:
         length = counted(last.end - last.start, "byte")
@@ -427,7 +422,7 @@ def _define(found: Catalogue, code: int, content: bytes, place: int) -> None:
         for channel in error.channels:
             found.redefined.setdefault(channel, place)
     except DamagedError as error:
-        found.notices.append(Notice("DAMAGED_RECORD", f"{error}; left out", lossy=True))
+        found.notices.append(Notice("DAMAGED_RECORD", numbers={"why": str(error)}, lossy=True))
         found.damage.append(str(error))
 
 
@@ -440,4 +435,4 @@ def _keep_metadata(file: File, record: framing.Record, found: Catalogue) -> None
         metadata = parse(records.Metadata, file.read(record.start, record.length))
         found.metadata.setdefault(metadata.name, metadata.metadata)
     except DamagedError as error:
-        found.notices.append(Notice("DAMAGED_RECORD", f"{error}; left out"))
+        found.notices.append(Notice("DAMAGED_RECORD", numbers={"why": str(error)}))

@@ -93,8 +93,8 @@ class Account:
             )
             said.append(Notice("DAMAGED_CHUNK", text + counting, lossy=True))
         elif promised is not None and promised != self.found:
-            text = f"the file counts {counted(promised, 'message')} and holds {self.found}"
-            said.append(Notice("MISSING_MESSAGES", text, lossy=True))
+            numbers = {"promised": promised, "found": self.found}
+            said.append(Notice("MISSING_MESSAGES", numbers=numbers, lossy=True))
         if self.torn:
             taken, held, size = self.torn
             lost = (  # counted by the share of bytes

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 _SAMPLES = 64
 _LETTERS_A_STEP, _BYTES_A_STEP = 4, 4
 """Letters of a definition, and bytes of a message, that are read in a step of work."""
+_TOPIC = Remedy({"topic": None})
+_JOINTS = Remedy({"joints": None})
 _USUAL = "/joint_states"
 _TELLING = (b"effort", b"tau_est", b"tau_J")
 """Names of torques in definitions: of ROS, Unitree, libfranka."""
@@ -90,7 +92,7 @@ def plan(source: Source, profile: Profile | None) -> Plan:
         home = topic or (usual.topic if usual else None) or (profile.topic if profile else None)
         if home is None:
             raise LogError(
-                f"{source.path}: {channel} is taken from {path!r} without a topic: --topic NAME (profile: topic = …)"
+                f"{source.path}: {channel} is taken from {path!r} without a topic: {_TOPIC}"
             )
         sources[channel] = (home, path)
     if (profile and not profile.velocity) or not all(name in sources for name in VELOCITIES):
@@ -114,10 +116,9 @@ def _choice_notice(usual: _Usual) -> tuple[Notice, ...]:
     """What to say where other topics hold two joints too."""
     if not usual.beside:
         return ()
-    names = ", ".join(usual.beside[:4])
-    text = f"the joints are taken from {usual.topic!r}; there are two also on {names}"
+    numbers = {"topic": usual.topic, "others": ", ".join(usual.beside[:4])}
     other = Remedy({"topic": usual.beside[0]}, "for the other")
-    return (Notice("TOPIC_CHOICE", text, note=True, remedies=(other,)),)
+    return (Notice("TOPIC_CHOICE", numbers=numbers, note=True, remedies=(other,)),)
 
 
 def _topic(
@@ -136,22 +137,21 @@ def _topic(
         if messages and (best is None or len(missing) < len(best[1])):
             best = (kind, missing, known, stamp)
     if best is None:
-        mend = '--topic NAME, or --set CHANNEL.topic=NAME for one channel (profile: topic = "NAME")'
         text = (
-            f"there is no message on topic {name!r}; found {listed(source)}; name another: {mend}"
+            f"there is no message on topic {name!r}; found {listed(source)}; name another: {_TOPIC}"
         )
-        raise NothingFoundError(f"{source.path}: {text}")
+        one = Remedy({"tau1.topic": None}, "for one channel")
+        raise NothingFoundError(f"{source.path}: {text}; {one}")
     kind, missing, known, stamp = best
     for channel in missing:
         raise LogError(
             f"{source.path}: messages on {name!r} have no {paths[channel]!r} for {channel}; found "
-            f"{', '.join(known)}; name another: --set {channel}.source=FIELD (profile: source of [{channel}])"
+            f"{', '.join(known)}; {Remedy({f'{channel}.source': None}, 'name another')}"
         )
     clock = profile.clock if profile else None
     if clock == "header" and stamp is None:
-        raise LogError(
-            f'{source.path}: messages on {name!r} carry no stamp: --clock log (profile: clock = "log")'
-        )
+        log_clock = Remedy({"clock": "log"})
+        raise LogError(f"{source.path}: messages on {name!r} carry no stamp: {log_clock}")
     return Topic(name, kind, Fields(paths, stamp), clock)
 
 
@@ -183,9 +183,11 @@ def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
                     fitting.setdefault(name, usual)
                     break
                 if repeated := repeated_name(shape):
-                    text = f"messages on {name!r} name the joint {repeated!r} twice; name the fields by their places, "
-                    mend = '--set theta1.source="position[0]" … (profile: source = "position[0]" of [theta1] …)'
-                    refused.append(LogError(f"{source.path}: {text}{mend}"))
+                    text = f"messages on {name!r} name the joint {repeated!r} twice"
+                    by_place = Remedy(
+                        {"theta1.source": "position[0]"}, "name the fields by their places"
+                    )
+                    refused.append(LogError(f"{source.path}: {text}; {by_place} …"))
                 if len(joints) > 2 or (joints and profile and profile.joints):
                     many.setdefault(name, {}).update(dict.fromkeys(joints))
                 elif len(joints) < 2 and names:
@@ -204,13 +206,11 @@ def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
     if len(fitting) == 1:
         return next(iter(fitting.values()))
     if fitting:
-        raise LogError(
-            f'{source.path}: joint states on {", ".join(fitting)}; choose: --topic NAME (profile: topic = "NAME")'
-        )
+        raise LogError(f"{source.path}: joint states on {', '.join(fitting)}; choose: {_TOPIC}")
     if many:
         name, own = next(iter(many.items()))
         text = f"{name!r} has {counted(len(own), 'joint')} ({', '.join([*own][:12])})"
-        raise LogError(f"{source.path}: {text}; choose: --joints A,B (profile: joints = […])")
+        raise LogError(f"{source.path}: {text}; choose: {_JOINTS}")
     if refused:
         raise refused[0]
     if profile is not None and all(profile.channel(name).source for name in JOINT_CHANNELS):
@@ -220,10 +220,11 @@ def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
         if profile and profile.joints
         else "positions and efforts of two joints"
     )
-    mend = "--topic NAME --joints A,B, or --set tau1.topic=NAME --set tau1.source=FIELD … (profile: topic, joints, …)"
+    both = Remedy({"topic": None, "joints": None})
+    each = Remedy({"tau1.topic": None, "tau1.source": None}, "or channel by channel")
     there = "; ".join([*dict.fromkeys(lacking)][:4]) or listed(source)
     raise NothingFoundError(
-        f"{source.path}: no topic holds {wanted}; found {there}; name topics and fields: {mend}"
+        f"{source.path}: no topic holds {wanted}; found {there}; name topics and fields: {both}; {each}"
     )
 
 
@@ -281,7 +282,7 @@ def _candidates(source: Source, profile: Profile | None) -> list[tuple[str, str]
             some.append(place)
     if len(some) > LIMITS.topics:
         raise LogError(
-            f"{source.path}: {counted(len(some), 'topic')} may hold joint states: --topic NAME (profile: topic = …)"
+            f"{source.path}: {counted(len(some), 'topic')} may hold joint states: {_TOPIC}"
         )
     return some
 

@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.log import IntArray
-from algid.notices import Notice
+from algid.notices import Notice, Remedy
 from algid.readers.messages.batch import Account
 from algid.readers.messages.codec import decoder_for
 from algid.readers.messages.columnar import Decoder, ExcessError, Shape
 from algid.readers.messages.source import Source, channels_of
 from algid.readers.table import VELOCITIES, SampleTable, stack
-from algid.words import counted
 
 JOINT_STATE = ("sensor_msgs/msg/JointState", "sensor_msgs/JointState")
 DYNAMIC_JOINT_STATE = ("control_msgs/msg/DynamicJointState", "control_msgs/DynamicJointState")
@@ -134,8 +133,8 @@ class Topic:
         path = source.path
         channels = channels_of(source, self.name, self.type)
         if not channels:
-            text = f"{path}: topic {self.name!r} is not in this file"
-            yield SampleTable(np.empty(0, np.int64), {}, (Notice("NO_TOPIC", text, lossy=True),))
+            missing = Notice("NO_TOPIC", numbers={"file": path, "topic": self.name}, lossy=True)
+            yield SampleTable(np.empty(0, np.int64), {}, (missing,))
             return
         wanted = dict(self.fields.paths)
         if self.fields.stamp is not None and self.clock != "log":
@@ -194,14 +193,14 @@ class Topic:
                 )
                 self._chosen = "log" if still else "header"
                 if still:
-                    text = f"header stamps of {self.name!r} stand still at {header[0]} ns"
-                    notices = (Notice("LOG_TIME", f"{text}: the recorder's times are taken"),)
+                    numbers = {"topic": self.name, "stamp": int(header[0])}
+                    notices = (Notice("LOG_TIME", numbers=numbers),)
             stamps = header if self._chosen == "header" else stamps
         if stamps is table.stamp_ns and len(table) and stamps.min() < 0:
+            header_clock = Remedy({"clock": "header"}, "take the header's stamps")
             raise LogError(
-                f"{path}: topic {self.name!r}: a log time of 2^63 ns or more; expected ns since 1970; take the "
-                "header's stamps: --clock header"
-                ' (profile: clock = "header")'
+                f"{path}: topic {self.name!r}: a log time of 2^63 ns or more; expected ns since 1970; "
+                f"{header_clock}"
             )
         floats = {name: np.asarray(values, np.float64) for name, values in columns.items()}
         return SampleTable(stamps, floats, table.notices + notices)
@@ -214,10 +213,10 @@ class Topic:
         ):
             wrong = np.flatnonzero(~(np.abs(values.astype(np.float64)) < largest))
             if wrong.size:
+                log_clock = Remedy({"clock": "log"}, "take the recorder's times")
                 raise LogError(
-                    f"{path}: topic {self.name!r}: a header stamp with {values[wrong[0]]} for seconds or nanoseconds; "
-                    "expected whole numbers below 2^63 ns; take the recorder's times: "
-                    '--clock log (profile: clock = "log")'
+                    f"{path}: topic {self.name!r}: a header stamp with {values[wrong[0]]} for seconds "
+                    f"or nanoseconds; expected whole numbers below 2^63 ns; {log_clock}"
                 )
         whole = np.floor(seconds)
         rest = (
@@ -232,19 +231,14 @@ class Topic:
         said = []
         if decoder.lacking:
             lacks = ", ".join(dict.fromkeys(decoder.wanted[name] for name in decoder.lacks))
-            text = f"{counted(decoder.lacking, 'message')} on {self.name!r} left out for want of {lacks}"
-            said.append(Notice("LACKING_MESSAGES", text, lossy=True))
+            numbers = {"count": decoder.lacking, "topic": self.name, "fields": lacks}
+            said.append(Notice("LACKING_MESSAGES", numbers=numbers, lossy=True))
         if decoder.skipped:
-            text = (
-                f"{counted(decoder.skipped, 'message')} on {self.name!r} left out: of other joints"
-            )
-            said.append(Notice("OTHER_MESSAGES", text))
+            numbers = {"count": decoder.skipped, "topic": self.name}
+            said.append(Notice("OTHER_MESSAGES", numbers=numbers))
         if decoder.misfits:
-            text = (
-                f"{counted(decoder.misfits, 'message')} on {self.name!r} of another form than the "
-                f"schema says; the first: {decoder.misfit}"
-            )
-            said.append(Notice("MISFIT_MESSAGES", text, lossy=True))
+            numbers = {"count": decoder.misfits, "topic": self.name, "first": str(decoder.misfit)}
+            said.append(Notice("MISFIT_MESSAGES", numbers=numbers, lossy=True))
         others = {
             one for one in source.used() - channels if source.channels[one].topic == self.name
         }
@@ -252,8 +246,6 @@ class Topic:
             types = ", ".join(
                 sorted({source.channels[one].type or "no schema" for one in others})[:4]
             )
-            text = (
-                f"topic {self.name!r} also carries messages of another type or definition ({types})"
-            )
-            said.append(Notice("OTHER_TYPE", f"{text}; they were not read", lossy=True))
+            numbers = {"topic": self.name, "types": types}
+            said.append(Notice("OTHER_TYPE", numbers=numbers, lossy=True))
         return said
