@@ -50,6 +50,7 @@ _BANDWIDTH = 40.0  # Hz, of the velocity beside k1
 _COULOMB_SPEED = 0.1  # rad/s
 AT_REST = 0.1  # of a joint's RMS speed
 _REWEIGHTINGS = 4
+_LEAST_POWER = 1e-280  # (N m)²: the square of a torque of denormal numbers is zero
 _FLOOR = 1e-9  # of a torque's power: a residual below it is rounding
 
 
@@ -202,10 +203,11 @@ def solved(
     order = np.array([[1, 0] if family.torques_swapped else [0, 1] for family in families])
     signs = np.array([family.torque_signs for family in families])
     cross = signs[:, :, None] * sums.cross[[0, 1], :, order]
-    power = np.repeat(sums.power[order], T.shape[0], axis=0)
+    power = np.repeat(np.maximum(sums.power, _LEAST_POWER)[order], T.shape[0], axis=0)
     gram = np.tile(T.swapaxes(1, 2)[:, None] @ sums.gram @ T[:, None], (len(families), 1, 1, 1))
     aimed = np.einsum("zxi,fax->fzai", T, cross).reshape(len(power), 2, -1)
-    weight, ridge = 1 / power, 1e-12 * np.eye(T.shape[2])
+    weight = 1 / power
+    ridge = 1e-12 * np.eye(T.shape[2])
     for _ in range(_REWEIGHTINGS):
         normal = np.einsum("za,zaij->zij", weight, gram)
         size = np.sqrt(np.maximum(np.einsum("zii->zi", normal), 1e-140))
