@@ -25,6 +25,7 @@ OWN_FLAGS = (
         "zero",
         "second_angle",
         "drive",
+        "effort",
         "passive",
         "joints",
         "angle_unit",
@@ -53,6 +54,7 @@ NO_PROFILE = ("estimator", "model", "delay", "l1", "l2", "range", "speed", "torq
 """Settings that no profile has."""
 UNIT_OF = {"angle_unit": "[theta1] and [theta2]", "torque_unit": "[tau1] and [tau2]"}
 OPEN = {
+    "l1": "M",
     "source": "NAME",
     "topic": "NAME",
     "time": "NAME",
@@ -210,7 +212,7 @@ MESSAGES: Mapping[str, str] = {
     "CONSTRAINED": "--constrain enforces {bounds}, which the logs contradict",
     "NOT_FEASIBLE": "--constrain cannot obey {bounds}: no estimates within the bounds were found",
     "REFINED_FAILED": "the refined estimator did not converge; the weak estimate is reported instead",
-    "NO_GRAVITY": "without gravity k2 and k4 have no effect, and the payload has no weight: give --l1 or --l2",
+    "NO_GRAVITY": "without gravity k2 and k4 have no effect, and the payload has no weight",
     "ENDOGENEITY": (
         "instruments and least squares are {distance:.1f} standard deviations apart: torque that the model lacks "
         "drives the motion, and least squares takes the constants too small"
@@ -247,9 +249,19 @@ MESSAGES: Mapping[str, str] = {
     "FLIPPED_SIGN": "gravity pulls upwards (k4 = {weight:.3g} N m): the sign of torques or angles is wrong",
     "WRONG_ZERO": "gravity is turned by {turn:.0f}°: θ1 is not from the horizontal",
     "GRAVITY_COMPENSATED": (
-        "torques carry no weight (gravity explains {percent:.2g} % of them): they are gravity-compensated, or the arm "
-        "moves in a horizontal plane"
+        "torques carry no weight of the arm: they are gravity-compensated, or the arm moves in a horizontal plane"
     ),
+    "WEIGHT_OF_PAYLOAD": (
+        "torques carry the payload's weight and not the arm's: they are taken as gravity-compensated, without k2 and k4"
+    ),
+    "PAYLOAD_WEIGHTLESS": (
+        "torques do not carry the payload's weight either: its inertia alone is left, which tells its mass where a "
+        "length is known"
+    ),
+    "EXTERNAL_EFFORT": (
+        "without payload the torques have nothing of an arm in them, with it those of a payload: they are external ones"
+    ),
+    "NO_FRICTION": "torques hold no friction: they are friction-compensated, or the joints have none",
     "WRONG_CONVENTION": "{wrong}, by all that physics says ({contradiction})",
     "ZERO_OFFSET": "{wrong}",
     "RESTS": (

@@ -32,6 +32,10 @@ else:
     VelocityUnit = Annotated[Literal[names_of("velocity")], BeforeValidator(_usual)]
     TorqueUnit = Annotated[Literal[names_of("torque", "current")], BeforeValidator(_usual)]
     TimeUnit = Annotated[Literal[names_of("time")], BeforeValidator(_usual)]
+Effort = Literal[
+    "raw", "gravity-compensated", "friction-compensated", "external", "command", "current"
+]
+"""As `algid.physics.effort.Effort`, of which a profile knows the words alone."""
 Check = Literal[
     "EFFORT_ZERO",
     "EFFORT_DENORMAL",
@@ -129,6 +133,8 @@ class Profile(_Strict):
         A joint without a motor, as an acrobot's first or a pendubot's second: its torque is zero,
         whatever the log says.
     gravity : float, m/s^2
+    effort : 'raw', 'gravity-compensated', 'friction-compensated', 'external', 'command' or 'current'
+        What the driver logs as torque.
     velocity : bool
         Whether recorded velocities are read.
     signs, offsets : pairs of 1 or -1, and of float in rad
@@ -157,6 +163,7 @@ class Profile(_Strict):
     drive: Literal["joint", "base"] = "joint"
     passive: Annotated[Literal[1, 2] | None, BeforeValidator(_number)] = None
     gravity: float = Field(default=9.81, ge=0)
+    effort: Effort | None = None
     velocity: bool = True
     signs: tuple[Literal[1, -1], Literal[1, -1]] = (1, 1)
     offsets: tuple[float, float] = (0.0, 0.0)

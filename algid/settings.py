@@ -15,11 +15,34 @@ from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_h
 from algid.errors import SettingError
 from algid.limits import PHYSICAL, Range
 from algid.methods import ESTIMATORS, NAMES, Estimator, estimator_of
+from algid.physics.effort import Effort, without_terms
 
 if TYPE_CHECKING:  # a type checker cannot read a registry
     EstimatorName = str
 else:
     EstimatorName = Literal[NAMES]
+
+
+EXTERNAL_GRAVITY = (
+    "--effort external: such a torque has nothing of the arm's weight; leave --gravity out, or say "
+    "--effort gravity-compensated"
+)
+
+
+OF_BOTH = ("gravity", "effort")
+"""Settings that a profile has too: there they are of its log's driver and arm."""
+
+
+def refuse_contradictions(given: Mapping[str, Any]) -> None:
+    """Refuse settings, by name as they were given, that cannot both be meant.
+
+    Raises
+    ------
+    SettingError
+        If gravity is given for a torque that has nothing of the arm's weight.
+    """
+    if given.get("effort") == "external" and given.get("gravity") is not None:
+        raise SettingError(EXTERNAL_GRAVITY)
 
 
 def flag(name: str) -> str:
@@ -88,6 +111,9 @@ class Settings:
         windows (0.4 s).
     bandwidth : float, Hz, of the zero-phase differentiator
     gravity : float, m/s^2, 0 for an arm that moves in a horizontal plane
+    effort : 'raw', 'gravity-compensated', 'friction-compensated', 'external', 'command', 'current' or None
+        What the logged torque is. None takes it for raw, unless the logs tell that gravity is
+        compensated; with `gravity` 0 a payload's weight is compensated too.
     model : 'auto', 'plain', or terms of the torque between commas
         Names in `algid.model.TERMS`, and delay; 'auto' lets the logs choose.
     torque_hold : 'foh' or 'zoh'
@@ -137,6 +163,10 @@ class Settings:
             "profile": True,
         },
     )
+    effort: Effort | None = field(
+        default=None,
+        metadata={"help": "What the driver logs as torque; by default raw.", "profile": True},
+    )
     model: str = field(
         default="auto",
         metadata={
@@ -184,6 +214,8 @@ class Settings:
                 raise SettingError(
                     f"{flag(one.name)}: expected {expected}, found {reprlib.repr(value)}"
                 )
+        if self.effort == "external" and self.gravity != type(self).gravity:
+            raise SettingError(EXTERNAL_GRAVITY)
         if self.model not in ("auto", "plain"):
             self._check_terms()
         self._refuse_what_it_lacks(estimator_of(self.estimator))
@@ -261,6 +293,11 @@ class Settings:
                 raise SettingError(
                     f"--model: {term} has no meaning without {needed}; add {needed} to the list"
                 )
+        gone = set(self.terms) - set(without_terms(self.effort, self.terms))
+        if gone:
+            raise SettingError(
+                f"--model: torque that is {self.effort} has no {min(gone)}; leave it out, or --effort"
+            )
         if sum(EVERY_TERM[term].timing is not None for term in self.terms) > 1:
             raise SettingError(
                 "--model: no log tells a delay from a lag beside it; leave one of them out"

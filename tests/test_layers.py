@@ -39,7 +39,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "files": room("construction errors limits", "pydantic"),
     "stores": room("construction errors files", "pyarrow"),
     "profile": room("errors files units", "pydantic"),
-    "settings": room("errors limits methods model signals"),
+    "settings": room("errors limits methods model physics signals"),
     "results": room("errors files limits log model notices settings text verdict words", "numpy polars pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
     "table4": room("arm limits log results synth"),

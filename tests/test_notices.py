@@ -23,6 +23,7 @@ from algid.notices import (
 )
 from algid.profile import Profile, with_settings
 from algid.results.verdict import CAUSES
+from algid.settings import OF_BOTH
 
 REMEDIES = (
     Remedy({"zero": "hanging"}),
@@ -81,7 +82,7 @@ def test_what_only_the_user_knows_is_left_open() -> None:
 
 
 def test_every_flag_of_its_own_is_one() -> None:
-    assert set(OWN_FLAGS) - set(NO_PROFILE) - {"gravity"} <= set(OF_PROFILE)
+    assert set(OWN_FLAGS) - set(NO_PROFILE) - set(OF_BOTH) <= set(OF_PROFILE)
     assert set(UNIT_OF) <= set(OWN_FLAGS)
     assert set(CAUSES) - set(MESSAGES) == {
         "EARLIER_CAUSE",

@@ -26,7 +26,7 @@ from algid.cli.completion import (
 from algid.errors import SettingError
 from algid.files import parsed_toml
 from algid.limits import LIMITS
-from algid.settings import Settings, flag
+from algid.settings import OF_BOTH, Settings, flag, refuse_contradictions
 from algid.units import names_of
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 MODEL, METHOD, LOG = "The arm's model", "Method", "What the log means"
 """Panels of a command's help."""
-MODELLED = ("gravity", "model", "torque_hold", "delay", "l1", "l2")
+MODELLED = ("gravity", "effort", "model", "torque_hold", "delay", "l1", "l2")
 
 
 COMPLETED = {"model": listed(terms)}
@@ -141,6 +141,7 @@ class Choice:
             for field in fields(Settings)
         }
         given = {name: value for name, value in self.settings_flags.items() if value is not None}
+        refuse_contradictions(given)
         return Settings(**{name: parsers[name](value) for name, value in given.items()})
 
     def profile(self, file: Path | None = None) -> Profile | None:
@@ -156,12 +157,13 @@ class Choice:
         found = profile_from(
             {**self.profile_flags, "profile": file or self.profile_flags.get("profile")}
         )
-        gravity = self.settings_flags.get("gravity")
-        if found is None or gravity is None:
+        said = {name: self.settings_flags.get(name) for name in OF_BOTH}
+        given = {name: value for name, value in said.items() if value is not None}
+        if not given or (found is None and "effort" not in given):
             return found
-        from algid.profile import with_settings
+        from algid.profile import Profile, with_settings
 
-        return with_settings(found, {"gravity": gravity})
+        return with_settings(found or Profile(), given)
 
 
 def profile_from(flags: Mapping[str, Any]) -> Profile | None:

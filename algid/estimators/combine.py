@@ -48,11 +48,15 @@ class LogInformation:
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Gaussian knowledge of the first parameters: mean (p,) and precision (p, p), zero along what is not known."""
+    """Gaussian knowledge of the first parameters: mean (p,) and precision (p, p), zero along what is not known.
+
+    Those of the names that are `absent` are nothing, by what the torque is said to hold.
+    """
 
     names: tuple[str, ...]
     mean: FloatArray
     precision: FloatArray
+    absent: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         keep_arrays(self)
@@ -61,6 +65,23 @@ class Prior:
     def of(cls, names: tuple[str, ...], mean: FloatArray, covariance: FloatArray) -> Prior:
         """The knowledge that an estimate `mean` (p,) with `covariance` (p, p) holds."""
         return cls(names, mean, scaled_pinv(covariance))
+
+
+_NOTHING = 1e-6  # standard deviation of what is absent, in its unit: far below what any log tells
+
+
+def without(prior: Prior | None, absent: tuple[str, ...]) -> Prior | None:
+    """What is known beforehand where the parameters `absent` are nothing."""
+    if not absent:
+        return prior
+    names = tuple(name for name in (() if prior is None else prior.names) if name not in absent)
+    precision = np.diag([0.0] * len(names) + [_NOTHING**-2] * len(absent))
+    mean = np.zeros(len(names) + len(absent))
+    if prior is not None and names:
+        kept = [prior.names.index(name) for name in names]
+        mean[: len(names)] = prior.mean[kept]
+        precision[: len(names), : len(names)] = prior.precision[np.ix_(kept, kept)]
+    return Prior((*names, *absent), mean, precision, absent)
 
 
 def scaled_pinv(S: FloatArray, tolerance: float = RANK_TOLERANCE) -> FloatArray:

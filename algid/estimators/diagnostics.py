@@ -103,7 +103,12 @@ def broken_bounds(fit: Fit) -> list[BrokenBound]:
     size = sizes(fit.names, fit.values)
     shrunk = () if fit.shrinkage is None else fit.shrinkage.names
     spreads = zip(fit.names, fit.std, strict=True)
-    open_ones = {f"{name} >= 0" for name, std in spreads if np.isinf(std) or name in shrunk}
+    unknown = {name for name, std in spreads if np.isinf(std)} | {*shrunk, *fit.absent}
+    open_ones = {f"{name} >= 0" for name in unknown}
+    if {"k1", "k2"} & set(fit.absent):
+        open_ones.add("k1 k2 >= 0")
+    if {"k1", "k3", "k5"} & set(fit.absent):
+        open_ones |= {"M22 > 0", "det M > 0 at theta2 = 0", "det M > 0 at theta2 = pi"}
     broken = []
     for name, bound in bounds(fit.shared).items():
         value = bound(fit.values)
@@ -123,7 +128,7 @@ def length_by_constants(fit: Fit) -> tuple[float, float] | None:
     No gain of both torques changes it: where it is not the length that is known, gravity is
     compensated in part, or the zeros or the terms of the torque are wrong.
     """
-    if fit.shared.model.gravity == 0:
+    if fit.shared.model.gravity == 0 or {"k1", "k2"} & set(fit.absent):
         return None
     places = [fit.names.index(name) for name in ("k1", "k2")]
     if np.any(np.isinf(fit.std[places])) or not fit.values[places[1]]:
@@ -261,7 +266,7 @@ def joints_apart(normals: Sequence[Normal], model: Model) -> JointsApart | None:
     for joint in range(2):
         grams = [normal.gram[:, joint] for normal in normals]
         nothing = np.zeros(len(model.names))
-        c, covariance, _ = _by_themselves(
+        c, covariance, _ = by_themselves(
             shared,
             [LogInformation(False, nothing, gram[:, :-1, :-1], gram[:, :-1, -1]) for gram in grams],
         )
@@ -322,7 +327,7 @@ def payload_distance(fit: Fit) -> float | None:
     kinds = [[log for log in fit.logs if log.loaded is kind] for kind in (False, True)]
     if not fit.shared.payload or not all(kinds):
         return None
-    unloaded, loaded = (_by_themselves(fit.shared, logs) for logs in kinds)
+    unloaded, loaded = (by_themselves(fit.shared, logs) for logs in kinds)
     if not (unloaded[2] and loaded[2]):
         return None
     freedom = len(fit.shared.log_names) - (len(fit.shared.names) - len(fit.shared.log_names))
@@ -373,7 +378,7 @@ def repeatability(fit: Fit) -> MassScatter | None:
     return MassScatter(np.array(masses), std, (low, high))
 
 
-def _by_themselves(
+def by_themselves(
     shared: Shared, logs: Sequence[LogInformation]
 ) -> tuple[FloatArray, FloatArray, bool]:
     """Coefficients (q,) that logs of one kind give, their sandwich (q, q), and whether all of them are determined."""

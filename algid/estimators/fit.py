@@ -19,7 +19,12 @@ from algid.estimators.combine import (
     left_out,
     sandwich,
 )
-from algid.estimators.identifiability import Whiteness, examine, open_directions
+from algid.estimators.identifiability import (
+    Identifiability,
+    Whiteness,
+    examine,
+    open_directions,
+)
 from algid.estimators.innovations import NORMAL, ResidualSums
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
@@ -91,6 +96,11 @@ class Fit:
     def names(self) -> tuple[str, ...]:
         """Names of the shared parameters."""
         return self.shared.names
+
+    @property
+    def absent(self) -> tuple[str, ...]:
+        """Parameters that are nothing, by what the torque is said to hold."""
+        return () if self.prior is None else self.prior.absent
 
     @cached_property
     def std(self) -> FloatArray:
@@ -219,7 +229,7 @@ def conclude(
     parameters.
     """
     beta, S, _ = combine(shared, logs, beta, prior)
-    known = examine(shared.names, beta, S, moved)
+    known = examined(shared.names, beta, S, moved, () if prior is None else prior.absent)
     covariance, quantile = known.covariance, NORMAL
     intervals: Intervals = "likelihood"
     freedom = samples
@@ -251,6 +261,25 @@ def conclude(
         without=without,
         moved=moved,
     )
+
+
+def examined(
+    names: Sequence[str],
+    beta: FloatArray,
+    S: FloatArray,
+    moved: FloatArray,
+    absent: Collection[str],
+) -> Identifiability:
+    """What logs determine where the parameters `absent` are nothing, which is known."""
+    if not absent:
+        return examine(names, beta, S, moved)
+    free = [place for place, name in enumerate(names) if name not in absent]
+    found = examine([names[place] for place in free], beta[free], S[np.ix_(free, free)], moved)
+    covariance = np.zeros_like(S)
+    covariance[np.ix_(free, free)] = found.covariance
+    determined = dict(zip(free, found.determined, strict=True))
+    every = tuple(determined.get(place, True) for place in range(len(names)))
+    return Identifiability(found.sentences, every, covariance)
 
 
 def _satterthwaite(

@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.estimators.combine import LogInformation, combine
-from algid.estimators.fit import Fit
-from algid.estimators.identifiability import examine
+from algid.estimators.fit import Fit, examined
 
 MOMENTS = 96
 """About how many moments the logs are looked at together."""
@@ -92,7 +91,7 @@ def _estimate(fit: Fit, logs: Sequence[LogInformation]) -> tuple[FloatArray, Flo
     beta, S, _ = combine(fit.shared, logs, fit.values, fit.prior)
     if not S.any():  # a joint at rest, and nothing else so far
         return np.full(beta.shape, np.nan), np.full(beta.shape, np.nan)
-    known = examine(fit.names, beta, S, fit.moved)
+    known = examined(fit.names, beta, S, fit.moved, fit.absent)
     std = np.sqrt(np.maximum(np.diag(known.covariance), 0.0))
     lost = np.array(
         [status == "NOT_IDENTIFIABLE" for status in fit.status]

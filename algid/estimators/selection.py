@@ -16,7 +16,7 @@ friction and where a term that is not linear is linearised, is improved between 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import combinations
 from typing import Literal
@@ -146,6 +146,7 @@ def select(
     settings: WeakSettings,
     candidates: Sequence[str] = CHOICE,
     kept: Sequence[str] = (),
+    absent: Collection[str] = (),
 ) -> Selection:
     """Choose the terms of the torque's model.
 
@@ -159,6 +160,8 @@ def select(
         A delay that turns out negative is a lag where that explains more.
     kept : names in `CHOICES`
         Terms that stay whatever the data say; only their shapes are found.
+    absent : names of parameters
+        That the unloaded arm's torque does not hold: what is found for them is noise.
 
     Raises
     ------
@@ -190,7 +193,7 @@ def select(
     for _ in range(_ROUNDS):
         grams = look.grams(everything)
         searches.append(
-            _Search(grams, tuple(term for term in candidates if term not in fixed), fixed)
+            _Search(grams, tuple(term for term in candidates if term not in fixed), fixed, absent)
         )
         terms = searches[-1].run()
         if terms == before or not (_RELINEARISED | _SHAPED["coulomb_speed"]) & set(terms):
@@ -246,6 +249,7 @@ class _Search:
     grams: Grams
     candidates: tuple[str, ...]
     fixed: tuple[str, ...]
+    absent: Collection[str] = ()
 
     def evidence(self, terms: Sequence[str], beside: Sequence[str]) -> float:
         """Evidence of `terms` less its price."""
@@ -267,7 +271,12 @@ class _Search:
     def plausible(self, terms: Sequence[str], among: Sequence[str]) -> bool:
         """Whether the coefficients of `terms` beside `among` are plausible."""
         value = self.grams.coefficients([*among, *terms])[False]
-        names = [name for term in terms for name in term_names(term) if name in value]
+        names = [
+            name
+            for term in terms
+            for name in term_names(term)
+            if name in value and name not in self.absent
+        ]
         ranges = ((value[name], PARAMETERS[name].plausible) for name in names)
         turned = (
             np.arctan2(abs(value[name]), value[SINES[name]]) for name in names if name in SINES

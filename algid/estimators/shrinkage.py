@@ -153,7 +153,8 @@ def joined(first: Prior | None, second: Prior) -> Prior:
     size = len(first.names)
     precision = np.zeros((size + len(second.names),) * 2)
     precision[:size, :size], precision[size:, size:] = first.precision, second.precision
-    return Prior(first.names + second.names, np.concatenate([first.mean, second.mean]), precision)
+    mean = np.concatenate([first.mean, second.mean])
+    return Prior(first.names + second.names, mean, precision, first.absent + second.absent)
 
 
 def shrink(

@@ -41,7 +41,8 @@ def concluded(
         How far each joint travelled.
     """
     beta, H, _ = combine(shared, logs, beta, prior)
-    statuses, sentences = _judged(shared.names, beta, H, shrinkage.names, moved)
+    given = (*shrinkage.names, *prior.absent)
+    statuses, sentences = _judged(shared.names, beta, H, given, moved)
     without = _left_out(shared, logs, beta, prior)
     wide = spread(shared, logs, beta, prior, without)
     intervals: Intervals = "sandwich" if wide.jackknife is None else "jackknife"

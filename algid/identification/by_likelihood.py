@@ -11,7 +11,7 @@ import numpy as np
 from algid.errors import LogError
 from algid.estimators import instruments, shrunk, weak
 from algid.estimators.body import with_body
-from algid.estimators.combine import Prior
+from algid.estimators.combine import Prior, without
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, constrained
 from algid.estimators.doubt import doubted
 from algid.estimators.fit import Fit
@@ -25,6 +25,7 @@ from algid.estimators.selection import (
     needs_shape,
     select,
 )
+from algid.estimators.shrinkage import SCALES
 from algid.estimators.too_short import TooShortError
 from algid.identification.known import model_of
 from algid.identification.predicted import prediction
@@ -33,8 +34,18 @@ from algid.identification.source import LogSource
 from algid.identification.survey import Survey
 from algid.identification.velocities import with_velocities
 from algid.methods import estimator_of
-from algid.model import CHOICES, DELAYS, EVERY_TERM, RIGID, Model, without_delay
+from algid.model import (
+    CHOICES,
+    COLUMN_NAMES,
+    DELAYS,
+    EVERY_TERM,
+    RIGID,
+    TERMS,
+    Model,
+    without_delay,
+)
 from algid.notices import Notice
+from algid.physics.effort import absent, without_terms
 from algid.results import Result
 from algid.runtime import beside
 from algid.settings import Settings
@@ -72,8 +83,9 @@ def choose_model(survey: Survey, settings: Settings, earlier: Result | None = No
             unloaded,
             loaded,
             _weak_settings(settings, _given(plain, ())),
-            candidates,
+            without_terms(settings.effort, candidates),
             settings.terms,
+            absent(settings.effort, COLUMN_NAMES),
         )
     except TooShortError as error:
         raise LogError(
@@ -126,8 +138,11 @@ def run_fit(
     unloaded, loaded = _passes(
         survey, settings, partial(_scored, chosen.model, settings, sums) if scored else None
     )
+    nothing = absent(settings.effort, chosen.model.names)
     try:
-        fit = estimator.fit(unloaded, loaded, ours, settings.lengths, prior, survey.progress)
+        fit = estimator.fit(
+            unloaded, loaded, ours, settings.lengths, without(prior, nothing), survey.progress
+        )
         if fit.refuted and settings.chooses:
             fit, chosen = _shrunk(fit, unloaded, loaded, ours, settings, chosen, prior)
             sums.clear()
@@ -153,7 +168,9 @@ def _shrunk(
 ) -> tuple[Fit, Selection]:
     """The fit with every term shrunk in place of the `refuted` one's, and its model."""
     shaped = replace(ours, model=chosen.shapes or chosen.model)
-    fit = shrunk.fit(unloaded, loaded, shaped, settings.lengths, prior)
+    every = replace(shaped.model, terms=tuple(term for term in TERMS if term in SCALES))
+    nothing = absent(settings.effort, every.names)
+    fit = shrunk.fit(unloaded, loaded, shaped, settings.lengths, without(prior, nothing))
     fit = replace(fit, notes=(*refuted.notes, Notice("SHRUNK_TERMS", note=True)))
     terms = (*fit.shared.model.terms, *(DELAYS if fit.shared.delay else ()))
     trials = tuple(TermTrial(term, True, np.nan, np.nan, _SHRUNK) for term in terms)

@@ -27,12 +27,16 @@ from algid.identification.source import (
 from algid.identification.summary import result_of
 from algid.identification.survey import Survey
 from algid.methods import estimator_of, settles
+from algid.physics.effort import absent
 from algid.progress import Progress
 from algid.results import Result, read_result, write_result
 from algid.runtime import one_blas_thread
-from algid.settings import Settings
+from algid.settings import OF_BOTH, Settings, refuse_contradictions
 
 if TYPE_CHECKING:
+    from algid.estimators.fit import Fit
+    from algid.estimators.selection import Selection
+    from algid.identification.by_likelihood import Predictions
     from algid.identification.options import ProfileLike
     from algid.profile import Profile
 
@@ -127,19 +131,15 @@ def identify(
     settings, meaning = with_options(settings, profile, options)
     earlier = Earlier.of(parameters)
     meaning = meaning if earlier is None else reused(meaning, earlier.result)
-    if (
-        meaning is not None
-        and "gravity" in meaning.model_fields_set
-        and settings.gravity == Settings.gravity
-    ):
-        settings = replace(settings, gravity=meaning.gravity)
+    settings = _with_meaning(settings, meaning, earlier)
     sources = with_twins_marked(
-        open_sources(unloaded, "unloaded", meaning, settings.gravity),
-        open_sources(loaded, "loaded", meaning, settings.gravity),
+        open_sources(unloaded, "unloaded", meaning, settings.gravity, settings.effort),
+        open_sources(loaded, "loaded", meaning, settings.gravity, settings.effort),
     )
     survey = Survey(sources, progress)
     said = {} if meaning is None else meaning.model_dump(mode="json", exclude_unset=True)
-    if not survey.unloaded and (earlier is None or not survey.loaded):
+    alone = earlier is not None or settings.effort == "external"
+    if not survey.unloaded and not (alone and survey.loaded):
         raise ValueError("an unloaded log is needed, or parameters and a loaded log")
     if settings.cross_validate and (len(survey.unloaded) == 1 or len(survey.loaded) == 1):
         kind = "unloaded" if len(survey.unloaded) == 1 else "loaded"
@@ -163,6 +163,23 @@ def identify(
 
             export_mcap(temporary, progress)
     return result
+
+
+def _with_meaning(settings: Settings, meaning: Profile | None, earlier: Earlier | None) -> Settings:
+    """The settings with what the profile says of the arm, or an earlier result, where they are silent."""
+    said: dict[str, Any] = (
+        {} if earlier is None else {"effort": earlier.result.settings.get("effort")}
+    )
+    if meaning is not None:
+        own = {name: getattr(meaning, name) for name in OF_BOTH if name in meaning.model_fields_set}
+        refuse_contradictions(own)
+        said |= own
+    silent = {
+        name: value
+        for name, value in said.items()
+        if getattr(settings, name) == getattr(Settings, name)
+    }
+    return replace(settings, **silent)
 
 
 def reused(profile: Profile | None, earlier: Result) -> Profile | None:
@@ -190,7 +207,9 @@ def _identified(
         if settles(settings.estimator):
             outcome = _by_the_paper(survey, settings, earlier, folder)
         else:
-            outcome = _by_likelihood(survey, settings, earlier, folder if series else None)
+            outcome, settings = _by_likelihood(
+                survey, settings, earlier, folder if series else None
+            )
         result = result_of(outcome, settings, survey)
     otherwise = [] if earlier is None else read_otherwise(result.logs, earlier.result, earlier.file)
     return result.model_copy(update={"profile": said, "notices": [*otherwise, *result.notices]})
@@ -219,17 +238,36 @@ def _by_the_paper(
 
 def _by_likelihood(
     survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None
-) -> Identified:
-    from algid.identification.by_likelihood import (
-        choose_model,
-        residual_of,
-        run_fit,
-        with_doubt,
-        with_endogeneity,
-        without_nothing,
-    )
-    from algid.identification.known import prior_of
+) -> tuple[Identified, Settings]:
+    """What the logs tell, and the settings with the effort that they tell."""
+    from algid.identification.by_likelihood import residual_of, with_doubt, with_endogeneity
+    from algid.identification.efforts import of_effort, told
     from algid.identification.outcome import outcome_of
+
+    asked = settings
+    fit, predictions, chosen = _fitted(survey, settings, earlier)
+    settings = told(fit, settings)
+    said = of_effort(fit, settings, asked)
+    if settings != asked:
+        fit, predictions, chosen = _fitted(survey, settings, earlier)
+    fit = with_endogeneity(with_doubt(fit, survey, settings, chosen), survey, settings, chosen)
+    survey.begin("prediction")
+    outcome = outcome_of(fit, predictions, survey, settings, chosen)
+    outcome = replace(outcome, notices=[*outcome.notices, *said])
+    if folder is not None:
+        survey.begin("series")
+        write_fit_series(folder, fit, survey, settings, residual_of(survey, settings, chosen, fit))
+        if estimator_of(settings.estimator).beside_paper:
+            outcome = _with_the_papers(outcome, survey, settings, folder)
+    return outcome, settings
+
+
+def _fitted(
+    survey: Survey, settings: Settings, earlier: Earlier | None
+) -> tuple[Fit, Predictions, Selection]:
+    """The fit with the terms that the logs choose, without those that it finds to be nothing."""
+    from algid.identification.by_likelihood import choose_model, run_fit, without_nothing
+    from algid.identification.known import prior_of
 
     survey.begin("choosing terms")
     chosen = choose_model(survey, settings, None if earlier is None else earlier.result)
@@ -239,15 +277,7 @@ def _by_likelihood(
     fewer = without_nothing(chosen, fit, settings)
     if fewer is not chosen:
         fit, predictions, chosen = run_fit(survey, settings, fewer, prior)
-    fit = with_endogeneity(with_doubt(fit, survey, settings, chosen), survey, settings, chosen)
-    survey.begin("prediction")
-    outcome = outcome_of(fit, predictions, survey, settings, chosen)
-    if folder is not None:
-        survey.begin("series")
-        write_fit_series(folder, fit, survey, settings, residual_of(survey, settings, chosen, fit))
-        if estimator_of(settings.estimator).beside_paper:
-            outcome = _with_the_papers(outcome, survey, settings, folder)
-    return outcome
+    return fit, predictions, chosen
 
 
 def _with_the_papers(
@@ -260,6 +290,7 @@ def _with_the_papers(
     if (
         first is None
         or settings.gravity == 0
+        or absent(settings.effort, CONSTANT_NAMES)
         or min(durations) < SHORTEST
         or max(durations) > SERIES_SECONDS
     ):

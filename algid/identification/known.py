@@ -14,6 +14,7 @@ from algid.estimators.parametrisation import Shared
 from algid.identification.source import Role
 from algid.model import Model, without_delay
 from algid.notices import Notice
+from algid.physics.effort import absent
 from algid.physics.parameters import BODY, PAYLOAD
 from algid.results import Result
 from algid.settings import Settings
@@ -57,19 +58,21 @@ def prior_of(result: Result, model: Model, file: str | None = None) -> Prior:
             "identify with --estimator refined or weak, or use --estimator paper here too"
         )
     known = set(result.fit.covariance_names) & set(result.parameters)
-    missing = [name for name in model.names if name not in known]
+    gone = absent(Settings.of(result.settings).effort, model.names)
+    names = tuple(name for name in model.names if name not in gone)
+    missing = [name for name in names if name not in known]
     if missing:
         raise ResultError(
             f"{file}: the result has no {', '.join(missing)}; use the flags it was made with"
         )
-    places = [result.fit.covariance_names.index(name) for name in model.names]
+    places = [result.fit.covariance_names.index(name) for name in names]
     covariance = np.array(result.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
-    mean = np.array([result.parameters[name].estimate for name in model.names], dtype=np.float64)
+    mean = np.array([result.parameters[name].estimate for name in names], dtype=np.float64)
     if not (np.isfinite(covariance).all() and np.isfinite(mean).all()):
         raise ResultError(
             f"{file}: the result leaves constants undetermined; identify from more logs first"
         )
-    return Prior.of(model.names, mean, covariance)
+    return Prior.of(names, mean, covariance)
 
 
 def torque_constants(result: Result, model: Model, role: Role, file: str) -> FloatArray:
@@ -83,6 +86,8 @@ def torque_constants(result: Result, model: Model, role: Role, file: str) -> Flo
     values = {
         name: found.estimate for name, found in {**result.parameters, **result.payload}.items()
     }
+    for name in absent(Settings.of(result.settings).effort, model.names):
+        values[name] = 0.0
     wanted = [*model.names, *((one.name for one in PAYLOAD) if role == "loaded" else ())]
     values |= {
         name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from algid.errors import SettingError
-from algid.settings import Settings, flag
+from algid.settings import OF_BOTH, Settings, flag, refuse_contradictions
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -50,8 +50,10 @@ def with_options(
             of_settings[name] = parse(_text(name, value))
     if of_profile:
         known = with_settings(known or Profile(), of_profile)
-    if known is not None and "gravity" in of_settings:
-        known = with_settings(known, {"gravity": of_settings["gravity"]})
+    refuse_contradictions(options)
+    of_both = {name: of_settings[name] for name in OF_BOTH if name in of_settings}
+    if known is not None and of_both:
+        known = with_settings(known, of_both)
     return replace(given, **of_settings), known
 
 

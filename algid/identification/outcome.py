@@ -28,6 +28,7 @@ from algid.identification.series import torque_coefficients, torque_shift
 from algid.identification.survey import Survey
 from algid.model import UNITS
 from algid.notices import Notice
+from algid.physics.effort import absent
 from algid.results import Estimate, Status
 from algid.settings import Settings
 from algid.table4 import LOADED_ROWS, UNLOADED_ROWS, finite
@@ -61,9 +62,12 @@ def outcome_of(
     found = {name: unknown(UNITS[name]) for name in CONSTANT_NAMES}
     found |= _estimates(fit.names, fit.values, fit.std, fit.quantile, fit.status)
     found = with_significance(found)
+    gone = {*fit.absent, *absent(settings.effort, CONSTANT_NAMES)}
+    found = {name: one for name, one in found.items() if name not in gone}
     payload = {name: found.pop(name) for name in PAYLOAD_PARAMETERS if name in found}
     rows, stds = table_rows(fit)
-    combined = {name: unknown(TABLE_UNITS[name]) for name in LOADED_ROWS if survey.loaded}
+    held = [name for name in LOADED_ROWS if not gone & set(_LOADED[name])]
+    combined = {name: unknown(TABLE_UNITS[name]) for name in held if survey.loaded}
     for name in combined.keys() & rows.keys():
         status = "OK" if fit.converged else "NOT_CONVERGED"
         combined[name] = estimate(
@@ -189,6 +193,8 @@ def table_rows(fit: Fit) -> tuple[dict[str, float], dict[str, float]]:
         jacobian = fit.shared.jacobian(fit.values, loaded)
         coefficients = fit.shared.coefficients(fit.values, loaded)
         for name, constants in (_LOADED if loaded else _ROWS).items():
+            if set(constants) & set(fit.absent):
+                continue
             weight = np.array([float(one in constants) for one in fit.shared.log_names])
             spread = fit.spread(weight @ jacobian) if weight.sum() == len(constants) else np.inf
             if np.isfinite(spread) and name not in lost:
@@ -205,6 +211,7 @@ def fit_summary(
     """The statistical part of a result."""
     residual, crossed = _predicted(fit, predictions, survey, settings)
     lost, tests, repeated = np.isinf(fit.std), fit.whiteness, repeatability(fit)
+    there = [place for place, name in enumerate(fit.names) if name not in fit.absent]
     noise, endogeneity = {}, {}
     if fit.noise:
         levels = np.sqrt(np.mean(np.square([[*one.theta, *one.tau] for one in fit.noise]), axis=0))
@@ -218,10 +225,10 @@ def fit_summary(
         )
     return results.FitSummary(
         noise=noise,
-        covariance_names=list(fit.names),
+        covariance_names=[fit.names[place] for place in there],
         covariance=[
             [finite(value) for value in row]
-            for row in np.where(lost | lost[:, None], np.inf, fit.covariance)
+            for row in np.where(lost | lost[:, None], np.inf, fit.covariance)[np.ix_(there, there)]
         ],
         intervals=fit.intervals,
         iterations=fit.iterations,

@@ -32,7 +32,11 @@ def fit_warnings(fit: Fit) -> Iterator[Notice]:
         yield Notice("REFINED_FAILED")
     yield from (Notice("OPEN_DIRECTION", sentence) for sentence in fit.unidentifiable)
     if fit.shared.model.gravity == 0:
-        yield Notice("NO_GRAVITY")
+        needed = fit.shared.payload and not fit.shared.lengths
+        yield Notice(
+            "NO_GRAVITY",
+            remedies=(Remedy({"l1": None}, "a length tells its mass"),) if needed else (),
+        )
     if (
         fit.endogeneity is not None
         and fit.endogeneity > ENDOGENEOUS

@@ -53,6 +53,7 @@ class LogSource:
         Gives a fresh pass over the samples.
     promised : samples that the file says it has, 0 where it does not
     gravity : float, m/s^2, for the named checks
+    effort : as in `Settings`, for the named checks
     digest : callable or None
         Gives the SHA-256 of the log; None where only parts of it are here.
     """
@@ -63,6 +64,7 @@ class LogSource:
     blocks: Callable[[], Iterator[Log]]
     promised: int
     gravity: float
+    effort: str | None
     digest: Callable[[], str] | None
     notices: tuple[Notice, ...] = ()
 
@@ -72,6 +74,7 @@ def open_source(
     role: Role,
     profile: Profile | None = None,
     gravity: float = 9.81,
+    effort: str | None = None,
     *,
     changing: bool = False,
 ) -> LogSource:
@@ -107,6 +110,7 @@ def open_source(
             lambda: iter([log]),
             len(log),
             gravity,
+            effort,
             partial(_hash_of_arrays, log),
         )
     else:
@@ -121,6 +125,7 @@ def open_source(
             lambda: ahead(_of_an_arm(reader.blocks())),
             reader.rows,
             gravity,
+            effort,
             digest,
         )
     truth = source.origin.truth
@@ -147,7 +152,11 @@ def _of_an_arm(blocks: Iterator[Log]) -> Iterator[Log]:
 
 
 def open_sources(
-    logs: LogLike | Iterable[LogLike] | None, role: Role, profile: Profile | None, gravity: float
+    logs: LogLike | Iterable[LogLike] | None,
+    role: Role,
+    profile: Profile | None,
+    gravity: float,
+    effort: str | None = None,
 ) -> list[LogSource]:
     """Sources of one log, several, or none: see `open_source`.
 
@@ -161,7 +170,7 @@ def open_sources(
         if isinstance(logs, str | Path | Log | Staged) or is_columns(logs)
         else logs
     )
-    sources = [open_source(log, role, profile, gravity) for log in several]
+    sources = [open_source(log, role, profile, gravity, effort) for log in several]
     lengths = Counter(source.promised for source in sources if source.digest)
     kept: list[LogSource] = []
     places: dict[str, int] = {}

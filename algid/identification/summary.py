@@ -25,7 +25,12 @@ def result_of(outcome: Identified, settings: Settings, survey: Survey) -> Result
         (log.origin.truth.payload if log.origin.truth else None for log in survey.loaded), None
     )
     first, *others = [survey.summary(log) for log in survey.logs]
-    noticed = [(log, notice) for log in survey.logs for notice in survey.notices(log)]
+    noticed = [
+        (log, notice)
+        for log in survey.logs
+        for notice in survey.notices(log)
+        if not (settings.effort and notice.code == "GRAVITY_COMPENSATED")  # said of the fit
+    ]
     of_logs = [
         notice.of(PurePath(log.name).name) for log, notice in noticed
     ]  # the paths stand among the logs

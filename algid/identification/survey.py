@@ -133,7 +133,7 @@ class Survey:
         known = [(log, self._recorded.pop(log)) for log in logs if log in self._recorded]
         if not known:
             return {}
-        gravity = known[0][0].gravity > 0
+        gravity = _weight(known[0][0]) > 0
         found = zip(known, mends(known, gravity=gravity), strict=True)
         return {log: one.notice for (log, _), one in found if one is not None}
 
@@ -145,10 +145,10 @@ class Survey:
 
         alike = [one for one in self.logs if one.role == log.role]
         if len(alike) == 1:
-            return noticed(begin, gravity=log.gravity, whole=whole)
-        found = noticed(begin, gravity=log.gravity, whole=whole, alone=False)
+            return noticed(begin, gravity=_weight(log), effort=log.effort, whole=whole)
+        found = noticed(begin, gravity=_weight(log), effort=log.effort, whole=whole, alone=False)
         kept = None
-        if log in alike[:: -(-len(alike) // MOST_LOGS)]:
+        if log.effort != "external" and log in alike[:: -(-len(alike) // MOST_LOGS)]:
             kept = recorded(begin, seconds_of_each(len(alike)))
         if kept is not None:
             self._recorded[log] = kept
@@ -211,6 +211,12 @@ class Survey:
             self._seen[one].rows if one in self._seen else one.promised for one in self._over
         ]
         self.progress(words, sum(self._done.values()), sum(expected) if all(expected) else 0)
+
+
+def _weight(log: LogSource) -> float:
+    """Gravity in m/s² that the log's torque holds: a payload's is there, of which a driver knows nothing."""
+    weightless = log.effort in ("gravity-compensated", "external") and log.role == "unloaded"
+    return 0.0 if weightless else log.gravity
 
 
 def _with_end(blocks: Iterator[Log], promised: int) -> Iterator[tuple[Log, bool]]:

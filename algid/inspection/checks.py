@@ -16,7 +16,12 @@ from algid.notices import Notice
 
 
 def examine(
-    log: Log, *, gravity: float = 9.81, whole: bool = True, alone: bool = True
+    log: Log,
+    *,
+    gravity: float = 9.81,
+    effort: str | None = None,
+    whole: bool = True,
+    alone: bool = True,
 ) -> tuple[Notice, ...]:
     """Everything that the checks find in a log.
 
@@ -27,6 +32,8 @@ def examine(
     log : Log
     gravity : float, m/s^2
         0 for an arm in a horizontal plane.
+    effort : str, as in a profile
+        An external torque is nothing where nothing pulls, and tells no convention.
     whole : bool
         False where `log` is the beginning of a longer one.
     alone : bool
@@ -40,9 +47,10 @@ def examine(
     if len(log) < 4:
         return ()
     tried = cache(partial(judged, log, gravity=gravity > 0))
+    external = effort == "external"
     every = (
-        *efforts(log),
-        *dead_efforts(log),
+        *(() if external else efforts(log)),
+        *(() if external else dead_efforts(log)),
         *angles(log),
         *degrees(log, lambda: is_right(tried())),
         *spikes(log),
@@ -50,7 +58,7 @@ def examine(
         *rests(log, whole),
     )
     found = [yielding(notice, log.origin.reading.accepted) for notice in every]
-    if any(finding.refuse for finding in found):
+    if external or any(finding.refuse for finding in found):
         return tuple(found)
     mended = mend(log, tried()) if alone else None
     if mended is not None:
@@ -61,7 +69,12 @@ def examine(
 
 
 def noticed(
-    log: Log, *, gravity: float = 9.81, whole: bool = True, alone: bool = True
+    log: Log,
+    *,
+    gravity: float = 9.81,
+    effort: str | None = None,
+    whole: bool = True,
+    alone: bool = True,
 ) -> tuple[Notice, ...]:
     """What `examine` finds, as notices.
 
@@ -70,7 +83,7 @@ def noticed(
     LogError
         If a check forbids the use of a log that is all there.
     """
-    findings = examine(log, gravity=gravity, whole=whole, alone=alone)
+    findings = examine(log, gravity=gravity, effort=effort, whole=whole, alone=alone)
     refused = next((finding for finding in findings if finding.refuse), None)
     if refused is not None and whole:
         raise LogError(f"{log.origin.path}: {refused.code}: {refused.clause}")

@@ -19,6 +19,7 @@ _HEAD = """\
 # drive = "base"             # the second motor stands at the base: its torque acts on θ1 + θ2
 # passive = 2                # the joint without a motor: its torque is zero
 # gravity = 9.81             # 0 for an arm that moves in a horizontal plane
+# effort = "raw"             # what the driver logs as torque: "gravity-compensated", "external" …
 # velocity = false           # leave the log's velocities out
 # signs = [1, 1]             # -1 turns a joint's angle, velocity and torque round
 # offsets = [0.0, 0.0]       # rad, added to the angles

@@ -104,12 +104,9 @@ def gravity_findings(figures: DynamicFigures) -> Iterator[Notice]:
         return
     weightless = math.hypot(figures.weight1, figures.weight2) < _LEAST_PULL * abs(figures.inertia)
     if figures.seen > 0.15 and figures.gravity_share < 0.01 and weightless:
+        compensated = Remedy({"effort": "gravity-compensated"}, "for such a driver")
         level = Remedy({"gravity": 0}, "for a horizontal plane")
-        yield Notice(
-            "GRAVITY_COMPENSATED",
-            numbers={"percent": 100 * figures.gravity_share},
-            remedies=(level,),
-        )
+        yield Notice("GRAVITY_COMPENSATED", remedies=(compensated, level))
     elif figures.seen < 0.015 or figures.gravity_share < 0.02:
         return  # the motion does not tell where gravity pulls
     elif abs(figures.turn) > 135:

@@ -122,7 +122,7 @@ def inspect_log(path: Path, profile: Profile | None = None) -> Inspection:
         return Inspection(str(path), seen.format, seen.entries, refused=seen.refused)
     log = seen.found
     gravity = profile.gravity if profile is not None else 9.81
-    findings = examine(log, gravity=gravity)
+    findings = examine(log, gravity=gravity, effort=None if profile is None else profile.effort)
     reasons = [f"{one.code}: {one.clause}" for one in findings if one.refuse]
     return Inspection(
         path=str(path),

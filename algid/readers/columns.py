@@ -98,7 +98,7 @@ def assign(
     else:
         reading, order = Reading(joints_told="profile" if all_named else "names"), ()
     said = []
-    if take_apart(sources["tau1"]).stem in COMMANDED:
+    if take_apart(sources["tau1"]).stem in COMMANDED and profile.effort != "command":
         both = f"{sources['tau1']}, {sources['tau2']}"
         said.append(Notice("COMMANDED_TORQUE", numbers={"columns": both}))
     said += order

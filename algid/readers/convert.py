@@ -151,7 +151,7 @@ def channel_readings(
     found = {}
     for name in [name for name in CHANNELS if name in mapping]:
         channel, joint, own = profile.channel(name), int(name[-1]) - 1, stated.get(name)
-        unit = channel.unit or own or ("N m" if name.startswith("tau") else "rad")
+        unit = channel.unit or own or _usual_unit(name, profile)
         told = profile.told_by(f"{name}.unit") if channel.unit else "names" if own else "assumed"
         if name == f"tau{profile.passive}":
             found[name] = ChannelReading("none: no motor", "N m", "profile", 0.0)
@@ -162,6 +162,13 @@ def channel_readings(
         offset = channel.offset + (profile.offsets[joint] if name.startswith("theta") else 0.0)
         found[name] = ChannelReading(mapping[name], unit, told, factor, offset)
     return found
+
+
+def _usual_unit(name: str, profile: Profile) -> str:
+    """The unit of a channel of which nobody says it."""
+    if not name.startswith("tau"):
+        return "rad"
+    return "A" if profile.effort == "current" else "N m"
 
 
 def _factor(

@@ -40,6 +40,7 @@ CAUSES = (
         "ZERO_OFFSET",
         "FLIPPED_SIGN",
         "WRONG_ZERO",
+        "EXTERNAL_EFFORT",
         "GRAVITY_COMPENSATED",
     ),
     *("STUCK_SENSOR", "DEAD_EFFORT", "LOST_SAMPLES"),

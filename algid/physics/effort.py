@@ -1,0 +1,44 @@
+"""What a driver calls effort, and what of the arm's torque that does not hold.
+
+Whatever a driver takes off before it logs a torque is a change of the same regression: columns that
+are nothing. An arm's own columns are, not its payload's: a driver knows no payload unless it is
+told one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Literal
+
+from algid.physics.terms import ALWAYS, OPTIONAL
+from algid.physics.terms.viscous import VISCOUS
+
+Effort = Literal[
+    "raw", "gravity-compensated", "friction-compensated", "external", "command", "current"
+]
+"""The torque at the joint as measured; without the arm's weight; without friction; without all of
+the arm; as commanded; as a motor's current."""
+
+FRICTION = (VISCOUS.name, "coulomb", "stribeck", "asymmetry", "load")
+_OF_DRIVES = (*FRICTION, "rotor", "gain")
+_EVERY = (*ALWAYS, *OPTIONAL)
+
+
+def without_terms(effort: Effort | None, terms: Iterable[str]) -> tuple[str, ...]:
+    """Those of the optional `terms` that a torque so logged may have."""
+    gone = {"friction-compensated": FRICTION, "external": _OF_DRIVES}.get(effort or "", ())
+    return tuple(term for term in terms if term not in gone)
+
+
+def absent(effort: Effort | None, names: Iterable[str]) -> tuple[str, ...]:
+    """Those of the parameters `names` that the arm's own torque does not hold, so logged."""
+    if effort == "gravity-compensated":
+        gone = {one.name for term in _EVERY for one in term.parameters if one.weighs}
+    elif effort == "friction-compensated":
+        gone = {name for term in _EVERY if term.name in FRICTION for name in term.names}
+    elif effort == "external":
+        arm = [term for term in _EVERY if term.inertial or term.name in _OF_DRIVES]
+        gone = {name for term in arm for name in term.names}
+    else:
+        gone = set()
+    return tuple(name for name in names if name in gone)

@@ -1,0 +1,201 @@
+"""What a driver calls effort: told by the logs, named, or said by a flag."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from algid.arm import FloatArray, inverse_dynamics, passive_torque
+from algid.errors import SettingError
+from algid.identification.identify import identify
+from algid.identification.known import prior_of
+from algid.identification.validate import predictor_of
+from algid.log import Log, Origin
+from algid.profile import Profile
+from algid.results import Result
+from algid.settings import Settings
+from algid.synth.cases import load_case
+from algid.synth.excitation import wide_multi_sine
+from algid.synth.simulator import SimulatedMotion, simulate
+from tests.cli.commands import app
+
+RATE, DURATION = 250.0, 5.0
+SIGMA_THETA, SIGMA_TAU = 3e-4, 1e-2  # rad, N m
+CHANCE = 4.5  # standard deviations: once in 150 000
+CASE = load_case("case1")
+ARM = CASE.arm.constants()
+LOADED = CASE.arm.phasors(CASE.payload)[:7]
+
+
+@cache
+def moved(loaded: bool) -> SimulatedMotion:
+    t = np.arange(round(DURATION * RATE) + 1) / RATE
+    return simulate(LOADED if loaded else ARM, wide_multi_sine(CASE.arm, 5 + loaded), t)
+
+
+def weight(k: FloatArray, motion: SimulatedMotion) -> FloatArray:
+    only = np.array([0.0, k[1], 0.0, k[3], 0.0, 0.0, 0.0])
+    return passive_torque(only, motion.theta, np.zeros_like(motion.theta))
+
+
+def of_payload(motion: SimulatedMotion) -> FloatArray:
+    alpha = np.gradient(motion.omega, motion.t, axis=1)
+    return inverse_dynamics(LOADED - ARM, motion.theta, motion.omega, alpha)
+
+
+def friction(motion: SimulatedMotion) -> FloatArray:
+    return ARM[5:, None] * motion.omega
+
+
+Taken = Callable[[SimulatedMotion, float], FloatArray]
+TAKEN: dict[str, Taken] = {
+    "raw": lambda motion, _: np.zeros_like(motion.tau),
+    "gravity-compensated": lambda motion, _: weight(ARM, motion),
+    "payload-compensated": lambda motion, loaded: weight(LOADED if loaded else ARM, motion),
+    "friction-compensated": lambda motion, _: friction(motion),
+    "external": lambda motion, loaded: motion.tau - loaded * of_payload(motion),
+}
+"""What a driver takes off the torque before it logs it."""
+
+
+def logs(effort: str) -> tuple[Log, Log]:
+    rng = np.random.default_rng(0)
+    found = []
+    for loaded in (False, True):
+        motion = moved(loaded)
+        tau = motion.tau - TAKEN[effort](motion, loaded)
+        found.append(
+            Log(
+                np.round(motion.t * 1e9).astype(np.int64),
+                motion.theta + SIGMA_THETA * rng.standard_normal(tau.shape),
+                tau + SIGMA_TAU * rng.standard_normal(tau.shape),
+                Origin(f"{loaded}.csv", "csv", {}),
+            )
+        )
+    return found[0], found[1]
+
+
+@cache
+def told(effort: str) -> Result:
+    return identify(*logs(effort), report=False)
+
+
+def right(result: Result, names: str = "m_p l1 l2") -> None:
+    truth = dict(zip(("k1", "k2", "k3", "k4", "k5", "k6", "k7"), ARM.tolist(), strict=True))
+    truth |= {"m_p": CASE.payload, "l1": CASE.arm.l1, "l2": CASE.arm.l2}
+    for name in names.split():
+        found = result.estimates[name]
+        assert found.estimate is not None
+        assert found.std
+        assert abs(found.estimate - truth[name]) < CHANCE * found.std, name
+
+
+def codes(result: Result) -> set[str]:
+    return {notice.code for notice in result.notices}
+
+
+def test_gravity_that_is_compensated_is_told_by_the_logs() -> None:
+    result = told("gravity-compensated")
+    assert result.complete
+    assert not result.verdict.failed
+    assert "WEIGHT_OF_PAYLOAD" in codes(result)
+    assert result.settings["effort"] == "gravity-compensated"
+    assert not {"k2", "k4", "k2+z5", "k4+z4"} & set(result.estimates)
+    right(result, "k1 k3 k5 k6 k7 m_p l1 l2")
+
+
+def test_the_flag_says_what_the_logs_would_tell() -> None:
+    result = identify(*logs("gravity-compensated"), report=False, effort="gravity-compensated")
+    assert codes(result) == set()
+    assert result.parameters == told("gravity-compensated").parameters
+
+
+def test_an_unloaded_arm_without_weight_may_lie_or_be_compensated() -> None:
+    result = identify(logs("gravity-compensated")[0], report=False)
+    assert result.complete
+    (notice,) = (one for one in result.notices if one.code == "GRAVITY_COMPENSATED")
+    flags = [remedy.flags for remedy in notice.remedies]
+    assert flags == [("--effort", "gravity-compensated"), ("--gravity", "0")]
+    right(result, "k1 k3 k5 k6 k7")
+
+
+def test_a_payload_that_is_compensated_too_needs_a_length() -> None:
+    result = told("payload-compensated")
+    assert not result.complete
+    assert "PAYLOAD_WEIGHTLESS" in codes(result)
+    (asked,) = (one for one in result.notices if one.code == "NO_GRAVITY")
+    assert asked.remedies[0].flags == ("--l1", "M")
+    given = identify(*logs("payload-compensated"), report=False, l1=CASE.arm.l1)
+    assert given.complete
+    right(given, "m_p l2")
+
+
+@pytest.mark.parametrize(
+    ("effort", "code"), [("friction-compensated", "NO_FRICTION"), ("external", "EXTERNAL_EFFORT")]
+)
+def test_other_efforts_are_named_and_their_flag_gives_the_payload(effort: str, code: str) -> None:
+    (named,) = (one for one in told(effort).notices if one.code == code)
+    assert named.remedies[0].flags == ("--effort", effort)
+    result = identify(*logs(effort), report=False, **named.remedies[0].settings)
+    assert result.complete
+    assert not result.verdict.failed
+    right(result)
+
+
+def test_a_raw_torque_says_nothing_of_effort() -> None:
+    assert codes(told("raw")) == set()
+    assert told("raw").settings["effort"] is None
+
+
+def test_external_torque_needs_no_unloaded_log() -> None:
+    result = identify(None, logs("external")[1], report=False, effort="external")
+    right(result)
+    assert set(result.parameters) <= {"o1", "o2", "delay"}
+
+
+def test_a_result_of_compensated_torque_predicts_weighs_and_serves_later_payloads() -> None:
+    result = told("gravity-compensated")
+    known = predictor_of(result, "arm")
+    for role in ("unloaded", "loaded"):
+        c = dict(zip(known.model.names, known.coefficients(role), strict=True))
+        assert bool(c["k4"]) is (role == "loaded")
+    assert "k2" not in prior_of(result, known.model).names
+    again = identify(None, logs("gravity-compensated")[1], report=False, parameters=result)
+    assert again.settings["effort"] == "gravity-compensated"
+    right(again)
+
+
+def test_contradictions_have_one_line() -> None:
+    for call in (
+        lambda: Settings(effort="external", gravity=1.62),
+        lambda: identify(logs("raw")[0], effort="external", gravity=9.81),
+        lambda: identify(logs("raw")[0], profile={"effort": "external", "gravity": 9.81}),
+        lambda: Settings(effort="friction-compensated", model="coulomb"),
+    ):
+        with pytest.raises(SettingError, match=r"^--(effort external|model): ") as raised:
+            call()
+        assert "\n" not in str(raised.value)
+
+
+def test_the_command_line_refuses_gravity_of_external_torque(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("t,theta1,theta2,tau1,tau2\n")
+    call = ["identify", str(path), "--effort", "external", "--gravity", "9.81"]
+    ended = CliRunner().invoke(app, call)
+    assert isinstance(ended.exception, SettingError)
+
+
+def test_a_current_is_in_amperes() -> None:
+    from algid.errors import LogError
+    from algid.readers.convert import channel_readings
+
+    profile = Profile(effort="current")
+    with pytest.raises(LogError, match="torque_constant"):
+        channel_readings("log.csv", {"tau1": "effort"}, profile, {})
+    assert replace(Settings(), effort="command").effort == "command"
