@@ -30,7 +30,7 @@ FEWEST = 8  # logs in a window that is tested
 _SUMS = ("w", "wt", "wtt", "wy", "wty", "wyy", "n")
 
 
-def windows(jobs: pl.DataFrame, parameter: str) -> pl.DataFrame:
+def windows(jobs: pl.DataFrame, parameter: str, by: tuple[str, ...] = ("robot",)) -> pl.DataFrame:
     """A row a robot and month: mean and slope of `parameter` on the window that ends with that month.
 
     Parameters
@@ -39,11 +39,13 @@ def windows(jobs: pl.DataFrame, parameter: str) -> pl.DataFrame:
         As `algid.fleet.history.read_jobs` gives them.
     parameter : str
         A column of `jobs`, beside that of its standard deviation.
+    by : tuple of str
+        Columns that tell the histories apart, that of the robot among them.
 
     Returns
     -------
     pl.DataFrame
-        robot, parameter, month, end (time of its last log), logs, mean, mean_std, slope, slope_std
+        those of `by`, parameter, month, end (time of its last log), logs, mean, mean_std, slope, slope_std
         (of the parameter a month; NaN where not tested), p, drift.
     """
     import polars as pl
@@ -53,9 +55,9 @@ def windows(jobs: pl.DataFrame, parameter: str) -> pl.DataFrame:
         & (pl.col(f"{parameter}_std") > 0)
         & pl.col(parameter).is_finite()
     )
-    known = known.with_columns(pl.col(parameter).mean().over("robot").alias("centre"))
+    known = known.with_columns(pl.col(parameter).mean().over(*by).alias("centre"))
     w, t, y = 1 / pl.col(f"{parameter}_std") ** 2, pl.col("t"), pl.col(parameter) - pl.col("centre")
-    months = known.group_by("robot", "month", maintain_order=False).agg(
+    months = known.group_by(*by, "month", maintain_order=False).agg(
         pl.col("centre").first(),
         pl.col("time").max().alias("end"),
         w.sum().alias("w"),
@@ -66,14 +68,14 @@ def windows(jobs: pl.DataFrame, parameter: str) -> pl.DataFrame:
         (w * y * y).sum().alias("wyy"),
         pl.len().cast(pl.Float64).alias("n"),
     )
-    months = months.sort("robot", "month")
-    summed = months.rolling(index_column="month", period=f"{SPAN}i", group_by="robot").agg(
+    months = months.sort(*by, "month")
+    summed = months.rolling(index_column="month", period=f"{SPAN}i", group_by=list(by)).agg(
         pl.col("centre").last(), pl.col("end").last(), *(pl.col(name).sum() for name in _SUMS)
     )
-    return _regressed(summed, parameter)
+    return _regressed(summed, parameter, by)
 
 
-def _regressed(summed: pl.DataFrame, parameter: str) -> pl.DataFrame:
+def _regressed(summed: pl.DataFrame, parameter: str, by: tuple[str, ...]) -> pl.DataFrame:
     import polars as pl
     from scipy.special import stdtr
 
@@ -92,9 +94,7 @@ def _regressed(summed: pl.DataFrame, parameter: str) -> pl.DataFrame:
     tested = (n >= FEWEST) & sloped
     p = np.full(n.size, np.nan)
     p[tested] = 2 * stdtr(freedom[tested], -np.abs(slope[tested]) / slope_std[tested])
-    return summed.select(
-        "robot", pl.lit(parameter).alias("parameter"), "month", "end"
-    ).with_columns(
+    return summed.select(*by, pl.lit(parameter).alias("parameter"), "month", "end").with_columns(
         logs=pl.Series(n.astype(np.int64)),
         mean=pl.Series(summed["centre"].to_numpy() + wy / w),
         mean_std=pl.Series(scale / np.sqrt(w)),

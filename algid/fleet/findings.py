@@ -14,7 +14,7 @@ MISLABELLED = 5.0  # standard deviations: one false alarm in 1.7 million logs
 _MAD = 1.4826  # from the median of absolute deviations to a standard deviation
 
 
-def outliers(jobs: pl.DataFrame, parameter: str) -> pl.DataFrame:
+def outliers(jobs: pl.DataFrame, parameter: str, by: tuple[str, ...] = ("robot",)) -> pl.DataFrame:
     """Estimates of `parameter` far from their robot's median, in the larger of their own and the history's scatter.
 
     Parameters
@@ -23,6 +23,8 @@ def outliers(jobs: pl.DataFrame, parameter: str) -> pl.DataFrame:
         As `algid.fleet.history.read_jobs` gives them.
     parameter : str
         A column of `jobs`, beside that of its standard deviation.
+    by : tuple of str
+        Columns that tell the histories apart, that of the robot among them.
 
     Returns
     -------
@@ -33,10 +35,10 @@ def outliers(jobs: pl.DataFrame, parameter: str) -> pl.DataFrame:
 
     std = pl.col(f"{parameter}_std")
     scaled = jobs.filter((std > 0) & pl.col(parameter).is_finite()).with_columns(
-        pl.col(parameter).median().over("robot").alias("expected")
+        pl.col(parameter).median().over(*by).alias("expected")
     )
     scaled = scaled.with_columns(((pl.col(parameter) - pl.col("expected")) / std).alias("sigmas"))
-    scatter = (_MAD * pl.col("sigmas").abs().median().over("robot")).clip(lower_bound=1.0)
+    scatter = (_MAD * pl.col("sigmas").abs().median().over(*by)).clip(lower_bound=1.0)
     far = scaled.with_columns(pl.col("sigmas") / scatter).filter(pl.col("sigmas").abs() > OUTLYING)
     return _as_findings(far, "outlier", parameter)
 

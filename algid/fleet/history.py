@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from algid.errors import ResultError
 from algid.files import whole_file
+from algid.fleet.changes import with_stints
 from algid.fleet.drift import FEWEST, SPAN, windows
 from algid.fleet.findings import mislabelled, outliers
 from algid.limits import LIMITS
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 MONTH_DAYS = 30.4375
 PARAMETERS = ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "f1", "f2", "o1", "o2", "j2")
+MANY, FEW = 4, 2  # robots with so few logs each, which may be sessions of one
+HISTORY = ("robot", "stint")
 FEWEST_PEERS = 3  # logs of a robot, among which one can be known from the others
 
 
@@ -141,8 +144,9 @@ class History:
     windows : as `windows` gives them, of all parameters
     findings : as `outliers` and `mislabelled` give them
     roster : a row a robot: robot, logs, undated, first and last (times), latest (job), tested (for drift of anything)
-    jobs : robot and job of every log, the latest first
     nameless : logs that name no robot, and are left out
+    jobs : every log, the latest of each robot first, as `read_jobs` gives them
+    changes : as `with_stints` gives them
     """
 
     windows: pl.DataFrame
@@ -150,6 +154,7 @@ class History:
     roster: pl.DataFrame
     nameless: int = 0
     jobs: pl.DataFrame | None = None
+    changes: pl.DataFrame | None = None
 
     @property
     def robots(self) -> int:
@@ -160,6 +165,11 @@ class History:
     def logs(self) -> int:
         """How many there are, of all robots."""
         return int(self.roster["logs"].sum())
+
+    @property
+    def parameters(self) -> list[str]:
+        """Those that were followed."""
+        return [str(name) for name in self.windows["parameter"].unique(maintain_order=True)]
 
     @property
     def drifts(self) -> pl.DataFrame:
@@ -188,9 +198,27 @@ class History:
         }
         return [sentence for sentence, count in why.items() if count]
 
+    @property
+    def scattered(self) -> str:
+        """A sentence where folders may have made many robots of one; empty otherwise.
+
+        Most robots have a log or two, and no two were logged in the same time.
+        """
+        dated = self.roster.drop_nulls("first").sort("first")
+        few = int((self.roster["logs"] <= FEW).sum())
+        apart = (dated["first"].shift(-1) > dated["last"]).head(-1).all() if len(dated) else False
+        if self.robots < MANY or 2 * few <= self.robots or not (apart or not len(dated)):
+            return ""
+        return (
+            f"{few} of {counted(self.robots, 'robot')} have {FEW} logs or fewer, none at the same time: where their "
+            "folders are sessions of one robot, name it in a manifest's column robot and run algid batch again."
+        )
+
     def as_dict(self) -> dict[str, Any]:
         """What was found, in JSON's own types."""
         frames = {"robots": self.roster, "drifts": self.drifts, "findings": self.findings}
+        if self.changes is not None:
+            frames["changes"] = self.changes
         rows = {
             name: json.loads(frame.fill_nan(None).write_json()) for name, frame in frames.items()
         }
@@ -222,17 +250,17 @@ def history_of(path: Path, progress: Progress | None = None) -> History:
             "of their own, or name robots in a manifest, and run algid batch again"
         )
     followed, standing_out = [], [mislabelled(jobs)]
+    jobs, changes = with_stints(jobs, names)
     for place, name in enumerate(names):
         if progress is not None:
             progress("following", place, len(names))
-        followed.append(windows(jobs, name))
-        standing_out.append(outliers(jobs, name))
+        followed.append(windows(jobs, name, HISTORY))
+        standing_out.append(outliers(jobs, name, HISTORY))
     history = pl.concat(followed)
     findings = pl.concat(standing_out).sort("kind", "robot", "time", "parameter")
-    listed = jobs.sort("robot", "time", descending=[False, True], nulls_last=True).select(
-        "robot", "job"
-    )
-    return History(history, findings, _roster(jobs, history), finished.height - jobs.height, listed)
+    listed = jobs.sort("robot", "time", descending=[False, True], nulls_last=True)
+    nameless = finished.height - jobs.height
+    return History(history, findings, _roster(jobs, history), nameless, listed, changes)
 
 
 def _roster(jobs: pl.DataFrame, history: pl.DataFrame) -> pl.DataFrame:

@@ -1,4 +1,4 @@
-"""The fleet's page: what drifts and what stands out, in tables and figures that open offline."""
+"""The fleet's page: what drifts, changed or stands out, and every robot log by log; it opens offline."""
 
 from __future__ import annotations
 
@@ -6,44 +6,42 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 from urllib.parse import quote
-
-import numpy as np
 
 from algid import __version__
 from algid.fleet.drift import ALPHA, SPAN
+from algid.fleet.figures import courses, overview, robot_figure
 from algid.fleet.history import History
-from algid.model import UNITS
+from algid.fleet.tables import (
+    MOST_ROWS,
+    change_table,
+    drift_table,
+    finding_table,
+    parameter_table,
+    robot_table,
+)
 from algid.notices import Notice
 from algid.report.document import (
-    Column,
     Depth,
     Document,
-    Drawn,
     ReadingAid,
     References,
     Section,
-    Table,
     filled,
 )
-from algid.report.drawings import Course, sparklines
-from algid.report.figures.base import Figure, Panel, axis, label
 from algid.report.frame import page
-from algid.text import ABSENT, joined, significant, unit_text, visible
+from algid.text import joined, significant, visible
 from algid.verdict import Verdict, graded
 from algid.words import counted
 
-if TYPE_CHECKING:
-    import polars as pl
-
 READING = (
     "Read: each parameter has one scale of change for all robots; the band is the 95 % interval of the mean over "
-    f"{SPAN} months. Level within its band is steady, orange drifts. A robot's name leads to its latest report."
+    f"{SPAN} months. Level within its band is steady, orange drifts. A robot's name leads to all its parameters."
 )
 MOST_ROBOTS = 40  # whose table is printed
-MOST_ROWS = 200
-MOST_PANELS = 12
+MOST_NAMED = 3  # drifts
+# robots shown log by log: those of which something was found, then the first
+MOST_DRAWN = 40
 
 
 def fleet_html(history: History, reports: Mapping[str, str] | None = None) -> str:
@@ -59,38 +57,134 @@ def fleet_document(history: History, reports: Mapping[str, str] | None = None) -
     robots = robot_table(history).at(
         Depth.TERMINAL if history.robots <= MOST_ROBOTS else Depth.PAGE
     )
-    drifts, findings = drift_table(history), finding_table(history)
-    figures: list[Figure] = []
-    groups: dict[str, list[tuple[str, str]]] = {}
+    found = filled(change_table(history), drift_table(history), finding_table(history))
+    sections: tuple[Section, ...] = (Section((robots, *found)),)
     if reports is not None:
-        ends = history.roster.select("robot", "latest").iter_rows()
-        latest = {visible(robot): reports[job] for robot, job in ends if job in reports}
-        robots = replace(robots, drawn=tuple(_courses(history)), links=latest)
-        drifts = replace(drifts, links=latest)
-        findings = replace(findings, links={visible(job): place for job, place in reports.items()})
-        figures = _figures(history)
-        if reports and history.jobs is not None:
-            for (robot,), part in history.jobs.group_by("robot", maintain_order=True):
-                groups[str(robot)] = [
-                    (job, reports[job]) for job in part["job"].to_list() if job in reports
-                ]
+        sections = _page_sections(history, reports)
     return Document(
         title="Fleet",
         verdict=verdict(history),
-        sections=(
-            Section((robots, ReadingAid(READING), *filled(drifts, findings), *figures)),
-            Section(
-                (References(groups, MOST_ROWS),) if groups else (),
-                "reports",
-                "Reports",
-                fold="closed",
-            ),
-        ),
+        sections=sections,
         kicker="a fleet's history",
         name="Fleet",
         facts=f"{counted(history.robots, 'robot')} · {counted(history.logs, 'log')}",
         made=f"Made by algid {__version__}.",
     )
+
+
+def _page_sections(history: History, reports: Mapping[str, str]) -> tuple[Section, ...]:
+    """The tables with their drawings and links, what to look at first, then each robot."""
+    keys = {robot: f"robot-{place}" for place, robot in enumerate(_drawn(history), start=1)}
+    ends = history.roster.select("robot", "latest").iter_rows()
+    places = {visible(robot): reports[job] for robot, job in ends if job in reports}
+    places |= {visible(robot): f"#{key}" for robot, key in keys.items()}
+    drawn = courses(history, MOST_ROWS)
+    robots = replace(
+        robot_table(history).at(Depth.PAGE),
+        drawn=tuple(drawn),
+        links=places,
+    )
+    if drawn:  # which leave no room for when the robots' first logs were made
+        robots = robots.without(("From",))
+    jobs = {visible(job): place for job, place in reports.items()}
+    found = [
+        replace(table, links=links)
+        for table, links in (
+            (change_table(history), places),
+            (drift_table(history), places),
+            (finding_table(history), jobs),
+        )
+    ]
+    first = overview(history, reports)
+    shown = _only(history, list(keys))
+    each = [_robot_section(shown, robot, key, reports) for robot, key in keys.items()]
+    return (
+        Section((robots, *([ReadingAid(READING)] if drawn else []), *filled(*found))),
+        Section(() if first is None else (first,)),
+        Section((ReadingAid(_which(history, len(each))),) if each else (), "each", "Each robot"),
+        *each,
+        Section(
+            _other_reports(history, keys, reports),
+            "reports",
+            "Other robots' reports",
+            fold="closed",
+        ),
+    )
+
+
+def _drawn(history: History) -> list[str]:
+    """Robots that are shown log by log, in the roster's order."""
+    if history.jobs is None:
+        return []
+    frames = [history.drifts, history.findings]
+    frames += [] if history.changes is None else [history.changes]
+    marked = [robot for frame in frames for robot in frame["robot"].to_list()]
+    every = history.roster["robot"].to_list()
+    chosen = set(list(dict.fromkeys([*marked, *every]))[:MOST_DRAWN])
+    return [robot for robot in every if robot in chosen]
+
+
+def _only(history: History, robots: list[str]) -> History:
+    """The history with the logs and windows of those robots alone, which are looked through often."""
+    import polars as pl
+
+    own = pl.col("robot").is_in(robots)
+    jobs = None if history.jobs is None else history.jobs.filter(own)
+    return replace(history, windows=history.windows.filter(own), jobs=jobs)
+
+
+def _which(history: History, shown: int) -> str:
+    if shown == history.robots:
+        return "Read: open a robot to see all its parameters, log by log, and its reports."
+    return (
+        f"Read: open a robot to see all its parameters, log by log. {shown} of {counted(history.robots, 'robot')} are "
+        "here: those of which something was found, then the first."
+    )
+
+
+def _robot_section(history: History, robot: str, key: str, reports: Mapping[str, str]) -> Section:
+    """A robot: its parameters, their courses and its reports, folded."""
+    import polars as pl
+
+    assert history.jobs is not None
+    jobs = history.jobs.filter(pl.col("robot") == robot)
+    links = [(visible(job), reports[job]) for job in jobs["job"].to_list() if job in reports]
+    days = jobs["time"].drop_nulls()
+    when = f" · {days.min().date()} to {days.max().date()}" if len(days) else ""  # type: ignore[union-attr]
+    own = pl.col("robot") == robot
+    drifting = history.drifts.filter(own)["parameter"].sort().to_list()
+    said = f" · {joined(drifting)} drift{'s' * (len(drifting) == 1)}" if drifting else ""
+    if history.changes is not None and history.changes.filter(own).height:
+        said += " · changed at once"
+    outlying = history.findings.filter(own)["job"].n_unique()
+    said += f" · {counted(outlying, 'log stands out', 'logs stand out')}" if outlying else ""
+    listed = (References({"Reports, the latest first": links}, MOST_ROWS),) if links else ()
+    return Section(
+        (
+            parameter_table(history, robot, jobs),
+            robot_figure(history, robot, jobs, reports, f"{key}-logs"),
+            *listed,
+        ),
+        key,
+        f"{visible(robot)} · {counted(jobs.height, 'log')}{when}{said}",
+        fold="closed",
+        listed=False,
+    )
+
+
+def _other_reports(
+    history: History, keys: Mapping[str, str], reports: Mapping[str, str]
+) -> tuple[References, ...]:
+    """The reports of the robots that are not shown log by log."""
+    if not reports or history.jobs is None:
+        return ()
+    groups: dict[str, list[tuple[str, str]]] = {}
+    for (robot,), part in history.jobs.group_by("robot", maintain_order=True):
+        if str(robot) not in keys:
+            groups[str(robot)] = [
+                (job, reports[job]) for job in part["job"].to_list() if job in reports
+            ]
+    return (References(groups, MOST_ROWS),) if groups else ()
 
 
 def reports_of(history: History, batch: Path, out: Path) -> dict[str, str]:
@@ -104,36 +198,6 @@ def reports_of(history: History, batch: Path, out: Path) -> dict[str, str]:
             there = os.path.relpath(page.resolve(), out.resolve()).replace(os.sep, "/")
             found[job] = "./" + quote(there)  # a name such as javascript: leads nowhere else
     return found
-
-
-def _courses(history: History) -> list[Drawn]:
-    """A column of sparklines a parameter: each robot's mean over time with its 95 % band."""
-    import polars as pl
-
-    drifting = set(history.drifts.select("robot", "parameter").iter_rows())
-    shown = history.roster.head(MOST_ROWS)["robot"].implode()
-    columns = []
-    for (parameter,), rows in history.windows.filter(pl.col("robot").is_in(shown)).group_by(
-        "parameter", maintain_order=True
-    ):
-        own = {
-            visible(robot): _course(str(parameter), part, (robot, parameter) in drifting)
-            for (robot,), part in rows.group_by("robot", maintain_order=True)
-        }
-        columns.append(Drawn(str(parameter), sparklines(own), small=True))
-    return columns
-
-
-def _course(parameter: str, rows: pl.DataFrame, drifts: bool) -> Course:
-    rows = rows.sort("month").drop_nulls(["mean", "mean_std"])
-    t = rows["end"].dt.epoch("ms").to_numpy().astype(np.float64)
-    mean, half = rows["mean"].to_numpy(), 1.96 * rows["mean_std"].to_numpy()
-    ends = (
-        f"{significant(mean[0])} to {significant(mean[-1])}"
-        if mean.size > 1
-        else "".join(map(significant, mean))
-    )
-    return Course(t, mean, half, f"{parameter} {ends}{', drifts' if drifts else ''}", drifts)
 
 
 def verdict(history: History) -> Verdict:
@@ -151,138 +215,34 @@ def verdict(history: History) -> Verdict:
         statement += f" (p = {p})" + (
             "" if row["drift"] else f", which does not pass p < {ALPHA:g}"
         )
-    found = [Notice("DRIFTS", counted(drifts, "drift"))] * bool(drifts)
+    found = [Notice("DRIFTS", _drifting(history))] if drifts else []
+    changed = 0 if history.changes is None else history.changes.n_unique(["robot", "after"])
+    if changed:
+        found.append(Notice("CHANGED", _changes(history, changed)))
     found += [Notice("STAND_OUT", counted(findings, "log stands out", "logs stand out"))] * bool(
         findings
     )
+    if history.scattered:
+        found.append(Notice("SCATTERED", history.scattered))
     return graded(statement, [*found, *(Notice("NOT_TESTED", why) for why in history.untested)])
 
 
-def robot_table(history: History) -> Table:
-    """Every robot: its logs, their dates, and what was found of it."""
-    import polars as pl
+def _drifting(history: History) -> str:
+    """How many parameters drift, and the clearest ones."""
+    shown = history.drifts.head(MOST_NAMED).select("robot", "parameter").rows()
+    words = [f"{parameter} of {visible(robot)}" for robot, parameter in shown]
+    rest = history.drifts.height - len(shown)
+    if rest:
+        words.append(f"{rest} more")
+    return f"{counted(history.drifts.height, 'drift')}: {joined(words)}"
 
-    drifting = dict(history.drifts.group_by("robot").agg(pl.col("parameter").sort()).iter_rows())
-    standing_out = dict(
-        history.findings.group_by("robot").agg(pl.col("job").n_unique()).iter_rows()
+
+def _changes(history: History, count: int) -> str:
+    """The first change in words, and how many there are."""
+    assert history.changes is not None
+    row = history.changes.row(0, named=True)
+    words = (
+        f"{visible(row['robot'])} changed at once between {row['before'].date()} and {row['after'].date()}: "
+        f"{row['parameter']} by {100 * row['share']:+.2g} %"
     )
-    columns = (
-        Column("Robot", "name"),
-        Column("Logs", "number"),
-        Column("From", "text", rank=2),
-        Column("To", "text", rank=1),
-        Column("Drift", "text"),
-        Column("Stand out", "number"),
-    )
-    shown = history.roster.head(MOST_ROWS)
-    rows = tuple(
-        (
-            visible(row["robot"]),
-            str(row["logs"]),
-            *(
-                ABSENT if row[end] is None else row[end].date().isoformat()
-                for end in ("first", "last")
-            ),
-            joined(drifting.get(row["robot"], [])) or ("none" if row["tested"] else "not tested"),
-            str(standing_out.get(row["robot"], 0)),
-        )
-        for row in shown.iter_rows(named=True)
-    )
-    note = (
-        ""
-        if shown.height == history.robots
-        else f"{counted(history.robots, 'robot')}; the first {shown.height} are shown."
-    )
-    return Table("Robots", columns, rows, note)
-
-
-def drift_table(history: History) -> Table:
-    """Parameters that drift, the clearest first."""
-    columns = (
-        Column("Robot", "name"),
-        Column("Parameter", "text"),
-        Column("Until", "text", rank=1),
-        Column("Logs", "number", rank=2),
-        Column("Mean", "number", rank=3),
-        Column("Slope, % a month", "number"),
-        Column("95 % interval", "number"),
-        Column("p", "number", rank=4),
-    )
-    rows = []
-    for row in history.drifts.head(MOST_ROWS).iter_rows(named=True):
-        percent = 100 / abs(row["mean"]) if row["mean"] else np.nan
-        slope, half = percent * row["slope"], 1.96 * percent * row["slope_std"]
-        rows.append(
-            (
-                visible(row["robot"]),
-                row["parameter"],
-                row["end"].date().isoformat(),
-                str(row["logs"]),
-                significant(row["mean"]),
-                f"{slope:+.3g}",
-                f"[{slope - half:.3g}, {slope + half:.3g}]",
-                f"{row['p']:.1e}",
-            )
-        )
-    note = f"{history.drifts.height} found. A slope over {SPAN} months is told from none at p < {ALPHA:g}."
-    return Table("Drift", columns, tuple(rows), note)
-
-
-def finding_table(history: History) -> Table:
-    """Payloads unlike their labels, and outliers, the farthest first."""
-    import polars as pl
-
-    columns = (
-        Column("Job", "name"),
-        Column("Robot", "text", rank=1),
-        Column("What", "text"),
-        Column("Parameter", "text"),
-        Column("Value", "number"),
-        Column("Expected", "number"),
-        Column("σ away", "number"),
-    )
-    worst = history.findings.sort(pl.col("sigmas").abs(), descending=True).head(MOST_ROWS)
-    rows = tuple(
-        (
-            visible(row["job"]),
-            visible(row["robot"]),
-            {"payload": "payload unlike its label", "outlier": "outlier"}[row["kind"]],
-            row["parameter"],
-            significant(row["value"]),
-            significant(row["expected"]),
-            f"{row['sigmas']:+.1f}",
-        )
-        for row in worst.iter_rows(named=True)
-    )
-    note = f"{history.findings.height} found; the farthest {len(rows)} are shown."
-    return Table("Logs that stand out", columns, rows, note)
-
-
-def _figures(history: History) -> list[Figure]:
-    pairs = history.drifts.head(MOST_PANELS).select("robot", "parameter").rows()
-    panels = tuple(_panel(history, robot, parameter) for robot, parameter in pairs)
-    reading = f"Read: each dot is the mean of {SPAN} months that end there, with its 95 % interval."
-    return [Figure("drift", "Parameters that drift", panels, reading, columns=2)] if panels else []
-
-
-def _panel(history: History, robot: str, parameter: str) -> Panel:
-    import polars as pl
-
-    own = history.windows.filter(
-        (pl.col("robot") == robot) & (pl.col("parameter") == parameter)
-    ).sort("month")
-    trace = {
-        "type": "scatter",
-        "mode": "lines+markers",
-        "x": [end.isoformat() for end in own["end"]],
-        "y": own["mean"].to_list(),
-        "error_y": {"type": "data", "array": (1.96 * own["mean_std"]).to_list(), "color": "@blue"},
-        "line": {"color": "@blue", "width": 1.4},
-        "hovertemplate": "%{y:.6g}<extra></extra>",
-    }
-    layout = {
-        "xaxis": axis(type="date"),
-        "yaxis": axis(f"{parameter}, {unit_text(UNITS[parameter])}"),
-    }
-    says = f"{visible(robot)}, {parameter}, {counted(own.height, 'month')}"
-    return Panel([trace], layout, says, f"{label(robot)}: {parameter}")
+    return words if count == 1 else f"{words}; {counted(count, 'change')} in all"

@@ -164,6 +164,7 @@ class Section:
     key, title : its heading, which a page's contents lead to; without one they lead to its figures
     beside : an arm that stands beside the content where there is room
     fold : whether a page lets it be folded away, and how it stands at first
+    listed : whether a page's contents lead to it; one of many parts alike is not
     """
 
     content: tuple[Content, ...]
@@ -171,6 +172,7 @@ class Section:
     title: str = ""
     beside: ArmDrawing | None = None
     fold: Fold = ""
+    listed: bool = True
 
 
 @dataclass(frozen=True)

@@ -165,7 +165,7 @@ def _bar(name: str, value: float, scale: float) -> str:
     return _svg("forest", BAR_WIDTH, BAR_HEIGHT, f"{name}: {value:+.2f}", drawing)
 
 
-SPARK_WIDTH, SPARK_HEIGHT = 78.0, 24.0
+SPARK_WIDTH, SPARK_HEIGHT = 54.0, 24.0
 SPARK_EDGE = 3.0
 # quantile of a column's rows that its scale holds: a wild one leaves the frame, and the others
 # their shape

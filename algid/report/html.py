@@ -75,6 +75,8 @@ def contents(document: Document) -> str:
 
 
 def _links(section: Section) -> Iterator[tuple[str, str]]:
+    if not section.listed:
+        return
     if section.key and section.content:
         yield section.key, section.title
     elif not section.key:
@@ -93,7 +95,8 @@ def section_html(section: Section) -> str:
     key, title = section.key, escaped(section.title)
     if section.fold:
         opened = " open" if section.fold == "open" else ""
-        return f'<details class="paper" id="{key}"{opened}><summary>{title}</summary>\n{inner}</details>'
+        kind = "paper" if section.listed else "paper one"
+        return f'<details class="{kind}" id="{key}"{opened}><summary>{title}</summary>\n{inner}</details>'
     if key:
         return f'<section aria-labelledby="{key}"><h2 id="{key}">{title}</h2>\n{inner}\n</section>'
     beside = "" if section.beside is None else arm_html(section.beside)

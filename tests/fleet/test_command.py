@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
 from dataclasses import replace
-from datetime import datetime
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import polars as pl
 import pytest
 from scipy.stats import norm
@@ -17,8 +19,10 @@ from algid.batches.jobs import Job
 from algid.batches.records import End, JobRecord
 from algid.batches.table import write_jobs
 from algid.errors import ResultError
+from algid.fleet.figures import overview, robot_figure
 from algid.fleet.history import history_of
-from algid.fleet.page import _figures, drift_table, finding_table, robot_table, verdict
+from algid.fleet.page import verdict
+from algid.fleet.tables import drift_table, finding_table, robot_table
 from algid.stores import open_store
 from tests.cli.commands import app
 
@@ -148,19 +152,37 @@ def test_a_trend_is_told_in_percent_of_a_mean_that_is_not_zero(tmp_path: Path) -
     )  # 0.002 a day, 30.4 days a month
 
 
-def test_a_drift_is_drawn_with_its_intervals(tmp_path: Path) -> None:
+def _typed(packed: dict[str, str]) -> Any:
+    return np.frombuffer(base64.b64decode(packed["bdata"]), f"<{packed['dtype']}").astype(float)
+
+
+def test_every_log_is_a_point_with_its_interval_and_leads_to_its_report(tmp_path: Path) -> None:
     _batch(tmp_path)
     history = history_of(tmp_path / "jobs.parquet")
-    (figure,) = _figures(history)
-    (panel,) = figure.panels
-    (trace,) = panel.traces
-    means = history.windows.filter((pl.col("robot") == "r0") & (pl.col("parameter") == "k6"))
-    assert (panel.title, trace["type"], trace["mode"]) == ("r0: k6", "scatter", "lines+markers")
-    assert trace["y"] == means["mean"].to_list()
-    assert trace["error_y"]["array"] == pytest.approx(
-        (norm.ppf(0.975) * means["mean_std"]).to_list(), rel=1e-4
-    )
-    assert [datetime.fromisoformat(end) for end in trace["x"]] == means["end"].to_list()
+    assert history.jobs is not None
+    jobs = history.jobs.filter(pl.col("robot") == "r0")
+    figure = robot_figure(history, "r0", jobs, {"r0/3": "./there.html"}, "robot-1-logs")
+    panel = next(one for one in figure.panels if one.title.startswith("k6"))
+    mean, drift, points = panel.traces
+    assert _typed(points["x"]) == pytest.approx(jobs["time"].dt.epoch("ms").to_list(), rel=1e-12)
+    assert _typed(points["y"]) == pytest.approx(jobs["k6"].to_list(), rel=1e-6)
+    half = norm.ppf(0.975) * jobs["k6_std"]
+    assert _typed(points["error_y"]["array"]) == pytest.approx(half.to_list(), rel=1e-4)
+    assert points["text"] == jobs["job"].to_list()
+    assert [place for place in points["customdata"] if place] == ["./there.html"]
+    assert panel.layout["xaxis"]["type"] == "date"
+    windows = history.windows.filter((pl.col("robot") == "r0") & (pl.col("parameter") == "k6"))
+    assert _typed(mean["y"]) == pytest.approx(windows["mean"].to_list(), rel=1e-6)
+    first, last, _ = _typed(drift["y"])
+    start, end, _ = _typed(drift["x"])
+    (slope,) = windows["slope"].to_list()
+    assert (last - first) / ((end - start) / (86_400_000 * 30.4375)) == pytest.approx(slope)
+    whole = overview(history, {})
+    assert whole is not None
+    assert whole.title == "Every log of every robot"  # two robots fit into one panel
+    assert [entry.words for entry in whole.legend] == ["r0", "r1"]
+    groups = [[trace["legendgroup"] for trace in panel.traces] for panel in whole.panels]
+    assert groups == [["robot0", "robot1"], ["robot0", "robot1", "robot0"]]  # k6 of r0 drifts
 
 
 def test_what_is_no_batch_is_refused(tmp_path: Path) -> None:
@@ -183,21 +205,10 @@ def test_the_page_shows_every_robot_and_leads_to_its_reports(tmp_path: Path) -> 
     done = CliRunner().invoke(app, ["fleet", str(batch), "-o", str(tmp_path / "page")])
     assert done.exit_code == 0, done.output
     page = (tmp_path / "page/fleet.html").read_text(encoding="utf-8")
-    assert page.count('<svg class="spark') == 4  # two robots, k1 and k6
-    assert page.count('<svg class="spark marked"') == 1
-    assert 'aria-label="r0: k6 ' in page
     robots = re.search(r"<caption>Robots</caption>.*?</table>", page, re.DOTALL)
     assert robots is not None
-    assert '<a href="./../batch/r0/9.algid/report.html">r0</a>' in robots[0]
-    assert '<th scope="row">r1</th>' in robots[0]  # its latest log has no report
-    listed = re.search(
-        r'(?s)<details class="paper" id="reports"><summary>Reports</summary>\s*<dl>(.*?)</dl></details>',
-        page,
-    )
-    assert listed is not None
-    assert listed[1].startswith(
-        '<dt>r0</dt><dd><a href="./../batch/r0/9.algid/report.html">r0/9</a></dd><dt>r1</dt>'
-    )
+    assert '<a href="#robot-1">r0</a>' in robots[0]
+    assert '<a href="./../batch/r0/9.algid/report.html">r0/9</a>' in page
     links = re.findall(r'href="(\./[^"]+)"', page)
     assert links
     assert all((tmp_path / "page" / link).is_file() for link in links)
@@ -219,9 +230,10 @@ def test_a_fleet_that_stays_as_it_is_says_so_and_shows_it(tmp_path: Path) -> Non
     told = " ".join(done.stdout.split())
     assert "Good: 2 robots, 40 logs: 0 drifts and 0 findings; the clearest trend is k1 of r" in told
     assert "which does not pass p < 0.001" in told
-    page = (tmp_path / "fleet.html").read_text(encoding="utf-8")
-    assert page.count('<svg class="spark"') == 2
-    assert "Read: each parameter has one scale" in page
+    history = history_of(tmp_path / "jobs.parquet")
+    figure = overview(history, {})
+    assert figure is not None
+    assert [len(panel.traces) for panel in figure.panels] == [2]  # two robots, nothing marked
 
 
 def test_a_name_that_attacks_leads_nowhere(tmp_path: Path) -> None:

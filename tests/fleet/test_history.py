@@ -13,8 +13,11 @@ from scipy.stats import binom, linregress
 from scipy.stats import t as student
 
 from algid.errors import ResultError
+from algid.fleet.figures import courses
 from algid.fleet.history import History, history_of, write_history
-from algid.fleet.page import fleet_html, robot_table
+from algid.fleet.page import fleet_document, verdict
+from algid.fleet.tables import change_table, parameter_table, robot_table
+from algid.report.document import Depth, References
 from tests.intervals import holds_95
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
@@ -157,9 +160,15 @@ def test_few_logs_and_logs_of_one_instant_have_a_mean_with_its_error(
 
 
 def test_the_page_of_robots_with_a_log_each_draws_no_point_that_is_none(tmp_path: Path) -> None:
-    page = fleet_html(_history(_jobs(3, 1, seed=13), tmp_path))
-    assert page.count('class="spark"') == 3 * len(NAMES)
-    places = re.findall(r' (?:points|cx|cy)="([^"]*)"', page)
+    """Nor a course, which one month has none of; two months have."""
+    history = _history(_jobs(3, 1, seed=13), tmp_path)
+    document = fleet_document(history, {})
+    assert [table.drawn for table in document.tables(Depth.PAGE) if table.title == "Robots"] == [()]
+    longer = _jobs(3, 40, seed=13).filter(pl.col("robot") != "r1")
+    one = _jobs(2, 1, seed=13).filter(pl.col("robot") == "r1")
+    drawn = courses(_history(pl.concat([longer, one]), tmp_path), 10)
+    assert [(column.heading, len(column.rows)) for column in drawn] == [(n, 3) for n in NAMES]
+    places = re.findall(r' (?:points|cx|cy)="([^"]*)"', " ".join(drawn[0].rows.values()))
     assert places
     assert "nan" not in " ".join(places)
 
@@ -280,3 +289,83 @@ def test_each_parameter_is_told_as_it_is_followed(tmp_path: Path) -> None:
     calls: list[tuple[str, int, int]] = []
     history_of(tmp_path / "jobs.parquet", lambda *call: calls.append(call))
     assert calls == [("following", place, 7) for place in range(7)]
+
+
+def test_a_replaced_arm_is_one_change_and_neither_drift_nor_outliers(tmp_path: Path) -> None:
+    jobs = _jobs(2, 120, seed=20)
+    late = (pl.col("robot") == "r1") & (pl.col("time") >= START + timedelta(days=80))
+    replaced = jobs.with_columns(
+        pl.when(late).then(pl.col(name) * 1.05).otherwise(pl.col(name)).alias(name)
+        for name in ("k1", "k3")
+    )
+    history = _history(replaced, tmp_path)
+    assert history.changes is not None
+    assert sorted(history.changes.select("robot", "parameter").rows()) == [
+        ("r1", "k1"),
+        ("r1", "k3"),
+    ]
+    first = history.changes.row(0, named=True)
+    assert (first["before"], first["after"]) == tuple(START + timedelta(days=d) for d in (79, 80))
+    steps = history.changes["step"].to_numpy()
+    assert steps == pytest.approx(0.05, abs=5 * 0.005 * np.sqrt(1 / 80 + 1 / 40))
+    assert history.findings.height == 0
+    # the steps would be drifts of every window that holds them
+    assert history.drifts.filter(pl.col("parameter").is_in(["k1", "k3"])).height == 0
+    assert "r1 changed at once between 2026-03-21 and 2026-03-22" in " ".join(
+        one.text for one in verdict(history).reasons
+    )
+    (row,) = [row for row in change_table(history).rows if row[2] == "k1"]
+    assert row[:2] == ("r1", "2026-03-21 and 2026-03-22")
+    assert history.jobs is not None
+    table = parameter_table(history, "r1", history.jobs.filter(pl.col("robot") == "r1"))
+    assert [row[0] for row in table.rows] == list(NAMES)
+    assert table.rows[0][5].startswith("changed by +")
+    assert table.rows[1][5] == "–"
+
+
+@pytest.mark.parametrize("scatter", [1.0, 3.0])
+def test_no_change_is_seen_where_there_is_none(tmp_path: Path, scatter: float) -> None:
+    """200 lives of 90 logs: a share of 1e-6 of false ones is none of them."""
+    history = _history(_jobs(200, 90, seed=21, scatter=scatter), tmp_path)
+    assert history.changes is not None
+    assert history.changes.height == 0
+
+
+def test_neither_a_drift_nor_a_wild_log_is_a_change(tmp_path: Path) -> None:
+    growing = _history(_jobs(20, 365, seed=22, growth=0.01), tmp_path)
+    assert growing.changes is not None
+    assert growing.changes.height == 0
+    jobs = _jobs(1, 365, seed=23)
+    k3 = jobs["k3"].to_numpy().copy()
+    k3[200] = 50.0
+    wild = _history(jobs.with_columns(k3=pl.Series(k3)), tmp_path)
+    assert wild.changes is not None
+    assert wild.changes.height == 0
+    assert wild.findings["job"].to_list() == ["j200"]
+
+
+def test_many_robots_of_a_log_each_may_be_one_in_many_folders(tmp_path: Path) -> None:
+    one = _jobs(1, 15, seed=24).with_columns(robot=pl.col("job"))
+    assert _history(one, tmp_path).scattered.startswith("15 of 15 robots have 2 logs or fewer")
+    assert "name it in a manifest" in " ".join(
+        reason.text for reason in verdict(_history(one, tmp_path)).reasons
+    )
+    together = one.with_columns(time=pl.lit(START))  # robots of one moment are several
+    assert _history(together, tmp_path).scattered == ""
+    assert _history(_jobs(3, 30, seed=24), tmp_path).scattered == ""
+
+
+def test_every_robot_has_all_its_parameters_and_its_reports(tmp_path: Path) -> None:
+    history = _history(_jobs(3, 40, seed=25), tmp_path)
+    reports = {f"j{n}": f"./j{n}.html" for n in range(120)}
+    document = fleet_document(history, reports)
+    folded = [one for one in document.sections if one.fold and not one.listed]
+    assert [one.title.partition(" ")[0] for one in folded] == ["r0", "r1", "r2"]
+    for section in folded:
+        table, figure, links = section.content
+        assert isinstance(links, References)
+        assert [len(group) for group in links.groups.values()] == [40]
+        assert len(figure.panels) == len(NAMES)  # type: ignore[union-attr]
+        assert len(table.rows) == len(NAMES)  # type: ignore[union-attr]
+    (robots,) = [table for table in document.tables(Depth.PAGE) if table.title == "Robots"]
+    assert robots.links == {one.title.partition(" ")[0]: f"#{one.key}" for one in folded}

@@ -52,7 +52,9 @@ def test_courses_share_one_scale_of_time_and_of_change() -> None:
     np.testing.assert_allclose(
         lower[:, 1] - upper[:, 1], [2 * 0.5 * pixels] * 3, atol=0.9
     )  # clipped at the frame
-    np.testing.assert_allclose(points(drawn["b"], "course"), [[39.0, 12.0], [75.0, 12.0]])
+    np.testing.assert_allclose(
+        points(drawn["b"], "course"), [[SPARK_WIDTH / 2, 12.0], [SPARK_WIDTH - SPARK_EDGE, 12.0]]
+    )
     last = re.search(r'class="last" cx="([\d.]+)" cy="([\d.]+)"', drawn["a"])
     assert last is not None
     assert (float(last[1]), float(last[2])) == pytest.approx(tuple(line[-1]))

@@ -77,6 +77,10 @@
     await draw(panel);
     drawn.set(panel.id, range(plot));
     plot.on("plotly_relayout", (change) => follow(panel, change));
+    plot.on("plotly_click", ({ points }) => {
+      const place = points[0].customdata; // a log's report
+      if (typeof place === "string" && place.startsWith("./")) location.href = place;
+    });
     plot.addEventListener("keydown", keys(panel));
   };
   const folded = (panel) => document.getElementById(panel.id).closest("details:not([open])");
@@ -114,11 +118,21 @@
       Object.assign(cursor.style, { left: left + "px", top: _size.t + "px", height: _size.h + "px" });
     }
   });
+  const unfold = () => {
+    const target = location.hash && document.getElementById(location.hash.slice(1));
+    const details = target && target.closest("details");
+    if (details && !details.open) {
+      details.open = true;
+      details.scrollIntoView();
+    }
+  };
+  addEventListener("hashchange", unfold);
+  unfold();
   const menu = document.querySelector("nav details");
   if (menu && innerWidth < 640) menu.open = false; // a phone shows the numbers first
   dark.addEventListener("change", () => redraw());
   addEventListener("beforeprint", () => {
-    for (const details of document.querySelectorAll("details.paper")) details.open = true;
+    for (const details of document.querySelectorAll("details.paper:not(.one)")) details.open = true;
     root.dataset.theme = "light";
     redraw(PRINTED);
   });
