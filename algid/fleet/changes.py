@@ -23,11 +23,12 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
-from algid.arm import FloatArray
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     import polars as pl
+
+FloatArray = NDArray[np.float64]
 
 ALPHA = 1e-6  # in a robot's life
 FEWEST = 4  # logs before a change and after it
