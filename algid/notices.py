@@ -263,7 +263,12 @@ MESSAGES: Mapping[str, str] = {
     ),
     "NO_FRICTION": "torques hold no friction: they are friction-compensated, or the joints have none",
     "WRONG_CONVENTION": "{wrong}, by all that physics says ({contradiction})",
-    "ZERO_OFFSET": "{wrong}",
+    "ZERO_OFFSET": "{wrong}, or a centre of mass lies as far off its link's line",
+    "PHASES": (
+        "θ1's zero against gravity is off by {first}, joint 1's load lies {load} off link 1's line, and {second} is "
+        "θ2's zero or link 2's centre of mass, which no torque tells apart (95 %)"
+    ),
+    "PHASE": "{second} is θ2's zero or link 2's centre of mass, which no torque tells apart (95 %)",
     "RESTS": (
         "the arm rests {rests}; where friction holds it there, the torque is not that of the weight: leave the rest out"
     ),

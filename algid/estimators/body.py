@@ -12,6 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
+from algid.estimators.combine import likelihood
 from algid.estimators.fit import Fit, conclude
 from algid.estimators.shrunk_fit import concluded
 from algid.model import SINES
@@ -33,8 +34,8 @@ def with_body(fit: Fit) -> Fit:
     Returns
     -------
     Fit
-        The one with the most parameters of the body each of which is worth its price; an inertia
-        is positive.
+        The one with the most parameters of the body each of which is worth its price, of as many
+        the likeliest: an inertia may be worth much that stands for an offset. It is positive.
     """
     if not fit.shared.payload or not fit.converged:
         return fit
@@ -44,7 +45,7 @@ def with_body(fit: Fit) -> Fit:
         found = [with_body_of(fit, chosen) for chosen in combinations(names, count)]
         worthy = [one for one in found if _least_worth(one) > WORTH]
         if worthy:
-            return max(worthy, key=_least_worth)
+            return max(worthy, key=_likelihood)
     return with_body_of(fit, ()) if fit.shared.body else fit
 
 
@@ -102,6 +103,10 @@ def _worths(fit: Fit) -> list[float]:
         value, std = float(fit.values[place]), float(fit.std[place])
         worths.append((value / std) ** 2 if std > 0 and np.isfinite(std) else 0.0)
     return worths
+
+
+def _likelihood(fit: Fit) -> float:
+    return likelihood(fit.shared, fit.logs, fit.values, fit.prior)[0]
 
 
 def _least_worth(fit: Fit) -> float:

@@ -10,6 +10,7 @@ from algid import results
 from algid.estimators.diagnostics import broken_bounds, length_by_constants, payload_distance
 from algid.estimators.fit import Fit
 from algid.estimators.instruments import ENDOGENEOUS
+from algid.identification.phases import phase_note
 from algid.methods import estimator_of
 from algid.notices import Notice, Remedy
 
@@ -44,6 +45,9 @@ def fit_warnings(fit: Fit) -> Iterator[Notice]:
     ):
         instruments = Remedy({"estimator": "instruments"}, "to compare")
         yield Notice("ENDOGENEITY", numbers={"distance": fit.endogeneity}, remedies=(instruments,))
+    phases = phase_note(fit)
+    if phases is not None:
+        yield phases
     yield from _of_gains(fit)
     if "m_p" in fit.names:
         yield from _of_payload(fit)

@@ -18,6 +18,13 @@ CONTRADICTED = ("WRONG_CONVENTION", "LOST_SAMPLES")
 samples it lacks, accelerations are wrong by twice their share."""
 
 
+def _said_of_fit(outcome: Identified, settings: Settings) -> tuple[str, ...]:
+    """Codes of checks of single logs that the fit of all of them says better."""
+    phases = any(one.code in ("PHASES", "PHASE") for one in outcome.notices)
+    weightless = settings.effort is not None
+    return (*(("ZERO_OFFSET",) * phases), *(("GRAVITY_COMPENSATED",) * weightless))
+
+
 def result_of(outcome: Identified, settings: Settings, survey: Survey) -> Result:
     """The result of `outcome` on a survey's logs, the first log first."""
     truth = survey.logs[0].origin.truth
@@ -29,7 +36,7 @@ def result_of(outcome: Identified, settings: Settings, survey: Survey) -> Result
         (log, notice)
         for log in survey.logs
         for notice in survey.notices(log)
-        if not (settings.effort and notice.code == "GRAVITY_COMPENSATED")  # said of the fit
+        if notice.code not in _said_of_fit(outcome, settings)
     ]
     of_logs = [
         notice.of(PurePath(log.name).name) for log, notice in noticed

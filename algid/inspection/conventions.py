@@ -57,9 +57,10 @@ class Mend:
     @property
     def notice(self) -> Notice:
         """What there is to say of the log."""
-        code = "WRONG_CONVENTION" if self.another else "ZERO_OFFSET"
         numbers = {"wrong": self.words, "contradiction": self.contradiction}
-        return Notice(code, numbers=numbers, remedies=(self.remedy,))
+        if not self.another:
+            return Notice("ZERO_OFFSET", numbers=numbers, note=True)
+        return Notice("WRONG_CONVENTION", numbers=numbers, remedies=(self.remedy,))
 
     @property
     def remedy(self) -> Remedy:

@@ -37,7 +37,6 @@ CAUSES = (
         "EARLIER_CAUSE",
         "EXCHANGED_LOGS",
         "WRONG_CONVENTION",
-        "ZERO_OFFSET",
         "FLIPPED_SIGN",
         "WRONG_ZERO",
         "EXTERNAL_EFFORT",

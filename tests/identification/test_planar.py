@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from algid.arm import FloatArray
@@ -10,6 +12,7 @@ from algid.log import Log, Origin
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
+from pipelines.planar import PAYLOAD, Row, drawn, scene
 
 RATE, DURATION = 250.0, 4.0
 SIGMA_THETA, SIGMA_TAU = 3e-4, 1e-2  # rad, N m
@@ -47,3 +50,37 @@ def test_a_payload_off_the_line_of_a_straight_arm_is_found() -> None:
         assert found.estimate is not None
         assert found.std
         assert abs(found.estimate - value) < CHANCE * found.std, name
+
+
+def test_an_offset_is_not_taken_for_an_inertia_where_both_would_make_that_negative() -> None:
+    """Of one parameter of the body the likelier counts, not the one that has more of its own errors."""
+    row = Row(10.0, 0.0, 20.0)
+    result = drawn("arm21", row, 0)
+    truth = dict(zip(PAYLOAD, scene("arm21", row)[1].tolist(), strict=True))
+    assert "J_p" not in result.estimates
+    for name in ("m_p", "l1", "l2", "y_p"):
+        found = result.estimates[name]
+        assert found.estimate is not None
+        assert found.std
+        assert abs(found.estimate - truth[name]) < CHANCE * found.std, name
+
+
+def test_phases_are_a_note_of_what_they_mean_and_no_accusation() -> None:
+    case = load_case("case1")
+    off1, off2, bent1, bent2 = np.radians([4.0, -3.0, 8.0, 12.0])
+    arm = replace(case.arm, delta1=float(bent1), delta2=float(bent2))
+    log = moved(arm.phasors(), 3)
+    log = replace(log, theta=log.theta - np.array([[off1], [off2]]))
+    result = identify(log, report=False)
+    assert result.verdict.grade == "good"
+    (note,) = result.notices
+    assert note.code == "PHASES"
+    K1, K4 = arm.phasors()[[0, 3]] + 1j * arm.phasors()[[7, 9]]
+    for name, true in (
+        ("first", off1),
+        ("load", np.angle(K4)),
+        ("second", np.angle(K1) + off2),
+    ):
+        value, half = (float(one) for one in note.numbers[name].replace("°", "").split(" ± "))
+        assert 0 < half < 1.5
+        assert abs(value - np.degrees(true)) < 2.2 * half, name

@@ -1,0 +1,56 @@
+"""What the sine parts of the moments mean: zeros of the angles, and centres of mass off the links' lines.
+
+======  =====================================  ========  =======
+symbol  name                                   shape     unit
+======  =====================================  ========  =======
+K       phasor of a moment, k + i k_s          scalar    its own
+a       its argument                           scalar    rad
+slope   ∂a/∂β                                  (Q,)      mixed
+======  =====================================  ========  =======
+
+With centres of mass turned by δ off the lines and zeros off by ε: arg K2 − arg K1 = ε1, and arg K1
+= δ2 + ε2, of which no torque tells the parts. arg K4 − ε1 is where the load of joint 1 lies that
+turns with link 1.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.estimators.fit import Fit
+from algid.model import SINES, phasor
+from algid.notices import Notice
+
+
+def phase_note(fit: Fit) -> Notice | None:
+    """The phases in degrees with their 95 % intervals; None of an arm whose links are straight."""
+    if not set(SINES) & set(fit.names):
+        return None
+    second, of_second = _argument(fit, "k1")
+    numbers = {"second": _told(fit, second, of_second)}
+    if {"k2", "k4"} <= set(fit.names) - set(fit.absent):
+        whole, of_whole = _argument(fit, "k2")
+        load, of_load = _argument(fit, "k4")
+        first, of_first = whole - second, of_whole - of_second
+        numbers["first"] = _told(fit, first, of_first)
+        numbers["load"] = _told(fit, load - first, of_load - of_first)
+    code = "PHASES" if "first" in numbers else "PHASE"
+    return Notice(code, numbers=numbers, note=True)
+
+
+def _argument(fit: Fit, name: str) -> tuple[float, FloatArray]:
+    """Argument of the moment `name` and its slope (Q,)."""
+    K = phasor(fit.shared.model, fit.values[: len(fit.shared.model.names)], name)
+    slope = np.zeros(len(fit.names))
+    sine = next(own for own, of in SINES.items() if of == name)
+    square = max(abs(K) ** 2, 1e-300)
+    slope[fit.names.index(name)] = -K.imag / square
+    slope[fit.names.index(sine)] = K.real / square
+    return float(np.angle(K)), slope
+
+
+def _told(fit: Fit, angle: float, slope: FloatArray) -> str:
+    turned = float(np.degrees(np.remainder(angle + np.pi, 2 * np.pi) - np.pi))
+    half = float(np.degrees(fit.quantile * np.sqrt(max(slope @ fit.covariance @ slope, 0.0))))
+    return f"{turned:.3g}° ± {half:.2g}°"
