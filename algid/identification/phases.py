@@ -52,5 +52,6 @@ def _argument(fit: Fit, name: str) -> tuple[float, FloatArray]:
 
 def _told(fit: Fit, angle: float, slope: FloatArray) -> str:
     turned = float(np.degrees(np.remainder(angle + np.pi, 2 * np.pi) - np.pi))
-    half = float(np.degrees(fit.quantile * np.sqrt(max(slope @ fit.covariance @ slope, 0.0))))
+    variance = max(float(slope @ fit.covariance @ slope), 0.0)
+    half = float(np.degrees(fit.quantile * np.sqrt(variance)))
     return f"{turned:.3g}° ± {half:.2g}°"
