@@ -57,7 +57,7 @@ def _payload(result: TrackResult) -> Figure:
         traces.append(_steps(*_true_steps(result), "@ink", "truth", "dash", 1.3))
         legend.append(Legend("truth", "true schedule", "@ink", "dash"))
     if 0 < len(found.changes) <= MOST_MARKS:
-        legend.append(Legend("", "times between which a change lies", "@orange/0.2", "area"))
+        legend.append(Legend("", "95 % interval of a change's time", "@orange/0.2", "area"))
     layout = {
         "xaxis": axis("time, s", range=_span(found)),
         "yaxis": axis("payload, kg", range=_view(result)),
@@ -87,7 +87,7 @@ def _left(result: TrackResult) -> Figure:
     }
     reading = (
         "Read: about 1 all along is the sensors' noise; anything that stands out is torque that neither arm nor "
-        "payload explains. Changes are left out: a grasp jolts the arm."
+        "payload explains. Times at which the payload may be changing are left out."
     )
     middle = float(np.median(found.left))
     panel = Panel(

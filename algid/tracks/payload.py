@@ -58,6 +58,12 @@ class Stretch:
         """The 95 % interval, kg."""
         return self.m_p - QUANTILE * self.std, self.m_p + QUANTILE * self.std
 
+    @property
+    def empty(self) -> bool:
+        """Whether the interval holds nothing, so that there may be no payload."""
+        low, high = self.ci95
+        return low <= 0 <= high
+
 
 @dataclass(frozen=True, eq=False)
 class Track:

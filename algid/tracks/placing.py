@@ -44,6 +44,7 @@ CLOSE = 0.8  # s: changes closer than that may be one with its jolt
 MARGIN = 0.04  # s: of log at least before the first and after the last candidate
 LIKELY = 7.352  # −2 ln(1 − √0.95)
 SAFE = 25.0  # ξ beyond which a time is out of the question
+CLUSTER = 0.2  # s: of rows that may err alike
 _AT_ONCE = 32  # candidates whose columns are whitened together
 
 
@@ -183,7 +184,24 @@ def place(rows: Rows, low: float, high: float, variance: float) -> Place:
         likely = moments[ratio <= limit]
         return float(likely[0]) - STEP, float(likely[-1]) + STEP
 
-    return Place(float(moments[best]), within(LIKELY), within(SAFE), gain)
+    worth = _worth(rows, left, a / np.sqrt(information), float(moments[best]))
+    return Place(float(moments[best]), within(LIKELY), within(SAFE), worth)
+
+
+def _worth(rows: Rows, left: FloatArray, a: FloatArray, moment: float) -> float:
+    """What two masses explain of `left` (2 n,), the rows less one mass, over the variance of what they leave.
+
+    Rows of a cluster may err alike, as where a joint turns back and friction is not of its model's
+    shape: the variance is that of the clusters' scores (Liang & Zeger 1986), one a row at least.
+    `a` (2 n,) is the column of one mass, of length one.
+    """
+    x = rows.steps(np.array([moment]))[0]
+    x -= (a @ x) * a
+    information, score = max(float(x @ x), 1e-300), float(x @ left)
+    two = left - score / information * x
+    every = 2 * max(1, round(CLUSTER / rows.dt))
+    scores = np.add.reduceat(x * two, np.arange(0, left.size, every))
+    return score**2 / max(information, float(scores @ scores))
 
 
 def explained(rows: Rows, moments: FloatArray) -> float:

@@ -84,7 +84,7 @@ def change_table(result: TrackResult) -> Table:
                 ABSENT if true is None else f"{true:.3f}",
             )
         )
-    note = "Times between tell neither mass: a grasp jolts the arm."
+    note = "Between: the change's 95 % interval."
     return Table("Changes", columns, tuple(rows), note).without_empty()
 
 
@@ -127,13 +127,14 @@ def track_provenance(result: TrackResult) -> Table:
 
 
 def mass_text(stretch: Stretch) -> str:
-    """A stretch's mass in kg, down to the second digit of its standard deviation."""
-    return fixed(stretch.m_p, stretch.std)
+    """A stretch's mass in kg, down to the second digit of its standard deviation; 0 where it may be nothing."""
+    return "0" if stretch.empty else fixed(stretch.m_p, stretch.std)
 
 
 def half_text(stretch: Stretch) -> str:
-    """Half the 95 % interval in kg, with the mass's digits."""
-    return fixed(stretch.ci95[1] - stretch.m_p, stretch.std)
+    """Half the 95 % interval in kg, with the mass's digits; one digit beside 0."""
+    half = stretch.ci95[1] - stretch.m_p
+    return fixed(half, 10 * float(f"{half:.0e}") if stretch.empty else stretch.std)
 
 
 def fixed(value: float, std: float) -> str:

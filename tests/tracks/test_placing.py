@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from algid.estimators.whitening import NoiseLevels
+from algid.estimators.whitening import NoiseLevels, covariance_factor
 from algid.log import Log
 from algid.model import Model
 from algid.signals.differences import POINTS, Stencil
@@ -14,6 +14,7 @@ from algid.tracks.bins import IdentifiedArm
 from algid.tracks.placing import (
     Changes,
     Place,
+    Rows,
     confirmed,
     cut_to,
     place,
@@ -132,3 +133,20 @@ def test_the_torques_of_a_cut_are_those_of_its_stretch(dt: float, shift: float) 
     assert whole is not None
     assert len(whole) == n
     assert cut_to(segment, 0.0, 4.0, shift) is None
+
+
+@pytest.mark.parametrize("alike", [1, 200])
+def test_rows_that_err_alike_are_worth_as_much_less(alike: int) -> None:
+    """Errors that 200 rows share bring a score's variance to 200 times that of white rows; a change has to beat it."""
+    rng = np.random.default_rng(5)
+    n = 3000
+    t, g = 1e-3 * np.arange(n), np.ones((2, n))
+    factor = covariance_factor(np.zeros((2, 2, POINTS, n)))
+    worths = []
+    for _ in range(60):
+        shared = np.repeat(rng.standard_normal((n // alike, 2)), alike, axis=0)
+        step = 0.1 * (t > 1.5)[:, None]
+        rows = Rows(t, 1e-3, g, (shared + step).ravel(), factor)
+        worths.append(place(rows, 1.5, 1.5, 1.0).gain)
+    # a step of 0.1 between 3,000 rows on each side of variance one is worth 0.1² · 3000 / 2
+    assert np.median(worths) == pytest.approx(15 if alike == 1 else 0.5, rel=0.3, abs=0.8)

@@ -22,7 +22,15 @@ from algid.tracks.figures import MOST_MARKS, figures
 from algid.tracks.page import track_document
 from algid.tracks.payload import Stretch, Track
 from algid.tracks.result import TrackResult
-from algid.tracks.tables import change_table, fixed, quality_tables, stretch_table, verdict
+from algid.tracks.tables import (
+    change_table,
+    fixed,
+    half_text,
+    mass_text,
+    quality_tables,
+    stretch_table,
+    verdict,
+)
 
 
 def values(typed: dict[str, str]) -> FloatArray:
@@ -90,6 +98,13 @@ def test_a_mass_without_an_error_has_three_decimals_and_zero_no_sign() -> None:
     assert [fixed(0.12345, std) for std in (0.0, float("nan"), float("inf"))] == ["0.123"] * 3
     assert fixed(-0.00004, 0.001) == "0.0000"
     assert fixed(-1.0, 30.0) == "-1"
+
+
+def test_a_payload_that_may_be_nothing_is_zero_with_one_digit_of_its_error() -> None:
+    """No mass of −0.000028 kg where there is none."""
+    nothing, something = Stretch(0.0, 1.0, -2.8e-5, 5.1e-5), Stretch(0.0, 1.0, 2.8e-4, 5.1e-5)
+    assert (mass_text(nothing), half_text(nothing)) == ("0", "0.0001")
+    assert (mass_text(something), half_text(something)) == ("0.000280", "0.000100")
 
 
 def test_changes_have_their_sign_and_the_nearest_true_moment() -> None:
@@ -193,7 +208,7 @@ def test_the_figure_steps_where_the_payload_does() -> None:
 def test_many_changes_do_not_hide_the_payload() -> None:
     few, many = track([0.1, 0.2] * (MOST_MARKS // 2)), track([0.1, 0.2] * (MOST_MARKS // 2 + 1))
     assert len(few.track.changes) < MOST_MARKS < len(many.track.changes)
-    words = "times between which a change lies"
+    words = "95 % interval of a change's time"
     for made, marked in ((few, True), (many, False)):
         payload, _ = figures(made)
         assert (words in [entry.words for entry in payload.legend]) is marked
