@@ -14,14 +14,22 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from algid.api import synthesise
+    from algid.api.batch import batch
+    from algid.api.compare import compare
+    from algid.api.convert import convert
+    from algid.api.design import design
+    from algid.api.export import export
+    from algid.api.identify import identify
+    from algid.api.inspect import inspect
+    from algid.api.result import Result, read_result
+    from algid.api.synthesise import synthesise
+    from algid.api.track import track
+    from algid.api.validate import validate
     from algid.arm import Arm
     from algid.errors import AlgidError
-    from algid.identification.identify import identify
     from algid.log import Log
     from algid.profile import Profile
     from algid.readers import read_log
-    from algid.results import Result, read_result
     from algid.settings import Settings
     from algid.synth.simulator import simulate
     from algid.writers import write_log
@@ -36,11 +44,19 @@ __all__ = [
     "Result",
     "Settings",
     "__version__",
+    "batch",
+    "compare",
+    "convert",
+    "design",
+    "export",
     "identify",
+    "inspect",
     "read_log",
     "read_result",
     "simulate",
     "synthesise",
+    "track",
+    "validate",
     "write_log",
 ]
 
@@ -49,13 +65,21 @@ _HOMES = {
     "Arm": "algid.arm",
     "Log": "algid.log",
     "Profile": "algid.profile",
-    "Result": "algid.results",
+    "Result": "algid.api.result",
     "Settings": "algid.settings",
-    "identify": "algid.identification.identify",
+    "batch": "algid.api.batch",
+    "compare": "algid.api.compare",
+    "convert": "algid.api.convert",
+    "design": "algid.api.design",
+    "export": "algid.api.export",
+    "identify": "algid.api.identify",
+    "inspect": "algid.api.inspect",
     "read_log": "algid.readers",
-    "read_result": "algid.results",
+    "read_result": "algid.api.result",
     "simulate": "algid.synth.simulator",
-    "synthesise": "algid.api",
+    "synthesise": "algid.api.synthesise",
+    "track": "algid.api.track",
+    "validate": "algid.api.validate",
     "write_log": "algid.writers",
 }
 

@@ -220,6 +220,13 @@ class Log:
         ------
         ValueError
             If a shape does not fit, a value is not finite, or the times do not increase.
+
+        Examples
+        --------
+        >>> import algid
+        >>> t = [0.0, 0.01, 0.02]
+        >>> len(algid.Log.from_arrays(t, theta=[t, t], tau=[t, t]))
+        3
         """
         times = np.asarray(t, dtype=np.float64)
         if times.ndim != 1 or times.size < 2:

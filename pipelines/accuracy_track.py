@@ -18,8 +18,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from algid.api.identify import identify
 from algid.arm import Arm, FloatArray
-from algid.identification.identify import identify
 from algid.log import Log
 from algid.settings import Settings
 from algid.signals.segments import segments

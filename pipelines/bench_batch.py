@@ -27,7 +27,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from algid.api import synthesise
+from algid import synthesise
 from algid.batches.workers import THREADS
 from algid.identification.identify import identify
 from algid.runtime import keep_freed, keep_to_one_core

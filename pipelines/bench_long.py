@@ -32,7 +32,10 @@ def main() -> None:
     write_log(log, moving(samples, GAPS, 1000.0))
     for name, arguments in (
         (f"inspect {samples:.0e} rows, {GAPS} gaps", ("inspect", log)),
-        (f"convert {samples:.0e} rows to MCAP", ("convert", log, folder / "long.mcap", "--force")),
+        (
+            f"convert {samples:.0e} rows to MCAP",
+            ("convert", log, "-o", folder / "long.mcap", "--force"),
+        ),
     ):
         print(f"{name}: {timed(*arguments)}", flush=True)
     arm = folder / "arm.csv"

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import algid
-from algid.cli.guide import SUMMARIES, text_of
+from algid.api.guide import SUMMARIES, text_of
 
 
 def pages(folder: Path) -> None:

@@ -18,7 +18,6 @@ import pytest
 
 import algid
 from algid.errors import LogError, ResultError, SettingError
-from algid.identification.identify import identify
 from algid.log import ChannelReading, Reading
 from algid.model import PARAMETERS
 from algid.results import Estimate, Result, Status, write_result
@@ -29,7 +28,6 @@ from tests.report.folders import build
 def test_dir_shows_the_public_names_and_each_is_there() -> None:
     assert dir(algid) == sorted(algid.__all__)
     assert all(getattr(algid, name) is not None for name in algid.__all__)
-    assert algid.identify is identify
 
 
 CALLED = [name for name in algid.__all__ if name not in ("AlgidError", "Result", "__version__")]

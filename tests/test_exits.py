@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from algid.api.guide import text_of
 from algid.cli.app import COMMANDS
-from algid.cli.guide import text_of
 from algid.exits import MEANINGS, OF_COMMAND, WHAT_TO_DO, Exit, epilog, exit_of, table
 from tests.cli.commands import app
 

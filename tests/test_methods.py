@@ -8,7 +8,7 @@ from dataclasses import fields
 import pytest
 from typer.testing import CliRunner
 
-from algid.cli.guide import text_of
+from algid.api.guide import text_of
 from algid.errors import SettingError
 from algid.methods import ESTIMATORS, NAMES, estimator_of, settles
 from algid.physics.terms import OPTIONAL

@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from algid.api.ranges import ends
+from algid.cli.common import Quiet
 from algid.cli.output import say
 from algid.exits import Exit
 
@@ -26,12 +28,14 @@ def check(
         typer.Option(help="paper: each error at most Table 4's; truth: each at most --max-error."),
     ] = Against.TRUTH,
     max_error: Annotated[
-        float | None, typer.Option(help="Largest error allowed, percent.", min=0, max=1e9)
+        float | None,
+        typer.Option(help="Largest error allowed, percent.", **ends("check", "max_error")),
     ] = None,
     tolerance_file: Annotated[
         Path | None,
         typer.Option(help="TOML with a table [max_error_percent]: parameter = percent."),
     ] = None,
+    quiet: Quiet = False,
 ) -> None:
     """Compare a result's errors with their limits, row by row; exit code 1 when one is over.
 
@@ -42,11 +46,10 @@ def check(
     typer.Exit
         With `Exit.LIMIT` where an error is over its limit.
     """
-    from algid.check import failed, judge
-    from algid.results import read_result
+    from algid.api.check import check as run
 
-    rows = judge(read_result(result), against.value, max_error, tolerance_file)
-    for row in rows:
+    rows = run(result, against.value, max_error, tolerance_file)
+    for row in rows if not quiet else ():
         say(row.text)
-    if failed(rows):
+    if not all(row.passed for row in rows):
         raise typer.Exit(Exit.LIMIT)

@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
+from algid.api.choices import CASES, terms, written
+
 Completion = Callable[[str], list[str]]
 
 
@@ -34,20 +36,6 @@ def refusing_checks() -> list[str]:
     from algid.profile import Check
 
     return list(get_args(Check))
-
-
-def terms() -> list[str]:
-    """What ``--model`` may hold."""
-    from algid.model import CHOICES
-
-    return ["auto", "plain", *CHOICES]
-
-
-def written() -> list[str]:
-    """Ends of the names of logs that algid writes."""
-    from algid.writers import FORMATS
-
-    return [f".{name}" for name in FORMATS]
 
 
 LISTS: Mapping[str, Callable[[], list[str]]] = {
@@ -113,7 +101,7 @@ def or_files(*known: str) -> Completion:
     return complete
 
 
-cases = or_files("case1", "case2")
+cases = or_files(*CASES)
 """Completes the cases that algid knows, and files."""
 
 

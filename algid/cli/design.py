@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-import sys
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from algid.api.ranges import ends
+from algid.cli.common import Force, Form, Quiet, ResultFormat, command_line, out, print_report
 from algid.cli.completion import cases
-from algid.cli.output import console, remark, say
-from algid.cli.settings import two_names
+from algid.cli.output import remark
 from algid.exits import Exit
-
-if TYPE_CHECKING:
-    from algid.designs.campaign import Campaign
-    from algid.designs.prior import BelievedArm
-    from algid.designs.request import Request
-    from algid.estimators.whitening import NoiseLevels
-
-RATE, DURATION = 1000.0, 10.0
 
 
 class Drive(StrEnum):
@@ -28,13 +20,6 @@ class Drive(StrEnum):
 
     POSITION = "position"
     TORQUE = "torque"
-
-
-class Shown(StrEnum):
-    """What is printed."""
-
-    TABLE = "table"
-    JSON = "json"
 
 
 def design(
@@ -45,9 +30,7 @@ def design(
             help="Result folder of the arm, case1, case2, or a TOML file of the arm.",
         ),
     ],
-    out: Annotated[
-        Path, typer.Option("-o", "--out", help="Folder for the folder PRIOR.design.")
-    ] = Path(),
+    out: Annotated[Path, out("Folder for the folder PRIOR.design.")] = Path(),
     limits: Annotated[
         Path | None,
         typer.Option(help="TOML file with range, speed, …, in the flags' words; flags beat it."),
@@ -69,14 +52,19 @@ def design(
     ] = None,
     tip_height: Annotated[
         float | None,
-        typer.Option(help="Lowest height of the tip over joint 1, m.", min=-1e6, max=1e3),
+        typer.Option(
+            help="Lowest height of the tip over joint 1, m.", **ends("design", "tip_height")
+        ),
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(help="Length of a run, s; 10 by default.", min=0.5, max=120)
+        float | None,
+        typer.Option(help="Length of a run, s; 10 by default.", **ends("design", "duration")),
     ] = None,
     rate: Annotated[
         float | None,
-        typer.Option(help="Samples a second of its log, Hz; 1000 by default.", min=20, max=1e5),
+        typer.Option(
+            help="Samples a second of its log, Hz; 1000 by default.", **ends("design", "rate")
+        ),
     ] = None,
     runs: Annotated[
         str | None, typer.Option(help="Runs without and with the payload, like 2,1.")
@@ -90,11 +78,16 @@ def design(
     ] = None,
     position_noise: Annotated[
         float | None,
-        typer.Option(help="Noise of the angles, rad (standard deviation).", min=1e-12, max=1e3),
+        typer.Option(
+            help="Noise of the angles, rad (standard deviation).",
+            **ends("design", "position_noise"),
+        ),
     ] = None,
     torque_noise: Annotated[
         float | None,
-        typer.Option(help="Noise of the torques, N m (standard deviation).", min=1e-12, max=1e3),
+        typer.Option(
+            help="Noise of the torques, N m (standard deviation).", **ends("design", "torque_noise")
+        ),
     ] = None,
     noise_from: Annotated[
         Path | None, typer.Option(help="A log of the arm whose noise is taken.")
@@ -103,29 +96,29 @@ def design(
         float | None,
         typer.Option(
             help="Share by which masses and friction may be wrong where no error bar tells; 0.2.",
-            min=0,
-            max=100,
+            **ends("design", "prior_error"),
         ),
     ] = None,
     payload: Annotated[
-        float | None, typer.Option(help="Payload of the loaded runs, kg.", min=1e-6, max=1e6)
+        float | None,
+        typer.Option(help="Payload of the loaded runs, kg.", **ends("design", "payload")),
     ] = None,
     l1: Annotated[
         float | None,
-        typer.Option("--l1", help="Length of link 1, m, where known.", min=1e-3, max=1e3),
+        typer.Option("--l1", help="Length of link 1, m, where known.", **ends("design", "l1")),
     ] = None,
     l2: Annotated[
         float | None,
-        typer.Option("--l2", help="Length of link 2, m, where known.", min=1e-3, max=1e3),
+        typer.Option("--l2", help="Length of link 2, m, where known.", **ends("design", "l2")),
     ] = None,
     margin: Annotated[
-        float, typer.Option(help="Share of every limit left unused.", min=0, max=0.5)
+        float, typer.Option(help="Share of every limit left unused.", **ends("design", "margin"))
     ] = 0.05,
     joints: Annotated[str, typer.Option(help="Names of the robot's joints.")] = "joint1,joint2",
-    seed: Annotated[int, typer.Option(help="Seed of the search.", min=0, max=2**63)] = 0,
-    force: Annotated[bool, typer.Option("--force", help="Replace a design that is there.")] = False,
-    form: Annotated[Shown, typer.Option("--format", help="What to print.")] = Shown.TABLE,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
+    seed: Annotated[int, typer.Option(help="Seed of the search.", **ends("design", "seed"))] = 0,
+    force: Force = False,
+    form: Form = ResultFormat.TABLE,
+    quiet: Quiet = False,
 ) -> None:
     """Plan the motion that tells most about an arm within its limits; write PRIOR.design.
 
@@ -140,111 +133,41 @@ def design(
     typer.Exit
         With `Exit.FAILED` where a parameter stays open.
     """
-    import shlex
-
-    from algid.designs.campaign import plan
-    from algid.designs.page import design_document
-    from algid.designs.prior import KnownBefore, prior_of
-    from algid.designs.request import request
-    from algid.designs.write import Provenance, design_json, write_design
-    from algid.files import refuse_existing, whole_folder
+    from algid.api.design import design as run
+    from algid.api.design import folder_of
     from algid.report.progress import progress
-    from algid.report.terminal import print_document
-    from algid.runtime import one_blas_thread
 
-    asked = request(
-        limits,
-        {
-            "range": span,
-            "speed": speed,
-            "acceleration": acceleration,
-            "torque": torque,
-            "tip_height": tip_height,
-            "duration": duration,
-            "rate": rate,
-            "runs": runs,
-        },
-    )
-    names = two_names("joints", joints)
-    folder = out / f"{Path(prior).stem or 'arm'}.design"
-    refuse_existing(folder, force)
-    wished = asked.get("runs", None)
-    known = prior_of(
-        prior, None if wished is None else wished[1] > 0, KnownBefore(l1, l2, payload, prior_error)
-    )
-    noise = _noise(known, position_noise, torque_noise, noise_from)
-    campaign = _campaign(known, asked, noise, wanted, drive, margin, seed)
-    with one_blas_thread(), progress("steps", quiet) as shown:
-        planned = plan(campaign, shown)
-    origin = Provenance(prior, shlex.join(["algid", *sys.argv[1:]]), names, known.doubts)
-    with whole_folder(folder, force) as temporary:
-        write_design(planned, temporary, origin)
+    with progress("steps", quiet) as shown:
+        planned = run(
+            prior,
+            limits=limits,
+            range=span,
+            speed=speed,
+            acceleration=acceleration,
+            torque=torque,
+            tip_height=tip_height,
+            duration=duration,
+            rate=rate,
+            runs=runs,
+            drive=drive.value,
+            wanted=wanted,
+            position_noise=position_noise,
+            torque_noise=torque_noise,
+            noise_from=noise_from,
+            prior_error=prior_error,
+            payload=payload,
+            l1=l1,
+            l2=l2,
+            margin=margin,
+            joints=joints,
+            seed=seed,
+            out=out,
+            force=force,
+            command=command_line(),
+            progress=shown,
+        )
     if not quiet:
-        if form is Shown.JSON:
-            say(design_json(planned, origin), end="")
-        else:
-            print_document(design_document(planned, prior, known.doubts), console())
-        remark(f"wrote {folder}")
+        print_report(planned.document(), planned.as_json, form)
+        remark(f"wrote {folder_of(prior, out)}")
     if planned.open_parameters:
         raise typer.Exit(Exit.FAILED)
-
-
-def _campaign(
-    prior: BelievedArm,
-    asked: Request,
-    noise: NoiseLevels,
-    wanted: str | None,
-    drive: Drive,
-    margin: float,
-    seed: int,
-) -> Campaign:
-    from algid.designs.belief import asked_for
-    from algid.designs.campaign import Campaign
-    from algid.designs.information import Experiment
-    from algid.designs.request import limits_of
-
-    shared = prior.belief.shared
-    runs = asked.get("runs", (1, 1) if shared.payload else (1, 0))
-    names = None if wanted is None else [name.strip() for name in wanted.split(",")]
-    return Campaign(
-        experiment=Experiment(shared, runs, noise, asked.get("rate", RATE)),
-        belief=prior.belief,
-        limits=limits_of(asked, prior.lengths),
-        asked=asked_for(prior.belief, names, prior.source),
-        duration=asked.get("duration", DURATION),
-        drive="torque" if drive is Drive.TORQUE else "position",
-        margin=margin,
-        seed=seed,
-    )
-
-
-def _noise(
-    prior: BelievedArm, position: float | None, torque: float | None, log: Path | None
-) -> NoiseLevels:
-    """Noise of flags, else of a log, else of the logs behind the prior. Raises `SettingError` where none tells."""
-    import numpy as np
-
-    from algid.errors import SettingError
-    from algid.estimators.noise import first_guess
-    from algid.estimators.whitening import NoiseLevels
-
-    measured = prior.noise
-    if log is not None:
-        from algid.readers import read_log
-
-        found = read_log(log)
-        measured = first_guess(found.theta, found.tau)
-    levels = {}
-    for flag, given, name in (
-        ("--position-noise", position, "theta"),
-        ("--torque-noise", torque, "tau"),
-    ):
-        if given is not None:
-            levels[name] = np.full(2, given)
-        elif measured is not None and np.all(getattr(measured, name) > 0):
-            levels[name] = getattr(measured, name)
-        else:
-            raise SettingError(
-                f"{flag}: {prior.source} does not tell how noisy the sensors are; give it, or --noise-from LOG"
-            )
-    return NoiseLevels(**levels)

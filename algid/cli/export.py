@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from algid.api.ranges import ends
+from algid.cli.common import Force, Quiet, out
 from algid.cli.output import complain, remark
 
 
@@ -35,24 +36,32 @@ def export(
     ],
     out: Annotated[
         Path | None,
-        typer.Option(
-            "-o", "--out", help="File; the result's name with the format's ending by default."
-        ),
+        out("File or folder; the result's name with the format's ending by default."),
     ] = None,
     l1: Annotated[
         float | None,
-        typer.Option(help="Length of link 1, m; g k1 / k2 by default.", min=1e-3, max=1e3),
+        typer.Option(
+            help="Length of link 1, m; what the result knows best by default.",
+            **ends("export", "l1"),
+        ),
     ] = None,
     l2: Annotated[
-        float | None, typer.Option(help="Length of link 2, m.", min=1e-3, max=1e3)
+        float | None, typer.Option(help="Length of link 2, m.", **ends("export", "l2"))
     ] = None,
-    m1: Annotated[float | None, typer.Option(help="Mass of link 1, kg.", min=1e-6, max=1e6)] = None,
-    m2: Annotated[float | None, typer.Option(help="Mass of link 2, kg.", min=1e-6, max=1e6)] = None,
+    m1: Annotated[
+        float | None, typer.Option(help="Mass of link 1, kg.", **ends("export", "m1"))
+    ] = None,
+    m2: Annotated[
+        float | None, typer.Option(help="Mass of link 2, kg.", **ends("export", "m2"))
+    ] = None,
     rotor1: Annotated[
         float | None,
-        typer.Option(help="Joint 1's rotor at the joint, kg m²: a part of k5.", min=0, max=1e6),
+        typer.Option(
+            help="Joint 1's rotor at the joint, kg m²: a part of k5.", **ends("export", "rotor1")
+        ),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+    force: Force = False,
+    quiet: Quiet = False,
 ) -> None:
     """Write the arm of RESULT as a model.
 
@@ -60,21 +69,15 @@ def export(
 
     Example: algid export case1-unloaded.algid --to mjcf --l2 0.5
     """
-    from algid.exports.formats import FORMATS, exported
-    from algid.exports.links import Knowns
-    from algid.files import refuse_existing, whole_file
-    from algid.results import read_result
+    from algid.api.export import export as run
+    from algid.api.export import file_of
 
-    text, warnings = exported(
-        read_result(result), str(result), to.value, Knowns(l1, l2, m1, m2, rotor1)
-    )
-    if out is None:
-        stem = (result if result.name != "result.json" else result.resolve().parent).stem or "arm"
-        stem = re.sub(r"\W", "_", stem) if to is To.PYTHON else stem
-        out = Path(f"{stem}-payload.yaml" if to is To.YAML else f"{stem}{FORMATS[to.value].suffix}")
-    refuse_existing(out, force)
-    with whole_file(out) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    for warning in warnings:
+    file = file_of(result, to.value)
+    if out is not None:
+        file = out / file if out.is_dir() else out
+    made = run(result, to.value, l1=l1, l2=l2, m1=m1, m2=m2, rotor1=rotor1, out=file, force=force)
+    if quiet:
+        return
+    for warning in made.warnings:
         complain(warning.text)
-    remark(f"wrote {out}")
+    remark(f"wrote {file}")

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from algid.cli.common import Form, Quiet, ResultFormat, out, print_report
 from algid.cli.output import remark
-from algid.cli.report import ResultFormat, print_report
 
 
 def fleet(
     batch: Annotated[
         Path, typer.Argument(metavar="BATCH", help="Folder of algid batch, with its jobs.parquet.")
     ],
-    out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Folder to write to; BATCH by default.")
-    ] = None,
-    form: Annotated[
-        ResultFormat, typer.Option("--format", help="What to print.")
-    ] = ResultFormat.TABLE,
+    out: Annotated[Path | None, out("Folder to write into; BATCH by default.")] = None,
+    form: Form = ResultFormat.TABLE,
+    quiet: Quiet = False,
 ) -> None:
     """Tell which robots' parameters drift, and which logs stand out.
 
@@ -32,17 +28,14 @@ def fleet(
 
     Example: algid fleet results
     """
-    from algid.fleet.history import history_of, write_history
-    from algid.fleet.page import fleet_document
+    from algid.api.fleet import as_json, document
+    from algid.api.fleet import fleet as run
     from algid.report.progress import progress
 
-    with progress("parameters") as followed:
-        history = history_of(batch / "jobs.parquet", followed)
-        written = write_history(history, batch if out is None else out, batch)
-    print_report(
-        fleet_document(history),
-        lambda: json.dumps(history.as_dict(), indent=2, allow_nan=False) + "\n",
-        form,
-    )
+    with progress("parameters", quiet) as followed:
+        history, written = run(batch, out, progress=followed)
+    if quiet:
+        return
+    print_report(document(history), lambda: as_json(history), form)
     for path in written:
         remark(f"wrote {path}")

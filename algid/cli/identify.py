@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from algid.cli.common import (
+    OUTPUT,
+    Export,
+    Force,
+    Form,
+    Quiet,
+    ResultFormat,
+    command_line,
+    out,
+    print_report,
+)
 from algid.cli.output import remark, say
-from algid.cli.report import ExportTo, ResultFormat, print_result
 from algid.cli.settings import Choice, takes_settings
 from algid.exits import Exit, exit_of
 from algid.words import counted
 
 if TYPE_CHECKING:
-    from algid.results import Result
-
-
-OUTPUT = "Output"
+    from algid.api.result import Result
 
 
 @takes_settings
@@ -31,12 +37,7 @@ def identify(
     loaded: Annotated[
         list[Path] | None, typer.Option(help="A log of the arm with its payload; may be repeated.")
     ] = None,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--out", help="Folder for the result folder LOG.algid.", rich_help_panel=OUTPUT
-        ),
-    ] = Path(),
+    out: Annotated[Path, out("Folder for the result folder LOG.algid.")] = Path(),
     name: Annotated[
         str | None,
         typer.Option(
@@ -47,24 +48,21 @@ def identify(
         Path | None,
         typer.Option(help="Result of the arm identified before: then LOGS are of the loaded arm."),
     ] = None,
-    force: Annotated[
-        bool,
-        typer.Option("--force", help="Replace a result that is there.", rich_help_panel=OUTPUT),
-    ] = False,
+    force: Force = False,
     report: Annotated[
         bool,
         typer.Option(
             help="Write pages and time series beside result.json.", rich_help_panel=OUTPUT
         ),
     ] = True,
-    export: ExportTo = None,
-    output: Annotated[
-        ResultFormat, typer.Option("--format", help="What to print.", rich_help_panel=OUTPUT)
-    ] = ResultFormat.TABLE,
-    quiet: Annotated[
-        bool,
-        typer.Option("-q", "--quiet", help="Print nothing but errors.", rich_help_panel=OUTPUT),
-    ] = False,
+    export: Annotated[
+        Export | None,
+        typer.Option(
+            help="Also write estimates.mcap, for Foxglove and PlotJuggler.", rich_help_panel=OUTPUT
+        ),
+    ] = None,
+    form: Form = ResultFormat.TABLE,
+    quiet: Quiet = False,
     verbose: Annotated[
         bool,
         typer.Option(
@@ -81,32 +79,25 @@ def identify(
 
     Raises
     ------
-    SettingError
-        If a log of estimates is asked for without a report.
     typer.Exit
         As `algid.exits.exit_of` has it, where that is not `Exit.OK`.
     """
-    import shlex
-
-    from algid.errors import SettingError
-    from algid.files import result_folder
-    from algid.identification.identify import identify as run
+    from algid.api.identify import as_json, document, folder_of
+    from algid.api.identify import identify as run
+    from algid.report.brief import brief
     from algid.report.progress import progress
     from algid.runtime import keep_freed
     from algid.text import visible
 
-    if export is not None and not report:
-        raise SettingError("--export: the log is made from the time series; leave --no-report out")
     keep_freed()
-    settings = choice.settings()
-    unloaded, loaded = (
+    unloaded, carried = (
         (logs, loaded or []) if parameters is None else ([], [*logs, *(loaded or [])])
     )
     with progress("samples", quiet) as shown:
         result = run(
             unloaded,
-            loaded,
-            settings,
+            carried,
+            choice.settings(),
             parameters=parameters,
             profile=choice.profile(),
             out=out,
@@ -114,23 +105,20 @@ def identify(
             force=force,
             report=report,
             export=export is not None,
-            command=shlex.join(["algid", *sys.argv[1:]]),
+            command=command_line(),
             progress=shown,
         )
     if verbose:
         _print_reading(result)
     if not quiet:
-        folder = result_folder(result.log.path, out, name)
-        if output is ResultFormat.TABLE and not verbose:
-            from algid.report.brief import brief
-
+        if form is ResultFormat.TABLE and not verbose:
             for line in brief(result):
                 say(line)
         else:
-            print_result(result, output)
+            print_report(document(result), lambda: as_json(result), form)
             for note in result.notes:
                 remark(f"note: {visible(note)}")
-        remark(f"wrote {folder}")
+        remark(f"wrote {folder_of(result, out, name)}")
     ended = exit_of(failed=result.verdict.failed or not result.complete, lost=result.data_lost)
     if ended is not Exit.OK:
         raise typer.Exit(ended)

@@ -7,25 +7,25 @@ from typing import Annotated
 
 import typer
 
+from algid.cli.common import Force, Quiet, out
 from algid.cli.output import say
+
+NAME = "algid.toml"
 
 
 def new(
     log: Annotated[Path, typer.Argument(help="The log to write a profile for.")],
-    out: Annotated[Path, typer.Option("-o", "--out", help="Where to write it.")] = Path(
-        "algid.toml"
-    ),
-    force: Annotated[bool, typer.Option(help="Overwrite the profile.")] = False,
+    out: Annotated[Path, out("File or folder to write it to.")] = Path(NAME),
+    force: Force = False,
+    quiet: Quiet = False,
 ) -> None:
     """Write a profile with everything that can be set, filled in with what a log tells.
 
     Example: algid profile new arm.mcap -o algid.toml
     """
-    from algid.files import refuse_existing, whole_file
-    from algid.inspection.draft import draft_profile
+    from algid.api.write import profile_for
 
-    refuse_existing(out, force)
-    text = draft_profile(log)
-    with whole_file(out) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    say(f"{out}: written; edit it, then try: algid inspect {log} --profile {out}")
+    file = out / NAME if out.is_dir() else out
+    profile_for(log, file, force)
+    if not quiet:
+        say(f"{file}: written; edit it, then try: algid inspect {log} --profile {file}")

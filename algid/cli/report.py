@@ -1,46 +1,15 @@
-"""`algid report`: a result's page, made again, and its other forms."""
+"""`algid report`: write a result's or a track's pages anew."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from algid.cli.output import console, remark, say
-
-if TYPE_CHECKING:
-    from algid.report.document import Document
-    from algid.report.figures.base import Figure, Missing
-    from algid.results import Result
-    from algid.tracks.result import TrackResult
-
-    Written = tuple[list[Path], Callable[[], Sequence[Figure | Missing]]]
-    """The files that were written, and what gives the figures."""
-
-
-class ResultFormat(StrEnum):
-    """How a result is printed."""
-
-    TABLE = "table"
-    MARKDOWN = "markdown"
-    JSON = "json"
-
-
-class Export(StrEnum):
-    """Logs for other viewers."""
-
-    MCAP = "mcap"
-
-
-ExportTo = Annotated[
-    Export | None,
-    typer.Option(
-        help="Also write estimates.mcap, for Foxglove and PlotJuggler.", rich_help_panel="Output"
-    ),
-]
+from algid.cli.common import OUTPUT, Export, Form, Quiet, ResultFormat, print_report
+from algid.cli.output import remark
 
 
 class PlotFormat(StrEnum):
@@ -63,10 +32,13 @@ def report(
         list[Path],
         typer.Argument(metavar="RESULT...", help="Folders of algid identify or algid track."),
     ],
-    form: Annotated[
-        ResultFormat, typer.Option("--format", help="How to print the result.")
-    ] = ResultFormat.TABLE,
-    export: ExportTo = None,
+    form: Form = ResultFormat.TABLE,
+    export: Annotated[
+        Export | None,
+        typer.Option(
+            help="Also write estimates.mcap, for Foxglove and PlotJuggler.", rich_help_panel=OUTPUT
+        ),
+    ] = None,
     save_plots: SavePlots = None,
     plot_format: Annotated[
         PlotFormat, typer.Option(help="What --save-plots writes.")
@@ -75,81 +47,25 @@ def report(
         bool,
         typer.Option("--shared-library", help="Put the plotting library once beside the folders."),
     ] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Write report.html and report.md into each RESULT and print its table.
 
     Example: algid report case1-unloaded.algid --save-plots figures
     """
-    from algid.tracks.read import is_track
+    from algid.api.report import report as run
+    from algid.report.progress import progress
 
     for folder in results:
-        if is_track(folder):
-            written, figures = _track(folder, form, mcap=export is not None)
-        else:
-            written, figures = _identification(
-                folder, form, shared_library, mcap=export is not None
+        with progress("samples", quiet) as shown:
+            made = run(
+                folder, export=export is not None, shared_library=shared_library, progress=shown
             )
+        written = made.written
         if save_plots is not None:
-            from algid.report.plots import save_plots as save
-
-            written += save(figures(), save_plots, folder.resolve().stem, plot_format.value)
+            written += made.save_plots(save_plots, folder.resolve().stem, plot_format.value)
+        if quiet:
+            continue
+        print_report(made.document(), made.as_json, form)
         for path in written:
             remark(f"wrote {path}")
-
-
-def _identification(
-    folder: Path, form: ResultFormat, shared_library: bool, *, mcap: bool
-) -> Written:
-    """Write a result's pages and print it."""
-    from algid.report.export import export_mcap
-    from algid.report.gallery import gallery
-    from algid.report.page import write_markdown, write_report
-    from algid.report.progress import progress
-    from algid.results import read_result
-
-    result = read_result(folder)
-    with progress("samples") as shown:
-        written = [write_report(folder, shared_library, shown), write_markdown(folder)]
-        if mcap:
-            written.append(export_mcap(folder, shown))
-    print_result(result, form)
-    return written, lambda: gallery(folder, result).every
-
-
-def _track(folder: Path, form: ResultFormat, *, mcap: bool) -> Written:
-    """Write a track's pages and print it."""
-    from algid.tracks.figures import figures
-    from algid.tracks.page import write_pages
-    from algid.tracks.read import read_track
-
-    result = read_track(folder)
-    written = write_pages(result, folder, mcap)
-    print_track(result, form)
-    return written, lambda: figures(result)
-
-
-def print_track(result: TrackResult, form: ResultFormat) -> None:
-    """Print a track to stdout."""
-    from algid.tracks.page import track_document
-    from algid.tracks.result import track_json
-
-    print_report(track_document(result), lambda: track_json(result), form)
-
-
-def print_result(result: Result, form: ResultFormat) -> None:
-    """Print a result to stdout."""
-    from algid.report.page import result_document
-    from algid.results import result_json
-
-    print_report(result_document(result), lambda: result_json(result), form)
-
-
-def print_report(document: Document, json: Callable[[], str], form: ResultFormat) -> None:
-    """Print `document`, or what `json` gives, to stdout: nothing but it, so that it can be piped."""
-    from algid.report.markdown import markdown
-    from algid.report.terminal import print_document
-
-    if form is ResultFormat.TABLE:
-        print_document(document, console())
-    else:
-        say(json() if form is ResultFormat.JSON else markdown(document), end="")

@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
+from algid.api.choices import terms
+from algid.api.options import CHANNELS_OF, two_names
 from algid.cli.completion import (
     Completion,
     listed,
     of_profile,
     refusing_checks,
     settings_of_profile,
-    terms,
 )
 from algid.errors import SettingError
 from algid.files import parsed_toml
@@ -76,11 +77,6 @@ OF_PROFILE: Mapping[str, tuple[Any, str, Completion | None]] = {
     ),
 }
 """Type, help and completion of a profile's file, of each of its settings with a flag of its own, and of any other."""
-CHANNELS_OF = {
-    "angle_unit": ("theta1", "theta2", "omega1", "omega2"),
-    "torque_unit": ("tau1", "tau2"),
-}
-"""Flags that set the unit of several channels."""
 
 
 def options_of_settings() -> Iterator[inspect.Parameter]:
@@ -190,14 +186,6 @@ def profile_from(flags: Mapping[str, Any]) -> Profile | None:
             place, _, said = str(error).removeprefix("setting ").partition(": ")
             raise SettingError(f"{flag(name)} (profile: {place}): {said}") from error
     return found
-
-
-def two_names(name: str, text: str) -> tuple[str, str]:
-    """The names in NAME,NAME, the text of the flag of `name`; raises `SettingError` where there are not two."""
-    first, *others = (part.strip() for part in text.split(","))
-    if len(others) != 1 or not (first and others[0]):
-        raise SettingError(f"{flag(name)}: expected two names like shoulder,elbow, found {text!r}")
-    return first, others[0]
 
 
 def _meaning(name: str, text: str) -> dict[str, Any]:

@@ -14,7 +14,6 @@ from algid.errors import LogError, ResultError, SettingError
 from algid.estimators.paper import SHORTEST
 from algid.files import refuse_misleading, result_folder, whole_folder
 from algid.identification.by_paper import run_paper
-from algid.identification.options import with_options
 from algid.identification.outcome import Identified
 from algid.identification.series import write_fit_series
 from algid.identification.source import (
@@ -37,7 +36,6 @@ if TYPE_CHECKING:
     from algid.estimators.fit import Fit
     from algid.estimators.selection import Selection
     from algid.identification.by_likelihood import Predictions
-    from algid.identification.options import ProfileLike
     from algid.profile import Profile
 
 # the paper's convergence series is drawn beside other estimators up to this length of log
@@ -65,7 +63,7 @@ def identify(
     settings: Settings | None = None,
     *,
     parameters: Result | str | Path | None = None,
-    profile: ProfileLike | None = None,
+    profile: Profile | None = None,
     out: str | Path | None = None,
     name: str | None = None,
     force: bool = False,
@@ -74,7 +72,6 @@ def identify(
     command: str | None = None,
     shared_library: bool = False,
     progress: Progress | None = None,
-    **options: Any,
 ) -> Result:
     """Identify the constants k1 … k7 of an arm and, from loaded logs, its tip payload.
 
@@ -86,7 +83,7 @@ def identify(
     settings : Settings
     parameters : Result or path of one
         An arm identified before; then no unloaded log is needed.
-    profile : Profile, path of one, or dict of what would stand in its file
+    profile : Profile
         What the logs' names, units and signs mean; where it is silent, what was said of the
         earlier result's logs.
     out : Path
@@ -106,9 +103,6 @@ def identify(
     progress : callable
         Called with the stage and how many samples of how many it has gone over, as the work goes
         on.
-    **options : of `Settings` and of `Profile`, by their names
-        ``estimator="weak"``, ``zero="hanging"``: over `settings` and `profile`, as flags are over
-        a file. `velocity` is that of `Settings`.
 
     Returns
     -------
@@ -128,9 +122,9 @@ def identify(
     """
     refuse_misleading(name)
     out = None if out is None else Path(out)
-    settings, meaning = with_options(settings, profile, options)
+    settings = settings or Settings()
     earlier = Earlier.of(parameters)
-    meaning = meaning if earlier is None else reused(meaning, earlier.result)
+    meaning = profile if earlier is None else reused(profile, earlier.result)
     settings = _with_meaning(settings, meaning, earlier)
     sources = with_twins_marked(
         open_sources(unloaded, "unloaded", meaning, settings.gravity, settings.effort),

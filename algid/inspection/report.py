@@ -21,7 +21,8 @@ from algid.inspection.figures import ClockFigures, SignalFigures, clock_figures,
 from algid.log import Log
 from algid.notices import Notice
 from algid.readers import read_log
-from algid.readers.formats import Entry, format_of
+from algid.readers.formats import Entry, format_of, in_memory
+from algid.readers.memory import NAME
 
 T = TypeVar("T")
 
@@ -36,7 +37,7 @@ class Look(Generic[T]):
     refused: str | None = None
 
 
-def look(path: Path, read: Callable[[], T]) -> Look[T]:
+def look(log: Any, read: Callable[[], T]) -> Look[T]:
     """What a log holds, and what `read` makes of it.
 
     Raises
@@ -44,15 +45,15 @@ def look(path: Path, read: Callable[[], T]) -> Look[T]:
     LogError
         As `contents`; what `read` raises stands in `refused`.
     """
-    with during("opening", path):
-        kind, entries = contents(path)
+    with during("opening", NAME if not isinstance(log, str | Path) else log):
+        kind, entries = contents(log)
     try:
         return Look(kind, entries, found=read())
     except LogError as error:
         return Look(kind, entries, refused=str(error))
 
 
-def contents(path: Path) -> tuple[str, tuple[Entry, ...]]:
+def contents(log: Any) -> tuple[str, tuple[Entry, ...]]:
     """Format and entries of a log.
 
     Raises
@@ -60,8 +61,12 @@ def contents(path: Path) -> tuple[str, tuple[Entry, ...]]:
     LogError
         If there is no such log, or not even its list of entries can be read.
     """
-    form = format_of(path)
-    return form.name, form.entries(path)
+    if isinstance(log, Log):
+        return log.origin.format, ()
+    if not isinstance(log, str | Path):
+        return in_memory(log)
+    form = format_of(Path(log))
+    return form.name, form.entries(Path(log))
 
 
 if TYPE_CHECKING:
@@ -107,25 +112,26 @@ class Inspection:
         return plain
 
 
-def inspect_log(path: Path, profile: Profile | None = None) -> Inspection:
-    """Look at a log without using it.
+def inspect_log(given: Any, profile: Profile | None = None) -> Inspection:
+    """Look at a log, a path or one in memory, without using it.
 
-    a log that cannot be read gives what it holds, and the reason.
+    A log that cannot be read gives what it holds, and the reason.
 
     Raises
     ------
     LogError
         If there is no such log, or its format is unknown.
     """
-    seen = look(path, lambda: read_log(path, profile))
+    seen = look(given, lambda: given if isinstance(given, Log) else read_log(given, profile))
+    path = str(given) if isinstance(given, str | Path) else NAME
     if seen.found is None:
-        return Inspection(str(path), seen.format, seen.entries, refused=seen.refused)
+        return Inspection(path, seen.format, seen.entries, refused=seen.refused)
     log = seen.found
     gravity = profile.gravity if profile is not None else 9.81
     findings = examine(log, gravity=gravity, effort=None if profile is None else profile.effort)
     reasons = [f"{one.code}: {one.clause}" for one in findings if one.refuse]
     return Inspection(
-        path=str(path),
+        path=log.origin.path if isinstance(given, Log) else path,
         format=seen.format,
         entries=seen.entries,
         refused="; ".join(reasons) or None,

@@ -65,5 +65,13 @@ def read_log(path: str | Path | Columns, profile: Profile | None = None) -> Log:
     ------
     LogError
         As `open_log`, and if a value is not finite or time runs wrong.
+
+    Examples
+    --------
+    >>> import algid
+    >>> t = [0.0, 0.01, 0.02, 0.03]
+    >>> columns = {"t": t, "theta": [[0.0, 0.1, 0.2, 0.3], [0.0, 0.0, 0.1, 0.1]], "tau": [t, t]}
+    >>> algid.read_log(columns).theta[0].tolist()
+    [0.0, 0.1, 0.2, 0.3]
     """
     return open_log(path, profile).whole()

@@ -369,3 +369,12 @@ def sniff(path: Path) -> str:
         As `format_of`.
     """
     return format_of(path).name
+
+
+def in_memory(given: object) -> tuple[str, Entries]:
+    """The format and the columns of a log in memory: see `algid.readers.memory`."""
+    from algid.readers.memory import content_of
+
+    kind, content = content_of(given)
+    columns = [Entry(name, str(dtype), content.rows) for name, dtype in content.schema.items()]
+    return kind, tuple(columns)

@@ -48,14 +48,25 @@ def open_columns(given: Columns, profile: Profile) -> TableReader:
     LogError
         If the columns cannot be taken over, a channel is missing, or one is not of numbers.
     """
+    kind, content, others, units = _taken(given)
+    return open_content(NAME, kind, content, profile, units=units, others=others)
+
+
+def content_of(given: Columns) -> tuple[str, Content]:
+    """What columns in memory are called, and what they hold; raises as `open_columns`."""
+    return _taken(given)[:2]
+
+
+def _taken(given: Columns) -> tuple[str, Content, Any, dict[str, str]]:
+    """Kind, content, arrays of another length, and the units that are stated."""
     if isinstance(given, Mapping):
         columns, others = columns_of(
             NAME, {str(name): _array(name, values) for name, values in given.items()}
         )
         content = Content(columns, len(next(iter(columns.values()), ())))
-        return open_content(NAME, "arrays", _checked(content), profile, others=others)
+        return "arrays", _checked(content), others, {}
     frame, units = _frame(given)
-    return open_content(NAME, "frame", _checked(Content(frame, frame.height)), profile, units=units)
+    return "frame", _checked(Content(frame, frame.height)), (), units
 
 
 def _array(name: object, values: object) -> np.ndarray[Any, Any]:

@@ -26,6 +26,15 @@ class Comparison:
     sigma: dict[str, tuple[float | None, ...]]
     estimates: Table
     settings: Table
+    results: tuple[Result, ...] = ()
+
+    def tables(self) -> tuple[Table, Table]:
+        """The estimates side by side, and what was set otherwise."""
+        return self.estimates, self.settings
+
+    def as_json(self) -> str:
+        """The text of a JSON file: see `comparison_json`."""
+        return comparison_json(self, self.results)
 
     @property
     def largest_sigma(self) -> float | None:
@@ -67,7 +76,11 @@ def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> C
         for name in names
     }
     return Comparison(
-        tuple(shown), sigma, _estimates(results, shown, sigma), _settings(results, shown)
+        tuple(shown),
+        sigma,
+        _estimates(results, shown, sigma),
+        _settings(results, shown),
+        tuple(results),
     )
 
 

@@ -352,8 +352,15 @@ class Result(_Model):
 
     def __dir__(self) -> list[str]:
         """What is algid's, and not what is pydantic's."""
-        own = {name for name in vars(type(self)) if not name.startswith(("_", "model_"))}
+        kinds = [kind for kind in type(self).__mro__ if issubclass(kind, Result)]
+        own = {
+            name for kind in kinds for name in vars(kind) if not name.startswith(("_", "model_"))
+        }
         return sorted(own | set(type(self).model_fields))
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both hold the same, whatever else either can do."""
+        return isinstance(other, Result) and dict(self) == dict(other)
 
     def __str__(self) -> str:
         rows = [("parameter", "estimate", "std", "unit", "status"), *self._rows()]

@@ -70,6 +70,18 @@ def simulate(
         If there are fewer than two times or they do not increase.
     SettingError
         If the motion grows without bound.
+
+    Examples
+    --------
+    An arm that nothing drives, let go where it hangs:
+
+    >>> import numpy as np
+    >>> import algid
+    >>> arm = algid.Arm(1.2, 0.8, 0.15, 0.12, 0.3, 0.25, 0.01, 0.006, 0.5, 0.4, 9.81)
+    >>> still = lambda t: np.zeros((2, t.size))
+    >>> motion = algid.simulate(arm.constants(), still, np.linspace(0.0, 1.0, 101))
+    >>> bool(np.ptp(motion.theta, axis=1).max() < 1e-6)
+    True
     """
     if t.size < 2 or np.any(np.diff(t) <= 0):
         raise ValueError(f"t must hold at least two increasing times, got {t.size}")

@@ -16,7 +16,7 @@ from algid.identification.identify import reused
 from algid.identification.source import LogLike, open_source, read_otherwise
 from algid.identification.survey import Survey
 from algid.notices import Notice, merged
-from algid.results import read_result
+from algid.results import Result, read_result, result_json
 from algid.runtime import one_blas_thread
 from algid.tracks.bins import arm_of
 from algid.tracks.payload import track
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 def track_log(
     log: LogLike,
-    parameters: Path,
+    parameters: Result | str | Path,
     *,
     l1: float | None = None,
     l2: float | None = None,
@@ -40,8 +40,8 @@ def track_log(
     Parameters
     ----------
     log : path or `Log`
-    parameters : Path
-        Result folder of the arm, or its `result.json`.
+    parameters : Result or path of one
+        The arm.
     l1, l2 : float, m
         Link lengths; the result's by default.
     profile : Profile
@@ -57,7 +57,7 @@ def track_log(
     ResultError
         If the result cannot be read, or leaves a constant or a link length open.
     """
-    result = read_result(parameters)
+    result, content = _arm(parameters)
     source = open_source(
         log, "loaded", reused(profile, result), result.settings.get("gravity", 9.81), changing=True
     )
@@ -71,21 +71,33 @@ def track_log(
             found = track(partial(survey.segments, source), arm, covariance)
     except TooShortError as error:
         raise LogError(f"{source.name}: {error}; record longer") from error
-    otherwise = read_otherwise([survey.summary(source)], result, str(parameters))
+    otherwise = read_otherwise([survey.summary(source)], result, _called(parameters))
     truth, notices = source.origin.truth, survey.seen(source).notices
     judged = result.verdict
     doubt = Notice(
         "ARM_DOUBTFUL", numbers={"grade": judged.word.lower(), "headline": judged.headline}
     )
-    file = parameters / "result.json" if parameters.is_dir() else parameters
     return TrackResult(
         track=found,
         log=survey.summary(source),
-        arm=str(parameters),
-        arm_sha256=hashlib.sha256(read_whole(file)).hexdigest(),
+        arm=_called(parameters),
+        arm_sha256=hashlib.sha256(content).hexdigest(),
         settings={"l1": arm.l1, "l2": arm.l2, "gravity": arm.model.gravity, **(settings or {})},
         version=__version__,
         schedule=None if truth is None else truth.schedule or ((0.0, truth.payload),),
         notices=(*(() if judged.grade == "good" else (doubt,)), *otherwise, *merged(notices)),
         data_lost=any(notice.lossy for notice in notices),
     )
+
+
+def _arm(parameters: Result | str | Path) -> tuple[Result, bytes]:
+    """The arm's result, and its file's content."""
+    if isinstance(parameters, Result):
+        return parameters, result_json(parameters).encode()
+    path = Path(parameters)
+    result = read_result(path)
+    return result, read_whole(path / "result.json" if path.is_dir() else path)
+
+
+def _called(parameters: Result | str | Path) -> str:
+    return parameters.log.path if isinstance(parameters, Result) else str(parameters)

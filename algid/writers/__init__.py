@@ -34,6 +34,16 @@ def write_log(
         If the file cannot be written there.
     ValueError
         If the format is unknown.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import algid
+    >>> log, _ = algid.synthesise("case1")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     algid.write_log(f"{folder}/log.parquet", log)
+    ...     len(algid.read_log(f"{folder}/log.parquet"))
+    1001
     """
     path = Path(path)
     name = kind or path.suffix.lstrip(".").lower()

@@ -62,7 +62,7 @@ CALLS: dict[str, tuple[str, ...]] = {
     "report": ("weak.algid",),
     "compare": ("full.algid", "weak.algid", "-o", "out"),
     "synth": ("case1", "-o", "out", "--duration", "0.2", "--rate", "50"),
-    "convert": (UNLOADED, "out/copy.mcap"),
+    "convert": (UNLOADED, "-o", "out/copy.mcap"),
     "guide": (),
 }
 NEVER = {
@@ -209,7 +209,7 @@ def toml(draw: random.Random, place: Path) -> Call:
     known: tuple[tuple[Any, tuple[str, ...]], ...] = (
         (places.PROFILE, ("identify", UNLOADED, "-o", "out", *QUICK, "--profile", file)),
         (places.PROFILE, ("inspect", UNLOADED, "--profile", file)),
-        (places.PROFILE, ("convert", UNLOADED, "out/copy.csv", "--profile", file)),
+        (places.PROFILE, ("convert", UNLOADED, "-o", "out/copy.csv", "--profile", file)),
         (places.ARM, ("synth", file, "-o", "out", "--duration", "0.2", "--rate", "50")),
         (places.ARM, ("design", file, "-o", "out", *DESIGN)),
         (places.LIMITS, ("design", "case1", "-o", "out", "--limits", file, *NOISE)),

@@ -14,11 +14,11 @@ import polars as pl
 import pytest
 
 import algid
+from algid.api.batch import watched
 from algid.batches.discover import jobs_of
 from algid.batches.fetch import staged
 from algid.batches.records import End
 from algid.batches.run import Batch, Ended, Recipe
-from algid.cli import batch as command
 from algid.errors import AlgidError, LogError, OutputError, without_credentials
 from algid.settings import Settings
 from algid.stores import connect, list_urls, open_store, put_folder
@@ -276,7 +276,6 @@ def test_a_store_that_is_away_for_a_while_does_not_end_a_watched_prefix(
     served: Served,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr("algid.batches.run.LOOK_EVERY", 0.0)
     open_store(served.url("logs")).write("bad.csv", b"junk")
@@ -292,9 +291,10 @@ def test_a_store_that_is_away_for_a_while_does_not_end_a_watched_prefix(
         return looks in (1, 2) and path.rstrip("/") == f"/{served.bucket}"
 
     served.denied = denied
-    ended = command._watch(batch, [served.url("logs")], out, "logs", False)
+    heard: list[str] = []
+    ended = watched(batch, [served.url("logs")], out, "logs", False, heard.append)
     assert _ends(ended) == {"bad": End.FAILED}
-    assert capsys.readouterr().err.count("its objects cannot be listed") == 1
+    assert sum("its objects cannot be listed" in line for line in heard) == 1
 
 
 def _folder(place: Path, *names: str) -> Path:

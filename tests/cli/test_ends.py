@@ -12,12 +12,13 @@ import polars as pl
 import pytest
 import typer
 
+from algid.api.batch import Batched, watched
+from algid.api.compare import labels_of as labels
+from algid.api.design import campaign_of, noise_of
 from algid.batches.jobs import Job
 from algid.batches.records import End, JobRecord
 from algid.batches.run import Ended, Progress
 from algid.cli import batch as command
-from algid.cli.compare import labels
-from algid.cli.design import Drive, _campaign, _noise
 from algid.designs.prior import KnownBefore, prior_of
 from algid.designs.request import request
 from algid.errors import SettingError
@@ -79,10 +80,13 @@ BAD, DEAD = record("c", End.FAILED, "no\x1b[31m torque"), record("d", End.KILLED
 def test_a_batch_says_what_became_of_its_jobs(
     ended: Ended, stopped: bool, code: int, lines: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
+    batched = Batched(
+        ended.records, ended.ran, ended.left, "out", interrupted=stopped, stopped=ended.stopped
+    )
     for quiet in (False, True):
         left = 0
         try:
-            command._conclude(ended, stopped, "out", quiet)
+            command._conclude(batched, quiet)
         except typer.Exit as end:
             left = end.exit_code
         assert left == code
@@ -124,7 +128,7 @@ class Watched:
 
 
 def test_a_watch_complains_once_and_retries_what_failed_once(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     looks: list[Any] = [
         SettingError("logs: gone"),
@@ -146,10 +150,11 @@ def test_a_watch_complains_once_and_retries_what_failed_once(
         "algid.batches.run.Settling", lambda: SimpleNamespace(settled=lambda jobs: jobs)
     )
     running: Any = Watched(6)
-    ended = command._watch(running, ["logs"], "out", "logs", True)
+    heard: list[str] = []
+    ended = watched(running, ["logs"], "out", "logs", True, heard.append)
     assert running.heard == [([], False), (["a"], True), (["b"], False)]
     assert len(ended.records) == 3
-    assert capsys.readouterr().err == "algid: logs: gone\nalgid: twice\n"
+    assert heard == ["logs: gone", "twice"]
 
 
 def test_results_are_named_by_what_tells_them_apart(tmp_path: Path) -> None:
@@ -263,7 +268,7 @@ def prior() -> Any:
 
 
 def test_noise_is_the_flags_then_a_logs_then_the_results(tmp_path: Path) -> None:
-    by_flags = _noise(prior(), 1e-3, 2e-2, None)
+    by_flags = noise_of(prior(), 1e-3, 2e-2, None)
     assert (by_flags.theta.tolist(), by_flags.tau.tolist()) == ([1e-3, 1e-3], [2e-2, 2e-2])
     synthetic(
         tmp_path,
@@ -277,27 +282,27 @@ def test_noise_is_the_flags_then_a_logs_then_the_results(tmp_path: Path) -> None
         "2",
     )
     log = tmp_path / "case1-unloaded.csv"
-    measured = _noise(prior(), None, None, log)
+    measured = noise_of(prior(), None, None, log)
     # a first guess from differences: to a fifth or so
     assert measured.theta == pytest.approx(1e-3, rel=0.3)
     assert measured.tau == pytest.approx(2e-2, rel=0.3)
-    mixed = _noise(prior(), 5e-3, None, log)
+    mixed = noise_of(prior(), 5e-3, None, log)
     assert mixed.theta.tolist() == [5e-3, 5e-3]
     assert mixed.tau.tolist() == measured.tau.tolist()
     known = SimpleNamespace(
         source="arm", noise=NoiseLevels(np.full(2, 3e-4), np.array([0.1, np.nan]))
     )
-    assert _noise(known, None, 0.2, None).theta.tolist() == [3e-4, 3e-4]  # type: ignore[arg-type]
+    assert noise_of(known, None, 0.2, None).theta.tolist() == [3e-4, 3e-4]  # type: ignore[arg-type]
     with pytest.raises(
         SettingError, match=r"^--torque-noise: arm does not tell how noisy the sensors are; give it"
     ):
-        _noise(known, None, None, None)  # type: ignore[arg-type]
+        noise_of(known, None, None, None)  # type: ignore[arg-type]
 
 
 def test_a_campaign_takes_what_is_asked_and_else_its_defaults() -> None:
     limits = {"range": "1.2", "speed": "3", "torque": "1.5"}
     noise = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
-    plain = _campaign(prior(), request(None, limits), noise, None, Drive.POSITION, 0.05, 4)
+    plain = campaign_of(prior(), request(None, limits), noise, None, "position", 0.05, 4)
     assert (plain.duration, plain.experiment.rate, plain.drive, plain.margin, plain.seed) == (
         10,
         1000,
@@ -307,7 +312,7 @@ def test_a_campaign_takes_what_is_asked_and_else_its_defaults() -> None:
     )
     assert plain.experiment.runs == ((1, 1) if load_case("case1").payload else (1, 0))
     asked = request(None, limits | {"duration": 2.0, "rate": 100.0, "runs": "3,0"})
-    other = _campaign(prior(), asked, noise, "k1, k3", Drive.TORQUE, 0.1, 0)
+    other = campaign_of(prior(), asked, noise, "k1, k3", "torque", 0.1, 0)
     assert (other.duration, other.experiment.rate, other.experiment.runs) == (2, 100, (3, 0))
     assert (other.drive, other.margin) == ("torque", 0.1)
     assert plain.asked.wanted.all()

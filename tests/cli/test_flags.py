@@ -27,7 +27,7 @@ CALLS: dict[str, tuple[str, ...]] = {
     "report": ("arm.algid",),
     "compare": ("a.algid", "b.algid"),
     "synth": ("case1",),
-    "convert": ("log.csv", "out.csv"),
+    "convert": ("log.csv", "-o", "out.csv"),
     "guide": (),
     "profile new": ("log.csv",),
     "example": (),

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 import algid
-from algid.cli.guide import SUMMARIES, text_of
+from algid.api.guide import SUMMARIES, text_of
 from algid.notices import MESSAGES
 from tests.cli.commands import app
 

@@ -74,7 +74,7 @@ def test_an_option_that_names_a_pipe_is_refused(command: str, option: str, place
     arguments = {
         "batch": [log, "-o", str(place / "batch")],
         "check": [result],
-        "convert": [log, str(place / "out.csv")],
+        "convert": [log, "-o", str(place / "out.csv")],
         "design": [result, "-o", str(place / "design")],
         "identify": [log, "-o", str(place / "again")],
         "inspect": [log],
@@ -107,7 +107,7 @@ def test_an_option_that_names_a_pipe_is_refused(command: str, option: str, place
         ["report", "pipe.json"],
         ["report", "piped"],
         ["compare", "pipe", "case1-unloaded.algid"],
-        ["convert", "pipe", "out.csv"],
+        ["convert", "pipe", "-o", "out.csv"],
         ["inspect", "pipe"],
     ],
     ids=" ".join,

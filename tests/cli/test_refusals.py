@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from algid.cli.batch import _bytes
+from algid.api.batch import bytes_of
 from algid.errors import SettingError
 from tests.cli.commands import call
 
@@ -22,7 +22,7 @@ from tests.cli.commands import call
     ],
 )
 def test_memory_is_read_in_the_units_of_memory(text: str, size: int) -> None:
-    assert _bytes(text) == size
+    assert bytes_of(text) == size
 
 
 @pytest.mark.parametrize(
@@ -32,7 +32,7 @@ def test_no_memory_and_too_little_is_refused(text: str) -> None:
     with pytest.raises(
         SettingError, match=r"--memory-limit: expected at least 512MiB, like 2GB, found"
     ):
-        _bytes(text)
+        bytes_of(text)
 
 
 @pytest.mark.parametrize(

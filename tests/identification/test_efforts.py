@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from algid.api.identify import identify
 from algid.arm import FloatArray, inverse_dynamics, passive_torque
 from algid.errors import SettingError
-from algid.identification.identify import identify
 from algid.identification.known import prior_of
 from algid.identification.validate import predictor_of
 from algid.log import Log, Origin

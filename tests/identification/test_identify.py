@@ -18,6 +18,7 @@ from algid.identification.identify import identify
 from algid.identification.source import open_source
 from algid.inspection.checks import noticed
 from algid.log import Log
+from algid.profile import Profile
 from algid.results import Status, read_result, result_schema
 from algid.settings import Settings
 from algid.synth.cases import load_case
@@ -190,7 +191,7 @@ def test_blocks_change_no_estimate(
 
 def test_real_arm_is_identified(shared_data: Path) -> None:
     logs = sorted((shared_data / "dfki" / "C1_sysid").glob("*.csv"))[:3]
-    from algid.profile import Profile, with_settings
+    from algid.profile import with_settings
 
     settings = Settings(model="coulomb,offset")
     result = identify(logs, None, settings, profile=with_settings(Profile(), {"zero": "hanging"}))
@@ -236,7 +237,8 @@ def test_numbers_without_a_meaning_are_refused(name: str, value: float) -> None:
 )
 def test_a_real_run_that_hardly_drives_a_joint_has_not_failed(shared_data: Path, run: str) -> None:
     """One motor does next to nothing there: the run tells little, and contradicts nothing."""
-    result = identify(shared_data / "dfki" / f"{run}.csv", zero="hanging", report=False)
+    log = shared_data / "dfki" / f"{run}.csv"
+    result = identify(log, profile=Profile(zero="hanging"), report=False)
     assert result.verdict.grade == "reservations"
     assert not result.complete or any(
         found.status is Status.WEAK_EXCITATION for found in result.parameters.values()
@@ -245,7 +247,7 @@ def test_a_real_run_that_hardly_drives_a_joint_has_not_failed(shared_data: Path,
 
 def test_a_result_names_the_estimator_whose_numbers_it_holds(shared_data: Path) -> None:
 
-    from algid.profile import Profile, with_settings
+    from algid.profile import with_settings
 
     logs = sorted((shared_data / "dfki" / "C1_sysid").glob("*.csv"))
     profile = with_settings(Profile(), {"zero": "hanging"})

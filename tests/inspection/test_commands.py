@@ -145,20 +145,20 @@ def test_inspect_on_a_cut_file_exits_with_4(tmp_path: Path) -> None:
 def test_convert_keeps_every_bit_and_the_truth(source: str, target: str, tmp_path: Path) -> None:
     log = noise_log()
     write_log(tmp_path / f"in.{source}", log, truth=TRUTH)
-    run("convert", tmp_path / f"in.{source}", tmp_path / f"out.{target}")
+    run("convert", tmp_path / f"in.{source}", "-o", tmp_path / f"out.{target}")
     found = read_log(tmp_path / f"out.{target}")
     assert same(found, log)
     assert found.origin.truth == TRUTH
     with pytest.raises(OutputError, match="--force"):
-        run("convert", tmp_path / f"in.{source}", tmp_path / f"out.{target}")
+        run("convert", tmp_path / f"in.{source}", "-o", tmp_path / f"out.{target}")
 
 
 def test_convert_refuses_unknown_formats_and_settings(tmp_path: Path) -> None:
     write_log(tmp_path / "in.csv", noise_log())
     with pytest.raises(OutputError, match="ends in"):
-        run("convert", tmp_path / "in.csv", tmp_path / "out.txt")
+        run("convert", tmp_path / "in.csv", "-o", tmp_path / "out.txt")
     with pytest.raises(SettingError, match="zero"):
-        run("convert", tmp_path / "in.csv", tmp_path / "out.csv", "--zero", "sideways")
+        run("convert", tmp_path / "in.csv", "-o", tmp_path / "out.csv", "--zero", "sideways")
     assert not (tmp_path / "out.csv").exists()
 
 

@@ -97,8 +97,8 @@ TRIAL = """
 import numpy as np
 from typer.testing import CliRunner
 import algid
-from algid.cli.completion import terms
-from algid.cli.guide import text_of
+from algid.api.choices import terms
+from algid.api.guide import text_of
 from algid.errors import SettingError
 from algid.exports.formats import exported
 from algid.exports.links import Knowns

@@ -14,7 +14,7 @@ import zstandard
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from algid.cli.guide import text_of
+from algid.api.guide import text_of
 from algid.errors import LogError
 from algid.readers import read_log
 from algid.readers.csv import counted_rows

@@ -8,7 +8,8 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from algid.cli.compare import compare, labels
+from algid.api.compare import labels_of as labels
+from algid.cli.compare import compare
 from algid.cli.report import report
 from algid.errors import SettingError
 from algid.results import read_result, result_json

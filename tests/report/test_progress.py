@@ -94,7 +94,7 @@ def test_a_pipe_gets_none_of_it(
 ) -> None:
     arguments: dict[str, list[str | Path]] = {
         "identify": ["-q", path, "-o", tmp_path],
-        "convert": [path, tmp_path / "log.csv"],
+        "convert": ["-q", path, "-o", tmp_path / "log.csv"],
         "validate": [case_folder, path],
     }
     colour = {**os.environ, "FORCE_COLOR": "1"}  # asks for colour, not for a terminal's bars

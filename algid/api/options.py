@@ -17,6 +17,12 @@ if TYPE_CHECKING:
     ProfileLike = Profile | str | Path | Mapping[str, Any]
     """A profile, the path of its file, or what would stand in that."""
 
+CHANNELS_OF = {
+    "angle_unit": ("theta1", "theta2", "omega1", "omega2"),
+    "torque_unit": ("tau1", "tau2"),
+}
+"""Options that set the unit of several channels."""
+
 
 def with_options(
     settings: Settings | None, profile: ProfileLike | None, options: Mapping[str, Any]
@@ -38,23 +44,33 @@ def with_options(
     given, known = settings or Settings(), profile_of(profile)
     if not options:
         return given, known
-    from algid.profile import Profile, with_settings
+    from algid.profile import with_settings
 
     own = {field.name: field.metadata.get("parse") for field in fields(Settings)}
-    _refuse_unknown(options, [*own, *Profile.model_fields])
+    _refuse_unknown(options, [*own, *_of_profile()])
     of_settings = {name: value for name, value in options.items() if name in own}
-    of_profile = {name: value for name, value in options.items() if name not in own}
     for name, value in of_settings.items():
         parse = own[name]
         if parse is not None and value is not None:
             of_settings[name] = parse(_text(name, value))
-    if of_profile:
-        known = with_settings(known or Profile(), of_profile)
     refuse_contradictions(options)
+    known = _over(known, {name: value for name, value in options.items() if name not in own})
     of_both = {name: of_settings[name] for name in OF_BOTH if name in of_settings}
     if known is not None and of_both:
         known = with_settings(known, of_both)
     return replace(given, **of_settings), known
+
+
+def meaning(profile: ProfileLike | None, options: Mapping[str, Any]) -> Profile | None:
+    """The profile with single settings of it over it; for verbs that have no `Settings`.
+
+    Raises
+    ------
+    SettingError
+        If an option is not known, or a value is wrong.
+    """
+    _refuse_unknown(options, _of_profile())
+    return _over(profile_of(profile), options)
 
 
 def profile_of(given: ProfileLike | None) -> Profile | None:
@@ -76,6 +92,36 @@ def profile_of(given: ProfileLike | None) -> Profile | None:
             f"profile: expected a path, a dict or a Profile, found {type(given).__name__}"
         )
     return over(None, given)
+
+
+def two_names(name: str, given: object) -> tuple[str, str]:
+    """The names in ``NAME,NAME`` or a pair; raises `SettingError` where there are not two."""
+    parts = given.split(",") if isinstance(given, str) else given
+    if isinstance(parts, list | tuple) and len(parts) == 2:
+        first, second = (str(part).strip() for part in parts)
+        if first and second:
+            return first, second
+    raise SettingError(f"{flag(name)}: expected two names like shoulder,elbow, found {given!r:.60}")
+
+
+def _of_profile() -> list[str]:
+    from algid.profile import Profile
+
+    return [*Profile.model_fields, *CHANNELS_OF]
+
+
+def _over(profile: Profile | None, options: Mapping[str, Any]) -> Profile | None:
+    """The profile with options over it, one after another."""
+    from algid.profile import Profile, with_settings
+
+    for name, value in options.items():
+        settings = {name: value}
+        if name in CHANNELS_OF:
+            settings = {channel: {"unit": value} for channel in CHANNELS_OF[name]}
+        elif name == "joints" and value is not None:
+            settings = {name: two_names(name, value)}
+        profile = with_settings(profile or Profile(), settings)
+    return profile
 
 
 def _refuse_unknown(options: Mapping[str, Any], known: list[str]) -> None:

@@ -1,0 +1,281 @@
+"""Many logs, one result folder each, and a table of them all."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from algid.api.options import profile_of, with_options
+from algid.api.ranges import check
+from algid.errors import AlgidError, SettingError
+from algid.settings import Settings
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from algid.api.options import ProfileLike
+    from algid.batches.records import JobRecord
+    from algid.batches.run import Batch, Ended
+    from algid.batches.run import Progress as Progress
+    from algid.profile import Profile
+    from algid.results import Result
+
+Complaint = Callable[[str], None]
+"""Hears, in one line, what goes wrong while a batch goes on."""
+
+
+@dataclass(frozen=True)
+class Batched:
+    """How a batch ended.
+
+    Parameters
+    ----------
+    records : of its jobs, each with name, status and the reason of a failure
+    ran, left : how many were run now, and how many are left where it was stopped
+    out : where results and ``jobs.parquet`` are, less what opens it
+    interrupted : whether it was stopped by a signal
+    stopped : why it could not go on, where it could not
+    unreadable : why records that are there cannot be read, by their places
+    """
+
+    records: list[JobRecord]
+    ran: int
+    left: int
+    out: str
+    interrupted: bool = False
+    stopped: str | None = None
+    unreadable: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def failed(self) -> list[JobRecord]:
+        """Jobs without a result, or with one that must not be used."""
+        from algid.batches.records import FAILURES
+
+        return [record for record in self.records if record.status in FAILURES]
+
+    @property
+    def incomplete(self) -> bool:
+        """Whether a job's result leaves a parameter open."""
+        from algid.batches.records import End
+
+        return any(record.status is End.INCOMPLETE for record in self.records)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Jobs by status, those there are."""
+        from algid.batches.records import End
+
+        every = {end.value: sum(one.status is end for one in self.records) for end in End}
+        return {name: count for name, count in every.items() if count}
+
+
+def batch(
+    sources: str | Path | Sequence[str | Path],
+    out: str | Path,
+    settings: Settings | None = None,
+    *,
+    parameters: Result | str | Path | None = None,
+    profile: ProfileLike | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    memory_limit: str | None = None,
+    timeout: float = 3600.0,
+    retry_failed: bool = False,
+    watch: bool = False,
+    report: bool = True,
+    profile_for: Callable[[str | None], Profile | None] | None = None,
+    progress: Callable[[Progress], None] | None = None,
+    complain: Complaint | None = None,
+    **options: Any,
+) -> Batched:
+    """Identify many logs: a result folder a job and ``jobs.parquet``; what is done is not done again.
+
+    Parameters
+    ----------
+    sources : str or Path, one or several
+        Folders, logs, globs, URLs, or a manifest (CSV, TOML).
+    out : str or Path
+        Folder, or s3://, gs://, az:// URL, for all results.
+    settings : Settings
+    parameters : Result or path of one
+        An arm identified before; then logs are of the loaded arm.
+    profile : Profile, path of one, or dict of what would stand in its file
+    workers : int
+        Worker processes; one a core by default.
+    scheduler : str
+        ``tcp://HOST:PORT`` of a Dask scheduler to run on.
+    memory_limit : str
+        Memory of each worker, like ``2GB``; a job that needs more fails alone.
+    timeout : float, s
+        A job that takes longer fails alone.
+    retry_failed : bool
+        Run jobs again that have failed.
+    watch : bool
+        Go on until a signal, and take logs as they arrive.
+    report : bool
+        Write pages and time series beside each ``result.json``.
+    profile_for : callable
+        The profile of a manifest's entry by its file, where that is not the file's own.
+    progress : callable
+        Called with each job that ends.
+    complain : callable
+        Called with a line about what goes wrong while a watch goes on.
+    **options : of `Settings` and of `Profile`, by their names
+
+    Returns
+    -------
+    Batched
+        The jobs' records; failed jobs are no exception.
+
+    Raises
+    ------
+    SettingError
+        If a setting is wrong, there is no `out`, or the sources hold no log.
+    OutputError
+        If another batch is at work there.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import algid
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = algid.synthesise("case1", duration=3.0, excitation="wide", out=folder)
+    ...     done = algid.batch(folder, f"{folder}/results", workers=1, report=False)
+    >>> done.counts
+    {'ok': 1}
+    """
+    from algid.batches.discover import jobs_of
+    from algid.batches.lock import locked
+    from algid.batches.run import Batch, Recipe, stopped_by_signals, sweep
+    from algid.results import Result, read_result
+    from algid.stores import absolute, open_store, shown
+
+    given = [sources] if isinstance(sources, str | Path) else sources
+    names, place = [str(one) for one in given], str(out)
+    if not place.strip():
+        raise SettingError("-o: expected a folder or a URL, found none; name where results go")
+    check("batch", workers=workers, timeout=timeout)
+    bytes_each = None if memory_limit is None else bytes_of(memory_limit)
+    if scheduler is not None and (workers is not None or memory_limit is not None):
+        raise SettingError(
+            "--scheduler: workers and their memory are the cluster's; set them where it is started"
+        )
+    asked, said = with_options(settings, profile, options)
+    known = (
+        parameters
+        if parameters is None or isinstance(parameters, Result)
+        else read_result(parameters)
+    )
+    if scheduler is not None:  # a worker's own folder is another
+        names, place = [absolute(source) for source in names], absolute(place)
+    meant = profile_for or (lambda file: said if file is None else _over(file, options))
+    recipe = Recipe(place, asked, cache(meant), known, report)  # each file is read once
+    recipe.profile(None)
+    alone = "logs" if known is None else "loaded"
+    jobs = [] if watch else jobs_of(names, place, alone)
+    if not (jobs or watch):
+        raise SettingError(f"{' '.join(names)}: expected logs in MCAP, Parquet or CSV, found none")
+    store = open_store(place)
+    with locked(place):
+        sweep(store)
+        try:
+            with _workers(place, scheduler, workers, bytes_each, timeout) as (executor, slots):
+                running = Batch(store, recipe, executor, slots, progress or (lambda _: None))
+                with stopped_by_signals(running.stop):
+                    ended = (
+                        watched(running, names, place, alone, retry_failed, complain)
+                        if watch
+                        else running.run(jobs, retry_failed)
+                    )
+        finally:
+            sweep(store)
+    return Batched(
+        ended.records,
+        ended.ran,
+        ended.left,
+        shown(place),
+        running.stop.is_set() and not watch,
+        ended.stopped,
+        running.unreadable,
+    )
+
+
+def _over(file: str, options: dict[str, Any]) -> Profile | None:
+    """The profile of a manifest's entry with the options over it."""
+    return with_options(None, profile_of(file), options)[1]
+
+
+@contextmanager
+def _workers(
+    out: str, scheduler: str | None, workers: int | None, memory_limit: int | None, timeout: float
+) -> Iterator[tuple[Executor, int]]:
+    """The workers, and how many jobs to hand out at once; they end with the block."""
+    from algid.batches.workers import Workers
+    from algid.runtime import OPEN_FILES, OPEN_FILES_A_WORKER, cores, may_open
+
+    if scheduler is not None:
+        from algid.batches.cluster import cluster
+
+        with cluster(scheduler, out, timeout) as found:
+            yield found
+        return
+    count = workers or cores()
+    may_open(OPEN_FILES + OPEN_FILES_A_WORKER * count)
+    executor = Workers(count, memory_limit, timeout)
+    try:
+        yield executor, 2 * count
+    finally:
+        executor.shutdown(cancel_futures=True)
+
+
+def bytes_of(text: str) -> int:
+    """A size like ``2GB``; raises `SettingError` where it is none, or too small to work in."""
+    if sys.platform == "darwin":
+        raise SettingError(
+            "--memory-limit: macOS does not bound the memory of a process; leave it out"
+        )
+    units = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9, "ki": 2**10, "mi": 2**20, "gi": 2**30}
+    number = text.strip().lower().removesuffix("b")
+    unit = number.lstrip("0123456789.").strip()
+    try:
+        size = int(float(number.removesuffix(unit)) * units[unit])
+    except (ValueError, KeyError, OverflowError):
+        size = 0
+    if size < 1 << 29:
+        raise SettingError(f"--memory-limit: expected at least 512MiB, like 2GB, found {text!r}")
+    return size
+
+
+def watched(
+    running: Batch,
+    sources: Sequence[str],
+    out: str,
+    alone: str,
+    retry_failed: bool,
+    complain: Complaint | None = None,
+) -> Ended:
+    """Look for logs until stopped; nothing but settled ones are taken, and a trouble is told once."""
+    from algid.batches.discover import jobs_of
+    from algid.batches.run import LOOK_EVERY, Settling
+
+    settling = Settling()
+    complaint = ""
+    ended = running.run([])
+    while not running.stop.is_set():
+        try:
+            jobs = settling.settled(jobs_of(sources, out, alone))
+        except AlgidError as error:  # a store may be away for a while
+            jobs = []
+            if str(error) != complaint:
+                complaint = str(error)
+                if complain is not None:
+                    complain(complaint)
+        if jobs:
+            ended, retry_failed = running.run(jobs, retry_failed), False
+        running.stop.wait(LOOK_EVERY)
+    return ended

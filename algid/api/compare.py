@@ -1,0 +1,96 @@
+"""Results side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from algid.errors import SettingError
+from algid.files import refuse_existing
+from algid.results import Result, read_result
+
+if TYPE_CHECKING:
+    from algid.report.comparison import Comparison
+
+
+def compare(
+    results: Sequence[Result | str | Path],
+    *,
+    labels: Sequence[str] | None = None,
+    out: str | Path | None = None,
+    force: bool = False,
+) -> Comparison:
+    """Lay results side by side: differences in σ from the first one, and which settings differ.
+
+    Parameters
+    ----------
+    results : Result or path of one, two or more
+    labels : str, one each
+        What to call them; by default what tells their folders, or their logs, apart.
+    out : Path
+        Folder to write the page ``compare.html`` into; None writes nothing.
+    force : bool
+        Replace a page that is there.
+
+    Returns
+    -------
+    Comparison
+        By parameter the distances in combined standard deviations, and tables.
+
+    Raises
+    ------
+    SettingError
+        If there are fewer than two results, or not a label each.
+    ResultError
+        If a result cannot be read.
+    OutputError
+        If a page is there already and `force` is not set, or cannot be written.
+
+    Examples
+    --------
+    >>> import algid
+    >>> logs = algid.synthesise("case1", duration=3.0, excitation="wide", torque_noise=1e-2)
+    >>> ways = [algid.identify(*logs, estimator=name) for name in ("refined", "weak")]
+    >>> algid.compare(ways, labels=["refined", "weak"]).largest_sigma < 4
+    True
+    """
+    from algid.report.comparison import compare as compared
+
+    count = 1 if isinstance(results, str | Path | Result) else len(results)
+    if count < 2:
+        raise SettingError(
+            f"compare: expected two results or more, found {count}; name another one"
+        )
+    if labels is not None and len(labels) != len(results):
+        raise SettingError(f"labels: expected {len(results)}, found {len(labels)}")
+    if out is not None:
+        refuse_existing(page_of(Path(out)), force)
+    read = [one if isinstance(one, Result) else read_result(one) for one in results]
+    paths = [Path(one) for one in results if not isinstance(one, Result)]
+    if labels is None and len(paths) == len(read):
+        labels = labels_of(paths)
+    found = compared(read, labels)
+    if out is not None:
+        from algid.report.comparison_page import write_comparison
+
+        write_comparison(found, read, Path(out))
+    return found
+
+
+def page_of(out: Path) -> Path:
+    """Where the page of a comparison goes."""
+    from algid.report.comparison_page import NAME
+
+    return out / NAME
+
+
+def labels_of(paths: Sequence[Path]) -> list[str]:
+    """The folders' names without the suffix, with as many folders above them as tell them apart."""
+    folders = [(path.parent if path.name == "result.json" else path).resolve() for path in paths]
+    parts = [(*folder.parent.parts, folder.name.removesuffix(".algid")) for folder in folders]
+    for depth in range(1, max(map(len, parts)) + 1):
+        names = ["/".join(part[-depth:]) for part in parts]
+        if len(set(names)) == len(names):
+            return names
+    return [str(folder) for folder in folders]  # one of them is named twice

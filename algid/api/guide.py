@@ -1,0 +1,105 @@
+"""The guide: its topics and their text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from enum import StrEnum
+from importlib import resources
+
+
+class GuideTopic(StrEnum):
+    """The pages of the guide."""
+
+    START = "start"
+    ARM = "arm"
+    LOGS = "logs"
+    MOTION = "motion"
+    EXPORT = "export"
+    REPORT = "report"
+    WARNINGS = "warnings"
+    ESTIMATORS = "estimators"
+    PAPER = "paper"
+    PAYLOAD = "payload"
+    BATCH = "batch"
+    CI = "ci"
+    PYTHON = "python"
+    MEASURED = "measured"
+    CONTRIBUTING = "contributing"
+
+
+SUMMARIES = {
+    GuideTopic.START: "a first result from a real log",
+    GuideTopic.ARM: "the drawing, the equation of motion, what each constant is",
+    GuideTopic.LOGS: "formats, names, units, signs: a recipe for each awkward log",
+    GuideTopic.MOTION: "which motion to record",
+    GuideTopic.EXPORT: "the arm as URDF, SDF, MJCF, Python, C; the payload as YAML",
+    GuideTopic.REPORT: "the report, figure by figure",
+    GuideTopic.WARNINGS: "every warning and status: meaning, cause, what to do",
+    GuideTopic.ESTIMATORS: "the estimators, the torque's terms, and what they assume",
+    GuideTopic.PAPER: "the paper's method, its misprints, and how special its torque is",
+    GuideTopic.PAYLOAD: "payloads, lengths, payload in time",
+    GuideTopic.BATCH: "thousands of logs, fleets, clusters",
+    GuideTopic.CI: "an arm and its logs checked by a forge at every change",
+    GuideTopic.PYTHON: "the Python API",
+    GuideTopic.MEASURED: "what was measured, with the command that measures it",
+    GuideTopic.CONTRIBUTING: "the house and its rules",
+}
+
+
+def text_of(topic: str) -> str:
+    """A topic's Markdown; what the registries hold stands in place of their marks."""
+    text = (resources.files("algid") / "guide" / f"{topic}.md").read_text(encoding="utf-8")
+    for mark, table in TABLES.items():
+        if mark in text:
+            text = text.replace(mark, _markdown(*table()))
+    return text
+
+
+def _markdown(*rows: Sequence[str]) -> str:
+    """A table; the first row is its head."""
+    head, *others = (f"| {' | '.join(cells)} |" for cells in rows)
+    return "\n".join((head, "|---" * len(rows[0]) + "|", *others))
+
+
+def _terms() -> Iterator[Sequence[str]]:
+    from algid.physics.terms import OPTIONAL
+
+    yield "term", "what it is", "what it adds to the torque", "its parameters"
+    for term in OPTIONAL:
+        meanings = "; ".join(f"{one.name}, {one.unit}: {one.meaning}" for one in term.parameters)
+        needs = f", beside `{term.needs}`" if term.needs else ""
+        yield f"`{term.name}`", f"{term.title}{needs}", term.equation.replace("|", "\\|"), meanings
+
+
+def _estimators() -> Iterator[Sequence[str]]:
+    from algid.methods import ESTIMATORS
+
+    yield "`--estimator`", "what it does", "when"
+    for one in ESTIMATORS:
+        default = " (default)" if one is ESTIMATORS[0] else ""
+        yield f"`{one.name}`{default}", one.does, one.when
+
+
+def _formats() -> Iterator[Sequence[str]]:
+    from algid.readers.formats import FORMATS
+
+    yield "format", "names end in"
+    for form in FORMATS:
+        yield form.title, ", ".join(f"`{suffix}`" for suffix in form.suffixes) or "a folder"
+
+
+def _units() -> Iterator[Sequence[str]]:
+    from algid.units import UNITS
+
+    yield "unit", "of", "also written"
+    for unit in UNITS:
+        yield f"`{unit.name}`", ", ".join(unit.quantities), unit.spellings.replace(" ", ", ")
+
+
+TABLES: Mapping[str, Callable[[], Iterable[Sequence[str]]]] = {
+    "<!-- terms -->": _terms,
+    "<!-- estimators -->": _estimators,
+    "<!-- formats -->": _formats,
+    "<!-- units -->": _units,
+}
+"""Rows of a table by the mark in whose place it stands."""

@@ -1,0 +1,354 @@
+"""Synthetic logs of an arm, with the truth inside."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, overload
+
+from algid.api.ranges import check
+from algid.errors import SettingError
+from algid.files import refuse_existing
+from algid.limits import PHYSICAL
+from algid.log import Log
+from algid.synth import run
+from algid.synth.cases import load_case
+from algid.synth.sensors import Sensors
+
+if TYPE_CHECKING:
+    from algid.progress import Progress
+    from algid.synth.cases import Case
+    from algid.synth.excitation import Torque
+
+FIRST_YEAR, LAST_YEAR = 1970, 2037
+"""Of a log's start: the stamps in messages of ROS 2 end in January 2038."""
+HOLDS, FORMATS = ("exact", "zoh", "foh"), ("mcap", "parquet", "csv")
+
+State = Sequence[float]
+Schedule = Sequence[tuple[float, float]]
+
+
+@overload
+def synthesise(
+    case: str,
+    *,
+    duration: float | None = None,
+    rate: float = 1000.0,
+    excitation: str | Path | Log | None = None,
+    motion: str | Path | None = None,
+    torque_hold: Literal["exact", "zoh", "foh"] = "exact",
+    initial: State | str | None = None,
+    sensors: Sensors | None = None,
+    position_noise: float | None = None,
+    torque_noise: float | None = None,
+    encoder_bits: int | None = None,
+    jitter: float | None = None,
+    drop: float | None = None,
+    seed: int | None = None,
+    start_time: datetime | None = None,
+    payload_schedule: None = None,
+    out: str | Path | None = None,
+    kind: Literal["mcap", "parquet", "csv"] = "mcap",
+    force: bool = False,
+    progress: Progress | None = None,
+) -> tuple[Log, Log]: ...
+@overload
+def synthesise(
+    case: str,
+    *,
+    duration: float | None = None,
+    rate: float = 1000.0,
+    excitation: str | Path | Log | None = None,
+    motion: str | Path | None = None,
+    torque_hold: Literal["exact", "zoh", "foh"] = "exact",
+    initial: State | str | None = None,
+    sensors: Sensors | None = None,
+    position_noise: float | None = None,
+    torque_noise: float | None = None,
+    encoder_bits: int | None = None,
+    jitter: float | None = None,
+    drop: float | None = None,
+    seed: int | None = None,
+    start_time: datetime | None = None,
+    payload_schedule: Schedule | str,
+    out: str | Path | None = None,
+    kind: Literal["mcap", "parquet", "csv"] = "mcap",
+    force: bool = False,
+    progress: Progress | None = None,
+) -> tuple[Log]: ...
+def synthesise(
+    case: str,
+    *,
+    duration: float | None = None,
+    rate: float = 1000.0,
+    excitation: str | Path | Log | None = None,
+    motion: str | Path | None = None,
+    torque_hold: Literal["exact", "zoh", "foh"] = "exact",
+    initial: State | str | None = None,
+    sensors: Sensors | None = None,
+    position_noise: float | None = None,
+    torque_noise: float | None = None,
+    encoder_bits: int | None = None,
+    jitter: float | None = None,
+    drop: float | None = None,
+    seed: int | None = None,
+    start_time: datetime | None = None,
+    payload_schedule: Schedule | str | None = None,
+    out: str | Path | None = None,
+    kind: Literal["mcap", "parquet", "csv"] = "mcap",
+    force: bool = False,
+    progress: Progress | None = None,
+) -> tuple[Log, ...]:
+    """Logs of a simulated arm: unloaded and, if it has a payload, loaded; or one of a changing payload.
+
+    Parameters
+    ----------
+    case : str
+        Name of a case that ships with algid, or path of a TOML file that describes an arm.
+    duration, rate : float, s and Hz
+        1 s, or as long as the motion; 1000 Hz.
+    excitation : 'case' (the default), 'wide', 'none', or a log whose torque is replayed
+    motion : path
+        Folder of a design: a controller follows its motion, instead of an excitation.
+    torque_hold : 'exact', 'zoh' or 'foh'
+        Whether the drive holds or ramps the torque between samples.
+    initial : four float, rad and rad/s
+        The state θ1, θ2, ω1, ω2 to start from; hanging at rest by default.
+    sensors : Sensors
+        All that follows down to `seed` as one value; none by default.
+    position_noise, torque_noise, jitter : float, rad, N m and s
+        Standard deviations.
+    encoder_bits : int
+        Angles are rounded to 2π / 2^bits.
+    drop : float
+        Share of samples lost at random.
+    seed : int
+        Of noise, jitter and losses.
+    start_time : datetime
+        When the log starts, UTC where it names no zone; stamps count from zero by default.
+    payload_schedule : pairs of time in s and payload in kg
+        One log instead, its payload changing; bare before the first time.
+    out : Path
+        Folder to write the logs into; None writes nothing.
+    kind : 'mcap', 'parquet' or 'csv'
+        Format of what is written.
+    force : bool
+        Replace logs that are there.
+    progress : callable
+        Called as the simulation goes on.
+
+    Returns
+    -------
+    tuple of Log
+        Each of them with its truth; of an arm without payload the first alone.
+
+    Raises
+    ------
+    SettingError
+        If there is no such case, or a setting is wrong or contradicts another.
+    OutputError
+        If a log is there already and `force` is not set, or cannot be written.
+
+    Examples
+    --------
+    >>> import algid
+    >>> unloaded, loaded = algid.synthesise("case1", duration=2.0, excitation="wide")
+    >>> unloaded.theta.shape, loaded.origin.truth.payload
+    ((2, 2001), 0.3515)
+    """
+    given = {
+        "position_noise": position_noise,
+        "torque_noise": torque_noise,
+        "encoder_bits": encoder_bits,
+        "jitter": jitter,
+        "drop": drop,
+        "seed": seed,
+    }
+    check("synth", duration=duration, rate=rate, **given)
+    _among("--torque-hold", torque_hold, HOLDS)
+    _among("--format", kind, FORMATS)
+    described = load_case(case)
+    wished = {name: value for name, value in given.items() if value is not None}
+    measured = replace(sensors or Sensors(), **wished)  # type: ignore[arg-type]
+    if start_time is not None:
+        measured = replace(measured, start_ns=_start_ns(start_time))
+    asked = _Asked(described, rate, duration, measured, _Files(out, kind, force), progress)
+    if motion is not None:
+        _refuse_beside_motion(initial, payload_schedule, excitation)
+        logs = _followed(asked, Path(motion))
+    else:
+        logs = _driven(asked, excitation, torque_hold, initial, payload_schedule)
+    asked.files.write(logs)
+    return tuple(logs)
+
+
+@dataclass(frozen=True)
+class _Files:
+    """Where logs are written, if anywhere."""
+
+    out: str | Path | None
+    kind: str
+    force: bool
+
+    def path(self, name: str) -> Path:
+        return Path(self.out or "") / f"{name}.{self.kind}"
+
+    def refuse_existing(self, case: Case, roles: Sequence[str]) -> None:
+        for role in roles if self.out is not None else ():
+            refuse_existing(self.path(f"{case.name}-{role}"), self.force)
+
+    def write(self, logs: Sequence[Log]) -> None:
+        if self.out is None:
+            return
+        from algid.writers import write_log
+
+        for log in logs:
+            path = self.path(log.origin.path)
+            write_log(path, log, truth=log.origin.truth, kind=self.kind)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What every way to a log needs."""
+
+    case: Case
+    rate: float
+    duration: float | None
+    sensors: Sensors
+    files: _Files
+    progress: Progress | None
+
+    @property
+    def roles(self) -> tuple[str, ...]:
+        return ("unloaded", "loaded") if self.case.payload else ("unloaded",)
+
+    def recording(self, duration: float) -> run.Recording:
+        """How it is recorded; raises `SettingError` for fewer than two samples, or too many."""
+        most = PHYSICAL.samples[1]
+        if self.rate * duration > most:
+            raise SettingError(
+                f"--duration: {duration:g} s at --rate {self.rate:g} Hz are "
+                f"{self.rate * duration:.3g} samples; expected at most {most:g}, more than a day at 1 kHz"
+            )
+        if round(self.rate * duration) < 1:
+            raise SettingError(
+                f"--duration: expected at least {1 / self.rate:g} s, two samples at --rate {self.rate:g}, "
+                f"found {duration:g}"
+            )
+        return run.Recording(self.rate, duration, sensors=self.sensors)
+
+
+def _refuse_beside_motion(initial: object, schedule: object, excitation: object) -> None:
+    given = {"--initial": initial, "--payload-schedule": schedule, "--torque": excitation}
+    for flag, value in given.items():
+        if value is not None:
+            raise SettingError(
+                f"{flag} {value}: a motion starts where it was planned and carries one payload; leave it out"
+            )
+
+
+def _followed(asked: _Asked, motion: Path) -> list[Log]:
+    """The logs of a controller that follows a plan."""
+    from algid.synth.follow import read_plan
+
+    plan = read_plan(motion)
+    recording = asked.recording(asked.duration or plan.duration)
+    asked.files.refuse_existing(asked.case, asked.roles)
+    return run.rehearse(asked.case, plan, recording, asked.progress)
+
+
+def _driven(
+    asked: _Asked,
+    excitation: str | Path | Log | None,
+    hold: str,
+    initial: State | str | None,
+    payload_schedule: Schedule | str | None,
+) -> list[Log]:
+    """The logs of an arm under a torque."""
+    recording = asked.recording(1.0 if asked.duration is None else asked.duration)
+    if initial is not None:
+        recording = replace(recording, initial=_state(initial))
+    named = "case" if excitation is None else excitation
+    drive = _torque(asked.case, named, hold)
+    if hold != "exact" and named in run.EXCITATIONS:
+        drive = run.held(drive, asked.rate, recording.duration, "zoh" if hold == "zoh" else "foh")
+    if payload_schedule is not None:
+        schedule = _schedule(payload_schedule)
+        asked.files.refuse_existing(asked.case, ("schedule",))
+        return [run.with_schedule(asked.case, drive, recording, schedule, asked.progress)]
+    asked.files.refuse_existing(asked.case, asked.roles)
+    logs = run.synthesise(asked.case, drive, recording, asked.progress)
+    return [*logs][: len(asked.roles)]
+
+
+def _among(flag: str, value: object, known: Sequence[str]) -> None:
+    if value not in known:
+        raise SettingError(f"{flag}: expected one of {', '.join(known)}, found {value!r:.60}")
+
+
+def _start_ns(start: datetime) -> int:
+    """A date in ns since 1970, in UTC where it names no zone."""
+    found = start if start.tzinfo is not None else start.replace(tzinfo=UTC)
+    if not FIRST_YEAR <= found.year <= LAST_YEAR:
+        span = f"from {FIRST_YEAR} to {LAST_YEAR}"
+        raise SettingError(f"--start-time: expected a date {span}, found {start.isoformat()}")
+    return int(found.timestamp()) * 10**9
+
+
+def _schedule(given: Schedule | str) -> list[tuple[float, float]]:
+    """Times in s, increasing, and payloads in kg out of pairs, or of S=KG,…."""
+    pairs = [part.split("=") for part in given.split(",")] if isinstance(given, str) else given
+    try:
+        schedule = [(float(time), float(mass)) for time, mass in pairs]
+    except (TypeError, ValueError):
+        schedule = []
+    times = [time for time, _ in schedule]
+    increasing = all(earlier < later for earlier, later in pairwise(times))
+    longest, heaviest = PHYSICAL.duration[1], PHYSICAL.mass[1]
+    if not (
+        schedule
+        and increasing
+        and all(0 <= time <= longest and 0 <= m <= heaviest for time, m in schedule)
+    ):
+        raise SettingError(
+            f"--payload-schedule: expected increasing times and payloads of 0 or more like 2=0.05,4=0, found {given!r}"
+        )
+    return schedule
+
+
+def _state(given: State | str) -> tuple[float, float, float, float]:
+    """Two angles in rad and two velocities in rad/s out of four numbers, or of θ1,θ2,ω1,ω2."""
+    parts = given.split(",") if isinstance(given, str) else given
+    try:
+        first, second, third, fourth = (float(part) for part in parts)
+    except (TypeError, ValueError):
+        first = second = third = fourth = math.nan
+    if not math.isfinite(first + second + third + fourth):
+        raise SettingError(f"--initial: expected four numbers like -1.57,0,0,0, found {given!r}")
+    turned, fast = PHYSICAL.angle[1], PHYSICAL.speed[1]
+    if max(abs(first), abs(second)) > turned or max(abs(third), abs(fourth)) > fast:
+        raise SettingError(
+            f"--initial: expected angles within {turned:g} rad and {fast:g} rad/s, found {given!r}"
+        )
+    return first, second, third, fourth
+
+
+def _torque(case: Case, given: str | Path | Log, hold: str) -> Torque:
+    """The excitation of that name, or the torque of a log."""
+    from algid.synth.excitation import SampledTorque
+
+    if isinstance(given, str) and given in run.EXCITATIONS:
+        return run.excitation(case, given)
+    if not isinstance(given, Log):
+        from algid.readers import read_log
+
+        if not str(given) or not Path(given).exists():
+            raise SettingError(
+                f"--torque {given}: expected {', '.join(run.EXCITATIONS)} or a log, found neither"
+            )
+        given = read_log(given)
+    return SampledTorque(given.t, given.tau, "foh" if hold == "foh" else "zoh")

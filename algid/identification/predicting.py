@@ -1,0 +1,33 @@
+"""The torque that a result predicts along a log that it was not made from."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+import polars as pl
+
+from algid.arm import FloatArray
+from algid.estimators.prediction import seconds
+from algid.identification.identify import reused
+from algid.identification.series import torque_blocks
+from algid.identification.source import LogLike, Role, open_source
+from algid.identification.survey import Survey
+from algid.identification.validate import predictor_of
+from algid.results import Result
+
+if TYPE_CHECKING:
+    from algid.profile import Profile
+
+
+def predicted(result: Result, log: LogLike, role: Role, profile: Profile | None) -> pl.DataFrame:
+    """Motion, measured and predicted torque of a log: see `algid.Result.predict`."""
+    known = predictor_of(result, result.log.path)
+    source = open_source(log, role, reused(profile, result), known.model.gravity)
+    coefficients: dict[str, FloatArray] = {role: known.coefficients(role)}
+    shift = partial(seconds, known.shift)
+    blocks = list(torque_blocks(Survey([source]), known.model, coefficients, shift))
+    names = [name for name in blocks[0] if name != "log"] if blocks else []
+    columns = {name: np.concatenate([block[name] for block in blocks]) for name in names}
+    return pl.DataFrame(columns)

@@ -1,0 +1,87 @@
+"""What a log holds and is worth, as tables and lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from algid.inspection.report import Inspection
+from algid.report.document import Column, Table
+from algid.text import visible
+from algid.words import counted
+
+MOST_SHOWN = 100
+"""Entries of a log that are listed."""
+MOST_FIELDS = 12
+NAME, TYPE = 80, 60
+"""Letters of an entry's name and type that are shown."""
+
+
+def inspection_content(found: Inspection) -> Iterator[Table | str]:
+    """Tables, and lines between them, from what the log holds to what is wrong with it."""
+    synthetic = ", synthetic" if found.synthetic else ""
+    yield f"{visible(found.path, 1000)}: {found.format}{synthetic}"
+    yield from _held(found)
+    if found.mapping:
+        rows = tuple((name, visible(source)) for name, source in sorted(found.mapping.items()))
+        yield Table("Taken as", (Column("algid", "name"), Column("log", "text")), rows)
+    yield from _figures(found)
+    for one in (*found.notices, *found.findings):
+        yield f"{one.code}: {visible(one.clause, 2000)}"
+    if found.refused:
+        yield f"refused: {visible(found.refused, 2000)}"
+
+
+def _held(found: Inspection) -> Iterator[Table | str]:
+    """Columns or topics, then what the messages of each topic hold."""
+    shown = found.entries[:MOST_SHOWN]
+    columns = (
+        Column("Name", "name"),
+        Column("Type", "text"),
+        Column("Samples", "number"),
+        Column("Hz", "number"),
+    )
+    rows = [
+        (visible(one.name, NAME), visible(one.type, TYPE), *_numbers(one.count, one.rate))
+        for one in shown
+    ]
+    left = len(found.entries) - len(shown)
+    note = f"and {left} more" if left else ""
+    if rows:
+        yield Table("Channels", columns, tuple(rows), note).without_empty()
+    for one in shown:
+        if one.joints or one.fields:
+            joints = f"joints {', '.join(one.joints)}; " if one.joints else ""
+            more = " …" if len(one.fields) > MOST_FIELDS else ""
+            fields = ", ".join(one.fields[:MOST_FIELDS]) or "without a number"
+            yield visible(f"{one.name}: {joints}fields {fields}{more}", 2000)
+
+
+def _numbers(count: int | None, rate: float | None) -> tuple[str, str]:
+    return "" if count is None else str(count), "" if rate is None else f"{rate:.4g}"
+
+
+def _figures(found: Inspection) -> Iterator[Table | str]:
+    """Of clock, signals and dynamics."""
+    if found.clock is not None:
+        clock = found.clock
+        yield (
+            f"{counted(clock.rows, 'sample')}, {clock.duration:.6g} s at {clock.rate:.6g} Hz, "
+            f"jitter {clock.jitter * 1e3:.3g} ms, {counted(clock.gaps, 'gap')}, "
+            f"the longest {clock.longest_gap:.3g} s"
+        )
+    if found.signals:
+        headings = ("Low", "High", "Noise", "Step", "Saturated, %")
+        columns = (Column("Channel", "name"), *(Column(one, "number") for one in headings))
+        rows = []
+        for name, one in found.signals.items():
+            values = (one.low, one.high, one.noise, one.step, 100 * one.saturated)
+            rows.append((name, *(f"{value:.4g}" for value in values)))
+        yield Table("Signals", columns, tuple(rows))
+    if found.dynamics is not None:
+        rough = found.dynamics
+        yield (
+            f"excitation: condition number {rough.condition:.4g}; rough fit explains "
+            f"{100 * rough.explained:.3g} % of the torques, "
+            f"gravity {100 * rough.gravity_share:.3g} %: k4 {rough.weight1:.3g} N m, "
+            f"k2 {rough.weight2:.3g} N m, turned by {round(rough.turn)}°"
+        )
