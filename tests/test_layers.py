@@ -61,7 +61,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "numpy polars pyarrow",
     ),
     "batches": room(
-        "construction errors files identification limits profile readers results runtime settings stores verdict",
+        "construction errors files identification limits profile readers results runtime settings stores text verdict",
         "distributed mcap polars pyarrow pydantic",
     ),
     "tracks": room(

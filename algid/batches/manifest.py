@@ -21,6 +21,7 @@ from algid.batches.jobs import Job, Label, checked_name, utc_of
 from algid.errors import SettingError
 from algid.files import parsed_toml, read_start, read_text
 from algid.limits import LIMITS
+from algid.text import visible
 
 
 def is_manifest(path: Path) -> bool:
@@ -72,7 +73,7 @@ def _tables(path: Path) -> list[dict[str, object]]:
         or not all(isinstance(row, dict) for row in rows)
     ):
         found = ", ".join(content) or "nothing"
-        raise SettingError(f"{path}: expected tables [[job]] alone, found {found:.200}")
+        raise SettingError(f"{path}: expected tables [[job]] alone, found {visible(found, 200)}")
     return rows
 
 
@@ -94,7 +95,7 @@ def _job(row: Mapping[str, object], place: str, folder: Path) -> Job:
     logs, loaded = _paths(row, "logs", place, folder), _paths(row, "loaded", place, folder)
     if "name" not in row or not (logs or loaded):
         found = ", ".join(row) or "nothing"
-        raise SettingError(f"{place}: expected a name and logs, found {found:.200}")
+        raise SettingError(f"{place}: expected a name and logs, found {visible(found, 200)}")
     profile = _paths(row, "profile", place, folder)
     labels = {
         name: _label(row, name, place) for name in row if name not in ("logs", "loaded", "profile")

@@ -17,6 +17,7 @@ from algid.limits import LIMITS
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign
 from algid.readers.frames import flat_reader, number, of_numbers
+from algid.readers.hdf5 import arrays_of
 from algid.readers.jsonlines import frame_of_lines
 from algid.readers.matfile import check_elements
 from algid.readers.names import TIMES
@@ -147,7 +148,13 @@ def contents_of(path: Path, kind: str) -> tuple[Content, tuple[str, ...]]:
 
 
 def _npy(path: Path) -> dict[str, NDArray[Any]]:
-    array = np.load(path, allow_pickle=False)
+    with path.open("rb") as stream:
+        array = np.lib.format.read_array(stream, allow_pickle=False)
+        if stream.read(1):
+            raise LogError(
+                f"{path}: its head says {counted(len(array), 'row')}, and there is more behind them; the file was "
+                "damaged, save it again"
+            )
     if array.dtype.names is None:
         raise LogError(
             f"{path}: an array without names; save it with np.savez(FILE, t=…, q=…, tau=…)"
@@ -166,7 +173,7 @@ def _npz(path: Path) -> dict[str, NDArray[Any]]:
         return dict(archive)
 
 
-def _matlab(path: Path) -> dict[str, NDArray[Any]]:
+def _matlab(path: Path) -> Mapping[str, NDArray[Any]]:
     from scipy.io import loadmat
 
     check_elements(path)
@@ -177,43 +184,8 @@ def _matlab(path: Path) -> dict[str, NDArray[Any]]:
     return dict(_leaves(content, ""))
 
 
-def _hdf5(path: Path) -> dict[str, NDArray[Any]]:
-    """The datasets of numbers in an HDF5 file, by their paths with dots; nothing that lies in another file."""
-    try:
-        import h5py
-    except ImportError as error:
-        mend = "pip install 'algid[hdf5]', or in MATLAB save(FILE, '-v7')"
-        raise LogError(f"{path}: an HDF5 file, for which h5py is needed: {mend}") from error
-    found: dict[str, Any] = {}
-
-    def keep(name: str, one: Any) -> None:
-        if (
-            isinstance(one, h5py.Dataset)
-            and not (one.is_virtual or one.external)
-            and not name.startswith("#")
-        ):
-            kinds = one.dtype.names or ()
-            fields = {f"{name}/{field}": one.dtype[field] for field in kinds} or {name: one.dtype}
-            if one.ndim <= 2 and all(kind.kind in "iuf" for kind in fields.values()):
-                found[name] = one
-
-    with h5py.File(path, "r") as file:
-        file.visititems(keep)
-        claimed = sum(one.nbytes for one in found.values())
-        if claimed > LIMITS.whole_bytes or len(found) > LIMITS.columns:
-            raise LogError(
-                f"{path}: {counted(len(found), 'array')} of {counted(claimed, 'byte')}; save it as Parquet"
-            )
-        arrays: dict[str, NDArray[Any]] = {}
-        for name, one in found.items():
-            values = one[()]
-            plain = name.replace("/", ".")
-            arrays |= (
-                {f"{plain}.{field}": values[field] for field in values.dtype.names}
-                if values.dtype.names
-                else {plain: np.atleast_1d(values)}
-            )
-    return arrays
+def _hdf5(path: Path) -> Mapping[str, NDArray[Any]]:
+    return arrays_of(path, most_bytes=LIMITS.whole_bytes, most_arrays=LIMITS.columns)
 
 
 _LOADERS = {"npy": _npy, "npz": _npz, "mat": _matlab, "hdf5": _hdf5}

@@ -21,7 +21,7 @@ _CONTINUED = 0xFFFFFFFF
 _DICTIONARIES, _BATCHES = 2, 3
 """Fields of the footer: where those messages stand."""
 _BLOCK = struct.Struct("<qi4xq")
-_BUFFER = struct.Struct("<qq")
+_NODE = _BUFFER = struct.Struct("<qq")
 
 
 def claims(path: Path) -> int:
@@ -125,6 +125,11 @@ def _claimed(batch: _Table, stream: BinaryIO, start: int, size: int) -> _Message
     rows = batch.number(0, "<q")
     if not 0 <= rows <= LIMITS.whole_bytes:
         raise ValueError(f"the message at byte {start} claims {rows} as its rows")
+    nodes = batch.vector(1, _NODE)
+    if nodes and nodes[0][0] != rows:  # pyarrow takes the fewer
+        raise ValueError(
+            f"the message at byte {start} claims {counted(rows, 'row')}, and its first column {nodes[0][0]}"
+        )
     return _Message(rows, len(places), unpacked)
 
 

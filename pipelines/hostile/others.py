@@ -61,16 +61,14 @@ def _feather(path: Path, columns: dict[str, Any], packing: str | None) -> None:
 
 
 def _hdf5_files(folder: Path, columns: dict[str, Any]) -> list[Path]:
-    """Arrays in one piece, in chunks, packed and with sums, and a table; none where h5py is missing."""
+    """Arrays in one piece, in chunks that are packed and bear sums, and a table; none where h5py is missing."""
     try:
         import h5py
     except ImportError:
         return []
     kinds: dict[str, dict[str, Any]] = {
         "plain": {},
-        "chunked": {"chunks": (32,)},
-        "packed": {"chunks": (32,), "compression": "gzip"},
-        "summed": {"chunks": (32,), "fletcher32": True},
+        "packed": {"chunks": (30,), "compression": "gzip", "fletcher32": True},
     }
     paths = [folder / f"clean.{kind}.h5" for kind in (*kinds, "table")]
     for path, more in zip(paths, kinds.values(), strict=False):

@@ -274,6 +274,10 @@ def test_a_bad_manifest_is_refused_by_its_place(tmp_path: Path, text: str, told:
             r"expected tables \[\[job\]\] alone, found more, job",
         ),
         ("[[job]]\nlogs = 'a.csv'", "job 1: expected a name and logs, found logs"),
+        (
+            "[[job]]\n\"line\\nfeed\" = 'a.csv'",
+            r"job 1: expected a name and logs, found line\\x0afeed",
+        ),
         ("[[job]]\nname = 'x'\nlogs = 5", "job 1: logs: expected paths, found 5"),
         (
             "[[job]]\nname = 'x'\nlogs = ['a.csv', 5]",
