@@ -217,6 +217,15 @@ MESSAGES: Mapping[str, str] = {
         "instruments and least squares are {distance:.1f} standard deviations apart: torque that the model lacks "
         "drives the motion, and least squares takes the constants too small"
     ),
+    "INSTRUMENTS_STAND": (
+        "torque that the model lacks drives the motion (least squares is {distance:.1f} of its standard deviations "
+        "off), and the logged torque does not answer it: instruments stand in place of least squares"
+    ),
+    "FEEDBACK": (
+        "the logged torque answers torque that the model lacks (feedback, p = {p_value:.1g}): neither least squares "
+        "nor the logged torque as an instrument is right, and constants may be off by more than their intervals; "
+        "record with the torque commanded in open loop"
+    ),
     "NO_PAYLOAD": "the payload is not significantly different from zero: at most {most:.3g} kg at 95 %",
     "LENGTHS_NEEDED": "without link lengths a payload near zero is not determined: give --l1 and --l2",
     "LENGTH_MISMATCH": (

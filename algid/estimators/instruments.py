@@ -145,7 +145,7 @@ def _solved(
     logs: list[LogInformation] = []
     for _ in range(_ROUNDS):
         found = [moments(source, settings, c) for source in sources]
-        if any(one is None or one.astray > _FEWEST * one.rows for one in found):
+        if any(one is None or gone_astray(one) for one in found):
             return None
         sums = [one for one in found if one is not None and one.rows]
         if not sums:
@@ -189,6 +189,16 @@ def _information(sums: Moments, weights: FloatArray, c: FloatArray, loaded: bool
     return LogInformation(loaded, c, projection @ A, scores @ projection.T)
 
 
+def gone_astray(sums: Moments) -> bool:
+    """Whether most windows cannot be simulated."""
+    return sums.astray > _FEWEST * sums.rows
+
+
+def projected(sums: Moments, c: FloatArray, loaded: bool) -> LogInformation:
+    """A log's likelihood projected on the instruments, with the weights of its residual at `c` (q,)."""
+    return _information(sums, _weights(sums, c), c, loaded)
+
+
 def moments(
     source: Source, settings: WeakSettings, c: FloatArray, most: int | None = None
 ) -> Moments | None:
@@ -225,11 +235,21 @@ def moments(
             :, :-1, ::OVERLAP
         ]
         both = np.where(good, np.concatenate([Z, np.concatenate(columns, axis=2)], axis=1), 0.0)
+        both = np.where(_moving(windows, batch, settings)[:, None], both, 0.0)
         rows += good.size
         astray += int(np.sum(np.logical_not(good)))
         for part in np.split(both, np.cumsum([X.shape[2] for X in columns])[:-1], axis=2):
             sums.add(weak.grams(part, OVERLAP // _STRIDE))
     return Moments(sums.values(), rows, astray) if rows else Moments(np.zeros((0, 2, 1, 1)), 0, 0)
+
+
+def _moving(
+    windows: Windows, batch: Sequence[tuple[Segment, Windows, int]], settings: WeakSettings
+) -> NDArray[np.bool_]:
+    """Windows (2, R) in which a joint does not stand: see `WeakSettings.rest`."""
+    speeds = [windows.square_speeds(piece)[:, ::_STRIDE] for piece, _, _ in batch]
+    rest = (0.0, 0.0) if settings.rest is None else settings.rest
+    return np.concatenate(speeds, axis=1) >= np.square(rest)[:, None]
 
 
 def _cut(piece: Segment, windows: Windows) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

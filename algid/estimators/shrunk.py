@@ -63,11 +63,18 @@ def fit(
     terms = offered([normal for _, normal in first], held)
     estimates_delay = settings.estimate_delay or settings.delay == 0
     settings = replace(_with_terms(settings, terms), estimate_delay=estimates_delay)
-    rest = AT_REST * weak.speeds([*unloaded, *loaded], settings)
-    settings = replace(settings, rest=(float(rest[0]), float(rest[1])))
+    settings = resting(unloaded, loaded, settings)
     shared = Shared(settings.model, estimates_delay, bool(loaded), dict(lengths or {}))
     moved = np.max([normal.moved for _, normal in first], axis=0)
     return _found(logs, shared, settings, known, held, moved)
+
+
+def resting(
+    unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
+) -> WeakSettings:
+    """The settings with the speeds below which a joint of these logs stands."""
+    rest = AT_REST * weak.speeds([*unloaded, *loaded], settings)
+    return replace(settings, rest=(float(rest[0]), float(rest[1])))
 
 
 def offered(normals: Sequence[Normal], held: Sequence[str] = ()) -> tuple[str, ...]:

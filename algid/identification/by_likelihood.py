@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from algid.errors import LogError
-from algid.estimators import instruments, shrunk, weak
+from algid.estimators import exogeneity, instruments, shrunk, weak
 from algid.estimators.body import with_body
 from algid.estimators.combine import Prior, without
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, constrained
@@ -146,6 +146,8 @@ def run_fit(
         if fit.refuted and settings.chooses:
             fit, chosen = _shrunk(fit, unloaded, loaded, ours, settings, chosen, prior)
             sums.clear()
+        elif fit.estimator == "instruments":
+            fit = exogeneity.watched(fit, unloaded, loaded, ours)
     except TooShortError as error:
         raise LogError(
             f"{', '.join(log.name for log in survey.logs)}: {error}; record longer"
@@ -171,7 +173,8 @@ def _shrunk(
     every = replace(shaped.model, terms=tuple(term for term in TERMS if term in SCALES))
     nothing = absent(settings.effort, every.names)
     fit = shrunk.fit(unloaded, loaded, shaped, settings.lengths, without(prior, nothing))
-    fit = replace(fit, notes=(*refuted.notes, Notice("SHRUNK_TERMS", note=True)))
+    fit = exogeneity.settled(fit, unloaded, loaded, shaped)
+    fit = replace(fit, notes=(*refuted.notes, Notice("SHRUNK_TERMS", note=True), *fit.notes))
     terms = (*fit.shared.model.terms, *(DELAYS if fit.shared.delay else ()))
     trials = tuple(TermTrial(term, True, np.nan, np.nan, _SHRUNK) for term in terms)
     return fit, Selection(fit.shared.model, fit.shared.delay, chosen.chosen_by, trials, shrunk=True)
@@ -233,7 +236,9 @@ def _explains_little(fit: Fit, survey: Survey, settings: Settings) -> bool:
 
 
 def with_endogeneity(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) -> Fit:
-    """The fit with how far instruments and least squares are apart on its logs."""
+    """The fit with how far instruments and least squares are apart on its logs, where it is not known."""
+    if fit.endogeneity is not None:
+        return fit
     unloaded, loaded = _passes(survey, settings)
     return replace(
         fit,

@@ -1,0 +1,255 @@
+"""Whether least squares may stand: tests of an endogenous torque, and of one that answers the motion.
+
+Torque that the model lacks drives the motion, and least squares is attenuated by it. Instruments
+(`algid.estimators.instruments`) are not, as long as the measured torque does not answer that torque.
+Both are compared with the same terms and the same prior, and the residual with the torque after it:
+
+    h  = dᵀ V⁻¹ d,   d = β_instruments − β_least squares          χ² of the number of constants
+    r_l = Σ e(t) y(t + l) / (Σ_k N γ_e(k) γ_y(k))^½               normal, where no torque answers
+
+V is the long-run variance of the difference of both estimates' influences, window by window
+(Durbin, Wu & Hausman, in the form that needs no efficient estimate: Wooldridge 2010, §6.3.1); the
+variance of a cross-correlation is Bartlett's 1946. Instruments stand in place of least squares where
+h tells that they differ, no torque answers, and a constant moves by its own standard deviation:
+below that an interval loses less than 5 points of its coverage.
+
+======  =======================================================  ==========  =================
+symbol  name                                                     shape       unit
+======  =======================================================  ==========  =================
+e, y    residual of the instruments' windows, torque's moment    (2, R)      N m
+γ       autocovariances, lag by lag                              (K, 2)      (N m)²
+======  =======================================================  ==========  =================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import erfc, sqrt
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.compiled import chi2_tail
+from algid.estimators import instruments, weak
+from algid.estimators.combine import combine, long_run_variance, scaled_pinv
+from algid.estimators.fit import Fit
+from algid.estimators.shrinkage import dispersion, divided
+from algid.estimators.shrunk import resting
+from algid.estimators.shrunk_fit import concluded
+from algid.estimators.weak import Source, WeakSettings
+from algid.model import RIGID
+from algid.notices import Notice, Remedy
+
+SURE = 1e-3  # chance of a false alarm of endogeneity
+ANSWERS = 0.01  # chance of a false alarm of feedback
+MOVES = 1.0  # standard deviations of a constant that are worth another estimator
+_NEAR = 0.5  # of them: nearer, instruments are not simulated again
+_LAGS = 8  # steps between windows, two windows in all
+_MEMORY = 40  # lags of the autocovariances
+
+
+@dataclass(frozen=True)
+class Exogeneity:
+    """What the tests say.
+
+    Parameters
+    ----------
+    distance : how far a constant moves, in standard deviations of the instruments, at most
+    moved : the same in standard deviations of least squares
+    same : chance of such a difference where the torque is exogenous
+    silent : chance of such correlations where the torque does not answer the motion
+    """
+
+    distance: float
+    moved: float
+    same: float
+    silent: float
+
+    @property
+    def endogenous(self) -> bool:
+        """Whether least squares is off by more than its error bars take in."""
+        return self.same < SURE and self.moved > MOVES
+
+    @property
+    def answers(self) -> bool:
+        """Whether the measured torque answers the motion, so that it is no instrument."""
+        return self.silent < ANSWERS
+
+
+def settled(
+    fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
+) -> Fit:
+    """The fit of shrunk terms, by instruments where the torque is endogenous and answers nothing.
+
+    Parameters
+    ----------
+    fit : Fit
+        By least squares.
+    unloaded, loaded : sequences of callables
+        Each gives a fresh iterable of `Segment`.
+    settings : WeakSettings
+        Of the fit: window, bandwidth and hold; model and delay are the fit's.
+    """
+    settings = resting(unloaded, loaded, settings)
+    found = instrumented(fit, fit.values, unloaded, loaded, settings)
+    if found is None:
+        return fit
+    if _moved(found, fit) > _NEAR:
+        found = instrumented(fit, found.values, unloaded, loaded, settings) or found
+    tests = examined(found, fit, unloaded, loaded, settings)
+    fit = replace(fit, endogeneity=tests.distance)
+    if not tests.endogenous:
+        return fit
+    if tests.answers:
+        return fit.noted(feedback(tests.silent))
+    note = Notice("INSTRUMENTS_STAND", numbers={"distance": tests.moved}, note=True)
+    return replace(found, endogeneity=tests.distance, notes=fit.notes).noted(note)
+
+
+def watched(
+    fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
+) -> Fit:
+    """A fit by instruments, with a warning where the torque answers the motion and is none."""
+    chance = _silent(fit, unloaded, loaded, settings)
+    return fit.noted(feedback(chance)) if chance < ANSWERS else fit
+
+
+def feedback(p_value: float) -> Notice:
+    """That the measured torque answers what the model lacks."""
+    remedy = Remedy({"estimator": "weak"}, "to compare")
+    return Notice("FEEDBACK", numbers={"p_value": p_value}, remedies=(remedy,))
+
+
+def instrumented(
+    fit: Fit,
+    at: FloatArray,
+    unloaded: Sequence[Source],
+    loaded: Sequence[Source],
+    settings: WeakSettings,
+) -> Fit | None:
+    """The fit's parameters by instruments that are simulated at `at` (Q,), with its terms and its prior.
+
+    None where the windows cannot be simulated.
+    """
+    shared = fit.shared
+    settings, base = _of(fit, settings)
+    logs = []
+    for kind, sources in ((False, unloaded), (True, loaded)):
+        for source in sources:
+            c0 = shared.coefficients(at, kind)
+            c = c0.copy()
+            if shared.delay:  # the windows are shifted by it: its column tells a change
+                c[-1] -= base
+            sums = instruments.moments(source, settings, c)
+            if sums is None or instruments.gone_astray(sums):
+                return None
+            if sums.rows:
+                logs.append(replace(instruments.projected(sums, c, kind), c0=c0))
+    if len(logs) != len(fit.logs) or fit.prior is None or fit.shrinkage is None:
+        return None
+    scaled = divided(logs, dispersion(shared, logs, at))
+    found = concluded(shared, scaled, at, fit.prior, fit.shrinkage, fit.moved)
+    return replace(found, estimator="instruments")
+
+
+def examined(
+    better: Fit,
+    least: Fit,
+    unloaded: Sequence[Source],
+    loaded: Sequence[Source],
+    settings: WeakSettings,
+) -> Exogeneity:
+    """The tests on estimates by instruments and by least squares."""
+    places = [place for place, name in enumerate(least.names) if name in RIGID]
+    places = [place for place in places if np.isfinite(better.std[place] + least.std[place])]
+    if not places:
+        return Exogeneity(0.0, 0.0, 1.0, 1.0)
+    away = (better.values - least.values)[places]
+    influences = zip(_influences(better), _influences(least), strict=True)
+    V = np.sum([_variance(one, other) for one, other in influences], axis=0)
+    h = float(away @ scaled_pinv(V[np.ix_(places, places)]) @ away)
+    same = float(chi2_tail(len(places), max(h, 0.0)))
+    distance = float(np.max(np.abs(away) / better.std[places]))
+    silent = _silent(better, unloaded, loaded, settings)
+    return Exogeneity(distance, _moved(better, least), same, silent)
+
+
+def _moved(better: Fit, least: Fit) -> float:
+    """How far a constant moves at most, in standard deviations of least squares."""
+    known = np.array([name in RIGID for name in least.names]) & np.isfinite(least.std)
+    return float(
+        np.max(np.abs(better.values - least.values)[known] / least.std[known], initial=0.0)
+    )
+
+
+def _of(fit: Fit, settings: WeakSettings) -> tuple[WeakSettings, float]:
+    """The settings with the fit's model and delay, and that delay in s."""
+    shared = fit.shared
+    base = float(fit.values[fit.names.index("delay")]) if shared.delay else settings.delay
+    own = replace(settings, model=shared.model, delay=base, estimate_delay=shared.delay)
+    return own, base
+
+
+def _influences(fit: Fit) -> list[FloatArray]:
+    """What the stretches (B, Q) of each log move the estimate by."""
+    _, H, _ = combine(fit.shared, fit.logs, fit.values, fit.prior)
+    inverse = scaled_pinv(H)
+    found: list[FloatArray] = []
+    for log in fit.logs:
+        change = fit.shared.coefficients(fit.values, log.loaded) - log.c0
+        scores = (log.g - log.S @ change) @ fit.shared.jacobian(fit.values, log.loaded)
+        found.append(scores @ inverse)
+    return found
+
+
+def _variance(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Variance (Q, Q) of the sum of a difference of influences; of the first alone where stretches differ."""
+    return long_run_variance(one - other if one.shape == other.shape else one)[0]
+
+
+def _silent(
+    fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
+) -> float:
+    """Chance of such correlations between the residual and later torques where none answers (Bonferroni)."""
+    settings, _ = _of(fit, settings)
+    settings = replace(settings, estimate_delay=False)
+    products, variance = np.zeros((_LAGS, 2)), np.zeros(2)
+    for kind, sources in ((False, unloaded), (True, loaded)):
+        for source in sources:
+            c = fit.shared.coefficients(fit.values, kind)[: len(settings.model.names)]
+            e, y = _residual(source, settings, c)
+            if e.shape[1] > 2 * _LAGS:
+                own, spread = _crossed(e, y)
+                products, variance = products + own, variance + spread
+    if not np.all(variance > 0):
+        return 1.0
+    largest = float(np.max(np.abs(products) / np.sqrt(variance)))
+    return min(1.0, products.size * erfc(largest / sqrt(2)))
+
+
+def _residual(
+    source: Source, settings: WeakSettings, c: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Residuals and torques' moments (2, R) of a log's windows, less their means."""
+    rows = [np.empty((4, 0))]
+    for piece, windows, _ in weak.overlapping(source(), settings):
+        X = windows.equations(settings.model, piece, False, c)
+        rows.append(np.concatenate([X[:, -1] - np.einsum("q,aqr->ar", c, X[:, :-1]), X[:, -1]]))
+    every = np.concatenate(rows, axis=1)
+    every = every - every.mean(axis=1, keepdims=True) if every.shape[1] else every
+    return every[:2], every[2:]
+
+
+def _crossed(e: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Sums (L, 2) of products of residuals with torques l windows later, l = 1 … L, and their variances (2,)."""
+    count = e.shape[1]
+    memory = min(_MEMORY, count // 3)
+
+    def autocovariance(x: FloatArray) -> FloatArray:
+        every = [np.sum(x[:, : count - lag] * x[:, lag:], axis=1) for lag in range(memory)]
+        return np.array(every) / count
+
+    both = autocovariance(e) * autocovariance(y)
+    products = [np.sum(e[:, :-lag] * y[:, lag:], axis=1) for lag in range(1, _LAGS + 1)]
+    return np.array(products), count * np.maximum(both[0] + 2 * both[1:].sum(axis=0), both[0])
