@@ -81,7 +81,8 @@ def page(document: Document, shared_library: bool = False) -> str:
             NOSCRIPT,
         ]
     )
-    data, style = script_json(drawing(document)), _asset("report.css")
+    figures = gzip.compress(script_json(drawing(document)).encode(), mtime=0)
+    data, style = packed_text(figures), _asset("report.css")
     moves = any(isinstance(one, ArmDrawing) for one in document.content())
     running = [_asset(name) for name in ("report.js", *(["arm.js"] if moves else []))]
     if shared_library:
@@ -107,13 +108,14 @@ def page(document: Document, shared_library: bool = False) -> str:
         '<meta name="color-scheme" content="light dark">\n<link rel="icon" href="data:,">\n'
         f"<title>{escaped(document.tab or document.name)} · algid</title>\n<style>{style}</style>\n</head>\n<body>\n"
         f'<a class="skip" href="#numbers">Skip to the numbers</a>\n{body}\n'
-        f'<script type="application/json" id="figures">{data}</script>\n{tag}\n{elements}\n'
+        f'<script type="text/plain" id="figures">{data}</script>\n{tag}\n{elements}\n'
         "</body>\n</html>\n"
     )
 
 
 def drawing(document: Document) -> dict[str, object]:
-    """What the page's script draws."""
+    """What the page's script draws; an array that several lines share stands in `arrays` once."""
+    arrays: dict[str, int] = {}
     panels = [
         {
             "id": panel_id(figure, place),
@@ -121,14 +123,25 @@ def drawing(document: Document) -> dict[str, object]:
             "columns": "two" if figure.columns == 2 else "one",
             "sync": panel.sync,
             "height": panel.height,
-            "traces": panel.traces,
+            "traces": _shared(panel.traces, arrays),
             "layout": panel.layout,
         }
         for figure in document.content()
         if isinstance(figure, Figure)
         for place, panel in enumerate(figure.panels)
     ]
-    return {"template": TEMPLATE, "panels": panels}
+    return {"template": TEMPLATE, "panels": panels, "arrays": list(arrays)}
+
+
+def _shared(value: Any, arrays: dict[str, int]) -> Any:
+    """`value` with the place in `arrays` of each typed array's content instead of it."""
+    if isinstance(value, list):
+        return [_shared(inner, arrays) for inner in value]
+    if not isinstance(value, dict):
+        return value
+    if "bdata" in value:
+        return {**value, "bdata": arrays.setdefault(value["bdata"], len(arrays))}
+    return {name: _shared(inner, arrays) for name, inner in value.items()}
 
 
 def _asset(name: str) -> str:
@@ -161,4 +174,9 @@ def library() -> Library:
         from plotly.offline import get_plotlyjs
 
         content = gzip.compress(get_plotlyjs().encode(), mtime=0)
-    return Library(gzip.decompress(content).decode(), base64.b64encode(content).decode())
+    return Library(gzip.decompress(content).decode(), packed_text(content))
+
+
+def packed_text(content: bytes) -> str:
+    """What gzip made, as the page's script unpacks it."""
+    return base64.b64encode(content).decode()

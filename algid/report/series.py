@@ -31,7 +31,7 @@ from algid.report.reduce import (
 EPSILON = 0.2  # s: the paper's ε
 WINDOW = 2.0  # s: after which the paper's integrals restart, unless its own settings say otherwise
 LARGEST_CONDITION = 1e10  # beyond, the paper's stages call a system singular
-SERIES_POINTS = 1_600
+SERIES_POINTS = 1_200  # twice what a panel is wide, of two in a row
 STRETCHES = 400
 SAMPLES = 20_000
 MIDDLES = 500

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import hashlib
 import html
 import io
 import json
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,8 +31,8 @@ from algid.report.document import (
     Table,
     filled,
 )
-from algid.report.figures.base import Figure, Legend, Missing, Panel
-from algid.report.frame import page
+from algid.report.figures.base import Figure, Legend, Missing, Panel, packed
+from algid.report.frame import drawing, page
 from algid.report.html import banner, contents, section_html, table_html
 from algid.report.markdown import markdown, markdown_table
 from algid.report.terminal import print_document
@@ -247,7 +249,9 @@ def test_the_script_is_handed_every_panel_in_its_place() -> None:
         Section((figure("one"), Missing("x", "X", "gone"))), Section((two,), "part", "P")
     )
     text = page(shown, shared_library=True)
-    data = json.loads(text.partition('id="figures">')[2].partition("</script>")[0])
+    packed = text.partition('id="figures">')[2].partition("</script>")[0]
+    data = json.loads(gzip.decompress(base64.b64decode(packed)))
+    assert data == json.loads(json.dumps(drawing(shown)))
     told = [
         (panel["id"], panel["figure"], panel["columns"], panel["height"])
         for panel in data["panels"]
@@ -261,6 +265,20 @@ def test_the_script_is_handed_every_panel_in_its_place() -> None:
     assert text.index('class="panels two"') > text.index('id="two"') > text.index('class="panels"')
     assert text.count('<div class="panels two">') == text.count('<div class="panels">') == 1
     assert set(data["template"]["layout"]) >= {"xaxis", "yaxis", "paper_bgcolor"}
+
+
+def test_an_array_that_lines_share_is_written_once() -> None:
+    x, y = packed(np.arange(3.0)), packed(np.arange(3.0, 6.0))
+    traces = [{"x": x, "y": y, "error_y": {"array": x}}, {"x": x, "y": [1, 2]}]
+    made = replace(figure("one"), panels=(Panel(traces, {}, ""),))
+    data: Any = drawing(document(Section((made,))))
+    assert data["arrays"] == [x["bdata"], y["bdata"]]
+    (panel,) = data["panels"]
+    assert panel["traces"] == [
+        {"x": x | {"bdata": 0}, "y": y | {"bdata": 1}, "error_y": {"array": x | {"bdata": 0}}},
+        {"x": x | {"bdata": 0}, "y": [1, 2]},
+    ]
+    assert traces[0]["x"] == packed(np.arange(3.0))  # the figure's own are left as they are
 
 
 def test_a_legend_with_a_group_is_a_button_and_views_are_a_choice() -> None:

@@ -1,7 +1,12 @@
 "use strict";
-(() => {
+(async () => {
+  // Figures and library stand in the page as text: gzip in base64. The library's own hash lets it run.
+  const unpacked = (element) => {
+    const bytes = Uint8Array.from(atob(element.textContent), (letter) => letter.charCodeAt(0));
+    return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+  };
   const root = document.documentElement;
-  const page = JSON.parse(document.getElementById("figures").textContent);
+  const page = JSON.parse(await unpacked(document.getElementById("figures")));
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const touch = matchMedia("(pointer: coarse)").matches;
   const PRINTED = { one: 690, two: 335 }; // CSS pixels of A4 less its margins
@@ -27,7 +32,8 @@
   const paint = (value, key, style) => {
     if (typeof value === "string") return /color/i.test(key) && value[0] === "@" ? colour(value, style) : value;
     if (Array.isArray(value)) return value.map((item) => paint(item, key, style));
-    if (value === null || typeof value !== "object" || "bdata" in value) return value;
+    if (value === null || typeof value !== "object") return value;
+    if ("bdata" in value) return { ...value, bdata: page.arrays[value.bdata] };
     return Object.fromEntries(Object.entries(value).map(([name, item]) => [name, paint(item, name, style)]));
   };
   const painted = (panel, width) => {
@@ -138,34 +144,27 @@
   });
   addEventListener("afterprint", () => { delete root.dataset.theme; redraw(); });
 
-  // The library stands in the page as text, gzip in base64; its own hash lets it run.
-  const unpack = async (packed) => {
-    const bytes = Uint8Array.from(atob(packed.textContent), (letter) => letter.charCodeAt(0));
+  const library = document.getElementById("library");
+  if (library) {
     const script = document.createElement("script");
-    const text = new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
-    script.textContent = await text;
+    script.textContent = await unpacked(library);
     document.head.append(script);
-  };
-
-  (async () => {
-    const packed = document.getElementById("library");
-    if (packed) await unpack(packed);
-    let failed = 0;
-    const drawAll = async () => {
-      for (const panel of page.panels) {
-        if (drawn.has(panel.id) || folded(panel)) continue;
-        try {
-          await start(panel);
-        } catch (error) {
-          failed += 1;
-          document.getElementById(panel.id).textContent = "This panel could not be drawn: " + error.message;
-        }
-        await new Promise((next) => setTimeout(next)); // let the page answer between panels
+  }
+  let failed = 0;
+  const drawAll = async () => {
+    for (const panel of page.panels) {
+      if (drawn.has(panel.id) || folded(panel)) continue;
+      try {
+        await start(panel);
+      } catch (error) {
+        failed += 1;
+        document.getElementById(panel.id).textContent = "This panel could not be drawn: " + error.message;
       }
-      root.dataset.failed = failed;
-      root.dataset.drawn = drawn.size;
-    };
-    for (const details of document.querySelectorAll("details")) details.addEventListener("toggle", drawAll);
-    await drawAll();
-  })();
+      await new Promise((next) => setTimeout(next)); // let the page answer between panels
+    }
+    root.dataset.failed = failed;
+    root.dataset.drawn = drawn.size;
+  };
+  for (const details of document.querySelectorAll("details")) details.addEventListener("toggle", drawAll);
+  await drawAll();
 })();
