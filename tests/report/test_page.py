@@ -280,7 +280,7 @@ def test_the_library_in_a_page_is_the_one_that_was_built_for_it(folder: Path) ->
     not BUNDLE.is_file(), reason="built without npm: pages carry the whole of plotly"
 )
 def test_a_page_is_light(folder: Path) -> None:
-    assert write_report(folder).stat().st_size <= 1_200_000  # ten seconds of log, and a loaded log beside it
+    assert write_report(folder).stat().st_size <= 1_200_000
 
 
 def test_the_papers_part_is_open_for_its_own_cases_and_folded_for_a_real_log(
