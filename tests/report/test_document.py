@@ -269,7 +269,10 @@ def test_the_script_is_handed_every_panel_in_its_place() -> None:
 
 def test_an_array_that_lines_share_is_written_once() -> None:
     x, y = packed(np.arange(3.0)), packed(np.arange(3.0, 6.0))
-    traces = [{"x": x, "y": y, "error_y": {"array": x}}, {"x": x, "y": [1, 2]}]
+    traces: list[dict[str, Any]] = [
+        {"x": x, "y": y, "error_y": {"array": x}},
+        {"x": x, "y": [1, 2]},
+    ]
     made = replace(figure("one"), panels=(Panel(traces, {}, ""),))
     data: Any = drawing(document(Section((made,))))
     assert data["arrays"] == [x["bdata"], y["bdata"]]
