@@ -7,7 +7,7 @@ theta   joint angles θ1, θ2                 (2, ...)    rad
 omega   joint velocities θ̇1, θ̇2             (2, ...)    rad/s
 alpha   joint accelerations θ̈1, θ̈2          (2, ...)    rad/s^2
 tau     joint torques τ1, τ2                (2, ...)    N m
-k       constants k1 … k7 (Table 1)         (7,)        `CONSTANT_UNITS`
+k       constants k1 … k7 (Table 1)         (7,)        `algid.model.UNITS`
 z       payload constants z1 … z5 (Table 2) (5,)        `PAYLOAD_UNITS`
 m_p     tip payload                         scalar      kg
 ======  ==================================  ==========  ===============
@@ -42,15 +42,6 @@ def keep_arrays(holder: object) -> None:
 
 
 CONSTANT_NAMES = ("k1", "k2", "k3", "k4", "k5", "k6", "k7")
-CONSTANT_UNITS = {
-    "k1": "kg m^2",
-    "k2": "N m",
-    "k3": "kg m^2",
-    "k4": "N m",
-    "k5": "kg m^2",
-    "k6": "N m s/rad",
-    "k7": "N m s/rad",
-}
 PAYLOAD_NAMES = ("z1", "z2", "z3", "z4", "z5")
 PAYLOAD_UNITS = {"z1": "kg m^2", "z2": "kg m^2", "z3": "kg m^2", "z4": "N m", "z5": "N m"}
 
@@ -86,7 +77,7 @@ class Arm:
     delta2: float = 0.0
 
     def constants(self) -> FloatArray:
-        """Constants k1 … k7 (Table 1): (7,), in `CONSTANT_UNITS`.
+        """Constants k1 … k7 (Table 1): (7,), in `algid.model.UNITS`.
 
         Of phasors the parts along the links.
         """

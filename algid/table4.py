@@ -7,24 +7,15 @@ from collections.abc import Mapping
 from algid.arm import CONSTANT_NAMES, FloatArray, with_payload
 from algid.limits import LIMITS
 from algid.log import Truth
+from algid.model import UNITS as PARAMETER_UNITS
 from algid.results import Table4Row
 
-UNITS = {
-    "k5+k3": "kg m^2",
-    "k1": "kg m^2",
-    "k3": "kg m^2",
-    "k6": "N m s/rad",
-    "k4": "N m",
-    "k2": "N m",
-    "k5+k3+z1+z2": "kg m^2",
-    "k1+z3": "kg m^2",
-    "k3+z2": "kg m^2",
-    "k4+z4": "N m",
-    "k2+z5": "N m",
-    "m_p": "kg",
-}
 UNLOADED_ROWS = ("k5+k3", "k1", "k3", "k6", "k4", "k2")
 LOADED_ROWS = ("k5+k3+z1+z2", "k1+z3", "k3+z2", "k4+z4", "k2+z5")
+UNITS = {
+    row: PARAMETER_UNITS[row.partition("+")[0]] for row in (*UNLOADED_ROWS, *LOADED_ROWS, "m_p")
+}
+"""By row, in their order: that of its first constant."""
 
 
 def unloaded_rows(k: FloatArray) -> dict[str, float]:

@@ -42,7 +42,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "settings": room("errors limits methods model physics signals"),
     "results": room("errors files limits log model notices settings text verdict words", "numpy polars pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
-    "table4": room("arm limits log results synth"),
+    "table4": room("arm limits log model results synth"),
     "writers": room("errors files log ros2", "mcap numpy polars pyarrow zstandard"),
     "example": room("arm files log synth writers", "numpy"),
     "readers": room(
@@ -75,7 +75,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "numpy polars pydantic scipy",
     ),
     "exports": room("arm errors files identification model notices physics results text words", "numpy scipy"),
-    "fleet": room("errors files limits model notices progress report text verdict words", "numpy polars scipy"),
+    "fleet": room("errors files limits model notices physics progress report text verdict words", "numpy polars scipy"),
     "api": room(
         "batches check designs errors estimators example exports files fleet identification inspection limits log "
         "methods model notices physics profile progress readers report results runtime settings stores synth tracks "

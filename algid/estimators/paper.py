@@ -33,7 +33,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.arm import FloatArray
+from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.signals.differences import integral, nested_integral
 from algid.signals.segments import Segment, pieces
 
@@ -284,7 +284,7 @@ def stage2(
     theta, omega, tau : (2, ..., n), rad, rad/s and N m
         Windows of the loaded arm, each from its own start.
     dt : float, s
-    k : (7,), in `algid.arm.CONSTANT_UNITS`
+    k : (7,), in `algid.model.UNITS`
         Of the arm without payload.
     gravity : float, m/s²
 
@@ -309,7 +309,7 @@ def payload(x: FloatArray, k: FloatArray, gravity: float) -> tuple[FloatArray, F
     Parameters
     ----------
     x : (5, ...), in the order of `STAGE2_NAMES`
-    k : (7,), in `algid.arm.CONSTANT_UNITS`
+    k : (7,), in `algid.model.UNITS`
     gravity : float, m/s²
 
     Returns
@@ -329,7 +329,7 @@ SETTLED = 0.2  # s at the end of each window
 SHORTEST = EPSILON + SETTLED  # s
 BLOCK_SAMPLES = 16384  # bounds the memory: some 3 kB a sample
 
-STAGE1_SERIES = ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "k5+k3", "condition", "k7_condition")
+STAGE1_SERIES = (*CONSTANT_NAMES, "k5+k3", "condition", "k7_condition")
 STAGE2_SERIES = (*STAGE2_NAMES, "l1", "m_p", "condition")
 
 Stage = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
@@ -370,7 +370,7 @@ def stage2_series(
     Parameters
     ----------
     source, window : see `stage1_series`
-    k : (7,), in `algid.arm.CONSTANT_UNITS`, of the arm without payload
+    k : (7,), in `algid.model.UNITS`, of the arm without payload
     gravity : float, m/s²
     """
 

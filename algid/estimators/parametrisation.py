@@ -20,18 +20,15 @@ from functools import cached_property
 import numpy as np
 
 from algid.arm import FloatArray, payload_phasors
-from algid.model import DELAYS, SINES, Model
+from algid.model import DELAYS, PARAMETERS, SINES, Model
 from algid.physics.parameters import BODY, PAYLOAD
+from algid.physics.terms.rigid import K1, K2
 
 PAYLOAD_PARAMETERS = tuple(one.name for one in (*PAYLOAD, *BODY))
-# which z adds to which k, and its part: eq. (5) against eq. (3), the moments as phasors
-_LOADED = {
-    "k5": (0, "real"),
-    "k3": (1, "real"),
-    "k1": (2, "real"),
-    "k4": (3, "real"),
-    "k2": (4, "real"),
-} | {sine: ({"k1": 2, "k4": 3, "k2": 4}[name], "imag") for sine, name in SINES.items()}
+# which z adds to which coefficient, and its part: the moments are phasors
+_Z_OF = {name: one.payload for name, one in PARAMETERS.items() if one.payload is not None}
+_LOADED = {name: (z, "real") for name, z in _Z_OF.items()}
+_LOADED |= {sine: (_Z_OF[name], "imag") for sine, name in SINES.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +82,7 @@ class Shared:
         slope = np.zeros(len(self.log_names))
         turn = 0.0
         place = self.model.compiled.place
-        for name, sign in (("k2", 1.0), ("k1", -1.0)):
+        for name, sign in ((K2, 1.0), (K1, -1.0)):
             sine = next((own for own, of in SINES.items() if of == name and own in place), None)
             if sine is None or name not in place:
                 return 0.0, np.zeros(len(self.log_names))

@@ -19,7 +19,7 @@ from algid.errors import ResultError
 from algid.files import read_text
 from algid.identification.source import Role
 from algid.identification.validate import Predictor
-from algid.model import Model
+from algid.model import TERMS, Model
 from algid.words import counted
 
 GRAVITY = 9.81
@@ -75,9 +75,10 @@ def read_urdf(path: Path) -> tuple[Predictor, tuple[str, ...]]:
         raise ResultError(
             f"{path}: expected a URDF of an arm with two parallel joints: {error}; mend the file"
         ) from error
-    model = Model(("coulomb",) if any(friction) else (), gravity=arm.g)
+    jump = next(term for term in TERMS.values() if term.friction)
+    model = Model((jump.name,) if any(friction) else (), gravity=arm.g)
     value = {f"k{number}": float(k) for number, k in enumerate(arm.constants(), start=1)}
-    value |= {"f1": friction[0], "f2": friction[1]}
+    value |= dict(zip(jump.names, friction, strict=True))
     c = np.array([value[name] for name in model.names])
 
     def coefficients(role: Role) -> FloatArray:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 from algid.exports.description import Description, header, lacking
 from algid.exports.links import Link
+from algid.model import EVERY_TERM
 
 HYPHENS = "\N{HYPHEN}\N{HYPHEN}"
 JUMP = "holds Coulomb friction as a jump at standstill, where algid has f tanh(omega / {width:g} rad/s)"
@@ -134,18 +135,24 @@ def mjcf(arm: Description) -> str:
 def _joints(arm: Description, *, rotors: bool) -> tuple[tuple[Joint, Joint], list[str]]:
     """The joints, and remarks about what a format, with or without rotors, cannot hold: nothing negative, for one."""
     value, model = arm.coefficients.value, arm.coefficients.model
-    remarks = lacking(arm, frozenset({"coulomb", "rotor"} if rotors else {"coulomb"}))
-    if "coulomb" in model.terms:
+    kinds = ("damping", "friction", "rotor") if rotors else ("damping", "friction")
+    held = [term for term in EVERY_TERM.values() if any(getattr(term, kind) for kind in kinds)]
+    remarks = lacking(arm, frozenset(term.name for term in held))
+    if any(term.friction and term.name in model.terms for term in held):
         remarks.insert(0, JUMP.format(width=model.coulomb_speed))
-    names = ("k6", "k7", "f1", "f2", *(["j2"] if rotors else []))
-    remarks += [
-        f"leaves out {name}, which is negative: {value[name]:.6g}"
-        for name in names
-        if value[name] < 0
-    ]
-    kept = {name: max(value[name], 0.0) for name in names}
-    first = Joint("joint1", kept["k6"], kept["f1"], arm.rotor1)
-    return (first, Joint("joint2", kept["k7"], kept["f2"], kept.get("j2", 0.0))), remarks
+    of_joints: list[dict[str, float]] = [{}, {}]
+    for term in held:
+        for kind in kinds:
+            for name, joint in getattr(term, kind):
+                if value[name] < 0:
+                    remarks.append(f"leaves out {name}, which is negative: {value[name]:.6g}")
+                of_joints[joint][kind] = max(value[name], 0.0)
+    of_joints[0]["rotor"] = arm.rotor1
+    first, second = (
+        Joint(name, own.get("damping", 0.0), own.get("friction", 0.0), own.get("rotor", 0.0))
+        for name, own in zip(("joint1", "joint2"), of_joints, strict=True)
+    )
+    return (first, second), remarks
 
 
 def _rotorless(

@@ -13,6 +13,7 @@ from algid.fleet.changes import with_stints
 from algid.fleet.drift import FEWEST, SPAN, windows
 from algid.fleet.findings import mislabelled, outliers
 from algid.limits import LIMITS
+from algid.physics.terms import ALWAYS, OPTIONAL
 from algid.progress import Progress
 from algid.words import counted
 
@@ -20,7 +21,10 @@ if TYPE_CHECKING:
     import polars as pl
 
 MONTH_DAYS = 30.4375
-PARAMETERS = ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "f1", "f2", "o1", "o2", "j2")
+PARAMETERS = tuple(
+    name for term in (*ALWAYS, *OPTIONAL) if term in ALWAYS or term.usual for name in term.names
+)
+"""Those that most robots have: others would be tested on few logs."""
 MANY, FEW = 4, 2  # robots with so few logs each, which may be sessions of one
 HISTORY = ("robot", "stint")
 FEWEST_PEERS = 3  # logs of a robot, among which one can be known from the others

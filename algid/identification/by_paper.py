@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.arm import CONSTANT_NAMES, CONSTANT_UNITS, FloatArray, mass_matrix
+from algid.arm import CONSTANT_NAMES, FloatArray, mass_matrix
 from algid.errors import LogError
 from algid.estimators.diagnostics import FAR_BEYOND
 from algid.estimators.paper import (
@@ -28,6 +28,7 @@ from algid.identification.source import LogSource
 from algid.identification.survey import Survey
 from algid.identification.velocities import with_velocities
 from algid.methods import settles
+from algid.model import UNITS as PARAMETER_UNITS
 from algid.results import Estimate, Status
 from algid.settings import Settings
 from algid.table4 import UNITS, finite, unloaded_rows
@@ -61,7 +62,7 @@ def run_paper(
     if unloaded is not None:
         values, wander, usable = _estimate(survey, unloaded, settings, None, folder)
         k = values[: len(CONSTANT_NAMES)]
-        parameters = _named(CONSTANT_NAMES, CONSTANT_UNITS, values, usable)
+        parameters = _named(CONSTANT_NAMES, PARAMETER_UNITS, values, usable)
         if _is_no_arm(np.where(usable[: k.size], k, np.nan), wander):
             parameters = distrusted(parameters)
         if usable.all():

@@ -169,12 +169,11 @@ def unknown(unit: str) -> Estimate:
     )
 
 
-# of which constants each row of Table 4 is the sum; loaded ones hold the payload's share, and k6
-# is in none
-_ROWS = dict(
-    zip(UNLOADED_ROWS, (("k5", "k3"), ("k1",), ("k3",), ("k6",), ("k4",), ("k2",)), strict=True)
+# of which constants each row of Table 4 is the sum; loaded ones hold the payload's share
+_ROWS, _LOADED = (
+    {row: [name for name in row.split("+") if name in CONSTANT_NAMES] for row in rows}
+    for rows in (UNLOADED_ROWS, LOADED_ROWS)
 )
-_LOADED = dict(zip(LOADED_ROWS, (sums for sums in _ROWS.values() if sums != ("k6",)), strict=True))
 
 
 def table_rows(fit: Fit) -> tuple[dict[str, float], dict[str, float]]:

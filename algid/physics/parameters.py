@@ -46,6 +46,8 @@ class Parameter:
         Beyond, a value is another convention, or what a log that tells little makes of its noise.
     weighs : bool
         Whether it acts by gravity alone: an arm in a horizontal plane does not have it.
+    payload : int or None
+        Which of z1 … z5 (0 to 4) a payload adds to it: eq. (5) against eq. (3).
     """
 
     name: str
@@ -56,6 +58,7 @@ class Parameter:
     sign: Literal["+", "±"] = "±"
     plausible: tuple[float, float] = (-inf, inf)
     weighs: bool = False
+    payload: int | None = None
 
 
 PAYLOAD = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Iterator
 
+from algid.arm import CONSTANT_NAMES as ARM
 from algid.model import PARAMETERS
 from algid.notices import Notice
 from algid.results import Estimate, Result, Status
@@ -14,7 +15,6 @@ from algid.verdict import MOST_REASONS, Verdict
 from algid.words import counted
 
 WIDTH, HEIGHT = 80, 25
-ARM = ("k1", "k2", "k3", "k4", "k5", "k6", "k7")
 
 
 def brief(result: Result, place: str = "") -> list[str]:

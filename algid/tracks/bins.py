@@ -32,7 +32,7 @@ from algid.estimators.noise import first_guess
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
 from algid.identification.known import model_of, prior_of, shift_of
-from algid.model import SINES, TERMS, Model
+from algid.model import PARAMETERS, SINES, TERMS, Model
 from algid.results import Result
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.filters import smoothed
@@ -43,13 +43,6 @@ _PIECE_SAMPLES = 16384
 SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
 COULOMB = TERMS["coulomb"]
 FRICTION = ("k6", "k7", *COULOMB.names)
-_PAYLOAD_OF = {
-    "k5": 0,
-    "k3": 1,
-    "k1": 2,
-    "k4": 3,
-    "k2": 4,
-}  # which of z1 … z5 adds to which constant
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,9 +90,8 @@ class IdentifiedArm:
 
     def added(self, z: FloatArray) -> FloatArray:
         """Payload constants z (5,) as changes of the coefficients (q,)."""
-        return np.array(
-            [z[_PAYLOAD_OF[name]] if name in _PAYLOAD_OF else 0.0 for name in self.model.names]
-        )
+        places = [PARAMETERS[name].payload for name in self.model.names]
+        return np.array([0.0 if place is None else z[place] for place in places])
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,6 @@ from scipy.signal import butter, filtfilt
 
 from algid.arm import (
     CONSTANT_NAMES,
-    CONSTANT_UNITS,
     FloatArray,
     forward_dynamics,
     regressor,
@@ -23,6 +22,7 @@ from algid.arm import (
 from algid.estimators.innovations import residual_sums
 from algid.estimators.paper import STAGE2_NAMES, stage1, stage2
 from algid.identification.series import innovation_rows, write_columns
+from algid.model import UNITS
 from algid.notices import Notice
 from algid.results import (
     Estimate,
@@ -92,7 +92,7 @@ def _result(case: Case, k: FloatArray, covariance: FloatArray, unloaded: Recordi
     std = np.sqrt(np.diag(covariance))
     truth = dict(zip(CONSTANT_NAMES, case.arm.constants().tolist(), strict=True))
     parameters = {
-        name: estimate(value, spread, CONSTANT_UNITS[name])
+        name: estimate(value, spread, UNITS[name])
         for name, value, spread in zip(CONSTANT_NAMES, k.tolist(), std.tolist(), strict=True)
     }
     rms = np.sqrt(np.mean(unloaded.measured**2, axis=1))
@@ -148,7 +148,7 @@ def _table4(
     return [
         Table4Row(
             parameter=name,
-            unit=CONSTANT_UNITS[name],
+            unit=UNITS[name],
             estimate=parameters[name].estimate,
             std=parameters[name].std,
             truth=truth[name],

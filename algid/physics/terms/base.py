@@ -56,6 +56,8 @@ class Term:
     timing : "delay" or "lag"
         Whether its one parameter is a time by which the torque is late, as a whole or after a
         low-pass.
+    damping, friction, rotor : pairs of a parameter and the joint
+        Whose viscous and dry friction and rotor inertia it is, as robots' descriptions have them.
     """
 
     name: str
@@ -71,6 +73,9 @@ class Term:
     gains: tuple[tuple[str, int], ...] = ()
     sines: tuple[tuple[str, str], ...] = ()
     timing: Literal["delay", "lag"] | None = None
+    damping: tuple[tuple[str, int], ...] = ()
+    friction: tuple[tuple[str, int], ...] = ()
+    rotor: tuple[tuple[str, int], ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -20,5 +20,6 @@ COULOMB = Term(
     ),
     columns=(TorqueColumn("f1", f=(T1, NOTHING)), TorqueColumn("f2", f=(NOTHING, T2))),
     usual=True,
+    friction=(("f1", 0), ("f2", 1)),
     shapes=("coulomb_speed",),
 )

@@ -13,9 +13,20 @@ RIGID = Term(
     title="inertia and gravity of the links",
     equation="eq. (1) less viscous friction",
     parameters=(
-        Parameter("k1", "k₁", "kg m^2", "inertia that couples the links, m2 l1 lc2", INERTIA),
-        Parameter("k2", "k₂", "N m", "gravity moment of link 2, m2 g lc2", MOMENT, weighs=True),
-        Parameter("k3", "k₃", "kg m^2", "inertia of link 2 about joint 2, I2 + m2 lc2²", INERTIA),
+        Parameter(
+            "k1", "k₁", "kg m^2", "inertia that couples the links, m2 l1 lc2", INERTIA, payload=2
+        ),
+        Parameter(
+            "k2", "k₂", "N m", "gravity moment of link 2, m2 g lc2", MOMENT, weighs=True, payload=4
+        ),
+        Parameter(
+            "k3",
+            "k₃",
+            "kg m^2",
+            "inertia of link 2 about joint 2, I2 + m2 lc2²",
+            INERTIA,
+            payload=1,
+        ),
         Parameter(
             "k4",
             "k₄",
@@ -23,6 +34,7 @@ RIGID = Term(
             "gravity moment of link 1 with link 2 at its end, g (m1 lc1 + m2 l1)",
             MOMENT,
             weighs=True,
+            payload=3,
         ),
         Parameter(
             "k5",
@@ -31,6 +43,7 @@ RIGID = Term(
             "inertia about joint 1 less k3, I1 + m1 lc1² + m2 l1²",
             INERTIA,
             "+",
+            payload=0,
         ),
     ),
     columns=(
@@ -47,3 +60,4 @@ RIGID = Term(
     ),
     inertial=True,
 )
+K1, K2, K3, K4, K5 = RIGID.names

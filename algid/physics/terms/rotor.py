@@ -21,4 +21,5 @@ ROTOR = Term(
     ),
     columns=(TorqueColumn("j2", s=(NOTHING, Q2)),),
     usual=True,
+    rotor=(("j2", 1),),
 )

@@ -14,5 +14,6 @@ VISCOUS = Term(
         Parameter("k6", "k₆", "N m s/rad", "viscous friction of joint 1", SCALE, "+"),
         Parameter("k7", "k₇", "N m s/rad", "viscous friction of joint 2", SCALE, "+"),
     ),
+    damping=(("k6", 0), ("k7", 1)),
     columns=(TorqueColumn("k6", p=(Q1, NOTHING)), TorqueColumn("k7", p=(NOTHING, Q2))),
 )
