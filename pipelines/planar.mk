@@ -2,3 +2,8 @@
 
 planar: setup ## bent arms and payloads that are bodies: coverage of intervals, by parameter; into build/planar
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.planar -o build/planar
+
+.PHONY: efforts
+
+efforts: setup ## what drivers call effort: named by the logs, and the payload's interval; into build/efforts
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.efforts -o build/efforts

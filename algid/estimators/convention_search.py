@@ -34,6 +34,7 @@ from algid.estimators.convention_sums import (
     together,
 )
 from algid.estimators.conventions import AS_READ, Convention
+from algid.model import LARGEST_PHASE
 
 # of a torque's power: what the arm's true convention leaves on a log that is nearly all model
 _CLEAN = 1e-3
@@ -176,13 +177,27 @@ def judge_together(logs: Sequence[Recorded], *, gravity: bool = True) -> Judgeme
     found = list(log.discrete())
     judged = _judged(found, log.apart)
     if judged.alone and judged.best.left.max() < _CLEAN:
-        return judged
+        return _of_a_bent_arm(judged, log)
     found += log.shifted(found)
     judged = _judged(found, log.apart)
     if not judged.alone:
         found += log.scaled()
         judged = _judged(found, log.apart)
-    return judged
+    return _of_a_bent_arm(judged, log)
+
+
+def _of_a_bent_arm(judged: Judgement, log: _Trials) -> Judgement:
+    """The judgement; of another convention none where a bent arm, as it was read, explains as much.
+
+    Zeros turn three moments by two angles; centres of mass off the links' lines, or a payload, turn
+    each by its own.
+    """
+    best = judged.best
+    small = max(abs(angle) for angle in best.zero) <= LARGEST_PHASE
+    if not judged.alone or (best.family == AS_READ and small):
+        return judged
+    bent = log.bent()
+    return judged if bent is None or bent > best.score + log.apart else replace(judged, alone=False)
 
 
 def _judged(found: Sequence[Candidate], apart: float) -> Judgement:
@@ -292,6 +307,14 @@ class _Trials:
     def _scores(self, families: Sequence[Convention], log: _Windowed) -> list[float]:
         """What is left with free zeros, sums of logarithms, for families of the same angles and drive."""
         return _sizes(solved(self._sums(families[0], log), families, self._free[None])[1]).tolist()
+
+    def bent(self) -> float | None:
+        """What is left as the log was read with a phase for each moment; None where one is no phase."""
+        free = solved(self._sums(AS_READ, self._fine), [AS_READ], self._free[None])
+        c = self._free @ free[0][0]
+        moments = [c[COLUMNS.index(name) :][:2] for name in ("k1", "k2", "k4")]
+        turned = [np.arctan2(abs(sine), cosine) for cosine, sine in moments if cosine or sine]
+        return float(_sizes(free[1])[0]) if max(turned) <= LARGEST_PHASE else None
 
     def _best_zero(self, family: Convention) -> tuple[float, float]:
         """Zeros δ1 and δ2 in rad that leave least, with k1, k2 and k4 positive where the log tells."""

@@ -84,3 +84,10 @@ def test_phases_are_a_note_of_what_they_mean_and_no_accusation() -> None:
         value, half = (float(one) for one in note.numbers[name].replace("°", "").split(" ± "))
         assert 0 < half < 1.5
         assert abs(value - np.degrees(true)) < 2.2 * half, name
+
+
+def test_a_large_payload_on_a_bent_arm_is_no_other_convention() -> None:
+    """Three phases of their own look like a motor at the base, to conventions that have two zeros."""
+    result = drawn("arm23", Row(30.0, 0.15, 20.0), 0)
+    assert result.verdict.grade == "good"
+    assert "WRONG_CONVENTION" not in {one.code for one in result.notices}
