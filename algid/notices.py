@@ -56,6 +56,7 @@ UNIT_OF = {"angle_unit": "[theta1] and [theta2]", "torque_unit": "[tau1] and [ta
 OPEN = {
     "l1": "M",
     "source": "NAME",
+    "q_des": "NAME",
     "topic": "NAME",
     "time": "NAME",
     "joints": ("A", "B"),

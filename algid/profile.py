@@ -71,6 +71,11 @@ class Channel(_Strict):
     sign: Literal[1, -1] = 1
     offset: float = 0.0
 
+    @property
+    def column(self) -> str | None:
+        """The column or field that it is read from, where the user names it."""
+        return self.source
+
 
 class Angle(Channel):
     """An angle: `offset` in rad is added after unit and sign.
@@ -98,12 +103,21 @@ class Torque(Channel):
     """A torque: `offset` in N m. Amperes need `torque_constant` in N m/A at the motor.
 
     `gear_ratio` is how often the motor turns while the joint turns once: 1 for a torque at the
-    joint.
+    joint. Where none is logged, a PD law makes it: `kp` in N m/rad and `kd` in N m s/rad of the
+    desired angle in the column `q_des`, recorded as the angle is.
     """
 
     unit: TorqueUnit | None = None
     torque_constant: float | None = Field(default=None, gt=0)
     gear_ratio: float = Field(default=1.0, gt=0)
+    kp: float | None = Field(default=None, gt=0)
+    kd: float | None = Field(default=None, ge=0)
+    q_des: str | None = None
+
+    @property
+    def column(self) -> str | None:
+        """The column that it is read from: a torque, or a desired angle."""
+        return self.q_des or self.source
 
 
 class Profile(_Strict):
@@ -189,10 +203,10 @@ class Profile(_Strict):
         a source may be both, ``/joint_states: effort[elbow]``.
         """
         channel = self.channel(name)
-        topic, colon, field = (channel.source or "").partition(": ")
+        topic, colon, field = (channel.column or "").partition(": ")
         if colon and topic.startswith("/"):
             return topic, field
-        return channel.topic or self.topic, channel.source
+        return channel.topic or self.topic, channel.column
 
     def channel(self, name: str) -> Angle | Velocity | Torque:
         """The profile of the canonical channel `name`."""

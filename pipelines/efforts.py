@@ -54,16 +54,18 @@ def judged(job: tuple[str, str, int]) -> Counter[str]:
     found: Counter[str] = Counter()
     for seed in range(draws):
         rng = np.random.default_rng([seed, sum(name.encode())])
-        logs = []
-        for constants, motion in zip((k, loaded), motions(name, Row()), strict=True):
-            logged = motion.tau - taken(effort, k, constants, motion)
-            logs.append(noisy(replace(motion, tau=logged), rng, f"{len(logs)}.csv"))
-        result = identify(*logs, report=False)
+        first, second = (
+            noisy(replace(one, tau=one.tau - taken(effort, k, constants, one)), rng, title)
+            for title, constants, one in zip(
+                ("unloaded.csv", "loaded.csv"), (k, loaded), motions(name, Row()), strict=True
+            )
+        )
+        result = identify(first, second, report=False)
         named = [one for one in result.notices if one.code in NAMES[effort]]
         others = {one.code for one in result.notices if one.remedies} - set(NAMES[effort])
         flagged = result
         if named and named[0].remedy is not None:
-            flagged = identify(*logs, report=False, **named[0].remedy.keywords)
+            flagged = identify(first, second, report=False, **named[0].remedy.keywords)
         found.update(draws=1, named=bool(named), wrong=bool(others))
         found[f"exit {_exit(result)}"] += 1
         found[f"then {_exit(flagged)}"] += 1

@@ -36,7 +36,10 @@ _UNITS = {
     "omega": f'# unit = "deg"  # {_VELOCITIES}; angles a second\n{_ENCODER}',
     "tau": f'# unit = "N m"  # {_TORQUES}\n'
     "# torque_constant = 0.1  # N m/A at the motor, of a current\n"
-    "# gear_ratio = 1.0  # turns of the motor in one of the joint\n",
+    "# gear_ratio = 1.0  # turns of the motor in one of the joint\n"
+    '# q_des = "NAME"  # the desired angle of a PD law that makes the torque, where none is logged\n'
+    "# kp = 50.0  # N m/rad\n"
+    "# kd = 2.0  # N m s/rad\n",
 }
 _ON_TOPICS = tuple(form.name for form in FORMATS if form.messages)
 

@@ -16,7 +16,7 @@ from algid.faults import during
 from algid.limits import LIMITS
 from algid.log import Log, Origin
 from algid.notices import Notice, Remedy
-from algid.readers.convert import ROWS, Conversion, Gatherer, channel_readings
+from algid.readers.convert import ROWS, Conversion, Gatherer, channel_readings, laws_of
 from algid.readers.table import BLOCK_ROWS, SampleTable, cut
 from algid.readers.timebase import in_order
 from algid.words import counted
@@ -245,6 +245,7 @@ def reader_of(
         absolute=profile.second_angle == "absolute",
         base=profile.drive == "base",
         passive=profile.passive,
+        laws=laws_of(origin.path, profile, origin.mapping),
     )
     return TableReader(replace(origin, reading=reading), tables, units, notices, rows)
 

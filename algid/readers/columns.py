@@ -80,7 +80,7 @@ def assign(
             f"{path}: the columns {', '.join(gone)} that were written are not there: the file was changed "
             "or damaged; write it again, or remove its truth if it was changed on purpose"
         )
-    named = {name: source for name in CHANNELS if (source := profile.channel(name).source)}
+    named = {name: column for name in CHANNELS if (column := profile.channel(name).column)}
     if profile.time:
         named["t"] = profile.time
     sources, choice = _sources(path, available, named, profile)
@@ -141,8 +141,15 @@ def _sources(
     missing = [name for name in ("t", *JOINT_CHANNELS) if name not in sources]
     if missing:
         text = f"{path}: no column for {', '.join(missing)}; found {_listed(available)}"
-        raise LogError(f"{text}; name them: {_naming(missing)}")
+        raise LogError(f"{text}; name them: {_naming(missing)}{_or_a_law(missing)}")
     return sources, choice
+
+
+def _or_a_law(missing: Sequence[str]) -> str:
+    """What else makes torques where both are `missing`."""
+    if not {"tau1", "tau2"} <= set(missing):
+        return ""
+    return "; a PD law makes them of q_des, kp and kd of [tau1] and [tau2] (algid guide logs)"
 
 
 def _naming(channels: Sequence[str]) -> Remedy:

@@ -94,11 +94,54 @@ class Gatherer:
 
 
 @dataclass(frozen=True)
+class Law:
+    """A PD law τ = kp (q_des − θ) − kd θ̇: gains in N m/rad and N m s/rad."""
+
+    kp: float
+    kd: float
+
+
+def laws_of(
+    path: str, profile: Profile, mapping: Mapping[str, str]
+) -> tuple[Law | None, Law | None]:
+    """The PD law of each joint, where the profile has one.
+
+    Raises
+    ------
+    LogError
+        If one lacks its gain or its desired angle, or brakes by velocities that are not recorded.
+    """
+    first, second = (_law(path, joint, profile, mapping) for joint in (1, 2))
+    return first, second
+
+
+def _law(path: str, joint: int, profile: Profile, mapping: Mapping[str, str]) -> Law | None:
+    name, channel = f"tau{joint}", (profile.tau1, profile.tau2)[joint - 1]
+    given = [key for key in ("q_des", "kp", "kd") if getattr(channel, key) is not None]
+    if not given:
+        return None
+    needed = {f"{name}.{key}": None for key in ("q_des", "kp") if key not in given}
+    if needed:
+        raise LogError(
+            f"{path}: a PD law of {name} needs a desired angle and a gain, found {', '.join(given)} alone: "
+            f"{Remedy(needed)}"
+        )
+    law = Law(float(channel.kp or 0.0), float(channel.kd or 0.0))
+    if law.kd and f"omega{joint}" not in mapping:
+        velocities = Remedy({"omega1.source": None, "omega2.source": None})
+        raise LogError(
+            f"{path}: kd of {name} needs the joint's velocity, which is not there: {velocities}"
+        )
+    return law
+
+
+@dataclass(frozen=True)
 class Conversion:
     """Value · factor + offset for each channel of a table, then the zero and the reference of the angles.
 
     A second motor at the base does the work τ_m1 θ̇1 + τ_m2 (θ̇1 + θ̇2): joint 1 has the sum of
-    both torques. The torque of the `passive` joint, which has no motor, is nought.
+    both torques. The torque of the `passive` joint, which has no motor, is nought. One of a PD law
+    is made of the desired angle, which stands in its place, in the joint's own coordinates.
     """
 
     channels: Mapping[str, ChannelReading]
@@ -106,6 +149,7 @@ class Conversion:
     absolute: bool = False
     base: bool = False
     passive: int | None = None
+    laws: tuple[Law | None, Law | None] = (None, None)
 
     def apply(self, table: SampleTable, room: Room) -> None:
         """Fill in a table's angles, torques and, where recorded, velocities in rad, N m, rad/s."""
@@ -114,6 +158,10 @@ class Conversion:
         self._joint_pair(table, JOINT_CHANNELS[2:], room.tau)
         if omega is not None:
             self._joint_pair(table, VELOCITIES, omega)
+        for joint, law in enumerate(self.laws):
+            if law is not None:
+                speed = 0.0 if omega is None else omega[joint]
+                room.tau[joint] = law.kp * (room.tau[joint] - theta[joint]) - law.kd * speed
         if self.absolute:
             theta[1] -= theta[0]
             if omega is not None:
@@ -150,18 +198,25 @@ def channel_readings(
     """
     found = {}
     for name in [name for name in CHANNELS if name in mapping]:
-        channel, joint, own = profile.channel(name), int(name[-1]) - 1, stated.get(name)
-        unit = channel.unit or own or _usual_unit(name, profile)
-        told = profile.told_by(f"{name}.unit") if channel.unit else "names" if own else "assumed"
+        joint = int(name[-1]) - 1
+        like = f"theta{joint + 1}" if _is_desired(name, profile) else name
+        channel, own = profile.channel(like), stated.get(like)
+        unit = channel.unit or own or _usual_unit(like, profile)
+        told = profile.told_by(f"{like}.unit") if channel.unit else "names" if own else "assumed"
         if name == f"tau{profile.passive}":
             found[name] = ChannelReading("none: no motor", "N m", "profile", 0.0)
             continue
         factor = (
-            channel.sign * profile.signs[joint] * _factor(path, name, mapping[name], channel, unit)
+            channel.sign * profile.signs[joint] * _factor(path, like, mapping[name], channel, unit)
         )
-        offset = channel.offset + (profile.offsets[joint] if name.startswith("theta") else 0.0)
+        offset = channel.offset + (profile.offsets[joint] if like.startswith("theta") else 0.0)
         found[name] = ChannelReading(mapping[name], unit, told, factor, offset)
     return found
+
+
+def _is_desired(name: str, profile: Profile) -> bool:
+    """Whether a desired angle, recorded as the angle is, stands in the place of a torque."""
+    return getattr(profile.channel(name), "q_des", None) is not None
 
 
 def _usual_unit(name: str, profile: Profile) -> str:

@@ -1,0 +1,86 @@
+"""Torques that no driver logs: made of a desired angle and gains."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from algid.errors import LogError
+from algid.profile import Profile, with_settings
+from algid.readers import read_log
+
+KP, KD = (50.0, 20.0), (2.0, 0.5)
+LAWS = {
+    f"tau{joint}": {"q_des": f"command{joint}", "kp": KP[joint - 1], "kd": KD[joint - 1]}
+    for joint in (1, 2)
+}
+
+
+def written(folder: Path, *, velocities: bool = True) -> tuple[Path, np.ndarray]:
+    """A log in degrees without torques, and the torques (2, N) of its law in N m."""
+    t = np.arange(200) * 0.01
+    theta = np.stack([np.sin(t), np.cos(2 * t)])
+    omega = np.stack([np.cos(t), -2 * np.sin(2 * t)])
+    command = theta + 0.1 * np.stack([np.sin(3 * t), np.sin(5 * t)])
+    names = ["t", "q1", "q2", "command1", "command2"]
+    columns = [t, *np.degrees(theta), *np.degrees(command)]
+    if velocities:
+        names, columns = [*names, "dq1", "dq2"], [*columns, *np.degrees(omega)]
+    path = folder / "pd.csv"
+    np.savetxt(path, np.transpose(columns), delimiter=",", header=",".join(names), comments="")
+    gains = np.array([KP, KD])[:, :, None]
+    return path, gains[0] * (command - theta) - gains[1] * omega
+
+
+def profile(**settings: object) -> Profile:
+    unit = {"unit": "deg"}
+    angles = {name: unit for name in ("theta1", "theta2", "omega1", "omega2")}
+    return with_settings(Profile(), {**angles, **LAWS, **settings})
+
+
+def test_a_torque_is_made_of_a_desired_angle(tmp_path: Path) -> None:
+    path, tau = written(tmp_path)
+    assert np.allclose(read_log(path, profile()).tau, tau, atol=1e-9)
+
+
+def test_a_joint_that_counts_the_other_way_has_its_law_in_its_own_coordinates(
+    tmp_path: Path,
+) -> None:
+    path, tau = written(tmp_path)
+    turned = profile(signs=(-1, 1), offsets=(0.3, 0.0), zero="hanging")
+    assert np.allclose(read_log(path, turned).tau, [[-1], [1]] * tau, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("law", "told"),
+    [
+        ({"q_des": "command1"}, "a PD law of tau1 needs .*tau1.kp=VALUE"),
+        ({"kp": 50.0}, "a PD law of tau1 needs .*tau1.q_des=NAME|no column for tau1"),
+        ({"q_des": "nothing", "kp": 50.0}, "'nothing', which is not there"),
+    ],
+)
+def test_a_law_that_lacks_something_has_one_line(
+    law: dict[str, object], told: str, tmp_path: Path
+) -> None:
+    path, _ = written(tmp_path)
+    with pytest.raises(LogError, match=told) as raised:
+        read_log(path, profile(tau1=law) if "q_des" in law else profile_without_first(law))
+    assert "\n" not in str(raised.value)
+
+
+def profile_without_first(law: dict[str, object]) -> Profile:
+    return with_settings(Profile(), {"tau1": law, "tau2": LAWS["tau2"]})
+
+
+def test_a_law_that_brakes_needs_velocities(tmp_path: Path) -> None:
+    path, _ = written(tmp_path, velocities=False)
+    with pytest.raises(LogError, match="kd of tau1 needs the joint's velocity"):
+        read_log(path, profile())
+
+
+def test_a_log_without_torque_names_the_law(tmp_path: Path) -> None:
+    path, _ = written(tmp_path)
+    with pytest.raises(LogError, match="a PD law makes them of q_des, kp and kd"):
+        read_log(path)
