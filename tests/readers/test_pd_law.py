@@ -36,7 +36,7 @@ def written(folder: Path, *, velocities: bool = True) -> tuple[Path, np.ndarray]
 
 def profile(**settings: object) -> Profile:
     unit = {"unit": "deg"}
-    angles = {name: unit for name in ("theta1", "theta2", "omega1", "omega2")}
+    angles = dict.fromkeys(("theta1", "theta2", "omega1", "omega2"), unit)
     return with_settings(Profile(), {**angles, **LAWS, **settings})
 
 
