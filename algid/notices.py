@@ -346,6 +346,10 @@ MESSAGES: Mapping[str, str] = {
     "EFFORT_ZERO": "{channel} is zero in every sample",
     "EFFORT_DENORMAL": "{channel} never exceeds {largest:.3g} N m: no torque",
     "EFFORT_CONSTANT": "{channel} is {value:.6g} N m in every sample",
+    "HELD_EFFORT": (
+        "{channel} keeps each value for {held:.3g} ms while the angle moves: it is {late:.3g} ms late in the mean, and "
+        "inertia and friction take up what that makes"
+    ),
     "SATURATED_EFFORT": "{channel} stands at its limit in {percent:.3g} % of the samples",
     "DEAD_EFFORT": (
         "{channel} stands still for {seconds:.3g} s from t = {start:.6g} s; leave that out"

@@ -18,6 +18,10 @@ _DEAD, _DEAD_RUNS = (
     0.1,
     20,
 )  # s, and in usual runs: a torque that keeps one value so long is not measured
+_HELD_RUNS, _HELD_SHARE = 50, 0.6
+"""Changes of a torque that tell its clock, and of how many of the samples at most they are."""
+_OFF_STEP, _IN_STEP = 0.15, 0.9
+"""Of a held torque's step: how far its runs may be off whole steps, and the share of runs that are not."""
 _TURN = 2 * math.pi
 
 
@@ -68,6 +72,26 @@ def dead_efforts(log: Log) -> Iterator[Notice]:
         if not at_limit and length * log.period >= _DEAD and length >= _DEAD_RUNS * usual:
             seen = {"seconds": length * log.period, "start": first * log.period}
             yield Notice("DEAD_EFFORT", numbers={"channel": _source(log, name), **seen})
+
+
+def held_efforts(log: Log) -> Iterator[Notice]:
+    """Torques that keep each value for several samples, in step with a slower clock, while the angle moves.
+
+    A torque in coarse counts keeps its values too, but changes whenever it passes a count: its runs
+    are of every length. A log whose angles are held as well was recorded slowly as a whole.
+    """
+    for joint, (theta, tau) in enumerate(zip(log.theta, log.tau, strict=True), start=1):
+        changes = np.flatnonzero(np.diff(tau))
+        if not _HELD_RUNS <= changes.size < (len(log) - 1) * _HELD_SHARE:
+            continue
+        runs = np.diff(changes)
+        usual = float(np.median(thinned(runs)))
+        off = np.abs(runs - usual * np.maximum(1.0, np.round(runs / usual)))
+        in_step = float(np.mean(off <= _OFF_STEP * usual))
+        moves = np.count_nonzero(np.diff(theta)) > 1.5 * changes.size
+        if usual >= 2 and in_step >= _IN_STEP and moves:
+            seen = {"held": 1e3 * usual * log.period, "late": 5e2 * (usual - 1) * log.period}
+            yield Notice("HELD_EFFORT", numbers={"channel": _source(log, f"tau{joint}"), **seen})
 
 
 def angles(log: Log) -> Iterator[Notice]:

@@ -6,7 +6,14 @@ from dataclasses import replace
 from functools import cache, partial
 
 from algid.errors import LogError
-from algid.inspection.channels import angles, dead_efforts, degrees, efforts, spikes
+from algid.inspection.channels import (
+    angles,
+    dead_efforts,
+    degrees,
+    efforts,
+    held_efforts,
+    spikes,
+)
 from algid.inspection.conventions import is_right, judged, mend
 from algid.inspection.dynamics import dynamic_figures, gravity_findings
 from algid.inspection.findings import yielding
@@ -51,6 +58,7 @@ def examine(
     every = (
         *(() if external else efforts(log)),
         *(() if external else dead_efforts(log)),
+        *held_efforts(log),
         *angles(log),
         *degrees(log, lambda: is_right(tried())),
         *spikes(log),

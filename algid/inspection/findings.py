@@ -12,6 +12,7 @@ ANGLE_CONSTANT        no       an angle that never changes
 STUCK_SENSOR          no       an angle freezes in motion and jumps when it comes back
 SPIKES                no       single samples far off their neighbours
 SATURATED_EFFORT      no       a torque clipped at its limit
+HELD_EFFORT           no       a torque that keeps each value for several samples while the angle moves
 DEAD_EFFORT           no       a torque that keeps one value where others change all the time
 LOST_SAMPLES          no       steps twice as long as usual, though the stamps are even
 RESTS                 no       the arm stands still before it moves, or after

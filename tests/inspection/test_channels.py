@@ -14,7 +14,7 @@ from algid.errors import LogError
 from algid.inspection import channels
 from algid.inspection.checks import examine, noticed
 from algid.inspection.sampling import lost_steps, rests, samples_a_period, sampling
-from algid.log import ChannelReading, Log, Origin, Reading
+from algid.log import ChannelReading, IntArray, Log, Origin, Reading
 from algid.notices import Notice
 
 ROWS = 2000
@@ -448,3 +448,40 @@ def test_an_arm_in_a_horizontal_plane_is_not_asked_for_gravity(
     assert asked == []
     assert examine(log) == ()
     assert asked == [log]
+
+
+def slowed(tau: FloatArray, every: IntArray) -> FloatArray:
+    """A torque (2, N) that is measured at the samples `every` alone."""
+    rows = np.arange(tau.shape[1])
+    return tau[:, every[np.searchsorted(every, rows, side="right") - 1]]
+
+
+@pytest.mark.parametrize("step", [2, 10, 20])
+def test_a_held_torque_is_told_with_what_it_is_late(step: int) -> None:
+    log = logged()
+    found = list(
+        channels.held_efforts(replace(log, tau=slowed(log.tau, np.arange(0, T.size, step))))
+    )
+    assert [one.code for one in found] == ["HELD_EFFORT"] * 2
+    assert found[0].numbers["held"] == pytest.approx(step)
+    assert found[0].numbers["late"] == pytest.approx((step - 1) / 2)  # mean of 0 … step - 1 samples
+    assert not any(one.note or one.refuse for one in found)
+
+
+def test_a_torque_that_comes_nearly_in_step_is_held_too() -> None:
+    log = logged()
+    every = 10 * np.arange(T.size // 10) + np.random.default_rng(0).integers(0, 2, T.size // 10)
+    every[0] = 0
+    assert len(list(channels.held_efforts(replace(log, tau=slowed(log.tau, every))))) == 2
+
+
+def test_coarse_counts_and_logs_that_are_slow_as_a_whole_are_not_held() -> None:
+    log = logged()
+    assert not list(channels.held_efforts(log))
+    for count in (1e-3, 1e-2, 0.1):  # of sines of amplitude one and more, with and without noise
+        noise = 0.3 * count * np.random.default_rng(1).standard_normal(log.tau.shape)
+        for tau in (np.sin(log.theta), np.sin(log.theta) + noise):
+            assert not list(channels.held_efforts(replace(log, tau=count * np.rint(tau / count))))
+    every = np.arange(0, T.size, 10)
+    slow = replace(log, theta=slowed(log.theta, every), tau=slowed(log.tau, every))
+    assert not list(channels.held_efforts(slow))

@@ -78,6 +78,8 @@ def spoiled(name: str) -> Log:
             return replace(log, tau=tau * 1e-310)
         case "EFFORT_CONSTANT":
             return replace(log, tau=with_row(tau, 0, 2.5))
+        case "HELD_EFFORT":
+            return replace(log, tau=tau[:, np.arange(len(log)) // 10 * 10])
         case "SATURATED_EFFORT":
             return replace(log, tau=np.clip(tau, -4, 4))
         case "ANGLE_CONSTANT":
@@ -115,7 +117,15 @@ def spoiled(name: str) -> Log:
 
 
 REFUSED = ("EFFORT_ZERO", "EFFORT_DENORMAL", "EFFORT_CONSTANT", "WRAPPED_ANGLE", "DEGREES")
-TOLD = ("SATURATED_EFFORT", "ANGLE_CONSTANT", "STUCK_SENSOR", "SPIKES", "GAPS", "JITTER")
+TOLD = (
+    "HELD_EFFORT",
+    "SATURATED_EFFORT",
+    "ANGLE_CONSTANT",
+    "STUCK_SENSOR",
+    "SPIKES",
+    "GAPS",
+    "JITTER",
+)
 TOLD_OF_GRAVITY = ("FLIPPED_SIGN", "WRONG_ZERO", "GRAVITY_COMPENSATED")
 TOLD_OF_CONVENTIONS = ("WRONG_CONVENTION", "ZERO_OFFSET")
 
