@@ -84,6 +84,19 @@ def without(prior: Prior | None, absent: tuple[str, ...]) -> Prior | None:
     return Prior((*names, *absent), mean, precision, absent)
 
 
+def scaled_pinvs(S: FloatArray, tolerance: float = RANK_TOLERANCE) -> FloatArray:
+    """`scaled_pinv` of many matrices S (n, Q, Q) at once."""
+    diagonal = np.einsum("nii->ni", S)
+    size = np.sqrt(np.maximum(diagonal, 0.0))
+    inverse = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
+    values, vectors = np.linalg.eigh(S * (inverse[:, :, None] * inverse[:, None, :]))
+    size = np.abs(values)
+    kept = size > tolerance * size.max(axis=1, initial=0.0)[:, None]
+    shares = np.divide(1.0, values, out=np.zeros_like(values), where=kept)
+    half = inverse[:, :, None] * vectors
+    return np.asarray((half * shares[:, None, :]) @ half.swapaxes(1, 2))
+
+
 def scaled_pinv(S: FloatArray, tolerance: float = RANK_TOLERANCE) -> FloatArray:
     """Pseudo-inverse of a symmetric matrix after scaling to unit diagonal, whatever the units of its rows.
 

@@ -136,12 +136,11 @@ def instrumented(
     settings, base = _of(fit, settings)
     logs = []
     for kind, sources in ((False, unloaded), (True, loaded)):
-        for source in sources:
-            c0 = shared.coefficients(at, kind)
-            c = c0.copy()
-            if shared.delay:  # the windows are shifted by it: its column tells a change
-                c[-1] -= base
-            sums = instruments.moments(source, settings, c)
+        c0 = shared.coefficients(at, kind)
+        c = c0.copy()
+        if shared.delay:  # the windows are shifted by it: its column tells a change
+            c[-1] -= base
+        for sums in instruments.moments(sources, settings, c):
             if sums is None or instruments.gone_astray(sums):
                 return None
             if sums.rows:

@@ -30,8 +30,8 @@ gram    [Z X y] [Z X y]ᵀ by stretch and joint                      (B, 2, 2 q 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import islice
 
 import numpy as np
@@ -59,7 +59,7 @@ _STRIDE = 2  # windows overlap four-fold: more tell hardly more, and each is sim
 _STEP = 4e-3  # s: of the simulation, in which motions of 10 Hz turn by a quarter of a radian
 _ASTRAY = 100.0  # rad: a simulated window that ends so far from the measured one has run away
 _FEWEST = 0.5  # share of the windows that must not go astray
-_TOGETHER = 8  # pieces whose windows are simulated side by side
+_TOGETHER = 8 * (weak.PIECE_SAMPLES + 4096)  # samples whose windows are simulated side by side
 _EXAMINED = 4  # pieces of each log that `endogeneity` looks at
 ENDOGENEOUS = 3.0
 """Statistic of `endogeneity` beyond which the unmodelled torque drives the motion."""
@@ -144,7 +144,7 @@ def _solved(
     """
     logs: list[LogInformation] = []
     for _ in range(_ROUNDS):
-        found = [moments(source, settings, c) for source in sources]
+        found = moments(sources, settings, c)
         if any(one is None or gone_astray(one) for one in found):
             return None
         sums = [one for one in found if one is not None and one.rows]
@@ -200,56 +200,102 @@ def projected(sums: Moments, c: FloatArray, loaded: bool) -> LogInformation:
 
 
 def moments(
-    source: Source, settings: WeakSettings, c: FloatArray, most: int | None = None
-) -> Moments | None:
-    """Sums over one log, the windows simulated with coefficients `c`; None where those move no arm.
+    sources: Sequence[Source], settings: WeakSettings, c: FloatArray, most: int | None = None
+) -> list[Moments | None]:
+    """Sums over each log, the windows simulated with coefficients `c`; None of those that these do not move.
 
-    At most `most` pieces are looked at.
+    At most `most` pieces of a log are looked at. The windows of many pieces are simulated side by
+    side: a step costs the same for few as for many.
     """
-    sums = BlockSums()
-    rows = astray = 0
+    found: list[_Sums | None] = [_Sums() for _ in sources]
+    for batch in _batches(sources, settings, most):
+        simulated = _side_by_side(batch, settings, c)
+        for (number, _, _), (both, good, moves) in zip(batch, simulated, strict=True):
+            sums = found[number]
+            if not moves:
+                found[number] = None
+            elif sums is not None:
+                sums.add(both, good)
+    return [None if sums is None else sums.total() for sums in found]
+
+
+@dataclass(eq=False)
+class _Sums:
+    """Sums of one log so far."""
+
+    grams: BlockSums = field(default_factory=BlockSums)
+    rows: int = 0
+    astray: int = 0
+
+    def add(self, both: FloatArray, good: NDArray[np.bool_]) -> None:
+        """Take in instruments and columns (2, 2 q + 1, R) of windows, of which some (R,) are good."""
+        self.rows += good.size
+        self.astray += int(np.sum(np.logical_not(good)))
+        self.grams.add(weak.grams(np.where(good, both, 0.0), OVERLAP // _STRIDE))
+
+    def total(self) -> Moments:
+        if not self.rows:
+            return Moments(np.zeros((0, 2, 1, 1)), 0, 0)
+        return Moments(self.grams.values(), self.rows, self.astray)
+
+
+_Piece = tuple[int, Segment, Windows]
+"""The number of a log, a piece of it and the windows on that."""
+
+
+def _batches(
+    sources: Sequence[Source], settings: WeakSettings, most: int | None
+) -> Iterator[list[_Piece]]:
+    """Pieces with whole windows, those together that have the same windows and not too many samples."""
+    batch: list[_Piece] = []
+    samples = 0
+    for number, source in enumerate(sources):
+        for piece, windows, _ in islice(weak.overlapping(source(), settings), most):
+            if (len(piece) - 2 * windows.margin) // windows.step < OVERLAP:
+                continue
+            if batch and (samples + len(piece) > _TOGETHER or not _alike(windows, batch[0][2])):
+                yield batch
+                batch, samples = [], 0
+            batch.append((number, piece, windows))
+            samples += len(piece)
+    if batch:
+        yield batch
+
+
+def _alike(one: Windows, other: Windows) -> bool:
+    return (one.dt, one.length, one.shift, one.bandwidth) == (
+        other.dt, other.length, other.shift, other.bandwidth,
+    )  # fmt: skip
+
+
+def _side_by_side(
+    batch: Sequence[_Piece], settings: WeakSettings, c: FloatArray
+) -> Iterator[tuple[FloatArray, NDArray[np.bool_], bool]]:
+    """Of each piece instruments and columns (2, 2 q + 1, R), good windows (R,), and whether `c` moves the arm."""
+    windows = batch[0][2]
     linear = c[: len(settings.model.names)]
-    looked_at = islice(weak.overlapping(source(), settings), most)
-    while batch := list(islice(looked_at, _TOGETHER)):
-        windows = batch[0][1]
-        columns = [
-            windows.equations(settings.model, piece, settings.estimate_delay, linear)[
-                :, :, ::_STRIDE
-            ]
-            for piece, _, _ in batch
-        ]
-        cut = [
-            _cut(piece, windows)
-            for (piece, _, _), X in zip(batch, columns, strict=True)
-            if X.shape[2]
-        ]
-        if not cut:
-            continue
-        side_by_side = (np.concatenate(part, axis=1) for part in zip(*cut, strict=True))
-        simulated = _simulated(settings.model, linear, windows, *side_by_side)
-        if simulated is None:
-            return None
-        motion, good = simulated
-        plain = Windows(windows.dt, windows.length, 0.0, None)
-        Z = plain.equations(settings.model, motion, settings.estimate_delay, linear)[
-            :, :-1, ::OVERLAP
-        ]
-        both = np.where(good, np.concatenate([Z, np.concatenate(columns, axis=2)], axis=1), 0.0)
-        both = np.where(_moving(windows, batch, settings)[:, None], both, 0.0)
-        rows += good.size
-        astray += int(np.sum(np.logical_not(good)))
-        for part in np.split(both, np.cumsum([X.shape[2] for X in columns])[:-1], axis=2):
-            sums.add(weak.grams(part, OVERLAP // _STRIDE))
-    return Moments(sums.values(), rows, astray) if rows else Moments(np.zeros((0, 2, 1, 1)), 0, 0)
+    columns = [
+        windows.equations(settings.model, piece, settings.estimate_delay, linear)[:, :, ::_STRIDE]
+        for _, piece, _ in batch
+    ]
+    cut = [_cut(piece, windows) for _, piece, _ in batch]
+    together = (np.concatenate(part, axis=1) for part in zip(*cut, strict=True))
+    motion, good, moves = _simulated(settings.model, linear, windows, *together)
+    plain = Windows(windows.dt, windows.length, 0.0, None)
+    Z = plain.equations(settings.model, motion, settings.estimate_delay, linear)[:, :-1, ::OVERLAP]
+    last = 0
+    for X, (_, piece, _) in zip(columns, batch, strict=True):
+        own = slice(last, last := last + X.shape[2])
+        both = np.concatenate([Z[:, :, own], X], axis=1)
+        both = np.where(_moving(windows, piece, settings)[:, None], both, 0.0)
+        yield both, good[own], bool(np.all(moves[own]))
 
 
-def _moving(
-    windows: Windows, batch: Sequence[tuple[Segment, Windows, int]], settings: WeakSettings
-) -> NDArray[np.bool_]:
+def _moving(windows: Windows, piece: Segment, settings: WeakSettings) -> NDArray[np.bool_]:
     """Windows (2, R) in which a joint does not stand: see `WeakSettings.rest`."""
-    speeds = [windows.square_speeds(piece)[:, ::_STRIDE] for piece, _, _ in batch]
-    rest = (0.0, 0.0) if settings.rest is None else settings.rest
-    return np.concatenate(speeds, axis=1) >= np.square(rest)[:, None]
+    if settings.rest is None:
+        return np.ones((2, 1), dtype=bool)
+    return windows.square_speeds(piece)[:, ::_STRIDE] >= np.square(settings.rest)[:, None]
 
 
 def _cut(piece: Segment, windows: Windows) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -276,8 +322,10 @@ def _simulated(
     omega: FloatArray,
     tau: FloatArray,
     measured: FloatArray,
-) -> tuple[Segment, NDArray[np.bool_]] | None:
-    """The motion that windows cut from a log would have had, end to end, and which of them (R,) have not run away.
+) -> tuple[Segment, NDArray[np.bool_], NDArray[np.bool_]]:
+    """The motion that windows cut from logs would have had, end to end.
+
+    Also which windows (R,) have not run away, and on which the mass matrix is positive definite.
 
     Runge-Kutta's fourth order in steps of some `_STEP` s, all windows side by side, from the
     measured start. (To start earlier, so that what the unmodelled torque did before has faded,
@@ -297,7 +345,7 @@ def _simulated(
         for now, share in ((0, 0.5), (1, 0.5), (1, 1.0), (2, 0.0)):
             with np.errstate(
                 divide="ignore", invalid="ignore", over="ignore"
-            ):  # `_has_inertia` judges afterwards
+            ):  # `_inert` judges afterwards
                 rates.append((v, acceleration(model, c, x, v, acts[2 * step + now])))
             x, v = theta + share * h * rates[-1][0], omega + share * h * rates[-1][1]
         (v1, a1), (v2, a2), (v3, a3), (v4, a4) = rates
@@ -306,13 +354,12 @@ def _simulated(
         thetas[:, :, sample : sample + stride] = _cubic(theta, ahead, h * omega, h * faster, inside)
         omegas[:, :, sample : sample + stride] = _cubic(omega, faster, h * a1, h * a4, inside)
         theta, omega = (np.clip(signal, -1e6, 1e6) for signal in (ahead, faster))
-    if not _has_inertia(model, c, thetas[:, :, ::stride]):
-        return None
     good = np.abs(thetas - measured).max(axis=(0, 2)) < _ASTRAY
     angles, torques, velocities = (
         signal.reshape(2, -1) for signal in (thetas, tau[:, :, :-1], omegas)
     )
-    return Segment(0.0, windows.dt, angles, torques, velocities), good
+    moves = _inert(model, c, thetas[:, :, ::stride])
+    return Segment(0.0, windows.dt, angles, torques, velocities), good, moves
 
 
 def _cubic(
@@ -340,10 +387,10 @@ def _started(
     return theta, omega
 
 
-def _has_inertia(model: Model, c: FloatArray, theta: FloatArray) -> bool:
-    """Whether the mass matrix is positive definite at the angles (2, ...)."""
+def _inert(model: Model, c: FloatArray, theta: FloatArray) -> NDArray[np.bool_]:
+    """Whether the mass matrix is positive definite at the angles (2, R, S) of each window (R,)."""
     (m11, m12), (_, m22) = inertia(model, c, theta)
-    return bool(np.all((m11 > 0) & (m11 * m22 > m12**2)))
+    return np.all((m11 > 0) & (m11 * m22 > m12**2), axis=-1)
 
 
 def endogeneity(
@@ -364,7 +411,7 @@ def endogeneity(
         if not sources:
             continue
         c = fit.shared.coefficients(fit.values, kind)[: len(settings.model.names)]
-        found = [moments(source, settings, c, _EXAMINED) for source in sources]
+        found = moments(sources, settings, c, _EXAMINED)
         sums = [
             one
             for one in found

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -196,11 +196,10 @@ class Windows:
         self, X: FloatArray, model: Model, piece: Segment, theta: FloatArray, known: Known
     ) -> None:
         """Write the moments of every column of τ = d²s/dt² + dp/dt + f into X: ∫φ″ s - ∫φ′ p + ∫φ f."""
-        compiled, shape = model.compiled, model.shape
+        compiled, shape, own = model.compiled, model.shape, self._own
 
         def key(order: int, product: Product) -> Hashable:
-            shapes = sorted({name for atom in product for name in atom.shapes})
-            return self._own, order, product, tuple(getattr(shape, name) for name in shapes)
+            return own, order, product, tuple(getattr(shape, name) for name in _shapes(product))
 
         parts = tuple(enumerate((compiled.f, compiled.p, compiled.s)))
         wanted = {
@@ -273,6 +272,12 @@ class Windows:
         return correlate(
             piece.theta[:, self.margin - reach : len(piece) - self.margin + reach], kernel
         )
+
+
+@cache
+def _shapes(product: Product) -> tuple[str, ...]:
+    """The widths of friction that a product depends on."""
+    return tuple(sorted({name for atom in product for name in atom.shapes}))
 
 
 @lru_cache(maxsize=32)

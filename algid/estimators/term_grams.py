@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
-from algid.estimators.combine import long_run_variance, scaled_pinv
+from algid.estimators.combine import long_run_variance, scaled_pinv, scaled_pinvs
 from algid.estimators.modulating_functions import OVERLAP, Known, row_weights
 from algid.estimators.too_short import TooShortError
 from algid.estimators.weak import Normal, Source, WeakSettings, normal_equations
@@ -129,21 +129,16 @@ class Grams:
 
     def _weigh(self, normals: Sequence[tuple[bool, Normal]]) -> None:
         weights: list[FloatArray] = [np.ones(2) for _ in normals]
+        whole = [normal.gram.sum(axis=0) for _, normal in normals]
         for _ in range(_REWEIGHTINGS):
-            pairs = list(zip(normals, weights, strict=True))
-            total = sum(
-                (
-                    self._wide(loaded, np.einsum("a,baxy->xy", w, normal.gram)[None])
-                    for (loaded, normal), w in pairs
-                ),
-                np.zeros((1, self.size + 1, self.size + 1)),
-            )
-            p = _solved(total[0], np.arange(self.size))
+            total = np.zeros((self.size + 1, self.size + 1))
+            for (loaded, normal), w in zip(normals, weights, strict=True):
+                rows = self._rows(loaded)
+                total[rows] += np.einsum("a,baxy->xy", w, normal.gram)
+            p = _solved(total, np.arange(self.size))
             weights = [
-                row_weights(
-                    normal.gram.sum(axis=0), np.append(-p[self._places(loaded)], 1.0), normal.rows
-                )
-                for loaded, normal in normals
+                row_weights(gram, np.append(-p[self._places(loaded)], 1.0), normal.rows)
+                for (loaded, normal), gram in zip(normals, whole, strict=True)
             ]
         # Overlapping rows repeat each other: a window's worth of rows counts as two.
         share = 2.0 / OVERLAP
@@ -166,9 +161,13 @@ class Grams:
     def _wide(self, loaded: bool, gram: FloatArray) -> FloatArray:
         """Gram matrices (B, P + 1, P + 1) in p of a log's (B, q + 1, q + 1)."""
         wide = np.zeros((len(gram), self.size + 1, self.size + 1))
-        rows = [*self._places(loaded), self.size]
-        wide[np.ix_(range(len(gram)), rows, rows)] = gram
+        wide[:, *self._rows(loaded)] = gram
         return wide
+
+    def _rows(self, loaded: bool) -> tuple[IntArray, IntArray]:
+        """Where rows and columns of a log's Gram matrix stand, the torque's last."""
+        rows = np.append(self._places(loaded), self.size)
+        return rows[:, None], rows
 
     def _columns(self, terms: Iterable[str]) -> IntArray:
         """Places in p of eq. (1) and of `terms`."""
@@ -193,11 +192,16 @@ class Grams:
         columns = self._columns(terms)
         key = tuple(columns.tolist())  # each sub-model is asked for beside every term that it lacks
         if key not in self._squares:
-            value = 0.0
-            for fold in self._folds:
-                v = np.append(-_solved(self._total - fold, columns), 1.0)
-                value += float(v @ fold @ v)
-            self._squares[key] = value
+            rest = self._total - self._folds
+            p = np.einsum(
+                "nij,nj->ni",
+                scaled_pinvs(rest[:, columns[:, None], columns]),
+                rest[:, columns, -1],
+            )
+            v = np.concatenate([-p, np.ones((len(p), 1))], axis=1)
+            own = [*columns.tolist(), -1]
+            kept = self._folds[np.ix_(range(len(p)), own, own)]
+            self._squares[key] = float(np.einsum("ni,nij,nj->", v, kept, v, optimize=True))
         return self._squares[key]
 
     def wald(self, terms: Sequence[str], among: Sequence[str]) -> tuple[float, int, float]:

@@ -34,6 +34,7 @@ from algid.estimators.combine import (
     Prior,
     combine,
     scaled_pinv,
+    scaled_pinvs,
 )
 from algid.estimators.fit import Fit, conclude
 from algid.estimators.innovations import LAGS, ResidualSums, pooled, residual_sums
@@ -46,9 +47,12 @@ from algid.signals.segments import Segment, pieces
 
 Source = Callable[[], Iterable[Segment]]
 Gathered = TypeVar("Gathered")
+Solved = tuple[FloatArray, list[LogInformation]]
+"""Coefficients (q,) that logs share, and their likelihoods there."""
 PIECE_SAMPLES = 16384
 _SHORTEST = 64  # samples: shorter pieces hold no window
 _REWEIGHTINGS = 4
+_TOGETHER = 256  # logs that are left out at once
 _PASSES = 8
 _DELAY_SETTLED = 0.02  # samples
 _SETTLED = 1e-4  # of coefficients in which the torque is not linear: 1 or rad
@@ -161,16 +165,60 @@ def _left_out(
     `base` is the delay, in s, from which the passes tell a change; without the only log of its
     kind stands `beta`.
     """
+    arms, burdened = _solved_without_each(unloaded, False), _solved_without_each(loaded, True)
+    every, every_loaded = _solved_together(unloaded, False), _solved_together(loaded, True)
     found = []
     for place in range(len(unloaded) + len(loaded)):
-        rest = [n for number, n in enumerate(unloaded) if number != place]
-        rest_loaded = [n for number, n in enumerate(loaded) if len(unloaded) + number != place]
-        if (unloaded and not rest) or (loaded and not rest_loaded):
+        of_loaded = place - len(unloaded)
+        rest = arms[place] if of_loaded < 0 else every
+        rest_loaded = burdened[of_loaded] if of_loaded >= 0 else every_loaded
+        if (unloaded and rest is None) or (loaded and rest_loaded is None):
             found.append(beta)
             continue
-        start, others = _from(shared, *first_estimate(shared, rest, rest_loaded, prior), base)
+        start, others = _from(shared, *_started(shared, rest, rest_loaded, prior), base)
         found.append(combine(shared, others, start, prior)[0])
     return np.array(found)
+
+
+def _solved_together(normals: Sequence[Normal], loaded: bool) -> Solved | None:
+    """What `solve` gives, all logs in one sum; None without any."""
+    if not normals:
+        return None
+    c, logs = solve(normals, loaded)
+    S, g = (np.sum(part, axis=0) for part in zip(*(log.total for log in logs), strict=True))
+    return c, [LogInformation(loaded, c, S[None], g[None])]
+
+
+def _solved_without_each(normals: Sequence[Normal], loaded: bool) -> list[Solved | None]:
+    """What `solve` gives without each of several logs, all others in one sum; None without the only one.
+
+    The sums without a log are those of all less its own, and many logs' are taken in one product.
+    """
+    if len(normals) < 2:
+        return [None] * len(normals)
+    grams = np.stack([normal.gram.sum(axis=0) for normal in normals])
+    rows = np.stack([normal.rows for normal in normals])
+    least = 1e-24 * grams[:, :, -1, -1].max(axis=1)[:, None] + 1e-300
+    size, flat = grams.shape[-1], grams.reshape(2 * len(normals), -1)
+    found: list[Solved | None] = []
+    for first in range(0, len(normals), _TOGETHER):
+        left = np.arange(first, min(first + _TOGETHER, len(normals)))
+        others = np.ones((left.size, len(normals), 1))
+        others[np.arange(left.size), left] = 0.0
+        weights = np.broadcast_to(others, (left.size, len(normals), 2))
+        for _ in range(_REWEIGHTINGS):
+            total = (weights.reshape(left.size, -1) @ flat).reshape(-1, size, size)
+            c = np.einsum("nij,nj->ni", scaled_pinvs(total[:, :-1, :-1]), total[:, :-1, -1])
+            v = np.concatenate([-c, np.ones((left.size, 1))], axis=1)
+            squares = (v[:, :, None] * v[:, None, :]).reshape(left.size, -1) @ flat.T
+            squares = squares.reshape(left.size, len(normals), 2)
+            weights = others * (rows / np.maximum(squares, least))
+        total = 2.0 / OVERLAP * (weights.reshape(left.size, -1) @ flat).reshape(-1, size, size)
+        for own, gram in zip(c, total, strict=True):
+            S = gram[:-1, :-1]
+            g = gram[:-1, -1] - S @ own
+            found.append((own, [LogInformation(loaded, own, S[None], g[None])]))
+    return found
 
 
 def _linearisation(
@@ -196,20 +244,28 @@ def first_estimate(
     shared: Shared, unloaded: list[Normal], loaded: list[Normal], prior: Prior | None
 ) -> tuple[FloatArray, list[LogInformation]]:
     """Shared parameters from which `conclude` starts, and each log's likelihood."""
+    arm = solve(unloaded) if unloaded else None
+    return _started(shared, arm, solve(loaded, loaded=True) if loaded else None, prior)
+
+
+def _started(
+    shared: Shared, unloaded: Solved | None, loaded: Solved | None, prior: Prior | None
+) -> tuple[FloatArray, list[LogInformation]]:
+    """The same from what logs without and with payload give by themselves."""
     too_short = "log is long enough: expected at least a second of samples without a gap"
-    if not unloaded and (prior is None or not loaded):
+    if unloaded is None and (prior is None or loaded is None):
         raise TooShortError(f"no unloaded {too_short}")
     logs: list[LogInformation] = []
     arm: FloatArray = np.zeros(len(shared.log_names))
-    if unloaded:
-        arm, logs = solve(unloaded)
+    if unloaded is not None:
+        arm, logs = unloaded
     elif prior is not None:
         arm[[shared.log_names.index(name) for name in prior.names]] = prior.mean
     if not shared.payload:
         return arm, logs
-    if not loaded:
+    if loaded is None:
         raise TooShortError(f"no loaded {too_short}")
-    c, under_load = solve(loaded, loaded=True)
+    c, under_load = loaded
     together = LogInformation(
         True,
         c,

@@ -128,9 +128,8 @@ def test_windows_are_simulated_to_the_order_of_their_torque(late: float, order: 
         )  # acts `shift` after its stamp
         piece = Segment(0.0, dt, motion.theta, tau, motion.omega)
         windows = Windows(dt, 0.32, shift, None)
-        found = instruments._simulated(Model(), k, windows, *instruments._cut(piece, windows))
-        assert found is not None
-        simulated, good = found
+        cut = instruments._cut(piece, windows)
+        simulated, good, _ = instruments._simulated(Model(), k, windows, *cut)
         assert (simulated.start, simulated.dt) == (0.0, dt)
         length, first = 8 * windows.step, windows.margin
         starts = first + 2 * windows.step * np.arange(good.size)
@@ -155,13 +154,13 @@ def test_coefficients_that_move_no_arm_and_windows_that_run_away_are_told(bench:
     k, log = bench.arm.constants(), bench.log()
     windows = Windows(log.dt, 0.2, 0.0, None)
     cut = instruments._cut(log, windows)
-    assert instruments._simulated(Model(), -k, windows, *cut) is None
-    wild = instruments._simulated(Model(), k * np.array([1, 1, 1, 1, 1, -500, -500]), windows, *cut)
-    assert wild is not None
-    assert not wild[1].any()
-    found = instruments.moments(
-        lambda: [log], WeakSettings(), k * np.array([1, 1, 1, 1, 1, -500, -500])
-    )
+    assert not instruments._simulated(Model(), -k, windows, *cut)[2].any()
+    wild = k * np.array([1, 1, 1, 1, 1, -500, -500])
+    _, good, moves = instruments._simulated(Model(), wild, windows, *cut)
+    assert not good.any()
+    assert moves.all()
+    assert instruments.moments([lambda: [log]], WeakSettings(), -k) == [None]
+    (found,) = instruments.moments([lambda: [log]], WeakSettings(), wild)
     assert found is not None
     assert found.astray == found.rows > 0
     assert not found.gram.any()
@@ -215,3 +214,19 @@ def test_of_a_long_log_the_first_pieces_are_looked_at(
     apart = instruments.endogeneity([source], [], WeakSettings(), least)
     assert apart is not None
     assert 4 <= max(taken) + 1 <= 6  # one more is asked for before a piece is known to be whole
+
+
+def test_logs_side_by_side_have_the_sums_that_each_has_alone(bench: Bench) -> None:
+    """Also where rates differ, so that their windows cannot be simulated together."""
+    k, log = bench.arm.constants(), bench.log()
+    slower = Segment(0.0, 2 * log.dt, log.theta[:, ::2], log.tau[:, ::2])
+    short = Segment(0.0, log.dt, log.theta[:, :3000], log.tau[:, :3000])
+    none = Segment(0.0, log.dt, log.theta[:, :50], log.tau[:, :50])
+    sources: list[Source] = [partial(list, [one]) for one in (log, short, slower, none, log)]
+    together = instruments.moments(sources, WeakSettings(), k)
+    for source, found in zip(sources, together, strict=True):
+        (alone,) = instruments.moments([source], WeakSettings(), k)
+        assert alone is not None
+        assert found is not None
+        assert (found.rows, found.astray) == (alone.rows, alone.astray)
+        np.testing.assert_allclose(found.gram, alone.gram, rtol=1e-12, atol=1e-18)
