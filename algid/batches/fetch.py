@@ -15,7 +15,6 @@ from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -56,7 +55,6 @@ class UnforeseenError(Exception):
     """A reader asks for bytes that were not fetched."""
 
 
-@dataclass
 class Partial(File):
     """The sparse file under construction; also what `algid.readers.mcap` reads while planning.
 
@@ -69,9 +67,10 @@ class Partial(File):
         Fetch what is read and not there, instead of raising `UnforeseenError`.
     """
 
-    source: Any = None
-    on_demand: bool = False
-    _held: list[Range] = field(default_factory=list)
+    def __init__(self, path: Path, source: Any, *, on_demand: bool = False) -> None:
+        super().__init__(path)
+        self.source, self.on_demand = source, on_demand
+        self._held: list[Range] = []
 
     def __enter__(self) -> Partial:
         self._handle = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o600)

@@ -23,6 +23,7 @@ _LEAST = 3  # half length that three odd moments ask for, however slowly a log w
 _SETTLED = (
     1.0  # periods of a Butterworth cutoff, times its order, after which it forgets to some 1e-4
 )
+_AT_REST = np.zeros(2)  # state of a section of second order
 _ROWS = 32  # outputs a matrix product makes at once
 
 
@@ -117,7 +118,7 @@ def butterworth(x: FloatArray, dt: float, cutoff: float, order: int) -> FloatArr
         start = y[:, :1].copy()
         y = y - start
         for numerator, denominator in _sections(cutoff * dt, order):
-            y = _section(numerator, denominator, y)
+            y = np.stack([recursion(numerator, denominator, row, _AT_REST)[0] for row in y])
         y = (y + start)[:, ::-1]
     return np.ascontiguousarray(y[:, reach : reach + x.shape[1]])
 
@@ -138,16 +139,6 @@ def _sections(cutoff: float, order: int) -> list[tuple[FloatArray, FloatArray]]:
         numerator = warped / (1 + warped) * np.array([1.0, 1.0, 0.0])
         sections.append((numerator, np.array([1.0, (warped - 1) / (1 + warped), 0.0])))
     return sections
-
-
-def _section(numerator: FloatArray, denominator: FloatArray, x: FloatArray) -> FloatArray:
-    """Signals (m, N) after one section that was at rest before them: a triangular banded system."""
-    driven = numerator[0] * x
-    driven[:, 1:] += numerator[1] * x[:, :-1]
-    driven[:, 2:] += numerator[2] * x[:, :-2]
-    band = np.tile(denominator, (x.shape[1], 1)).T
-    y, _ = lapack.dtbtrs(band, driven.T, uplo="L", diag="U")
-    return np.asarray(y.T)
 
 
 def _reflected(x: FloatArray, reach: int) -> FloatArray:

@@ -19,7 +19,7 @@ from algid.cli.output import console
 from algid.faults import EXIT_INTERNAL
 from algid.text import printable
 from tests.cli.commands import call
-from tests.processes import Outcome, begin
+from tests.processes import begin
 
 
 class PanicError(BaseException):
@@ -124,21 +124,6 @@ def test_an_end_that_is_meant_keeps_its_meaning(
     found, told = run("inspect", "log.csv")
     assert found == code
     assert told in ("", "algid: stopped; nothing half-written is left\n")
-
-
-@pytest.fixture(scope="module")
-def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("result")
-    noisy = ("--position-noise", "1e-3", "--torque-noise", "1e-2")
-    assert (
-        Outcome("synth", "case1", "-o", folder, "--torque", "wide", "--duration", "4", *noisy).code
-        == 0
-    )
-    assert (
-        Outcome("identify", folder / "case1-unloaded.mcap", "-o", folder, "--no-report", "-q").code
-        == 0
-    )
-    return folder / "case1-unloaded.algid"
 
 
 def test_a_full_standard_output_is_one_line_of_every_command(result: Path, tmp_path: Path) -> None:

@@ -9,24 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.processes import Outcome, begin
+from tests.processes import begin
 
 ALGID = [sys.executable, "-m", "algid"]
-
-
-@pytest.fixture(scope="module")
-def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("result")
-    noisy = ("--position-noise", "1e-3", "--torque-noise", "1e-2")
-    assert (
-        Outcome("synth", "case1", "-o", folder, "--torque", "wide", "--duration", "4", *noisy).code
-        == 0
-    )
-    assert (
-        Outcome("identify", folder / "case1-unloaded.mcap", "-o", folder, "--no-report", "-q").code
-        == 0
-    )
-    return folder / "case1-unloaded.algid"
 
 
 @pytest.mark.parametrize("errors_too", [False, True])

@@ -9,13 +9,11 @@ bag has no checksums.
 
 from __future__ import annotations
 
-import os
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import TracebackType
 
 import numpy as np
 
@@ -43,6 +41,7 @@ from algid.readers.bags.records import (
 )
 from algid.readers.messages.batch import MessageBatch, Messages
 from algid.readers.messages.source import MessageChannel, Source
+from algid.readers.opened import OpenedFile
 from algid.words import counted
 
 MAGIC = b"#ROSBAG V2.0\n"
@@ -108,41 +107,15 @@ def bag_messages(path: Path, known: Bags | None = None) -> Iterator[Ros1Source]:
         yield Ros1Source(file, layout)
 
 
-class _File:
-    """An opened file, read by offset."""
+class _File(OpenedFile):
+    """An opened bag."""
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def __enter__(self) -> _File:
-        try:
-            self._handle = os.open(self.path, os.O_RDONLY)
-        except OSError as error:
-            raise LogError(f"{self.path}: the log cannot be read ({error.strerror})") from error
-        status = os.fstat(self._handle)
-        self.size, self.changed_ns = status.st_size, status.st_mtime_ns
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        os.close(self._handle)
-
-    def read(self, start: int, end: int) -> bytes:
-        """The bytes [start, end), or `BagError` where the file ends before."""
-        found = (
-            os.pread(self._handle, end - start, start) if 0 <= start <= end <= self.size else b""
-        )
-        if len(found) != end - start:
-            raise BagError(f"bytes {start} to {end} of a file of {self.size}")
-        return found
+        super().__init__(path, BagError)
 
     def record(self, place: int) -> BagRecord:
         """The record at an offset; its data may reach past the end."""
-        head = self.read(place, min(place + _PEEK, self.size))
+        head = self.read(place, min(_PEEK, self.size - place))
         if len(head) < 2 * SIZE.size:
             raise BagError("a record breaks off")
         (length,) = SIZE.unpack_from(head)
@@ -150,7 +123,7 @@ class _File:
             raise BagError(f"what stands at byte {place} is no record")
         start = place + length + 2 * SIZE.size
         if len(head) < start - place:
-            head = self.read(place, start)
+            head = self.read(place, start - place)
         (size,) = SIZE.unpack_from(head, SIZE.size + length)
         return BagRecord(fields_of(head[SIZE.size : SIZE.size + length]), start, start + size)
 
@@ -265,12 +238,14 @@ class _Outline:
         self._found.agreed = False
 
     def _connection(self, record: BagRecord) -> None:
-        number, channel = connection(record.fields, self._file.read(record.start, record.end))
+        number, channel = connection(
+            record.fields, self._file.read(record.start, record.end - record.start)
+        )
         if self._found.channels.setdefault(number, channel) != channel:
             raise BagError(f"connection {number} is defined anew and differently")
 
     def _info(self, record: BagRecord) -> None:
-        data = self._file.read(record.start, record.end)
+        data = self._file.read(record.start, record.end - record.start)
         pairs = struct.iter_unpack("<II", data) if len(data) % _INFO_ENTRY == 0 else ()
         self._told[record.number("chunk_pos", 8)] = {
             number: count for number, count in pairs if count
@@ -399,10 +374,13 @@ class Ros1Source(Source):
     def _records(self, part: BagPart) -> tuple[ChunkMessages, Others]:
         """The messages of a part, and its connections."""
         content = unpacked(
-            self._file.read(part.start, part.end), part.packing, part.size, torn=part.torn
+            self._file.read(part.start, part.end - part.start),
+            part.packing,
+            part.size,
+            torn=part.torn,
         )
         offsets = [
-            np.frombuffer(self._file.read(start, start + count * _INDEX_ENTRY), "<u4")[2::3]
+            np.frombuffer(self._file.read(start, count * _INDEX_ENTRY), "<u4")[2::3]
             for start, count in part.indexes.values()
         ]
         listed = (

@@ -9,18 +9,16 @@ record on the way.
 from __future__ import annotations
 
 import io
-import os
 import struct
 import zlib
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any, NamedTuple
 
-from algid.errors import LogError
 from algid.limits import LIMITS
+from algid.readers.opened import OpenedFile
 from algid.words import counted
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -66,44 +64,12 @@ class BrokenError(DamagedError):
         self.place = place
 
 
-@dataclass
-class File:
-    """An opened file, read by offset; counts the bytes it read."""
+class File(OpenedFile):
+    """An opened file, which counts what its chunks claim and how much work it makes."""
 
-    path: Path
-    size: int = 0
-    read_bytes: int = 0
-    _unpacked: int = 0
-    _work: int = 0
-    changed_ns: int = 0
-    _handle: int = field(default=-1, repr=False)
-
-    def __enter__(self) -> File:
-        try:
-            self._handle = os.open(self.path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
-        except OSError as error:
-            raise LogError(f"{self.path}: the log cannot be read ({error.strerror})") from error
-        status = os.fstat(self._handle)
-        self.size, self.changed_ns = status.st_size, status.st_mtime_ns
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        os.close(self._handle)
-
-    def read(self, start: int, length: int) -> bytes:
-        """The bytes at `start`, or `DamagedError` where the file ends before."""
-        if start < 0 or length < 0 or start + length > self.size:
-            raise DamagedError(f"bytes {start} to {start + length} of a file of {self.size}")
-        self.read_bytes += length
-        found = os.pread(self._handle, length, start)
-        if len(found) != length:
-            raise DamagedError(f"bytes {start} to {start + length} cannot be read")
-        return found
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, DamagedError)
+        self._unpacked = self._work = 0
 
     def unpacks(self, size: int) -> None:
         """Count bytes that a chunk claims to unpack to; `DamagedError` where no honest file of this size claims so."""
