@@ -57,7 +57,8 @@ def with_body_of(fit: Fit, body: Sequence[str]) -> Fit:
     known = dict(zip(fit.names, fit.values.tolist(), strict=True))
     start = np.array([known.get(name, 0.0) for name in shared.names])
     if fit.shrinkage is not None and fit.prior is not None:
-        found = concluded(shared, fit.logs, start, fit.prior, fit.shrinkage, fit.moved)
+        found = concluded(shared, fit.logs, start, fit.prior, fit.shrinkage, fit.moved, fit.repeats)
+        found = replace(found, estimator=fit.estimator)
     else:
         coloured = fit.intervals != "likelihood"
         found = conclude(

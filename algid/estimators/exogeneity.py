@@ -34,6 +34,7 @@ from algid.compiled import chi2_tail
 from algid.estimators import instruments, weak
 from algid.estimators.combine import combine, long_run_variance, scaled_pinv
 from algid.estimators.fit import Fit
+from algid.estimators.repeats import merged, shared_out
 from algid.estimators.shrinkage import dispersion, divided
 from algid.estimators.shrunk import resting
 from algid.estimators.shrunk_fit import concluded
@@ -147,8 +148,9 @@ def instrumented(
                 logs.append(replace(instruments.projected(sums, c, kind), c0=c0))
     if len(logs) != len(fit.logs) or fit.prior is None or fit.shrinkage is None:
         return None
-    scaled = divided(logs, dispersion(shared, logs, at))
-    found = concluded(shared, scaled, at, fit.prior, fit.shrinkage, fit.moved)
+    logs = shared_out(logs, fit.repeats)
+    scaled = divided(logs, dispersion(shared, merged(logs, fit.repeats), at))
+    found = concluded(shared, scaled, at, fit.prior, fit.shrinkage, fit.moved, fit.repeats)
     return replace(found, estimator="instruments")
 
 

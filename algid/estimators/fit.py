@@ -65,6 +65,7 @@ class Fit:
     notes : what is to be said of the fit, such as why the refined estimator handed back the weak estimate
     moved : (2,), rad, how far each joint travelled
     shrinkage : the prior's part on the torque's terms; None where none is shrunk
+    repeats : places of logs that repeat each other, where that was looked at
     """
 
     estimator: str
@@ -88,6 +89,7 @@ class Fit:
     notes: tuple[Notice, ...] = ()
     moved: FloatArray = field(default_factory=lambda: np.full(2, np.inf))
     shrinkage: Prior | None = None
+    repeats: tuple[tuple[int, ...], ...] = ()
 
     def __post_init__(self) -> None:
         keep_arrays(self)

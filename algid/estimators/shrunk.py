@@ -8,7 +8,7 @@ there: its windows say nothing and are left out.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from algid.estimators.combine import LogInformation, Prior
 from algid.estimators.fit import Fit
 from algid.estimators.modulating_functions import OVERLAP, row_weights
 from algid.estimators.parametrisation import Shared
+from algid.estimators.repeats import Groups, grouped, merged, shared_out
 from algid.estimators.shrinkage import SCALES, Expected, dispersion, divided, joined, shrink
 from algid.estimators.shrunk_fit import concluded
 from algid.estimators.weak import Normal, Source, WeakSettings
@@ -102,13 +103,24 @@ class _Logs:
         self, settings: WeakSettings, at: Mapping[bool, FloatArray]
     ) -> list[tuple[bool, Normal]]:
         """Normal equations of each log that is long enough, and whether it is loaded."""
-        found = []
-        for kind, sources in ((False, self.unloaded), (True, self.loaded)):
-            for source in sources:
-                normal = weak.normal_equations(source, settings, at.get(kind))
-                if normal is not None:
-                    found.append((kind, normal))
-        return found
+        return [(kind, normal) for _, kind, normal in self._placed(settings, at)]
+
+    def groups(self, settings: WeakSettings) -> Groups:
+        """Which of the logs that are long enough repeat each other."""
+        places = [place for place, _, _ in self._placed(settings, {})]
+        every = grouped(self.unloaded, self.loaded)
+        kept = (tuple(places.index(one) for one in group if one in places) for group in every)
+        return tuple(group for group in kept if group)
+
+    def _placed(
+        self, settings: WeakSettings, at: Mapping[bool, FloatArray]
+    ) -> Iterator[tuple[int, bool, Normal]]:
+        every = [(False, source) for source in self.unloaded]
+        every += [(True, source) for source in self.loaded]
+        for place, (kind, source) in enumerate(every):
+            normal = weak.normal_equations(source, settings, at.get(kind))
+            if normal is not None:
+                yield place, kind, normal
 
 
 def _found(
@@ -127,6 +139,7 @@ def _found(
     )
     beta, _ = weak.first_estimate(shared, bare, burdened, known)
     first = bare + burdened
+    groups = logs.groups(settings)
     share: FloatArray = np.ones(0)
     for number in range(_ROUNDS):
         if number:
@@ -142,11 +155,12 @@ def _found(
         share = share if number else np.ones(len(expected.names))
         for _ in range(_REWEIGHTINGS):
             likelihoods = [_weighed(shared, normal, kind, beta, base) for kind, normal in normals]
-            phi = dispersion(shared, likelihoods, beta)
+            likelihoods = shared_out(likelihoods, groups)
+            phi = dispersion(shared, merged(likelihoods, groups), beta)
             scaled = divided(likelihoods, phi)
             beta, share = shrink(shared, scaled, beta, expected, share, known)
     own = expected.prior(share)
-    return concluded(shared, scaled, beta, joined(known, own), own, moved)
+    return concluded(shared, scaled, beta, joined(known, own), own, moved, groups)
 
 
 def _weighed(

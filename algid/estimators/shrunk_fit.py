@@ -11,6 +11,7 @@ from algid.estimators.combine import LogInformation, Prior, combine, scaled_pinv
 from algid.estimators.fit import Fit, Intervals, Status
 from algid.estimators.identifiability import examine
 from algid.estimators.parametrisation import Shared
+from algid.estimators.repeats import Groups, merged
 from algid.estimators.shrinkage import spread
 
 QUANTILE = 2.3
@@ -24,6 +25,7 @@ def concluded(
     prior: Prior,
     shrinkage: Prior,
     moved: FloatArray,
+    groups: Groups,
 ) -> Fit:
     """The fit of likelihoods divided by φ, with error bars and statuses.
 
@@ -39,12 +41,16 @@ def concluded(
         Its part on the terms that are shrunk.
     moved : (2,), rad
         How far each joint travelled.
+    groups : Groups
+        Logs that repeat each other, among which each likelihood is shared out already.
     """
     beta, H, _ = combine(shared, logs, beta, prior)
     given = (*shrinkage.names, *prior.absent)
     statuses, sentences = _judged(shared.names, beta, H, given, moved)
     without = _left_out(shared, logs, beta, prior)
-    wide = spread(shared, logs, beta, prior, without)
+    each = merged(logs, groups)
+    alone = without if len(each) == len(logs) else _left_out(shared, each, beta, prior)
+    wide = spread(shared, each, beta, prior, alone)
     intervals: Intervals = "sandwich" if wide.jackknife is None else "jackknife"
     ways = [way for way in (wide.jackknife, wide.scores, wide.stretches) if way is not None]
     return Fit(
@@ -62,6 +68,7 @@ def concluded(
         shrinkage=shrinkage,
         without=without,
         moved=moved,
+        repeats=groups,
     )
 
 

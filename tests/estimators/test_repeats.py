@@ -1,0 +1,50 @@
+"""Runs of one motion are found by the motion, and count as one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from algid.arm import FloatArray
+from algid.estimators import shrunk
+from algid.estimators.repeats import grouped
+from algid.estimators.weak import Source, WeakSettings
+from algid.signals.segments import Segment
+from pipelines import real_arms
+
+
+def run(seed: int, shift: float = 0.0, dt: float = 2e-3, seconds: float = 6.0) -> Segment:
+    """Both joints under sines of random phases, with an encoder's noise of its own."""
+    rng = np.random.default_rng(seed)
+    phase, turn = rng.uniform(0, 6, (2, 4, 1)), rng.uniform(2, 15, (2, 4, 1))
+    t = dt * np.arange(round(seconds / dt)) + shift
+    theta = np.sin(turn * t + phase).sum(axis=1) / 3
+    noise = np.random.default_rng(round(1e6 * shift)).standard_normal(theta.shape)
+    return Segment(0.0, dt, theta + 1e-3 * noise, np.zeros_like(theta))
+
+
+def source(log: Segment) -> Source:
+    return lambda: [log]
+
+
+def test_repeats_are_found_by_their_motion() -> None:
+    """At another rate, begun later, a little shorter; another motion and a loaded log are no repeats."""
+    logs = [run(1), run(2), run(1, shift=0.3), run(1, dt=4e-3), run(1, seconds=5.5), run(3)]
+    unloaded = [source(log) for log in logs]
+    assert grouped(unloaded, [source(run(1))]) == ((0, 2, 3, 4), (1,), (5,), (6,))
+
+
+def fitted(logs: list[Segment]) -> tuple[FloatArray, FloatArray]:
+    found = shrunk.fit([source(log) for log in logs], (), WeakSettings(bandwidth=60.0))
+    return found.values[:7], found.std[:7]
+
+
+@pytest.mark.slow
+def test_six_repeats_tell_what_one_run_tells() -> None:
+    """Cogging is the same in each: without grouping the error bars would shrink by √6."""
+    made = real_arms.campaigns(real_arms.ROWS["torque ripple 3 %"], [81], 1)[81]
+    rng = np.random.default_rng(5)
+    alone, once = fitted([made[0].log(rng)])
+    together, six = fitted([made[0].log(rng) for _ in range(6)])
+    assert together == pytest.approx(alone, rel=0.05)
+    assert np.all(six > 0.7 * once)
