@@ -32,6 +32,7 @@ from algid.words import counted
 COLOURS = ("@blue", "@orange", "@green", "@amber", "@red", "@muted")
 CHANCE = 1.96  # σ that 95 % of differences by chance stay within
 FAR = 3.0  # σ that chance does not explain
+FARTHEST = 12.0  # σ that the first view shows
 NAME = "compare.html"
 ROW, FRAME = 24, 90  # pixels of a parameter, and of what stands around them
 READING = "a difference inside the blue band is one that chance explains 19 times of 20"
@@ -106,36 +107,44 @@ def _dots(
     }
 
 
-def _share(found: Estimate | None, middle: float) -> tuple[float, float] | None:
-    """Estimate and half its interval in percent of `middle`, less 100."""
-    if found is None or found.estimate is None or found.std is None:
+def _in_sigmas(found: Estimate | None, first: Estimate, sigma: float) -> tuple[float, float] | None:
+    """How far the estimate lies from the first one, and half its interval, in `sigma`."""
+    if found is None or found.estimate is None or found.std is None or first.estimate is None:
         return None
     low, high = found.ci95 or (None, None)
     half = CHANCE * found.std if low is None or high is None else (high - low) / 2
-    return 100 * (found.estimate - middle) / abs(middle), 100 * half / abs(middle)
+    return (found.estimate - first.estimate) / sigma, half / sigma
+
+
+def _sigmas(results: Sequence[Result], names: Sequence[str]) -> dict[str, float]:
+    """Each row's largest standard deviation, of the parameters of which the first result has an estimate."""
+    found = {}
+    for name in names:
+        first = results[0].estimates.get(name)
+        every = [result.estimates.get(name) for result in results]
+        stds = [one.std for one in every if one is not None and one.std]
+        if first is not None and first.estimate is not None and stds:
+            found[name] = max(stds)
+    return found
 
 
 def _intervals(found: Comparison, results: Sequence[Result]) -> Figure:
-    """A forest plot: every result's interval in percent of the first one's estimate."""
-    middles = {
-        name: results[0].estimates[name].estimate
-        for name in found.sigma
-        if name in results[0].estimates
-    }
-    known = {name: middle for name, middle in middles.items() if middle}
+    """A forest plot: every result's interval from the first one's estimate, a row a parameter, each row in its own σ."""
+    known = _sigmas(results, list(found.sigma))
+    first = results[0].estimates
     apart = 0.6 / len(results)
     traces: list[Trace] = []
     widest = [0.0]
     for place, result in enumerate(results):
         rows = [
-            (at, _share(result.estimates.get(name), middle))
-            for at, (name, middle) in enumerate(known.items())
+            (at, _in_sigmas(result.estimates.get(name), first[name], sigma))
+            for at, (name, sigma) in enumerate(known.items())
         ]
         shown = [(at, *share) for at, share in rows if share is not None]
         x, half = (np.array([row[column] for row in shown]) for column in (1, 2))
         y = np.array([row[0] for row in shown]) + (place - (len(results) - 1) / 2) * apart
         widest += [float(value) for value in np.abs(x) + half]
-        dots = _dots(found, place, x, y, 7, "+.3g} %")
+        dots = _dots(found, place, x, y, 7, "+.2f} σ")
         bar = {
             "type": "data",
             "array": half.tolist(),
@@ -144,9 +153,11 @@ def _intervals(found: Comparison, results: Sequence[Result]) -> Figure:
             "width": 0,
         }
         traces.append({**dots, "error_x": bar})
-    reach = 1.1 * float(np.quantile(widest, 0.9))
+    reach = 1.1 * min(max(widest), FARTHEST)
     layout = {
-        "xaxis": axis(f"from {label(found.labels[0])}, %", range=[-reach, reach]),
+        "xaxis": axis(
+            f"from {label(found.labels[0])}, in the row's largest σ", range=[-reach, reach]
+        ),
         "yaxis": _names(list(known)),
         "hovermode": "closest",
     }

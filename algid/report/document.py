@@ -167,7 +167,7 @@ class Section:
     listed : whether a page's contents lead to it; one of many parts alike is not
     """
 
-    content: tuple[Content, ...]
+    content: tuple[Content, ...] = ()
     key: str = ""
     title: str = ""
     beside: ArmDrawing | None = None

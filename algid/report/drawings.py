@@ -30,7 +30,7 @@ WIDTH, HEIGHT = 124.0, 22.0  # of a forest plot's row, pixels
 EDGE = 8.0  # where an arrow tells that an interval goes on
 WIDEST = 100.0  # percent: an interval beyond says little more than the estimate's size
 ROOM = 1.15  # of the widest interval
-MOST = 2.5  # of the median interval: wider ones end in arrows, so that they do not hide the others
+MOST = 4.0  # of the median interval: wider ones end in arrows, so that they do not hide the others
 STEPS = (1.0, 2.0, 5.0, 10.0)
 
 
@@ -90,8 +90,10 @@ def _share(found: Estimate) -> float | None:
 def _limit(shares: Sequence[float]) -> float:
     """The scale that holds every interval, or where a few are far wider than most, all but those.
 
+    Intervals as wide as their estimates do not count: they hold zero, and would flatten the others.
     It is rounded up to the next 1, 2 or 5 times a power of ten.
     """
+    shares = [share for share in shares if share < WIDEST] or shares
     least = min(max(shares) * ROOM, MOST * statistics.median(shares), WIDEST) if shares else 0.0
     if least <= 0:
         return 1.0

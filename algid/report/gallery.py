@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from algid.errors import ResultError
+from algid.methods import settles
 from algid.progress import Progress
 from algid.report.figures.base import Figure, Missing
 from algid.report.figures.convergence import LOADED, convergence
@@ -64,7 +65,9 @@ def gallery(folder: Path, result: Result, progress: Progress | None = None) -> G
     else:
         figures.append(torque(found, result.logs, _scored(folder / "scored.parquet", result)))
         if found.reduced:
-            figures.append(_try("closeup", CLOSEUP, torques, lambda: closeup(torques, found)))
+            figures.append(
+                _try("closeup", CLOSEUP, torques, lambda: closeup(torques, found, result.logs))
+            )
     figures.append(_try("innovations", INNOVATIONS, left, lambda: innovations(left, result)))
     figures.append(_try("running", RUNNING, so_far, lambda: running(so_far, result)))
     if read is not None:
@@ -77,6 +80,8 @@ def gallery(folder: Path, result: Result, progress: Progress | None = None) -> G
         paper.append(
             _try("loaded", LOADED, loaded, lambda: convergence(loaded, result, loaded=True))
         )
+    if settles(result.estimator):  # which has no residual, no intervals and nothing of them
+        figures = [one for one in figures if not (isinstance(one, Missing) and one.absent)]
     return Gallery(read, figures, paper)
 
 
@@ -114,7 +119,7 @@ def drawable(result: Result) -> Result:
 def _try(key: str, title: str, file: Path, make: Callable[[], T]) -> T | Missing:
     """What `make` gives, or why the file does not give it."""
     if not file.is_file():
-        return Missing(key, title, f"{file.name} is not in this folder")
+        return Missing(key, title, f"{file.name} is not in this folder", absent=True)
     try:
         return make()
     except ResultError as error:

@@ -30,7 +30,8 @@ from algid.words import counted
 
 FIRST = ("Parameters", "Payload")
 SECOND = ("Torque prediction",)
-TOLD_ELSEWHERE = ("± std, %", "Paper %")  # on a page: by the forest plot, and by Table 4
+# on a page: by the interval, by the forest plot, and by Table 4
+TOLD_ELSEWHERE = ("± std", "± std, %", "Paper %")
 TERMS_READING = (
     "Read: a bar to the left lowers the error of torque that was held out; a term is kept where it does so and its "
     "odds are good. What is left out would gain no more than stands here."
@@ -103,7 +104,10 @@ def result_document(result: Result, shown: Gallery | None = None) -> Document:
     notes = Bullets(
         noted, "What the readers and the estimator warn of stands at the top of the page."
     )
-    opened: Fold = "open" if settles(result.estimator) or _truth(result) else "closed"
+    fold: Fold = "open" if _truth(result) else "closed"  # folded where a real log is
+    of_paper = (*convergence, *paper)
+    leads = settles(result.estimator)
+    folded = Section(of_paper, "paper", "The paper's figure and tables", fold=fold)
     sections = (
         Section(
             (
@@ -112,6 +116,7 @@ def result_document(result: Result, shown: Gallery | None = None) -> Document:
             ),
             beside=arm_of(result, torque),
         ),
+        Section(of_paper if leads else ()),
         Section(tuple(figures[:1])),
         Section(
             tuple(terms if shown is None else _with_gains(terms, result)),
@@ -126,8 +131,7 @@ def result_document(result: Result, shown: Gallery | None = None) -> Document:
             "settings",
             "Settings and provenance",
         ),
-        # open where the paper is the matter, folded where a real log is
-        Section((*paper, *convergence), "paper", "The paper's tables and convergence", fold=opened),
+        Section() if leads else folded,
     )
     name = file_name(result.log.path)
     seconds, samples = (
@@ -158,10 +162,17 @@ def _with_intervals(tables: Sequence[Table], result: Result) -> list[Table]:
     if not shown or not drawn.rows:
         return shown
     marks = [
-        f"Drawn: the 95 % interval on a scale of ± {significant(drawn.limit, 1)} % of the estimate"
+        f"Drawn: the 95 % interval on a scale of ± {significant(drawn.limit, 1)} % of the estimate, with arrows where it "
+        "is wider"
     ]
-    marks += ["grey dots: each unloaded log's own estimate"] if logs else []
-    marks += ["ring: the truth"] if truth else []
+    marks += (
+        [
+            "grey dots: each unloaded log by itself, hollow at the edge where it lies beyond the scale"
+        ]
+        if logs
+        else []
+    )
+    marks += ["orange ring: the truth"] if truth else []
     shown[-1] = replace(shown[-1], note="; ".join(marks) + ".")
     return [
         replace(table, drawn=(Drawn(drawn.heading, drawn.rows, after="Unit"),)) for table in shown

@@ -26,6 +26,7 @@ WIDTH = 7.1  # inches: two columns of a journal
 INCHES = 1 / 96  # of a page's pixel
 POINTS = 0.75  # of a page's pixel
 DPI = 200
+UPRIGHT = 6  # names of logs: more stand upright
 MISSING = (
     "--save-plots: expected matplotlib, found none; install it with: pip install 'algid[plots]'"
 )
@@ -156,6 +157,7 @@ def _panel(sheet: Any, cell: Any, panel: Panel, colours: Colours) -> None:
             transform=top.get_xaxis_transform(),
             va="bottom",
             size=6,
+            rotation=90 if len(layout["annotations"]) > UPRIGHT else 0,
         )
     _axes(bottom, layout.get("xaxis", {}), "x")
     _axes(top, layout["yaxis"], "y")

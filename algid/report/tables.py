@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from algid.methods import settles
+from algid.model import PARAMETERS
 from algid.report.document import Column, Depth, Table, filled
 from algid.report.series import TorqueLog
 from algid.results import Estimate, FitSummary, LogSummary, Result, Table4Row
@@ -168,14 +170,16 @@ def used_settings(result: Result) -> Table:
     for name, value in _found(result).items():
         if value != used.get(name):
             asked[name], used[name] = used.get(name, ABSENT), value
-    for log in {log.role: log for log in reversed(result.logs)}.values():
-        if log.reading is not None:
-            used |= {
-                f"{log.role} log: {name.replace('_', ' ')}": setting_text(
-                    getattr(log.reading, name)
-                )
-                for name in CONVENTIONS
-            }
+    for name in CONVENTIONS:
+        read = {
+            log.role: setting_text(getattr(log.reading, name))
+            for log in reversed(result.logs)
+            if log.reading is not None
+        }
+        alike = len(set(read.values())) == 1
+        words = name.replace("_", " ")
+        used |= {f"{words} of the {role} log": value for role, value in read.items() if not alike}
+        used |= {words: value for value in list(read.values())[:1] if alike}
     rows = tuple(
         (visible(name), visible(value, LONGEST_VALUE), visible(asked.get(name, ABSENT)))
         for name, value in used.items()
@@ -187,6 +191,8 @@ def used_settings(result: Result) -> Table:
 def _found(result: Result) -> dict[str, str]:
     """The settings that the logs decided: estimator, terms of the torque, delay."""
     found = {"estimator": result.estimator}
+    if settles(result.estimator):
+        found["model"] = "plain"
     model = None if result.fit is None else result.fit.model
     delay = result.parameters.get("delay")
     if model is not None:
@@ -286,11 +292,12 @@ ESTIMATE_COLUMNS = (
     Column("Truth", "number", rank=5),
     Column("Error %", "number", rank=3),
     Column("Paper %", "number", rank=4),
+    Column("Meaning", "text", rank=7),
 )
 TABLE4_COLUMNS = tuple(
     column
     for column in ESTIMATE_COLUMNS
-    if column.kind != "status" and "interval" not in column.heading
+    if column.kind != "status" and column.heading not in ("95 % interval", "Meaning")
 )
 PREDICTION_COLUMNS = (
     Column("Torque predicted", "name"),
@@ -326,7 +333,10 @@ def estimate_tables(result: Result) -> tuple[Table, ...]:
             )
             for row in known
         )
-        note = "Names and order of the paper's Table 4; Paper % is the error it reports."
+        note = (
+            "Names and order of the paper's Table 4; Paper % is the error it reports. The paper does not state its torque: that of "
+            "the synthetic cases was sought for this table."
+        )
         tables.append(Table("Table 4", TABLE4_COLUMNS, rows, note))
     shown = filled(*(table.without_empty() for table in tables))
     if result.verdict.failed:
@@ -353,6 +363,7 @@ def _estimate_row(name: str, found: Estimate, result: Result) -> tuple[str, ...]
         found.status.value,
         ABSENT if found.ci95 is None else interval(*found.ci95, found.std),
         *_against(known, found.estimate, found.std),
+        PARAMETERS[name].meaning if name in PARAMETERS else ABSENT,
     )
 
 

@@ -23,7 +23,7 @@ from algid.report.figures.inertia import inertia
 from algid.report.figures.information import information
 from algid.report.figures.innovations import CORRELATION, SPECTRUM, TORQUE, innovations
 from algid.report.figures.running import running
-from algid.report.figures.timeline import chained, offsets, separators, views
+from algid.report.figures.timeline import chained, offsets, separators, short, views
 from algid.report.figures.torque import Scored, closeup, signals, torque
 from algid.report.gallery import drawable
 from algid.report.series import LogRange, TorqueLog, read_scored, read_torque
@@ -110,11 +110,15 @@ def test_logs_follow_one_another_a_hundredth_of_the_whole_apart(result: Result) 
     assert [shape["x0"] for shape in shown["shapes"]] == pytest.approx([end[0] for end in ends[1:]])
     assert [note["text"] for note in shown["annotations"]] == ["a.csv", "b.csv", "log 3"]
     assert shown["margin"]["t"] > 22  # the template's
-    many = {log: LogRange(0.0, 1.0) for log in range(7)}
-    crowded = separators(many, offsets(many), logs)
-    assert len(crowded["shapes"]) == 6
-    assert crowded["annotations"] == []
-    assert "margin" not in crowded
+    many = {log: LogRange(0.0, 1.0) for log in range(30)}
+    runs = [result.log.model_copy(update={"path": f"/d/run_{n:02}.csv"}) for n in range(30)]
+    crowded = separators(many, offsets(many), runs)
+    assert len(crowded["shapes"]) == 29
+    # every log keeps its name, less what all names share
+    assert [note["text"] for note in crowded["annotations"]] == [f"{n:02}" for n in range(30)]
+    assert short(["a.csv", "b.csv"]) == ["a", "b"]
+    assert short(["run", "run-1"]) == ["run", "run-1"]
+    assert short(["x-143339.csv", "x-143524.csv"]) == ["143339", "143524"]
     assert separators({0: RANGES[0]}, moved, logs) == {}
 
 
@@ -337,7 +341,7 @@ def test_what_has_no_prediction_shows_its_spectra_and_ticks(result: Result, tmp_
 
 @pytest.mark.parametrize(("joint", "moment"), [(1, 1.234), (2, 0.1)])
 def test_the_worst_moment_is_shown_sample_by_sample(
-    case_folder: Path, tmp_path: Path, joint: int, moment: float
+    case_folder: Path, result: Result, tmp_path: Path, joint: int, moment: float
 ) -> None:
     rows = pl.read_parquet(case_folder / "torque.parquet")
     knock = (pl.col("t") - moment).abs() < 5e-4
@@ -351,7 +355,7 @@ def test_the_worst_moment_is_shown_sample_by_sample(
     path = tmp_path / "torque.parquet"
     changed.write_parquet(path)
     found = read_torque(path)
-    panel = drawn(closeup(path, found)).panels[joint - 1]
+    panel = drawn(closeup(path, found, result.logs)).panels[joint - 1]
     near = changed.filter((pl.col("log") == 1) & pl.col("t").is_between(moment - 0.5, moment + 0.5))
     measured, predicted, residual = (values(trace["y"]) for trace in panel.traces)
     np.testing.assert_allclose(measured, near[name].to_numpy(), rtol=1e-6, atol=1e-7)
@@ -360,10 +364,10 @@ def test_the_worst_moment_is_shown_sample_by_sample(
     )
     assert measured.size == predicted.size == (1001 if moment > 0.5 else 601)
     assert panel.says.startswith(f"Joint {joint}, largest residual ")
-    assert panel.says.endswith(f" at {moment:.3f} s of log 2")
+    assert panel.says.endswith(f" at {moment:.3f} s of case1-loaded.mcap")
     path.write_bytes(b"PAR1 nothing")
     with pytest.raises(ResultError, match="cannot read it"):
-        closeup(path, found)
+        closeup(path, found, result.logs)
 
 
 def test_torques_and_signals_hold_the_extremes_of_their_logs(

@@ -53,9 +53,19 @@ def test_one_wild_row_does_not_hide_the_others() -> None:
     }
     wild = {"k9": Estimate(estimate=1.0, std=0.4, ci95=(0.2, 1.8), unit="m")}
     drawn = forest(steady | wild)
-    assert drawn.limit == 5.0  # 2.5 times 2 %
+    assert drawn.limit == 10.0  # 4 times 2 %, rounded up
     assert 'class="end"' in drawn.rows["k9"]
     assert 'class="end"' not in drawn.rows["k0"]
+
+
+def test_estimates_about_zero_do_not_flatten_the_others() -> None:
+    known = {f"k{n}": Estimate(estimate=1.0, ci95=(0.96, 1.04), unit="m") for n in range(3)}
+    nothing = {f"o{n}": Estimate(estimate=0.001, ci95=(-1.0, 1.0), unit="m") for n in range(9)}
+    drawn = forest(known | nothing)
+    assert drawn.limit == 5.0  # 4 % and room
+    assert 'class="end"' in drawn.rows["o0"]
+    left, right = reach(drawn.rows["k0"])
+    assert right - left > WIDTH / 2
 
 
 def test_bars_stand_on_the_side_of_their_sign_and_share_a_scale() -> None:

@@ -20,6 +20,7 @@ import pytest
 from algid.arm import FloatArray
 from algid.errors import ResultError
 from algid.notices import Notice
+from algid.report.document import Depth
 from algid.report.figures.base import Figure, Missing
 from algid.report.figures.timeline import views
 from algid.report.frame import library
@@ -230,7 +231,7 @@ def test_numbers_that_no_arm_has_are_told_and_not_drawn(folder: Path, result: Re
     )
     torque.with_columns(tau1_predicted=beyond).write_parquet(folder / "torque.parquet")
     page = write_report(folder).read_text(encoding="utf-8")  # pytest makes any overflow an error
-    assert "9e29" in page or "9.0e+29" in page
+    assert "[−1.1e30" in page or "[-1.1e30" in page or "1.7e29" in page
     assert "k1, k3 or k5 has no estimate that can be drawn" in page
 
 
@@ -335,7 +336,7 @@ def test_each_logs_own_estimate_is_a_dot_of_the_forest_plot(folder: Path, result
     row = re.search(r'<tr><th scope="row">k1</th>.*?</tr>', page, re.DOTALL)
     assert row is not None
     assert row[0].count('class="log"') == 2
-    assert "grey dots: each unloaded log&#x27;s own estimate" in page
+    assert "grey dots: each unloaded log by itself, hollow at the edge" in page
     loaded = [both[0], both[1].model_copy(update={"role": "loaded"})]
     changes["more_logs"] = loaded[1:]  # whose k1 holds the payload's share
     assert 'class="log"' not in page_html(folder, result.model_copy(update=changes))
@@ -368,3 +369,24 @@ def test_a_page_shows_three_reasons_and_folds_the_rest_and_the_notes() -> None:
     assert "2 more reasons" in rest
     assert "data notes (1)" in rest
     assert "a.csv: reason 4" in rest
+
+
+def test_a_page_of_the_papers_method_begins_with_its_figure_and_lacks_nothing(
+    folder: Path, result: Result
+) -> None:
+    for name in ("torque", "innovations", "running", "information"):
+        (folder / f"{name}.parquet").unlink()
+    of_paper = result.model_copy(update={"estimator": "paper", "fit": None})
+    document = result_document(of_paper, gallery(folder, of_paper))
+    figures = [one for one in document.content() if isinstance(one, Figure)]
+    assert [one.key for one in figures[:2]] == ["convergence", "loaded"]
+    assert "Figure 2" in figures[0].title
+    assert not [one for one in document.content() if isinstance(one, Missing)]
+    assert not any(section.fold for section in document.sections)
+    (table,) = [one for one in document.tables(*Depth) if one.title == "Table 4"]
+    assert "was sought for this table" in table.note
+    other = result.model_copy(
+        update={"fit": None}
+    )  # which another estimator does not lack by nature
+    shown = result_document(other, gallery(folder, other))
+    assert [one for one in shown.content() if isinstance(one, Missing)]

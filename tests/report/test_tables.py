@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
+from algid.model import PARAMETERS
 from algid.report.document import Table
 from algid.report.markdown import escaped, markdown
 from algid.report.page import FIRST, TOLD_ELSEWHERE, page_html, result_document, write_report
@@ -145,7 +146,9 @@ def test_the_error_belongs_to_the_estimate_beside_it(result: Result) -> None:
     other = {"m_p": Estimate(estimate=0.51, unit="kg")}
     changed = result.model_copy(update={"table4": [row], "paper_payload": other, "payload": {}})
     table = next(table for table in estimate_tables(changed) if "route" in table.title)
-    assert table.rows == (("m_p", "0.51000", "kg", "OK", "0.50000", "2.000", "0.2449"),)
+    (row,) = table.rows
+    assert row[:-1] == ("m_p", "0.51000", "kg", "OK", "0.50000", "2.000", "0.2449")
+    assert row[-1] == PARAMETERS["m_p"].meaning
 
 
 def test_a_column_that_nobody_fills_is_dropped(result: Result) -> None:
@@ -158,8 +161,13 @@ def test_a_column_that_nobody_fills_is_dropped(result: Result) -> None:
         "Estimate",
         "Unit",
         "Status",
+        "Meaning",
     ]
-    assert tables[0].rows == (("k1", "1.0000", "kg m²", "OK"),)
+    assert tables[0].rows == (("k1", "1.0000", "kg m²", "OK", PARAMETERS["k1"].meaning),)
+    unnamed = {"k1+z3": Estimate(estimate=1.0, unit="kg m^2")}
+    loaded = estimate_tables(result.model_copy(update={"loaded": unnamed}))
+    table = next(table for table in loaded if table.title == "Loaded arm")
+    assert "Meaning" not in [column.heading for column in table.columns]
 
 
 def test_an_unbounded_interval_is_shown_as_one(result: Result) -> None:
@@ -189,7 +197,7 @@ def test_the_terminal_has_no_colour_without_a_colour_system(
     assert "\x1b[3" not in terminal(result, force_terminal=True)
 
 
-@pytest.mark.parametrize("width", [80, 100, 106, 140])
+@pytest.mark.parametrize("width", [80, 100, 106, 200])
 def test_a_narrow_terminal_drops_columns_and_never_digits(result: Result, width: int) -> None:
     table = estimate_tables(result)[0]
     shown = from_terminal(terminal(result, width), "Parameters")
@@ -197,7 +205,7 @@ def test_a_narrow_terminal_drops_columns_and_never_digits(result: Result, width:
         assert set(row) <= set(full)
         assert row[:2] == list(full[:2])
         assert full[6] in row  # the interval
-    assert (len(shown[0]) == len(table.columns)) == (width == 140)
+    assert (len(shown[0]) == len(table.columns)) == (width == 200)
 
 
 def test_where_nothing_can_be_dropped_cells_fold(result: Result) -> None:

@@ -37,6 +37,7 @@ ESTIMATES = Table(
             "0.1234",
             "0.04",
             "1",
+            "–",
         ),
         (
             "k6",
@@ -49,6 +50,7 @@ ESTIMATES = Table(
             "12.3456",
             "0.05",
             "2.34",
+            "viscous friction of joint 1",
         ),
     ),
 )
@@ -67,10 +69,11 @@ def test_the_interval_stays_at_eighty_columns(width: int) -> None:
     ):
         assert cell in text
     assert "Truth" not in text
+    assert "viscous" not in text  # the meaning goes first
 
 
 def test_everything_stays_where_there_is_room() -> None:
-    text = printed(ESTIMATES, 140)
+    text = printed(ESTIMATES, 170)
     assert all(column.heading in text for column in ESTIMATES.columns)
     assert all(cell in text for row in ESTIMATES.rows for cell in row)
 

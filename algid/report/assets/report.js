@@ -15,7 +15,7 @@
     displayModeBar: "hover",
     modeBarButtons: [["zoom2d", "pan2d", "autoScale2d", "resetScale2d", "toImage"]],
   };
-  const [NAME, CELL, FRAME, BARRED] = [110, 34, 70, 190]; // pixels: a log's name, a number; axes, with a colour bar
+  const [LETTER, LINE, CELL, FRAME, BARRED] = [6.4, 13, 34, 70, 190]; // pixels; the last two: axes, with a colour bar
   const drawn = new Map();
   const off = [...document.querySelectorAll('.legend button[aria-pressed="false"]')];
   const hidden = new Set(off.map(({ dataset }) => dataset.figure + " " + dataset.group));
@@ -46,7 +46,15 @@
     const traces = paint(panel.traces, "", style);
     const room = width || document.getElementById(panel.id).clientWidth;
     const names = layout.annotations || [];
-    if (room < NAME * names.length + (traces[0].type === "heatmap" ? BARRED : FRAME)) layout.annotations = [];
+    const free = room - (traces[0].type === "heatmap" ? BARRED : FRAME);
+    const long = LETTER * Math.max(0, ...names.map(({ text }) => text.length));
+    if (free < (long + LETTER) * names.length) { // names of logs stand upright; each so many where even then there is no room
+      const each = Math.ceil(LINE * names.length / free);
+      const shown = names.filter((_, place) => place % each === 0);
+      layout.annotations = shown.map((name) => ({ ...name, textangle: -90 }));
+      layout.margin = { ...layout.margin, t: long + LINE };
+      layout.height += long;
+    }
     for (const trace of traces) {
       if (trace.texttemplate && room < CELL * trace.x.length + BARRED) delete trace.texttemplate;
       if (hidden.has(panel.figure + " " + trace.legendgroup)) trace.visible = false;

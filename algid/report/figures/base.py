@@ -67,11 +67,12 @@ class Figure:
 
 @dataclass(frozen=True)
 class Missing:
-    """A figure that cannot be drawn, and why."""
+    """A figure that cannot be drawn, and why; `absent` where nothing of it was written."""
 
     key: str
     title: str
     why: str
+    absent: bool = False
 
 
 def packed(values: FloatArray, precise: bool = False) -> dict[str, str]:

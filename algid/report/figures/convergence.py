@@ -30,7 +30,8 @@ from algid.results import Estimate, Result
 from algid.text import resolved, significant, unit_text
 
 HEIGHT = 230
-TITLE, LOADED = "Convergence of the estimates", "Convergence, loaded log"
+TITLE = "Convergence of the estimates (the paper's Figure 2)"
+LOADED = "Convergence, loaded log"
 MOST_WINDOWS = 6  # beyond, a line at every window's ε hides the series
 
 

@@ -19,7 +19,10 @@ def correlation(result: Result) -> Figure | Missing:
     """The covariance scaled to ones on the diagonal."""
     if result.fit is None or not result.fit.covariance:
         return Missing(
-            "correlation", TITLE, f"the estimator {result.estimator} gives no covariance"
+            "correlation",
+            TITLE,
+            f"the estimator {result.estimator} gives no covariance",
+            absent=True,
         )
     names = result.fit.covariance_names
     matrix = correlation_matrix(result.fit.covariance)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from os.path import commonprefix
 
 import numpy as np
 
@@ -13,10 +14,8 @@ from algid.results import LogSummary
 from algid.text import file_name
 
 SPACE = 0.01  # of the whole time, between two logs
-MOST_NAMES = 6
-# pixels above a panel: names, and the buttons above them where a screen has no pointer to show
-# them by
-ROOM = 40
+MOST_NAMES = 6  # that are written in full
+ROOM = 26  # pixels above a panel, for names; the page's script makes more where they stand upright
 
 
 def offsets(ranges: Mapping[int, LogRange]) -> dict[int, float]:
@@ -47,7 +46,7 @@ def views(
     """Name, start and end of each log on the common axis; nothing for a single one."""
     moved = offsets(ranges)
     spans = [
-        (_words(log, logs), moved[log] + span.first, moved[log] + span.last)
+        (log_name(log, logs), moved[log] + span.first, moved[log] + span.last)
         for log, span in sorted(ranges.items())
     ]
     return tuple(spans) if len(spans) > 1 else ()
@@ -61,7 +60,9 @@ def separators(
         return {}
     starts = {log: moved[log] + span.first for log, span in sorted(ranges.items())}
     shapes = [upright(start, "@muted/0.6") for start in list(starts.values())[1:]]
-    named = starts if len(starts) <= MOST_NAMES else {}
+    words = [log_name(log, logs) for log in starts]
+    if len(words) > MOST_NAMES:
+        words = short(words)
     name: Layout = {
         "y": 1,
         "yref": "paper",
@@ -70,10 +71,22 @@ def separators(
         "showarrow": False,
     }
     name["font"] = {"size": 11, "color": "@muted"}
-    names = [{**name, "x": start, "text": _words(log, logs)} for log, start in named.items()]
-    room = {"margin": {"t": ROOM}} if names else {}
-    return {"shapes": shapes, "annotations": names, **room}
+    names = [
+        {**name, "x": start, "text": text}
+        for start, text in zip(starts.values(), words, strict=True)
+    ]
+    return {"shapes": shapes, "annotations": names, "margin": {"t": ROOM}}
 
 
-def _words(log: int, logs: list[LogSummary]) -> str:
+def short(names: Sequence[str]) -> list[str]:
+    """The names less the words that all of them begin and end with."""
+    first, last = (commonprefix([name[::way] for name in names]) for way in (1, -1))
+    begin = next((at for at in range(len(first), 0, -1) if not first[at - 1].isalnum()), 0)
+    end = next((at for at in range(len(last), 0, -1) if not last[at - 1].isalnum()), 0)
+    cut = [name[begin : len(name) - end] for name in names]
+    return cut if all(cut) else list(names)
+
+
+def log_name(log: int, logs: list[LogSummary]) -> str:
+    """The name of the log of that number, for plotly."""
     return label(file_name(logs[log].path), 22) if 0 <= log < len(logs) else f"log {log + 1}"

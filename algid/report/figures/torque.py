@@ -10,7 +10,7 @@ import numpy as np
 
 from algid.errors import ResultError
 from algid.report.figures.base import Figure, Legend, Missing, Panel, Trace, axis, line
-from algid.report.figures.timeline import chained, offsets, separators, views
+from algid.report.figures.timeline import chained, log_name, offsets, separators, views
 from algid.report.series import Series, TorqueLog
 from algid.results import LogSummary, TorquePrediction
 from algid.results.verdict import share_text
@@ -141,9 +141,11 @@ def _shares(found: TorqueLog) -> list[str]:
     return [f"{significant(left, 3)} of {significant(rms, 3)} N m RMS" for left, rms in pairs]
 
 
-def closeup(path: Path, found: TorqueLog) -> Figure | Missing:
+def closeup(path: Path, found: TorqueLog, logs: list[LogSummary]) -> Figure | Missing:
     """One second around the largest residual of each joint, every sample. Raises `ResultError`."""
-    panels = tuple(_closeup_panel(path, found, joint) for joint in (1, 2) if joint in found.worst)
+    panels = tuple(
+        _closeup_panel(path, found, joint, logs) for joint in (1, 2) if joint in found.worst
+    )
     if not panels:
         return Missing("closeup", CLOSEUP, "no torque is predicted")
     reading = "Read: a residual that stands out once is an event, such as a knock; one like the rest is the model's limit."
@@ -151,7 +153,7 @@ def closeup(path: Path, found: TorqueLog) -> Figure | Missing:
     return Figure("closeup", CLOSEUP, panels, reading, legend, columns=2)
 
 
-def _closeup_panel(path: Path, found: TorqueLog, joint: int) -> Panel:
+def _closeup_panel(path: Path, found: TorqueLog, joint: int, logs: list[LogSummary]) -> Panel:
     """The stretch around the worst moment of a joint; only the file's row groups around it are read."""
     import polars as pl
 
@@ -173,7 +175,7 @@ def _closeup_panel(path: Path, found: TorqueLog, joint: int) -> Panel:
         line(t, predicted, "@blue", "predicted", "predicted"),
         line(t, residual, "@orange", "residual", "residual", width=1.0),
     ]
-    where = f" of log {log + 1}" if len(found.ranges) > 1 else ""
+    where = f" of {log_name(log, logs)}" if len(found.ranges) > 1 else ""
     largest = significant(float(np.nanmax(np.abs(residual))), 3)
     says = f"Joint {joint}, largest residual {largest} N m at {moment:.3f} s{where}"
     layout = {"xaxis": axis(f"time{where}, s"), "yaxis": axis("N m"), "hovermode": "closest"}
