@@ -161,10 +161,8 @@ def _with_intervals(tables: Sequence[Table], result: Result) -> list[Table]:
     shown = [table.without(TOLD_ELSEWHERE) for table in tables]
     if not shown or not drawn.rows:
         return shown
-    marks = [
-        f"Drawn: the 95 % interval on a scale of ± {significant(drawn.limit, 1)} % of the estimate, with arrows where it "
-        "is wider"
-    ]
+    scale = significant(drawn.limit, 1)
+    marks = [f"Drawn: the 95 % interval on a scale of ± {scale} % of the estimate, arrows beyond"]
     marks += (
         [
             "grey dots: each unloaded log by itself, hollow at the edge where it lies beyond the scale"

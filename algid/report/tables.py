@@ -176,10 +176,11 @@ def used_settings(result: Result) -> Table:
             for log in reversed(result.logs)
             if log.reading is not None
         }
-        alike = len(set(read.values())) == 1
         words = name.replace("_", " ")
-        used |= {f"{words} of the {role} log": value for role, value in read.items() if not alike}
-        used |= {words: value for value in list(read.values())[:1] if alike}
+        if len(set(read.values())) == 1:
+            used[words] = next(iter(read.values()))
+        else:
+            used |= {f"{words} of the {role} log": value for role, value in read.items()}
     rows = tuple(
         (visible(name), visible(value, LONGEST_VALUE), visible(asked.get(name, ABSENT)))
         for name, value in used.items()
@@ -334,8 +335,8 @@ def estimate_tables(result: Result) -> tuple[Table, ...]:
             for row in known
         )
         note = (
-            "Names and order of the paper's Table 4; Paper % is the error it reports. The paper does not state its torque: that of "
-            "the synthetic cases was sought for this table."
+            "Names and order of the paper's Table 4; Paper % is the error it reports. The paper does not state "
+            "its torque: that of the synthetic cases was sought for this table."
         )
         tables.append(Table("Table 4", TABLE4_COLUMNS, rows, note))
     shown = filled(*(table.without_empty() for table in tables))

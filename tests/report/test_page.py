@@ -26,7 +26,7 @@ from algid.report.figures.timeline import views
 from algid.report.frame import library
 from algid.report.gallery import gallery
 from algid.report.html import banner
-from algid.report.page import page_html, write_report
+from algid.report.page import page_html, result_document, write_report
 from algid.report.series import LogRange, read_torque
 from algid.report.text import escaped, script_json
 from algid.results import Estimate, Result, Status, TermCriterion, read_result, write_result

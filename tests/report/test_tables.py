@@ -146,9 +146,9 @@ def test_the_error_belongs_to_the_estimate_beside_it(result: Result) -> None:
     other = {"m_p": Estimate(estimate=0.51, unit="kg")}
     changed = result.model_copy(update={"table4": [row], "paper_payload": other, "payload": {}})
     table = next(table for table in estimate_tables(changed) if "route" in table.title)
-    (row,) = table.rows
-    assert row[:-1] == ("m_p", "0.51000", "kg", "OK", "0.50000", "2.000", "0.2449")
-    assert row[-1] == PARAMETERS["m_p"].meaning
+    (shown,) = table.rows
+    assert shown[:-1] == ("m_p", "0.51000", "kg", "OK", "0.50000", "2.000", "0.2449")
+    assert shown[-1] == PARAMETERS["m_p"].meaning
 
 
 def test_a_column_that_nobody_fills_is_dropped(result: Result) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from os.path import commonprefix
+from itertools import takewhile
 
 import numpy as np
 
@@ -80,11 +80,17 @@ def separators(
 
 def short(names: Sequence[str]) -> list[str]:
     """The names less the words that all of them begin and end with."""
-    first, last = (commonprefix([name[::way] for name in names]) for way in (1, -1))
-    begin = next((at for at in range(len(first), 0, -1) if not first[at - 1].isalnum()), 0)
-    end = next((at for at in range(len(last), 0, -1) if not last[at - 1].isalnum()), 0)
+    begin = _in_common(names)
+    end = _in_common([name[::-1] for name in names])
     cut = [name[begin : len(name) - end] for name in names]
     return cut if all(cut) else list(names)
+
+
+def _in_common(names: Sequence[str]) -> int:
+    """How many characters all names begin with, up to the end of a word."""
+    alike = takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
+    first = [letters[0] for letters in alike]
+    return max((at + 1 for at, letter in enumerate(first) if not letter.isalnum()), default=0)
 
 
 def log_name(log: int, logs: list[LogSummary]) -> str:
