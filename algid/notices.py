@@ -202,6 +202,14 @@ MESSAGES: Mapping[str, str] = {
         "log tells which is right, and where torque 2 is, k1 … k7 and every mass are larger by that factor"
     ),
     "JOINT_STILL": "{joints} never moved: give a log in which both joints do",
+    "HEAVY_ARM": (
+        "the arm would be {mass:.3g} kg heavy on a link of {length:.2g} m, more than a block of steel of that length: are "
+        "its torques in N m?"
+    ),
+    "MOTORLESS_UNTOLD": (
+        "joint {joint} has no motor, and what else moves it (friction, cables) pulls as hard as its load: k1 … k5 are "
+        "not told; move it faster"
+    ),
     "JOINTS_CONTRADICT": (
         "joint 1 by itself tells {name} as {first:.2g} {unit} and joint 2 as {second:.2g}: one of them is hardly "
         "driven, or a term is missing; give a log that drives both"

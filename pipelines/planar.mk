@@ -7,3 +7,8 @@ planar: setup ## bent arms and payloads that are bodies: coverage of intervals, 
 
 efforts: setup ## what drivers call effort: named by the logs, and the payload's interval; into build/efforts
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.efforts -o build/efforts
+
+.PHONY: passive
+
+passive: setup ## acrobots and pendubots with friction and cables: coverage of intervals; into build/passive
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.passive -o build/passive

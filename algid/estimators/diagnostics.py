@@ -261,6 +261,8 @@ def joints_apart(normals: Sequence[Normal], model: Model) -> JointsApart | None:
     fit.
     """
     shared = Shared(model)
+    if not all(normal.gram[:, joint, -1, -1].any() for normal in normals for joint in range(2)):
+        return None  # without a motor a joint's equation is solved by nothing
     both = [place for place, name in enumerate(model.names) if name in ("k1", "k2", "k3")]
     found = []
     for joint in range(2):

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from algid.estimators import weak
 from algid.estimators.combine import FEWEST_LOGS
 from algid.estimators.diagnostics import joints_apart
@@ -37,6 +39,48 @@ def doubted(
         return fit
     doubt = _doubt(fit, unloaded, loaded, settings)
     return fit if doubt is None else fit.marked("WEAK_EXCITATION", RIGID).noted(doubt)
+
+
+UNTOLD = 0.02
+"""Of the other joint's torque: less than that at a joint without a motor is what a bearing or a cable does."""
+
+
+def untold(
+    fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
+) -> Fit:
+    """The fit with status WEAK_EXCITATION for k1 … k5 where they explain nothing of a joint without a motor.
+
+    Inertia, weight and friction, which cancel there, are then of no size beside the other joint's
+    torque: constants near nothing solve that equation too, and least squares ends there where
+    friction and cables pull as hard as the arm's own load.
+
+    Parameters
+    ----------
+    fit : Fit
+    unloaded, loaded : sequences of callables
+        Each gives a fresh iterable of `Segment`.
+    settings : WeakSettings
+        Of the fit.
+    """
+    value = dict(zip(fit.names, fit.values.tolist(), strict=True))
+    model = fit.shared.model
+    settings = replace(
+        settings, model=model, estimate_delay=False, delay=value.get("delay", settings.delay)
+    )
+    for kind, sources in ((False, unloaded), (True, loaded)):
+        if not sources:
+            continue
+        c = fit.shared.coefficients(fit.values, kind)[: len(model.names)]
+        every = [weak.normal_equations(source, settings, c) for source in sources]
+        grams = [normal.gram.sum(axis=0) for normal in every if normal is not None]
+        for joint in range(2) if grams else ():
+            gram = np.sum([one[joint] for one in grams], axis=0)
+            acting = float(np.diag(gram)[:-1] @ c**2)
+            power = float(np.sum([one[1 - joint, -1, -1] for one in grams]))
+            if gram[-1, -1] == 0 and acting < UNTOLD**2 * power:
+                said = Notice("MOTORLESS_UNTOLD", numbers={"joint": joint + 1})
+                return fit.marked("WEAK_EXCITATION", RIGID).noted(said)
+    return fit
 
 
 def _doubt(

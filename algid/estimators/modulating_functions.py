@@ -296,6 +296,10 @@ def _kernels(length: int, dt: float, offset: float) -> FloatArray:
     return found
 
 
+MOTORLESS = 0.1
+"""Of the driven joint's residual: the least that bearing and cables leave at a joint without a motor."""
+
+
 def row_weights(gram: FloatArray, v: FloatArray, rows: int | FloatArray) -> FloatArray:
     """Inverse residual variance (2,) of a row of each joint.
 
@@ -312,9 +316,16 @@ def row_weights(gram: FloatArray, v: FloatArray, rows: int | FloatArray) -> Floa
     -----
     A residual below rounding, 1e-12 of the torque, counts as that. The joint with the larger
     torque sets the measure: a joint without a motor has none, and its load is of the size of the
-    other's.
+    other's. Constants that are nothing solve the equation of a joint without a motor exactly, and
+    the better it is solved the more it would weigh: its residual counts as `MOTORLESS` of the
+    other's at least.
     """
     squares = np.einsum("x,axy,y->a", v, gram, v)
+    driven = gram[:, -1, -1] > 0
+    if driven.sum() == 1:
+        each = squares / np.maximum(rows, 1)
+        least = MOTORLESS**2 * float(each[driven][0]) * np.asarray(rows)
+        squares = np.where(driven, squares, np.maximum(squares, least))
     return np.asarray(rows / np.maximum(squares, 1e-24 * float(gram[:, -1, -1].max()) + 1e-300))
 
 

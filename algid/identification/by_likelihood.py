@@ -13,7 +13,7 @@ from algid.estimators import exogeneity, instruments, shrunk, weak
 from algid.estimators.body import with_body
 from algid.estimators.combine import Prior, without
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, constrained
-from algid.estimators.doubt import doubted
+from algid.estimators.doubt import doubted, untold
 from algid.estimators.fit import Fit
 from algid.estimators.innovations import ResidualSums, pooled
 from algid.estimators.prediction import PredictionScore, PredictionSums, score
@@ -205,8 +205,11 @@ def residual_of(
 def with_doubt(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) -> Fit:
     """The fit; where its likelihood is refuted, with what makes k1 … k5 doubtful: see `doubted`.
 
-    One that physics contradicts stays as sure as it is, so that the contradiction is reported.
+    Of an arm with a joint that has no motor, whether its equation tells them: see `untold`. One
+    that physics contradicts stays as sure as it is, so that the contradiction is reported.
     """
+    if any(log.origin.reading.passive for log in survey.logs):
+        fit = untold(fit, *_passes(survey, settings), _weak_settings(settings, chosen))
     if not (fit.refuted and settings.chooses):
         return fit
     far = [

@@ -15,6 +15,8 @@ from algid.methods import estimator_of
 from algid.notices import Notice, Remedy
 
 ONE_SIDED = 1.645  # standard deviations of a one-sided bound at 95 %
+STEEL = 8000.0  # kg/m³
+LEAST_SURE = 10.0  # standard deviations that a length has to have
 FAR_APART = 5.0  # standard deviations past which two logs are not of one arm
 
 
@@ -49,6 +51,7 @@ def fit_warnings(fit: Fit) -> Iterator[Notice]:
     if phases is not None:
         yield phases
     yield from _of_gains(fit)
+    yield from _of_mass(fit)
     if "m_p" in fit.names:
         yield from _of_payload(fit)
     given, by_constants = fit.shared.lengths.get("l1"), length_by_constants(fit)
@@ -67,6 +70,21 @@ def fit_warnings(fit: Fit) -> Iterator[Notice]:
     apart = payload_distance(fit)
     if apart is not None and apart > FAR_APART:
         yield Notice("LOGS_APART", numbers={"distance": apart})
+
+
+def _of_mass(fit: Fit) -> Iterator[Notice]:
+    """That an arm would be heavier than steel cubes of its link's length: m1 lc1 / l1 + m2 = k4 / (g l1)."""
+    by_constants = length_by_constants(fit)
+    if "k4" not in fit.names or "k4" in fit.absent or by_constants is None:
+        return
+    length, std = by_constants
+    if not LEAST_SURE * std < length:
+        return
+    mass = abs(float(fit.values[fit.names.index("k4")])) / (fit.shared.model.gravity * length)
+    if mass > STEEL * length**3:
+        small = Remedy({"torque_unit": "mN m"}, "where torques are in mN m")
+        numbers = {"mass": mass, "length": length}
+        yield Notice("HEAVY_ARM", numbers=numbers, remedies=(small,))
 
 
 def _of_gains(fit: Fit) -> Iterator[Notice]:

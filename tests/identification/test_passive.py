@@ -25,6 +25,8 @@ from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
 from algid.tracks.result import track_json
 from algid.tracks.run import track_log
+from pipelines.accuracy_scenes import case_of
+from pipelines.passive import log_of
 from tests.cli.commands import app
 from tests.intervals import holds_at_least_95, in_axes
 
@@ -160,3 +162,24 @@ def test_a_weak_result_tracks_and_designs_where_a_joint_has_no_motor(tmp_path: P
     done = CliRunner().invoke(app, ["design", folder, *bounds, *sure, "-o", str(tmp_path)])
     assert "nan" not in done.output, done.output
     assert done.exit_code in (0, 3), done.output
+
+
+def test_nothing_is_no_solution_where_cables_pull_as_hard_as_the_arm() -> None:
+    """An acrobot of much friction: constants near nothing solve the first joint's equation all but exactly."""
+    result = identify(log_of("case1", 1, 0), report=False)
+    assert not any(result.parameters[name].usable for name in ("k1", "k2", "k3", "k4", "k5"))
+    assert "MOTORLESS_UNTOLD" in [notice.code for notice in result.notices]
+
+
+def test_cables_of_two_percent_leave_the_constants_told() -> None:
+    result = identify(log_of("arm22", 2, 0), report=False)
+    assert {"MOTORLESS_UNTOLD", "JOINTS_CONTRADICT"}.isdisjoint(
+        notice.code for notice in result.notices
+    )
+    true = case_of("arm22").arm.constants().tolist()
+    for name, value in zip(CONSTANT_NAMES, true, strict=True):
+        found = result.parameters[name]
+        assert found.estimate is not None
+        assert found.std
+        assert abs(found.estimate - value) < 4.5 * found.std, name
+        assert abs(found.estimate - value) < 0.1 * value, name

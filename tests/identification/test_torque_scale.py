@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -81,3 +82,16 @@ def test_intervals_hold_where_the_second_motor_stands_at_the_base() -> None:
         return in_axes(fit.values - k, fit.covariance, fit.quantile)
 
     holds_95(np.array([ratios(seed) for seed in range(140)]))
+
+
+def test_masses_that_no_arm_has_are_asked_about() -> None:
+    """Torques in mN m that nobody labelled make every constant a thousand times too large."""
+    log = currents(loaded=False)
+    for factor, heavy in ((CONSTANT, False), (1e3 * CONSTANT, True)):
+        result = identify(replace(log, tau=factor * log.tau), report=False)
+        asked = [one for one in result.notices if one.code == "HEAVY_ARM"]
+        assert bool(asked) is heavy
+        for one in asked:
+            assert one.remedies[0].flags == ("--torque-unit", "mN m")
+            assert 200 < one.numbers["mass"] < 350
+            assert result.verdict.grade == "reservations"

@@ -1,0 +1,113 @@
+"""Arms with a joint that has no motor, its bearing's friction and the pull of cables: `make passive`.
+
+An acrobot's first joint, or a pendubot's second, bears Coulomb friction of its bearing, and cables
+pull at both joints by 2 % of the driven joint's torque, slowly and unlogged. Every draw is
+identified with no flag but `--passive`. A row gives how many converged, how many failed, how many
+have k1, k2 and k3 all as nothing, and how many intervals hold the truth, by constant. Writes
+`passive.md` into the output folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+from algid.arm import CONSTANT_NAMES, FloatArray
+from algid.identification.identify import identify
+from algid.log import Log, Origin, Reading
+from algid.signals.filters import correlate
+from algid.synth.excitation import SampledTorque, wide_multi_sine
+from algid.synth.simulator import simulate
+from pipelines.accuracy_scenes import case_of
+
+ARMS = ("case1", "arm21", "arm22", "arm23")
+RATE, DURATION = 250.0, 10.0
+SIGMA_THETA, SIGMA_TAU = 3e-4, 1e-2  # rad, N m
+CABLES = 0.02  # of the driven joint's torque, RMS
+BEARING = 0.01  # of it: Coulomb friction of the passive joint
+SLOW = 0.5  # s: how long cables keep their pull
+
+
+def log_of(name: str, passive: int, seed: int) -> Log:
+    """One draw: what moves the arm is the motor less friction and cables; the motor's torque is logged."""
+    arm = case_of(name).arm
+    rng = np.random.default_rng([seed, passive, sum(name.encode())])
+    t = np.arange(round(DURATION * RATE) + 1) / RATE
+    driven = wide_multi_sine(arm, seed)(t) * np.array([[passive != 1], [passive != 2]])
+    size = float(np.sqrt(np.mean(driven[2 - passive] ** 2)))
+    pull = CABLES * size * _slow(rng, t.size)
+    motion = simulate(arm.constants(), SampledTorque(t, driven + pull, "foh"), t)
+    for _ in range(3):  # friction of the motion that it makes itself
+        friction = np.zeros_like(pull)
+        friction[passive - 1] = BEARING * size * np.tanh(motion.omega[passive - 1] / 0.05)
+        motion = simulate(arm.constants(), SampledTorque(t, driven + pull - friction, "foh"), t)
+    reading = Reading(passive=passive, accepted=("DEGREES",))
+    logged = driven + SIGMA_TAU * rng.standard_normal(driven.shape)
+    logged[passive - 1] = 0.0
+    theta = motion.theta + SIGMA_THETA * rng.standard_normal(driven.shape)
+    origin = Origin(f"{name}.csv", "csv", {}, reading=reading)
+    return Log(np.round(t * 1e9).astype(np.int64), theta, logged, origin)
+
+
+def _slow(rng: np.random.Generator, count: int) -> FloatArray:
+    """Two slow signals of unit RMS (2, count)."""
+    kernel = np.hanning(round(SLOW * RATE) | 1)
+    white = rng.standard_normal((2, count + kernel.size - 1))
+    slow = correlate(white, kernel)
+    return np.asarray(slow / np.sqrt(np.mean(slow**2, axis=1, keepdims=True)))
+
+
+def judged(job: tuple[str, int, int]) -> Counter[str]:
+    """What became of the draws of an arm."""
+    name, passive, draws = job
+    true = dict(zip(CONSTANT_NAMES, case_of(name).arm.constants().tolist(), strict=True))
+    found: Counter[str] = Counter()
+    for seed in range(draws):
+        result = identify(log_of(name, passive, seed), report=False)
+        assert result.fit is not None
+        found.update(draws=1, converged=result.fit.converged, failed=result.verdict.failed)
+        sizes = [abs(result.parameters[k].estimate or 0.0) / true[k] for k in ("k1", "k2", "k3")]
+        found["nothing"] += max(sizes) < 0.1
+        for k, value in true.items():
+            one = result.parameters[k]
+            low, high = one.ci95 or (None, None)
+            found[k] += low is None or high is None or low <= value <= high
+            found[f"OK {k}"] += one.usable
+    return found
+
+
+def lines(draws: int, processes: int) -> Iterator[str]:
+    """The table, row by row."""
+    yield f"| joint without motor | draws | converged | failed | nothing | {' | '.join(CONSTANT_NAMES)} |"
+    yield f"|{'---|' * (5 + len(CONSTANT_NAMES))}"
+    with ProcessPoolExecutor(processes) as pool:
+        for passive, title in ((1, "1 (acrobot)"), (2, "2 (pendubot)")):
+            total: Counter[str] = Counter()
+            for found in pool.map(judged, [(name, passive, draws) for name in ARMS]):
+                total.update(found)
+            cells = [total[cell] for cell in ("draws", "converged", "failed", "nothing")]
+            held = [f"{total[k]}/{total['draws']}" for k in CONSTANT_NAMES]
+            yield f"| {title} | {' | '.join(map(str, [*cells, *held]))} |"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--draws", type=int, default=50, help="of each of four arms and kind")
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("-o", "--output", type=Path, default=Path("build/passive"))
+    given = parser.parse_args()
+    text = []
+    for line in lines(given.draws, given.processes):
+        print(line, flush=True)
+        text.append(line)
+    given.output.mkdir(parents=True, exist_ok=True)
+    (given.output / "passive.md").write_text("\n".join([*text, ""]), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
