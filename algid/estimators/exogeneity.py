@@ -137,6 +137,8 @@ def instrumented(
     settings, base = _of(fit, settings)
     logs = []
     for kind, sources in ((False, unloaded), (True, loaded)):
+        if not sources:  # without loaded logs there is no payload among the parameters
+            continue
         c0 = shared.coefficients(at, kind)
         c = c0.copy()
         if shared.delay:  # the windows are shifted by it: its column tells a change
