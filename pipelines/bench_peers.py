@@ -40,11 +40,11 @@ def _filtered(path: Path) -> tuple[FloatArray, FloatArray, FloatArray, FloatArra
 
 
 def least_squares(path: Path) -> FloatArray:
-    """Filtered least squares by numpy and scipy."""
+    """Filtered least squares by numpy and scipy, out of its normal equations."""
     theta, omega, alpha, tau, _ = _filtered(path)
     Y = regressor(theta, omega, alpha)
-    rows = np.concatenate([Y[0], Y[1]], axis=1).T
-    return np.asarray(np.linalg.lstsq(rows, np.concatenate([tau[0], tau[1]]), rcond=None)[0])
+    gram = Y[0] @ Y[0].T + Y[1] @ Y[1].T
+    return np.asarray(np.linalg.solve(gram, Y[0] @ tau[0] + Y[1] @ tau[1]))
 
 
 def pinocchio(path: Path) -> FloatArray:
@@ -59,7 +59,8 @@ def pinocchio(path: Path) -> FloatArray:
         block = pin.computeJointTorqueRegressor(model, data, theta[:, i], omega[:, i], alpha[:, i])
         W[i, :20], W[n + i, :20] = block[0], block[1]
     W[:n, 20], W[n:, 21] = omega
-    found = np.linalg.lstsq(W, np.concatenate([tau[0], tau[1]]), rcond=1e-8)[0]
+    moment = W.T @ np.concatenate([tau[0], tau[1]])
+    found = np.linalg.pinv(W.T @ W, rcond=1e-12, hermitian=True) @ moment
     x1, inertia1, m2, x2, inertia2 = found[[1, 9, 10, 11, 19]]
     g = 9.81
     return np.array(

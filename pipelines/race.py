@@ -39,6 +39,8 @@ import numpy as np
 
 from algid.arm import FloatArray, regressor
 from algid.signals.segments import Segment
+from pipelines.race_examples import example_table, reproduced
+from pipelines.race_page import page
 from pipelines.race_peers import PEERS, Answer
 from pipelines.race_scenes import KINDS, Scene, scene
 
@@ -151,16 +153,18 @@ def _runs(folder: Path, build: str) -> tuple[Segment, ...]:
     return tuple(found)
 
 
-def real_half(job: tuple[Path, str, tuple[int, ...], str]) -> tuple[Answer | None, float]:
-    """One contender on some runs of a build."""
+def real_half(job: tuple[Path, str, tuple[int, ...], str]) -> tuple[Answer | str, float]:
+    """One contender on some runs of a build; where it falls, why."""
     folder, build, places, peer = job
     try:
         return _answered(peer, [_runs(folder, build)[place] for place in places], L1)
-    except Exception:
-        return None, 0.0
+    except Exception as error:  # a contender that falls is a result
+        return f"{type(error).__name__}: {error}"[:200], 0.0
 
 
-def real_rows(folder: Path, pool: ProcessPoolExecutor) -> list[dict[str, Any]]:
+def real_rows(
+    folder: Path, wanted: Sequence[str], pool: ProcessPoolExecutor
+) -> list[dict[str, Any]]:
     """Halves that agree, repeatability, and what one half predicts of the other half's runs."""
     rows = []
     for build in REAL:
@@ -168,14 +172,14 @@ def real_rows(folder: Path, pool: ProcessPoolExecutor) -> list[dict[str, Any]]:
         rng = np.random.default_rng(0)
         orders = [rng.permutation(len(runs)) for _ in range(SPLITS)]
         halves = [tuple(half.tolist()) for order in orders for half in np.array_split(order, 2)]
-        for peer in PEERS:
+        for peer in wanted:
             found = list(pool.map(real_half, [(folder, build, half, peer) for half in halves]))
             rows.append({"peer": peer, "build": build, **_halves(found, halves, runs)})
     return rows
 
 
 def _halves(
-    found: list[tuple[Answer | None, float]],
+    found: list[tuple[Answer | str, float]],
     halves: list[tuple[int, ...]],
     runs: tuple[Segment, ...],
 ) -> dict[str, Any]:
@@ -183,7 +187,7 @@ def _halves(
     scatter, every, moving = [], [], []
     for place in range(0, len(found), 2):
         (one, _), (other, _) = found[place : place + 2]
-        if one is None or other is None:
+        if isinstance(one, str) or isinstance(other, str):
             continue
         mean = 0.5 * (one.values + other.values)
         scatter.append(np.abs(one.values - other.values)[:5] / np.sqrt(2) / np.abs(mean)[:5])
@@ -206,13 +210,14 @@ def _halves(
         if moving
         else None,
         "seconds": float(np.mean([seconds for _, seconds in found])),
+        "failed": next((answer for answer, _ in found if isinstance(answer, str)), ""),
     }
 
 
 def simulated_table(rows: Sequence[Row]) -> str:
     """Markdown: a line a contender, pooled over the arms."""
     heading = f"| contender | error over bound (RMS) | error %, {' / '.join(KINDS)} (median) | intervals that hold, % "
-    lines = [f"{heading}| held out | processor s | choices |", "|---|---|---|---|---|---|---|"]
+    lines = [f"{heading}| held out, N m | moving alone | processor s | choices |", "|" + 8 * "---|"]
     for peer, (_, choices) in PEERS.items():
         own = [row for row in rows if row.peer == peer]
         good = [row for row in own if not row.failed]
@@ -226,11 +231,12 @@ def simulated_table(rows: Sequence[Row]) -> str:
             f"| {peer} | {_number(np.sqrt(np.nanmean(bounds**2)) if bounds.size else None)} | "
             + " / ".join(_number(np.nanmedian(one) if one else None) for one in errors)
             + f" | {_number(100 * np.mean(inside) if inside else None)}{f' of {len(inside)}' if inside else ''} | "
-            + f"{_number(np.nanmedian([row.held_out for row in good]) if good else None)} N m | "
+            + f"{_number(np.nanmedian([row.held_out for row in good]) if good else None)} | "
+            + f"{_number(np.nanmedian([row.held_out_moving for row in good]) if good else None)} | "
             + f"{_number(np.mean([row.seconds for row in good]) if good else None)} | {choices} |"
         )
         lines += [
-            f"| | failed on {row.logs}: {row.failed} | | | | | |" for row in own if row.failed
+            f"| | failed on {row.logs}: {row.failed} | | | | | | |" for row in own if row.failed
         ]
     return "\n".join(lines)
 
@@ -249,6 +255,8 @@ def real_table(rows: Sequence[dict[str, Any]]) -> str:
             f"| {row['build']} | {row['peer']} | {_number(agree)} | {_number(row['repeatability'])} "
             f"| {pairs[0]} | {pairs[1]} | {_number(row['seconds'])} |"
         )
+        if row.get("failed"):
+            lines.append(f"| | failed: {row['failed']} | | | | | |")
     return "\n".join(lines)
 
 
@@ -263,20 +271,35 @@ def main() -> None:
     )
     parser.add_argument("--data", type=Path, default=Path("../shared/data"))
     parser.add_argument("-o", "--output", type=Path, default=Path("build/race"))
+    parser.add_argument(
+        "--only", help="contenders to run, with commas; the others' rows stay as they are in OUTPUT"
+    )
     given = parser.parse_args()
     given.output.mkdir(parents=True, exist_ok=True)
-    jobs = [(kind, seed, peer) for kind in KINDS for seed in SEEDS for peer in PEERS]
+    store = given.output / "race.json"
+    before = json.loads(store.read_text(encoding="utf-8")) if given.only else {}
+    wanted = given.only.split(",") if given.only else list(PEERS)
+    examples = reproduced(list(PEERS))
+    jobs = [(kind, seed, peer) for kind in KINDS for seed in SEEDS for peer in wanted]
     with ProcessPoolExecutor(2) as pool:
-        rows = list(pool.map(simulated_row, jobs, chunksize=len(PEERS)))
-        real = real_rows(given.data, pool) if (given.data / "dfki").is_dir() else []
+        rows = list(pool.map(simulated_row, jobs, chunksize=len(wanted)))
+        real = real_rows(given.data, wanted, pool) if (given.data / "dfki").is_dir() else []
+    rows += [Row(**row) for row in before.get("simulated", []) if row["peer"] not in wanted]
+    real += [row for row in before.get("real", []) if row["peer"] not in wanted]
+    real.sort(key=lambda row: (list(REAL).index(row["build"]), list(PEERS).index(row["peer"])))
     versions = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
-    text = f"## Simulated arms\n\n{simulated_table(rows)}\n\n"
+    text = f"## Examples reproduced\n\n{example_table(examples)}\n\n"
+    text += f"## Simulated arms\n\n{simulated_table(rows)}\n\n"
     if real:
         text += f"## Real arms\n\n{real_table(real)}\n\n"
     text += f"Seeds {SEEDS}; {versions}.\n"
     (given.output / "race.md").write_text(text, encoding="utf-8")
-    content = {"simulated": [asdict(row) for row in rows], "real": real, "versions": versions}
-    (given.output / "race.json").write_text(json.dumps(content, indent=1), encoding="utf-8")
+    simulated = [asdict(row) for row in rows]
+    content = {
+        "examples": examples, "simulated": simulated, "real": real, "versions": versions,
+    }  # fmt: skip
+    store.write_text(json.dumps(content, indent=1), encoding="utf-8")
+    (given.output / "race.html").write_text(page(simulated, real, text), encoding="utf-8")
     print(text)
 
 

@@ -18,8 +18,10 @@ import numpy as np
 
 from algid.arm import CONSTANT_NAMES, FloatArray, regressor
 from algid.signals.segments import Segment
+from pipelines import race_regressions as regressions
 
-COULOMB_WIDTH = 0.05  # rad/s, what the linear contenders take
+COULOMB_WIDTH = regressions.WIDTH  # rad/s, what the linear contenders take
+L1_OF_EXAMPLE = 0.1626  # m: link 1 of the paper's first case
 CUTOFF = 20.0  # Hz
 _DROPPED = 0.3  # s at each end, where a filter rings
 
@@ -77,37 +79,22 @@ def filtered(
     return theta, omega, np.gradient(omega, log.dt, axis=1), tau
 
 
-def _rows(log: Segment) -> tuple[FloatArray, FloatArray]:
-    """Columns k1 … k7, f1, f2, j2 of both joints (2 N, 10) and their torque (2 N,), filtered and thinned alike."""
-    from scipy.signal import butter, sosfiltfilt
-
-    theta, omega, alpha, tau = filtered(log)
-    zero = np.zeros_like(theta[0])
-    rubbing = np.tanh(omega / COULOMB_WIDTH)
-    extra = np.array([[rubbing[0], zero, zero], [zero, rubbing[1], alpha[1]]])
-    Y = np.concatenate([regressor(theta, omega, alpha), extra], axis=1)
-    sections = butter(4, CUTOFF, fs=1 / log.dt, output="sos")
-    Y = sosfiltfilt(sections, Y, axis=-1)
-    tau = sosfiltfilt(sections, tau, axis=-1)
-    edge = round(_DROPPED / log.dt)
-    inner = slice(edge, -edge, max(1, round(1 / (4 * CUTOFF * log.dt))))
-    return np.concatenate([Y[joint][:, inner].T for joint in range(2)]), tau[:, inner].ravel()
+def _regression(p: FloatArray, covariance: FloatArray) -> Answer:
+    """The answer of a regression's parameters (12,) with their covariance."""
+    half = 1.96 * np.sqrt(np.maximum(np.diag(covariance), 0.0))[:7]
+    terms = dict(zip(regressions.NAMES[7:], p[7:].tolist(), strict=True))
+    return Answer(p[:7], np.stack([p[:7] - half, p[:7] + half], axis=1), terms)
 
 
 def least_squares(logs: Sequence[Segment]) -> Answer:
-    """Least squares behind a filter of 20 Hz, with Coulomb friction and a rotor: what a lab writes in an hour."""
-    pieces = [_rows(log) for log in logs]
-    A, b = (
-        np.concatenate([one for one, _ in pieces]),
-        np.concatenate([other for _, other in pieces]),
-    )
-    found = np.linalg.lstsq(A, b, rcond=None)[0]
-    variance = np.sum((b - A @ found) ** 2) / (b.size - found.size)
-    std = np.sqrt(variance * np.diag(np.linalg.pinv(A.T @ A)))
-    half = 1.96 * std[:7]
-    names = ("f1", "f2", "j2")
-    terms = dict(zip(names, found[7:].tolist(), strict=True))
-    return Answer(found[:7], np.stack([found[:7] - half, found[:7] + half], axis=1), terms)
+    """Least squares behind filters that predict best, with Coulomb friction, offsets and a rotor."""
+    p, covariance, _ = regressions.least_squares(logs)
+    return _regression(p, covariance)
+
+
+def idim_iv(logs: Sequence[Segment]) -> Answer:
+    """The same equations with the columns of a simulated motion as instruments."""
+    return _regression(*regressions.instruments(logs))
 
 
 def pinocchio(logs: Sequence[Segment], l1: float) -> Answer:
@@ -301,6 +288,28 @@ def _stretches(logs: Sequence[Segment], model: Any) -> tuple[list[Any], list[Any
     return states, controls, sensors
 
 
+def mujoco_log() -> tuple[FloatArray, Segment, float]:
+    """Constants (7,), a log of 10 s at 500 Hz and the length of link 1 in m of an arm that MuJoCo simulates."""
+    import mujoco as package
+
+    mujoco: Any = package
+    dt, l1 = 0.002, 0.3
+    arm = {"m1": 2.0, "m2": 1.0, "lc1": 0.15, "lc2": 0.12, "I1": 0.02, "I2": 0.01}
+    arm |= {"b1": 0.4, "b2": 0.2}
+    model = mujoco.MjSpec.from_string(_ARM_XML.format(dt=dt, l1=l1, **arm)).compile()
+    data = mujoco.MjData(model)
+    data.qpos[:] = -np.pi / 2, 0.0
+    t = dt * np.arange(5001)
+    tau = np.stack([4 * np.sin(5 * t) + 2 * np.sin(11 * t), 1.2 * np.sin(7 * t + 1)])
+    theta = np.empty((2, 5000))
+    for n in range(5000):
+        theta[:, n] = data.qpos
+        data.ctrl[:] = 0.5 * (tau[:, n] + tau[:, n + 1])
+        mujoco.mj_step(model, data)
+    x = np.array([arm[name] for name in _CHANGES])
+    return _constants(x, arm, l1), Segment(0.0, dt, theta, tau[:, :-1]), l1
+
+
 def _physical(k: FloatArray, l1: float) -> dict[str, float]:
     """Masses, centres and inertias of an arm with the constants k (7,).
 
@@ -347,6 +356,7 @@ PEERS: dict[str, tuple[Contender, int]] = {
     "algid": (without_length(algid_by("default")), 0),
     "algid weak": (without_length(algid_by("weak")), 1),
     "filtered least squares": (without_length(least_squares), 5),
+    "IDIM-IV": (without_length(idim_iv), 6),
     "output error": (without_length(output_error), 6),
     "MuJoCo sysid": (mujoco_sysid, 9),
     "PySINDy weak form": (without_length(pysindy), 5),

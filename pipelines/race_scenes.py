@@ -8,7 +8,8 @@ x       angles and velocities of both joints              (4,)
 ======  ================================================  =======================
 
 With centres of mass at angles δ off their links, K1 = m2 l1 lc2 exp(i δ2), K2 = g m2 lc2 exp(i δ2)
-and K4 = m1 g lc1 exp(i δ1) + m2 g l1; the constants k1, k2, k4 are their magnitudes.
+and K4 = m1 g lc1 exp(i δ1) + m2 g l1; the constants k1, k2, k4 are their real parts, what lies
+along the links.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ class _Plant:
         K2 = arm.g * arm.m2 * arm.lc2 * lean2
         K4 = arm.m1 * arm.g * arm.lc1 * lean1 + arm.m2 * arm.g * arm.l1
         k = arm.constants().copy()
-        k[[0, 1, 3]] = abs(K1), abs(K2), abs(K4)
+        k[[0, 1, 3]] = K1.real, K2.real, K4.real
         return cls(arm, (K1, K2, K4), k, coulomb)
 
     def rate(self, x: FloatArray, tau: FloatArray) -> FloatArray:

@@ -134,7 +134,7 @@ class LogEvidence:
         """Pass over the whole log at the coefficients `c`, settling each piece's trajectory by itself."""
         gathered = _Gathered()
         for piece in self._pieces():
-            first = self._linearise(c, _first_trajectory(piece), piece)
+            first = self._linearise(c, _first_trajectory(piece), piece, residual_only=True)
             multiplier = first.solve_transposed(first.columns[-1:])[0]
             theta = trajectory(piece, first, multiplier, self.noise)
             gathered.take(self._linearise(c, theta, piece), piece.dt)
@@ -153,10 +153,20 @@ class LogEvidence:
         self.noise = better
         return change
 
-    def _linearise(self, c: FloatArray, theta: FloatArray, piece: Segment) -> Linearised:
+    def _linearise(
+        self, c: FloatArray, theta: FloatArray, piece: Segment, *, residual_only: bool = False
+    ) -> Linearised:
         shared = self._shared
-        columns, stencil = c[: len(shared.model.names)], self._stencil(piece.dt, c)
-        return linearise(shared.model, columns, theta, piece, stencil, self.noise, shared.delay)
+        return linearise(
+            shared.model,
+            c[: len(shared.model.names)],
+            theta,
+            piece,
+            self._stencil(piece.dt, c),
+            self.noise,
+            shared.delay,
+            residual_only=residual_only,
+        )
 
 
 def _first_trajectory(piece: Segment) -> FloatArray:

@@ -31,7 +31,7 @@ import numpy as np
 
 from algid.arm import FloatArray, keep_arrays
 from algid.compiled import lapack
-from algid.model import Model, Motion, partials, sensitivity, torque
+from algid.model import Model, Motion, partials, regressor, sensitivity, torque
 from algid.signals.differences import HELD, POINTS, Stencil, held_torque
 from algid.signals.filters import recursion
 from algid.signals.segments import Segment
@@ -99,6 +99,8 @@ def linearise(
     stencil: Stencil,
     noise: NoiseLevels,
     delay: bool = False,
+    *,
+    residual_only: bool = False,
 ) -> Linearised:
     """Linearise a piece of log at a trajectory and at coefficients, and whiten it.
 
@@ -117,6 +119,8 @@ def linearise(
     delay : bool
         Whether the last column but the residual is the derivative of the torque by the stencil's
         shift.
+    residual_only : bool
+        Whether the residual is the only column, which is all that a trajectory needs.
 
     Raises
     ------
@@ -126,8 +130,12 @@ def linearise(
     length = theta0.shape[1]
     torques, first = stencil.torques(length), stencil.first(length)
     motion = Motion(*stencil.differences(theta0))
-    J = sensitivity(model, c, motion)
-    modelled = torque(model, c, motion)
+    if model.linear:
+        J = regressor(model, motion)
+        modelled = np.einsum("aqn,q->an", J, c)
+    else:
+        J = sensitivity(model, c, motion)
+        modelled = torque(model, c, motion)
     if model.lag_name is not None:
         J, modelled = (low_passed(signal, stencil.dt, model.lag(c)) for signal in (J, modelled))
         J[:, model.names.index(model.lag_name)] = -np.gradient(modelled, stencil.dt, axis=1)
@@ -136,8 +144,11 @@ def linearise(
     error = measured[:, torques] - modelled - forward(G, piece.theta - theta0, first)
     H = G * (noise.theta[None, :, None, None] / noise.tau[:, None, None, None])
     factor = covariance_factor(H, held=stencil.held)
-    extra = [np.gradient(modelled, stencil.dt, axis=1)[None]] if delay else []
-    rows = np.concatenate([J.swapaxes(0, 1), *extra, error[None]])
+    parts = [error[None]]
+    if not residual_only:
+        extra = [np.gradient(modelled, stencil.dt, axis=1)[None]] if delay else []
+        parts = [J.swapaxes(0, 1), *extra, *parts]
+    rows = np.concatenate(parts)
     rows = np.ascontiguousarray((rows / noise.tau[None, :, None]).swapaxes(1, 2))
     columns = triangular(factor, rows.reshape(rows.shape[0], -1), "N")
     return Linearised(columns, factor, H, first, error, stencil.held)
