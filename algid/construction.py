@@ -187,6 +187,31 @@ def _take_away(found: _Left) -> None:
         os.close(handle)
 
 
+def put_file_in_place(temporary: Path, target: Path, *, replace: bool) -> None:
+    """Give a file its name at one stroke.
+
+    Raises
+    ------
+    FileExistsError
+        If something stands there and is not to be replaced.
+    OSError
+        If the file cannot be renamed.
+    """
+    if replace:
+        temporary.replace(target)
+        return
+    try:
+        os.link(temporary, target, follow_symlinks=False)  # a rename would replace what is there
+    except FileExistsError:
+        raise
+    except OSError as error:  # this file system has no second names
+        if os.path.lexists(target):
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(target)) from error
+        temporary.replace(target)
+        return
+    temporary.unlink()
+
+
 def put_in_place(temporary: Path, target: Path, *, replace: bool) -> None:
     """Give a folder its name at one stroke.
 

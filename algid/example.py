@@ -64,8 +64,8 @@ def write_example(folder: str | Path, force: bool = False) -> list[Path]:
     for path in paths:
         refuse_existing(path, force)
     for number, (path, payload) in enumerate(zip(paths, LOGS.values(), strict=False)):
-        write_log(path, run(number, payload))
-    with whole_file(paths[-1]) as temporary:
+        write_log(path, run(number, payload), force=force)
+    with whole_file(paths[-1], force=force) as temporary:
         temporary.write_text(PROFILE_TEXT, encoding="utf-8")
     return paths
 

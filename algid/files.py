@@ -19,7 +19,13 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from algid.construction import beside, put_in_place, remove_left, under_construction
+from algid.construction import (
+    beside,
+    put_file_in_place,
+    put_in_place,
+    remove_left,
+    under_construction,
+)
 from algid.errors import OutputError, SettingError
 from algid.limits import LIMITS
 
@@ -66,7 +72,7 @@ def refuse_links(folder: Path, name: str) -> None:
 
 
 @contextmanager
-def whole_file(path: Path, *, sweep: bool = True) -> Iterator[Path]:
+def whole_file(path: Path, *, sweep: bool = True, force: bool = True) -> Iterator[Path]:
     """Give a temporary name beside `path` to write to; it becomes `path` when the block ends well.
 
     Parameters
@@ -74,12 +80,15 @@ def whole_file(path: Path, *, sweep: bool = True) -> Iterator[Path]:
     path : Path
     sweep : bool
         Remove first what killed runs have left of it: this looks through the folder.
+    force : bool
+        Replace one that exists, also one that another process has made meanwhile.
 
     Raises
     ------
     OutputError
-        If the folder cannot be made or written to.
+        If the folder cannot be made or written to, or the file exists and `force` is not set.
     """
+    refuse_existing(path, force)
     with ExitStack() as stack:
         with writing(path, "cannot write there"):
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -91,7 +100,10 @@ def whole_file(path: Path, *, sweep: bool = True) -> Iterator[Path]:
             mask = os.umask(0)
             os.umask(mask)
             temporary.chmod(0o666 & ~mask)
-            temporary.replace(path)
+            try:
+                put_file_in_place(temporary, path, replace=force)
+            except FileExistsError as error:
+                raise OutputError(EXISTS.format(path)) from error
 
 
 def _touch(path: Path) -> None:

@@ -85,5 +85,5 @@ def convert(
             if progress is not None:
                 progress("writing", done, reader.rows)
 
-    write_log(target, noted(), truth=reader.origin.truth)
+    write_log(target, noted(), truth=reader.origin.truth, force=force)
     return notices

@@ -92,7 +92,7 @@ def export(
         return Exported(text, warnings)
     path = Path(out)
     refuse_existing(path, force)
-    with whole_file(path) as temporary:
+    with whole_file(path, force=force) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return Exported(text, warnings, path)
 

@@ -208,7 +208,7 @@ class _Files:
 
         for log in logs:
             path = self.path(log.origin.path)
-            write_log(path, log, truth=log.origin.truth, kind=self.kind)
+            write_log(path, log, truth=log.origin.truth, kind=self.kind, force=self.force)
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ def profile_for(log: Path, out: Path, force: bool = False) -> None:
 
     refuse_existing(out, force)
     text = draft_profile(log)
-    with whole_file(out) as temporary:
+    with whole_file(out, force=force) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 

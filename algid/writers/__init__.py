@@ -16,6 +16,7 @@ def write_log(
     *,
     truth: Truth | None = None,
     kind: str | None = None,
+    force: bool = True,
 ) -> None:
     """Write a log, or the blocks of one, whole or not at all.
 
@@ -27,11 +28,13 @@ def write_log(
         The arm and the payload behind a synthetic log, which is written beside its samples.
     kind : 'mcap', 'parquet' or 'csv'
         Format; that of `path`'s suffix by default.
+    force : bool
+        Replace a file that is there, also one that another process has written meanwhile.
 
     Raises
     ------
     OutputError
-        If the file cannot be written there.
+        If the file cannot be written there, or exists and `force` is not set.
     ValueError
         If the format is unknown.
 
@@ -50,14 +53,14 @@ def write_log(
     if name == "mcap":
         from algid.writers import mcap
 
-        mcap.write(path, log, truth=truth)
+        mcap.write(path, log, truth=truth, force=force)
     elif name == "parquet":
         from algid.writers import parquet
 
-        parquet.write(path, log, truth=truth)
+        parquet.write(path, log, truth=truth, force=force)
     elif name == "csv":
         from algid.writers import csv
 
-        csv.write(path, log, truth=truth)
+        csv.write(path, log, truth=truth, force=force)
     else:
         raise ValueError(f"format must be one of {', '.join(FORMATS)}, got {name!r}")

@@ -10,7 +10,9 @@ from algid.log import Companion, Log, Truth
 from algid.writers.blocks import as_blocks, columns, exact_in_seconds, summed
 
 
-def write(path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None) -> None:
+def write(
+    path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None, force: bool = True
+) -> None:
     """Write a log, or the blocks of one: t in s, angles, torques, velocities where recorded.
 
     Stamps too far from zero for float64 seconds get a column ``stamp_ns`` as well. The sidecar is
@@ -19,12 +21,12 @@ def write(path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None) -
     Raises
     ------
     OutputError
-        If the file cannot be written there.
+        If the file cannot be written there, or exists and `force` is not set.
     """
     import polars as pl
 
     sums: dict[str, int] = {}
-    with whole_file(path) as temporary:
+    with whole_file(path, force=force) as temporary:
         stamped = None
         with temporary.open("wb") as stream:
             for block in as_blocks(log):

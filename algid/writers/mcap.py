@@ -34,7 +34,12 @@ _QOS = """\
 
 
 def write(
-    path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None, chunk_size: int = _CHUNK
+    path: Path,
+    log: Log | Iterable[Log],
+    *,
+    truth: Truth | None = None,
+    chunk_size: int = _CHUNK,
+    force: bool = True,
 ) -> None:
     """Write a log, or the blocks of one; the truth goes into the metadata record "algid".
 
@@ -43,13 +48,13 @@ def write(
     Raises
     ------
     OutputError
-        If the file cannot be written there, or a stamp is none of a ROS 2 header's.
+        If the file cannot be written there, or exists and `force` is not set, or a stamp is none of a ROS 2 header's.
     """
     from mcap.records import Channel, Schema
 
     from algid.writers.chunks import ChunkedFile, message_bytes
 
-    with whole_file(path) as temporary, temporary.open("wb") as stream:
+    with whole_file(path, force=force) as temporary, temporary.open("wb") as stream:
         file = ChunkedFile(
             stream,
             profile="ros2",

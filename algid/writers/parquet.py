@@ -11,20 +11,22 @@ from algid.log import KEY, Companion, Log, Truth
 from algid.writers.blocks import as_blocks, columns, summed
 
 
-def write(path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None) -> None:
+def write(
+    path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None, force: bool = True
+) -> None:
     """Write a log, or the blocks of one, a row group a block: t in s … stamp_ns last.
 
     Raises
     ------
     OutputError
-        If the file cannot be written there, or there is no block.
+        If the file cannot be written there, or exists and `force` is not set, or there is no block.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     sums: dict[str, int] = {}
     writer = None
-    with whole_file(path) as temporary:
+    with whole_file(path, force=force) as temporary:
         try:
             for block in as_blocks(log):
                 found = columns(block)
