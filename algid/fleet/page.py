@@ -39,7 +39,7 @@ READING = (
     f"{SPAN} months. Level within its band is steady, orange drifts. A robot's name leads to all its parameters."
 )
 MOST_ROBOTS = 40  # whose table is printed
-MOST_NAMED = 3  # drifts
+MOST_NAMED = 3  # drifts, and logs that stand out
 # robots shown log by log: those of which something was found, then the first
 MOST_DRAWN = 40
 
@@ -84,8 +84,6 @@ def _page_sections(history: History, reports: Mapping[str, str]) -> tuple[Sectio
         drawn=tuple(drawn),
         links=places,
     )
-    if drawn:  # which leave no room for when the robots' first logs were made
-        robots = robots.without(("From",))
     jobs = {visible(job): place for job, place in reports.items()}
     found = [
         replace(table, links=links)
@@ -219,9 +217,8 @@ def verdict(history: History) -> Verdict:
     changed = 0 if history.changes is None else history.changes.n_unique(["robot", "after"])
     if changed:
         found.append(Notice("CHANGED", _changes(history, changed)))
-    found += [Notice("STAND_OUT", counted(findings, "log stands out", "logs stand out"))] * bool(
-        findings
-    )
+    if findings:
+        found.append(Notice("STAND_OUT", _standing_out(history)))
     if history.scattered:
         found.append(Notice("SCATTERED", history.scattered))
     return graded(statement, [*found, *(Notice("NOT_TESTED", why) for why in history.untested)])
@@ -235,6 +232,22 @@ def _drifting(history: History) -> str:
     if rest:
         words.append(f"{rest} more")
     return f"{counted(history.drifts.height, 'drift')}: {joined(words)}"
+
+
+def _standing_out(history: History) -> str:
+    """How many logs stand out, and the ones that do so most."""
+    import polars as pl
+
+    worst = history.findings.sort(pl.col("sigmas").abs(), descending=True)
+    rows = worst.head(MOST_NAMED).select("job", "parameter", "sigmas").rows()
+    words = [
+        f"{visible(job)} ({parameter}, {significant(sigmas, 2)} σ)"
+        for job, parameter, sigmas in rows
+    ]
+    rest = worst.height - len(rows)
+    if rest:
+        words.append(f"{rest} more")
+    return f"{counted(worst.height, 'log stands out', 'logs stand out')}: {joined(words)}"
 
 
 def _changes(history: History, count: int) -> str:

@@ -221,5 +221,7 @@ def finding_table(history: History) -> Table:
         )
         for row in worst.iter_rows(named=True)
     )
-    note = f"{history.findings.height} found; the farthest {len(rows)} are shown."
+    note = f"{history.findings.height} found."
+    if history.findings.height > len(rows):
+        note = f"{history.findings.height} found; the farthest {len(rows)} are shown."
     return Table("Logs that stand out", columns, rows, note)

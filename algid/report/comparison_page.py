@@ -76,7 +76,8 @@ def verdict(found: Comparison) -> Verdict:
     far = [words for size, words in sorted(distances, reverse=True) if size > FAR]
     if far:
         more = f" and {len(far) - 3} more" if len(far) > 3 else ""
-        return Verdict("reservations", f"{joined(far[:3])}{more} lie beyond {FAR:g} σ")
+        lie = "lies" if len(far) == 1 else "lie"
+        return Verdict("reservations", f"{joined(far[:3])}{more} {lie} beyond {FAR:g} σ")
     inside = sum(size <= CHANCE for size, _ in distances)
     largest = max(distances)[1]
     within = f"{inside} of {counted(len(distances), 'difference')} within {CHANCE:g} σ"

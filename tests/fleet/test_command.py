@@ -55,6 +55,7 @@ def test_drift_and_findings_are_printed_and_written(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     assert "2 robots, 20 logs: 1 drift and 1 finding" in done.stdout
     assert "payload unlike its label" in done.stdout
+    assert "1 log stands out: r0/0 (m_p, 400 σ)" in " ".join(done.stdout.split())
     assert "wrote" in done.stderr
     assert {path.name for path in (tmp_path / "page").iterdir()} == {
         "fleet.parquet",
@@ -118,7 +119,7 @@ def test_the_tables_have_their_columns_and_their_notes(tmp_path: Path) -> None:
         "0.50000",
         "+400.0",
     )
-    assert finding_table(history).note == "1 found; the farthest 1 are shown."
+    assert finding_table(history).note == "1 found."
     # what a narrow terminal leaves out first
     ranks = [
         {column.heading: column.rank for column in table(history).columns if column.rank}
