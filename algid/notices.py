@@ -31,6 +31,8 @@ OWN_FLAGS = (
         "angle_unit",
         "torque_unit",
         "topic",
+        "rate",
+        "columns",
         "clock",
         "start",
     ),
@@ -65,6 +67,7 @@ OPEN = {
     "offset": "RAD",
     "torque_constant": "K",
     "start": "S",
+    "rate": "HZ",
     "end": "S",
 }
 """What stands for a value that only the user knows, by the last part of a setting's name."""

@@ -14,6 +14,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr,
 
 from algid.errors import SettingError
 from algid.files import first_misfit, read_toml
+from algid.limits import PHYSICAL
 from algid.units import names_of, unit_of
 
 
@@ -135,6 +136,10 @@ class Profile(_Strict):
         Stamps of the messages' own header, or those of the recorder.
     time, time_unit : str
         The column of the time, and its unit: 's', 'ms', 'us' or 'ns'.
+    rate : float, Hz
+        Samples a second of a table without a time: its rows are counted.
+    columns : tuple of str
+        The names of the columns of a text table without a header, in their order.
     zero : 'horizontal' or 'hanging'
         Where θ1 is zero.
     second_angle : 'relative' or 'absolute'
@@ -172,6 +177,8 @@ class Profile(_Strict):
     clock: Literal["header", "log"] | None = None
     time: str | None = None
     time_unit: TimeUnit | None = None
+    rate: float | None = Field(default=None, ge=PHYSICAL.rate[0], le=PHYSICAL.rate[1])
+    columns: Annotated[tuple[str, ...] | None, BeforeValidator(_parts)] = None
     zero: Literal["horizontal", "hanging"] = "horizontal"
     second_angle: Literal["relative", "absolute"] = "relative"
     drive: Literal["joint", "base"] = "joint"

@@ -38,7 +38,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "methods": room("estimators progress"),
     "files": room("construction errors limits", "pydantic"),
     "stores": room("construction errors files", "pyarrow"),
-    "profile": room("errors files units", "pydantic"),
+    "profile": room("errors files limits units", "pydantic"),
     "settings": room("errors limits methods model physics signals"),
     "results": room("errors files limits log model notices settings text verdict words", "numpy polars pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),

@@ -52,6 +52,8 @@ OF_PROFILE: Mapping[str, tuple[Any, str, Completion | None]] = {
     "profile": (Path, "algid.toml that says what the log's names and units mean.", None),
     "topic": (str, "Topic with the joint states.", None),
     "joints": (str, "The two joints, as NAME,NAME.", None),
+    "rate": (str, "Samples a second, Hz, of a table without a time.", None),
+    "columns": (str, "Names of the columns of a CSV without a header, as t,theta1,….", None),
     "angle_unit": (str, f"{_words(names_of('angle'))}.", of_profile("unit", "theta1")),
     "torque_unit": (str, f"{_words(names_of('torque', 'current'))}.", of_profile("unit", "tau1")),
     "zero": (str, "Where θ1 is zero: horizontal or hanging.", of_profile("zero")),

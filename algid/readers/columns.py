@@ -42,6 +42,8 @@ class Columns:
     time_stated: bool = False
     reading: Reading = field(default_factory=Reading)
     others: Mapping[str, str] = field(default_factory=dict)
+    rate: float | None = None
+    """Hz, of rows that are counted: there is no time."""
 
     def dated(self) -> Columns:
         """The same with a time that holds dates or durations, which come in ns."""
@@ -109,6 +111,9 @@ def assign(
     if all(sources[name] == name for name in ("t", *JOINT_CHANNELS)):
         units.setdefault("t", "s")  # algid's own names mean algid's own units
     others = other_joints(available, [sources["theta1"], sources["theta2"]])
+    if profile.rate is not None:
+        sources["t"] = sources["theta1"]  # any column has a cell in each row that is counted
+        return Columns(sources, units, "ns", tuple(said), True, reading, others, profile.rate)
     return Columns(
         sources, units, of_time or units.get("t"), tuple(said), of_time is not None, reading, others
     )
@@ -138,11 +143,21 @@ def _sources(
         sources.setdefault(f"tau{profile.passive}", sources[f"tau{3 - profile.passive}"])
     if not (profile.velocity and sources.keys() >= set(VELOCITIES)):
         sources = {name: column for name, column in sources.items() if name not in VELOCITIES}
+    if profile.rate is not None:
+        sources["t"] = ""
     missing = [name for name in ("t", *JOINT_CHANNELS) if name not in sources]
     if missing:
         text = f"{path}: no column for {', '.join(missing)}; found {_listed(available)}"
-        raise LogError(f"{text}; name them: {_naming(missing)}{_or_a_law(missing)}")
+        raise LogError(
+            f"{text}; name them: {_naming(missing)}{_or_a_rate(missing)}{_or_a_law(missing)}"
+        )
     return sources, choice
+
+
+def _or_a_rate(missing: Sequence[str]) -> str:
+    """What else to say of a log without a time."""
+    rate = Remedy({"rate": None}, "; or give the samples a second of a log without a time")
+    return str(rate) if "t" in missing else ""
 
 
 def _or_a_law(missing: Sequence[str]) -> str:

@@ -44,7 +44,7 @@ def open_csv(path: Path, profile: Profile, kind: str = "csv") -> TableReader:
         If the text is no table, or columns are missing.
     """
     head = head_of(path, kind)
-    dialect = detect(path, head)
+    dialect = detect(path, head, profile.columns)
     beside = sidecar(path)
     try:
         companion = loads(read_whole(beside)) if beside.is_file() else NO_COMPANION
@@ -53,7 +53,7 @@ def open_csv(path: Path, profile: Profile, kind: str = "csv") -> TableReader:
             f"{beside}: the truth beside the log cannot be read ({error}); remove it"
         ) from error
     columns = assign(str(path), dialect.columns, profile, dialect.units, companion.sums)
-    if columns.sources["t"] in dialect.dates:
+    if columns.rate is None and columns.sources["t"] in dialect.dates:
         columns = columns.dated()
     # rows to expect of plain text: from the length of its first lines, and a tenth more
     rows = (

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from algid.errors import LogError
 from algid.limits import LIMITS
+from algid.notices import Remedy
 from algid.readers.stated import in_text
 from algid.units import is_foreign, unit_of
 from algid.words import counted
@@ -22,6 +23,14 @@ _NUMBER = re.compile(
 )
 _WHOLE = re.compile(r"^[+-]?\d{1,19}$")
 _DATE = re.compile(r"^\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}")
+
+
+class NoHeaderError(LogError):
+    """A table without a header, of so many columns."""
+
+    def __init__(self, columns: int, message: str) -> None:
+        super().__init__(message)
+        self.columns = columns
 
 
 @dataclass(frozen=True)
@@ -60,13 +69,14 @@ class Dialect:
     dates: frozenset[str] = frozenset()
 
 
-def detect(path: Path, head: bytes) -> Dialect:
-    """The dialect of the table whose first bytes are `head`.
+def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Dialect:
+    """The dialect of the table whose first bytes are `head`, its columns called `names` where those are given.
 
     Raises
     ------
     LogError
-        If there is no header, no data under it, or the text is not UTF-8.
+        If there is no header, no data under it, there are not so many columns as names, or the text
+        is not UTF-8.
     """
     lines = _lines(path, head)
     comment = next(
@@ -85,11 +95,10 @@ def detect(path: Path, head: bytes) -> Dialect:
     separator = _separator(path, header, [line for _, line in data[1:20]])
     first_row = 1
     if all(_is_number(cell) for cell in split(header, separator) if cell):
-        header, first_row = (
-            _commented_header(path, lines[:number], comment, split(header, separator), separator),
-            0,
-        )
-    columns = tuple(split(header, separator))
+        cells, first_row = split(header, separator), 0
+        if names is None:
+            header = _commented_header(path, lines[:number], comment, cells, separator)
+    columns = _named(path, split(header, separator), names)
     units = _units(columns, split(data[first_row][1], separator)) if len(data) > first_row else {}
     first_row += bool(units)
     if len(data) <= first_row:
@@ -99,6 +108,14 @@ def detect(path: Path, head: bytes) -> Dialect:
         path, columns, separator, number, comment, [line for _, line in data[first_row:]], row
     )
     return replace(found, units={**in_text(above, columns), **units})
+
+
+def described(path: Path, head: bytes) -> Dialect:
+    """The dialect of a table to look at: columns without a name are numbered. Raises as `detect`."""
+    try:
+        return detect(path, head)
+    except NoHeaderError as error:
+        return detect(path, head, [f"column {place + 1}" for place in range(error.columns)])
 
 
 def _below_titles(data: list[tuple[int, str]]) -> list[tuple[int, str]]:
@@ -206,6 +223,18 @@ def _separator(path: Path, header: str, rows: list[str]) -> str:
     )
 
 
+def _named(path: Path, cells: list[str], names: Sequence[str] | None) -> tuple[str, ...]:
+    """The header's cells, or the names that a user gives the columns."""
+    if names is None:
+        return tuple(cells)
+    if len(names) != len(cells):
+        raise LogError(
+            f"{path}: {counted(len(cells), 'column')}, and {counted(len(names), 'name')} for them: "
+            f"{', '.join(names)[:200]}; name each: --columns"
+        )
+    return tuple(names)
+
+
 def _commented_header(
     path: Path, before: list[str], comment: str | None, cells: list[str], separator: str
 ) -> str:
@@ -214,9 +243,11 @@ def _commented_header(
         names = split(text, separator)
         if len(names) == len(cells) and not any(map(_is_number, names)):
             return text
-    raise LogError(
+    named = Remedy({"columns": ["t", "theta1", "theta2", "tau1", "tau2"]}, "name its columns")
+    raise NoHeaderError(
+        len(cells),
         f"{path}: the table has no header, its first line is {', '.join(cells)[:60]!r}; "
-        "put a line with the columns' names above it: t,theta1,theta2,tau1,tau2"
+        f"put a line with the columns' names above it, or {named}",
     )
 
 

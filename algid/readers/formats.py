@@ -198,10 +198,10 @@ def _open_csv(kind: str, path: Path, profile: Profile) -> TableReader:
 
 def _csv_entries(kind: str, path: Path) -> Entries:
     from algid.readers.csv import counted_rows
-    from algid.readers.dialect import detect, kinds
+    from algid.readers.dialect import described, kinds
 
     head = head_of(path, kind)
-    dialect = detect(path, head)
+    dialect = described(path, head)
     rows = _known(lambda: counted_rows(path, kind, dialect))
     return tuple(Entry(name, dtype, rows) for name, dtype in kinds(path, head, dialect).items())
 

@@ -66,7 +66,10 @@ def flat_reader(
         As `reader_of`.
     """
     reading = replace(columns.reading, clock="column", time_unit=columns.time_unit)
-    origin = Origin(path, kind, dict(columns.sources), companion.truth, reading)
+    mapping = dict(columns.sources)
+    if columns.rate is not None:
+        mapping["t"] = f"rows at {columns.rate:g} Hz"
+    origin = Origin(path, kind, mapping, companion.truth, reading)
 
     def look(others: Mapping[str, str]) -> Iterator[SampleTable]:
         looked = replace(columns, sources={"t": columns.sources["t"], **others})
@@ -244,6 +247,11 @@ def tables(
             seen[name] = add(seen[name], word_sum(frame[name]))
         times = frame["t"]
         notices = list(cut_off)
+        if columns.rate is not None and any(one.code == "EMPTY_CELLS" for one in notices):
+            raise LogError(
+                f"{path}: rows lack a value, and without a time the rows behind them have none; "
+                "fill the cells, or add a column of times"
+            )
         if unit is None and times.size:
             if not np.all(np.isfinite(times)):
                 raise LogError(f"{path}: a time is not finite; expected a number in every row")
@@ -251,7 +259,11 @@ def tables(
             if unit != "s":
                 notices.append(Notice("TIME_UNIT", numbers={"unit": unit}))
         try:
-            stamps = to_nanoseconds(times, unit or "s")
+            stamps = (
+                to_nanoseconds(times, unit or "s")
+                if columns.rate is None
+                else _counted(done, times.size, columns.rate)
+            )
         except ValueError as error:
             raise LogError(
                 f"{path}: {error} in column {columns.sources['t']!r}, past row {done}"
@@ -267,6 +279,11 @@ def tables(
             f"{path}: the values of {', '.join(wrong)} are not those that were written: the file was changed "
             "or damaged; write it again, or remove its truth if it was changed on purpose"
         )
+
+
+def _counted(done: int, rows: int, rate: float) -> IntArray:
+    """Stamps (N,) in ns of the rows behind the first `done`, `rate` a second."""
+    return np.rint((done + np.arange(rows)) * (1e9 / rate)).astype(np.int64)
 
 
 def _slow(column: str, stamps: IntArray, unit: str) -> list[Notice]:

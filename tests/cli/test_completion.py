@@ -18,6 +18,8 @@ FREE = {
     *(
         "topic",
         "joints",
+        "rate",
+        "columns",
         "start",
         "end",
         "name",

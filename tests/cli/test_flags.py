@@ -165,6 +165,7 @@ OF_A_LOG = [
     ("--start", "x", "--start (profile: start): expected a valid number, found 'x'"),
     ("--start", "-1", "--start (profile: start): expected greater than or equal to 0, found '-1'"),
     ("--start", "nan", "--start (profile: start): expected a finite number, found 'nan'"),
+    ("--rate", "0", "--rate (profile: rate): expected greater than or equal to 0.001, found '0'"),
     ("--end", "0", "--end (profile: end): expected greater than 0, found '0'"),
     ("--end", "1e400", "--end (profile: end): expected a finite number, found '1e400'"),
     ("--set", "zero", "--set zero: expected KEY=VALUE like tau1.sign=-1"),
@@ -182,7 +183,7 @@ OF_A_LOG = [
         "absent.toml: cannot read it (No such file or directory); check the name",
     ),
 ]
-UNCHECKED = {"topic", "accept", "name", "scheduler", "out"}
+UNCHECKED = {"columns", "topic", "accept", "name", "scheduler", "out"}
 """Text that means what it says: names, which a log or a folder has or has not."""
 
 

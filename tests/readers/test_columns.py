@@ -30,6 +30,7 @@ def test_columns_that_are_missing_are_named_with_the_flags_that_name_them() -> N
     assert refusal("q1 q2 tau1") == (
         "no column for t, tau1, tau2; found 'q1', 'q2', 'tau1'; name them: --set time=NAME --set tau1.source=NAME "
         '--set tau2.source=NAME (profile: time = "NAME", source = "NAME" of [tau1], source = "NAME" of [tau2]); '
+        "or give the samples a second of a log without a time: --rate HZ (profile: rate = HZ); "
         "a PD law makes them of q_des, kp and kd of [tau1] and [tau2] (algid guide logs)"
     )
     many = " ".join(f"c{place:02d}" + "x" * 60 for place in range(18))

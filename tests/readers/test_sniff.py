@@ -139,7 +139,7 @@ def found(text: str) -> Dialect:
         ("time\n1\n2\n", "'time' has one column; expected columns split by"),
         (
             "1,2\n3,4\n",
-            "no header, its first line is '1, 2'; put a line with the columns' names above it: t,theta1",
+            "no header, its first line is '1, 2'; put a line with the columns' names above it, or",
         ),
         ("# t q1 q2\n1,2\n3,4\n", "no header"),
         ("t,q1,t\n1,2,3\n4,5,6\n", "the column 't' stands in the header twice; rename one"),
