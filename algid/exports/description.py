@@ -23,6 +23,7 @@ from algid.identification.known import (
     first_length,
     has_error_bar,
     model_of,
+    payload_length,
     torque_constants,
 )
 from algid.model import TERMS, UNITS, Model
@@ -147,13 +148,15 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
         name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None
     }
     given = before | {name: value for name, value in knowns.given.items() if name in ("l1", "l2")}
-    coefficients = coefficients_of(result, file, given.get("l1"))
+    told = None if not links or "l1" in given else payload_length(result)
+    length = given.get("l1") if told is None else told[0]
+    coefficients = coefficients_of(result, file, length)
     numbers = _identified(coefficients)
     chosen = None
     if links:
         known = Knowns(**{**knowns.given, **given})
         full = replace(known, l2=given.get("l2", _length(result.payload.get("l2"))))
-        l1 = _first_length(coefficients, file) if known.l1 is None else known.l1
+        l1 = _first_length(coefficients, file) if length is None else length
         chosen = links_of(coefficients.value, coefficients.model.gravity, l1, full, file)
         numbers += _chosen(chosen, coefficients, known, result)
     delay = result.parameters.get("delay")
@@ -192,8 +195,17 @@ def _first_length(coefficients: Coefficients, file: str) -> float:
     return gravity * k1 / k2
 
 
+def _of_first_length(result: Result) -> str:
+    """What tells the length of link 1, where it is not given."""
+    by_payload, by_constants = payload_length(result), first_length(result)
+    if by_payload is not None:
+        return f"identified with the payload, ± {by_payload[1]:.2g}"
+    spread = "" if by_constants is None else f", ± {by_constants[1]:.2g}"
+    return f"identified, g k1 / k2{spread}"
+
+
 def _identified(coefficients: Coefficients) -> tuple[Number, ...]:
-    after = ", conditioned on the given l1" if coefficients.conditioned else ""
+    after = ", conditioned on l1" if coefficients.conditioned else ""
     found = []
     for name in coefficients.model.names:
         std = "" if name not in coefficients.std else f", ± {coefficients.std[name]:.2g}"
@@ -208,12 +220,7 @@ def _chosen(
     masses = {name: "given" if getattr(knowns, name) is not None else "" for name in ("m1", "m2")}
     nearest = "chosen, nearest to a uniform link"
     horizontal = coefficients.model.gravity == 0
-    by_constants = first_length(result)
-    l1 = (
-        "given"
-        if knowns.l1
-        else f"identified, g k1 / k2{'' if by_constants is None else f', ± {by_constants[1]:.2g}'}"
-    )
+    l1 = "given" if knowns.l1 else _of_first_length(result)
     l2 = (
         "given"
         if knowns.l2

@@ -132,6 +132,17 @@ def first_length(result: Result) -> tuple[float, float] | None:
     return gravity * k1.estimate / k2.estimate, float(np.sqrt(slope @ covariance @ slope))
 
 
+def payload_length(result: Result) -> tuple[float, float] | None:
+    """The payload's l1 and its standard deviation in m, where it is told better than by `first_length`."""
+    found = result.payload.get("l1")
+    if found is None or found.estimate is None or not found.std or not found.usable:
+        return None
+    by_constants = first_length(result)
+    if by_constants is not None and by_constants[0] > 0 and by_constants[1] <= found.std:
+        return None
+    return found.estimate, found.std
+
+
 def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice, ...]:
     """Notices of given lengths far from what the result says of them: by itself, and by l1 = g k1 / k2."""
     identified = {

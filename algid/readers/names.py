@@ -189,6 +189,7 @@ _JOINT_PLACED = re.compile(r"^.*/(position|velocity|effort)[.\[/](\d+)\]?$")
 _STATE_OF_JOINT = re.compile(r"^(?:\w+[./])*\w*state[./]?\[(\d{1,3})\][./](\w+)$")
 _STATE_OF_ALL = re.compile(r"^(?:\w+[./])*\w*state[./](\w+)\[(\d{1,3})\]$")
 _JOINT_FIRST = re.compile(r"^(?:joint|axis|motor|link|j)[_ ]?(\d{1,3})[_./ ]+(.+)$")
+_NUMBERED = re.compile(r"^(?:joint|axis|motor|link|j)[_ ]?(\d{1,3})$")
 _JOINT_LAST = re.compile(r"^(.*?[^\W\d])[_./ ]*\[?(\d{1,3})\]?$")
 
 
@@ -371,7 +372,7 @@ def _two(by_joint: dict[str, str], joints: tuple[str, str] | None) -> tuple[str,
     """The columns of the two joints given, else of the two there are, from the base outwards where their names tell."""
     if joints:
         found = [
-            [key for key in by_joint if joint.lower() in (key, key.rpartition("/")[2])]
+            [key for key in by_joint if _called(joint) & {key, key.rpartition("/")[2]}]
             for joint in joints
         ]
         return (
@@ -385,6 +386,13 @@ def _two(by_joint: dict[str, str], joints: tuple[str, str] | None) -> tuple[str,
     named = short if len(short) == 2 else by_joint
     (first, second), _ = along_the_arm(list(named))
     return named[first], named[second]
+
+
+def _called(joint: str) -> set[str]:
+    """What columns may call a joint that a user names: ``Joint_2`` is the joint 2 of ``Joint_2_pos``."""
+    name = joint.strip().lower()
+    numbered = _NUMBERED.match(name)
+    return {name, numbered[1].lstrip("0") or "0"} if numbered else {name}
 
 
 def other_joints(columns: Iterable[str], angles: Collection[str]) -> dict[str, str]:

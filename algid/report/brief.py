@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import textwrap
 from collections.abc import Iterable, Iterator
 
@@ -15,6 +16,10 @@ from algid.verdict import MOST_REASONS, Verdict
 from algid.words import counted
 
 WIDTH, HEIGHT = 80, 25
+MOST_COMMAND = 6
+"""Lines of what to run first."""
+TIMED = ("delay",)
+"""Terms whose coefficient is their name, and that are in no regressor."""
 
 
 def brief(result: Result, place: str = "") -> list[str]:
@@ -30,9 +35,27 @@ def brief(result: Result, place: str = "") -> list[str]:
     head = _wrapped(f"{judged.word}: {visible(judged.headline)}.")
     body = ["", *_estimates(result), *_terms(result), *_prediction(result)]
     tail = [*_notes(judged.notes), *([f"Report: {place}"] if place else [])]
-    command = [f"Run first: {judged.command}"] if judged.command else []
+    command = run_first(judged.command)
+    if len(command) > MOST_COMMAND:
+        command = ["Run first: the command with -v, or in the report; it is long"]
     room = HEIGHT - len(head) - len(body) - len(tail) - len(command)
     return [*head, *_reasons(judged, room), *command, *body, *tail]
+
+
+def run_first(command: str | None) -> list[str]:
+    """What to run first, to be copied: a longer one goes on behind a backslash, as shells read it."""
+    if not command:
+        return []
+    words = [shlex.quote(word) for word in shlex.split(command)]
+    lines, line = [], "Run first:"
+    for place, word in enumerate(words):
+        last = place == len(words) - 1
+        if len(line) + 1 + len(word) + (0 if last else 2) > WIDTH and line.strip():
+            lines.append(f"{line} \\")
+            line = "   "
+        line = f"{line} {word}"
+    lines.append(line)
+    return lines
 
 
 def _wrapped(text: str, first: str = "", rest: str = "") -> list[str]:
@@ -109,7 +132,8 @@ def _terms(result: Result) -> list[str]:
         f"{name} {resolved(found.estimate, found.std)} ± {_half(found)}"
         for name, found in others.items()
     ]
-    return _at_most(2, f"Terms kept: {', '.join(terms) or 'delay'} ({', '.join(numbers)})")
+    kept = [*terms, *(name for name in TIMED if name in others and name not in terms)]
+    return _at_most(2, f"Terms kept: {', '.join(kept)} ({', '.join(numbers)})")
 
 
 def _at_most(lines: int, text: str) -> list[str]:

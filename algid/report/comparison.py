@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 from algid.report.document import Column, Table
 from algid.report.tables import flat_settings
@@ -142,7 +142,33 @@ def _estimates(
             cells += [with_std(other), change, ABSENT if distance is None else f"{distance:+.1f}"]
         rows.append(tuple(cells))
     note = f"Differences are against {labels[0]}; σ combines both standard deviations."
-    return Table("Estimates side by side", tuple(columns), tuple(rows), note).without_empty()
+    table = Table("Estimates side by side", tuple(columns), tuple(rows), note).without_empty()
+    return replace(table, upright=_upright(results, labels, sigma, note))
+
+
+def _upright(
+    results: Sequence[Result],
+    labels: list[str],
+    sigma: dict[str, tuple[float | None, ...]],
+    note: str,
+) -> Table:
+    """The estimates one below the other: as wide for many results as for two."""
+    columns = (
+        Column("Parameter", "name"),
+        Column("Result", "text"),
+        Column("Estimate", "number"),
+        Column("Unit", "text", rank=1),
+        Column("Δ/σ", "number"),
+    )
+    rows = []
+    for name, distances in sigma.items():
+        for place, (label, result) in enumerate(zip(labels, results, strict=True)):
+            found = result.estimates.get(name)
+            unit = "" if found is None else unit_text(found.unit)
+            distance = distances[place - 1] if place else None
+            far = "" if distance is None else f"{distance:+.1f}"
+            rows.append((visible(name) if place == 0 else "", label, with_std(found), unit, far))
+    return Table("Estimates side by side", columns, tuple(rows), note)
 
 
 def with_std(found: Estimate | None) -> str:
@@ -174,4 +200,11 @@ def _settings(results: Sequence[Result], labels: list[str]) -> Table:
     )
     columns = (Column("Setting", "name"), *(Column(label, "text") for label in labels))
     note = "" if rows else "Every setting is the same, and every log was read the same way."
-    return Table("Settings that differ", columns, rows, note)
+    table = Table("Settings that differ", columns, rows, note)
+    upright = tuple(
+        (row[0] if place == 0 else "", label, row[place + 1])
+        for row in rows
+        for place, label in enumerate(labels)
+    )
+    headings = (Column("Setting", "name"), Column("Result", "text"), Column("Value", "text"))
+    return replace(table, upright=replace(table, columns=headings, rows=upright))

@@ -72,6 +72,7 @@ class Table:
     depth : which formats show it
     drawn : columns of drawings, which only a page has
     links : where the names of rows lead, which only a page tells
+    upright : what stands in its place where a terminal has no room for all of its columns
     """
 
     title: str
@@ -81,6 +82,7 @@ class Table:
     depth: Depth = Depth.TERMINAL
     drawn: tuple[Drawn, ...] = ()
     links: Mapping[str, str] | None = None
+    upright: Table | None = None
 
     def at(self, depth: Depth) -> Table:
         """The table that deep."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from algid.report.brief import run_first
 from algid.report.document import Column, Depth, Document, Table
 from algid.results import Status
 from algid.text import visible
@@ -53,7 +54,8 @@ def print_verdict(judged: Verdict, console: Console, most: int | None = None) ->
     if points.row_count:
         console.print(points)
     if judged.command:
-        console.print(Text.assemble(("Run first: ", "bold"), judged.command), soft_wrap=True)
+        for line in run_first(judged.command):
+            console.print(Text(line), soft_wrap=True)
 
 
 def print_table(table: Table, console: Console) -> None:
@@ -78,9 +80,13 @@ def print_table(table: Table, console: Console) -> None:
         narrowed = _narrowed(widths, list(map(_least, table.columns, columns)), room)
         fewer = table.narrower()
         most_missed = all(column.rank <= 1 for column in table.columns)
-        if sum(widths) <= room or fewer is None or (sum(narrowed) <= room and most_missed):
+        squeezed = sum(narrowed) <= room and most_missed and table.upright is None
+        if sum(widths) <= room or squeezed:
             break
-        table = fewer
+        other = fewer or table.upright
+        if other is None:
+            break
+        table = other
     console.print(rich_table(table, narrowed))
     if table.note:
         console.print(Text(table.note, "dim"))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
-from algid.notices import Notice
+from algid.notices import Notice, Remedy
 from algid.text import joined, significant, visible
 from algid.verdict import Verdict, graded
 from algid.words import counted
@@ -74,9 +74,34 @@ def again(result: Result, flags: Sequence[str]) -> str:
         word for log in result.logs if log.role == "loaded" for word in ("--loaded", log.path)
     ]
     made = result.settings.get("command")
-    words = shlex.split(made) if isinstance(made, str) else ["algid", "identify", *logs, *loaded]
+    words = shlex.split(made) if isinstance(made, str) else _call(result, [*logs, *loaded])
     force = [] if "--force" in words else ["--force"]
     return visible(shlex.join([*words, *flags, *force]), LONGEST_COMMAND)
+
+
+def _call(result: Result, logs: Sequence[str]) -> list[str]:
+    """The command that does what Python was asked for."""
+    from algid.settings import Settings, flag
+
+    asked = Settings.of(result.settings)
+    words = ["algid", "identify", *logs]
+    for name, value in vars(asked).items():
+        default = getattr(Settings, name)
+        if name == "poles" or value == default or (name == "gravity" and name in result.profile):
+            continue
+        words += [flag(name)] if value is True else [flag(name), str(value)]
+    return [*words, *Remedy(_flat(result.profile)).flags]
+
+
+def _flat(profile: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings of a profile by their names with dots."""
+    flat: dict[str, Any] = {}
+    for name, value in profile.items():
+        if value is None:
+            continue
+        inner = value if isinstance(value, Mapping) else None
+        flat |= {name: value} if inner is None else {f"{name}.{k}": v for k, v in inner.items()}
+    return flat
 
 
 def is_implausible(result: Result) -> bool:

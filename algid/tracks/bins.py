@@ -21,6 +21,7 @@ The arm that a result describes, for tracking what it carries.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 
@@ -31,7 +32,13 @@ from algid.errors import ResultError
 from algid.estimators.noise import first_guess
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
-from algid.identification.known import model_of, prior_of, shift_of
+from algid.identification.known import (
+    first_length,
+    model_of,
+    payload_length,
+    prior_of,
+    shift_of,
+)
 from algid.model import PARAMETERS, SINES, TERMS, Model
 from algid.results import Result
 from algid.signals.differences import POINTS, Stencil
@@ -246,10 +253,23 @@ def arm_of(
         np.ix_(places, places)
     ]
     noise = [result.fit.noise.get(name, 0.0) for name in ("theta1", "theta2", "tau1", "tau2")]
+    constants = _by_constants(result, l1, prior.names)
+    if constants is not None:
+        _, gradient = constants
+        q, row = gradient.size, covariance[-2]
+        row[:] = 0.0
+        row[:q] = gradient @ covariance[:q, :q]
+        if "l2" in names:
+            by_l2 = [
+                result.fit.covariance[fitted.index("l2")][fitted.index(n)] for n in prior.names
+            ]
+            row[-1] = gradient @ np.array(by_l2, dtype=np.float64)
+        row[-2] = row[:q] @ gradient
+        covariance[:, -2] = row
     known = IdentifiedArm(
         model,
         prior.mean,
-        _length(result, "l1", l1),
+        _length(result, "l1", l1) if constants is None else constants[0],
         _length(result, "l2", l2),
         NoiseLevels(np.array(noise[:2]), np.array(noise[2:]))
         if min(noise) > 0
@@ -258,6 +278,24 @@ def arm_of(
         *_body(result),
     )
     return known, covariance
+
+
+def _by_constants(
+    result: Result, given: float | None, names: Sequence[str]
+) -> tuple[float, FloatArray] | None:
+    """l1 = g k1 / k2 in m and its gradient (q,) by the constants `names`.
+
+    None where l1 is given, or the payload tells it better.
+    """
+    if given is not None or result.settings.get("l1") is not None:
+        return None
+    found = first_length(result)
+    if found is None or found[0] <= 0 or payload_length(result) is not None:
+        return None
+    k1, k2 = (result.parameters[name].estimate or math.nan for name in ("k1", "k2"))
+    gradient = np.zeros(len(names))
+    gradient[names.index("k1")], gradient[names.index("k2")] = found[0] / k1, -found[0] / k2
+    return found[0], gradient
 
 
 def with_friction(arm: IdentifiedArm, covariance: FloatArray) -> tuple[IdentifiedArm, FloatArray]:

@@ -170,8 +170,9 @@ def test_the_file_says_what_is_identified_given_and_chosen() -> None:
     }
     origins = {name: number.origin.split(",")[0].split(":")[0] for name, number in numbers.items()}
     assert origins == dict.fromkeys(
-        ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "l1", "lc2", "I2"), "identified"
+        ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "lc2", "I2"), "identified"
     ) | {
+        "l1": "identified with the payload",
         "g": "given",
         "m2": "given",
         "rotor1": "given",

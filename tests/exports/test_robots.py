@@ -237,10 +237,7 @@ def test_lengths_that_the_result_was_told_are_taken_and_flags_beat_them() -> Non
     assert re.search(r"l1 +0\.41 +m +given", sdf)
     assert re.search(r"l2 +0\.33 +m +given", sdf)
     # k1 and k2, each to a thousandth, tell the same length then: k1 to a thousandth over √2
-    assert (
-        f"identified, ± {1e-3 * 0.7 * 0.4 * 0.11 / np.sqrt(2):.2g}, conditioned on the given l1"
-        in sdf
-    )
+    assert f"identified, ± {1e-3 * 0.7 * 0.4 * 0.11 / np.sqrt(2):.2g}, conditioned on l1" in sdf
     assert re.search(r"l1 +0\.39 +m +given", exported(told, "a", "sdf", Knowns(l1=0.39))[0])
 
 

@@ -20,6 +20,7 @@ import algid
 from algid.log import Log
 from algid.synth.sensors import Sensors
 from tests.processes import Outcome
+from tests.report.test_brief import held
 
 SHARED = Path(__file__).parents[3] / "shared" / "data"
 NOISY = Sensors(position_noise=1e-3, torque_noise=1e-2, seed=4)
@@ -43,7 +44,11 @@ def logs(name: str, duration: float = 4.0, exact: bool = False) -> tuple[Log, Lo
 
 
 def summary(result: algid.Result) -> Summary:
-    """Estimates with their deviations, statuses, codes, terms and prediction of a result."""
+    """Estimates with their deviations, statuses, codes, terms and prediction of a result.
+
+    What a terminal shows of it is held to its 25 lines of 80 columns on the way.
+    """
+    held(result)
     content = result.model_dump(mode="json")
     estimates = {**content["parameters"], **content["payload"]}
     found: Summary = {

@@ -160,3 +160,13 @@ def test_two_recordings_in_one_file_are_not_mixed() -> None:
         sorted_stamps([*range(0, 6000, 2), *range(1, 6000, 2)])
     with pytest.raises(LogError, match="time goes backwards"):
         sorted_stamps(list(range(0, 6000, 2)), list(range(1, 6000, 2)))
+
+
+@pytest.mark.parametrize("joints", [("2", "3"), ("Joint_2", "Joint_3"), ("joint2", "axis 03")])
+def test_joints_are_named_by_their_numbers_or_by_what_columns_begin_with(
+    joints: tuple[str, str],
+) -> None:
+    columns = [f"Joint_{n}_{what}" for n in (1, 2, 3) for what in ("pos", "torque")]
+    found = choose(["time", *columns], joints).columns
+    assert found["theta1"] == "Joint_2_pos"
+    assert found["tau2"] == "Joint_3_torque"

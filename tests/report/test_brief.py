@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import pytest
@@ -19,10 +20,8 @@ def held(result: Result) -> str:
     """The lines as one text, once they are within their bounds."""
     lines = brief(result)
     assert len(lines) <= HEIGHT, lines
-    commands = [
-        line for line in lines if line.startswith("Run first: ")
-    ]  # there to be copied, whole
-    assert all(len(line) <= WIDTH for line in lines if line not in commands), lines
+    for line in lines:  # a path that is longer than a line stands alone in its own
+        assert len(line) <= WIDTH or " " not in line.removesuffix(" \\").strip(), lines
     return "\n".join(lines)
 
 
@@ -50,9 +49,15 @@ def test_a_simulated_log_shows_its_errors(estimator: str) -> None:
 def test_a_failed_log_says_what_to_run_first() -> None:
     log, _ = algid.synthesise("case1", duration=3.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
     log.theta[1] *= -1
-    text = held(algid.identify(log, settings=Settings(estimator="weak")))
+    log = algid.Log.from_arrays(log.t, log.theta, log.tau, name="runs/of may/arm 1.csv")
+    text = held(algid.identify(log, settings=Settings(estimator="weak"), zero="hanging", start=0.1))
     assert text.startswith("Failed: ")
-    assert "Run first: " in text
+    command = text.partition("Run first: ")[2].partition("\n\n")[0].partition("\nk1")[0]
+    words = shlex.split(command.replace("\\\n", " "))
+    assert words[:3] == ["algid", "identify", "runs/of may/arm 1.csv"]
+    for flags in (["--estimator", "weak"], ["--zero", "hanging"], ["--start", "0.1"]):
+        place = words.index(flags[0])
+        assert words[place : place + 2] == flags
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@ import pytest
 from algid.report.comparison import compare
 from algid.results import Estimate, Result
 from tests.report.folders import estimate
+from tests.report.test_terminal import printed
 
 
 def test_the_difference_is_over_both_standard_deviations(result: Result) -> None:
@@ -54,3 +55,18 @@ def test_one_result_cannot_be_compared(result: Result) -> None:
         compare([result])
     with pytest.raises(ValueError, match="must name 2 results, got 1"):
         compare([result, result], ["a"])
+
+
+@pytest.mark.parametrize("count", [2, 3, 6])
+def test_any_number_of_results_is_readable_in_a_pipe(result: Result, count: int) -> None:
+    labels = [f"robot-{place}/2026-05-0{place}" for place in range(1, count + 1)]
+    other = {**result.settings, "window": 4.0, "model": "coulomb,offset,rotor"}
+    several = [result, *[result.model_copy(update={"settings": other})] * (count - 1)]
+    found = compare(several, labels)
+    for table in found.tables():
+        text = printed(table, 80)
+        cells = {cell for row in table.rows for cell in row if cell}
+        for cell in [*cells, *labels]:
+            assert all(word in text for word in cell.split()), cell
+    k1 = found.estimates.rows[0][2]
+    assert printed(found.estimates, 80).count(k1) >= count

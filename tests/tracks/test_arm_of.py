@@ -86,7 +86,7 @@ def test_a_length_that_is_given_goes_before_the_results_and_is_exact(
 
 
 def test_without_a_length_or_error_bars_it_is_refused(result: Result, first: Segment) -> None:
-    with pytest.raises(ResultError, match=r"has no l1; give the link's length with --l1"):
+    with pytest.raises(ResultError, match=r"has no l2; give the link's length with --l2"):
         arm_of(result.model_copy(update={"payload": {}}), first)
     with pytest.raises(ResultError, match=r"has no l2; give the link's length with --l2"):
         arm_of(result.model_copy(update={"payload": {}}), first, l1=0.3)
