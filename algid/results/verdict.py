@@ -35,6 +35,7 @@ STATUS_WORDS = {
 CAUSES = (
     *(
         "EARLIER_CAUSE",
+        "OTHER_JOINTS",
         "EXCHANGED_LOGS",
         "WRONG_CONVENTION",
         "FLIPPED_SIGN",

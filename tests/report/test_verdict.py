@@ -342,3 +342,11 @@ def test_a_bound_without_a_distance_does_not_hide_a_useless_model(result: Result
     assert implausible(result).verdict.sentence.startswith(
         "Failed: physics forbids these estimates;"
     )
+
+
+def test_joints_that_move_beside_those_read_lead_the_reasons(result: Result) -> None:
+    """Conventions are sought in torques in which other joints have their share."""
+    others = Notice("OTHER_JOINTS", numbers={"count": 1, "joints": "wrist", "samples": 9})
+    found = implausible(result.model_copy(update={"notices": [HANGING, others]})).verdict
+    assert [reason.code for reason in found.reasons[:2]] == ["OTHER_JOINTS", "WRONG_ZERO"]
+    assert found.command == f"algid inspect {result.log.path}"
