@@ -21,6 +21,8 @@ _RATE = 100.0
 _MOST_ROWS = 20_000
 _EDGE = 10
 _K2, _K3, _K4, _K5 = 1, 2, 3, 4
+_OF_LEFT = 0.1
+"""Of what the rough fit leaves: errors of its differentiation make gravity's columns fit a part of it."""
 _LEAST_PULL = 1.3
 """Weight in N m to inertia in kg m^2: a fifth of g/l for links of 1.5 m."""
 
@@ -102,12 +104,13 @@ def gravity_findings(figures: DynamicFigures) -> Iterator[Notice]:
     """What a rough fit that explains the torques says of gravity: none, upwards, or sideways."""
     if figures.condition > 1e6 or figures.explained < 0.3:
         return
+    left = 1 - figures.explained
     weightless = math.hypot(figures.weight1, figures.weight2) < _LEAST_PULL * abs(figures.inertia)
     if figures.seen > 0.15 and figures.gravity_share < 0.01 and weightless:
         compensated = Remedy({"effort": "gravity-compensated"}, "for such a driver")
         level = Remedy({"gravity": 0}, "for a horizontal plane")
         yield Notice("GRAVITY_COMPENSATED", remedies=(compensated, level))
-    elif figures.seen < 0.015 or figures.gravity_share < 0.02:
+    elif figures.seen < 0.015 or figures.gravity_share < max(0.02, _OF_LEFT * left):
         return  # the motion does not tell where gravity pulls
     elif abs(figures.turn) > 135:
         torques = Remedy(

@@ -173,6 +173,10 @@ UP, ASIDE = replace(SURE, turn=170), replace(SURE, turn=-90)
         (replace(UP, seen=0.016), "FLIPPED_SIGN"),
         (replace(ASIDE, gravity_share=0.019), None),
         (replace(ASIDE, gravity_share=0.021), "WRONG_ZERO"),
+        (replace(ASIDE, explained=0.5, gravity_share=0.049), None),
+        (replace(ASIDE, explained=0.5, gravity_share=0.051), "WRONG_ZERO"),
+        # a sound arm of links that spin at 200 rad/s, of `make false-alarms`
+        (replace(ASIDE, turn=-104, explained=0.398, gravity_share=0.0226, seen=0.77), None),
         (replace(UP, condition=1.1e6), None),
         (replace(UP, condition=0.9e6), "FLIPPED_SIGN"),
         (replace(UP, explained=0.29), None),
