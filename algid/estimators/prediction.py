@@ -18,13 +18,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 
 from algid.arm import FloatArray
 from algid.estimators.combine import left_out
 from algid.estimators.fit import Fit
+from algid.estimators.standing import Standing, standing
 from algid.estimators.weak import Source
 from algid.model import Model, Motion, regressor, torque
 from algid.signals.filters import butterworth, correlate, smoother
@@ -61,13 +61,17 @@ class PredictionFilter:
 
 @dataclass(frozen=True, eq=False)
 class PredictionScore:
-    """Sums by joint (2,): samples, squared residuals, torque, squared torque, and squares of the model's parts."""
+    """Sums by joint (2,): samples, squared residuals, torque, squared torque, and squares of the model's parts.
+
+    `standing` are those of moving and of standing joints, where one set of coefficients is scored.
+    """
 
     count: float = 0.0
     residual: FloatArray = field(default_factory=lambda: np.zeros(2))
     torque: FloatArray = field(default_factory=lambda: np.zeros(2))
     square: FloatArray = field(default_factory=lambda: np.zeros(2))
     parts: FloatArray = field(default_factory=lambda: np.zeros(2))
+    standing: Standing = field(default_factory=Standing)
 
     def __add__(self, other: PredictionScore) -> PredictionScore:
         return PredictionScore(
@@ -76,6 +80,7 @@ class PredictionScore:
             self.torque + other.torque,
             self.square + other.square,
             self.parts + other.parts,
+            self.standing + other.standing,
         )
 
     @property
@@ -142,6 +147,7 @@ class PredictionSums:
         self._by = by or PredictionFilter()
         self._cutter: Cutter | None = None
         size = len(model.names) + 1
+        self._standing = Standing()
         self._count, self._torque, self._gram = 0, np.zeros(2), np.zeros((2, size, size))
 
     def push(self, segment: Segment) -> None:
@@ -161,18 +167,28 @@ class PredictionSums:
         residual = np.maximum(np.einsum("x,axy,y->a", v, self._gram, v), 0.0)
         parts = np.einsum("x,axx->a", c**2, self._gram[:, :-1, :-1])
         square = self._gram[:, -1, -1].copy()
-        return PredictionScore(float(self._count), residual, self._torque.copy(), square, parts)
+        return PredictionScore(
+            float(self._count), residual, self._torque.copy(), square, parts, self._standing
+        )
 
     def _add(self, piece: Segment) -> None:
         shift = seconds(self._shift, piece.dt)
         if self._at is not None:
             shift -= self._model.lag(self._at)
-        _, X = _filtered(partial(regressor, self._model, c=self._at), piece, shift, self._by)
+        _, X = _filtered(self._rows, piece, shift, self._by)
         if not X.size:
             return
+        if self._at is not None:
+            X, omega = np.delete(X, -2, axis=1), X[:, -2]
+            self._standing += standing(self._model, self._at, X, omega)
         self._count += X.shape[2]
         self._torque = self._torque + X[:, -1].sum(axis=1)
         self._gram += X @ X.swapaxes(1, 2)
+
+    def _rows(self, motion: Motion) -> FloatArray:
+        """The regressor (2, q, n), and where one set of coefficients is scored each joint's velocity behind it."""
+        Y = regressor(self._model, motion, self._at)
+        return Y if self._at is None else np.concatenate([Y, motion.omega[:, None]], axis=1)
 
 
 def seconds(shift: Shift, dt: float) -> float:

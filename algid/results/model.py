@@ -170,6 +170,9 @@ class TorquePrediction(_Model):
 
     Scored is what lies below `bandwidth`, in Hz; `filter` says how it is cut out. `of_load` is the
     RMSE over what acts on a joint: its torque, or the model's parts where they are larger.
+    `rmse_moving` and `rmse_rest` are those of a joint faster and slower than friction's step, and
+    `rmse_held` the latter beyond the ± f that dry friction may be there; null where a joint never
+    moves or stands, or that was not looked at.
     """
 
     rmse: tuple[float, float]
@@ -178,6 +181,9 @@ class TorquePrediction(_Model):
     filter: str
     bandwidth: float | None = None
     of_load: tuple[float, float] | None = None
+    rmse_moving: tuple[float | None, float | None] | None = None
+    rmse_rest: tuple[float | None, float | None] | None = None
+    rmse_held: tuple[float | None, float | None] | None = None
 
     def unexplained(self, least: float) -> tuple[int, ...]:
         """Joints, 1 or 2, whose R² is below `least`, and whose residual is no trifle beside what acts on them."""

@@ -92,6 +92,17 @@ def test_an_arm_without_unmodelled_torque_keeps_least_squares() -> None:
     assert found.endogeneity is not None
 
 
+def test_unloaded_logs_alone_are_compared() -> None:
+    """Without loaded logs there is no payload whose coefficients to ask for."""
+    made = scene(2, feedback=True, share=0.0)
+    log = Segment(0.0, DT, made.theta[0], made.tau[0]).part(0, 1500)
+    sources: list[Source] = [lambda: [log]]
+    least = shrunk.fit(sources, (), SETTINGS)
+    found = exogeneity.instrumented(least, least.values, sources, (), SETTINGS)
+    assert found is not None
+    assert found.names == least.names
+
+
 def test_both_conditions_are_asked() -> None:
     far = exogeneity.Exogeneity(distance=5.0, moved=2.0, same=SURE / 2, silent=1.0)
     assert far.endogenous
