@@ -44,6 +44,7 @@ CLOSE = 0.8  # s: changes closer than that may be one with its jolt
 MARGIN = 0.04  # s: of log at least before the first and after the last candidate
 LIKELY = 7.352  # −2 ln(1 − √0.95)
 SAFE = 25.0  # ξ beyond which a time is out of the question
+CLUSTERED = 3.0  # times as much counts what is explained over the variance of clusters
 CLUSTER = 0.2  # s: of rows that may err alike
 _AT_ONCE = 32  # candidates whose columns are whitened together
 
@@ -189,10 +190,11 @@ def place(rows: Rows, low: float, high: float, variance: float) -> Place:
 
 
 def _worth(rows: Rows, left: FloatArray, a: FloatArray, moment: float) -> float:
-    """What two masses explain of `left` (2 n,), the rows less one mass, over the variance of what they leave.
+    """What two masses explain of `left` (2 n,), the rows less one mass.
 
     Rows of a cluster may err alike, as where a joint turns back and friction is not of its model's
-    shape: the variance is that of the clusters' scores (Liang & Zeger 1986), one a row at least.
+    shape. Over the variance of the clusters' scores (Liang & Zeger 1986) it has to be a third as
+    much, since these few scores hold what a change leaves of its neighbours too.
     `a` (2 n,) is the column of one mass, of length one.
     """
     x = rows.steps(np.array([moment]))[0]
@@ -201,7 +203,8 @@ def _worth(rows: Rows, left: FloatArray, a: FloatArray, moment: float) -> float:
     two = left - score / information * x
     every = 2 * max(1, round(CLUSTER / rows.dt))
     scores = np.add.reduceat(x * two, np.arange(0, left.size, every))
-    return score**2 / max(information, float(scores @ scores))
+    alike = max(information, float(scores @ scores))
+    return score**2 * min(1 / information, CLUSTERED / alike)
 
 
 def explained(rows: Rows, moments: FloatArray) -> float:
