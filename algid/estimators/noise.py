@@ -29,6 +29,13 @@ from algid.estimators.combine import scaled_pinv
 from algid.estimators.whitening import Linearised, NoiseLevels, adjoint, forward
 
 _DIFFERENCE = 6  # order of the difference that leaves only noise of a smooth signal
+_FED_BACK = (
+    0.9  # of the torque's white level: a controller makes more than that of its encoders' noise
+)
+_LAGS = 32  # samples that a controller's torque rests on
+_MOST_SAMPLES = 8192
+_FEWEST_SAMPLES = 10 * 2 * _LAGS
+_RIDGE = 1e-9  # of the angles' sums of squares
 _PROBES = 8
 _LARGEST_STEP = 2.0  # in log σ²
 _SMALLEST = 1e-12  # relative to the signal: below it floating point is the noise
@@ -65,7 +72,8 @@ def first_guess(theta: FloatArray, tau: FloatArray) -> NoiseLevels:
     -------
     NoiseLevels
         The differences' median size over 0.6745 √C(12, 6); their root mean square where most of
-        them are zero.
+        them are zero. Of the torques' differences, what a controller makes of the angles' noise is
+        left out.
 
     Notes
     -----
@@ -74,11 +82,43 @@ def first_guess(theta: FloatArray, tau: FloatArray) -> NoiseLevels:
     """
     rms = np.sqrt(np.mean(tau**2, axis=1))
     least = np.where(rms > 0, 0.0, _MOTORLESS * rms.max())
-    return NoiseLevels(_white_noise(theta), np.maximum(_white_noise(tau), least))
+    levels, own = _white_noise(tau), _white_noise(tau, _not_fed_back(theta, tau))
+    levels = np.where(own < _FED_BACK * levels, own, levels)
+    return NoiseLevels(_white_noise(theta), np.maximum(levels, least))
 
 
-def _white_noise(signal: FloatArray) -> FloatArray:
-    difference = np.diff(signal, _DIFFERENCE, axis=1)
+def _not_fed_back(theta: FloatArray, tau: FloatArray) -> FloatArray:
+    """Sixth differences of the torques (2, N - 6), less what the angles up to then tell of them.
+
+    A controller turns the noise of its encoders into torque, which moves the arm and is no noise of
+    the torque.
+    """
+    angles, torques = (np.diff(x[:, :_MOST_SAMPLES], _DIFFERENCE, axis=1) for x in (theta, tau))
+    n = angles.shape[1] - _LAGS
+    if n < _FEWEST_SAMPLES or not _is_noise(theta[:, :_MOST_SAMPLES]):
+        return np.diff(tau, _DIFFERENCE, axis=1)
+    X = np.concatenate([angles[:, _LAGS - lag : _LAGS - lag + n] for lag in range(_LAGS)])
+    size = np.sqrt(np.sum(X**2, axis=1)) + 1e-300
+    X = X / size[:, None]
+    own = torques[:, _LAGS:]
+    law = np.linalg.solve(X @ X.T + _RIDGE * np.eye(len(X)), X @ own.T)
+    return np.asarray(own - law.T @ X)
+
+
+def _is_noise(signal: FloatArray) -> bool:
+    """Whether a next difference of each row grows as that of white noise does, so that no motion is left in it."""
+    first, second = (
+        np.median(np.abs(np.diff(signal, order, axis=1)), axis=1)
+        for order in (_DIFFERENCE, _DIFFERENCE + 1)
+    )
+    growth = np.sqrt(
+        comb(2 * _DIFFERENCE + 2, _DIFFERENCE + 1) / comb(2 * _DIFFERENCE, _DIFFERENCE)
+    )
+    return bool(np.all(np.abs(second - growth * first) < 0.1 * growth * first))
+
+
+def _white_noise(signal: FloatArray, difference: FloatArray | None = None) -> FloatArray:
+    difference = np.diff(signal, _DIFFERENCE, axis=1) if difference is None else difference
     # The median of squares, so that steps in the signal do not count as noise.
     median = np.median(np.abs(difference), axis=1) / 0.6745
     mean = np.sqrt(np.mean(difference**2, axis=1))

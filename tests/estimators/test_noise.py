@@ -193,3 +193,36 @@ def test_a_torque_that_is_none_has_a_share_of_the_others_as_noise() -> None:
     np.testing.assert_allclose(
         first_guess(np.stack([t, t]), tau[::-1]).tau[0], 1e-3 * rms, rtol=1e-12
     )
+
+
+def _loop(noise: float, count: int = 6000) -> tuple[FloatArray, FloatArray]:
+    """A smooth motion's angles with white noise of 1e-3 rad, and torques that a PD law makes of them, with `noise`."""
+    rng = np.random.default_rng(4)
+    t = 1e-3 * np.arange(count)
+    theta = np.stack([np.sin(5 * t), np.cos(3 * t)]) + 1e-3 * rng.standard_normal((2, count))
+    slope = np.zeros((2, count))
+    for n in range(1, count):
+        slope[:, n] = 0.5 * slope[:, n - 1] + 0.5 * (theta[:, n] - theta[:, n - 1]) / 1e-3
+    mixed = np.array([[1.0, 0.3], [0.2, 1.0]])
+    tau = -mixed @ (3 * theta + 0.2 * slope) + noise * rng.standard_normal((2, count))
+    return theta, tau
+
+
+@pytest.mark.parametrize("noise", [1e-3, 1e-2, 1.0])
+def test_torque_that_a_controller_makes_of_the_angles_noise_is_no_noise(noise: float) -> None:
+    """It is 0.1 N m here, a hundred times the least sensor's."""
+    found = first_guess(*_loop(noise))
+    np.testing.assert_allclose(found.tau, noise, rtol=0.06)
+    np.testing.assert_allclose(found.theta, 1e-3, rtol=0.06)
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-3])
+def test_a_torque_of_its_own_is_judged_by_itself(size: float) -> None:
+    """Whether or not the angles have noise, and whatever smooth law there is between both."""
+    rng = np.random.default_rng(5)
+    t = 1e-3 * np.arange(4000)
+    theta = np.stack([np.sin(5 * t), np.cos(3 * t)])
+    tau = 4 * theta[::-1] + 1e-2 * rng.standard_normal((2, 4000))
+    noisy = theta + size * rng.standard_normal((2, 4000))
+    own = np.median(np.abs(np.diff(tau, 6, axis=1)), axis=1) / 0.6745 / np.sqrt(924)
+    np.testing.assert_array_equal(first_guess(noisy, tau).tau, own)
