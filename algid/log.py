@@ -53,6 +53,8 @@ class Truth:
     schedule: tuple[tuple[float, float], ...] = ()
 
 
+ZEROS = {"horizontal": 0.0, "hanging": -math.pi / 2, "upright": math.pi / 2}
+"""rad: where θ1 is zero, as the angle from the horizontal."""
 SAME_OFFSET = 1e-9
 """rad or N m: offsets this close are one, written in different units."""
 STRICT = {"extra": "forbid"}

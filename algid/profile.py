@@ -140,7 +140,7 @@ class Profile(_Strict):
         Samples a second of a table without a time: its rows are counted.
     columns : tuple of str
         The names of the columns of a text table without a header, in their order.
-    zero : 'horizontal' or 'hanging'
+    zero : 'horizontal', 'hanging' or 'upright'
         Where θ1 is zero.
     second_angle : 'relative' or 'absolute'
         Whether θ2 counts from link 1, or from where θ1 does.
@@ -179,7 +179,7 @@ class Profile(_Strict):
     time_unit: TimeUnit | None = None
     rate: float | None = Field(default=None, ge=PHYSICAL.rate[0], le=PHYSICAL.rate[1])
     columns: Annotated[tuple[str, ...] | None, BeforeValidator(_parts)] = None
-    zero: Literal["horizontal", "hanging"] = "horizontal"
+    zero: Literal["horizontal", "hanging", "upright"] = "horizontal"
     second_angle: Literal["relative", "absolute"] = "relative"
     drive: Literal["joint", "base"] = "joint"
     passive: Annotated[Literal[1, 2] | None, BeforeValidator(_number)] = None

@@ -447,7 +447,10 @@ def test_a_profile_is_given_in_any_form_and_its_settings_as_keywords(
         ({"bandwidth": None}, "^--bandwidth: expected a number from "),
         ({"poles": [1, 2]}, "^--poles 1,2: "),
         ({"poles": 7}, "^--poles: expected text or numbers, found 7$"),
-        ({"zero": "down"}, "^setting zero: expected 'horizontal' or 'hanging', found 'down'$"),
+        (
+            {"zero": "down"},
+            "^setting zero: expected 'horizontal', 'hanging' or 'upright', found 'down'$",
+        ),
         ({"tau1": {"unit": "m"}}, "^setting tau1.unit: expected "),
         (
             {"profile": {"zeros": "hanging"}},

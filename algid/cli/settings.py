@@ -56,7 +56,7 @@ OF_PROFILE: Mapping[str, tuple[Any, str, Completion | None]] = {
     "columns": (str, "Names of the columns of a CSV without a header, as t,theta1,….", None),
     "angle_unit": (str, f"{_words(names_of('angle'))}.", of_profile("unit", "theta1")),
     "torque_unit": (str, f"{_words(names_of('torque', 'current'))}.", of_profile("unit", "tau1")),
-    "zero": (str, "Where θ1 is zero: horizontal or hanging.", of_profile("zero")),
+    "zero": (str, "Where θ1 is zero: horizontal, hanging or upright.", of_profile("zero")),
     "second_angle": (str, "θ2 is relative (to link 1) or absolute.", of_profile("second_angle")),
     "drive": (
         str,

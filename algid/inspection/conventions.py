@@ -16,7 +16,7 @@ import numpy as np
 
 from algid.estimators.convention_search import Judgement, Recorded, judge_together
 from algid.estimators.conventions import AS_READ, Convention
-from algid.log import Log, Origin, Reading
+from algid.log import ZEROS, Log, Origin, Reading
 from algid.notices import Notice, Remedy
 from algid.signals.segments import Segment, append, segments
 from algid.words import counted
@@ -251,8 +251,10 @@ def _zeros(convention: Convention, reading: Reading, place: tuple[int, int]) -> 
     """Zero and offsets of the profile: what is added to the angles as recorded, once signs and scales are right."""
     channels = (reading.channels.get("theta1"), reading.channels.get("theta2"))
     own = [0.0 if channel is None else channel.offset for channel in channels]
-    hanging = -pi / 2 if reading.zero == "hanging" else 0.0
-    read = [own[0] + hanging, own[1] - (own[0] if reading.second_angle == "absolute" else 0.0)]
+    read = [
+        own[0] + ZEROS[reading.zero],
+        own[1] - (own[0] if reading.second_angle == "absolute" else 0.0),
+    ]
     first, second = (
         convention.signs[joint] / convention.scale[joint] * read[place[joint]] for joint in (0, 1)
     )
@@ -266,7 +268,7 @@ def _zeros(convention: Convention, reading: Reading, place: tuple[int, int]) -> 
         and not convention.absolute
     ):
         return {}
-    zeros = {"horizontal": first, "hanging": first + pi / 2}
+    zeros = {name: first - turned for name, turned in ZEROS.items()}
     zero = min(
         zeros, key=lambda name: (abs(remainder(zeros[name], 2 * pi)) > _SAME, name != reading.zero)
     )

@@ -14,7 +14,7 @@ from algid.units import names_of
 
 _HEAD = """\
 # What the log's names, units and signs mean. Lines behind # are defaults or not known: edit what is wrong.
-# zero = "hanging"           # θ1 is zero hanging straight down, not along the horizontal
+# zero = "hanging"           # θ1 is zero hanging straight down, not along the horizontal; or "upright"
 # second_angle = "absolute"  # θ2 from the horizontal or vertical, not from link 1
 # drive = "base"             # the second motor stands at the base: its torque acts on θ1 + θ2
 # passive = 2                # the joint without a motor: its torque is zero

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -112,18 +113,32 @@ def gravity_findings(figures: DynamicFigures) -> Iterator[Notice]:
         yield Notice("GRAVITY_COMPENSATED", remedies=(compensated, level))
     elif figures.seen < 0.015 or figures.gravity_share < max(0.02, _OF_LEFT * left):
         return  # the motion does not tell where gravity pulls
-    elif abs(figures.turn) > 135:
-        torques = Remedy(
-            {"tau1.sign": -1, "tau2.sign": -1},
-            "turn the torques round, or angles and velocities likewise",
-        )
-        yield Notice("FLIPPED_SIGN", numbers={"weight": figures.weight1}, remedies=(torques,))
-    elif abs(figures.turn) > 45:
-        hanging, other = (
-            Remedy({"zero": "hanging"}),
-            Remedy({"theta1.offset": None}, "another zero"),
-        )
-        yield Notice("WRONG_ZERO", numbers={"turn": figures.turn}, remedies=(hanging, other))
+    else:
+        yield from _of_turn(figures)
+
+
+def _of_turn(figures: DynamicFigures) -> Iterator[Notice]:
+    """What is wrong where gravity does not pull down: inertia tells a torque's sign from an arm's.
+
+    Torques the other way round turn inertia and friction round too; an arm that is seen from
+    behind keeps both, and its gravity pulls upwards.
+    """
+    negative = figures.inertia < 0
+    turn = math.remainder(figures.turn - 180 * negative, 360)
+    numbers = {"weight": figures.weight1}
+    if abs(figures.turn) <= 45:
+        return
+    if abs(turn) <= 45:
+        torques = Remedy({"tau1.sign": -1, "tau2.sign": -1}, "for torques the other way round")
+        yield Notice("FLIPPED_SIGN", numbers=numbers, remedies=(torques,))
+    elif abs(turn) > 135:
+        seen = Remedy({"signs": [-1, -1]}, "for an arm that is seen from behind")
+        yield Notice("FLIPPED_SIGN", numbers=numbers, remedies=(seen,))
+    else:
+        torques_too: dict[str, Any] = {"tau1.sign": -1, "tau2.sign": -1} if negative else {}
+        near = Remedy({"zero": "hanging" if turn > 0 else "upright", **torques_too})
+        other = Remedy({"theta1.offset": None, **torques_too}, "another zero")
+        yield Notice("WRONG_ZERO", numbers={"turn": turn}, remedies=(near, other))
 
 
 def _smoothed(log: Log) -> tuple[FloatArray, FloatArray, float] | None:

@@ -14,7 +14,7 @@ from algid.arm import FloatArray
 from algid.errors import LogError
 from algid.faults import during
 from algid.limits import LIMITS
-from algid.log import Log, Origin
+from algid.log import ZEROS, Log, Origin
 from algid.notices import Notice, Remedy
 from algid.readers.convert import ROWS, Conversion, Gatherer, channel_readings, laws_of
 from algid.readers.table import BLOCK_ROWS, SampleTable, cut
@@ -241,7 +241,7 @@ def reader_of(
     )
     units = Conversion(
         channels,
-        hanging=profile.zero == "hanging",
+        zero=ZEROS[profile.zero],
         absolute=profile.second_angle == "absolute",
         base=profile.drive == "base",
         passive=profile.passive,

@@ -145,7 +145,7 @@ class Conversion:
     """
 
     channels: Mapping[str, ChannelReading]
-    hanging: bool = False
+    zero: float = 0.0
     absolute: bool = False
     base: bool = False
     passive: int | None = None
@@ -166,8 +166,8 @@ class Conversion:
             theta[1] -= theta[0]
             if omega is not None:
                 omega[1] -= omega[0]
-        if self.hanging:
-            theta[0] -= math.pi / 2
+        if self.zero:
+            theta[0] += self.zero
         if self.passive is not None:
             room.tau[self.passive - 1] = 0.0
         if self.base:

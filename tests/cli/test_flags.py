@@ -151,9 +151,13 @@ OF_A_LOG = [
     (
         "--zero",
         "sideways",
-        "--zero (profile: zero): expected 'horizontal' or 'hanging', found 'sideways'",
+        "--zero (profile: zero): expected 'horizontal', 'hanging' or 'upright', found 'sideways'",
     ),
-    ("--zero", "", "--zero (profile: zero): expected 'horizontal' or 'hanging', found ''"),
+    (
+        "--zero",
+        "",
+        "--zero (profile: zero): expected 'horizontal', 'hanging' or 'upright', found ''",
+    ),
     (
         "--second-angle",
         "x",

@@ -90,6 +90,23 @@ def test_gravity_is_found_turned_as_far_as_the_zero_is(degrees: float, told: str
     assert [one.code for one in gravity_findings(found)] == ([] if told is None else [told])
 
 
+@pytest.mark.parametrize(
+    ("degrees", "gain", "settings"),
+    [
+        (0, -1, {"tau1.sign": -1, "tau2.sign": -1}),
+        (180, 1, {"signs": [-1, -1]}),
+        (90, 1, {"zero": "hanging"}),
+        (-90, 1, {"zero": "upright"}),
+        (90, -1, {"zero": "hanging", "tau1.sign": -1, "tau2.sign": -1}),
+    ],
+)
+def test_inertia_tells_torques_that_are_turned_from_an_arm_seen_from_behind(
+    degrees: float, gain: int, settings: dict[str, Any]
+) -> None:
+    (told,) = gravity_findings(figures_of(swung(math.radians(degrees), gain=gain)))
+    assert told.remedies[0].settings == settings
+
+
 def test_a_torque_the_other_way_round_pulls_upwards_and_says_so() -> None:
     (told,) = gravity_findings(figures_of(swung(gain=-1)))
     assert told.code == "FLIPPED_SIGN"
@@ -256,7 +273,7 @@ TORQUES_SWAPPED = '--set tau1.source="tau2" --set tau2.source="tau1"'
             "--set theta2.gear_ratio=7.00001",
         ),
         (Convention(zero=(-HALF, 0.0)), "θ1 is zero hanging straight down", "--zero hanging"),
-        (Convention(zero=(HALF, 0.0)), "θ1 is zero upright", "--set offsets=[1.5708, 0.0]"),
+        (Convention(zero=(HALF, 0.0)), "θ1 is zero upright", "--zero upright"),
         (
             Convention(zero=(0.0, HALF)),
             "the zero of θ2 is off by 90°",

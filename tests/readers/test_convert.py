@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -151,7 +152,7 @@ def test_a_second_motor_at_the_base_does_the_same_work() -> None:
 
 def test_zero_and_reference_of_the_angles() -> None:
     """The tip of an arm of two links of 1 m is where it was, whatever the angles are counted from."""
-    hanging, absolute = converted(hanging=True).theta, converted(absolute=True)
+    hanging, absolute = converted(zero=-math.pi / 2).theta, converted(absolute=True)
     first, second = SIGNALS[:2]
     assert np.allclose(np.exp(1j * hanging[0]) * 1j, np.exp(1j * first), atol=1e-14)
     assert np.allclose(np.exp(1j * absolute.theta.sum(axis=0)), np.exp(1j * second), atol=1e-14)
