@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
 from algid.arm import FloatArray
+from algid.limits import PHYSICAL
 from algid.synth.collocation import Acceleration, integrate
 
 Timed = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
@@ -62,10 +63,13 @@ def test_a_stiff_damper_agrees_with_an_implicit_integrator() -> None:
     np.testing.assert_allclose(states, other, atol=1e-8)
 
 
-def test_what_no_double_holds_is_refused() -> None:
-    with pytest.raises(
-        ArithmeticError, match=r"beyond (1|0\.99)"
-    ):  # θ̈ = 6 θ² from θ(0) = 1: (1 − t)^−2
-        integrate(
-            at(lambda _t, theta, _omega: 6 * theta**2), np.array([1.0, 2.0]), np.array([0.0, 2.0])
-        )
+def test_a_motion_without_bound_is_refused_before_it_gets_there() -> None:
+    def accelerate(_t: float, theta: FloatArray, _omega: FloatArray) -> FloatArray:
+        return 6 * theta**2  # θ(0) = 1, θ̇(0) = 2: θ = (1 − t)^−2 and θ̇ = 2 (1 − t)^−3
+
+    fastest = PHYSICAL.speed[1]
+    reached = 1 - (2 / fastest) ** (1 / 3)  # s, when θ̇ is that fast
+    with pytest.raises(ArithmeticError, match=r"faster than \d+ rad/s beyond (\S+) s") as refused:
+        integrate(at(accelerate), np.array([1.0, 2.0]), np.array([0.0, 2.0]))
+    beyond = float(str(refused.value).split()[-2])
+    assert reached <= beyond < 1
