@@ -191,7 +191,10 @@ def test_what_is_written_is_what_the_command_writes(
     ("call", "expected"),
     [
         (lambda: algid.inspect({}, estimator="weak"), "^estimator: no setting has this name"),
-        (lambda: algid.inspect({}, zero="down"), "^setting zero: expected 'horizontal' or"),
+        (
+            lambda: algid.inspect({}, zero="down"),
+            "^setting zero: expected 'horizontal', 'hanging' or 'upright'",
+        ),
         (lambda: algid.inspect({}, joints="one"), "^--joints: expected two names"),
         (lambda: algid.track({}, "none", l1=0.0), "^--l1: expected a number from 0.001 to 1000"),
         (lambda: algid.validate("none", {}, max_nrmse=-1), "^--max-nrmse: expected a number"),

@@ -355,10 +355,12 @@ def _simulated(
         omegas[:, :, sample : sample + stride] = _cubic(omega, faster, h * a1, h * a4, inside)
         theta, omega = (np.clip(signal, -1e6, 1e6) for signal in (ahead, faster))
     good = np.abs(thetas - measured).max(axis=(0, 2)) < _ASTRAY
+    moves = _inert(model, c, thetas[:, :, ::stride])
+    # A window that ran away is left out; products of its velocities would overflow.
+    thetas[:, ~good], omegas[:, ~good] = 0.0, 0.0
     angles, torques, velocities = (
         signal.reshape(2, -1) for signal in (thetas, tau[:, :, :-1], omegas)
     )
-    moves = _inert(model, c, thetas[:, :, ::stride])
     return Segment(0.0, windows.dt, angles, torques, velocities), good, moves
 
 

@@ -132,7 +132,7 @@ def _frames(
 def _lines(path: Path, kind: str, dialect: Dialect) -> Iterator[tuple[int, bytes]]:
     """The lines under the header that are no comments, with their numbers.
 
-    Those between quotes are lines too.
+    Those between quotes are lines too. Long runs of lines without cells and quotes are passed over.
 
     Raises
     ------
@@ -140,9 +140,15 @@ def _lines(path: Path, kind: str, dialect: Dialect) -> Iterator[tuple[int, bytes
         If a line is no table's.
     """
     comment = dialect.comment.encode() if dialect.comment else b"\n"
+    marks = (dialect.separator.encode(), b'"')
     rest, number = b"", 0
     for piece in chain(_small(pieces(path, kind)), [b"\n"]):
-        *lines, rest = (rest + piece).split(b"\n")
+        text = rest + piece
+        if not any(mark in text for mark in marks):
+            number += text.count(b"\n")
+            lines, rest = [], text[text.rfind(b"\n") + 1 :]
+        else:
+            *lines, rest = text.split(b"\n")
         if len(rest) > LIMITS.line_bytes:
             raise LogError(
                 f"{path}: a line of more than 65,000 characters; expected rows of numbers"

@@ -418,7 +418,7 @@ def test_one_sentence_judges_every_report() -> None:
 
 def test_the_word_of_a_verdict_is_marked_in_every_format() -> None:
     reasons = (Notice("A", "a|b"), Notice("C", "c"))
-    poor = Verdict("failed", "it is <broken>", reasons, command="algid x `y`")
+    poor = Verdict("failed", "it is <broken>", reasons, command="algid x '`y`'")
     shown = document(verdict=poor)
     coloured = terminal(shown, force_terminal=True, color_system="standard")
     assert "\x1b[1;31mFailed\x1b[0m: it is <broken>." in coloured
@@ -427,16 +427,16 @@ def test_the_word_of_a_verdict_is_marked_in_every_format() -> None:
         "Failed: it is <broken>.",
         " • a|b [A]",
         " • c [C]",
-        "Run first: algid x `y`",
+        "Run first: algid x '`y`'",
     ]
     text = markdown(shown)
     assert "❌ **Failed**: it is \\<broken\\>." in text
-    assert "```sh\nalgid x `y`\n```" in text
+    assert "```sh\nalgid x '`y`'\n```" in text
     assert "- a\\|b\n- c\n" in text
     marked = banner(poor)
     assert '<div class="verdict failed"><span class="sign" aria-hidden="true">✕</span>' in marked
     assert "<p><strong>Failed</strong>: it is &lt;broken&gt;.</p>" in marked
-    assert "Run first: <code>algid x `y`</code>" in marked
+    assert "Run first: <code>algid x &#x27;`y`&#x27;</code>" in marked
     assert "<ul><li>a|b</li><li>c</li></ul>" in marked
     assert "<ul>" not in banner(GOOD)
     assert "cause" not in banner(GOOD)

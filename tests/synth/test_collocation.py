@@ -64,7 +64,7 @@ def test_a_stiff_damper_agrees_with_an_implicit_integrator() -> None:
 
 
 def test_a_motion_without_bound_is_refused_before_it_gets_there() -> None:
-    def accelerate(_t: float, theta: FloatArray, _omega: FloatArray) -> FloatArray:
+    def accelerate(_t: FloatArray, theta: FloatArray, _omega: FloatArray) -> FloatArray:
         return 6 * theta**2  # θ(0) = 1, θ̇(0) = 2: θ = (1 − t)^−2 and θ̇ = 2 (1 − t)^−3
 
     fastest = PHYSICAL.speed[1]
