@@ -55,9 +55,22 @@ def read_track(folder: Path) -> TrackResult:
     curve = list(blocks(folder / CURVE, COLUMNS, finite=COLUMNS))
     if not curve:
         raise ResultError(f"{folder / CURVE}: it holds no rows; {again}")
-    return _result(
-        found, {name: np.concatenate([part[name] for part in curve]) for name in COLUMNS}
-    )
+    columns = {name: np.concatenate([part[name] for part in curve]) for name in COLUMNS}
+    wrong = _misfit_of_curve(columns, len(found.stretches))
+    if wrong is not None:
+        raise ResultError(f"{folder / CURVE}: {wrong}; {again}")
+    return _result(found, columns)
+
+
+def _misfit_of_curve(curve: Block, stretches: int) -> str | None:
+    """What no track's curve of so many stretches has; None where nothing is wrong."""
+    if np.any(np.diff(curve["t"]) < 0):
+        return "t: expected times that do not fall"
+    if np.any(curve["high"] < curve["m_p"]):
+        return "high: expected the upper end of m_p's interval, which is not below m_p"
+    if not np.all(np.isin(curve["stretch"], np.arange(stretches))):
+        return f"stretch: expected the number of a stretch, from 0 to {stretches - 1}"
+    return None
 
 
 class _Stretch(BaseModel):

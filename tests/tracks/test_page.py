@@ -319,6 +319,25 @@ def test_a_curve_without_a_number_in_every_row_is_refused(
             read_track(folder)
 
 
+@pytest.mark.parametrize(
+    ("column", "value", "expected"),
+    [("t", -1e9, "times"), ("high", -1e9, "not below m_p"), ("stretch", 7777, "from 0 to")],
+)
+def test_a_curve_that_no_track_has_is_refused(
+    result: TrackResult, tmp_path: Path, column: str, value: float, expected: str
+) -> None:
+    folder = tmp_path / "picking.track"
+    write_track(result, folder)
+    table = pl.read_parquet(folder / CURVE)
+    last = pl.int_range(pl.len()) == table.height - 1
+    changed = pl.when(last).then(pl.lit(value)).otherwise(pl.col(column))
+    table.with_columns(changed.cast(table.schema[column]).alias(column)).write_parquet(
+        folder / CURVE
+    )
+    with pytest.raises(ResultError, match=rf"track\.parquet: {column}: expected .*{expected}"):
+        read_track(folder)
+
+
 def test_what_a_track_cannot_explain_is_told_by_how_much(result: TrackResult) -> None:
     def judged(**changes: Any) -> Verdict:
         return verdict(replace(result, track=replace(result.track, **changes)))
