@@ -99,7 +99,8 @@ def _external(fit: Fit) -> bool:
 
 
 def _without_friction(fit: Fit) -> bool:
-    terms = {name for term in FRICTION[1:] for name in EVERY_TERM[term].names}
+    dry = [term for name, term in EVERY_TERM.items() if name in FRICTION[1:]]
+    terms = {name for term in dry for name in term.names}
     if fit.absent or (fit.shrinkage is None and terms & set(fit.names)):
         return False
     found = _of_fit(fit)

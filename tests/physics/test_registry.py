@@ -169,7 +169,7 @@ from algid.batches.discover import jobs_of
 assert [job.name for job in jobs_of([str(toy.parent.absolute())], "results")] == ["arm"]
 from algid.cli.completion import of_profile
 assert of_profile("unit", "tau1")("N m") == ["N m", "N mm"]
-assert called("convert", toy, "arm.csv").exit_code == 0
+assert called("convert", toy, "-o", "arm.csv").exit_code == 0
 assert abs(np.loadtxt("arm.csv", delimiter=",", skiprows=1)[0, 3] - log.tau[0, 0]) < 1e-12
 seen = called("inspect", toy, "--set", 'tau1.unit="N mm"').stdout
 assert "toy" in seen and f"{len(table):d} toys" in seen and "--zero hanging" in seen, seen
