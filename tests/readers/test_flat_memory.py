@@ -48,14 +48,15 @@ def _packed(columns: Columns) -> bytes:
 
 
 def _write(path: Path, kind: str, rows: int) -> None:
-    t = np.arange(rows) / 1000
-    columns = {
-        "t": t,
-        "theta1": np.sin(2 * t),
-        "theta2": np.cos(3 * t),
-        "tau1": np.cos(t),
-        "tau2": np.sin(t),
+    one = 2 * np.pi * np.arange(1000) / 1000  # a second, over and over: it packs quickly
+    motion = {
+        "theta1": np.sin(2 * one),
+        "theta2": np.cos(3 * one),
+        "tau1": np.cos(one),
+        "tau2": np.sin(one),
     }
+    columns = {"t": np.arange(rows) / 1000}
+    columns |= {name: np.tile(values, rows // 1000) for name, values in motion.items()}
     WRITERS[kind](path, columns)
 
 
@@ -68,7 +69,7 @@ def test_blocks_of_a_table_are_its_rows(kind: str, tmp_path: Path) -> None:
     stamps = np.concatenate([block.stamp_ns for block in blocks])
     assert np.array_equal(stamps, np.arange(12_000) * 1_000_000)
     assert np.allclose(
-        np.concatenate([block.tau[1] for block in blocks]), np.sin(stamps * 1e-9), atol=1e-6
+        np.concatenate([block.tau[1] for block in blocks]), np.sin(2e-9 * np.pi * stamps), atol=1e-6
     )
 
 
