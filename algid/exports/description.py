@@ -186,13 +186,16 @@ def _first_length(coefficients: Coefficients, file: str) -> float:
         raise SettingError(
             f"--l1: {file}: an arm in a horizontal plane does not tell its length; give --l1"
         )
-    k1, k2 = coefficients.value["k1"], coefficients.value["k2"]
+    value = coefficients.value
+    k1, k2 = value["k1"], value["k2"]
     if k1 * k2 <= 0:
         raise ResultError(
             f"{file}: k1 {k1:.4g} and k2 {k2:.4g} make l1 = g k1 / k2 no positive length; "
             "give --l1, or identify it from logs that tell more"
         )
-    return gravity * k1 / k2
+    # of moments off the links' lines, the sizes
+    K1, K2 = (complex(value[name], value.get(f"{name}s", 0.0)) for name in ("k1", "k2"))
+    return gravity * abs(K1) / abs(K2)
 
 
 def _of_first_length(result: Result) -> str:

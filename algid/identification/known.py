@@ -111,25 +111,40 @@ def has_error_bar(result: Result, name: str) -> bool:
     return ok and result.fit is not None and name in result.fit.covariance_names
 
 
-def first_length(result: Result) -> tuple[float, float] | None:
-    """l1 = g k1 / k2 and its standard deviation, in m; None where the result tells neither."""
+def by_constants(result: Result) -> tuple[float, dict[str, float]] | None:
+    """l1 = g |K1| / |K2| in m and its derivatives by the constants; None where the result tells neither.
+
+    K = k + i ks are the moments as phasors. Of an arm whose links are straight l1 has the sign of
+    k1 / k2, so that a wrong one shows.
+    """
     gravity = Settings.of(result.settings).gravity
-    k1, k2 = (result.parameters.get(name) for name in ("k1", "k2"))
-    if (
-        not gravity
-        or result.fit is None
-        or k1 is None
-        or k2 is None
-        or not k1.estimate
-        or not k2.estimate
-    ):
+    names = [name for name in ("k1", "k2", "k1s", "k2s") if has_error_bar(result, name)]
+    if not gravity or not {"k1", "k2"} <= set(names):
         return None
-    if not all(has_error_bar(result, name) for name in ("k1", "k2")):
+    value = {name: result.parameters[name].estimate for name in names}
+    K1, K2 = (complex(value[name], value.get(f"{name}s", 0.0)) for name in ("k1", "k2"))
+    if not (K1.real and K2.real):
         return None
-    places = [result.fit.covariance_names.index(name) for name in ("k1", "k2")]
+    l1 = gravity * abs(K1) / abs(K2) * float(np.sign(K1.real * K2.real))
+    slopes = {
+        "k1": l1 * K1.real / abs(K1) ** 2,
+        "k1s": l1 * K1.imag / abs(K1) ** 2,
+        "k2": -l1 * K2.real / abs(K2) ** 2,
+        "k2s": -l1 * K2.imag / abs(K2) ** 2,
+    }
+    return l1, {name: slopes[name] for name in names}
+
+
+def first_length(result: Result) -> tuple[float, float] | None:
+    """l1 = g |K1| / |K2| and its standard deviation, in m; None where the result tells neither."""
+    found = by_constants(result)
+    if found is None or result.fit is None:
+        return None
+    l1, slopes = found
+    places = [result.fit.covariance_names.index(name) for name in slopes]
     covariance = np.array(result.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
-    slope = gravity * np.array([1 / k2.estimate, -k1.estimate / k2.estimate**2])
-    return gravity * k1.estimate / k2.estimate, float(np.sqrt(slope @ covariance @ slope))
+    slope = np.array(list(slopes.values()))
+    return l1, float(np.sqrt(slope @ covariance @ slope))
 
 
 def payload_length(result: Result) -> tuple[float, float] | None:

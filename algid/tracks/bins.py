@@ -33,13 +33,15 @@ from algid.estimators.noise import first_guess
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
 from algid.identification.known import (
-    first_length,
+    by_constants,
+    has_error_bar,
     model_of,
     payload_length,
     prior_of,
     shift_of,
 )
-from algid.model import PARAMETERS, SINES, TERMS, Model
+from algid.model import SINES, TERMS, Model
+from algid.physics.parameters import BODY
 from algid.results import Result
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.filters import smoothed
@@ -49,6 +51,7 @@ CELL = 0.02  # s
 _PIECE_SAMPLES = 16384
 SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
 COULOMB = TERMS["coulomb"]
+BODY_NAMES = tuple(one.name for one in BODY)
 FRICTION = ("k6", "k7", *COULOMB.names)
 
 
@@ -66,14 +69,13 @@ class IdentifiedArm:
     """m, of a payload's centre of mass off link 2's line."""
     gyration: float = 0.0
     """m, a payload's radius of gyration."""
+    body: tuple[str, ...] = ()
+    """What of the payload's body is uncertain: y_p, and J_p for each kilogram."""
 
     @property
     def unit(self) -> FloatArray:
         """D (q,): what a payload of 1 kg adds to the coefficients."""
-        across = bool(set(SINES) & set(self.model.names))
-        shared = Shared(self.model, payload=True, body=(*(("y_p",) if across else ()), "J_p"))
-        body = {"m_p": 1.0, "l1": self.l1, "l2": self.l2, "y_p": self.y, "J_p": self.gyration**2}
-        beta = np.concatenate([self.k, [body[name] for name in shared.names[self.k.size :]]])
+        shared, beta = self._loaded
         return shared.coefficients(beta, True) - shared.coefficients(beta, False)
 
     @property
@@ -87,18 +89,19 @@ class IdentifiedArm:
         return abs(float(self.k[self.model.names.index("k3")])) / self.l2**2
 
     @property
-    def by_lengths(self) -> tuple[FloatArray, FloatArray]:
-        """Derivatives (q,) by l1 and l2 of what a payload of 1 kg adds to the coefficients."""
-        g, l1, l2 = self.model.gravity, self.l1, self.l2
-        return (
-            self.added(np.array([2 * l1, 0.0, l2, g, 0.0])),
-            self.added(np.array([0.0, 2 * l2, l1, 0.0, g])),
-        )
+    def by_shape(self) -> FloatArray:
+        """Derivatives (2 + b, q) of `unit` by l1, l2 and what is uncertain of the payload's `body`."""
+        shared, beta = self._loaded
+        T = shared.jacobian(beta, True)
+        return np.stack([T[:, shared.names.index(name)] for name in ("l1", "l2", *self.body)])
 
-    def added(self, z: FloatArray) -> FloatArray:
-        """Payload constants z (5,) as changes of the coefficients (q,)."""
-        places = [PARAMETERS[name].payload for name in self.model.names]
-        return np.array([0.0 if place is None else z[place] for place in places])
+    @property
+    def _loaded(self) -> tuple[Shared, FloatArray]:
+        """Parameters of the arm with a payload of 1 kg."""
+        across = bool(set(SINES) & set(self.model.names))
+        shared = Shared(self.model, payload=True, body=(*(("y_p",) if across else ()), "J_p"))
+        one = {"m_p": 1.0, "l1": self.l1, "l2": self.l2, "y_p": self.y, "J_p": self.gyration**2}
+        return shared, np.concatenate([self.k, [one[name] for name in shared.names[self.k.size :]]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,15 +153,13 @@ class Cells:
         """The payload in kg that fits all cells best."""
         return float(self.B.sum() / max(self.A.sum(), 1e-300))
 
-    def sensitivity(self, arm: IdentifiedArm, mass: float | FloatArray) -> FloatArray:
-        """T (C, q + 2): how the scores of a payload of `mass` kg, one or (C,), shift with constants, l1 and l2."""
-        by_l1, by_l2 = arm.by_lengths
-        return np.column_stack([self.S, mass * (self.S @ by_l1), mass * (self.S @ by_l2)])
+    def sensitivity(self, arm: IdentifiedArm, mass: FloatArray) -> FloatArray:
+        """T (C, p): how the scores of a payload of `mass` (C,) kg shift with constants, lengths and its body."""
+        return np.concatenate([self.S, mass[:, None] * (self.S @ arm.by_shape.T)], axis=1)
 
     def friction_sensitivity(self, arm: IdentifiedArm, mass: FloatArray) -> FloatArray:
-        """V (C, f, q + 2): how D shifts with constants, l1 and l2 where the payload has `mass` (C,) kg."""
-        lengths = [mass[:, None] * (self.N @ by_length) for by_length in arm.by_lengths]
-        return np.concatenate([self.N, *(one[..., None] for one in lengths)], axis=2)
+        """V (C, f, p): how D shifts with constants, lengths and the body of a payload of `mass` (C,) kg."""
+        return np.concatenate([self.N, mass[:, None, None] * (self.N @ arm.by_shape.T)], axis=2)
 
     def squares(self, mass: float | FloatArray) -> FloatArray:
         """Σ (e − g m_p)² (C,): what a payload of `mass` kg, one or (C,), leaves."""
@@ -225,7 +226,9 @@ def _sums(
 def arm_of(
     result: Result, first: Segment, l1: float | None = None, l2: float | None = None
 ) -> tuple[IdentifiedArm, FloatArray]:
-    """The arm of a result with link lengths from it or given, and the covariance (q + 2, q + 2) of both.
+    """The arm of a result with link lengths from it or given, and the covariance (p, p) of both.
+
+    Behind the q constants stand l1, l2 and what is uncertain of the payload's body.
 
     Noise levels are the result's; where it has none, the log's first stretch tells them.
 
@@ -241,31 +244,20 @@ def arm_of(
         )
     model = model_of(result)
     prior = prior_of(result, model)
-    fitted = result.fit.covariance_names
-    names = [
-        *prior.names,
-        *(n for n, given in (("l1", l1), ("l2", l2)) if given is None and n in fitted),
+    y, gyration = _body(result)
+    body = tuple(
+        name for name in BODY_NAMES if has_error_bar(result, name) and gyration + abs(y) > 0
+    )
+    lengths = [
+        n for n, given in (("l1", l1), ("l2", l2)) if given is None and has_error_bar(result, n)
     ]
-    places = [fitted.index(name) for name in names]
-    rows = [(*prior.names, "l1", "l2").index(name) for name in names]
-    covariance = np.zeros((len(prior.names) + 2,) * 2)
-    covariance[np.ix_(rows, rows)] = np.array(result.fit.covariance, dtype=np.float64)[
-        np.ix_(places, places)
-    ]
+    covariance = _covariance_of(
+        result, (*prior.names, "l1", "l2", *body), (*prior.names, *lengths, *body)
+    )
     noise = [result.fit.noise.get(name, 0.0) for name in ("theta1", "theta2", "tau1", "tau2")]
-    constants = _by_constants(result, l1, prior.names)
+    constants = _by_constants(result, l1)
     if constants is not None:
-        _, gradient = constants
-        q, row = gradient.size, covariance[-2]
-        row[:] = 0.0
-        row[:q] = gradient @ covariance[:q, :q]
-        if "l2" in names:
-            by_l2 = [
-                result.fit.covariance[fitted.index("l2")][fitted.index(n)] for n in prior.names
-            ]
-            row[-1] = gradient @ np.array(by_l2, dtype=np.float64)
-        row[-2] = row[:q] @ gradient
-        covariance[:, -2] = row
+        covariance = _with_first_length(covariance, prior.names, constants[1])
     known = IdentifiedArm(
         model,
         prior.mean,
@@ -275,39 +267,64 @@ def arm_of(
         if min(noise) > 0
         else first_guess(first.theta, first.tau),
         shift_of(result)(first.dt),
-        *_body(result),
+        y,
+        gyration,
+        body,
     )
     return known, covariance
 
 
-def _by_constants(
-    result: Result, given: float | None, names: Sequence[str]
-) -> tuple[float, FloatArray] | None:
-    """l1 = g k1 / k2 in m and its gradient (q,) by the constants `names`.
+def _by_constants(result: Result, given: float | None) -> tuple[float, dict[str, float]] | None:
+    """l1 = g |K1| / |K2| in m and its derivatives by the constants.
 
     None where l1 is given, or the payload tells it better.
     """
     if given is not None or result.settings.get("l1") is not None:
         return None
-    found = first_length(result)
+    found = by_constants(result)
     if found is None or found[0] <= 0 or payload_length(result) is not None:
         return None
-    k1, k2 = (result.parameters[name].estimate or math.nan for name in ("k1", "k2"))
-    gradient = np.zeros(len(names))
-    gradient[names.index("k1")], gradient[names.index("k2")] = found[0] / k1, -found[0] / k2
-    return found[0], gradient
+    return found
+
+
+def _with_first_length(
+    covariance: FloatArray, constants: Sequence[str], slopes: Mapping[str, float]
+) -> FloatArray:
+    """The covariance (p, p) with l1, which stands behind the constants, as a function of them."""
+    T = np.eye(covariance.shape[0])
+    row = T[len(constants)]
+    row[:] = 0.0
+    for name, slope in slopes.items():
+        row[constants.index(name)] = slope
+    return T @ covariance @ T.T
+
+
+def _covariance_of(result: Result, names: Sequence[str], uncertain: Sequence[str]) -> FloatArray:
+    """Covariance (p, p) of `names`, nothing where they are not `uncertain`; J_p is that of each kilogram."""
+    assert result.fit is not None
+    fitted, full = result.fit.covariance_names, np.array(result.fit.covariance, dtype=np.float64)
+    slopes = np.zeros((len(names), len(fitted)))
+    for name in uncertain:
+        slopes[names.index(name), fitted.index(name)] = 1.0
+    if "J_p" in uncertain:  # J_p / m_p
+        row, (J, m_p) = names.index("J_p"), (result.payload[n].estimate for n in ("J_p", "m_p"))
+        slopes[row, fitted.index("J_p")] = 1 / m_p
+        if "m_p" in fitted:
+            slopes[row, fitted.index("m_p")] = -J / m_p**2
+    return slopes @ full @ slopes.T
 
 
 def with_friction(arm: IdentifiedArm, covariance: FloatArray) -> tuple[IdentifiedArm, FloatArray]:
-    """The arm and its covariance (q + 2, q + 2) with columns of Coulomb friction, of nothing where it had none."""
+    """The arm and its covariance (p, p) with columns of Coulomb friction, of nothing where it had none."""
     if COULOMB.name in arm.model.terms:
         return arm, covariance
     model = replace(arm.model, terms=(*arm.model.terms, COULOMB.name))
     places = [model.names.index(name) for name in arm.model.names]
     k = np.zeros(len(model.names))
     k[places] = arm.k
-    places += [k.size, k.size + 1]
-    wider = np.zeros((k.size + 2,) * 2)
+    others = covariance.shape[0] - len(places)  # lengths, and what the payload's body adds
+    places += list(range(k.size, k.size + others))
+    wider = np.zeros((k.size + others,) * 2)
     wider[np.ix_(places, places)] = covariance
     return replace(arm, model=model, k=k), wider
 

@@ -155,7 +155,7 @@ def test_an_uncertain_arm_adds_its_share_to_the_variance() -> None:
         track(lambda: segments([log]), ARM, one).stretches[0] for one in (NOTHING, covariance)
     )
     cells = joined(cells_of(segments([log]), ARM, sure.m_p))
-    J = cells.sensitivity(ARM, sure.m_p).sum(axis=0) / cells.A.sum()
+    J = cells.sensitivity(ARM, np.full(len(cells), sure.m_p)).sum(axis=0) / cells.A.sum()
     assert sure.std**2 == pytest.approx(
         1 / cells.A.sum(), rel=0.1
     )  # cells at both ends are left out
@@ -274,3 +274,28 @@ def test_an_object_is_shaped_like_the_payload_that_was_identified() -> None:
     assert complex(added["k1"], added["k1s"]) == pytest.approx(0.4 * r)
     assert complex(added["k2"], added["k2s"]) == pytest.approx(9.81 * r)
     assert complex(added["k4"], added["k4s"]) == pytest.approx(9.81 * 0.4)
+
+
+@pytest.mark.parametrize("name", ["l1", "l2", "y_p", "J_p"])
+def test_scores_shift_with_a_bodys_shape_by_its_derivatives(name: str) -> None:
+    """Of an arm with bent links: against central differences of what a kilogram adds."""
+    model = Model(("phases",))
+    k = np.array([0.1, 0.5, 0.2, 0.9, 0.4, 0.1, 0.1, 0.02, 0.15, 0.05])
+    arm = IdentifiedArm(model, k, 0.4, 0.3, NOISE, 0.0, 0.05, 0.07, ("y_p", "J_p"))
+    step = 1e-6
+
+    def moved(by: float) -> IdentifiedArm:
+        if name == "J_p":  # of each kilogram
+            return replace(arm, gyration=np.sqrt(arm.gyration**2 + by))
+        field = {"y_p": "y"}.get(name, name)
+        return replace(arm, **{field: getattr(arm, field) + by})
+
+    slope = (moved(step).unit - moved(-step).unit) / (2 * step)
+    row = ("l1", "l2", "y_p", "J_p").index(name)
+    np.testing.assert_allclose(arm.by_shape[row], slope, atol=1e-8)
+    count = numbered(3)
+    cells = replace(count, S=np.outer(np.arange(1.0, 4.0), np.arange(10.0)))
+    mass = np.array([0.2, 0.5, 1.1])
+    T = cells.sensitivity(arm, mass)
+    assert T.shape == (3, 14)
+    np.testing.assert_allclose(T[:, 10 + row], mass * (cells.S @ slope), atol=1e-6)
