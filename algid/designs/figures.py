@@ -36,15 +36,17 @@ def _motion(design: Design) -> Figure:
                 design, f"torques, {kind}", torque, "torque, N m", (-limits.torque, limits.torque)
             )
         )
-    legend = (
+    legend: tuple[Legend, ...] = (
         Legend("joint 1", "joint 1", COLOURS[0]),
         Legend("joint 2", "joint 2", COLOURS[1]),
-        Legend("", "its limits", "@muted", "dash"),
     )
-    reading = (
-        "Read: the motion starts and ends at rest; torques are the believed arm's. Limits hold for every arm that is "
-        "believed possible, which is why the believed one keeps some distance from its torques' limits."
-    )
+    reading = "Read: the motion starts and ends at rest; torques are the believed arm's."
+    if any(panel.layout["shapes"] for panel in panels):
+        legend += (Legend("", "its limits", "@muted", "dash"),)
+        reading += (
+            " Limits hold for every arm that is believed possible, which is why the believed one keeps some distance "
+            "from its torques' limits."
+        )
     return Figure("motion", "The motion", tuple(panels), reading, legend)
 
 

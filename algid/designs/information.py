@@ -163,11 +163,12 @@ class Information:
     def parts(self, samples: int) -> FloatArray:
         """Information (B, Q, Q) of each `samples` samples of the motion.
 
-        The last part may be shorter.
+        The last part holds what is left too, or by itself where that is half as many.
         """
         total = []
+        starts = 2 * samples * np.arange(max(1, round(self._slopes.Y.shape[2] / samples)))
         for log in self._logs:
-            pieces = [log.Z[:, a : a + 2 * samples] for a in range(0, log.Z.shape[1], 2 * samples)]
+            pieces = np.split(log.Z, starts[1:], axis=1)
             total.append(log.count * log.T.T @ np.stack([Z @ Z.T for Z in pieces]) @ log.T)
         return np.sum(total, axis=0)
 

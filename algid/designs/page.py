@@ -16,7 +16,8 @@ from algid.report.document import Document, Section
 from algid.report.frame import page
 from algid.text import file_name, significant
 
-_READING = "Play the motion: is the space around the arm free? The grey line is the tip's path, the red one its limit."
+_READING = "Play the motion: is the space around the arm free? The grey line is the tip's path{}."
+_LIMIT = ", the red one its limit"
 
 
 def page_html(design: Design, source: str, doubts: Sequence[Notice] = ()) -> str:
@@ -52,4 +53,5 @@ def _arm(design: Design) -> list[ArmDrawing]:
     if design.campaign.experiment.runs[1]:
         mass = float(design.campaign.belief.mean[list(design.names).index("m_p")])
         payload = f"payload of {significant(mass, 3)} kg"
-    return [ArmDrawing(l1, l2, design.t, design.motion.theta, _READING, payload, limits.height)]
+    reading = _READING.format(_LIMIT if np.isfinite(limits.height) else "")
+    return [ArmDrawing(l1, l2, design.t, design.motion.theta, reading, payload, limits.height)]

@@ -11,7 +11,8 @@ from algid.designs.limits import Row
 from algid.designs.torque import END
 from algid.model import UNITS
 from algid.notices import Notice, Remedy
-from algid.report.document import Column, Table
+from algid.report.document import Column, Drawn, Table
+from algid.report.drawings import gauges
 from algid.text import ABSENT, percent, resolved, significant, unit_text
 from algid.verdict import Verdict, graded
 
@@ -73,14 +74,18 @@ def _runs(runs: tuple[int, int]) -> str:
 
 
 def limit_table(design: Design) -> Table:
-    """Each limit with what is used of it, the tightest first."""
+    """Each kind of limit with what is used of it where it is tightest, the tightest kind first."""
     most = 1 - design.campaign.margin
-    rows = []
+    tightest: dict[str, tuple[Row, float]] = {}
     for row, used in design.binding:
+        tightest.setdefault(kind_name(row), (row, used))
+    rows = []
+    for kind, (row, used) in tightest.items():
         limit, value = amounts(design, row, used)
         rows.append(
             (
-                limit_name(row),
+                kind,
+                place_name(row) or ABSENT,
                 significant(value, 4),
                 significant(limit, 4),
                 SIGNS[row.limit],
@@ -90,6 +95,7 @@ def limit_table(design: Design) -> Table:
         )
     columns = (
         Column("Limit", "name"),
+        Column("Tightest", "text", 1),
         Column("Used", "number", 2),
         Column("Allowed", "number"),
         Column("Unit", "text", 3),
@@ -100,17 +106,33 @@ def limit_table(design: Design) -> Table:
         f"A margin of {percent(design.campaign.margin, 1.0)} % is left for what a controller overshoots. Torque is the "
         "largest that any arm of those believed possible asks for."
     )
-    return Table("What limits bind", columns, tuple(rows), note)
+    drawn = Drawn("of the limit", gauges({kind: used for kind, (_, used) in tightest.items()}), "%")
+    return Table("What limits bind", columns, tuple(rows), note, drawn=(drawn,))
+
+
+def kind_name(row: Row) -> str:
+    """What a limit is of, in words."""
+    if row.limit == "rest":
+        return "velocity at the end"
+    load = "" if row.loaded is None else ", loaded" if row.loaded else ", unloaded"
+    return f"{row.limit.replace('-', ' ')}{load}"
+
+
+def place_name(row: Row) -> str:
+    """Where a limit is: a joint, and which way."""
+    if row.joint is None:
+        return ""
+    side = "" if row.limit == "rest" else ", up" if row.upper else ", down"
+    return f"joint {row.joint + 1}{side}"
 
 
 def limit_name(row: Row) -> str:
-    """A limit and its side in words."""
+    """A limit, its joint and its side in words."""
     if row.limit == "rest":
         return f"velocity of joint {(row.joint or 0) + 1} at the end"
-    joint = "" if row.joint is None else f" of joint {row.joint + 1}"
-    side = "" if row.joint is None else ", up" if row.upper else ", down"
-    load = "" if row.loaded is None else ", loaded" if row.loaded else ", unloaded"
-    return f"{row.limit.replace('-', ' ')}{joint}{side}{load}"
+    kind, comma, load = kind_name(row).partition(",")
+    where = place_name(row)
+    return f"{kind}{f' of {where}' if where else ''}{comma}{load}"
 
 
 def amounts(design: Design, row: Row, used: float) -> tuple[float, float]:

@@ -83,19 +83,17 @@ def _length(result: Result, name: str) -> float | None:
 
 
 def _coupling_length(result: Result) -> float | None:
-    """l1 = g k1 / k2 (Table 1), in m.
+    """l1 = g |K1| / |K2| (Table 1), in m.
 
     None where gravity does not act or the constants are no arm's.
     """
-    k1, k2 = (
-        result.parameters[name].estimate if name in result.parameters else None
-        for name in ("k1", "k2")
-    )
+    value = {name: found.estimate or 0.0 for name, found in result.parameters.items()}
     gravity = result.settings.get("gravity")
-    if not k1 or not k2 or not isinstance(gravity, int | float):
+    k1, k2 = (value.get(name, 0.0) for name in ("k1", "k2"))
+    if not k1 * k2 > 0 or not isinstance(gravity, int | float) or not gravity > 0:
         return None
-    length = gravity * k1 / k2
-    return length if length > 0 else None
+    K1, K2 = (complex(value[name], value.get(f"{name}s", 0.0)) for name in ("k1", "k2"))
+    return gravity * abs(K1) / abs(K2)
 
 
 def _motion(torque: TorqueLog) -> tuple[FloatArray, FloatArray] | None:

@@ -167,6 +167,20 @@ def _bar(name: str, value: float, scale: float) -> str:
     return _svg("forest", BAR_WIDTH, BAR_HEIGHT, f"{name}: {value:+.2f}", drawing)
 
 
+def gauges(shares: Mapping[str, float]) -> dict[str, str]:
+    """A drawing a row: how much of the whole a share between 0 and 1 is, the whole a line at the end."""
+    return {name: _gauge(name, share) for name, share in shares.items()}
+
+
+def _gauge(name: str, share: float) -> str:
+    whole = BAR_WIDTH - 2
+    drawing = (
+        f'<rect class="more" x="0" y="2" width="{min(max(share, 0.0), 1.0) * whole:.1f}" height="{BAR_HEIGHT - 4:g}"/>'
+        f'<line class="zero" x1="{whole:g}" y1="0" x2="{whole:g}" y2="{BAR_HEIGHT:g}"/>'
+    )
+    return _svg("forest", BAR_WIDTH, BAR_HEIGHT, f"{name}: {100 * share:.1f} %", drawing)
+
+
 SPARK_WIDTH, SPARK_HEIGHT = 54.0, 24.0
 SPARK_EDGE = 3.0
 # quantile of a column's rows that its scale holds: a wild one leaves the frame, and the others

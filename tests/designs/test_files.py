@@ -14,8 +14,11 @@ from algid import __version__
 from algid.arm import FloatArray
 from algid.designs.belief import Asked, Belief
 from algid.designs.campaign import Campaign, Design
+from algid.designs.figures import figures
 from algid.designs.information import Experiment
 from algid.designs.limits import Limits, Row, Usage
+from algid.designs.page import page_html
+from algid.designs.tables import limit_table
 from algid.designs.write import Provenance, design_json, joint_trajectory, trajectory
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
@@ -221,3 +224,37 @@ def test_points_are_a_fiftieth_of_a_second_apart_whatever_the_rate() -> None:
     text = joint_trajectory(replace(one, campaign=fast, t=np.arange(COUNT) / 600), ("a", "b"))
     stamps = [int(nanosec) for nanosec in re.findall(r"time_from_start: .*nanosec: (\d+)", text)]
     assert stamps == [20_000_000 * place for place in range(6)]
+
+
+def test_a_kind_of_limit_has_one_row_with_its_tightest_joint_and_a_bar() -> None:
+    table = limit_table(made_up())
+    assert [(row[0], row[1], row[5]) for row in table.rows] == [
+        ("speed", "joint 1, up", "90.0"),
+        ("torque, loaded", "joint 1, down", "70.0"),
+        ("range", "joint 2, down", "50.0"),
+    ]
+    (drawn,) = table.drawn
+    assert set(drawn.rows) == {row[0] for row in table.rows}
+    assert "speed: 90.0 %" in drawn.rows["speed"]
+
+
+def test_a_page_speaks_of_limits_that_are_drawn_alone() -> None:
+    one = made_up()
+    motion, _ = figures(one)
+    assert "Limits hold" in motion.reading
+    free = replace(
+        one.campaign.limits,
+        low=np.full(2, -np.inf),
+        high=np.full(2, np.inf),
+        speed=np.full(2, np.inf),
+        torque=np.full(2, np.inf),
+    )
+    motion, _ = figures(replace(one, campaign=replace(one.campaign, limits=free)))
+    assert "Limits hold" not in motion.reading
+    assert "its limits" not in [entry.words for entry in motion.legend]
+    for height, said in ((-np.inf, False), (-0.5, True)):
+        limits = replace(one.campaign.limits, height=height)
+        bare = replace(one.campaign.experiment, runs=(2, 0))
+        campaign = replace(one.campaign, limits=limits, experiment=bare)
+        text = page_html(replace(one, campaign=campaign), "arm")
+        assert ("the red one its limit" in text) is said

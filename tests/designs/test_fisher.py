@@ -120,9 +120,11 @@ def test_without_noise_of_the_angles_each_sample_adds_its_own() -> None:
         Experiment(SHARED, (2, 0), noise, RATE), BETA, Slopes(SHARED.model, one, RATE)
     )
     parts = information.parts(25)
-    assert parts.shape[0] == 3  # 60 samples: two of 25 and one of 10
-    for place, part in enumerate(parts):
-        own = J[:, 25 * place : 25 * (place + 1)] / noise.tau[:, None, None]
+    ends = (0, 25, 60)  # the last 10 of 60 samples are no part of their own
+    assert len(information.parts(24)) == 2
+    assert len(information.parts(22)) == 3
+    for first, last, part in zip(ends[:-1], ends[1:], parts, strict=True):
+        own = J[:, first:last] / noise.tau[:, None, None]
         expected = 2 * np.einsum("anq,anr->qr", own, own)
         np.testing.assert_allclose(part, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
     np.testing.assert_allclose(
