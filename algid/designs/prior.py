@@ -16,9 +16,11 @@ from algid.estimators.whitening import NoiseLevels
 from algid.identification.known import contradictions, has_error_bar, model_of
 from algid.model import TERMS, Model
 from algid.notices import Notice
+from algid.physics.parameters import BODY
 from algid.results import Result, read_result
 from algid.synth.cases import Case, load_case
 
+PHASES = next(name for name, term in TERMS.items() if term.sines)
 WRONG = 0.2  # share by which masses and friction of a drawing may be wrong
 # the torque is not linear in them, or they are not of one instant
 _UNPLANNED = tuple(name for name, term in TERMS.items() if not term.linear or term.timing)
@@ -90,7 +92,7 @@ def prior_of(source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedA
     else:
         prior = of_case(load_case(source), source, loaded, knowns)
     value = dict(zip(prior.belief.shared.names, prior.belief.mean.tolist(), strict=True))
-    k1, k3, k5 = value["k1"], value["k3"], value["k5"]
+    k1, k3, k5 = abs(complex(value["k1"], value.get("k1s", 0.0))), value["k3"], value["k5"]
     if min(k3, k5) <= 0 or k3 * k5 <= k1**2:
         raise SettingError(
             f"{source}: its inertia matrix is not positive definite (k1 {k1:.3g}, k3 {k3:.3g}, k5 {k5:.3g} "
@@ -100,16 +102,21 @@ def prior_of(source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedA
 
 
 def of_case(case: Case, source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedArm:
-    """The prior of a simulated or drawn arm: its masses and friction may be wrong, its lengths are right.
+    """The prior of a simulated or drawn arm: its masses and friction may be wrong, its shape is right.
 
     Raises
     ------
     SettingError
         If there are to be loaded runs without a payload.
     """
-    arm = replace(case.arm, **knowns.lengths)
+    case = replace(case, arm=replace(case.arm, **knowns.lengths))
+    arm = case.arm
     mass = case.payload if knowns.payload is None else knowns.payload
-    shared = _shared(Model(gravity=arm.g), mass or None, loaded, source, knowns)
+    body = {"y_p": case.place[1], "J_p": case.inertia}
+    shaped = tuple(name for name, value in body.items() if value)
+    bent = bool(arm.sines().any()) or "y_p" in shaped
+    model = Model((PHASES,) if bent else (), gravity=arm.g)
+    shared = _shared(model, mass or None, loaded, source, knowns, shaped)
     more = 1 + (WRONG if knowns.error is None else knowns.error)
     wrong = [  # the parameters are linear in each mass and friction
         (replace(arm, m1=more * arm.m1, I1=more * arm.I1), mass),
@@ -118,27 +125,36 @@ def of_case(case: Case, source: str, loaded: bool | None, knowns: KnownBefore) -
         (replace(arm, b2=more * arm.b2), mass),
         (arm, more * mass),
     ]
-    mean = _parameters(shared, arm, mass)
-    spread = np.stack([_parameters(shared, *other) - mean for other in wrong], axis=1)
+    mean = _parameters(shared, case, arm, mass)
+    spread = np.stack([_parameters(shared, case, *other) - mean for other in wrong], axis=1)
     return BelievedArm(
         source, Belief(shared, mean, spread, box=True), np.array([arm.l1, arm.l2]), None
     )
 
 
 def _shared(
-    model: Model, mass: float | None, loaded: bool | None, source: str, knowns: KnownBefore
+    model: Model,
+    mass: float | None,
+    loaded: bool | None,
+    source: str,
+    knowns: KnownBefore,
+    body: tuple[str, ...],
 ) -> Shared:
     if loaded and not mass:
         raise SettingError(
             f"{source}: it knows no payload for the loaded runs; give --payload KG, or --runs 1,0"
         )
-    return Shared(model, payload=bool(mass) if loaded is None else loaded, lengths=knowns.lengths)
+    payload = bool(mass) if loaded is None else loaded
+    return Shared(model, payload=payload, lengths=knowns.lengths, body=body if payload else ())
 
 
-def _parameters(shared: Shared, arm: Arm, mass: float) -> FloatArray:
-    """Parameters (Q,) of an arm and its payload."""
+def _parameters(shared: Shared, case: Case, arm: Arm, mass: float) -> FloatArray:
+    """Parameters (Q,) of an arm and its payload, an object of the shape that the case's has."""
+    x, y = case.place
     value = {f"k{place}": float(k) for place, k in enumerate(arm.constants(), start=1)}
-    value |= {"m_p": mass, "l1": arm.l1, "l2": arm.l2}
+    value |= dict(zip(("k1s", "k2s", "k4s"), arm.sines().tolist(), strict=True))
+    value |= {"m_p": mass, "l1": arm.l1, "l2": arm.l2 if x is None else x, "y_p": y}
+    value |= {"J_p": case.inertia * (mass / case.payload if case.payload else 1.0)}
     return np.array([value[name] for name in shared.names])
 
 
@@ -152,8 +168,11 @@ def _of_result(
     lengths = before | knowns.lengths
     value = {name: found.estimate for name, found in result.estimates.items()} | lengths
     mass = value.get("m_p") if knowns.payload is None else knowns.payload
-    shared = _shared(model, mass, loaded, source, replace(knowns, **lengths))
-    value |= {} if mass is None else {"m_p": mass}
+    body = tuple(one.name for one in BODY if has_error_bar(result, one.name))
+    shared = _shared(model, mass, loaded, source, replace(knowns, **lengths), body)
+    if mass is not None:  # an object of another mass is shaped like the one that was identified
+        share = mass / (value.get("m_p") or mass)
+        value |= {"m_p": mass} | ({"J_p": share * value["J_p"]} if "J_p" in body else {})
     missing = next((name for name in shared.names if value.get(name) is None), None)
     if missing is not None:
         remedy = (

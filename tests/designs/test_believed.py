@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from algid.arm import Arm
-from algid.designs.belief import SURE
+from algid.designs.belief import SURE, asked_for
 from algid.designs.prior import BelievedArm, KnownBefore, of_case, prior_of
 from algid.errors import AlgidError
 from algid.model import Model
@@ -193,3 +193,25 @@ def test_lengths_that_the_result_was_told_are_not_estimated(tmp_path: Path) -> N
     assert believed(result_of(values_of(ODD)), tmp_path).lengths.tolist() == pytest.approx(
         [np.nan] * 2, nan_ok=True
     )
+
+
+BENT = Case(
+    "bent", replace(ARM, delta1=0.2, delta2=-0.3), 0.5, None, {}, place=(0.28, 0.04), inertia=0.002
+)
+
+
+def test_a_bent_arm_and_a_body_are_believed_with_their_sine_parts() -> None:
+    """Its logs' coefficients are those of the simulator's arm, with the payload and without."""
+    belief = of_case(BENT, "bent", None, KnownBefore(error=0.1)).belief
+    names = belief.shared.names
+    assert names[-5:] == ("m_p", "l1", "l2", "y_p", "J_p")
+    model = belief.shared.model
+    for loaded, mass in ((False, 0.0), (True, 0.5)):
+        c = dict(zip(model.names, belief.load(loaded).c.tolist(), strict=True))
+        every = [f"k{n}" for n in range(1, 8)] + ["k1s", "k2s", "k4s"]
+        np.testing.assert_allclose([c[name] for name in every], BENT.constants(mass), atol=1e-12)
+    heavier = dict(zip(names, belief.spread[:, 4].tolist(), strict=True))
+    assert (heavier["m_p"], heavier["J_p"]) == pytest.approx((0.05, 0.0002))
+    assert heavier["y_p"] == heavier["k1s"] == 0.0
+    asked = asked_for(belief, ["y_p", "J_p"], "bent")
+    assert [name for name, yes in zip(names, asked.wanted, strict=True) if yes] == ["y_p", "J_p"]
