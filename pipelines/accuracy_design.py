@@ -25,6 +25,7 @@ from algid.designs.prior import KnownBefore, of_case
 from algid.estimators.whitening import NoiseLevels
 from algid.identification.identify import identify
 from algid.log import Log
+from algid.settings import Settings
 from algid.synth.cases import Case
 from pipelines.accuracy_scenes import case_of
 from pipelines.controlled import Controller, Motions, Plan, controlled
@@ -163,7 +164,7 @@ def run(scene: Scene, case: Case, design: Design, draws: int, seed: int, verbose
     predicted, reported, held = [], [], []
     for draw in range(draws):
         bare, loaded = (logged(scene, motions, draw, rng) for motions in both)
-        result = identify(bare, loaded, report=False, **scene.settings)
+        result = identify(bare, loaded, Settings(**scene.settings), report=False)
         found = [result.estimates[name] for name in names]
         true = np.array([truth[name] for name in names])
         errors = np.array([one.estimate for one in found]) - true

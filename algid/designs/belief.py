@@ -32,6 +32,7 @@ from algid.arm import FloatArray
 from algid.errors import SettingError
 from algid.estimators.identifiability import sizes
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS, Shared
+from algid.model import DELAYS
 
 # z: standard deviations of the prior within which no limit breaks; beyond are 6 arms in 100,000
 SURE = 4.0
@@ -85,9 +86,11 @@ class Belief:
     box: bool
 
     def load(self, loaded: bool) -> Load:
-        """Coefficients of the logs without or with the payload."""
-        T = self.shared.jacobian(self.mean, loaded)
-        return Load(loaded, self.shared.coefficients(self.mean, loaded), T @ self.spread, self.box)
+        """Coefficients of the logs without or with the payload; a delay is none of the torque's."""
+        q = len(self.shared.model.names)
+        T = self.shared.jacobian(self.mean, loaded)[:q]
+        c = self.shared.coefficients(self.mean, loaded)[:q]
+        return Load(loaded, c, T @ self.spread, self.box)
 
     def draws(self, count: int, seed: int) -> FloatArray:
         """Arms (count, Q) drawn from the belief."""
@@ -143,7 +146,7 @@ class Asked:
 def asked_for(belief: Belief, names: Sequence[str] | None, source: str) -> Asked:
     """What a design for the parameters `names` makes small.
 
-    For all that the prior knows where None.
+    For all that the prior knows where None, but for a delay.
 
     Raises
     ------
@@ -155,7 +158,7 @@ def asked_for(belief: Belief, names: Sequence[str] | None, source: str) -> Asked
     known = np.abs(mean) > _SEEN * belief.std
     size = np.where(known, np.abs(mean), sizes(every, mean))
     if names is None:
-        return Asked(size, known, known)
+        return Asked(size, known, known & ~np.isin(every, DELAYS))
     for name in names:
         if name not in every:
             hint = " (there are no loaded runs)" if name in PAYLOAD_PARAMETERS else ""

@@ -129,6 +129,7 @@ class Information:
         self._weights = Stencil(1 / slopes.rate).weights
         self._ratio = noise.theta[None, :] / noise.tau[:, None]
         self._sigma = noise.tau
+        self._delay = shared.delay
         self._logs = []
         for loaded in experiment.kinds:
             c, T = shared.coefficients(beta, loaded), shared.jacobian(beta, loaded)
@@ -142,10 +143,15 @@ class Information:
         P = partials(slopes.model, c, slopes.motion)
         H = along_stencil(P, self._weights) * self._ratio[:, :, None, None]
         factor = covariance_factor(H)
-        q, n = slopes.Y.shape[1:]
-        rows = np.ascontiguousarray(
-            (slopes.Y / self._sigma[:, None, None]).transpose(1, 2, 0)
-        ).reshape(q, -1)
+        Y = slopes.Y
+        if self._delay:  # a torque that is late by dt differs by its slope times dt
+            torque = np.einsum("aqn,q->an", Y, c[: Y.shape[1]])
+            slope = np.gradient(torque, 1 / slopes.rate, axis=1)
+            Y = np.concatenate([Y, slope[:, None]], axis=1)
+        q, n = Y.shape[1:]
+        rows = np.ascontiguousarray((Y / self._sigma[:, None, None]).transpose(1, 2, 0)).reshape(
+            q, -1
+        )
         Z, failed = lapack.dtbtrs(factor, rows.T, uplo="L", trans="N")
         W, failed_too = lapack.dtbtrs(factor, Z, uplo="L", trans="T")
         if failed or failed_too:
@@ -173,14 +179,17 @@ class Information:
         return np.sum(total, axis=0)
 
     def gradient(self, A: FloatArray) -> FloatArray:
-        """Derivative (6, N) of tr(A S) by the motion, for a symmetric A (Q, Q)."""
+        """Derivative (6, N) of tr(A S) by the motion, for a symmetric A (Q, Q).
+
+        The column of a delay counts as one that stays.
+        """
         slopes = self._slopes
-        n = slopes.Y.shape[2]
+        q, n = slopes.Y.shape[1:]
         to_Y, total = np.zeros_like(slopes.Y), np.zeros((COMPONENTS, n))
         for log in self._logs:
             inner = log.count * log.T @ A @ log.T.T
             AW = np.tensordot(inner, log.W, axes=1)
-            to_Y += 2 * AW.transpose(1, 0, 2) / self._sigma[:, None, None]
+            to_Y += 2 * AW[:q].transpose(1, 0, 2) / self._sigma[:, None, None]
             back = np.zeros((AW.shape[0], 2, n + POINTS - 1))  # Gᵀ W
             for point in range(POINTS):
                 back[:, :, point : point + n] += np.einsum(

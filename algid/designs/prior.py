@@ -14,7 +14,7 @@ from algid.errors import ResultError, SettingError
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
 from algid.identification.known import contradictions, has_error_bar, model_of
-from algid.model import TERMS, Model
+from algid.model import DELAYS, TERMS, Model
 from algid.notices import Notice
 from algid.physics.parameters import BODY
 from algid.results import Result, read_result
@@ -170,6 +170,8 @@ def _of_result(
     mass = value.get("m_p") if knowns.payload is None else knowns.payload
     body = tuple(one.name for one in BODY if has_error_bar(result, one.name))
     shared = _shared(model, mass, loaded, source, replace(knowns, **lengths), body)
+    # what is estimated with the constants takes of their precision
+    shared = replace(shared, delay=all(has_error_bar(result, name) for name in DELAYS))
     if mass is not None:  # an object of another mass is shaped like the one that was identified
         share = mass / (value.get("m_p") or mass)
         value |= {"m_p": mass} | ({"J_p": share * value["J_p"]} if "J_p" in body else {})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -130,6 +131,26 @@ def test_without_noise_of_the_angles_each_sample_adds_its_own() -> None:
     np.testing.assert_allclose(
         parts.sum(axis=0), information.S, rtol=0, atol=1e-9 * np.abs(information.S).max()
     )
+
+
+def test_a_delay_is_told_by_the_slope_of_the_torque_and_takes_of_the_rest() -> None:
+    noise = NoiseLevels(np.full(2, 1e-12), np.array([0.02, 0.05]))
+    one, delayed = motion(), replace(SHARED, delay=True)
+    q = len(SHARED.model.names)
+    beta = np.insert(BETA, q, 1e-3)
+    slopes = Slopes(SHARED.model, one, RATE)
+    S = Information(Experiment(delayed, (2, 0), noise, RATE), beta, slopes).S
+    tau = np.einsum("aqn,q->an", slopes.Y, BETA[:q])
+    columns = np.concatenate([slopes.Y, np.gradient(tau, 1 / RATE, axis=1)[:, None]], axis=1)
+    expected = 2 * np.einsum("aqn,arn,a->qr", columns, columns, noise.tau**-2.0)
+    np.testing.assert_allclose(
+        S[: q + 1, : q + 1], expected, rtol=0, atol=1e-6 * np.abs(expected).max()
+    )
+    size = len(delayed.names)
+    A = np.eye(size)
+    information = Information(Experiment(delayed, (1, 1), noise, RATE), beta, slopes)
+    assert information.gradient(A).shape == (6, one.theta.shape[1])
+    assert S.shape == (size, size)
 
 
 def test_noise_takes_information_away_and_none_adds_any() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import algid
-from algid.designs.belief import SURE, asked_for
+from algid.designs.belief import SURE, Belief, asked_for
 from algid.designs.prior import KnownBefore, prior_of
 from algid.errors import ResultError, SettingError
 from algid.results import Result, Status, write_result
@@ -93,6 +93,23 @@ def test_friction_of_a_real_arm_is_planned_for_and_what_cannot_be_is_said(tmp_pa
     assert not asked.wanted[
         places
     ].all()  # the arm has no offsets: no error is large or small beside them
+
+
+def test_a_delay_that_was_estimated_is_planned_for_and_no_aim(tmp_path: Path) -> None:
+    """It takes of the others' precision; nobody moves an arm to learn it unless it is asked for."""
+    logs = algid.synthesise(
+        "case1", duration=2.0, rate=500.0, excitation="wide", sensors=Sensors(1e-3, 1e-2)
+    )
+    found = algid.identify(*logs, Settings(model="delay"))
+    belief = prior_of(saved(found, tmp_path), None, KnownBefore()).belief
+    assert belief.shared.delay
+    place = belief.shared.names.index("delay")
+    sure = Belief(
+        belief.shared, belief.mean + 1e-3 * np.eye(belief.mean.size)[place], belief.spread, False
+    )
+    assert not asked_for(sure, None, "it").wanted[place]
+    assert asked_for(sure, ["delay"], "it").wanted[place]
+    assert belief.load(False).c.size == len(belief.shared.model.names)
 
 
 def test_loaded_runs_need_a_payload(tmp_path: Path) -> None:
