@@ -121,7 +121,7 @@ def by_constants(result: Result) -> tuple[float, dict[str, float]] | None:
     names = [name for name in ("k1", "k2", "k1s", "k2s") if has_error_bar(result, name)]
     if not gravity or not {"k1", "k2"} <= set(names):
         return None
-    value = {name: result.parameters[name].estimate for name in names}
+    value = {name: result.parameters[name].estimate or 0.0 for name in names}
     K1, K2 = (complex(value[name], value.get(f"{name}s", 0.0)) for name in ("k1", "k2"))
     if not (K1.real and K2.real):
         return None

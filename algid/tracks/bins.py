@@ -245,9 +245,8 @@ def arm_of(
     model = model_of(result)
     prior = prior_of(result, model)
     y, gyration = _body(result)
-    body = tuple(
-        name for name in BODY_NAMES if has_error_bar(result, name) and gyration + abs(y) > 0
-    )
+    weighed = result.payload["m_p"].estimate if "m_p" in result.payload else None
+    body = tuple(name for name in BODY_NAMES if weighed and has_error_bar(result, name))
     lengths = [
         n for n, given in (("l1", l1), ("l2", l2)) if given is None and has_error_bar(result, n)
     ]
@@ -307,7 +306,8 @@ def _covariance_of(result: Result, names: Sequence[str], uncertain: Sequence[str
     for name in uncertain:
         slopes[names.index(name), fitted.index(name)] = 1.0
     if "J_p" in uncertain:  # J_p / m_p
-        row, (J, m_p) = names.index("J_p"), (result.payload[n].estimate for n in ("J_p", "m_p"))
+        row = names.index("J_p")
+        J, m_p = (result.payload[name].estimate or 0.0 for name in ("J_p", "m_p"))
         slopes[row, fitted.index("J_p")] = 1 / m_p
         if "m_p" in fitted:
             slopes[row, fitted.index("m_p")] = -J / m_p**2

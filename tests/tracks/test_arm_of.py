@@ -146,3 +146,33 @@ def test_what_the_log_tells_stands_in_the_track(
     other = track_log(tmp_path / "log.mcap", weighed, profile=Profile(theta1=Angle(offset=0.01)))
     (read,) = (one for one in other.notices if one.code == "READ_OTHERWISE")
     assert read.numbers["file"] == str(weighed)
+
+
+def test_a_bodys_shape_comes_with_its_error_of_each_kilogram(
+    result: Result, first: Segment
+) -> None:
+    """J_p / m_p by the delta method, against draws from the result's covariance."""
+    assert result.fit is not None
+    m_p = result.payload["m_p"]
+    assert m_p.estimate is not None
+    assert m_p.std is not None
+    std = 2e-5
+    J = m_p.model_copy(update={"estimate": 4e-4, "std": std, "unit": "kg m^2"})
+    names = [*result.fit.covariance_names, "J_p"]
+    covariance = np.zeros((len(names),) * 2)
+    covariance[:-1, :-1] = result.fit.covariance
+    covariance[-1, -1] = std**2
+    place = names.index("m_p")
+    covariance[-1, place] = covariance[place, -1] = 0.5 * std * m_p.std
+    fit = result.fit.model_copy(
+        update={"covariance_names": names, "covariance": covariance.tolist()}
+    )
+    bodied = result.model_copy(update={"payload": {**result.payload, "J_p": J}, "fit": fit})
+    arm, found = arm_of(bodied, first)
+    assert arm.body == ("J_p",)
+    assert arm.gyration**2 == pytest.approx(4e-4 / m_p.estimate)
+    assert found.shape == (len(arm.model.names) + 3,) * 2
+    draws = np.random.default_rng(0).multivariate_normal(
+        [m_p.estimate, 4e-4], covariance[np.ix_([place, -1], [place, -1])], 40_000
+    )
+    assert np.sqrt(found[-1, -1]) == pytest.approx((draws[:, 1] / draws[:, 0]).std(), rel=0.03)
