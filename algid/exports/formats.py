@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from algid.errors import ResultError, SettingError
@@ -70,7 +70,7 @@ def exported(result: Result, file: str, to: str, knowns: Knowns) -> tuple[str, t
 
 
 def payload_yaml(result: Result, file: str, knowns: Knowns) -> str:
-    """Mass and centre of gravity of a result's payload, with their standard deviations.
+    """Mass, centre of gravity and inertia of a result's payload, with their errors and covariance.
 
     Raises
     ------
@@ -91,7 +91,9 @@ def payload_yaml(result: Result, file: str, knowns: Knowns) -> str:
         raise ResultError(f"{file}: the result does not tell where the payload hangs; give --l2")
     spread = 0.0 if given or found is None else found.std
     y, y_std = _told(result, "y_p")
-    J, _ = _told(result, "J_p")
+    J, J_std = _told(result, "J_p")
+    shared = ("m_p", "y_p", "J_p") if given else ("m_p", "l2", "y_p", "J_p")
+    rows = "".join(f"    - [{', '.join(map(repr, row))}]\n" for row in _covariance(result, shared))
     where = "given" if given else "identified"
     return (
         f"# Payload by algid export, from {json.dumps(file)}, estimator {result.estimator}; SI units.\n"
@@ -104,7 +106,23 @@ def payload_yaml(result: Result, file: str, knowns: Knowns) -> str:
         f"  centre_of_gravity: [{float(length)!r}, {y!r}, 0.0]  # m\n"
         f"  centre_of_gravity_std: [{_or_null(spread)}, {_or_null(y_std)}, 0.0]\n"
         f"  inertia: {{ixx: 0.0, iyy: 0.0, izz: {J!r}, ixy: 0.0, ixz: 0.0, iyz: 0.0}}  # kg m^2\n"
+        f"  izz_std: {_or_null(J_std)}\n"
+        "  covariance:  # of mass, x, y and izz\n" + rows
     )
+
+
+def _covariance(result: Result, shared: Sequence[str]) -> list[list[float]]:
+    """Covariance (4, 4) of mass, x, y and inertia: nothing of what is given or was not told."""
+    fit = result.fit
+    places = {} if fit is None else {name: at for at, name in enumerate(fit.covariance_names)}
+
+    def entry(one: str, other: str) -> float:
+        if fit is None or not {one, other} <= set(shared) & set(places):
+            return 0.0
+        return float(fit.covariance[places[one]][places[other]] or 0.0)
+
+    names = ("m_p", "l2", "y_p", "J_p")
+    return [[entry(one, other) for other in names] for one in names]
 
 
 def _told(result: Result, name: str) -> tuple[float, float | None]:

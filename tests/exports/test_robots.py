@@ -204,7 +204,16 @@ def test_the_payload_is_yaml_that_a_planner_reads() -> None:
         "centre_of_gravity": [0.3, 0.0, 0.0],
         "centre_of_gravity_std": [pytest.approx(0.003), 0.0, 0.0],
         "inertia": dict.fromkeys(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), 0.0),
+        "izz_std": 0.0,
+        "covariance": [
+            [pytest.approx(0.005**2), 0.0, 0.0, 0.0],
+            [0.0, pytest.approx(0.003**2), 0.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0],
+        ],
     }
+    given = YAML(typ="safe").load(exported(result, "a", "yaml", Knowns(l2=0.3))[0])["payload"]
+    assert given["covariance"][1] == [0.0] * 4
     bare = result.payload["m_p"].model_copy(update={"std": None})
     text = exported(
         result.model_copy(update={"payload": {**result.payload, "m_p": bare}}),
