@@ -11,12 +11,11 @@ import numpy as np
 from algid.arm import Arm, FloatArray
 from algid.designs.belief import SURE, Belief
 from algid.errors import ResultError, SettingError
-from algid.estimators.parametrisation import Shared
+from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
 from algid.estimators.whitening import NoiseLevels
 from algid.identification.known import contradictions, has_error_bar, model_of
 from algid.model import DELAYS, TERMS, Model
 from algid.notices import Notice
-from algid.physics.parameters import BODY
 from algid.results import Result, read_result
 from algid.synth.cases import Case, load_case
 
@@ -168,7 +167,7 @@ def _of_result(
     lengths = before | knowns.lengths
     value = {name: found.estimate for name, found in result.estimates.items()} | lengths
     mass = value.get("m_p") if knowns.payload is None else knowns.payload
-    body = tuple(one.name for one in BODY if has_error_bar(result, one.name))
+    body = tuple(name for name in BODY_PARAMETERS if has_error_bar(result, name))
     shared = _shared(model, mass, loaded, source, replace(knowns, **lengths), body)
     # what is estimated with the constants takes of their precision
     shared = replace(shared, delay=all(has_error_bar(result, name) for name in DELAYS))

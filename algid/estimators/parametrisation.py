@@ -24,6 +24,7 @@ from algid.model import DELAYS, PARAMETERS, SINES, Model
 from algid.physics.parameters import BODY, PAYLOAD
 from algid.physics.terms.rigid import K1, K2
 
+BODY_PARAMETERS = tuple(one.name for one in BODY)
 PAYLOAD_PARAMETERS = tuple(one.name for one in (*PAYLOAD, *BODY))
 # which z adds to which coefficient, and its part: the moments are phasors
 _Z_OF = {name: one.payload for name, one in PARAMETERS.items() if one.payload is not None}

@@ -30,7 +30,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.errors import ResultError
 from algid.estimators.noise import first_guess
-from algid.estimators.parametrisation import Shared
+from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
 from algid.identification.known import (
     by_constants,
@@ -41,7 +41,6 @@ from algid.identification.known import (
     shift_of,
 )
 from algid.model import SINES, TERMS, Model
-from algid.physics.parameters import BODY
 from algid.results import Result
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.filters import smoothed
@@ -51,7 +50,6 @@ CELL = 0.02  # s
 _PIECE_SAMPLES = 16384
 SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
 COULOMB = TERMS["coulomb"]
-BODY_NAMES = tuple(one.name for one in BODY)
 FRICTION = ("k6", "k7", *COULOMB.names)
 
 
@@ -246,7 +244,7 @@ def arm_of(
     prior = prior_of(result, model)
     y, gyration = _body(result)
     weighed = result.payload["m_p"].estimate if "m_p" in result.payload else None
-    body = tuple(name for name in BODY_NAMES if weighed and has_error_bar(result, name))
+    body = tuple(name for name in BODY_PARAMETERS if weighed and has_error_bar(result, name))
     lengths = [
         n for n, given in (("l1", l1), ("l2", l2)) if given is None and has_error_bar(result, n)
     ]
