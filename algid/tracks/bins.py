@@ -21,7 +21,6 @@ The arm that a result describes, for tracking what it carries.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 

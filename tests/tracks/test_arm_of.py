@@ -176,3 +176,51 @@ def test_a_bodys_shape_comes_with_its_error_of_each_kilogram(
         [m_p.estimate, 4e-4], covariance[np.ix_([place, -1], [place, -1])], 40_000
     )
     assert np.sqrt(found[-1, -1]) == pytest.approx((draws[:, 1] / draws[:, 0]).std(), rel=0.03)
+
+
+@pytest.mark.parametrize("bent", [False, True])
+def test_the_first_length_by_the_constants_comes_with_what_it_shares_with_them(
+    result: Result, first: Segment, bent: bool
+) -> None:
+    """l1 = g |K1| / |K2| and its covariances, against draws from the result's covariance."""
+    assert result.fit is not None
+    fit, parameters = result.fit, dict(result.parameters)
+    names, full = list(fit.covariance_names), np.array(fit.covariance)
+    if bent:
+        sines = {"k1s": 0.3, "k2s": 0.4, "k4s": 0.1}
+        for name, part in sines.items():
+            size = float(parameters[name[:2]].estimate or 0.0)
+            parameters[name] = parameters[name[:2]].model_copy(update={"estimate": part * size})
+        turn = np.vstack([np.eye(len(names)), np.zeros((len(sines), len(names)))])
+        for row, (name, part) in enumerate(sines.items(), start=len(names)):
+            turn[row, [names.index(name[:2]), names.index("l2")]] = 2 * part, 1e-3 * part
+        names, full = [*names, *sines], turn @ full @ turn.T
+        assert fit.model is not None
+        fit = fit.model_copy(update={"model": fit.model.model_copy(update={"terms": ["phases"]})})
+    changed = result.model_copy(
+        update={
+            "parameters": parameters,
+            "payload": {name: one for name, one in result.payload.items() if name != "l1"},
+            "fit": fit.model_copy(update={"covariance_names": names, "covariance": full.tolist()}),
+        }
+    )
+    arm, found = arm_of(changed, first)
+    order = [*arm.model.names, "l2"]
+    places = [names.index(name) for name in order]
+    mean = np.array([changed.estimates[name].estimate for name in order], dtype=np.float64)
+    small = 1e-4  # so that what is not linear does not show
+    draws = mean[:, None] + small * (
+        np.random.default_rng(0)
+        .multivariate_normal(np.zeros(len(order)), full[np.ix_(places, places)], 40_000)
+        .T
+    )
+    moments = {name: draws[order.index(name)] for name in order if name[:2] in ("k1", "k2")}
+    K1, K2 = (moments[name] + 1j * moments.get(f"{name}s", 0.0) for name in ("k1", "k2"))
+    l1 = 9.81 * np.abs(K1) / np.abs(K2)
+    assert arm.l1 == pytest.approx(l1.mean(), rel=1e-5)
+    both = np.cov(np.vstack([draws[:-1], l1, draws[-1:]])) / small**2
+    scale = np.sqrt(np.diag(both))
+    q = len(order) - 1
+    np.testing.assert_allclose(
+        (found / np.outer(scale, scale))[q], both[q] / scale / scale[q], atol=0.03
+    )
