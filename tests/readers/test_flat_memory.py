@@ -55,7 +55,7 @@ def _write(path: Path, kind: str, rows: int) -> None:
         "tau1": np.cos(one),
         "tau2": np.sin(one),
     }
-    columns = {"t": np.arange(rows) / 1000}
+    columns: Columns = {"t": np.arange(rows) / 1000}
     columns |= {name: np.tile(values, rows // 1000) for name, values in motion.items()}
     WRITERS[kind](path, columns)
 
