@@ -31,7 +31,10 @@ class Judged:
     def text(self) -> str:
         """One line for the terminal."""
         found = "no estimate" if self.error is None else f"{self.error:.4g} %"
-        return f"{'ok  ' if self.passed else 'OVER'}  {self.parameter:12}  {found:>12}  limit {self.limit:.4g} %"
+        return (
+            f"{'ok  ' if self.passed else 'OVER'}  {self.parameter:12}  {found:>12}  limit "
+            f"{self.limit:.4g} %"
+        )
 
 
 class _Tolerances(BaseModel):
@@ -57,7 +60,8 @@ def judge(
     """
     if not any(row.truth is not None for row in result.table4):
         raise ResultError(
-            f"{result.log.path}: the log holds no true parameters; only synthetic logs can be checked"
+            f"{result.log.path}: the log holds no true parameters; only synthetic logs can be "
+            "checked"
         )
     limits = _limits(result, against == "paper", max_error, tolerance_file)
     return [
@@ -84,7 +88,8 @@ def _limits(
         for name in limits:
             if name not in names:
                 raise SettingError(
-                    f"{tolerance_file}: max_error_percent.{name}: expected one of {', '.join(names)}"
+                    f"{tolerance_file}: max_error_percent.{name}: expected one of "
+                    f"{', '.join(names)}"
                 )
         return limits
     if of_paper:

@@ -48,7 +48,19 @@ def under_construction(path: Path, make: Callable[[Path], None]) -> Iterator[Pat
 
 
 def _made(path: Path, make: Callable[[Path], None]) -> tuple[Path, int]:
-    """What `make` has made, and the hold on it; another one where a sweep was quicker than the hold."""
+    """What `make` has made, and the hold on it.
+
+    Another one where a sweep was quicker than the hold.
+
+    Raises
+    ------
+    OSError
+        Where it is busy each time, or cannot be made.
+    BlockingIOError
+        Where its folder is gone and another sweep holds the rest.
+    FileNotFoundError
+        Where its folder is gone.
+    """
     for _ in range(MOST_TRIES):
         temporary = beside(path)  # named before it is made: a signal may come as soon as it stands
         try:

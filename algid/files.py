@@ -67,7 +67,8 @@ def refuse_links(folder: Path, name: str) -> None:
         place /= part
         if place.is_symlink():
             raise OutputError(
-                f"{place}: a link, which is not followed; make it a folder, or choose another one with -o"
+                f"{place}: a link, which is not followed; make it a folder, or choose another one "
+                "with -o"
             )
 
 
@@ -258,7 +259,8 @@ def refuse_misleading(name: str | None) -> None:
     """Raises `SettingError` where the name of a result's folder is none, or would lead elsewhere."""
     if name == "":
         raise SettingError(
-            "--name: expected a name for the result folder, found ''; leave it out for the log's own"
+            "--name: expected a name for the result folder, found ''; leave it out for the log's "
+            "own"
         )
     if name is not None and (name in (".", "..") or "/" in name or not name.isprintable()):
         found = f"found {name!r:.60}; -o names the folder around it"

@@ -187,124 +187,163 @@ MESSAGES: Mapping[str, str] = {
     "WIDE_INTERVAL": "the 95 % interval of {names} is wide",
     "FAR_FROM_TRUTH": "{names} {names:lies|lie} far from the truth",
     # of a fit
-    "LITTLE_EXPLAINED": "the model explains only {percent:.0f} % of the torque of joint {joint}{band}",
+    "LITTLE_EXPLAINED": "the model explains only {percent:.0f} % of the torque of joint "
+    "{joint}{band}",
     "WORSE_THAN_MEAN": "the model predicts the torque of joint {joint} worse than its mean does",
     "BROKEN_BOUND": "the estimates break {bound} by {distance}",
     "NOT_WHITE": "the residual of {names} is not white, though the intervals take it to be",
     "UNKNOWN_CAUSE": (
-        "angles, signs, units or the order of the joints are not what algid took them for, or the logs are of another "
+        "angles, signs, units or the order of the joints are not what algid took them for, or the "
+        "logs are of another "
         "arm"
     ),
     "REFUTED": (
-        "the torque's error is far larger and slower than its sensor's noise (unmodelled dynamics): the likelihood of "
-        "white noise does not hold, and the {kept} estimate with robust intervals stands in its place"
+        "the torque's error is far larger and slower than its sensor's noise (unmodelled "
+        "dynamics): the likelihood of "
+        "white noise does not hold, and the {kept} estimate with robust intervals stands in its "
+        "place"
     ),
-    "SHRUNK_TERMS": "every term of the torque is shrunk to what the logs tell of it: none is chosen",
+    "SHRUNK_TERMS": "every term of the torque is shrunk to what the logs tell of it: none is "
+    "chosen",
     "UNLIKE_GAINS": (
-        "the gains of the torques differ: torque 2 is {ratio:.3f} ± {half:.2g} times (95 %) what torque 1 has it; no "
-        "log tells which is right, and where torque 2 is, k1 … k7 and every mass are larger by that factor"
+        "the gains of the torques differ: torque 2 is {ratio:.3f} ± {half:.2g} times (95 %) what "
+        "torque 1 has it; no "
+        "log tells which is right, and where torque 2 is, k1 … k7 and every mass are larger by "
+        "that factor"
     ),
     "JOINT_STILL": "{joints} never moved: give a log in which both joints do",
     "HEAVY_ARM": (
-        "the arm would be {mass:.3g} kg heavy on a link of {length:.2g} m, more than a block of steel of that length: are "
+        "the arm would be {mass:.3g} kg heavy on a link of {length:.2g} m, more than a block of "
+        "steel of that length: are "
         "its torques in N m?"
     ),
     "MOTORLESS_UNTOLD": (
-        "joint {joint} has no motor, and what else moves it (friction, cables) pulls as hard as its load: k1 … k5 are "
+        "joint {joint} has no motor, and what else moves it (friction, cables) pulls as hard as "
+        "its load: k1 … k5 are "
         "not told; move it faster"
     ),
     "JOINTS_CONTRADICT": (
-        "joint 1 by itself tells {name} as {first:.2g} {unit} and joint 2 as {second:.2g}: one of them is hardly "
+        "joint 1 by itself tells {name} as {first:.2g} {unit} and joint 2 as {second:.2g}: one of "
+        "them is hardly "
         "driven, or a term is missing; give a log that drives both"
     ),
     "BOUNDS_DOUBTED": (
-        "the estimates break {bounds}, though an arm that obeys physics explains the torques as well: a joint is hardly "
-        "driven, and the friction that moves it makes the constants; give logs that drive both joints"
+        "the estimates break {bounds}, though an arm that obeys physics explains the torques as "
+        "well: a joint is hardly "
+        "driven, and the friction that moves it makes the constants; give logs that drive both "
+        "joints"
     ),
     "CONSTRAINED": "--constrain enforces {bounds}, which the logs contradict",
     "NOT_FEASIBLE": "--constrain cannot obey {bounds}: no estimates within the bounds were found",
-    "REFINED_FAILED": "the refined estimator did not converge; the weak estimate is reported instead",
+    "REFINED_FAILED": "the refined estimator did not converge; the weak estimate is reported "
+    "instead",
     "NO_GRAVITY": "without gravity k2 and k4 have no effect, and the payload has no weight",
     "ENDOGENEITY": (
-        "instruments and least squares are {distance:.1f} standard deviations apart: torque that the model lacks "
+        "instruments and least squares are {distance:.1f} standard deviations apart: torque that "
+        "the model lacks "
         "drives the motion, and least squares takes the constants too small"
     ),
     "INSTRUMENTS_STAND": (
-        "torque that the model lacks drives the motion (least squares is {distance:.1f} of its standard deviations "
-        "off), and the logged torque does not answer it: instruments stand in place of least squares"
+        "torque that the model lacks drives the motion (least squares is {distance:.1f} of its "
+        "standard deviations "
+        "off), and the logged torque does not answer it: instruments stand in place of least "
+        "squares"
     ),
     "FEEDBACK": (
-        "the logged torque answers torque that the model lacks (feedback, p = {p_value:.1g}): neither least squares "
-        "nor the logged torque as an instrument is right, and constants may be off by more than their intervals; "
+        "the logged torque answers torque that the model lacks (feedback, p = {p_value:.1g}): "
+        "neither least squares "
+        "nor the logged torque as an instrument is right, and constants may be off by more than "
+        "their intervals; "
         "record with the torque commanded in open loop"
     ),
-    "NO_PAYLOAD": "the payload is not significantly different from zero: at most {most:.3g} kg at 95 %",
-    "LENGTHS_NEEDED": "without link lengths a payload near zero is not determined: give --l1 and --l2",
+    "NO_PAYLOAD": "the payload is not significantly different from zero: at most {most:.3g} kg at "
+    "95 %",
+    "LENGTHS_NEEDED": "without link lengths a payload near zero is not determined: give --l1 and "
+    "--l2",
     "LENGTH_MISMATCH": (
-        "g k1 / k2 makes l1 {length:.4g} ± {half:.2g} m, given are {given:g} m: gravity is compensated in part, or a "
+        "g k1 / k2 makes l1 {length:.4g} ± {half:.2g} m, given are {given:g} m: gravity is "
+        "compensated in part, or a "
         "zero, a sign or a term of the torque is wrong"
     ),
-    "EXCHANGED_LOGS": "the payload's mass is negative by far: the loaded and the unloaded logs are exchanged",
-    "LOGS_APART": "the loaded and the unloaded logs are {distance:.1f} standard deviations from belonging to one arm",
+    "EXCHANGED_LOGS": "the payload's mass is negative by far: the loaded and the unloaded logs "
+    "are exchanged",
+    "LOGS_APART": "the loaded and the unloaded logs are {distance:.1f} standard deviations from "
+    "belonging to one arm",
     "NO_CROSS_VALIDATION": "no cross-validation: a log is too short to be fitted, or to be judged",
     "ONE_RUN": "what differs from run to run is not in the intervals: give four logs or more",
     "REPEATABILITY": (
-        "the loaded runs by themselves weigh {masses} kg: repeatability {std:.2g} kg (95 %: {low:.2g} to {high:.2g})"
+        "the loaded runs by themselves weigh {masses} kg: repeatability {std:.2g} kg (95 %: "
+        "{low:.2g} to {high:.2g})"
     ),
     "TORQUE_GAIN": (
-        "by the payload that is known the torques have to be multiplied by {gain:.5g} (95 %: {low:.5g} to {high:.5g}), "
+        "by the payload that is known the torques have to be multiplied by {gain:.5g} (95 %: "
+        "{low:.5g} to {high:.5g}), "
         "and with them k1 … k7, friction and masses"
     ),
     "NO_TORQUE_GAIN": (
-        "the payload that is known does not tell the gain of the torques: its mass is not significantly different from "
+        "the payload that is known does not tell the gain of the torques: its mass is not "
+        "significantly different from "
         "zero"
     ),
     # of logs
     "SAME_LOG": "{name} is the same log, byte for byte, and counts once",
     "SAME_LOG_LOADED": (
-        "{name} is {twin}, byte for byte: one log is given as unloaded and as loaded, which makes the payload zero"
+        "{name} is {twin}, byte for byte: one log is given as unloaded and as loaded, which makes "
+        "the payload zero"
     ),
     "OTHER_ARM": "its metadata name another arm than {first}",
     "READ_OTHERWISE": "read otherwise than the log of {file}: {differences}",
     "DATA_LOST": "samples of the log are lost",
-    "FLIPPED_SIGN": "gravity pulls upwards (k4 = {weight:.3g} N m): the sign of torques or angles is wrong",
+    "FLIPPED_SIGN": "gravity pulls upwards (k4 = {weight:.3g} N m): the sign of torques or angles "
+    "is wrong",
     "WRONG_ZERO": "gravity is turned by {turn:.0f}°: θ1 is not from the horizontal",
     "GRAVITY_COMPENSATED": (
-        "torques carry no weight of the arm: they are gravity-compensated, or the arm moves in a horizontal plane"
+        "torques carry no weight of the arm: they are gravity-compensated, or the arm moves in a "
+        "horizontal plane"
     ),
     "WEIGHT_OF_PAYLOAD": (
-        "torques carry the payload's weight and not the arm's: they are taken as gravity-compensated, without k2 and k4"
+        "torques carry the payload's weight and not the arm's: they are taken as "
+        "gravity-compensated, without k2 and k4"
     ),
     "PAYLOAD_WEIGHTLESS": (
-        "torques do not carry the payload's weight either: its inertia alone is left, which tells its mass where a "
+        "torques do not carry the payload's weight either: its inertia alone is left, which tells "
+        "its mass where a "
         "length is known"
     ),
     "EXTERNAL_EFFORT": (
-        "without payload the torques have nothing of an arm in them, with it those of a payload: they are external ones"
+        "without payload the torques have nothing of an arm in them, with it those of a payload: "
+        "they are external ones"
     ),
-    "NO_FRICTION": "torques hold no friction: they are friction-compensated, or the joints have none",
+    "NO_FRICTION": "torques hold no friction: they are friction-compensated, or the joints have "
+    "none",
     "WRONG_CONVENTION": "{wrong}, by all that physics says ({contradiction})",
     "ZERO_OFFSET": "{wrong}, or a centre of mass lies as far off its link's line",
     "PHASES": (
-        "θ1's zero against gravity is off by {first}, joint 1's load lies {load} off link 1's line, and {second} is "
+        "θ1's zero against gravity is off by {first}, joint 1's load lies {load} off link 1's "
+        "line, and {second} is "
         "θ2's zero or link 2's centre of mass, which no torque tells apart (95 %)"
     ),
     "PHASE": "{second} is θ2's zero or link 2's centre of mass, which no torque tells apart (95 %)",
     "RESTS": (
-        "the arm rests {rests}; where friction holds it there, the torque is not that of the weight: leave the rest out"
+        "the arm rests {rests}; where friction holds it there, the torque is not that of the "
+        "weight: leave the rest out"
     ),
     "LOST_SAMPLES": (
-        "{count:# step of the angles is|steps of the angles are} twice as long as usual, though the stamps are even: "
-        "samples were lost and the others renumbered, so that no estimate can be right; take the stamps of the "
+        "{count:# step of the angles is|steps of the angles are} twice as long as usual, though "
+        "the stamps are even: "
+        "samples were lost and the others renumbered, so that no estimate can be right; take the "
+        "stamps of the "
         "messages, or record without losses"
     ),
     # of readers
     "COMMANDED_TORQUE": "torques are commanded ones ({columns}): no measured torque in the log",
     "FOREIGN_UNIT": (
-        "the column {column!r} for {name} states the unit {unit!r}, and is taken for {given} as told"
+        "the column {column!r} for {name} states the unit {unit!r}, and is taken for {given} as "
+        "told"
     ),
     "CURRENT_AS_TORQUE": (
-        "{column!r} for {name} is a current by its name, and is taken for a torque in {given} as told"
+        "{column!r} for {name} is a current by its name, and is taken for a torque in {given} as "
+        "told"
     ),
     "MOTOR_SIDE": "{columns}: signals of motors, taken for those of joints",
     "OTHER_UNIT": (
@@ -313,23 +352,29 @@ MESSAGES: Mapping[str, str] = {
     "JOINT_ORDER": "joint 1 is {first!r} and joint 2 {second!r}, {why}",
     "OTHER_JOINTS": (
         "{count:# other joint moves|other joints move} meanwhile: {joints} (in the first "
-        "{samples:# sample|samples}); what that does to the torques is in no two-link model: hold them still"
+        "{samples:# sample|samples}); what that does to the torques is in no two-link model: hold "
+        "them still"
     ),
     "TOPIC_CHOICE": "the joints are taken from {topic!r}; there are two also on {others}",
     "NO_TOPIC": "{file}: topic {topic!r} is not in this file",
-    "LOG_TIME": "header stamps of {topic!r} stand still at {stamp} ns: the recorder's times are taken",
+    "LOG_TIME": "header stamps of {topic!r} stand still at {stamp} ns: the recorder's times are "
+    "taken",
     "LACKING_MESSAGES": "{count:# message|messages} on {topic!r} left out for want of {fields}",
     "OTHER_MESSAGES": "{count:# message|messages} on {topic!r} left out: of other joints",
     "MISFIT_MESSAGES": (
-        "{count:# message|messages} on {topic!r} of another form than the schema says; the first: {first}"
+        "{count:# message|messages} on {topic!r} of another form than the schema says; the first: "
+        "{first}"
     ),
     "OTHER_TYPE": (
-        "topic {topic!r} also carries messages of another type or definition ({types}); they were not read"
+        "topic {topic!r} also carries messages of another type or definition ({types}); they were "
+        "not read"
     ),
-    "STRAY_MESSAGES": "{count:# message|messages} of no topic that the table 'topics' lists; left out",
+    "STRAY_MESSAGES": "{count:# message|messages} of no topic that the table 'topics' lists; left "
+    "out",
     "MISSING_MESSAGES": "the file counts {promised:# message|messages} and holds {found}",
     "BROKEN_RECORD": (
-        "{bytes:# byte|bytes} in {places:# place|places}, the first at byte {first}, hold no whole record"
+        "{bytes:# byte|bytes} in {places:# place|places}, the first at byte {first}, hold no "
+        "whole record"
     ),
     "MISSING_SPLIT": "{missing} of {files:# file|files} of the bag missing: {names}",
     "NO_INDEX": "the file has no usable index; read by scanning",
@@ -345,12 +390,14 @@ MESSAGES: Mapping[str, str] = {
         "{count:# sample repeats|samples repeat} a stamp; the first of each was kept{others}"
     ),
     "ALIGNED": (
-        "{topic!r} ({rate:.6g} Hz) was interpolated; error, root mean square, in the log's units: {error}"
+        "{topic!r} ({rate:.6g} Hz) was interpolated; error, root mean square, in the log's units: "
+        "{error}"
     ),
     "NOT_COVERED": "{count:# sample was|samples were} dropped, where another topic has none",
     "TIME_UNIT": "times are taken for {unit}, from their size and their steps",
     "SLOW_CLOCK": (
-        "times in {column!r} are taken for {unit}, which makes {rate:.3g} Hz, too slow for an arm in motion"
+        "times in {column!r} are taken for {unit}, which makes {rate:.3g} Hz, too slow for an arm "
+        "in motion"
     ),
     "EMPTY_CELLS": "{count} of {rows:# row|rows} dropped for want of a value",
     # of checks
@@ -358,7 +405,8 @@ MESSAGES: Mapping[str, str] = {
     "EFFORT_DENORMAL": "{channel} never exceeds {largest:.3g} N m: no torque",
     "EFFORT_CONSTANT": "{channel} is {value:.6g} N m in every sample",
     "HELD_EFFORT": (
-        "{channel} keeps each value for {held:.3g} ms while the angle moves: it is {late:.3g} ms late in the mean, and "
+        "{channel} keeps each value for {held:.3g} ms while the angle moves: it is {late:.3g} ms "
+        "late in the mean, and "
         "inertia and friction take up what that makes"
     ),
     "SATURATED_EFFORT": "{channel} stands at its limit in {percent:.3g} % of the samples",
@@ -370,39 +418,48 @@ MESSAGES: Mapping[str, str] = {
     "STUCK_SENSOR": "{channel} freezes for {seconds:.3g} s from t = {start:.6g} s, then jumps",
     "SPIKES": "{channel} has {count:# spike|spikes}, the first at t = {start:.6g} s",
     "SHORT_LOG": (
-        "the log lasts {seconds:.3g} s; an estimate needs a second of motion at least, ten are better"
+        "the log lasts {seconds:.3g} s; an estimate needs a second of motion at least, ten are "
+        "better"
     ),
     "SLOW_SAMPLING": (
         "{samples:.2g} samples in a period of the motion at {rate:.4g} Hz: too slow to tell its "
         "acceleration; record faster, or move more slowly"
     ),
     "NEAR_STAMPS": (
-        "{count:# sample follows|samples follow} the one before by less than {share:g} of a period of "
-        "{period:.4g} ms, as receipt times do: late ones go back to the period they are missing from, "
+        "{count:# sample follows|samples follow} the one before by less than {share:g} of a "
+        "period of "
+        "{period:.4g} ms, as receipt times do: late ones go back to the period they are missing "
+        "from, "
         "the mean stands for the others"
     ),
     "GAPS": "{count:# gap|gaps}, the longest {seconds:.4g} s; no window spans one",
     "JITTER": (
-        "stamps jitter by {jitter:.3g} ms about a period of {period:.4g} ms; resampling moves angles "
+        "stamps jitter by {jitter:.3g} ms about a period of {period:.4g} ms; resampling moves "
+        "angles "
         "by {error:.2g} rad at most, linearly"
     ),
     # of tracks
-    "STRETCHES_WEAK": "stretch{numbers:|es} {numbers} {numbers:moves|move} too little to be weighed",
+    "STRETCHES_WEAK": "stretch{numbers:|es} {numbers} {numbers:moves|move} too little to be "
+    "weighed",
     "STRETCHES_NEGATIVE": (
-        "stretch{numbers:|es} {numbers} {numbers:weighs|weigh} less than nothing, which no payload does"
+        "stretch{numbers:|es} {numbers} {numbers:weighs|weigh} less than nothing, which no "
+        "payload does"
     ),
     "TORQUE_UNEXPLAINED": "arm and payload explain only {percent:.0f} % of the torque",
     "TORQUE_ERRORS": (
-        "the torque holds errors {times} times its sensors' noise that the arm's model does not explain: intervals are "
+        "the torque holds errors {times} times its sensors' noise that the arm's model does not "
+        "explain: intervals are "
         "wider by as much, and small changes go unseen"
     ),
     "ARM_DOUBTFUL": "the arm's own result is {grade}: {headline}",
     "LENGTH_CONTRADICTED": (
-        "{name} of {given:g} m lies {distance:.0f} σ from the result's {estimate:.5g} ± {std:.2g} m; one is wrong"
+        "{name} of {given:g} m lies {distance:.0f} σ from the result's {estimate:.5g} ± {std:.2g} "
+        "m; one is wrong"
     ),
     # of designs and fleets
     "TERMS_LEFT_OUT": (
-        "the plan leaves out {terms}: where they are estimated too, error bars are somewhat larger than predicted"
+        "the plan leaves out {terms}: where they are estimated too, error bars are somewhat "
+        "larger than predicted"
     ),
     "NOT_REACHED": "no motion within the limits tells {names}",
     "BROKEN_OFF": "the search was broken off: this is the best motion until then",

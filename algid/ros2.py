@@ -47,6 +47,7 @@ def check_stamps(path: Path, stamp_ns: NDArray[np.int64]) -> None:
     wrong = stamp_ns[(stamp_ns < 0) | (stamp_ns >= MOST_NS)]
     if wrong.size:
         raise OutputError(
-            f"{path}: ROS 2 messages hold times from 1970 to 2038 (0 to 2^31 s), found {wrong[0] * 1e-9:.17g} s; "
+            f"{path}: ROS 2 messages hold times from 1970 to 2038 (0 to 2^31 s), found "
+            f"{wrong[0] * 1e-9:.17g} s; "
             "write Parquet or CSV, or times that count from zero"
         )

@@ -69,14 +69,21 @@ def check_environment() -> None:
 
 
 def may_open(files: int) -> None:
-    """Let this process have so many files open at once. Raises `SettingError` where the system does not allow it."""
+    """Let this process have so many files open at once.
+
+    Raises
+    ------
+    SettingError
+        Where the system does not allow it.
+    """
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     most = float("inf") if hard == resource.RLIM_INFINITY else hard
     if soft != resource.RLIM_INFINITY and soft < files <= most:
         resource.setrlimit(resource.RLIMIT_NOFILE, (files, hard))
     elif most < files:
         raise SettingError(
-            f"the limit on open files: expected {files} or more, found {hard}; raise it with ulimit -n"
+            f"the limit on open files: expected {files} or more, found {hard}; raise it with "
+            "ulimit -n"
         )
 
 

@@ -148,7 +148,8 @@ class Settings:
         default=None,
         metadata={
             "range": PHYSICAL.window,
-            "help": "Window, s: the paper's integrals restart after it (2), or the weak form's (0.4).",
+            "help": "Window, s: the paper's integrals restart after it (2), or the weak form's "
+            "(0.4).",
         },
     )
     bandwidth: float = field(
@@ -296,7 +297,8 @@ class Settings:
         gone = set(self.terms) - set(without_terms(self.effort, self.terms))
         if gone:
             raise SettingError(
-                f"--model: torque that is {self.effort} has no {min(gone)}; leave it out, or --effort"
+                f"--model: torque that is {self.effort} has no {min(gone)}; leave it out, or "
+                "--effort"
             )
         if sum(EVERY_TERM[term].timing is not None for term in self.terms) > 1:
             raise SettingError(

@@ -77,7 +77,9 @@ def _draw(job: tuple[str, float, bool, int]) -> dict[str, Any]:
 
 
 def noise_rows(pool: ProcessPoolExecutor, draws: int) -> list[Row]:
-    """Every arm and noise: RMS over the bound, bias over σ, coverage, and the methods side by side."""
+    """Every arm and noise: RMS over the bound, bias over σ, coverage, and the methods side by
+    side.
+    """
     jobs = [(name, sigma, encoder) for name in SCENES for sigma, encoder in _noises()]
     drawn = list(
         pool.map(_draw, [(*job, seed) for job in jobs for seed in range(draws)], chunksize=4)
@@ -128,7 +130,9 @@ def _noise_row(
 
 
 def table4_rows() -> list[Row]:
-    """Errors without noise against the paper's Table 4: largest share of a hundredth of the paper's error."""
+    """Errors without noise against the paper's Table 4: largest share of a hundredth of the
+    paper's error.
+    """
     rows = []
     for name in ("case1", "case2"):
         here, case = scene_of(name), load_case(name)

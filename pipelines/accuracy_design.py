@@ -2,9 +2,10 @@
 
     python -m pipelines.accuracy_design [--draws 12] [--scenes hold,noise]
 
-A PD controller at 1 kHz holds its torque from sample to sample; the arm has Coulomb friction of 5 % of its weight's
-torque; the encoders' noise is fed back. Each scene is identified without flags. Asked: errors over predicted
-deviations of an RMS of 0.9 to 1.15 and intervals that hold the truth in 92 to 98 %.
+A PD controller at 1 kHz holds its torque from sample to sample; the arm has Coulomb friction of 5
+% of its weight's torque; the encoders' noise is fed back. Each scene is identified without flags.
+Asked: errors over predicted deviations of an RMS of 0.9 to 1.15 and intervals that hold the truth
+in 92 to 98 %.
 """
 
 from __future__ import annotations
@@ -144,7 +145,9 @@ def logged(scene: Scene, motions: Motions, draw: int, rng: np.random.Generator) 
 
 @dataclass
 class Errors:
-    """Errors over predicted and over reported deviations (D, Q), and which intervals hold (D, Q)."""
+    """Errors over predicted and over reported deviations (D, Q), and which intervals
+    hold (D, Q).
+    """
 
     names: tuple[str, ...]
     predicted: FloatArray

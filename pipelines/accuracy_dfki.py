@@ -63,7 +63,10 @@ def evaluate(folder: Path) -> list[dict[str, Any]]:
         assert score is not None
         terms = " + ".join([*chosen.model.terms, *(["delay"] if chosen.delay else [])]) or "viscous"
         for joint in range(2):
-            what = f"{terms} (chosen by {chosen.chosen_by}): RMSE of joint {joint + 1}, N m (aim {AIM[joint]:.3f})"
+            what = (
+                f"{terms} (chosen by {chosen.chosen_by}): RMSE of joint {joint + 1}, N m (aim "
+                f"{AIM[joint]:.3f})"
+            )
             rows.append({"what": what, "value": float(score.rmse[joint]), "asked": ASKED[joint]})
     rows.append(_bandwidth(sources))
     return rows

@@ -1,4 +1,5 @@
-"""Errors that real arms have, and what `--model auto` makes of them: the model errors of `make accuracy`.
+"""Errors that real arms have, and what `--model auto` makes of them: the model errors of `make
+accuracy`.
 
     python -m pipelines.accuracy_models --arms 4 --draws 4
 
@@ -41,7 +42,9 @@ def install(made: dict[tuple[str, int, bool], real_arms.Scene]) -> None:
 
 
 def draw(job: tuple[str, int, int, str]) -> Row:
-    """One pair of logs of a row, identified in one mode: errors in σ and in percent, and which intervals hold."""
+    """One pair of logs of a row, identified in one mode: errors in σ and in percent, and which
+    intervals hold.
+    """
     row, arm, seed, mode = job
     rng = np.random.default_rng([seed, arm, sum(row.encode())])
     unloaded, loaded = (_scenes[row, arm, kind].log(rng) for kind in (False, True))
@@ -100,7 +103,10 @@ def markdown(lines: Sequence[Row]) -> str:
     text = [
         f"## Model errors: coverage asked {ASKED:g} %, errors at most those of all old flags",
         "",
-        "| error of arm or sensors | mode | estimators | coverage % | 95th pct of abs z | k: median % | m_p | terms |",
+        (
+            "| error of arm or sensors | mode | estimators | coverage % | 95th pct of abs z | k: "
+            "median % | m_p | terms |"
+        ),
         "|" + "---|" * 8,
     ]
     for line in lines:
@@ -109,7 +115,8 @@ def markdown(lines: Sequence[Row]) -> str:
             for key in ("estimators", "terms")
         )
         text.append(
-            f"| {line['row']} | {line['mode']} | {estimators} | {line['coverage']:.0f} | {line['z95']:.1f} "
+            f"| {line['row']} | {line['mode']} | {estimators} | {line['coverage']:.0f} | "
+            f"{line['z95']:.1f} "
             f"| {line['k_percent']:.3g} | {line['m_p_percent']:.3g} | {terms} |"
         )
     return "\n".join(text) + "\n"

@@ -1,4 +1,5 @@
-"""The refined estimator alone against the Cramér-Rao bound: the part of `make accuracy` that wants many draws.
+"""The refined estimator alone against the Cramér-Rao bound: the part of `make accuracy` that wants
+many draws.
 
     python -m pipelines.accuracy_refined --draws 100
 
@@ -21,7 +22,9 @@ from pipelines import accuracy, accuracy_scenes
 
 
 def draw(name: str, sigma: float, encoder: bool, seed: int) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Errors (8,) of k1 … k7 and m_p on one pair of logs, and which intervals (10,) hold the truth."""
+    """Errors (8,) of k1 … k7 and m_p on one pair of logs, and which intervals (10,) hold the
+    truth.
+    """
     here = accuracy.scene_of(name)
     rng = np.random.default_rng([seed, sum(name.encode())])
     bare, loaded = (
@@ -35,7 +38,9 @@ def draw(name: str, sigma: float, encoder: bool, seed: int) -> tuple[FloatArray,
 
 
 def line(pool: ProcessPoolExecutor, name: str, sigma: float, encoder: bool, draws: int) -> str:
-    """RMS error over the bound of each parameter, largest bias over σ, coverage: a row of Markdown."""
+    """RMS error over the bound of each parameter, largest bias over σ, coverage: a row of
+    Markdown.
+    """
     drawn = list(pool.map(partial(draw, name, sigma, encoder), range(draws), chunksize=5))
     bound = sigma * accuracy.bound(name)[:8]
     errors = np.array([error for error, _ in drawn])
@@ -43,7 +48,10 @@ def line(pool: ProcessPoolExecutor, name: str, sigma: float, encoder: bool, draw
     bias = np.abs(errors.mean(axis=0) / errors.std(axis=0)).max()
     coverage = 100 * np.mean([inside for _, inside in drawn])
     noise = "12 bit" if encoder else f"{sigma:g}"
-    return f"| {name} | {noise} | {' | '.join(f'{value:.2f}' for value in rms)} | {bias:.2f} | {coverage:.1f} |"
+    return (
+        f"| {name} | {noise} | {' | '.join(f'{value:.2f}' for value in rms)} | {bias:.2f} | "
+        f"{coverage:.1f} |"
+    )
 
 
 def main() -> None:

@@ -48,7 +48,8 @@ def _noise(rows: list[dict[str, Any]]) -> list[str]:
         ratios = " | ".join(f"{value:.2f}" for value in row["rms_over_bound"]["refined"])
         bias = max(abs(value) for value in row["bias_over_sigma"])
         lines.append(
-            f"| {row['arm']} | {row['turns'][0]}, {row['turns'][1]} | {_sigma(row)} | {ratios} | {bias:.2f} "
+            f"| {row['arm']} | {row['turns'][0]}, {row['turns'][1]} | {_sigma(row)} | {ratios} | "
+            f"{bias:.2f} "
             f"| {100 * row['coverage']:.1f} | {row['fell_back']} |"
         )
     return lines
@@ -69,7 +70,8 @@ def _side_by_side(rows: list[dict[str, Any]]) -> list[str]:
         pooled = row["pooled_over_bound"]
         first = "yes" if min(pooled, key=pooled.__getitem__) == "refined" else "no"
         lines.append(
-            f"| {row['arm']} | {_sigma(row)} | {' | '.join(_number(pooled[m]) for m in METHODS)} | {first} |"
+            f"| {row['arm']} | {_sigma(row)} | {' | '.join(_number(pooled[m]) for m in METHODS)} "
+            f"| {first} |"
         )
     return lines
 

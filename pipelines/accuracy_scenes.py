@@ -104,7 +104,9 @@ def _moved(k: FloatArray, torque: Torque) -> Truth:
 def noisy(
     truth: Truth, sigma_theta: float, sigma_tau: float, encoder: bool, rng: np.random.Generator
 ) -> Segment:
-    """One draw of a log: Gaussian noise on the angles, or an encoder of twelve bits at a random phase."""
+    """One draw of a log: Gaussian noise on the angles, or an encoder of twelve bits at a random
+    phase.
+    """
     theta = truth.theta + sigma_theta * rng.standard_normal(truth.theta.shape)
     if encoder:
         phase = rng.uniform(0, ENCODER_STEP, (2, 1))
@@ -115,7 +117,9 @@ def noisy(
 
 
 def filtered_least_squares(bare: Segment, burdened: Segment, gravity: float) -> FloatArray:
-    """Inverse-dynamics least squares behind zero-phase filters of each cutoff: k1 … k7 and m_p (C, 8)."""
+    """Inverse-dynamics least squares behind zero-phase filters of each cutoff: k1 … k7 and m_p (C,
+    8).
+    """
     rows = []
     for cutoff in CUTOFFS:
         k, loaded = _inverse_dynamics(bare, cutoff), _inverse_dynamics(burdened, cutoff)
@@ -142,7 +146,9 @@ def _inverse_dynamics(log: Segment, cutoff: float) -> FloatArray:
 
 
 def paper(bare: Segment, burdened: Segment, gravity: float) -> FloatArray:
-    """The paper's method with its observer on windows of one second, median over windows: k1 … k7, m_p (8,)."""
+    """The paper's method with its observer on windows of one second, median over windows: k1 … k7,
+    m_p (8,).
+    """
     theta, omega, tau = _windows(bare)
     k = np.nanmedian(stage1(theta, omega, tau, bare.dt).k[..., -200:], axis=(1, 2))
     theta, omega, tau = _windows(burdened)

@@ -41,7 +41,9 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True)
 class Kind:
-    """A row: duration in s, rate in Hz, hold, terms that are given (None: the logs choose), constants that count."""
+    """A row: duration in s, rate in Hz, hold, terms that are given (None: the logs choose),
+    constants that count.
+    """
 
     duration: float
     rate: float = 1000.0

@@ -1,11 +1,12 @@
-"""How well `algid track` finds changes of payload under a controller, and whether its intervals hold the truth.
+"""How well `algid track` finds changes of payload under a controller, and whether its intervals
+hold the truth.
 
     python -m pipelines.accuracy_track [--scenes plain,often] [--draws 1]
 
-Arms follow a slow multi-sine under a PD controller with the bare arm's weight fed forward, at 1 kHz. Each log has
-constants of its own, identified from 10 s without payload and 10 s with one, under the same controller and friction.
-Asked: false and missed changes, medians of errors in time, brackets that hold the true time, and masses inside their
-95 % intervals.
+Arms follow a slow multi-sine under a PD controller with the bare arm's weight fed forward, at 1
+kHz. Each log has constants of its own, identified from 10 s without payload and 10 s with one,
+under the same controller and friction. Asked: false and missed changes, medians of errors in time,
+brackets that hold the true time, and masses inside their 95 % intervals.
 """
 
 from __future__ import annotations
@@ -39,7 +40,10 @@ Schedule = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True)
 class Scene:
-    """Logs of `changes` changes each, every `spacing` s; friction is a share of the arm's weight's torque."""
+    """Logs of `changes` changes each, every `spacing` s.
+
+    Friction is a share of the arm's weight's torque.
+    """
 
     name: str
     spacing: float
@@ -119,7 +123,9 @@ def plan_of(arm: Arm, duration: float, seed: int) -> Plan:
 
 
 def schedule_of(scene: Scene, arm: Arm, rng: np.random.Generator) -> Schedule:
-    """Changes at random times about each `spacing`, by 0.1 to 0.5 of link 2's mass, never below nothing."""
+    """Changes at random times about each `spacing`, by 0.1 to 0.5 of link 2's mass, never below
+    nothing.
+    """
     mass, found = 0.0, []
     for place in range(scene.changes):
         moment = scene.spacing * (place + 1 + 0.15 * rng.uniform(-1, 1))
@@ -287,9 +293,11 @@ def row(scene: Scene, tally: Tally) -> str:
         100 * np.mean(tally.inside),
     )
     return (
-        f"| {scene.name} | {tally.changes} | {beside(tally.false, scene.false)} | {beside(tally.missed, scene.missed)} "
+        f"| {scene.name} | {tally.changes} | {beside(tally.false, scene.false)} | "
+        f"{beside(tally.missed, scene.missed)} "
         f"| {late:.3f} (≤ 0.05) | {held:.0f}{' (≥ 90)' if scene.brackets else ''} "
-        f"| {inside:.1f}{' (92 to 98)' if scene.masses else ''} | {np.sqrt(np.mean(np.square(tally.z))):.2f} |"
+        f"| {inside:.1f}{' (92 to 98)' if scene.masses else ''} | "
+        f"{np.sqrt(np.mean(np.square(tally.z))):.2f} |"
     )
 
 
@@ -303,7 +311,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--verbose", action="store_true")
     wanted = parser.parse_args(arguments)
     print(
-        "| scene | changes | false | missed | median error, s | brackets that hold, % | masses in 95 %, % | z RMS |"
+        "| scene | changes | false | missed | median error, s | brackets that hold, % | masses in "
+        "95 %, % | z RMS |"
     )
     print("|---|---|---|---|---|---|---|---|")
     for name in wanted.scenes.split(","):

@@ -1,4 +1,5 @@
-"""Time algid and its peers on the same logs in the same run, interleaved, and tell medians, ratios and memory.
+"""Time algid and its peers on the same logs in the same run, interleaved, and tell medians, ratios
+and memory.
 
 Usage: python -m pipelines.bench [-o FOLDER] [--rounds N] [--day]
 
@@ -129,7 +130,10 @@ def write(
     name: str = "bench",
 ) -> None:
     """Write the table as Markdown and Parquet, and every run."""
-    machine = f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, polars {pl.__version__}"
+    machine = (
+        f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, "
+        f"polars {pl.__version__}"
+    )
     load = "load average before and after: {:.1f}, {:.1f}".format(*_LOADS[:1], os.getloadavg()[0])
     (folder / f"{name}.md").write_text(
         f"{markdown(table)}\n{machine}; {load}.\n{extra}", encoding="utf-8"

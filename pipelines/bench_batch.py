@@ -1,4 +1,5 @@
-"""Throughput of batches on one and two workers and on Dask, overhead beyond identification, and kills.
+"""Throughput of batches on one and two workers and on Dask, overhead beyond identification, and
+kills.
 
 Usage: python -m pipelines.bench_batch FOLDER [LOGS [KILLS]]
 
@@ -64,7 +65,9 @@ def run(source: Path, out: Path, *flags: str) -> float:
 
 
 def spent(who: int, pids: Iterable[int] = ()) -> float:
-    """Processor seconds so far: of this process or of its children that have ended, and of others that run."""
+    """Processor seconds so far: of this process or of its children that have ended, and of others
+    that run.
+    """
     own = resource.getrusage(who)
     fields = [Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split() for pid in pids]
     ticks = sum(int(one[11]) + int(one[12]) for one in fields)
@@ -147,7 +150,8 @@ def digest(out: Path) -> str:
 
 
 def kills(source: Path, out: Path, count: int, seconds: float) -> list[tuple[str, int, bool]]:
-    """Kill batches `count` times at random instants: whom, how often, and whether all ended as undisturbed ones.
+    """Kill batches `count` times at random instants: whom, how often, and whether all ended as
+    undisturbed ones.
 
     A batch whose parent was killed is run again, and killed again, until one ends.
     """
@@ -243,12 +247,14 @@ def main(folder: Path, count: int = 1000, killed: int = 50) -> None:
     bare = alone(source, out)
     ideal = spent(resource.RUSAGE_SELF) - before
     print(
-        f"{count} logs of 10 s at 1 kHz; {os.cpu_count()} cores, load {load:.1f} to {os.getloadavg()[0]:.1f}."
+        f"{count} logs of 10 s at 1 kHz; {os.cpu_count()} cores, load {load:.1f} to "
+        f"{os.getloadavg()[0]:.1f}."
     )
     print("\n| what | asked | measured |\n|---|---|---|")
     print(f"| two workers over one | ≥ 1.8 | {one / two:.2f} ({one:.1f} s, {two:.1f} s) |")
     print(
-        f"| overhead of one worker beyond identification | ≤ 15 % | {100 * (one / bare - 1):.0f} % ({bare:.1f} s) |"
+        f"| overhead of one worker beyond identification | ≤ 15 % | {100 * (one / bare - 1):.0f} "
+        f"% ({bare:.1f} s) |"
     )
     with dask(2, folder / "dask") as running:
         pids = [process.pid for process in running.running]
@@ -256,7 +262,8 @@ def main(folder: Path, count: int = 1000, killed: int = 50) -> None:
         cluster = run(source, out, "--scheduler", ADDRESS)
         used = spent(resource.RUSAGE_CHILDREN, pids) - before
     print(
-        f"| Dask's two workers over the process pool's | ≥ 0.95 | {two / cluster:.2f} ({cluster:.1f} s) |"
+        f"| Dask's two workers over the process pool's | ≥ 0.95 | {two / cluster:.2f} "
+        f"({cluster:.1f} s) |"
     )
     share = f"{ideal / used:.2f} ({ideal:.1f} s of {used:.1f} s)"
     print(

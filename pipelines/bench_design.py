@@ -47,7 +47,9 @@ Job = tuple[str, tuple[float, float, float] | None, int]
 
 
 def limits_of(case: Case) -> Limits:
-    """± 1.2 rad about hanging, 3 rad/s, and twice the weight's torque of the true arm with its payload."""
+    """± 1.2 rad about hanging, 3 rad/s, and twice the weight's torque of the true arm with its
+    payload.
+    """
     k = with_payload(case.arm.constants(), case.arm.payload_constants(case.payload))
     weight = np.array([k[3] + k[1], k[1]])
     return Limits(
@@ -78,7 +80,9 @@ def campaign_of(prior: Case, limits: Limits) -> Campaign:
 
 
 class LeastConditionNumber(PositionProblem):
-    """The peers' criterion: the condition number of the stacked regressor, its columns as they are."""
+    """The peers' criterion: the condition number of the stacked regressor, its columns as they
+    are.
+    """
 
     def criterion(self, slopes: Slopes, _stage: Stage) -> tuple[float, FloatArray]:
         figure, slope = self._condition(slopes)
@@ -114,7 +118,9 @@ def bound(campaign: Campaign, slopes: Slopes) -> float:
 
 
 def worth(name: str, randoms: int) -> Row:
-    """The largest relative bound of the design, of random motions, and of the least condition number."""
+    """The largest relative bound of the design, of random motions, and of the least condition
+    number.
+    """
     case = case_of(name)
     campaign = campaign_of(case, limits_of(case))
     began, cpu = time.monotonic(), time.process_time()
@@ -139,7 +145,9 @@ def worth(name: str, randoms: int) -> Row:
 
 
 def rehearsed(name: str, error: tuple[float, float, float] | None, draws: int) -> Row:
-    """Errors over the error bars predicted (draws, Q), and the largest usage of any limit by the true arm."""
+    """Errors over the error bars predicted (draws, Q), and the largest usage of any limit by the
+    true arm.
+    """
     case = case_of(name)
     limits = limits_of(case)
     prior = case if error is None else wrong(case, *error)
@@ -274,7 +282,8 @@ def markdown(values: list[Row], rehearsals: list[Row], figures: list[Row]) -> st
     """The tables as text."""
     lines = ["| figure | asked | measured | |", "|---|---|---|---|"]
     lines += [
-        f"| {row['figure']} | ≤ {row['at_most']:.3g} | {row['measured']:.3g} | {'✓' if row['reached'] else 'missed'} |"
+        f"| {row['figure']} | ≤ {row['at_most']:.3g} | {row['measured']:.3g} | "
+        f"{'✓' if row['reached'] else 'missed'} |"
         for row in figures
     ]
     lines += [

@@ -1,4 +1,5 @@
-"""Time `algid fleet` on a table of a million rows, and count drifts found and false alarms on simulated fleets.
+"""Time `algid fleet` on a table of a million rows, and count drifts found and false alarms on
+simulated fleets.
 
 Usage: python -m pipelines.bench_fleet FOLDER
 """

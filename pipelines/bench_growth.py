@@ -1,4 +1,5 @@
-"""How processor time and memory grow with samples, logs and terms, and the exponent between the largest two.
+"""How processor time and memory grow with samples, logs and terms, and the exponent between the
+largest two.
 
     python -m pipelines.bench_growth -o build/growth [--samples 7]
 

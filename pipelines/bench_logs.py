@@ -1,4 +1,5 @@
-"""The logs that `bench` identifies from: a periodic motion and the torque it takes, tiled without end.
+"""The logs that `bench` identifies from: a periodic motion and the torque it takes, tiled without
+end.
 
 The motion of 10 s is a sum of harmonics, so that its derivatives and, by eq. (1), its torque are
 closed forms; each repetition gets torque noise of its own, and the encoder's steps.
@@ -34,7 +35,9 @@ _MAGIC = b"\x89MCAP0\r\n"
 
 
 def motion(seed: int = 0) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Angles, velocities and accelerations (2, N) of one period: ten harmonics from 0.1 to 2 Hz a joint."""
+    """Angles, velocities and accelerations (2, N) of one period: ten harmonics from 0.1 to 2 Hz a
+    joint.
+    """
     draw = np.random.default_rng(seed)
     t = np.arange(round(PERIOD * RATE)) / RATE
     order = np.arange(1, 21, 2)

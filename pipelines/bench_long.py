@@ -72,7 +72,9 @@ def main() -> None:
 
 
 def moving(samples: int, gaps: int, rate: float) -> Log:
-    """An arm of k = 0.05, 0.5 and the like on smooth motion, with noise, and gaps of 50 periods evenly spread."""
+    """An arm of k = 0.05, 0.5 and the like on smooth motion, with noise, and gaps of 50 periods
+    evenly spread.
+    """
     from algid.arm import regressor
 
     t = np.arange(samples) / rate
@@ -105,7 +107,10 @@ def timed(*arguments: object) -> str:
         raise RuntimeError(f"{command}: {done.returncode}: {done.stderr[-500:]}")
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return f"{time.perf_counter() - start:.1f} s, {spent:.1f} s of processors, at most {after.ru_maxrss >> 10} MB so far"
+    return (
+        f"{time.perf_counter() - start:.1f} s, {spent:.1f} s of processors, at most "
+        f"{after.ru_maxrss >> 10} MB so far"
+    )
 
 
 if __name__ == "__main__":

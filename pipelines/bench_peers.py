@@ -25,7 +25,9 @@ _WINDOW = 0.4  # s
 
 
 def _filtered(path: Path) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]:
-    """Angles, velocities, accelerations and torques (2, N) after a zero-phase filter, and the period in s."""
+    """Angles, velocities, accelerations and torques (2, N) after a zero-phase filter, and the
+    period in s.
+    """
     import polars as pl
     from scipy.signal import butter, sosfiltfilt
 
@@ -48,7 +50,9 @@ def least_squares(path: Path) -> FloatArray:
 
 
 def pinocchio(path: Path) -> FloatArray:
-    """FIGAROH's way: pinocchio's torque regressor sample by sample, viscous columns beside it, least squares."""
+    """FIGAROH's way: pinocchio's torque regressor sample by sample, viscous columns beside it,
+    least squares.
+    """
     import pinocchio as pin
 
     theta, omega, alpha, tau, _ = _filtered(path)
@@ -82,7 +86,9 @@ def _two_links(pin: Any) -> tuple[Any, float]:
 
 
 def pysindy(path: Path) -> FloatArray:
-    """PySINDy's weak form: integrals of the columns and of the torque over windows, then least squares."""
+    """PySINDy's weak form: integrals of the columns and of the torque over windows, then least
+    squares.
+    """
     from pysindy import WeakPDELibrary
     from pysindy.feature_library import PolynomialLibrary
 

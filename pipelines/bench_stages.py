@@ -1,4 +1,6 @@
-"""Where the weak estimator's time goes: each stage run on top of the ones before it, in one process."""
+"""Where the weak estimator's time goes: each stage run on top of the ones before it, in one
+process.
+"""
 
 from __future__ import annotations
 

@@ -88,7 +88,10 @@ def _peers(costs: Mapping[str, Cost], failed: Mapping[str, str]) -> list[Row]:
         theirs = _net(costs, peer)
         whole, own = costs[f"{peer} million"].wall, costs["weak million"].wall
         busy = _busy(costs, peer) / _busy(costs, "weak")
-        detail = f"{theirs:.2f} s less start-up, processor {busy:.1f}; whole processes {whole:.2f} s against {own:.2f} s"
+        detail = (
+            f"{theirs:.2f} s less start-up, processor {busy:.1f}; whole processes "
+            f"{whole:.2f} s against {own:.2f} s"
+        )
         found.append(
             Row(
                 f"{name}, to weak",
@@ -194,7 +197,10 @@ def day_rows(costs: Mapping[str, Cost], failed: Mapping[str, str]) -> list[Row]:
         second, hour, day = (costs[f"{kind} {name}"] for name in ("second", "hour", "day"))
         growth = (day.wall - second.wall) / (_DAY / _HOUR) / (hour.wall - second.wall)
         busy = (day.cpu - second.cpu) / (_DAY / _HOUR) / (hour.cpu - second.cpu)
-        detail = f"{day.wall:.1f} s, processor {day.cpu:.1f} s; an hour {hour.wall:.2f} s, start-up {second.wall:.2f} s"
+        detail = (
+            f"{day.wall:.1f} s, processor {day.cpu:.1f} s; an hour {hour.wall:.2f} s, "
+            f"start-up {second.wall:.2f} s"
+        )
         found += [
             Row(
                 f"{kind}, 24 h at 1 kHz, peak memory, MB",

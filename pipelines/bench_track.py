@@ -1,4 +1,5 @@
-"""Count changes of payload found, false ones, and intervals that hold the truth, on draws of case 1's arm.
+"""Count changes of payload found, false ones, and intervals that hold the truth, on draws of case
+1's arm.
 
 Usage: python -m pipelines.bench_track [--draws 300] [--hard 100]
 
@@ -54,7 +55,9 @@ QUICK: tuple[Schedule, ...] = (
 
 @dataclass(frozen=True)
 class Scene:
-    """What is drawn: schedules in turn, how the arm is known, friction in the arm, an encoder instead of noise."""
+    """What is drawn: schedules in turn, how the arm is known, friction in the arm, an encoder
+    instead of noise.
+    """
 
     name: str
     schedules: tuple[Schedule, ...]
@@ -79,7 +82,9 @@ HARD = (
 
 @dataclass
 class Tally:
-    """Delays (s) of the changes found, changes missed, false ones, and whether each stretch's interval held."""
+    """Delays (s) of the changes found, changes missed, false ones, and whether each stretch's
+    interval held.
+    """
 
     draws: int = 0
     delays: list[float] = field(default_factory=list)

@@ -1,7 +1,8 @@
-"""Arms under a controller, many draws side by side: the simulator of `accuracy_track` and `accuracy_design`.
+"""Arms under a controller, many draws side by side: the simulator of `accuracy_track` and
+`accuracy_design`.
 
-It shares no equation with algid: inertia, centripetal torques and weight are written out from the masses, one
-Runge-Kutta step of fourth order a sample.
+It shares no equation with algid: inertia, centripetal torques and weight are written out from the
+masses, one Runge-Kutta step of fourth order a sample.
 
 ======  =======================================================  =========
 symbol  name                                                     shape
@@ -28,7 +29,9 @@ WIDTH = 0.02  # rad/s, of the Coulomb friction's step
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What a controller follows: θ_d, θ̇_d and τ_ff, each (2, 2 N - 1) at times half a sample apart."""
+    """What a controller follows: θ_d, θ̇_d and τ_ff, each (2, 2 N - 1) at times half a sample
+    apart.
+    """
 
     theta: FloatArray
     omega: FloatArray
@@ -39,8 +42,9 @@ class Plan:
 class Controller:
     """Gains P and D, (2, 2) each.
 
-    A digital one holds its torque from one sample to the next. It sees angles with white noise of `seen` rad, and
-    their backward difference behind a low-pass of `bandwidth` Hz; any other sees the true state at every instant.
+    A digital one holds its torque from one sample to the next. It sees angles with white noise of
+    `seen` rad, and their backward difference behind a low-pass of `bandwidth` Hz; any other sees
+    the true state at every instant.
     """
 
     P: FloatArray
@@ -52,7 +56,10 @@ class Controller:
 
 @dataclass(frozen=True, eq=False)
 class Motions:
-    """Times (N,) in s; true angles and torques (2, N, B); angles as a digital controller saw them (2, N, B)."""
+    """Times (N,) in s; true angles and torques (2, N, B).
+
+    Angles as a digital controller saw them (2, N, B).
+    """
 
     t: FloatArray
     theta: FloatArray

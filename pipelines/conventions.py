@@ -96,7 +96,9 @@ INVISIBLE: dict[str, Spoil] = {
 
 
 def motion_of(name: str, *, loaded: bool = False) -> tuple[FloatArray, SimulatedMotion]:
-    """Constants (7,) of an arm by name, and its motion under a wide torque, with half of link 2's mass or without."""
+    """Constants (7,) of an arm by name, and its motion under a wide torque, with half of link 2's
+    mass or without.
+    """
     arm = case_of(name).arm
     t = np.arange(round(DURATION * RATE) + 1) / RATE
     k = arm.constants()
@@ -166,7 +168,9 @@ def row(
 
 
 def _noticed(result: Result, code: str, k: FloatArray) -> bool:
-    """Whether a result names `code`, is not Good, and has no error beyond `FAR` without having failed."""
+    """Whether a result names `code`, is not Good, and has no error beyond `FAR` without having
+    failed.
+    """
     level = result.verdict.grade
     named = any(notice.code == code for notice in result.notices)
     return named and level != "good" and (level == "failed" or furthest(result, k) <= FAR)

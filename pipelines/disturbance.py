@@ -1,4 +1,5 @@
-"""What an unmodelled torque that drives the motion does to each estimator: bias and coverage in simulation.
+"""What an unmodelled torque that drives the motion does to each estimator: bias and coverage in
+simulation.
 
     python -m pipelines.disturbance
 

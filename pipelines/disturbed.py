@@ -1,12 +1,13 @@
-"""Six logs of an arm that a torque which no model holds drives too: open loop, and under a PD controller.
+"""Six logs of an arm that a torque which no model holds drives too: open loop, and under a PD
+controller.
 
     python -m pipelines.disturbed --arms 4
 
 The disturbance is an Ornstein-Uhlenbeck torque of 0.1 s and 30 % of the drive's RMS on each joint.
 In open loop the logged torque is a multi-sine; under feedback it is kp (q_des - θ) + kd (q̇_des -
-θ̇) with the weight held, so that it answers the disturbance. Each row identifies with no flag; asked
-are 90 % of the intervals of k1 … k5 that hold, and a bias of 1.5 % at most, or a warning that the
-torque is endogenous.
+θ̇) with the weight held, so that it answers the disturbance. Each row identifies with no flag;
+asked are 90 % of the intervals of k1 … k5 that hold, and a bias of 1.5 % at most, or a warning
+that the torque is endogenous.
 """
 
 from __future__ import annotations
@@ -36,7 +37,9 @@ _FREQUENCIES = np.array([0.3, 0.7, 1.1, 1.6, 2.3])
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Logs of one arm (angles and torques (n, 2, N)), and the reference's angles, where there is one."""
+    """Logs of one arm (angles and torques (n, 2, N)), and the reference's angles, where there is
+    one.
+    """
 
     arm: Arm
     theta: FloatArray
@@ -87,7 +90,10 @@ def _controller(arm: Arm, half: FloatArray, rng: np.random.Generator) -> tuple[F
 def _simulated(
     arm: Arm, control: Control, share: float, rng: np.random.Generator, reference: FloatArray | None
 ) -> Scene:
-    """Runge-Kutta's fourth order over all logs side by side; the disturbance's size follows the drive's."""
+    """Runge-Kutta's fourth order over all logs side by side.
+
+    The disturbance's size follows the drive's.
+    """
     k, count = arm.constants(), round(DURATION / DT)
     size = share * np.sqrt(np.mean(_driven(k, control, count)[1] ** 2, axis=(1, 2)))
     return _with_noise(arm, *_driven(k, control, count, size, rng), rng, reference)
@@ -148,7 +154,9 @@ def logs_of(made: Scene) -> list[Log]:
 
 
 def evaluate(arms: int, *, feedback: bool, share: float = SHARE) -> list[dict[str, object]]:
-    """Coverage and mean bias of k1 … k5, and how often a warning says that the torque is endogenous."""
+    """Coverage and mean bias of k1 … k5, and how often a warning says that the torque is
+    endogenous.
+    """
     inside, errors, warned, estimators = [], [], 0, []
     for number in range(arms):
         made = scene(number, feedback=feedback, share=share)

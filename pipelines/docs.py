@@ -1,4 +1,5 @@
-"""The pages of the site: the guide as the command prints it, and the API's reference out of its docstrings.
+"""The pages of the site: the guide as the command prints it, and the API's reference out of its
+docstrings.
 
 Usage: python -m pipelines.docs FOLDER
 """

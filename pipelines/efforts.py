@@ -1,4 +1,5 @@
-"""What drivers call effort: told by the logs, named, and what the payload is worth then: `make efforts`.
+"""What drivers call effort: told by the logs, named, and what the payload is worth then: `make
+efforts`.
 
 Of five arms, straight and with a point at the tip, each pair of logs is identified with no flag and
 its torque as such a driver logs it; where a notice names a flag, once more with that. A row gives
@@ -34,7 +35,9 @@ NAMES = {
 
 
 def taken(effort: str, k: FloatArray, loaded: FloatArray, motion: SimulatedMotion) -> FloatArray:
-    """What a driver takes off the torque (2, N) of an arm `k` that moves with constants `loaded`."""
+    """What a driver takes off the torque (2, N) of an arm `k` that moves with constants
+    `loaded`.
+    """
     if effort == "gravity-compensated":
         weight = np.where(np.isin(np.arange(7), (1, 3)), k, 0.0)
         return passive_torque(weight, motion.theta, np.zeros_like(motion.omega))

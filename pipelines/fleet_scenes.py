@@ -1,4 +1,5 @@
-"""Write tables of fleets to look at: few and many robots, a drift, an arm that was replaced, one robot in 15 folders.
+"""Write tables of fleets to look at: few and many robots, a drift, an arm that was replaced, one
+robot in 15 folders.
 
 Usage: python -m pipelines.fleet_scenes FOLDER, then algid fleet FOLDER/NAME for each of its folders
 """
@@ -21,7 +22,9 @@ STD = 0.003  # of an estimate, as a share
 
 
 def table(robots: int, days: FloatArray, seed: int = 0) -> pl.DataFrame:
-    """A log of each robot on each of `days`: its estimates of k1 to k7 and friction, with their deviations."""
+    """A log of each robot on each of `days`: its estimates of k1 to k7 and friction, with their
+    deviations.
+    """
     rng = np.random.default_rng(seed)
     constants = dict(zip(CONSTANT_NAMES, load_case("case1").arm.constants().tolist(), strict=True))
     constants |= {"f1": 0.25, "f2": 0.15}

@@ -132,7 +132,8 @@ def batches(files: int, seed: int) -> int:
             failed += wrong
             if wrong:
                 print(
-                    f"batch over hostile, seed {first}: exit {done.returncode}, {jobs.height} of {len(names)} jobs"
+                    f"batch over hostile, seed {first}: exit {done.returncode}, {jobs.height} of "
+                    f"{len(names)} jobs"
                 )
                 print(done.stderr[-2000:], flush=True)
             total.update(jobs["status"].to_list() if jobs.height else [])

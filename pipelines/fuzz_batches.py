@@ -95,7 +95,8 @@ def main() -> int:
         if kind in FAILURES:
             print(f"{kind}: seed {number}: {text}", flush=True)
     print(
-        f"{cases} batches: {dict(total)}; the slowest {slowest:.1f} s; {time.monotonic() - start:.0f} s in all"
+        f"{cases} batches: {dict(total)}; the slowest {slowest:.1f} s; "
+        f"{time.monotonic() - start:.0f} s in all"
     )
     return int(any(total[kind] for kind in FAILURES))
 

@@ -68,7 +68,8 @@ def main() -> int:
             counts, most = _batched(sound, first, count)
             total, slowest = total + counts, max(slowest, most)
     print(
-        f"{calls} calls: {dict(total)}; the slowest {slowest:.1f} s; {time.monotonic() - start:.0f} s in all"
+        f"{calls} calls: {dict(total)}; the slowest {slowest:.1f} s; "
+        f"{time.monotonic() - start:.0f} s in all"
     )
     return int(any(total[kind] for kind in FAILURES))
 

@@ -184,7 +184,8 @@ def _with_one_caller(text: str) -> int:
 
 
 def _calls() -> tuple[set[tuple[str, str]], set[tuple[str, str]]]:
-    """Rooms that call and rooms that are called while a log is identified, its report and series written.
+    """Rooms that call and rooms that are called while a log is identified, its report and series
+    written.
 
     Calls of functions, and generators that are begun or resumed.
 

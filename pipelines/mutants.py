@@ -78,7 +78,9 @@ def prepare(folder: Path) -> None:
 
 
 def chosen(tests: list[str], seconds: dict[str, float], name: str) -> list[str]:
-    """Of the tests that touch a mutant those of its module first, then those of its room, within `BUDGET`."""
+    """Of the tests that touch a mutant those of its module first, then those of its room, within
+    `BUDGET`.
+    """
     module, own = name.split(".")[-2], room(name)
     named = (f"test_{module}.py", f"test_{module}s.py")
     kept: list[str] = []
@@ -121,7 +123,14 @@ def jobs(folder: Path, drawn: list[str]) -> Iterator[tuple[str, list[str], int]]
 
 
 def tried(folder: Path, drawn: list[str]) -> Iterator[tuple[str, str]]:
-    """Each mutant with its end as soon as that is known: ``killed``, ``survived`` or ``no test``."""
+    """Each mutant with its end as soon as that is known: ``killed``, ``survived`` or
+    ``no test``.
+
+    Raises
+    ------
+    SystemExit
+        Where the trial breaks off.
+    """
     known = list(jobs(folder, drawn))
     yield from ((name, "no test") for name, tests, _ in known if not tests)
     lines = "".join(json.dumps(job) + "\n" for job in known if job[1])
@@ -192,7 +201,8 @@ def main() -> None:
         print(f"{key:12} {killed[key]:3} of {number:3}")
     share = killed.total() / len(ends)
     print(
-        f"killed {killed.total()} of {len(ends)}: {100 * share:.0f} % (asked {100 * options.asked:.0f} %)"
+        f"killed {killed.total()} of {len(ends)}: {100 * share:.0f} % (asked "
+        f"{100 * options.asked:.0f} %)"
     )
     raise SystemExit(0 if share >= options.asked else 1)
 

@@ -1,4 +1,5 @@
-"""Tries mutants, for `pipelines.mutants`: run in mutmut's copy of the project, where each name switches one change on.
+"""Tries mutants, for `pipelines.mutants`: run in mutmut's copy of the project, where each name
+switches one change on.
 
 Reads lines of JSON: a mutant's name, its tests, the seconds of processor time that they may take.
 Writes a line for each: the name, and what pytest ended with in a process of its own (0 where no

@@ -35,7 +35,9 @@ _NUDGE = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class _Windows:
-    """Starts (4, W), torques (N + 1, 2, W) and measured angles (N, 2, W) after each step of dt s."""
+    """Starts (4, W), torques (N + 1, 2, W) and measured angles (N, 2, W) after each
+    step of dt s.
+    """
 
     dt: float
     start: FloatArray

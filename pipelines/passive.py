@@ -1,4 +1,5 @@
-"""Arms with a joint that has no motor, its bearing's friction and the pull of cables: `make passive`.
+"""Arms with a joint that has no motor, its bearing's friction and the pull of cables: `make
+passive`.
 
 An acrobot's first joint, or a pendubot's second, bears Coulomb friction of its bearing, and cables
 pull at both joints by 2 % of the driven joint's torque, slowly and unlogged. Every draw is
@@ -34,7 +35,10 @@ SLOW = 0.5  # s: how long cables keep their pull
 
 
 def log_of(name: str, passive: int, seed: int) -> Log:
-    """One draw: what moves the arm is the motor less friction and cables; the motor's torque is logged."""
+    """One draw: what moves the arm is the motor less friction and cables.
+
+    The motor's torque is logged.
+    """
     arm = case_of(name).arm
     rng = np.random.default_rng([seed, passive, sum(name.encode())])
     t = np.arange(round(DURATION * RATE) + 1) / RATE

@@ -1,4 +1,5 @@
-"""Payloads weighed on the residuals of real arms: is none found none, and are injected ones inside their intervals?
+"""Payloads weighed on the residuals of real arms: is none found none, and are injected ones inside
+their intervals?
 
     python -m pipelines.payload_residuals ../shared/data --draws 100
 
@@ -163,7 +164,9 @@ def weighed(job: tuple[Path, str, int, float]) -> tuple[float, float, float]:
 
 
 class _Unexamined(Survey):
-    """Logs without the named checks: signs and zeros of these are known, and the checks take half of the time."""
+    """Logs without the named checks: signs and zeros of these are known, and the checks take half
+    of the time.
+    """
 
     def _examined(self, log: LogSource, block: Log, alone: bool) -> tuple[Notice, ...]:  # noqa: ARG002
         return ()

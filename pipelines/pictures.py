@@ -1,4 +1,5 @@
-"""Draw the README's pictures from a result folder: the terminal as SVG, the report as PNG, light and dark.
+"""Draw the README's pictures from a result folder: the terminal as SVG, the report as PNG, light
+and dark.
 
     python -m pipelines.pictures build/pictures/case1-unloaded.algid -o data/pictures
 

@@ -45,7 +45,9 @@ PAYLOAD = ("m_p", "l1", "l2", "y_p", "J_p")
 
 @dataclass(frozen=True)
 class Row:
-    """How far centres of mass are off (°), the payload's radius of gyration (m) and direction (°)."""
+    """How far centres of mass are off (°), the payload's radius of gyration (m) and
+    direction (°).
+    """
 
     centre: float = 0.0
     radius: float = 0.0

@@ -1,4 +1,5 @@
-"""The plotting library that pages carry: plotly.js with the traces of two axes alone, a third of the whole.
+"""The plotting library that pages carry: plotly.js with the traces of two axes alone, a third of
+the whole.
 
 Run by the build of a wheel and by `pip install -e .`. Where npm is not at hand the pages carry the
 whole library out of the package `plotly`, and are one megabyte larger.

@@ -216,7 +216,10 @@ def _halves(
 
 def simulated_table(rows: Sequence[Row]) -> str:
     """Markdown: a line a contender, pooled over the arms."""
-    heading = f"| contender | error over bound (RMS) | error %, {' / '.join(KINDS)} (median) | intervals that hold, % "
+    heading = (
+        f"| contender | error over bound (RMS) | error %, {' / '.join(KINDS)} (median) | "
+        "intervals that hold, % "
+    )
     lines = [f"{heading}| held out, N m | moving alone | processor s | choices |", "|" + 8 * "---|"]
     for peer, (_, choices) in PEERS.items():
         own = [row for row in rows if row.peer == peer]
@@ -243,7 +246,10 @@ def simulated_table(rows: Sequence[Row]) -> str:
 
 def real_table(rows: Sequence[dict[str, Any]]) -> str:
     """Markdown: a line a contender and build."""
-    heading = "| build | contender | halves that agree, % | repeatability, % | held out, N m, joint 1 / 2 "
+    heading = (
+        "| build | contender | halves that agree, % | repeatability, % | held out, N m, "
+        "joint 1 / 2 "
+    )
     lines = [f"{heading}| moving alone | processor s |", "|---|---|---|---|---|---|---|"]
     for row in rows:
         pairs = [
@@ -252,7 +258,8 @@ def real_table(rows: Sequence[dict[str, Any]]) -> str:
         ]
         agree = None if row["agree"] is None else 100 * row["agree"]
         lines.append(
-            f"| {row['build']} | {row['peer']} | {_number(agree)} | {_number(row['repeatability'])} "
+            f"| {row['build']} | {row['peer']} | {_number(agree)} | "
+            f"{_number(row['repeatability'])} "
             f"| {pairs[0]} | {pairs[1]} | {_number(row['seconds'])} |"
         )
         if row.get("failed"):

@@ -1,4 +1,5 @@
-"""What each contender reproduces before it takes part: an example of its own kind whose answer is known.
+"""What each contender reproduces before it takes part: an example of its own kind whose answer is
+known.
 
 Regressions, output error and algid recover the constants of the paper's first case from a log
 without noise; PySINDy's weak form finds Lorenz' equations, as in its own examples; MuJoCo's sysid
@@ -46,7 +47,9 @@ def _constants(peer: str) -> float:
 
 
 def _lorenz() -> float:
-    """PySINDy's weak form on Lorenz' equations: the largest error of the seven coefficients over the largest."""
+    """PySINDy's weak form on Lorenz' equations: the largest error of the seven coefficients over
+    the largest.
+    """
     from pysindy import STLSQ, SINDy, WeakPDELibrary
     from pysindy.feature_library import PolynomialLibrary
     from scipy.integrate import solve_ivp
@@ -98,7 +101,9 @@ def _inverse_dynamics() -> float:
 
 
 def _table4() -> float:
-    """The paper's method on case 1: the worst row's share of the paper's error, less one, where it is above."""
+    """The paper's method on case 1: the worst row's share of the paper's error, less one, where it
+    is above.
+    """
     import algid
 
     unloaded, loaded = algid.synthesise("case1", excitation="case", duration=1.0)

@@ -55,7 +55,8 @@ def page(simulated: Sequence[Any], real: Sequence[Any], text: str) -> str:
         ]
     style = "body{font:15px system-ui;max-width:60rem;margin:2rem auto;padding:0 1rem}"
     return (
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>The race</title><style>{style}'
+        '<!doctype html><html lang="en"><meta charset="utf-8"><title>The '
+        f"race</title><style>{style}"
         f"pre{{overflow-x:auto;font-size:12px}}</style><h1>The race</h1>{''.join(plots)}"
         f"<h2>Tables</h2><pre>{escape(text)}</pre></html>\n"
     )
@@ -88,7 +89,8 @@ def _plot(title: str, series: Series, names: Sequence[str]) -> str:
 
     height = _ROW * (len(series) + 2)
     parts = [
-        f'<line x1="{x(10.0**n):.1f}" x2="{x(10.0**n):.1f}" y1="5" y2="{height - 30}" stroke="#ddd"/>'
+        f'<line x1="{x(10.0**n):.1f}" x2="{x(10.0**n):.1f}" y1="5" y2="{height - 30}" '
+        'stroke="#ddd"/>'
         f'<text x="{x(10.0**n):.1f}" y="{height - 14}" text-anchor="middle">{10.0**n:g}</text>'
         for n in np.arange(low, low + span + 1)
     ]
@@ -100,7 +102,8 @@ def _plot(title: str, series: Series, names: Sequence[str]) -> str:
                 colour = _COLOURS[list(names).index(name) % len(_COLOURS)]
                 tip = escape(f"{peer}, {name}: {value:.3g}")
                 parts.append(
-                    f'<circle cx="{x(value):.1f}" cy="{y}" r="5" fill="{colour}" fill-opacity="0.8">'
+                    f'<circle cx="{x(value):.1f}" cy="{y}" r="5" fill="{colour}" '
+                    'fill-opacity="0.8">'
                     f"<title>{tip}</title></circle>"
                 )
     legend = " ".join(

@@ -1,4 +1,5 @@
-"""The contenders of the race: each takes the same logs and gives k1 … k7, their deviations where it has any.
+"""The contenders of the race: each takes the same logs and gives k1 … k7, their deviations where
+it has any.
 
 An answer's values are k1 … k7; what else a contender knows of the torque (Coulomb friction, a
 rotor, an offset) is in `terms`, so that its prediction is judged with all that it identified.
@@ -28,7 +29,9 @@ _DROPPED = 0.3  # s at each end, where a filter rings
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """k1 … k7 (7,), their standard deviations or intervals (7, 2) where given, and other terms by name."""
+    """k1 … k7 (7,), their standard deviations or intervals (7, 2) where given, and other terms by
+    name.
+    """
 
     values: FloatArray
     interval: FloatArray | None = None
@@ -87,7 +90,9 @@ def _regression(p: FloatArray, covariance: FloatArray) -> Answer:
 
 
 def least_squares(logs: Sequence[Segment]) -> Answer:
-    """Least squares behind filters that predict best, with Coulomb friction, offsets and a rotor."""
+    """Least squares behind filters that predict best, with Coulomb friction, offsets
+    and a rotor.
+    """
     p, covariance, _ = regressions.least_squares(logs)
     return _regression(p, covariance)
 
@@ -98,7 +103,9 @@ def idim_iv(logs: Sequence[Segment]) -> Answer:
 
 
 def pinocchio(logs: Sequence[Segment], l1: float) -> Answer:
-    """FIGAROH's way: pinocchio's torque regressor sample by sample, viscous and Coulomb columns, least squares."""
+    """FIGAROH's way: pinocchio's torque regressor sample by sample, viscous and Coulomb columns,
+    least squares.
+    """
     import pinocchio as pin
 
     model = pin.Model()
@@ -166,7 +173,9 @@ def pysindy(logs: Sequence[Segment]) -> Answer:
 
 
 def output_error(logs: Sequence[Segment]) -> Answer:
-    """Windows of 0.2 s simulated from the filtered motion, Coulomb friction and a rotor, Gauss-Newton."""
+    """Windows of 0.2 s simulated from the filtered motion, Coulomb friction and a rotor,
+    Gauss-Newton.
+    """
     from pipelines import output_error as peer
 
     found = peer.fit(logs, least_squares(logs).values)
@@ -194,7 +203,8 @@ _ARM_XML = """
 
 
 def mujoco_sysid(logs: Sequence[Segment], l1: float) -> Answer:
-    """MuJoCo's sysid: simulated against measured angles in stretches of 0.5 s, with its own covariance.
+    """MuJoCo's sysid: simulated against measured angles in stretches of 0.5 s, with its own
+    covariance.
 
     The masses and the length of link 1 are taken as known, so that its six parameters are
     determined; it starts from filtered least squares. A sensor of MuJoCo shows the state before
@@ -289,7 +299,9 @@ def _stretches(logs: Sequence[Segment], model: Any) -> tuple[list[Any], list[Any
 
 
 def mujoco_log() -> tuple[FloatArray, Segment, float]:
-    """Constants (7,), a log of 10 s at 500 Hz and the length of link 1 in m of an arm that MuJoCo simulates."""
+    """Constants (7,), a log of 10 s at 500 Hz and the length of link 1 in m of an arm that MuJoCo
+    simulates.
+    """
     import mujoco as package
 
     mujoco: Any = package

@@ -1,4 +1,5 @@
-"""Two contenders that are regressions: least squares behind filters that are chosen, and instrumental variables.
+"""Two contenders that are regressions: least squares behind filters that are chosen, and
+instrumental variables.
 
 The filters are chosen as a practitioner would: the motion's and the equations' cut-offs that
 predict best what was left out, a half of the logs or of the one log. Coulomb friction, offsets and
@@ -63,7 +64,9 @@ def columns(motion: Motion) -> FloatArray:
 
 
 def _rows(signals: FloatArray, dt: float, cutoff: float) -> FloatArray:
-    """Signals (2, …, N) behind the equations' filter, ends dropped, thinned: (R, …) of both joints."""
+    """Signals (2, …, N) behind the equations' filter, ends dropped, thinned: (R, …) of both
+    joints.
+    """
     edge, every = round(_DROPPED / dt), max(1, round(1 / (4 * cutoff * dt)))
     kept = _below(cutoff, dt, signals)[..., edge:-edge:every]
     return np.concatenate([np.moveaxis(joint, -1, 0) for joint in kept])
@@ -86,7 +89,9 @@ def _fitted(logs: Sequence[Segment], cutoffs: Cutoffs) -> FloatArray:
 
 
 def chosen_cutoffs(logs: Sequence[Segment]) -> Cutoffs:
-    """The cut-offs whose fit to one half of the logs, or of the one log, predicts the other half best."""
+    """The cut-offs whose fit to one half of the logs, or of the one log, predicts the other half
+    best.
+    """
     halves: list[Sequence[Segment]] = [logs[::2], logs[1::2]]
     if len(logs) == 1:
         middle = len(logs[0]) // 2
@@ -137,7 +142,9 @@ def instruments(logs: Sequence[Segment]) -> tuple[FloatArray, FloatArray]:
 
 
 def _tracked(log: Segment, p: FloatArray, cutoff: float) -> Motion:
-    """What the arm of `p` does under the measured torque and a controller that tracks the measured motion."""
+    """What the arm of `p` does under the measured torque and a controller that tracks the measured
+    motion.
+    """
     wanted, speeds, _ = smoothed(log, cutoff)
     k1, k2, k3, k4, k5, b1, b2, f1, f2, j2, o1, o2 = p.tolist()
     stiffness = np.array([k5 + k3 + 2 * k1, k3 + j2]) * _TRACKED**2

@@ -1,4 +1,5 @@
-"""Arms of the race, simulated by a road of their own: the general planar arm under the Runge-Kutta method.
+"""Arms of the race, simulated by a road of their own: the general planar arm under the Runge-Kutta
+method.
 
 ======  ================================================  =======================
 symbol  name                                              shape
@@ -38,7 +39,9 @@ Drive = Callable[[float, FloatArray], FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A simulated arm: constants, link 1's length in m, a log, another to predict, the bound (7,) where it is known."""
+    """A simulated arm: constants, link 1's length in m, a log, another to predict, the bound (7,)
+    where it is known.
+    """
 
     kind: str
     seed: int

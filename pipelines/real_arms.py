@@ -1,4 +1,5 @@
-"""Arms with the errors of real joints and sensors, simulated by a road of its own: no code of the estimators.
+"""Arms with the errors of real joints and sensors, simulated by a road of its own: no code of the
+estimators.
 
 All arms of all rows are integrated side by side by the classical Runge-Kutta method, at steps of
 `STEP` s.
@@ -197,7 +198,9 @@ class _Case:
 
 
 def _wandering(count: int, rng: np.random.Generator) -> FloatArray:
-    """An Ornstein-Uhlenbeck process (2, count) of unit variance, at half the steps of the integration."""
+    """An Ornstein-Uhlenbeck process (2, count) of unit variance, at half the steps of the
+    integration.
+    """
     from scipy.signal import lfilter
 
     keep = np.exp(-0.5 * STEP / PERSISTENCE)

@@ -1,4 +1,5 @@
-"""Sets of runs of real arms against the fit of all others: whether any is Failed, or sure and wrong.
+"""Sets of runs of real arms against the fit of all others: whether any is Failed, or sure and
+wrong.
 
     python -m pipelines.real_sets ../shared/data --most 30
 
@@ -36,7 +37,9 @@ FAR = 3.0
 
 @dataclass(frozen=True)
 class Case:
-    """A set of runs: its verdict's grade and headline, exit code, and the largest distance of k1 … k5 in σ."""
+    """A set of runs: its verdict's grade and headline, exit code, and the largest distance of k1 …
+    k5 in σ.
+    """
 
     runs: tuple[int, ...]
     grade: str
@@ -73,7 +76,9 @@ def cases(folder: Path, arm: str, size: int, most: int) -> Iterator[Case]:
 
 
 def _distance(result: Result, others: Result) -> float:
-    """The largest distance in standard deviations of the difference, of estimates that may be used."""
+    """The largest distance in standard deviations of the difference, of estimates that may be
+    used.
+    """
     far: list[float] = [0.0]
     for name in NAMES:
         one, other = result.parameters[name], others.parameters[name]

@@ -1,9 +1,10 @@
-"""Six runs of one motion beside six different motions: whether repeats count as more than they tell.
+"""Six runs of one motion beside six different motions: whether repeats count as more than they
+tell.
 
     python -m pipelines.repeats --arms 3
 
-What the model lacks is the same in each repeat, so that their estimates agree and are wrong together.
-Asked are 92 % of the intervals of k1 … k7.
+What the model lacks is the same in each repeat, so that their estimates agree and are wrong
+together. Asked are 92 % of the intervals of k1 … k7.
 """
 
 from __future__ import annotations

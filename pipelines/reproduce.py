@@ -1,4 +1,5 @@
-"""How often a torque reaches the errors of the paper's Table 4, and what speed and observer do to them.
+"""How often a torque reaches the errors of the paper's Table 4, and what speed and observer do to
+them.
 
     python -m pipelines.reproduce
 
@@ -139,7 +140,8 @@ def print_choices() -> None:
                 share = np.abs(error) / np.array(paper)
                 worst = int(np.argmax(share))
                 print(
-                    f"{case_name:6} {name:20} {readout:25} {share[worst]:8.3g}  {names[worst]}: {error[worst]:+.3g} %"
+                    f"{case_name:6} {name:20} {readout:25} {share[worst]:8.3g}  {names[worst]}: "
+                    f"{error[worst]:+.3g} %"
                 )
     print()
 
@@ -185,7 +187,8 @@ def print_shares(pool: ProcessPoolExecutor, count: int) -> None:
     """Print which share of `count` random torques reaches Table 4."""
     batches = -(-count // BATCH)
     print(
-        f"Random torques that reach Table 4, of {batches * BATCH}; errors as multiples of the paper's"
+        f"Random torques that reach Table 4, of {batches * BATCH}; errors as multiples of the "
+        "paper's"
     )
     print(f"{'case':6} {'gain':20} {'reach it':>8} {'share, 95 %':>22} {'best':>8} {'median':>8}")
     for case_name in CASES:
@@ -200,7 +203,9 @@ def print_shares(pool: ProcessPoolExecutor, count: int) -> None:
 
 
 def print_map(pool: ProcessPoolExecutor) -> None:
-    """Print the median of the largest error over the torque's speed and the observer's slow pole."""
+    """Print the median of the largest error over the torque's speed and the observer's
+    slow pole.
+    """
     print(f"\nMedian of the largest error over {MAPPED} torques, as a multiple of the paper's")
     for case_name in CASES:
         heading = "".join(f"{f'{pole:g} rad/s':>12}" for pole in POLES)

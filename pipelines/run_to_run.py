@@ -168,7 +168,9 @@ def evaluate(folder: Path, splits: int, model: str = NO_FLAG) -> list[Row]:
 
 
 def _repeatability(found: Sequence[_Half]) -> float:
-    """Scatter of k1 … k5 between halves over their size, in %: the root of the mean square, the mean of the five."""
+    """Scatter of k1 … k5 between halves over their size, in %: the root of the mean square, the
+    mean of the five.
+    """
     scatter = []
     for name in ("k1", "k2", "k3", "k4", "k5"):
         pairs = [

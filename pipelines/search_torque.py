@@ -1,4 +1,5 @@
-"""Search the slow multi-sine torques with which the paper's method reaches the errors of its Table 4.
+"""Search the slow multi-sine torques with which the paper's method reaches the errors of its Table
+4.
 
 The paper does not state the torque behind Table 4. Its observer lags more the faster the arm
 moves, so the torque decides the errors. This script seeks, for one case, four harmonics a joint
@@ -121,7 +122,9 @@ def table4_errors(case: Case, x_r: FloatArray, x_m: FloatArray) -> FloatArray:
 
 
 def shares(case: Case, genes: FloatArray) -> FloatArray:
-    """The errors (12, B) as shares of the paper's, sign kept, for the candidates `genes` (24, B)."""
+    """The errors (12, B) as shares of the paper's, sign kept, for the candidates
+    `genes` (24, B).
+    """
     paper = np.array(list(case.paper_error_percent.values()))[:, None]
     with np.errstate(all="ignore"):
         found = errors(case, genes) / paper
@@ -146,7 +149,9 @@ def first_points(case: Case, points: int, count: int, seed: int) -> FloatArray:
 
 
 def evolve(case: Case, start: FloatArray, generations: int, seed: int) -> tuple[FloatArray, float]:
-    """The candidate (24,) that CMA-ES reaches from `start` (24,), rounded as it will be written, and its share."""
+    """The candidate (24,) that CMA-ES reaches from `start` (24,), rounded as it will be written,
+    and its share.
+    """
     import cma
 
     low, high = np.array(BOUNDS).T

@@ -1,4 +1,5 @@
-"""Print Table 4 of both cases: the paper's errors, those of its method here, and the refined estimator's.
+"""Print Table 4 of both cases: the paper's errors, those of its method here, and the refined
+estimator's.
 
 python -m pipelines.table4 build/demo
 """
@@ -25,7 +26,8 @@ def rows(folder: Path, estimator: str, case: str) -> list[Table4Row]:
 def table4(folder: Path) -> Table:
     """Errors in percent: by case the paper's print, its method here, the refined estimator."""
     table = Table(
-        title="Table 4, estimation error (%): the paper's print, its method here, and algid's refined estimator",
+        title="Table 4, estimation error (%): the paper's print, its method here, and algid's "
+        "refined estimator",
         title_justify="left",
         box=box.SIMPLE_HEAD,
         pad_edge=False,
@@ -51,5 +53,6 @@ def table4(folder: Path) -> Table:
 if __name__ == "__main__":
     Console().print(table4(Path(sys.argv[1])))
     print(
-        "The torque was sought for this table, which the paper does not state: see `algid guide paper`."
+        "The torque was sought for this table, which the paper does not state: see `algid guide "
+        "paper`."
     )

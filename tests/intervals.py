@@ -14,7 +14,8 @@ CHANCE = 1e-3  # that right intervals fail, one side and the other together
 
 
 def holds_95(ratios: FloatArray) -> None:
-    """Fail unless independent errors over the half widths of their intervals, `ratios`, are those of 95 % intervals.
+    """Fail unless independent errors over the half widths of their intervals, `ratios`, are those
+    of 95 % intervals.
 
     As many as 95 % of them have to lie within ±1, by the binomial distribution; and had the
     intervals been of 90 %, the same draws would fail: a test that could not tell them apart fails
@@ -42,5 +43,7 @@ def holds_at_least_95(ratios: FloatArray) -> None:
 
 
 def in_axes(error: FloatArray, covariance: FloatArray, quantile: float) -> FloatArray:
-    """Errors (Q,) over half widths along the covariance's own axes (Q,), where they are independent."""
+    """Errors (Q,) over half widths along the covariance's own axes (Q,), where they are
+    independent.
+    """
     return np.linalg.solve(np.linalg.cholesky(covariance), error) / quantile

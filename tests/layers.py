@@ -1,4 +1,6 @@
-"""Which room of the house may import which: a table, and what breaks it, read from the source without running it."""
+"""Which room of the house may import which: a table, and what breaks it, read from the source
+without running it.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ PURE = frozenset(
 
 @dataclass(frozen=True)
 class Room:
-    """What a room may import: other rooms, packages, and of the standard library a list or (None) all of it."""
+    """What a room may import: other rooms, packages, and of the standard library a list or (None)
+    all of it.
+    """
 
     rooms: frozenset[str]
     packages: frozenset[str]
@@ -41,7 +45,9 @@ def room(rooms: str = "", packages: str = "", library: frozenset[str] | None = N
 
 
 def breaches(sources: Mapping[str, str], table: Mapping[str, Room]) -> Iterator[str]:
-    """Every import in `sources` (text by module) that `table` (room by name, lower ones first) does not allow."""
+    """Every import in `sources` (text by module) that `table` (room by name, lower ones first)
+    does not allow.
+    """
     for module, text in sources.items():
         own = _room(module)
         if own in ("", "__main__"):

@@ -1,4 +1,6 @@
-"""A local server that speaks S3 and counts what it hands out, and a log with cameras beside the joints."""
+"""A local server that speaks S3 and counts what it hands out, and a log with cameras beside the
+joints.
+"""
 
 from __future__ import annotations
 
@@ -101,7 +103,9 @@ def s3(monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
 
 
 def with_cameras(path: Path, log: Log, images: int, size: int = 1 << 20, every: int = 250) -> None:
-    """Joint states in chunks of their own between chunks of `images` images that do not compress."""
+    """Joint states in chunks of their own between chunks of `images` images that do not
+    compress.
+    """
     noise = np.random.default_rng(3)
     with path.open("wb") as stream:
         writer = Writer(stream, chunk_size=1 << 30, compression=CompressionType.ZSTD)

@@ -1,4 +1,5 @@
-"""`algid` as its users start it: a process with its own arguments, folder, environment, descriptors and exit code.
+"""`algid` as its users start it: a process with its own arguments, folder, environment,
+descriptors and exit code.
 
 A fresh interpreter spends most of a second on imports. One server a test process has done them,
 computes nothing, and forks for each command. What depends on the interpreter's start or on signals
@@ -140,7 +141,9 @@ def _become(request: dict[str, Any], stdout: int, stderr: int) -> None:
 
 
 def _run_and_exit() -> NoReturn:
-    """Run the command and end as the interpreter does, without the time that it takes to forget all modules."""
+    """Run the command and end as the interpreter does, without the time that it takes to forget
+    all modules.
+    """
     from algid.cli import main
 
     code: int = 1

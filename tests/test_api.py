@@ -50,7 +50,9 @@ def test_a_result_says_what_each_of_its_fields_is() -> None:
 
 
 def _sections(thing: object) -> dict[str, set[str]]:
-    """By numpydoc's heading the names that its lines explain: before a colon, with commas between them."""
+    """By numpydoc's heading the names that its lines explain: before a colon, with commas between
+    them.
+    """
     parts = re.split(r"^(\w+)\n-+\n", inspect.getdoc(thing) or "", flags=re.MULTILINE)[1:]
     return {
         heading: {
@@ -171,7 +173,10 @@ def test_a_result_keeps_all_that_a_reader_decided(tmp_path: Path) -> None:
         (
             "joints_told",
             "nobody",
-            "log.reading.joints_told: expected 'flag', 'profile', 'names' or 'order', found 'nobody'",
+            (
+                "log.reading.joints_told: expected 'flag', 'profile', 'names' or 'order', found "
+                "'nobody'"
+            ),
         ),
     ],
 )

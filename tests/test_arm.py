@@ -157,7 +157,9 @@ def _by_pinocchio(pin: Any, arm: Arm, payload: float) -> Any:
 @pytest.mark.parametrize("g", [9.81, 1.62, 0.0])
 @pytest.mark.parametrize("payload", [0.0, PAYLOAD])
 def test_torque_inertia_and_energy_are_those_of_pinocchio(payload: float, g: float) -> None:
-    """Arms drawn at random, by recursive Newton-Euler, the composite rigid bodies and the bodies' own energies."""
+    """Arms drawn at random, by recursive Newton-Euler, the composite rigid bodies and the bodies'
+    own energies.
+    """
     pin = pytest.importorskip("pinocchio")
     draw = np.random.default_rng(11)
     theta, omega, alpha = states(20)

@@ -1,4 +1,6 @@
-"""What is loaded past SciPy's packages is SciPy's, and the quantiles are those of `scipy.special`."""
+"""What is loaded past SciPy's packages is SciPy's, and the quantiles are those of
+`scipy.special`.
+"""
 
 import json
 import subprocess
@@ -76,7 +78,8 @@ print(json.dumps([packages, tail, float(scipy.special.chdtrc(4, 3.0)), compiled.
 """
 REFUSAL = (
     "lambda self, module, real=importlib.machinery.ExtensionFileLoader.exec_module: "
-    "refuse(self, module) if 'linalg._flapack' in module.__name__ and 'scipy.linalg' not in sys.modules "
+    "refuse(self, module) if 'linalg._flapack' in module.__name__ and 'scipy.linalg' not in "
+    "sys.modules "
     "else real(self, module)"
 )
 

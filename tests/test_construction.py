@@ -1,4 +1,6 @@
-"""Files and folders under construction: what a killed run leaves goes, what another run makes stays."""
+"""Files and folders under construction: what a killed run leaves goes, what another run makes
+stays.
+"""
 
 from __future__ import annotations
 

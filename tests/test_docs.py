@@ -1,4 +1,5 @@
-"""Every command of the README and the guide, run as it stands, and its output compared with the one shown.
+"""Every command of the README and the guide, run as it stands, and its output compared with the
+one shown.
 
 A fence ``sh`` is run by bash in an empty folder of its page, one block after another; ``sh
 install`` needs the network and a clean clone (the slow lane runs it); ``sh elsewhere`` needs a
@@ -47,7 +48,9 @@ def blocks(text: str) -> list[Block]:
 
 
 def run(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run a block as a person would type it: bash, the environment activated, stop at the first failure."""
+    """Run a block as a person would type it: bash, the environment activated, stop at the first
+    failure.
+    """
     environment = {
         **os.environ,
         "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",

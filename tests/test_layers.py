@@ -49,36 +49,44 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "arm errors faults files limits log notices profile ros2 runtime units words",
         "google h5py lz4 mcap numpy polars pyarrow rosbags scipy zstandard",
     ),
-    "inspection": room("arm errors estimators faults log notices profile readers signals units words", "numpy"),
+    "inspection": room("arm errors estimators faults log notices profile readers signals units "
+                       "words", "numpy"),
     "report": room(
-        "arm errors files inspection methods model notices progress results ros2 text verdict words",
+        "arm errors files inspection methods model notices progress results ros2 text verdict "
+        "words",
         "matplotlib mcap numpy plotly polars pyarrow rich"
     ),
     "check": room("errors files results", "pydantic"),
     "identification": room(
-        "arm errors estimators files inspection log methods model notices physics profile progress readers report "
+        "arm errors estimators files inspection log methods model notices physics profile "
+        "progress readers report "
         "results runtime settings signals table4 text",
         "numpy polars pyarrow",
     ),
     "batches": room(
-        "construction errors files identification limits profile readers results runtime settings stores text verdict",
+        "construction errors files identification limits profile readers results runtime settings "
+        "stores text verdict",
         "distributed mcap polars pyarrow pydantic",
     ),
     "tracks": room(
-        "arm errors estimators files identification model notices profile report results runtime signals text verdict "
+        "arm errors estimators files identification model notices profile report results runtime "
+        "signals text verdict "
         "words",
         "mcap numpy polars pyarrow pydantic",
     ),
     "designs": room(
-        "arm compiled errors estimators files identification log model notices progress report results "
+        "arm compiled errors estimators files identification log model notices progress report "
+        "results "
         "signals synth text verdict writers",
         "numpy polars pydantic scipy",
     ),
     "exports": room("arm errors files identification model notices physics results text words", "numpy scipy"),
     "fleet": room("errors files limits model notices physics progress report text verdict words", "numpy polars scipy"),
     "api": room(
-        "batches check designs errors estimators example exports files fleet identification inspection limits log "
-        "methods model notices physics profile progress readers report results runtime settings stores synth tracks "
+        "batches check designs errors estimators example exports files fleet identification "
+        "inspection limits log "
+        "methods model notices physics profile progress readers report results runtime settings "
+        "stores synth tracks "
         "units writers",
         "matplotlib numpy polars",
     ),

@@ -127,6 +127,7 @@ def test_a_notice_is_plain_data() -> None:
     one = Notice("WRONG_ZERO", numbers={"turn": -90.0}, remedies=(REMEDIES[0],))
     assert (
         one.clause
-        == 'gravity is turned by -90°: θ1 is not from the horizontal: --zero hanging (profile: zero = "hanging")'
+        == "gravity is turned by -90°: θ1 is not from the horizontal: --zero hanging (profile: "
+        'zero = "hanging")'
     )
     assert json.dumps(dict(one.numbers)) == '{"turn": -90.0}'

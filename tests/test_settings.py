@@ -1,4 +1,6 @@
-"""One place for what decides an identification: fields, options and what a result remembers are the same."""
+"""One place for what decides an identification: fields, options and what a result remembers are
+the same.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Results, tracks and tables of a batch that nobody wrote so: one line that names the file and the place."""
+"""Results, tracks and tables of a batch that nobody wrote so: one line that names the file and the
+place.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""The verbs: each command is a thin skin over one, with its settings as keywords, and each example runs."""
+"""The verbs: each command is a thin skin over one, with its settings as keywords, and each example
+runs.
+"""
 
 from __future__ import annotations
 

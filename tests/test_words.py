@@ -1,4 +1,6 @@
-"""The words of messages: numbers and their nouns agree, and a flag stands before the line of a profile."""
+"""The words of messages: numbers and their nouns agree, and a flag stands before the line of a
+profile.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,8 @@ ROOT = Path(algid.__file__).parent
 VERBS = frozenset(
     re.findall(
         "[a-z]+",
-        "as breaks claims comes counts depends does freezes gives has holds is jumps leads less lies ns stands states "
+        "as breaks claims comes counts depends does freezes gives has holds is jumps leads less "
+        "lies ns stands states "
         "swaps takes unpacks was",
     )
 )
@@ -24,7 +27,8 @@ VERBS = frozenset(
 BETWEEN = frozenset(
     re.findall(
         "[a-z]+",
-        "a an and are at by for from had have in into may never of on or the to was were where which with",
+        "a an and are at by for from had have in into may never of on or the to was were where "
+        "which with",
     )
 )
 """What no adjective of a noun is."""
@@ -41,7 +45,9 @@ def test_a_noun_agrees_with_its_number() -> None:
 
 
 def plural(text: str) -> str | None:
-    """The noun in the plural with which a text goes on behind a number, if it does: ``samples``, ``moving joints``."""
+    """The noun in the plural with which a text goes on behind a number, if it does: ``samples``,
+    ``moving joints``.
+    """
     found = re.match(r" ([a-z]+)(?: ([a-z]+))?", text)
     if found is None:
         return None
@@ -53,7 +59,9 @@ def plural(text: str) -> str | None:
 
 
 def fixed(value: ast.FormattedValue) -> bool:
-    """Whether this is a constant of the house, a text, or a measured number with its digits: 1.3 degrees."""
+    """Whether this is a constant of the house, a text, or a measured number with its digits: 1.3
+    degrees.
+    """
     inner = value.value
     if isinstance(inner, ast.Call):
         asked = (
@@ -83,7 +91,9 @@ def fixed(value: ast.FormattedValue) -> bool:
 
 
 def unhelped(source: str) -> Iterator[str]:
-    """Every formatted number with a noun in the plural behind it that does not ask how many there are."""
+    """Every formatted number with a noun in the plural behind it that does not ask how many there
+    are.
+    """
     for node in ast.walk(ast.parse(source)):
         if not isinstance(node, ast.JoinedStr):
             continue

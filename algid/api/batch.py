@@ -93,7 +93,9 @@ def batch(
     complain: Complaint | None = None,
     **options: Any,
 ) -> Batched:
-    """Identify many logs: a result folder a job and ``jobs.parquet``; what is done is not done again.
+    """Identify many logs: a result folder a job and ``jobs.parquet``.
+
+    What is done is not done again.
 
     Parameters
     ----------
@@ -259,7 +261,10 @@ def watched(
     retry_failed: bool,
     complain: Complaint | None = None,
 ) -> Ended:
-    """Look for logs until stopped; nothing but settled ones are taken, and a trouble is told once."""
+    """Look for logs until stopped.
+
+    Nothing but settled ones are taken, and a trouble is told once.
+    """
     from algid.batches.discover import jobs_of
     from algid.batches.run import LOOK_EVERY, Settling
 

@@ -27,7 +27,9 @@ def convert(
     progress: Progress | None = None,
     **options: Any,
 ) -> list[Notice]:
-    """Write a log in another format, in SI units, with canonical names; a synthetic one keeps its truth.
+    """Write a log in another format, in SI units, with canonical names.
+
+    A synthetic one keeps its truth.
 
     Parameters
     ----------

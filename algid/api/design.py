@@ -286,7 +286,8 @@ def noise_of(
             levels[name] = getattr(measured, name)
         else:
             raise SettingError(
-                f"{flag}: {prior.source} does not tell how noisy the sensors are; give it, or --noise-from LOG"
+                f"{flag}: {prior.source} does not tell how noisy the sensors are; give it, or "
+                "--noise-from LOG"
             )
     return NoiseLevels(**levels)
 

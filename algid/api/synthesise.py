@@ -103,7 +103,9 @@ def synthesise(
     force: bool = False,
     progress: Progress | None = None,
 ) -> tuple[Log, ...]:
-    """Logs of a simulated arm: unloaded and, if it has a payload, loaded; or one of a changing payload.
+    """Logs of a simulated arm: unloaded and, if it has a payload, loaded.
+
+    Or one of a changing payload.
 
     Parameters
     ----------
@@ -232,11 +234,13 @@ class _Asked:
         if self.rate * duration > most:
             raise SettingError(
                 f"--duration: {duration:g} s at --rate {self.rate:g} Hz are "
-                f"{self.rate * duration:.3g} samples; expected at most {most:g}, more than a day at 1 kHz"
+                f"{self.rate * duration:.3g} samples; expected at most {most:g}, more than a day "
+                "at 1 kHz"
             )
         if round(self.rate * duration) < 1:
             raise SettingError(
-                f"--duration: expected at least {1 / self.rate:g} s, two samples at --rate {self.rate:g}, "
+                f"--duration: expected at least {1 / self.rate:g} s, two samples at --rate "
+                f"{self.rate:g}, "
                 f"found {duration:g}"
             )
         return run.Recording(self.rate, duration, sensors=self.sensors)
@@ -247,7 +251,8 @@ def _refuse_beside_motion(initial: object, schedule: object, excitation: object)
     for flag, value in given.items():
         if value is not None:
             raise SettingError(
-                f"{flag} {value}: a motion starts where it was planned and carries one payload; leave it out"
+                f"{flag} {value}: a motion starts where it was planned and carries one payload; "
+                "leave it out"
             )
 
 
@@ -315,7 +320,8 @@ def _schedule(given: Schedule | str) -> list[tuple[float, float]]:
         and all(0 <= time <= longest and 0 <= m <= heaviest for time, m in schedule)
     ):
         raise SettingError(
-            f"--payload-schedule: expected increasing times and payloads of 0 or more like 2=0.05,4=0, found {given!r}"
+            "--payload-schedule: expected increasing times and payloads of 0 or more like "
+            f"2=0.05,4=0, found {given!r}"
         )
     return schedule
 

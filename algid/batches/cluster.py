@@ -162,9 +162,15 @@ def misfit_of(version: str, mark: str | None, out: str) -> Callable[[], str | No
         except ImportError:
             return f"{socket.gethostname()}: algid is not installed there; install algid {version}"
         if found != version:
-            return f"{socket.gethostname()}: algid {found} stands there; install algid {version} and restart the worker"
+            return (
+                f"{socket.gethostname()}: algid {found} stands there; install algid {version} "
+                "and restart the worker"
+            )
         if mark is not None and not os.path.exists(mark):  # noqa: PTH110  # nothing but what is named here is certain
-            return f"{socket.gethostname()}: it does not see {out}; choose a place with -o that all machines see"
+            return (
+                f"{socket.gethostname()}: it does not see {out}; choose a place with -o that "
+                "all machines see"
+            )
         return None
 
     return misfit
@@ -394,6 +400,9 @@ def answered_within(call: bytes, timeout: float | None) -> bytes:
         )
         thread.join(LAST_SECONDS)
         if thread.is_alive():
-            reason += f"; it still runs on {socket.gethostname()}, process {os.getpid()}: restart that worker"
+            reason += (
+                f"; it still runs on {socket.gethostname()}, process {os.getpid()}: restart "
+                "that worker"
+            )
         return pickle.dumps((False, reason))
     return answers.get()

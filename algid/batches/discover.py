@@ -152,7 +152,8 @@ def _walk(folder: Path, out: str) -> Iterator[_File]:
                 raise
             yield _File(
                 place,
-                trouble=f"{kept_path(place)}: cannot look there ({error.strerror}); check its rights",
+                trouble=f"{kept_path(place)}: cannot look there ({error.strerror}); check its "
+                "rights",
             )
             continue
         if BAG in files and place != str(folder):
@@ -281,5 +282,8 @@ def _of_one_name(first: Job, second: Job) -> Job:
         for one in (first.logs + second.logs, first.loaded + second.loaded)
     )
     paths = ", ".join(map(kept_path, [*logs, *loaded][:MOST_NAMED]))
-    trouble = f"{first.name}: two jobs of one name ({paths}); rename a log, or name the jobs in a manifest"
+    trouble = (
+        f"{first.name}: two jobs of one name ({paths}); rename a log, or name the jobs in a "
+        "manifest"
+    )
     return replace(first, logs=logs, loaded=loaded, trouble=trouble)

@@ -160,7 +160,13 @@ def record_name(job: str) -> str:
 
 
 def prepare(store: Store) -> None:
-    """Make room for records, before any job has run. Raises `OutputError` where none can be written."""
+    """Make room for records, before any job has run.
+
+    Raises
+    ------
+    OutputError
+        Where none can be written, or something else stands in their place.
+    """
     if store.folder is None:
         return
     for name, wanted in ((FOLDER, True), (TABLE, False)):
@@ -169,7 +175,8 @@ def prepare(store: Store) -> None:
         if os.path.lexists(path) and path.is_dir() != wanted:
             kind = "folder" if wanted else "file"
             raise OutputError(
-                f"{path}: expected a {kind} of algid's own; move it, or choose another folder with -o"
+                f"{path}: expected a {kind} of algid's own; move it, or choose another folder "
+                "with -o"
             )
     with writing(store.folder / FOLDER):
         (store.folder / FOLDER).mkdir(parents=True, exist_ok=True)

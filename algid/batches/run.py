@@ -56,12 +56,19 @@ class Recipe:
     report: bool = True
 
     def task(self, job: Job) -> Task:
-        """The job with all that decides its outcome. Raises `SettingError` where it cannot be run so."""
+        """The job with all that decides its outcome.
+
+        Raises
+        ------
+        SettingError
+            Where it cannot be run so.
+        """
         if job.trouble is not None:
             raise SettingError(job.trouble)
         if not job.logs and self.parameters is None:
             raise SettingError(
-                f"{', '.join(job.loaded)}: a loaded log alone; add the arm's log without payload, named "
+                f"{', '.join(job.loaded)}: a loaded log alone; add the arm's log without payload, "
+                "named "
                 f"{job.name}-unloaded.*, or give the arm's result as --parameters"
             )
         return self._task(job, self.profile(job.profile))

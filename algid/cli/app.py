@@ -93,7 +93,8 @@ def gathered(names: Iterable[str], *, listed: bool = False) -> typer.Typer:
     Commands that are only `listed` have their help and none of their options.
     """
     made = typer.Typer(
-        help="Parameters and payload of a two-link arm, with honest error bars, from its torque and angle logs.",
+        help="Parameters and payload of a two-link arm, with honest error bars, from its torque "
+        "and angle logs.",
         no_args_is_help=True,
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["-h", "--help"]},

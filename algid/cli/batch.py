@@ -112,7 +112,10 @@ def _progress(quiet: bool) -> Iterator[Callable[[Progress], None]]:
         return
 
     def show(progress: Progress) -> None:
-        text = f"{progress.done}/{progress.total} {progress.last.job.name[:50]}: {progress.last.status.value}"
+        text = (
+            f"{progress.done}/{progress.total} {progress.last.job.name[:50]}: "
+            f"{progress.last.status.value}"
+        )
         print(f"\r\x1b[2K{text}", end="", file=sys.stderr, flush=True)
 
     try:
@@ -130,7 +133,8 @@ def _conclude(ended: Batched, quiet: bool) -> None:
             say(f"{visible(record.job.name)}: {record.status.value}: {visible(record.reason)}")
         summary = ", ".join(f"{count} {name}" for name, count in ended.counts.items())
         say(
-            f"{summary or 'nothing done'}; {ended.ran} run now, {ended.left} left; {ended.out}/jobs.parquet"
+            f"{summary or 'nothing done'}; {ended.ran} run now, {ended.left} left; "
+            f"{ended.out}/jobs.parquet"
         )
     if ended.stopped is not None:
         complain(ended.stopped)

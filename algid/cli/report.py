@@ -22,7 +22,8 @@ class PlotFormat(StrEnum):
 SavePlots = Annotated[
     Path | None,
     typer.Option(
-        help="Folder for each figure as a file of its own, for papers; needs matplotlib: algid[plots]."
+        help="Folder for each figure as a file of its own, for papers; needs matplotlib: "
+        "algid[plots]."
     ),
 ]
 

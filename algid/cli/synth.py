@@ -56,7 +56,8 @@ def synth(
         str | None,
         typer.Option(
             autocompletion=or_files("case", "wide", "none"),
-            help="case (the case's own, the default), wide (0.3 to 8 Hz), none, or a log to replay.",
+            help="case (the case's own, the default), wide (0.3 to 8 Hz), none, or a log to "
+            "replay.",
         ),
     ] = None,
     motion: Annotated[

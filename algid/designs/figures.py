@@ -44,7 +44,8 @@ def _motion(design: Design) -> Figure:
     if any(panel.layout["shapes"] for panel in panels):
         legend += (Legend("", "its limits", "@muted", "dash"),)
         reading += (
-            " Limits hold for every arm that is believed possible, which is why the believed one keeps some distance "
+            " Limits hold for every arm that is believed possible, which is why the believed one "
+            "keeps some distance "
             "from its torques' limits."
         )
     return Figure("motion", "The motion", tuple(panels), reading, legend)
@@ -81,5 +82,8 @@ def _teaching(design: Design) -> Figure:
     shares = 100 * design.shares
     x = (np.arange(shares.shape[1]) + 0.5) * SECOND
     panel = information_panel(design.names, x, shares, SCALE)
-    reading = "Read: strongly coloured seconds teach most; cut the motion there, and that parameter's error bar grows."
+    reading = (
+        "Read: strongly coloured seconds teach most; cut the motion there, and that "
+        "parameter's error bar grows."
+    )
     return Figure("teaching", "Which second teaches what", (panel,), reading)

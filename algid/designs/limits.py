@@ -210,13 +210,16 @@ def _missed(row: Row, limits: Limits, most: float) -> str:
         reach = float(limits.lengths.sum())
         lowest = reach - most * (reach - limits.height)
         return (
-            f"--tip-height: within the range the tip rises no higher than {lowest:.3g} m, the limit asks for "
+            f"--tip-height: within the range the tip rises no higher than {lowest:.3g} m, the "
+            "limit asks for "
             f"{limits.height:.3g} m (margin included); lower it, or widen --range"
         )
     assert row.joint is not None
     limit = limits.torque[row.joint]
     with_load = "loaded " if row.loaded else ""
     return (
-        f"--torque: the {with_load}arm asks for {most * limit:.3g} N m at joint {row.joint + 1} even at rest, the "
-        f"limit is {limit:.3g} N m (margin included); raise it, or move --range to where gravity pulls less"
+        f"--torque: the {with_load}arm asks for {most * limit:.3g} N m at joint {row.joint + 1} "
+        "even at rest, the "
+        f"limit is {limit:.3g} N m (margin included); raise it, or move --range to where gravity "
+        "pulls less"
     )

@@ -94,7 +94,8 @@ def prior_of(source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedA
     k1, k3, k5 = abs(complex(value["k1"], value.get("k1s", 0.0))), value["k3"], value["k5"]
     if min(k3, k5) <= 0 or k3 * k5 <= k1**2:
         raise SettingError(
-            f"{source}: its inertia matrix is not positive definite (k1 {k1:.3g}, k3 {k3:.3g}, k5 {k5:.3g} "
+            f"{source}: its inertia matrix is not positive definite (k1 {k1:.3g}, k3 {k3:.3g}, k5 "
+            f"{k5:.3g} "
             "kg m²); no arm is like that: identify it anew, or describe the arm in a TOML file"
         )
     return prior
@@ -210,7 +211,15 @@ def _spread(
     given: set[str],
     error: float | None,
 ) -> FloatArray:
-    """F (Q, Q): a root of the result's covariance; what has no error bar is wrong by `error` at `SURE` deviations."""
+    """F (Q, Q): a root of the result's covariance.
+
+    What has no error bar is wrong by `error` at `SURE` deviations.
+
+    Raises
+    ------
+    ResultError
+        Where a constant has no error bar and no `error` is given.
+    """
     covariance = np.zeros((len(names), len(names)))
     known = [name for name in names if name not in given and has_error_bar(result, name)]
     if known and result.fit is not None:
@@ -228,7 +237,8 @@ def _spread(
             else f"the result leaves {', '.join(without)} without error bars"
         )
         raise ResultError(
-            f"{source}: {why}; identify from logs that tell, or say how wrong it may be: --prior-error"
+            f"{source}: {why}; identify from logs that tell, or say how wrong it may be: "
+            "--prior-error"
         )
     for name in bare:
         row = names.index(name)

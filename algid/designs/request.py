@@ -85,7 +85,8 @@ def limits_of(asked: Request, lengths: FloatArray) -> Limits:
     for name in ("range", "speed", "torque"):
         if name not in asked.content:
             raise SettingError(
-                f"--{name}: it must be given, or `{name} = …` in the file of --limits; inf is no limit at all"
+                f"--{name}: it must be given, or `{name} = …` in the file of --limits; inf is no "
+                "limit at all"
             )
     for name in ("range", "speed", "acceleration", "torque"):
         _check(name, asked.content.get(name))
@@ -114,7 +115,8 @@ def _check(name: str, value: Any) -> None:
     wrong = ~(np.isinf(numbers) | (numbers == 0) | ((numbers >= SMALLEST) & (numbers <= LARGEST)))
     if np.any(wrong):
         raise SettingError(
-            f"--{name}: expected from {SMALLEST:g} to {LARGEST:g}, or inf, found {numbers[wrong][0]:g}"
+            f"--{name}: expected from {SMALLEST:g} to {LARGEST:g}, or inf, found "
+            f"{numbers[wrong][0]:g}"
         )
 
 
@@ -134,7 +136,8 @@ def _range(value: Any) -> tuple[FloatArray, FloatArray]:
             )
         if np.isfinite(low[joint]) != np.isfinite(high[joint]):
             raise SettingError(
-                f"--range: expected both ends of joint {joint + 1} or neither, found {low[joint]:g}:{high[joint]:g}; "
+                f"--range: expected both ends of joint {joint + 1} or neither, found "
+                f"{low[joint]:g}:{high[joint]:g}; "
                 "give a wide one in place of inf"
             )
     return low, high

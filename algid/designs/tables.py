@@ -59,7 +59,8 @@ def bound_table(design: Design) -> Table:
     )
     runs = design.campaign.experiment.runs
     note = (
-        f"One standard deviation, from {_runs(runs)} together, if sensors are as noisy as told. The worst arm is the "
+        f"One standard deviation, from {_runs(runs)} together, if sensors are as noisy as told. "
+        "The worst arm is the "
         "worst of 20 drawn from what is believed."
     )
     return Table("What the campaign will tell", columns, tuple(rows), note)
@@ -103,7 +104,8 @@ def limit_table(design: Design) -> Table:
         Column("Binds", "text"),
     )
     note = (
-        f"A margin of {percent(design.campaign.margin, 1.0)} % is left for what a controller overshoots. Torque is the "
+        f"A margin of {percent(design.campaign.margin, 1.0)} % is left for what a controller "
+        "overshoots. Torque is the "
         "largest that any arm of those believed possible asks for."
     )
     drawn = Drawn("of the limit", gauges({kind: used for kind, (_, used) in tightest.items()}), "%")
@@ -175,6 +177,7 @@ def _headline(design: Design) -> str:
     name = design.names[int(np.argmax(relative))]
     row, used = design.binding[0]
     return (
-        f"every parameter asked for to within {percent(design.largest, 1.0)} % (one σ; {name} is the least certain); "
+        f"every parameter asked for to within {percent(design.largest, 1.0)} % (one σ; {name} is "
+        "the least certain); "
         f"{limit_name(row)} is used to {percent(used, 1.0, 3)} %"
     )

@@ -97,8 +97,14 @@ def joint_trajectory(design: Design, joints: tuple[str, str]) -> str:
     places = [*range(0, design.t.size - 1, every), design.t.size - 1]
     lines = [
         "# trajectory_msgs/msg/JointTrajectory, planned by algid design.",
-        "# Angles in rad: the first joint's from the horizontal (gravity pulls along -y), the second's from link 1.",
-        "# Hanging straight down is (-1.5708, 0). Move the arm slowly to the first point before it is played.",
+        (
+            "# Angles in rad: the first joint's from the horizontal (gravity pulls along -y), the "
+            "second's from link 1."
+        ),
+        (
+            "# Hanging straight down is (-1.5708, 0). Move the arm slowly to the first point before "
+            "it is played."
+        ),
         "header: {stamp: {sec: 0, nanosec: 0}, frame_id: ''}",
         f"joint_names: {json.dumps(list(joints), ensure_ascii=False)}",
         "points:",

@@ -309,7 +309,10 @@ class _Trials:
         return _sizes(solved(self._sums(families[0], log), families, self._free[None])[1]).tolist()
 
     def bent(self) -> float | None:
-        """What is left as the log was read with a phase for each moment; None where one is no phase."""
+        """What is left as the log was read with a phase for each moment.
+
+        None where one is no phase.
+        """
         free = solved(self._sums(AS_READ, self._fine), [AS_READ], self._free[None])
         c = self._free @ free[0][0]
         moments = [c[COLUMNS.index(name) :][:2] for name in ("k1", "k2", "k4")]

@@ -1,17 +1,18 @@
 """Whether least squares may stand: tests of an endogenous torque, and of one that answers the motion.
 
 Torque that the model lacks drives the motion, and least squares is attenuated by it. Instruments
-(`algid.estimators.instruments`) are not, as long as the measured torque does not answer that torque.
-Both are compared with the same terms and the same prior, and the residual with the torque after it:
+(`algid.estimators.instruments`) are not, as long as the measured torque does not answer that
+torque. Both are compared with the same terms and the same prior, and the residual with the torque
+after it:
 
     h  = dᵀ V⁻¹ d,   d = β_instruments − β_least squares          χ² of the number of constants
     r_l = Σ e(t) y(t + l) / (Σ_k N γ_e(k) γ_y(k))^½               normal, where no torque answers
 
 V is the long-run variance of the difference of both estimates' influences, window by window
 (Durbin, Wu & Hausman, in the form that needs no efficient estimate: Wooldridge 2010, §6.3.1); the
-variance of a cross-correlation is Bartlett's 1946. Instruments stand in place of least squares where
-h tells that they differ, no torque answers, and a constant moves by its own standard deviation:
-below that an interval loses less than 5 points of its coverage.
+variance of a cross-correlation is Bartlett's 1946. Instruments stand in place of least squares
+where h tells that they differ, no torque answers, and a constant moves by its own standard
+deviation: below that an interval loses less than 5 points of its coverage.
 
 ======  =======================================================  ==========  =================
 symbol  name                                                     shape       unit
@@ -207,7 +208,10 @@ def _influences(fit: Fit) -> list[FloatArray]:
 
 
 def _variance(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Variance (Q, Q) of the sum of a difference of influences; of the first alone where stretches differ."""
+    """Variance (Q, Q) of the sum of a difference of influences.
+
+    Of the first alone where stretches differ.
+    """
     return long_run_variance(one - other if one.shape == other.shape else one)[0]
 
 

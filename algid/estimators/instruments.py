@@ -202,7 +202,9 @@ def projected(sums: Moments, c: FloatArray, loaded: bool) -> LogInformation:
 def moments(
     sources: Sequence[Source], settings: WeakSettings, c: FloatArray, most: int | None = None
 ) -> list[Moments | None]:
-    """Sums over each log, the windows simulated with coefficients `c`; None of those that these do not move.
+    """Sums over each log, the windows simulated with coefficients `c`.
+
+    None of those that these do not move.
 
     At most `most` pieces of a log are looked at. The windows of many pieces are simulated side by
     side: a step costs the same for few as for many.

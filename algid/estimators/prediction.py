@@ -54,7 +54,8 @@ class PredictionFilter:
 
     def __str__(self) -> str:
         return (
-            f"zero-phase Butterworth, order {self.order}: motion {self.motion:g} Hz, then torque {self.cutoff:g} Hz; "
+            f"zero-phase Butterworth, order {self.order}: motion {self.motion:g} Hz, then torque "
+            f"{self.cutoff:g} Hz; "
             f"{self.dropped:g} s dropped at each end"
         )
 

@@ -128,7 +128,8 @@ def fit(
         if given and not any(log.loaded is loaded_ones for log in logs):
             which = "loaded" if loaded_ones else "unloaded"
             raise TooShortError(
-                f"no {which} log is long enough for the likelihood: expected at least {SHORTEST} samples without a gap"
+                f"no {which} log is long enough for the likelihood: expected at least {SHORTEST} "
+                "samples without a gap"
             )
     try:
         beta, outcomes, iterations, end = _train(shared, logs, start.values, settings, progress)

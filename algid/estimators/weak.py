@@ -190,7 +190,9 @@ def _solved_together(normals: Sequence[Normal], loaded: bool) -> Solved | None:
 
 
 def _solved_without_each(normals: Sequence[Normal], loaded: bool) -> list[Solved | None]:
-    """What `solve` gives without each of several logs, all others in one sum; None without the only one.
+    """What `solve` gives without each of several logs, all others in one sum.
+
+    None without the only one.
 
     The sums without a log are those of all less its own, and many logs' are taken in one product.
     """

@@ -84,7 +84,15 @@ class Linearised:
 
 
 def triangular(factor: FloatArray, columns: FloatArray, transposed: str) -> FloatArray:
-    """L⁻¹ of columns (m, 2 n), or L⁻ᵀ where `transposed` is "T" and not "N"; `factor` is L's band."""
+    """L⁻¹ of columns (m, 2 n), or L⁻ᵀ where `transposed` is "T" and not "N".
+
+    `factor` is L's band.
+
+    Raises
+    ------
+    LinAlgError
+        Where the band is singular.
+    """
     solution, info = lapack.dtbtrs(factor, columns.T, uplo="L", trans=transposed)
     if info != 0:
         raise np.linalg.LinAlgError(f"banded substitution failed with info {info}")

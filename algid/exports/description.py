@@ -72,7 +72,8 @@ def coefficients_of(result: Result, file: str, l1: float | None = None) -> Coeff
     k1, k3, k5 = value["k1"], value["k3"], value["k5"]
     if min(k3, k5) <= 0 or k3 * k5 <= k1**2:
         raise ResultError(
-            f"{file}: its inertia matrix is not positive definite (k1 {k1:.3g}, k3 {k3:.3g}, k5 {k5:.3g} kg m²), so "
+            f"{file}: its inertia matrix is not positive definite (k1 {k1:.3g}, k3 {k3:.3g}, k5 "
+            f"{k5:.3g} kg m²), so "
             "that masses would come out negative; "
             + ("check --l1" if conditioned else "identify it from logs that tell more")
         )
@@ -277,7 +278,10 @@ def header(arm: Description, remarks: list[str]) -> list[str]:
     """Lines of the comment at the top of a file."""
     return [
         f"Two-link arm by algid export, from {arm.source}.",
-        "theta1 from the horizontal, theta2 from link 1, counterclockwise; gravity pulls down; SI units.",
+        (
+            "theta1 from the horizontal, theta2 from link 1, counterclockwise; gravity pulls down; SI "
+            "units."
+        ),
         "",
         *(str(number).rstrip() for number in arm.numbers),
         *([""] if remarks or arm.warnings else []),

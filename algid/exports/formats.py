@@ -82,7 +82,8 @@ def payload_yaml(result: Result, file: str, knowns: Knowns) -> str:
         raise ResultError(f"{file}: the result has no payload; identify with --loaded LOG")
     if mass.estimate <= 0:
         raise ResultError(
-            f"{file}: no load explains a payload of {mass.estimate:.4g} kg; check which log is the loaded one"
+            f"{file}: no load explains a payload of {mass.estimate:.4g} kg; check which log is "
+            "the loaded one"
         )
     given = knowns.l2 or result.settings.get("l2")
     found = result.payload.get("l2")
@@ -96,8 +97,10 @@ def payload_yaml(result: Result, file: str, knowns: Knowns) -> str:
     rows = "".join(f"    - [{', '.join(map(repr, row))}]\n" for row in _covariance(result, shared))
     where = "given" if given else "identified"
     return (
-        f"# Payload by algid export, from {json.dumps(file)}, estimator {result.estimator}; SI units.\n"
-        "# Mass identified; what is 0 below was not told by the logs, or lies out of the arm's plane.\n"
+        f"# Payload by algid export, from {json.dumps(file)}, estimator {result.estimator}; SI "
+        "units.\n"
+        "# Mass identified; what is 0 below was not told by the logs, or lies out of the arm's "
+        "plane.\n"
         f"# centre_of_gravity x {where}, in the frame of link 2: x along the link from joint 2.\n"
         "payload:\n"
         f"  mass: {mass.estimate!r}  # kg\n"

@@ -96,7 +96,10 @@ def links_of(
     if m2 is None:
         m2 = arm.nearest(low, high)
     elif not low < m2 < high:
-        why = f"with link 2 of {m2:g} kg an inertia comes out negative; between {low:.4g} and {high:.4g} kg"
+        why = (
+            f"with link 2 of {m2:g} kg an inertia comes out negative; between {low:.4g} and "
+            f"{high:.4g} kg"
+        )
         raise SettingError(_refusal(file, knowns, why, "m2"))
     return arm.first(m2), arm.second(m2)
 

@@ -196,7 +196,8 @@ class _Robot:
         beside = float(np.cross(about, line) @ centre)
         if abs(beside) > _BESIDE * length:
             warnings.append(
-                f"the centre of link {number} lies {abs(beside):.3g} m beside its line, which is left out"
+                f"the centre of link {number} lies {abs(beside):.3g} m beside its line, which is "
+                "left out"
             )
         along = float(line @ centre)
         second = float(np.trace(body.second) - about @ body.second @ about)  # about the joint

@@ -14,7 +14,10 @@ from algid.exports.links import Link
 from algid.model import EVERY_TERM
 
 HYPHENS = "\N{HYPHEN}\N{HYPHEN}"
-JUMP = "holds Coulomb friction as a jump at standstill, where algid has f tanh(omega / {width:g} rad/s)"
+JUMP = (
+    "holds Coulomb friction as a jump at standstill, where algid has f tanh(omega / {width:g} "
+    "rad/s)"
+)
 TIMESTEP = 5e-4  # s: Runge-Kutta of fourth order errs far below 1e-5 rad a second with it
 
 
@@ -38,28 +41,35 @@ def urdf(arm: Description) -> str:
     def joint(one: Joint, parent: str, child: str, at: float) -> str:
         return (
             f'  <joint name="{one.name}" type="continuous">\n    <parent link="{parent}"/>\n'
-            f'    <child link="{child}"/>\n    <origin xyz="{_numbers(at, 0, 0)}"/>\n    <axis xyz="{_axis(arm)}"/>\n'
-            f'    <dynamics damping="{_numbers(one.damping)}" friction="{_numbers(one.friction)}"/>\n  </joint>\n'
+            f'    <child link="{child}"/>\n    <origin xyz="{_numbers(at, 0, 0)}"/>\n    <axis '
+            f'xyz="{_axis(arm)}"/>\n'
+            f'    <dynamics damping="{_numbers(one.damping)}" '
+            f'friction="{_numbers(one.friction)}"/>\n  </joint>\n'
         )
 
     def link(name: str, one: Link) -> str:
         xx, yy, zz = map(_numbers, one.tensor)
         return (
-            f'  <link name="{name}">\n    <inertial>\n      <origin xyz="{_numbers(one.centre, 0, 0)}"/>\n'
+            f'  <link name="{name}">\n    <inertial>\n      <origin '
+            f'xyz="{_numbers(one.centre, 0, 0)}"/>\n'
             f'      <mass value="{_numbers(one.mass)}"/>\n'
             f'      <inertia ixx="{xx}" iyy="{yy}" izz="{zz}" ixy="0" ixz="0" iyz="0"/>\n'
-            f'    </inertial>\n    <visual>\n      <origin xyz="{_numbers(one.length / 2, 0, 0)}"/>\n'
+            "    </inertial>\n    <visual>\n      <origin "
+            f'xyz="{_numbers(one.length / 2, 0, 0)}"/>\n'
             f'      <geometry><box size="{_box(one)}"/></geometry>\n    </visual>\n  </link>\n'
         )
 
     return (
-        f'<?xml version="1.0"?>\n{_comment(arm, remarks)}\n<robot name="{arm.name}">\n  <link name="base"/>\n'
+        f'<?xml version="1.0"?>\n{_comment(arm, remarks)}\n<robot name="{arm.name}">\n  <link '
+        'name="base"/>\n'
         + joint(joints[0], "base", "link1", 0.0)
         + link("link1", first)
         + joint(joints[1], "link1", "link2", first.length)
         + link("link2", second)
-        + '  <joint name="tip_mount" type="fixed">\n    <parent link="link2"/>\n    <child link="tip"/>\n'
-        f'    <origin xyz="{_numbers(second.length, 0, 0)}"/>\n  </joint>\n  <link name="tip"/>\n</robot>\n'
+        + '  <joint name="tip_mount" type="fixed">\n    <parent link="link2"/>\n    <child '
+        'link="tip"/>\n'
+        f'    <origin xyz="{_numbers(second.length, 0, 0)}"/>\n  </joint>\n  <link '
+        'name="tip"/>\n</robot>\n'
     )
 
 
@@ -72,7 +82,8 @@ def sdf(arm: Description) -> str:
             f'    <joint name="{one.name}" type="revolute">\n      <parent>{parent}</parent>\n'
             f"      <child>{child}</child>\n      <axis>\n        <xyz>{_axis(arm)}</xyz>\n"
             f"        <dynamics><damping>{_numbers(one.damping)}</damping>"
-            f"<friction>{_numbers(one.friction)}</friction></dynamics>\n      </axis>\n    </joint>\n"
+            f"<friction>{_numbers(one.friction)}</friction></dynamics>\n      </axis>\n    "
+            "</joint>\n"
         )
 
     def link(name: str, base: str, at: float, one: Link) -> str:
@@ -81,18 +92,24 @@ def sdf(arm: Description) -> str:
             f"<ixx>{xx}</ixx><iyy>{yy}</iyy><izz>{zz}</izz><ixy>0</ixy><ixz>0</ixz><iyz>0</iyz>"
         )
         return (
-            f'    <link name="{name}">\n      <pose relative_to="{base}">{_numbers(at, 0, 0, 0, 0, 0)}</pose>\n'
+            f'    <link name="{name}">\n      <pose '
+            f'relative_to="{base}">{_numbers(at, 0, 0, 0, 0, 0)}</pose>\n'
             f"      <inertial>\n        <pose>{_numbers(one.centre, 0, 0, 0, 0, 0)}</pose>\n"
-            f"        <mass>{_numbers(one.mass)}</mass>\n        <inertia>{inertia}</inertia>\n      </inertial>\n"
-            f'      <visual name="{name}">\n        <pose>{_numbers(one.length / 2, 0, 0, 0, 0, 0)}</pose>\n'
-            f"        <geometry><box><size>{_box(one)}</size></box></geometry>\n      </visual>\n    </link>\n"
+            f"        <mass>{_numbers(one.mass)}</mass>\n        <inertia>{inertia}</inertia>\n   "
+            "   </inertial>\n"
+            f'      <visual name="{name}">\n        '
+            f"<pose>{_numbers(one.length / 2, 0, 0, 0, 0, 0)}</pose>\n"
+            f"        <geometry><box><size>{_box(one)}</size></box></geometry>\n      </visual>\n "
+            "   </link>\n"
         )
 
     return (
-        f'<?xml version="1.0"?>\n{_comment(arm, remarks)}\n<sdf version="1.9">\n  <model name="{arm.name}">\n'
+        f'<?xml version="1.0"?>\n{_comment(arm, remarks)}\n<sdf version="1.9">\n  <model '
+        f'name="{arm.name}">\n'
         + link("link1", "__model__", 0.0, first)
         + link("link2", "link1", first.length, second)
-        + f'    <frame name="tip" attached_to="link2"><pose>{_numbers(second.length, 0, 0, 0, 0, 0)}</pose></frame>\n'
+        + '    <frame name="tip" '
+        f'attached_to="link2"><pose>{_numbers(second.length, 0, 0, 0, 0, 0)}</pose></frame>\n'
         + joint(joints[0], "world", "link1")
         + joint(joints[1], "link1", "link2")
         + "  </model>\n</sdf>\n"
@@ -122,10 +139,12 @@ def mjcf(arm: Description) -> str:
     return (
         f'{_comment(arm, remarks)}\n<mujoco model="{arm.name}">\n  <compiler angle="radian"/>\n'
         f'  <option gravity="{_numbers(0, 0, -arm.coefficients.model.gravity)}" integrator="RK4" '
-        f'timestep="{_numbers(TIMESTEP)}"/>\n  <worldbody>\n    <body name="link1">\n      {joint(joints[0])}\n'
+        f'timestep="{_numbers(TIMESTEP)}"/>\n  <worldbody>\n    <body name="link1">\n      '
+        f"{joint(joints[0])}\n"
         f'{link(first, "      ")}      <body name="link2" pos="{_numbers(first.length, 0, 0)}">\n'
         f"        {joint(joints[1])}\n"
-        f'{link(second, "        ")}        <site name="tip" pos="{_numbers(second.length, 0, 0)}"/>\n'
+        f'{link(second, "        ")}        <site name="tip" '
+        f'pos="{_numbers(second.length, 0, 0)}"/>\n'
         "      </body>\n    </body>\n  </worldbody>\n  <actuator>\n"
         '    <motor name="motor1" joint="joint1"/>\n    <motor name="motor2" joint="joint2"/>\n'
         "  </actuator>\n</mujoco>\n"

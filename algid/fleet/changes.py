@@ -40,7 +40,10 @@ _LEAST = 1e-300
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """Between logs `place` - 1 and `place` of those that were given; p, and by parameter its step and the step's error."""
+    """Between logs `place` - 1 and `place` of those that were given.
+
+    P, and by parameter its step and the step's error.
+    """
 
     place: int
     p: float

@@ -45,8 +45,8 @@ def windows(jobs: pl.DataFrame, parameter: str, by: tuple[str, ...] = ("robot",)
     Returns
     -------
     pl.DataFrame
-        those of `by`, parameter, month, end (time of its last log), logs, mean, mean_std, slope, slope_std
-        (of the parameter a month; NaN where not tested), p, drift.
+        those of `by`, parameter, month, end (time of its last log), logs, mean, mean_std, slope,
+        slope_std (of the parameter a month; NaN where not tested), p, drift.
     """
     import polars as pl
 

@@ -39,8 +39,10 @@ SIDE_BY_SIDE = 6  # robots that one panel can hold in a colour each
 MOST_ROBOTS = 40  # that it can hold in one
 COLOURS = ("@blue", "@orange", "@green", "@amber", "@red", "@muted")
 READING = (
-    "Read: a dot is a log with its 95 % interval, and leads to its report. A red ring is an outlier; grey is the mean "
-    f"of the {SPAN} months before; an orange line is a drift; at a red line the arm changed at once."
+    "Read: a dot is a log with its 95 % interval, and leads to its report. A red ring is an "
+    "outlier; grey is the mean "
+    f"of the {SPAN} months before; an orange line is a drift; at a red line the arm changed at "
+    "once."
 )
 LEGEND = (
     Legend("log", "a log, ± 95 %", "@blue", "point"),
@@ -107,7 +109,8 @@ def overview(history: History, reports: Mapping[str, str]) -> Figure | None:
             if len(robots) <= SIDE_BY_SIDE
         )
         reading = (
-            "Read: a dot is a log with its 95 % interval, and leads to its report; a red ring is an outlier, "
+            "Read: a dot is a log with its 95 % interval, and leads to its report; a red ring is "
+            "an outlier, "
             "an orange line a drift."
         )
         return Figure("logs", "Every log of every robot", panels, reading, legend, columns=2)
@@ -148,7 +151,10 @@ def _changed(history: History) -> int:
 
 
 def _worth_a_look(history: History) -> list[Marked]:
-    """Drifts, changes and outliers, the clearest of each first; of a fleet without, its clearest trends."""
+    """Drifts, changes and outliers, the clearest of each first.
+
+    Of a fleet without, its clearest trends.
+    """
     import polars as pl
 
     outlying = history.findings.filter(pl.col("kind") == "outlier")

@@ -192,13 +192,17 @@ class History:
         steady = self.roster.filter(~pl.col("tested")).height
         alone = self.roster.filter(pl.col("logs") < FEWEST_PEERS).height
         why = {
-            f"{counted(self.nameless, 'log')} left out for want of a robot: give each robot's logs their own folder, "
+            f"{counted(self.nameless, 'log')} left out for want of a robot: give each robot's "
+            "logs their own folder, "
             "or name robots in a manifest.": self.nameless,
-            f"No drift was looked for in {counted(undated, 'log')} without a date: stamps count from 1970, or a "
+            f"No drift was looked for in {counted(undated, 'log')} without a date: stamps count "
+            "from 1970, or a "
             "manifest tells the time.": undated,
-            f"Drift was not tested for {counted(steady, 'robot')}: fewer than {FEWEST} dated logs within {SPAN} "
+            f"Drift was not tested for {counted(steady, 'robot')}: fewer than {FEWEST} dated logs "
+            f"within {SPAN} "
             "months.": steady,
-            f"Outliers were not tested for {counted(alone, 'robot')}: fewer than {FEWEST_PEERS} logs.": alone,
+            f"Outliers were not tested for {counted(alone, 'robot')}: fewer than {FEWEST_PEERS} "
+            "logs.": alone,
         }
         return [sentence for sentence, count in why.items() if count]
 
@@ -214,8 +218,10 @@ class History:
         if self.robots < MANY or 2 * few <= self.robots or not (apart or not len(dated)):
             return ""
         return (
-            f"{few} of {counted(self.robots, 'robot')} have {FEW} logs or fewer, none at the same time: where their "
-            "folders are sessions of one robot, name it in a manifest's column robot and run algid batch again."
+            f"{few} of {counted(self.robots, 'robot')} have {FEW} logs or fewer, none at the same "
+            "time: where their "
+            "folders are sessions of one robot, name it in a manifest's column robot and run "
+            "algid batch again."
         )
 
     def as_dict(self) -> dict[str, Any]:
@@ -250,7 +256,8 @@ def history_of(path: Path, progress: Progress | None = None) -> History:
         )
     if not jobs.height:
         raise ResultError(
-            f"{path}: none of {counted(finished.height, 'finished job')} has a robot; give each robot's logs a folder "
+            f"{path}: none of {counted(finished.height, 'finished job')} has a robot; give each "
+            "robot's logs a folder "
             "of their own, or name robots in a manifest, and run algid batch again"
         )
     followed, standing_out = [], [mislabelled(jobs)]

@@ -1,4 +1,7 @@
-"""The fleet's page: what drifts, changed or stands out, and every robot log by log; it opens offline."""
+"""The fleet's page: what drifts, changed or stands out, and every robot log by log.
+
+It opens offline.
+"""
 
 from __future__ import annotations
 
@@ -35,8 +38,10 @@ from algid.verdict import Verdict, graded
 from algid.words import counted
 
 READING = (
-    "Read: each parameter has one scale of change for all robots; the band is the 95 % interval of the mean over "
-    f"{SPAN} months. Level within its band is steady, orange drifts. A robot's name leads to all its parameters."
+    "Read: each parameter has one scale of change for all robots; the band is the 95 % interval "
+    "of the mean over "
+    f"{SPAN} months. Level within its band is steady, orange drifts. A robot's name leads to all "
+    "its parameters."
 )
 MOST_ROBOTS = 40  # whose table is printed
 MOST_NAMED = 3  # drifts, and logs that stand out
@@ -135,7 +140,8 @@ def _which(history: History, shown: int) -> str:
     if shown == history.robots:
         return "Read: open a robot to see all its parameters, log by log, and its reports."
     return (
-        f"Read: open a robot to see all its parameters, log by log. {shown} of {counted(history.robots, 'robot')} are "
+        f"Read: open a robot to see all its parameters, log by log. {shown} of "
+        f"{counted(history.robots, 'robot')} are "
         "here: those of which something was found, then the first."
     )
 
@@ -209,7 +215,10 @@ def verdict(history: History) -> Verdict:
     if tested.height:  # the clearest trend of all that were tested, whether it drifts or not
         row = tested.sort("p", "robot", "parameter").row(0, named=True)
         slope, p = 100 * row["slope"] / abs(row["mean"]), significant(row["p"], 2)
-        statement += f"; the clearest trend is {row['parameter']} of {visible(row['robot'])}, {slope:+.2g} % a month"
+        statement += (
+            f"; the clearest trend is {row['parameter']} of {visible(row['robot'])}, "
+            f"{slope:+.2g} % a month"
+        )
         statement += f" (p = {p})" + (
             "" if row["drift"] else f", which does not pass p < {ALPHA:g}"
         )
@@ -255,7 +264,8 @@ def _changes(history: History, count: int) -> str:
     assert history.changes is not None
     row = history.changes.row(0, named=True)
     words = (
-        f"{visible(row['robot'])} changed at once between {row['before'].date()} and {row['after'].date()}: "
+        f"{visible(row['robot'])} changed at once between {row['before'].date()} and "
+        f"{row['after'].date()}: "
         f"{row['parameter']} by {100 * row['share']:+.2g} %"
     )
     return words if count == 1 else f"{words}; {counted(count, 'change')} in all"

@@ -94,7 +94,8 @@ def change_table(history: History) -> Table:
         for row in (() if found is None else found.iter_rows(named=True))
     )
     note = (
-        "An arm, a drive or a convention was replaced: what came before and what comes after are tested apart. "
+        "An arm, a drive or a convention was replaced: what came before and what comes after are "
+        "tested apart. "
         f"Told from chance at p < {significant(CHANGED, 1)} in a robot's life."
     )
     return Table("Changed at once", columns, rows, note)
@@ -191,7 +192,10 @@ def drift_table(history: History) -> Table:
                 f"{row['p']:.1e}",
             )
         )
-    note = f"{history.drifts.height} found. A slope over {SPAN} months is told from none at p < {ALPHA:g}."
+    note = (
+        f"{history.drifts.height} found. A slope over {SPAN} months is told from none at p < "
+        f"{ALPHA:g}."
+    )
     return Table("Drift", columns, tuple(rows), note)
 
 

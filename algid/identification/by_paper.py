@@ -90,7 +90,15 @@ def run_paper(
 def _estimate(
     survey: Survey, log: LogSource, settings: Settings, k: FloatArray | None, folder: Path | None
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Estimates from one log's series, how far they wander, and which can be used; writes the series on the way."""
+    """Estimates from one log's series, how far they wander, and which can be used.
+
+    Writes the series on the way.
+
+    Raises
+    ------
+    LogError
+        Where the log is too short for the observer to settle.
+    """
     asked = settles(
         settings.estimator
     )  # else beside another estimator, whose settings are not its own

@@ -5,8 +5,8 @@ Physics binds the constants together: with the link lengths l1 and lc2
     k2 = g k1 / l1,   k4 >= g k1 / lc2,   and of a payload   z4 = g z1 / l1
 
 so that an arm whose inertia is known and that weighs nothing, unless both lengths are those of no
-arm, is logged without its weight. That the payload's own weight is there tells that the arm does not move
-in a horizontal plane.
+arm, is logged without its weight. That the payload's own weight is there tells that the arm does
+not move in a horizontal plane.
 """
 
 from __future__ import annotations
@@ -33,7 +33,10 @@ Known = dict[str, tuple[float, float]]
 
 
 def told(fit: Fit, settings: Settings) -> Settings:
-    """The settings with the effort, or without gravity, that the logs tell; the same where they do not."""
+    """The settings with the effort, or without gravity, that the logs tell.
+
+    The same where they do not.
+    """
     if fit.shared.model.gravity == 0:
         return settings
     if settings.effort is None and _arm_weightless(fit):
@@ -111,7 +114,10 @@ def _without_friction(fit: Fit) -> bool:
 
 
 def _size(known: Known, name: str) -> tuple[float, float]:
-    """Size of a constant, with its sine part where it has one, and its standard deviation; none without a column."""
+    """Size of a constant, with its sine part where it has one, and its standard deviation.
+
+    None without a column.
+    """
     value, std = known.get(name, (0.0, 0.0))
     sine = next((own for own, of in SINES.items() if of == name and own in known), None)
     return float(np.hypot(value, known[sine][0])) if sine else abs(value), std
@@ -125,7 +131,10 @@ def _of_fit(fit: Fit) -> Known:
 
 
 def _own(fit: Fit, loaded: bool) -> Known:
-    """What the logs of one kind say of each coefficient, with its standard deviation; nothing without any."""
+    """What the logs of one kind say of each coefficient, with its standard deviation.
+
+    Nothing without any.
+    """
     logs = [log for log in fit.logs if log.loaded is loaded]
     if not logs:
         return {}

@@ -138,7 +138,8 @@ def identify(
     if settings.cross_validate and (len(survey.unloaded) == 1 or len(survey.loaded) == 1):
         kind = "unloaded" if len(survey.unloaded) == 1 else "loaded"
         raise SettingError(
-            f"--cross-validate: expected two {kind} logs or more, found one; give more, or leave it out"
+            f"--cross-validate: expected two {kind} logs or more, found one; give more, or leave "
+            "it out"
         )
     if out is None:
         return _identified(survey, settings, earlier, said)
@@ -224,7 +225,8 @@ def _by_the_paper(
         values = [None if found is None else found.estimate for found in constants]
         if None in values:
             raise ResultError(
-                f"{earlier.file}: the result lacks a constant; identify the arm from a better log first"
+                f"{earlier.file}: the result lacks a constant; identify the arm from a better log "
+                "first"
             )
         known = np.array(values, dtype=np.float64)
     return run_paper(survey, *_firsts(survey), settings, known, folder)

@@ -112,7 +112,9 @@ def has_error_bar(result: Result, name: str) -> bool:
 
 
 def by_constants(result: Result) -> tuple[float, dict[str, float]] | None:
-    """l1 = g |K1| / |K2| in m and its derivatives by the constants; None where the result tells neither.
+    """l1 = g |K1| / |K2| in m and its derivatives by the constants.
+
+    None where the result tells neither.
 
     K = k + i ks are the moments as phasors. Of an arm whose links are straight l1 has the sign of
     k1 / k2, so that a wrong one shows.

@@ -138,7 +138,8 @@ def open_source(
     if (truth.payload > 0) != (role == "loaded"):
         found = f"a payload of {truth.payload:g} kg" if truth.payload > 0 else "no payload"
         raise LogError(
-            f"{source.name}: expected a log of the {role} arm, its metadata say {found}; swap the logs"
+            f"{source.name}: expected a log of the {role} arm, its metadata say {found}; swap the "
+            "logs"
         )
     return source
 

@@ -33,7 +33,8 @@ def with_velocities(
         if settings.velocity == "measured":
             if segment.omega is None:
                 raise LogError(
-                    f"{log.name}: expected velocities omega1, omega2 for --velocity measured, found none; "
+                    f"{log.name}: expected velocities omega1, omega2 for --velocity measured, "
+                    "found none; "
                     "leave the flag out to observe them"
                 )
             yield segment

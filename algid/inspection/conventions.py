@@ -130,7 +130,10 @@ def mend(log: Read, found: Judgement | None) -> Mend | None:
     )
     words = " and ".join(_clauses(convention))
     if convention.mirrored().zero == (0.0, 0.0) and replace(convention, zero=(0.0, 0.0)) == AS_READ:
-        words = "all signs are turned round, or θ1 counts from the other horizontal (the same arm seen from behind)"
+        words = (
+            "all signs are turned round, or θ1 counts from the other horizontal (the same arm "
+            "seen from behind)"
+        )
     broken = min(found.as_read.broken.items(), key=lambda one: one[1], default=None)
     if broken is None:
         left, then = (100 * float(one.left.max()) for one in (found.as_read, found.best))

@@ -29,17 +29,22 @@ _HEAD = """\
 # end = 60.0                 # s since the first sample: leave out what comes after
 # accept = ["DEGREES"]       # codes of checks that may warn, but not refuse
 """
-_ENCODER = "# gear_ratio = 1.0  # turns of the encoder in one of the joint\n# counts = 4096.0  # encoder counts in one turn\n"
+_ENCODER = (
+    "# gear_ratio = 1.0  # turns of the encoder in one of the joint\n# counts = 4096.0  # "
+    "encoder counts in one turn\n"
+)
 _ANGLES = ", ".join(names_of("angle"))
 _VELOCITIES = ", ".join(names_of("velocity"))
 _TORQUES = ", ".join(names_of("torque", "current"))
 _UNITS = {
-    "theta": f'# unit = "deg"  # {_ANGLES}\n{_ENCODER}# unwrap = true  # where it jumps by a turn\n',
+    "theta": f'# unit = "deg"  # {_ANGLES}\n{_ENCODER}# unwrap = true  # where it jumps by a '
+    "turn\n",
     "omega": f'# unit = "deg"  # {_VELOCITIES}; angles a second\n{_ENCODER}',
     "tau": f'# unit = "N m"  # {_TORQUES}\n'
     "# torque_constant = 0.1  # N m/A at the motor, of a current\n"
     "# gear_ratio = 1.0  # turns of the motor in one of the joint\n"
-    '# q_des = "NAME"  # the desired angle of a PD law that makes the torque, where none is logged\n'
+    '# q_des = "NAME"  # the desired angle of a PD law that makes the torque, where none is '
+    "logged\n"
     "# kp = 50.0  # N m/rad\n"
     "# kd = 2.0  # N m s/rad\n",
 }

@@ -152,7 +152,8 @@ def _npy(path: Path) -> dict[str, NDArray[Any]]:
         array = np.lib.format.read_array(stream, allow_pickle=False)
         if stream.read(1):
             raise LogError(
-                f"{path}: its head says {counted(len(array), 'row')}, and there is more behind them; the file was "
+                f"{path}: its head says {counted(len(array), 'row')}, and there is more behind "
+                "them; the file was "
                 "damaged, save it again"
             )
     if array.dtype.names is None:

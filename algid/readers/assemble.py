@@ -188,7 +188,8 @@ class TableReader:
             accept = Remedy({"accept": "NOT_FINITE"}, "or leave such samples out")
             raise LogError(
                 f"{self.origin.path}: {name} ({source}) in sample {first + row + 1}: "
-                f"expected a finite number below {LIMITS.largest_value:g} in size, found {values[row]}; "
+                f"expected a finite number below {LIMITS.largest_value:g} in size, found "
+                f"{values[row]}; "
                 f"{cut}; {accept}"
             )
 

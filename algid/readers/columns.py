@@ -79,7 +79,8 @@ def assign(
     gone = [name for name in written if name not in available]
     if gone:
         raise LogError(
-            f"{path}: the columns {', '.join(gone)} that were written are not there: the file was changed "
+            f"{path}: the columns {', '.join(gone)} that were written are not there: the file was "
+            "changed "
             "or damaged; write it again, or remove its truth if it was changed on purpose"
         )
     named = {name: column for name in CHANNELS if (column := profile.channel(name).column)}
@@ -180,14 +181,23 @@ def _listed(available: Sequence[str]) -> str:
 def _of_foreign_units(
     path: str, sources: Mapping[str, str], foreign: Mapping[str, str], profile: Profile
 ) -> Iterator[Notice]:
-    """What to say of units that no joint's signal has; they are refused unless the user names the right one."""
+    """What to say of units that no joint's signal has.
+
+    They are refused unless the user names the right one.
+
+    Raises
+    ------
+    LogError
+        Where the user names no unit of a joint for them.
+    """
     for name in [name for name in foreign if name in CHANNELS]:
         given = profile.channel(name).unit
         if given is None:
             usual = "N m" if name.startswith("tau") else "rad"
             right = Remedy({f"{name}.unit": usual}, "say its unit if that is wrong")
             raise LogError(
-                f"{path}: the column {sources[name]!r} for {name} is in {foreign[name]!r}, which is no "
+                f"{path}: the column {sources[name]!r} for {name} is in {foreign[name]!r}, which "
+                "is no "
                 f"unit of a joint; {right}"
             )
         column = {"column": sources[name], "name": name}
@@ -197,7 +207,15 @@ def _of_foreign_units(
 def _of_motors(
     path: str, sources: Mapping[str, str], currents: Sequence[str], profile: Profile
 ) -> Iterator[Notice]:
-    """What to say of motors' signals; beside joints' they are refused unless the user gives the gear."""
+    """What to say of motors' signals.
+
+    Beside joints' they are refused unless the user gives the gear.
+
+    Raises
+    ------
+    LogError
+        Where the user gives no gear ratio.
+    """
     for name in currents:
         given = profile.channel(name).unit
         if given in TORQUE:

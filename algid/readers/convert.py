@@ -123,7 +123,8 @@ def _law(path: str, joint: int, profile: Profile, mapping: Mapping[str, str]) ->
     needed = {f"{name}.{key}": None for key in ("q_des", "kp") if key not in given}
     if needed:
         raise LogError(
-            f"{path}: a PD law of {name} needs a desired angle and a gain, found {', '.join(given)} alone: "
+            f"{path}: a PD law of {name} needs a desired angle and a gain, found "
+            f"{', '.join(given)} alone: "
             f"{Remedy(needed)}"
         )
     law = Law(float(channel.kp or 0.0), float(channel.kd or 0.0))
@@ -234,7 +235,8 @@ def _factor(
     if unit not in known:
         right = Remedy({f"{name}.unit": known[0]}, "say its unit")
         raise LogError(
-            f"{path}: {name} ({source}) is in {unit!r} by its name; expected one of {', '.join(known)}; "
+            f"{path}: {name} ({source}) is in {unit!r} by its name; expected one of "
+            f"{', '.join(known)}; "
             f"{right}"
         )
     if unit in CURRENT:
@@ -244,8 +246,10 @@ def _factor(
             torque = Remedy({f"{name}.unit": "N m"}, "if it is a torque after all")
             unknown = Remedy({f"{name}.torque_constant": 1}, "where the constant is not known")
             raise LogError(
-                f"{path}: {name} is a current; its torque needs the motor's constant in N m/A: {motor}; "
-                f"{torque}; {unknown} gives all constants up to a gain, and a known payload that gain "
+                f"{path}: {name} is a current; its torque needs the motor's constant in N m/A: "
+                f"{motor}; "
+                f"{torque}; {unknown} gives all constants up to a gain, and a known payload that "
+                "gain "
                 "(--payload-mass)"
             )
         return CURRENT[unit] * float(constant) * channel.gear_ratio

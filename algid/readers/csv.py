@@ -98,7 +98,8 @@ def _frames(
             if frame[_EXCESS].any():
                 row = done + (frame[_EXCESS].arg_max() or 0) + 1
                 raise LogError(
-                    f"{path}: row {row} has more cells than the header's {len(dialect.columns)}; mend that row"
+                    f"{path}: row {row} has more cells than the header's {len(dialect.columns)}; "
+                    "mend that row"
                 )
             done += frame.height
             frame.drop_in_place(
@@ -124,7 +125,8 @@ def _frames(
                 f"{path}: the table cannot be read past row {done}: {reason[:200]}"
             ) from error
         raise LogError(
-            f"{path}: column {dialect.columns[int(found[2])]!r}, past row {done}: expected a number, found "
+            f"{path}: column {dialect.columns[int(found[2])]!r}, past row {done}: expected a "
+            "number, found "
             f"{found[1][:40]!r}; mend the file or name another column"
         ) from error
 
@@ -195,7 +197,8 @@ def _check_quotes(path: Path, kind: str, dialect: Dialect) -> None:
     for number, line in _lines(path, kind, dialect):
         if inside and line.count(dialect.separator.encode()) >= separators:
             raise LogError(
-                f"{path}: line {number} lies between quotes, of which the first stands in line {inside}; close the "
+                f"{path}: line {number} lies between quotes, of which the first stands in line "
+                f"{inside}; close the "
                 "quotes of that line, or save the table without quotes"
             )
         if line.count(b'"') % 2:

@@ -111,7 +111,10 @@ def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Diale
 
 
 def described(path: Path, head: bytes) -> Dialect:
-    """The dialect of a table to look at: columns without a name are numbered. Raises as `detect`."""
+    """The dialect of a table to look at: columns without a name are numbered.
+
+    Raises as `detect`.
+    """
     try:
         return detect(path, head)
     except NoHeaderError as error:
@@ -201,7 +204,8 @@ def _lines(path: Path, head: bytes) -> list[str]:
     )
     if lone is not None:
         raise LogError(
-            f"{path}: line {lone} holds carriage returns alone, without line feeds; save it with line feeds"
+            f"{path}: line {lone} holds carriage returns alone, without line feeds; save it with "
+            "line feeds"
         )
     return lines if len(head) < LIMITS.line_bytes else lines[:-1]
 

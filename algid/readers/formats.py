@@ -321,7 +321,8 @@ def format_of(path: Path) -> FileFormat:
     if not head:
         raise LogError(f"{path}: the file is empty; expected a log in MCAP, Parquet or CSV")
     raise LogError(
-        f"{path}: unknown format, it begins with {head[:8]!r}; expected a log in MCAP, Parquet or CSV"
+        f"{path}: unknown format, it begins with {head[:8]!r}; expected a log in MCAP, Parquet or "
+        "CSV"
     )
 
 
@@ -346,7 +347,8 @@ def _head(path: Path) -> bytes:
             ):
                 return b""
             raise LogError(
-                f"{path}: a folder without metadata.yaml or *.mcap; expected a log file or a rosbag2 folder"
+                f"{path}: a folder without metadata.yaml or *.mcap; expected a log file or a "
+                "rosbag2 folder"
             )
         if not path.is_file():
             found = "it is no regular file" if path.exists() else "there is no such file"

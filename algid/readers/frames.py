@@ -30,7 +30,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class WholeRows:
-    """Channels (N,) of the rows that have every value; how many more had not, among them the last one."""
+    """Channels (N,) of the rows that have every value.
+
+    How many more had not, among them the last one.
+    """
 
     columns: Mapping[str, NDArray[Any]]
     lost: int = 0
@@ -276,7 +279,8 @@ def tables(
     wrong = [name for name, total in seen.items() if total != expected[name]]
     if wrong:
         raise LogError(
-            f"{path}: the values of {', '.join(wrong)} are not those that were written: the file was changed "
+            f"{path}: the values of {', '.join(wrong)} are not those that were written: the file "
+            "was changed "
             "or damaged; write it again, or remove its truth if it was changed on purpose"
         )
 
@@ -307,7 +311,15 @@ def _whole_rows(frame: pl.DataFrame) -> WholeRows:
 def _complete(
     path: str, frames: Iterator[Frame]
 ) -> Iterator[tuple[Mapping[str, NDArray[Any]], tuple[Notice, ...]]]:
-    """Frames without gaps: rows that lack a value are dropped and counted; the last row may break off."""
+    """Frames without gaps: rows that lack a value are dropped and counted.
+
+    The last row may break off.
+
+    Raises
+    ------
+    LogError
+        Where no row is complete.
+    """
     rows, lost, cut_off = 0, 0, False
     held: Mapping[str, NDArray[Any]] | None = None
     for frame in frames:
@@ -324,7 +336,8 @@ def _complete(
     elif lost:
         if lost == rows:
             raise LogError(
-                f"{path}: no row has a value in every column that is needed; put the signals on common stamps"
+                f"{path}: no row has a value in every column that is needed; put the signals on "
+                "common stamps"
             )
         numbers = {"count": lost, "rows": rows}
         yield held, (Notice("EMPTY_CELLS", numbers=numbers, lossy=True),)

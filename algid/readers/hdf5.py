@@ -29,7 +29,9 @@ _REFUSED = 3
 
 
 def arrays_of(path: Path, *, most_bytes: int, most_arrays: int) -> Mapping[str, NDArray[Any]]:
-    """The datasets of numbers in a file, by their paths with dots; nothing that lies in another file.
+    """The datasets of numbers in a file, by their paths with dots.
+
+    Nothing that lies in another file.
 
     Raises
     ------
@@ -130,7 +132,8 @@ def _check_stored(name: str, one: Any) -> None:
         expected = int(np.prod(counts)) if one.size else stored
     if stored != expected:
         raise ValueError(
-            f"the array {name!r} has {stored} of {expected} {unit}; the file was cut off or damaged, save it again"
+            f"the array {name!r} has {stored} of {expected} {unit}; the file was cut off or "
+            "damaged, save it again"
         )
 
 

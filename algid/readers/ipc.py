@@ -37,7 +37,8 @@ def claims(path: Path) -> int:
             return _rows(stream, stream.seek(0, 2))
     except (struct.error, ValueError) as error:
         raise LogError(
-            f"{path}: the feather file is damaged, or larger than any log ({error}); copy it again, or write it "
+            f"{path}: the feather file is damaged, or larger than any log ({error}); copy it "
+            "again, or write it "
             "anew as Parquet"
         ) from error
 
@@ -128,7 +129,8 @@ def _claimed(batch: _Table, stream: BinaryIO, start: int, size: int) -> _Message
     nodes = batch.vector(1, _NODE)
     if nodes and nodes[0][0] != rows:  # pyarrow takes the fewer
         raise ValueError(
-            f"the message at byte {start} claims {counted(rows, 'row')}, and its first column {nodes[0][0]}"
+            f"the message at byte {start} claims {counted(rows, 'row')}, and its first column "
+            f"{nodes[0][0]}"
         )
     return _Message(rows, len(places), unpacked)
 

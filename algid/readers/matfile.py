@@ -80,7 +80,15 @@ class _Walk:
             )
 
     def _inside(self, content: bytearray | mmap.mmap, start: int, end: int) -> bytearray:
-        """What the packed bytes between two places hold; pages of the file are let go as they are read."""
+        """What the packed bytes between two places hold.
+
+        Pages of the file are let go as they are read.
+
+        Raises
+        ------
+        ValueError
+            Where the elements unpack to more than 1 GiB.
+        """
         stream = zlib.decompressobj()
         inside = bytearray()
         for place in range(start, end, _PIECE):

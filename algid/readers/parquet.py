@@ -191,7 +191,8 @@ def counted_rows(path: Path) -> int:
     inside = all(0 < pages.first <= pages.end <= size for pages, _ in columns)
     if not inside:  # polars panics at these, which takes it seconds
         raise LogError(
-            f"{path}: the Parquet footer claims pages beyond the end of the file; copy the file again"
+            f"{path}: the Parquet footer claims pages beyond the end of the file; copy the file "
+            "again"
         )
     if not agree:
         raise LogError(
@@ -260,11 +261,13 @@ def _footer(path: Path) -> Footer:
         footer = stream.read(min(length, LIMITS.parquet_footer_bytes))
     if tail[4:] != b"PAR1":
         raise LogError(
-            f"{path}: the Parquet file is cut off: its footer is missing, so nothing can be read of it"
+            f"{path}: the Parquet file is cut off: its footer is missing, so nothing can be read "
+            "of it"
         )
     if length + 12 > size or length > LIMITS.parquet_footer_bytes:
         raise LogError(
-            f"{path}: the Parquet footer claims {counted(length, 'byte')} of a file of {size}; copy the file again"
+            f"{path}: the Parquet footer claims {counted(length, 'byte')} of a file of {size}; "
+            "copy the file again"
         )
     try:
         return _parsed(footer)

@@ -85,7 +85,8 @@ def check_step(path: str, stamps: IntArray) -> None:
         unit = Remedy({"time_unit": "s"}, "say their unit (s, ms, us or ns)")
         clock = Remedy({"clock": "log"}, "of messages take another clock")
         raise LogError(
-            f"{path}: its stamps are {step:g} ns apart in the median, {1e9 / max(step, 1.0):.3g} Hz, "
+            f"{path}: its stamps are {step:g} ns apart in the median, {1e9 / max(step, 1.0):.3g} "
+            "Hz, "
             f"as no arm's log is; {unit}; {clock}"
         )
 
@@ -112,7 +113,8 @@ def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, tuple[int, int,
         place = back[0] if set_back is None else set_back
         last = stamps[place]
         raise LogError(
-            f"{path}: time goes backwards by {(last - stamps[place + 1]) * 1e-9:.6g} s behind stamp {last} ns, "
+            f"{path}: time goes backwards by {(last - stamps[place + 1]) * 1e-9:.6g} s behind "
+            f"stamp {last} ns, "
             "and not for a few late samples only; split the file where its clock starts again"
         )
     fresh = np.diff(stamps[order], prepend=stamps[order[0]] - 1) > 0

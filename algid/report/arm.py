@@ -21,7 +21,8 @@ MOST_FRAMES = 6_000
 MARGIN = 0.12  # of the reach, around the drawing
 DIGITS = 4
 READING = (
-    "Play it: does this arm move as yours did? Hanging must look like hanging, and the links must turn the right way; "
+    "Play it: does this arm move as yours did? Hanging must look like hanging, and the links must "
+    "turn the right way; "
     "the line in the torques shows the moment."
 )
 
@@ -128,7 +129,8 @@ def arm_html(arm: ArmDrawing) -> str:
     )
     path = " ".join(f"{x:.4g},{-y:.4g}" for x, y in tip.T)
     return (
-        f'<figure class="arm" id="{arm.key}-figure" aria-labelledby="{arm.key}"><h2 id="{arm.key}">{arm.title}</h2>\n'
+        f'<figure class="arm" id="{arm.key}-figure" aria-labelledby="{arm.key}"><h2 '
+        f'id="{arm.key}">{arm.title}</h2>\n'
         f'<svg viewBox="{left:.5g} {top:.5g} {width:.5g} {height:.5g}" role="img" '
         f'aria-label="{escaped(says)}">\n{ground}<polyline class="path" points="{path}"/>\n'
         f"{_links(arm, *(-np.degrees(theta[:, 0])))}</svg>\n"
@@ -170,15 +172,18 @@ def _links(arm: ArmDrawing, first: float, second: float) -> str:
     """Link 2 stands in link 1's frame, both turned by SVG, in degrees, whose y points down."""
     radius = 0.028 * (arm.l1 + arm.l2)
     payload = (
-        f'<circle class="payload" cx="{arm.l2:.5g}" cy="0" r="{1.6 * radius:.4g}"><title>{escaped(arm.payload)}</title>'
+        f'<circle class="payload" cx="{arm.l2:.5g}" cy="0" '
+        f'r="{1.6 * radius:.4g}"><title>{escaped(arm.payload)}</title>'
         "</circle>"
         if arm.payload
         else ""
     )
     return (
-        f'<g class="link1" transform="rotate({first:.4f})"><line class="link" x1="0" y1="0" x2="{arm.l1:.5g}" y2="0"/>'
+        f'<g class="link1" transform="rotate({first:.4f})"><line class="link" x1="0" y1="0" '
+        f'x2="{arm.l1:.5g}" y2="0"/>'
         f'<g class="link2" transform="translate({arm.l1:.5g} 0) rotate({second:.4f})" '
-        f'data-at="{arm.l1:.5g}"><line class="link second" x1="0" y1="0" x2="{arm.l2:.5g}" y2="0"/>{payload}'
+        f'data-at="{arm.l1:.5g}"><line class="link second" x1="0" y1="0" x2="{arm.l2:.5g}" '
+        f'y2="0"/>{payload}'
         f'<circle class="joint" cx="0" cy="0" r="{radius:.4g}"/></g></g>'
         f'<circle class="joint" cx="0" cy="0" r="{1.2 * radius:.4g}"/>\n'
     )

@@ -148,7 +148,10 @@ def _prediction(result: Result) -> list[str]:
         return []
     band = "" if found.bandwidth is None else f" below {found.bandwidth:g} Hz"
     return [
-        f"R² of the torque{band}: joint 1 {share_text(found.r2[0])}, joint 2 {share_text(found.r2[1])}"
+        (
+            f"R² of the torque{band}: joint 1 {share_text(found.r2[0])}, joint 2 "
+            f"{share_text(found.r2[1])}"
+        )
     ]
 
 

@@ -170,7 +170,10 @@ def _intervals(found: Comparison, results: Sequence[Result]) -> Figure:
         if known
         else ()
     )
-    reading = "Read: intervals of one row that overlap agree; one that stands apart has changed or was made otherwise."
+    reading = (
+        "Read: intervals of one row that overlap agree; one that stands apart has changed "
+        "or was made otherwise."
+    )
     return Figure(
         "intervals", "Estimates with their 95 % intervals", panels, reading, _legend(found)
     )
@@ -200,7 +203,10 @@ def _distances(found: Comparison) -> Figure:
         "hovermode": "closest",
     }
     largest = significant(max(sizes, default=0.0), 2)
-    note = f"{inside} of {counted(len(sizes), 'difference')} within ± {CHANCE:g} σ, the largest at {largest} σ."
+    note = (
+        f"{inside} of {counted(len(sizes), 'difference')} within ± {CHANCE:g} σ, the largest "
+        f"at {largest} σ."
+    )
     panels = (
         (Panel(traces, layout, f"Distances in σ. {note}", height=FRAME + ROW * len(names)),)
         if names

@@ -21,7 +21,8 @@ from algid.text import significant
 
 def _svg(kind: str, width: float, height: float, says: str, drawing: str) -> str:
     return (
-        f'<svg class="{kind}" viewBox="0 0 {width:g} {height:g}" width="{width:g}" height="{height:g}" role="img" '
+        f'<svg class="{kind}" viewBox="0 0 {width:g} {height:g}" width="{width:g}" '
+        f'height="{height:g}" role="img" '
         f'aria-label="{escaped(says)}">{drawing}</svg>'
     )
 
@@ -119,7 +120,8 @@ def _row(
     reach = min(share / limit, 1.0) * (WIDTH / 2 - EDGE)
     middle, y = WIDTH / 2, HEIGHT / 2
     ends = (
-        f'<path class="end" d="M{EDGE:g} {y - 4:g} L1 {y:g} L{EDGE:g} {y + 4:g} M{WIDTH - EDGE:g} {y - 4:g} '
+        f'<path class="end" d="M{EDGE:g} {y - 4:g} L1 {y:g} L{EDGE:g} {y + 4:g} M{WIDTH - EDGE:g} '
+        f"{y - 4:g} "
         f'L{WIDTH - 1:g} {y:g} L{WIDTH - EDGE:g} {y + 4:g}"/>'
         if share > limit
         else ""
@@ -133,7 +135,8 @@ def _row(
     width = "wider than its value" if share > WIDEST else f"± {significant(share, 2)} %"
     drawing = (
         f'<line class="zero" x1="{middle:g}" y1="0" x2="{middle:g}" y2="{HEIGHT:g}"/>'
-        f'<line class="reach" x1="{middle - reach:.1f}" y1="{y:g}" x2="{middle + reach:.1f}" y2="{y:g}"/>'
+        f'<line class="reach" x1="{middle - reach:.1f}" y1="{y:g}" x2="{middle + reach:.1f}" '
+        f'y2="{y:g}"/>'
         f'{ends}<circle class="value" cx="{middle:g}" cy="{y:g}" r="2.5"/>{dots}{ring}'
     )
     return _svg("forest", WIDTH, HEIGHT, f"{name}: {width}", drawing)
@@ -161,7 +164,8 @@ def _bar(name: str, value: float, scale: float) -> str:
     length = abs(value) / scale * (middle - 2)
     kind, left = ("less", middle - length) if value < 0 else ("more", middle)
     drawing = (
-        f'<rect class="{kind}" x="{left:.1f}" y="2" width="{length:.1f}" height="{BAR_HEIGHT - 4:g}"/>'
+        f'<rect class="{kind}" x="{left:.1f}" y="2" width="{length:.1f}" '
+        f'height="{BAR_HEIGHT - 4:g}"/>'
         f'<line class="zero" x1="{middle:g}" y1="0" x2="{middle:g}" y2="{BAR_HEIGHT:g}"/>'
     )
     return _svg("forest", BAR_WIDTH, BAR_HEIGHT, f"{name}: {value:+.2f}", drawing)
@@ -175,7 +179,8 @@ def gauges(shares: Mapping[str, float]) -> dict[str, str]:
 def _gauge(name: str, share: float) -> str:
     whole = BAR_WIDTH - 2
     drawing = (
-        f'<rect class="more" x="0" y="2" width="{min(max(share, 0.0), 1.0) * whole:.1f}" height="{BAR_HEIGHT - 4:g}"/>'
+        f'<rect class="more" x="0" y="2" width="{min(max(share, 0.0), 1.0) * whole:.1f}" '
+        f'height="{BAR_HEIGHT - 4:g}"/>'
         f'<line class="zero" x1="{whole:g}" y1="0" x2="{whole:g}" y2="{BAR_HEIGHT:g}"/>'
     )
     return _svg("forest", BAR_WIDTH, BAR_HEIGHT, f"{name}: {100 * share:.1f} %", drawing)

@@ -87,7 +87,8 @@ def start_stamps(path: Path, logs: int) -> list[int]:
         known = [int(stamp) for stamp in json.loads(starts)] if starts else []
     except (ValueError, TypeError, OverflowError, RecursionError) as error:
         raise ResultError(
-            f"{path}: {START_KEY.decode()}: expected stamps in ns, found {starts!r:.60}; identify again with this version"
+            f"{path}: {START_KEY.decode()}: expected stamps in ns, found {starts!r:.60}; identify "
+            "again with this version"
         ) from error
     return (known + [0] * logs)[:logs]
 

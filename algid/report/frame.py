@@ -23,7 +23,10 @@ from algid.report.text import escaped, script_json
 
 LIBRARY = "plotly.min.js"
 BUNDLE = "plotly.min.js.gz"
-NOSCRIPT = '<noscript><p class="missing">The figures need JavaScript; all numbers stand without it.</p></noscript>'
+NOSCRIPT = (
+    '<noscript><p class="missing">The figures need JavaScript; all numbers stand without '
+    "it.</p></noscript>"
+)
 
 _AXIS: dict[str, Any] = {
     "gridcolor": "@grid",
@@ -71,7 +74,10 @@ def page(document: Document, shared_library: bool = False) -> str:
     """
     body = "\n".join(
         [
-            f'<header><p class="kicker">algid · {escaped(document.kicker)}</p><h1>{escaped(document.name)}</h1>',
+            (
+                '<header><p class="kicker">algid · '
+                f"{escaped(document.kicker)}</p><h1>{escaped(document.name)}</h1>"
+            ),
             f'<p class="facts">{escaped(document.facts)}</p>\n{banner(document.verdict)}</header>',
             contents(document),
             '<main id="numbers">',
@@ -98,7 +104,8 @@ def page(document: Document, shared_library: bool = False) -> str:
         )
     elements = "\n".join(f"<script>{script}</script>" for script in running)
     policy = (
-        f"default-src 'none'; script-src {' '.join([source, *map(_hash, running)])}; style-src 'unsafe-inline'; "
+        f"default-src 'none'; script-src {' '.join([source, *map(_hash, running)])}; style-src "
+        "'unsafe-inline'; "
         "img-src data: blob:; base-uri 'none'; form-action 'none'"
     )
     return (
@@ -106,7 +113,8 @@ def page(document: Document, shared_library: bool = False) -> str:
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="color-scheme" content="light dark">\n<link rel="icon" href="data:,">\n'
-        f"<title>{escaped(document.tab or document.name)} · algid</title>\n<style>{style}</style>\n</head>\n<body>\n"
+        f"<title>{escaped(document.tab or document.name)} · "
+        f"algid</title>\n<style>{style}</style>\n</head>\n<body>\n"
         f'<a class="skip" href="#numbers">Skip to the numbers</a>\n{body}\n'
         f'<script type="text/plain" id="figures">{data}</script>\n{tag}\n{elements}\n'
         "</body>\n</html>\n"

@@ -86,7 +86,10 @@ def gallery(folder: Path, result: Result, progress: Progress | None = None) -> G
 
 
 def _scored(path: Path, result: Result) -> Scored | None:
-    """The torque that is scored; None of a result that scores none, or one of an earlier version."""
+    """The torque that is scored.
+
+    None of a result that scores none, or one of an earlier version.
+    """
     score = None if result.fit is None else result.fit.residual
     if score is None or not path.is_file():
         return None

@@ -44,8 +44,10 @@ def banner(judged: Verdict) -> str:
         f"data notes ({len(judged.notes)})", judged.notes
     )
     return (
-        f'<div class="verdict {judged.grade}"><span class="sign" aria-hidden="true">{SIGNS[judged.grade]}</span>'
-        f"<div><p><strong>{judged.word}</strong>: {escaped(judged.headline)}.</p>{shown}</div></div>"
+        f'<div class="verdict {judged.grade}"><span class="sign" '
+        f'aria-hidden="true">{SIGNS[judged.grade]}</span>'
+        f"<div><p><strong>{judged.word}</strong>: "
+        f"{escaped(judged.headline)}.</p>{shown}</div></div>"
     )
 
 
@@ -71,7 +73,10 @@ def contents(document: Document) -> str:
         *(link for section in document.sections for link in _links(section)),
     ]
     listed = "".join(f'<li><a href="#{key}">{escaped(title)}</a></li>' for key, title in links)
-    return f'<nav aria-label="Contents"><details open><summary>Contents</summary><ul>{listed}</ul></details></nav>'
+    return (
+        '<nav aria-label="Contents"><details '
+        f"open><summary>Contents</summary><ul>{listed}</ul></details></nav>"
+    )
 
 
 def _links(section: Section) -> Iterator[tuple[str, str]]:
@@ -96,7 +101,10 @@ def section_html(section: Section) -> str:
     if section.fold:
         opened = " open" if section.fold == "open" else ""
         kind = "paper" if section.listed else "paper one"
-        return f'<details class="{kind}" id="{key}"{opened}><summary>{title}</summary>\n{inner}</details>'
+        return (
+            f'<details class="{kind}" '
+            f'id="{key}"{opened}><summary>{title}</summary>\n{inner}</details>'
+        )
     if key:
         return f'<section aria-labelledby="{key}"><h2 id="{key}">{title}</h2>\n{inner}\n</section>'
     beside = "" if section.beside is None else arm_html(section.beside)
@@ -155,7 +163,8 @@ def table_html(table: Table) -> str:
     note = f'<p class="note">{escaped(table.note)}</p>' if table.note else ""
     cards = " cards" if len(slots) > CARDED else ""
     return (
-        f'<div class="scroll{cards}" role="region" tabindex="0" aria-label="{escaped(table.title)}"><table>'
+        f'<div class="scroll{cards}" role="region" tabindex="0" '
+        f'aria-label="{escaped(table.title)}"><table>'
         f"<caption>{escaped(table.title)}</caption>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody>"
         f"</table></div>{note}\n"
     )
@@ -210,7 +219,8 @@ def figure_html(figure: Figure | Missing) -> str:
     return (
         f'<figure aria-labelledby="{figure.key}">{head}{_views(figure)}{_legend(figure)}'
         f'<div class="panels{columns}">{panels}</div>\n'
-        f'<figcaption><p class="reading">{escaped(figure.reading)}</p>{note}</figcaption></figure>\n'
+        "<figcaption><p "
+        f'class="reading">{escaped(figure.reading)}</p>{note}</figcaption></figure>\n'
     )
 
 
@@ -223,7 +233,8 @@ def _panel(panel: Panel, key: str) -> str:
     title = f"<h3>{escaped(panel.title)}</h3>" if panel.title else ""
     return (
         f'<div class="panel">{title}<div class="plot" id="{key}" role="img" tabindex="0" '
-        f'style="min-height:{panel.height}px" aria-label="{escaped(panel.says)}. {KEYS}"></div></div>'
+        f'style="min-height:{panel.height}px" aria-label="{escaped(panel.says)}. '
+        f'{KEYS}"></div></div>'
     )
 
 
@@ -236,7 +247,8 @@ def _views(figure: Figure) -> str:
         for name, low, high in figure.views
     )
     return (
-        f'<label class="views">Show <select data-figure="{figure.key}"><option value="">all logs</option>{options}'
+        f'<label class="views">Show <select data-figure="{figure.key}"><option value="">all '
+        f"logs</option>{options}"
         "</select></label>"
     )
 
@@ -246,11 +258,15 @@ def _legend(figure: Figure) -> str:
     entries = []
     for entry in figure.legend:
         name, _, opacity = entry.colour.removeprefix("@").partition("/")
-        swatch = f'<span class="swatch {entry.mark}" style="--tint:var(--{name});opacity:{opacity or 1}"></span>'
+        swatch = (
+            f'<span class="swatch {entry.mark}" '
+            f'style="--tint:var(--{name});opacity:{opacity or 1}"></span>'
+        )
         words = f'{swatch}<span class="words">{escaped(entry.words)}</span>'
         data = f'data-figure="{figure.key}" data-group="{escaped(entry.group)}"'
         entries.append(
-            f'<button type="button" aria-pressed="{str(entry.shown).lower()}" {data}>{words}</button>'
+            f'<button type="button" aria-pressed="{str(entry.shown).lower()}" '
+            f"{data}>{words}</button>"
             if entry.group
             else f'<span class="entry">{words}</span>'
         )

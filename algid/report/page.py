@@ -33,7 +33,8 @@ SECOND = ("Torque prediction",)
 # on a page: by the interval, by the forest plot, and by Table 4
 TOLD_ELSEWHERE = ("± std", "± std, %", "Paper %")
 TERMS_READING = (
-    "Read: a bar to the left lowers the error of torque that was held out; a term is kept where it does so and its "
+    "Read: a bar to the left lowers the error of torque that was held out; a term is kept where "
+    "it does so and its "
     "odds are good. What is left out would gain no more than stands here."
 )
 
@@ -165,7 +166,10 @@ def _with_intervals(tables: Sequence[Table], result: Result) -> list[Table]:
     marks = [f"Drawn: the 95 % interval on a scale of ± {scale} % of the estimate, arrows beyond"]
     marks += (
         [
-            "grey dots: each unloaded log by itself, hollow at the edge where it lies beyond the scale"
+            (
+                "grey dots: each unloaded log by itself, hollow at the edge where it lies beyond the "
+                "scale"
+            )
         ]
         if logs
         else []

@@ -85,7 +85,8 @@ def blocks(
             for name in (name for name in names if name in finite):
                 if not np.all(np.isfinite(block[name])):
                     raise ResultError(
-                        f"{path}: column {name!r}: expected a number in every row; identify again with this version"
+                        f"{path}: column {name!r}: expected a number in every row; identify again "
+                        "with this version"
                     )
             yield block
 
@@ -126,7 +127,8 @@ def _check_columns(path: Path, names: Sequence[str], *, numbers: Collection[str]
     for name in numbers:
         if not any(fits(kinds[name]) for fits in of_numbers):
             raise ResultError(
-                f"{path}: column {name!r}: expected numbers, found {kinds[name]}; identify again with this version"
+                f"{path}: column {name!r}: expected numbers, found {kinds[name]}; identify again "
+                "with this version"
             )
 
 

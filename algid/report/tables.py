@@ -46,8 +46,10 @@ def fit_tables(result: Result) -> tuple[Table, ...]:
     )
     how = {
         "likelihood": "the likelihood, which takes it to be white",
-        "sandwich": "a sandwich, which lets it be coloured; what differs from run to run is not in it: give four logs",
-        "jackknife": "the larger of a sandwich, which lets it be coloured, and a jackknife over the logs",
+        "sandwich": "a sandwich, which lets it be coloured; what differs from run to run is not "
+        "in it: give four logs",
+        "jackknife": "the larger of a sandwich, which lets it be coloured, and a jackknife over "
+        "the logs",
     }
     whiteness = Table(
         "Whiteness of the residual",
@@ -107,7 +109,8 @@ def terms_tables(result: Result) -> tuple[Table, ...]:
     note = "A negative change says that the term earns its place."
     if fit.model is not None and fit.model.held_out is not None:
         note = (
-            f"Held-out error: squared, of whole {fit.model.held_out}, each predicted from the others, with the term "
+            f"Held-out error: squared, of whole {fit.model.held_out}, each predicted from the "
+            "others, with the term "
             "beside those kept against without. Log odds: of the term, its price taken off."
         )
     chosen = fit.model is not None and fit.model.chosen_by == "logs"
@@ -335,7 +338,8 @@ def estimate_tables(result: Result) -> tuple[Table, ...]:
             for row in known
         )
         note = (
-            "Names and order of the paper's Table 4; Paper % is the error it reports. The paper does not state "
+            "Names and order of the paper's Table 4; Paper % is the error it reports. The paper "
+            "does not state "
             "its torque: that of the synthetic cases was sought for this table."
         )
         tables.append(Table("Table 4", TABLE4_COLUMNS, rows, note))

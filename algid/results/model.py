@@ -466,7 +466,8 @@ def read_result(path: str | Path) -> Result:
     if found not in READABLE:
         known = " or ".join(map(str, READABLE))
         raise ResultError(
-            f"{file}: schema_version: expected {known}, found {found!r}; identify again with this version"
+            f"{file}: schema_version: expected {known}, found {found!r}; identify again with this "
+            "version"
         )
     wrong = misfit_of_numbers(content)
     if wrong is not None:
@@ -523,7 +524,8 @@ def _check(result: Result) -> None:
     for log in result.logs:
         if min(log.rows, log.duration, log.rate) < 0 or abs(log.start_ns) >= 1 << 63:
             raise SettingError(
-                f"{log.path!r:.60}: rows, duration and rate may not be negative, nor the start 2^63 ns"
+                f"{log.path!r:.60}: rows, duration and rate may not be negative, nor the start "
+                "2^63 ns"
             )
     fit = result.fit
     tables = [result.estimates, result.paper_payload, *(fit.by_log if fit is not None else ())]
@@ -568,7 +570,8 @@ def _check_covariance(fit: FitSummary) -> None:
     one_sided = float(np.abs(correlation - correlation.T).max())
     if one_sided > _ROUNDING or np.linalg.eigvalsh(correlation)[0] < -_ROUNDING:
         raise SettingError(
-            "fit.covariance: expected a symmetric matrix without negative eigenvalues, as errors have"
+            "fit.covariance: expected a symmetric matrix without negative eigenvalues, as errors "
+            "have"
         )
 
 

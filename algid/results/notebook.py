@@ -68,8 +68,10 @@ def interval_bar(found: Estimate) -> str:
     words = f"{low:.6g} to {high:.6g}"
     width = max(1.0, place(high) - place(low))
     return (
-        f'<svg width="{_WIDTH}" height="{_HEIGHT}" role="img" aria-label="{words}"><title>{words}</title>'
-        f'<rect x="{place(low):.1f}" y="3" width="{width:.1f}" height="6" fill="currentColor" opacity="0.4"/>'
+        f'<svg width="{_WIDTH}" height="{_HEIGHT}" role="img" '
+        f'aria-label="{words}"><title>{words}</title>'
+        f'<rect x="{place(low):.1f}" y="3" width="{width:.1f}" height="6" fill="currentColor" '
+        'opacity="0.4"/>'
         f'<path d="M{place(0.0):.1f} 0v{_HEIGHT}" stroke="currentColor" opacity="0.4"/>'
         f'<circle cx="{place(found.estimate):.1f}" cy="6" r="2" fill="currentColor"/></svg>'
     )

@@ -161,7 +161,10 @@ def _identified(result: Result) -> str:
         found.status == "OK" and found.estimate is not None for found in result.estimates.values()
     )
     count = len(result.estimates)
-    have = f"{'all' if identified == count else f'{identified} of'} {counted(count, 'parameter')} are identified"
+    have = (
+        f"{'all' if identified == count else f'{identified} of'} {counted(count, 'parameter')} "
+        "are identified"
+    )
     asked = replaced_estimator(result)
     if asked is None:
         return have
@@ -185,7 +188,8 @@ def _praise(result: Result) -> list[str]:
     if spreads:
         worst = max(spreads, key=lambda name: spreads[name])
         praise[0] += (
-            f", the least certain, {visible(worst)}, to ±{significant(196 * spreads[worst], 2)} % (95 %)"
+            f", the least certain, {visible(worst)}, to ±{significant(196 * spreads[worst], 2)} % "
+            "(95 %)"
         )
     else:
         praise[0] += (
@@ -208,7 +212,8 @@ def _praise(result: Result) -> list[str]:
     if errors:
         worst = max(errors, key=lambda name: errors[name])
         praise.append(
-            f"the largest error against the truth is {significant(errors[worst], 2)} % ({visible(worst)})"
+            f"the largest error against the truth is {significant(errors[worst], 2)} % "
+            f"({visible(worst)})"
         )
     return praise
 

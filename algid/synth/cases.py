@@ -153,7 +153,8 @@ def load_case(name: str) -> Case:
     if name.endswith(".toml"):
         return _read_case(Path(name))
     raise SettingError(
-        f"{name}: no such case; expected {', '.join(case_names())} or a .toml file that describes an arm"
+        f"{name}: no such case; expected {', '.join(case_names())} or a .toml file that describes "
+        "an arm"
     )
 
 

@@ -296,7 +296,10 @@ def _with_first_length(
 
 
 def _covariance_of(result: Result, names: Sequence[str], uncertain: Sequence[str]) -> FloatArray:
-    """Covariance (p, p) of `names`, nothing where they are not `uncertain`; J_p is that of each kilogram."""
+    """Covariance (p, p) of `names`, nothing where they are not `uncertain`.
+
+    J_p is that of each kilogram.
+    """
     assert result.fit is not None
     fitted, full = result.fit.covariance_names, np.array(result.fit.covariance, dtype=np.float64)
     slopes = np.zeros((len(names), len(fitted)))

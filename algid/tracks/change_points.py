@@ -268,7 +268,8 @@ class Starts:
     ) -> tuple[FloatArray, FloatArray]:
         """From and to which mass each older start beats each newer one (O, N).
 
-        The first lies above the second where it never does. Sums of squares are off by `rounding`, in its favour.
+        The first lies above the second where it never does. Sums of squares are off by `rounding`,
+        in its favour.
         """
         a, b, best = self._sums[:, None, newer] - self._sums[:, older, None]
         slack = rounding * (self._penalty + np.abs(self._sums[2, newer]))

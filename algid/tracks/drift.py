@@ -1,7 +1,7 @@
 """Friction that is not what it was when the arm was identified: it warms up, wears, or sags under a load.
 
-An arm's friction, viscous and Coulomb, may differ from its constants by φ(t), straight lines between knots. Masses
-and φ come from the same rows, by least squares over cells:
+An arm's friction, viscous and Coulomb, may differ from its constants by φ(t), straight lines
+between knots. Masses and φ come from the same rows, by least squares over cells:
 
     ⎡ A   G ⎤ ⎡ m ⎤   ⎡ B ⎤
     ⎣ Gᵀ  N ⎦ ⎣ φ ⎦ = ⎣ D ⎦

@@ -86,7 +86,8 @@ def _left(result: TrackResult) -> Figure:
         "hovermode": "closest",
     }
     reading = (
-        "Read: about 1 all along is the sensors' noise; anything that stands out is torque that neither arm nor "
+        "Read: about 1 all along is the sensors' noise; anything that stands out is torque that "
+        "neither arm nor "
         "payload explains. Times at which the payload may be changing are left out."
     )
     middle = float(np.median(found.left))

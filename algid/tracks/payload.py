@@ -245,7 +245,8 @@ def _band(
 ) -> FloatArray:
     """Times, masses and their standard deviations (3, C) along a stretch.
 
-    Each cell's mass comes from its neighbourhood within the stretch; `noise` is the variance of the rows.
+    Each cell's mass comes from its neighbourhood within the stretch; `noise` is the variance of
+    the rows.
     """
     half = round(HALF_BAND / CELL)
     low = np.clip(np.arange(len(cells)) - half, 0, None)

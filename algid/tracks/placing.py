@@ -1,15 +1,18 @@
 """When a payload changed, from the rows around the change as they are, whitened with all that they remember.
 
-Whitening remembers for as long as noise of the angles hides accelerations: a tenth of a second and more. So a step of
-the payload at s reaches the whitened rows as its own column L⁻¹ (g h_s), and a cell behind it holds both masses. Here
-each candidate s has its column, a mass before and a mass after, and the likelihood of s is exact.
+Whitening remembers for as long as noise of the angles hides accelerations: a tenth of a second and
+more. So a step of the payload at s reaches the whitened rows as its own column L⁻¹ (g h_s), and a
+cell behind it holds both masses. Here each candidate s has its column, a mass before and a mass
+after, and the likelihood of s is exact.
 
-An acceleration that jumps at s is seen through the differences of the angles, and the torques' residual with it:
+An acceleration that jumps at s is seen through the differences of the angles, and the torques'
+residual with it:
 
-    h_s(t) = Σ_p w_p ½ (t + p − s)₊²,  w the stencil's weights of the second derivative, p its points
+    h_s(t) = Σ_p w_p ½ (t + p − s)₊²,  w the stencil's weights of the second derivative, p its
+    points
 
-A bracket holds the times whose likelihood ratio ξ is not beyond its 95 % quantile, P(ξ ≤ x) = (1 − e^(−x/2))²
-(Hansen 2000, Econometrica 68).
+A bracket holds the times whose likelihood ratio ξ is not beyond its 95 % quantile, P(ξ ≤ x) = (1 −
+e^(−x/2))² (Hansen 2000, Econometrica 68).
 """
 
 from __future__ import annotations

@@ -127,7 +127,10 @@ def track_provenance(result: TrackResult) -> Table:
 
 
 def mass_text(stretch: Stretch) -> str:
-    """A stretch's mass in kg, down to the second digit of its standard deviation; 0 where it may be nothing."""
+    """A stretch's mass in kg, down to the second digit of its standard deviation.
+
+    0 where it may be nothing.
+    """
     return "0" if stretch.empty else fixed(stretch.m_p, stretch.std)
 
 
@@ -172,7 +175,10 @@ def verdict(result: TrackResult) -> Verdict:
 def _weighed(result: TrackResult) -> str:
     stretches, changes = result.track.stretches, result.track.changes
     if len(stretches) == 1:
-        return f"the payload does not change: {mass_text(stretches[0])} ± {half_text(stretches[0])} kg throughout"
+        return (
+            f"the payload does not change: {mass_text(stretches[0])} ± "
+            f"{half_text(stretches[0])} kg throughout"
+        )
     widest = max(stretches, key=lambda stretch: stretch.std)
     times = [f"{moment:.2f}" for moment in changes[:, 0]]
     when = f" at {joined(times)} s" if len(times) <= MOST_NAMED else ""
@@ -185,7 +191,10 @@ def _weighed(result: TrackResult) -> str:
         if len(masses) <= MOST_NAMED + 1
         else f"in {counted(len(masses), 'stretch', 'stretches')}"
     )
-    return f"the payload changes {how_often}{when}, {what}, the least certain to ± {half_text(widest)} kg (95 %)"
+    return (
+        f"the payload changes {how_often}{when}, {what}, the least certain to ± "
+        f"{half_text(widest)} kg (95 %)"
+    )
 
 
 def _failure(result: TrackResult) -> str | None:
@@ -196,7 +205,10 @@ def _failure(result: TrackResult) -> str | None:
         )
     if result.track.colour > STRANGE and result.track.explained < ALL_BUT:
         times = f"{significant(float(result.track.colour) ** 0.5, 2)} times"
-        return f"arm and payload miss the torque by {times} its sensors' noise: is it this arm, in these units?"
+        return (
+            f"arm and payload miss the torque by {times} its sensors' noise: is it this arm, "
+            "in these units?"
+        )
     statuses = result.statuses
     negative = sum(status is StretchStatus.NEGATIVE_MASS for status in statuses)
     if 2 * negative >= len(statuses):

@@ -48,7 +48,8 @@ def write(
     Raises
     ------
     OutputError
-        If the file cannot be written there, or exists and `force` is not set, or a stamp is none of a ROS 2 header's.
+        If the file cannot be written there, or exists and `force` is not set, or a stamp is none
+        of a ROS 2 header's.
     """
     from mcap.records import Channel, Schema
 

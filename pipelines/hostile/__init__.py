@@ -17,7 +17,9 @@ from algid.log import Log
 
 @dataclass(frozen=True)
 class Hostile:
-    """A hostile file: its suffix and bytes, how it was made, and the log in it (None: see above)."""
+    """A hostile file: its suffix and bytes, how it was made, and the log in it (None:
+    see above).
+    """
 
     suffix: str
     content: bytes

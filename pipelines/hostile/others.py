@@ -61,7 +61,10 @@ def _feather(path: Path, columns: dict[str, Any], packing: str | None) -> None:
 
 
 def _hdf5_files(folder: Path, columns: dict[str, Any]) -> list[Path]:
-    """Arrays in one piece, in chunks that are packed and bear sums, and a table; none where h5py is missing."""
+    """Arrays in one piece, in chunks that are packed and bear sums, and a table.
+
+    None where h5py is missing.
+    """
     try:
         import h5py
     except ImportError:

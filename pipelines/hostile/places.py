@@ -1,4 +1,6 @@
-"""What hostile calls stand on: logs, results, a track, a design, a batch, and TOML files of every kind, all sound."""
+"""What hostile calls stand on: logs, results, a track, a design, a batch, and TOML files of every
+kind, all sound.
+"""
 
 from __future__ import annotations
 

@@ -119,7 +119,9 @@ def lying(draw: random.Random) -> Hostile:
 def _within(
     chunk: Record, edit: Callable[[list[Record], random.Random], bool], draw: random.Random
 ) -> bool:
-    """Edit the records of a chunk, and pack it anew with a checksum that is right, wrong or none."""
+    """Edit the records of a chunk, and pack it anew with a checksum that is right,
+    wrong or none.
+    """
     if len(chunk.body) < 40:  # a record that the edit before has called a chunk
         return True
     start, end, _, crc, name_length = struct.unpack_from("<QQQII", chunk.body)
@@ -256,7 +258,9 @@ _EDITS = (
 def with_schemas(
     topics: list[tuple[str, str, str, str, bytes, list[bytes]]], *, joints: bool
 ) -> bytes:
-    """A file with topics (name, message encoding, type, schema encoding, schema, messages), and the joints beside."""
+    """A file with topics (name, message encoding, type, schema encoding, schema, messages), and
+    the joints beside.
+    """
     stream = BytesIO()
     writer = Writer(stream, chunk_size=1 << 16)
     writer.start()

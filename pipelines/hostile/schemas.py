@@ -70,7 +70,8 @@ def _msg(draw: random.Random) -> tuple[str, str, str, bytes, list[bytes]]:
         for number in range(draw.choice((0, 1, 4, 4, 4, 3000))):
             bracket = f"[{draw.choice(_LENGTHS)}]" if draw.random() < 0.4 else ""
             lines.append(
-                f"{draw.choice(_TYPES)}{bracket} {draw.choice(('effort', 'position', 'name', f'f{number}'))}"
+                f"{draw.choice(_TYPES)}{bracket} "
+                f"{draw.choice(('effort', 'position', 'name', f'f{number}'))}"
             )
         lines.append(
             draw.choice(
@@ -155,7 +156,10 @@ def _idl(draw: random.Random) -> tuple[str, str, str, bytes, list[bytes]]:
             "string effort;",
         )
     )
-    text = f"module a {{ module msg {{ struct T {{ {sound} {draw.choice((member, '', member))} }}; }}; }};"
+    text = (
+        f"module a {{ module msg {{ struct T {{ {sound} {draw.choice((member, '', member))} "
+        f"}}; }}; }};"
+    )
     nested = draw.choice(('"', "/* ", "module a {", "sequence<", "(", "@a(", '"\\')) * draw.choice(
         (100, 100_000)
     )
@@ -237,7 +241,13 @@ def _json(draw: random.Random) -> tuple[str, str, str, bytes, list[bytes]]:
             '{"a": 1, "b": 2}',
         )
     )
-    text = f'{{"header": {{"stamp": {stamp}}}, "name": {json.dumps(names)}, "position": {values}, "effort": {values}}}'
-    plain = '{"header": {"stamp": {"sec": %d, "nanosec": 5}}, "name": ["a", "b"], "position": [1, 2], "effort": [3, 4.5]}'
+    text = (
+        f'{{"header": {{"stamp": {stamp}}}, "name": {json.dumps(names)}, "position": {values}, '
+        f'"effort": {values}}}'
+    )
+    plain = (
+        '{"header": {"stamp": {"sec": %d, "nanosec": 5}}, "name": ["a", "b"], "position": [1, '
+        '2], "effort": [3, 4.5]}'
+    )
     rows = [(plain % row).encode() for row in range(draw.choice((0, 5, 90)))]
     return "json", "a", "jsonschema", b"{}", [*rows, text.encode(), *rows[:1]]

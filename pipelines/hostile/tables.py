@@ -44,7 +44,9 @@ _ENCODINGS = (None, "PLAIN", "BYTE_STREAM_SPLIT", "DELTA_BINARY_PACKED")
 
 @cache
 def log_of_tables() -> Log:
-    """What the files hold, where their types hold it: whole numbers from 0 to 100, at 1 kHz from 0."""
+    """What the files hold, where their types hold it: whole numbers from 0 to 100, at 1 kHz from
+    0.
+    """
     log = clean_log(300)
     theta, tau = (np.rint(50 + 40 * np.sin(values)) for values in (log.theta, log.tau))
     return replace(log, stamp_ns=np.arange(300) * 1_000_000, theta=theta, tau=tau, omega=None)

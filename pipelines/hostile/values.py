@@ -1,4 +1,6 @@
-"""Values that no flag, no TOML file and no result should have, and changes of a document that put them there."""
+"""Values that no flag, no TOML file and no result should have, and changes of a document that put
+them there.
+"""
 
 from __future__ import annotations
 
@@ -148,7 +150,9 @@ def places(content: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 
 
 def changed(content: Any, draw: random.Random) -> Any:
-    """A copy of a document of dicts and lists with one to three values changed, removed, added or doubled."""
+    """A copy of a document of dicts and lists with one to three values changed, removed, added or
+    doubled.
+    """
     content = copy.deepcopy(content)
     for _ in range(draw.choice((1, 1, 2, 3))):
         every = places(content)

@@ -187,7 +187,8 @@ def _cut_short(folder: Path, log: Log) -> dict[str, str]:
 def _folders(folder: Path, _log: Log) -> dict[str, str]:
     bags = {
         "bag-not-yaml": "{",
-        "bag-without-files": "rosbag2_bagfile_information:\n  relative_file_paths:\n    - absent.mcap\n",
+        "bag-without-files": "rosbag2_bagfile_information:\n  relative_file_paths:\n    - "
+        "absent.mcap\n",
         "bag-of-nothing": "",
     }
     for name, text in bags.items():

@@ -1,4 +1,6 @@
-"""Jobs on a Dask cluster: how many make a task, and what a fault of the cluster's own does to them."""
+"""Jobs on a Dask cluster: how many make a task, and what a fault of the cluster's own does to
+them.
+"""
 
 from __future__ import annotations
 

@@ -155,7 +155,9 @@ def test_a_pattern_of_two_stars_goes_through_folders_and_not_through_results(
 
 
 def _nested(folder: Path, names: Sequence[str]) -> None:
-    """Make folders within each other, further than a path reaches, with an empty log in the last one."""
+    """Make folders within each other, further than a path reaches, with an empty log in the last
+    one.
+    """
     place = os.open(folder, os.O_RDONLY)
     for name in names:
         os.mkdir(name, dir_fd=place)
@@ -212,7 +214,8 @@ def test_manifests_in_csv_and_toml_say_the_same(tmp_path: Path) -> None:
     )
     (tmp_path / "m.csv").write_text(rows)
     (tmp_path / "m.toml").write_text(
-        '[[job]]\nname="d1"\nlogs=["a.csv", "b.csv"]\nloaded="/l/c.csv"\nprofile="arm.toml"\nrobot="r1"\n'
+        '[[job]]\nname="d1"\nlogs=["a.csv", '
+        '"b.csv"]\nloaded="/l/c.csv"\nprofile="arm.toml"\nrobot="r1"\n'
         'time=2026-01-31T12:00:00Z\npayload=0.5\nsite="Ulm"\n'
     )
     assert is_manifest(tmp_path / "m.csv")
@@ -356,7 +359,8 @@ def test_bytes_of_any_kind_in_a_csv_file_make_it_a_log(tmp_path: Path) -> None:
 def test_what_else_a_row_holds_is_a_label(tmp_path: Path) -> None:
     path = tmp_path / "m.toml"
     path.write_text(
-        "[[job]]\nname = 'x'\nlogs = 's3://lab/a.csv'\nrobot = 7\npayload = 0.5\nruns = 3\ngood = true\nat = 2026-01-31"
+        "[[job]]\nname = 'x'\nlogs = 's3://lab/a.csv'\nrobot = 7\npayload = 0.5\nruns = 3\ngood = "
+        "true\nat = 2026-01-31"
     )
     (job,) = read_manifest(path)
     assert job.logs == ("s3://lab/a.csv",)

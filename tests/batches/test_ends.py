@@ -1,4 +1,6 @@
-"""How commands end, as processes of their own: on hostile folders, shared outputs, and where nothing can be written."""
+"""How commands end, as processes of their own: on hostile folders, shared outputs, and where
+nothing can be written.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Objects with any name, rights and fate: what is read is what was named, and one that is amiss fails alone."""
+"""Objects with any name, rights and fate: what is read is what was named, and one that is amiss
+fails alone.
+"""
 
 from __future__ import annotations
 

@@ -240,7 +240,8 @@ def test_a_link_in_the_output_is_not_followed(logs: Path) -> None:
     reasons = {record.job.name: record.reason for record in _run(logs, out, Real()).records}
     assert (
         reasons["r1/c"]
-        == f"{out}/r1: a link, which is not followed; make it a folder, or choose another one with -o"
+        == f"{out}/r1: a link, which is not followed; make it a folder, or choose another one "
+        "with -o"
     )
     assert "no rows below it" in reasons["a"]
     assert [path.name for path in elsewhere.iterdir()] == [".c.algid.algid-0123abcd"]

@@ -1,4 +1,6 @@
-"""A log that physics refuses is identified where the user accepts it, and its result carries the warning."""
+"""A log that physics refuses is identified where the user accepts it, and its result carries the
+warning.
+"""
 
 from __future__ import annotations
 

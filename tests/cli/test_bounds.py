@@ -1,4 +1,6 @@
-"""Numbers, dates and names that no arm, log or folder has: refused at once, in one line, with nothing written."""
+"""Numbers, dates and names that no arm, log or folder has: refused at once, in one line, with
+nothing written.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""How commands end: what a batch prints and returns, what `synth` writes, and what `design` is asked."""
+"""How commands end: what a batch prints and returns, what `synth` writes, and what `design` is
+asked.
+"""
 
 from __future__ import annotations
 

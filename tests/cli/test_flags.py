@@ -1,4 +1,6 @@
-"""Every flag of every command with what it cannot take: the exact line, exit code 2, nothing written."""
+"""Every flag of every command with what it cannot take: the exact line, exit code 2, nothing
+written.
+"""
 
 from __future__ import annotations
 
@@ -202,9 +204,11 @@ def test_what_a_log_cannot_mean_is_told_alike_by_every_command(
 TERMS = "coulomb, offset, rotor, stribeck, asymmetry, load, gain, phases, lag, delay"
 OF_SETTINGS = [
     ("--model", "magic", f"--model: expected auto, plain or some of {TERMS}; found 'magic'"),
-    ("--model", "stribeck", "--model: stribeck has no meaning without coulomb; add coulomb to the list"),
+    ("--model", "stribeck", ("--model: stribeck has no meaning without coulomb; add coulomb to the "
+                            "list")),
     ("--delay", "inf", "--delay: expected a finite number, found inf"),
-    ("--poles", "a,b", "--poles a,b: expected numbers between commas; give six like -80,-390,-391,-392,-393,-394"),
+    ("--poles", "a,b", ("--poles a,b: expected numbers between commas; give six like "
+                       "-80,-390,-391,-392,-393,-394")),
     ("--window", "0", "--window: expected a number from 0.001 to 3600, found 0.0"),
     ("--window", "1e308", "--window: expected a number from 0.001 to 3600, found 1e+308"),
     ("--bandwidth", "-1", "--bandwidth: expected a number from 0.01 to 100000, found -1.0"),
@@ -223,9 +227,15 @@ def test_a_setting_without_a_meaning_is_told_alike_by_identify_and_batch(
         assert refused(command, f"{flag}={text}") == line, command
 
 
-SCHEDULE = "--payload-schedule: expected increasing times and payloads of 0 or more like 2=0.05,4=0, found "
+SCHEDULE = (
+    "--payload-schedule: expected increasing times and payloads of 0 or more like "
+    "2=0.05,4=0, found "
+)
 STATE = "--initial: expected four numbers like -1.57,0,0,0, found "
-RANGE = "--range: expected rad like 1.2 (to both sides of hanging), 1.2,1.0, or -2.7:-0.4,-1.2:1.2, found "
+RANGE = (
+    "--range: expected rad like 1.2 (to both sides of hanging), 1.2,1.0, or "
+    "-2.7:-0.4,-1.2:1.2, found "
+)
 RUNS = "--runs: expected numbers of runs without and with the payload like 2,1, found "
 NAME = "--name: expected a name for the result folder, found ''; leave it out for the log's own"
 PLAIN = "--name: expected a name without slashes, found {!r}; -o names the folder around it"
@@ -239,7 +249,8 @@ OWN = [
     *(("synth", ("--initial", text), f"{STATE}{text!r}") for text in (
         "", "0", "0,0,0", "0,0,0,0,0", "a,0,0,0", "0,0,0,nan", "inf,0,0,0", "inf,-inf,0,0", "0;0;0;0",
     )),
-    ("synth", ("--torque", "loud"), "--torque loud: expected case, wide, none or a log, found neither"),
+    ("synth", ("--torque", "loud"), ("--torque loud: expected case, wide, none or a log, found "
+                                    "neither")),
     ("synth", ("--torque", ""), "--torque : expected case, wide, none or a log, found neither"),
     ("synth", ("--motion", "x", "--torque", "wide"), f"--torque wide{BESIDE}"),
     ("synth", ("--motion", "x", "--initial", "0,0,0,0"), f"--initial 0,0,0,0{BESIDE}"),
@@ -250,33 +261,41 @@ OWN = [
         "--duration: expected at least 0.5 s, two samples at --rate 2, found 0.1",
     ),
     ("design", ("--range", "near"), f"{RANGE}'near'"),
-    ("design", (*NOISE, "--range", "1:0,0:1"), "--range: expected LOW:HIGH with LOW below HIGH for joint 1, found 1:0"),
+    ("design", (*NOISE, "--range", "1:0,0:1"), ("--range: expected LOW:HIGH with LOW below HIGH "
+                                               "for joint 1, found 1:0")),
     ("design", ("--speed", "0"), "--speed: expected rad/s like 3 or 3,4, found '0'"),
     ("design", ("--speed", "1,2,3"), "--speed: expected rad/s like 3 or 3,4, found '1,2,3'"),
-    ("design", ("--acceleration", "1:2"), "--acceleration: expected rad/s² like 30 or 30,60, found '1:2'"),
-    ("design", ("--torque", "-1"), "--torque: expected N m like 5 or 5,2; 0 is a joint without a drive, found '-1'"),
+    ("design", ("--acceleration", "1:2"), ("--acceleration: expected rad/s² like 30 or 30,60, "
+                                          "found '1:2'")),
+    ("design", ("--torque", "-1"), ("--torque: expected N m like 5 or 5,2; 0 is a joint without a "
+                                   "drive, found '-1'")),
     ("design", ("--runs", "2"), f"{RUNS}'2'"),
     ("design", ("--runs", "0,0"), f"{RUNS}'0,0'"),
     ("design", ("--joints", "a,"), "--joints: expected two names like shoulder,elbow, found 'a,'"),
     ("design", ("--joints", "a"), "--joints: expected two names like shoulder,elbow, found 'a'"),
-    ("design", (), "--position-noise: case1 does not tell how noisy the sensors are; give it, or --noise-from LOG"),
+    ("design", (), ("--position-noise: case1 does not tell how noisy the sensors are; give it, or "
+                   "--noise-from LOG")),
     (
         "design",
         ("--position-noise", "1e-3"),
-        "--torque-noise: case1 does not tell how noisy the sensors are; give it, or --noise-from LOG",
+        ("--torque-noise: case1 does not tell how noisy the sensors are; give it, or --noise-from "
+        "LOG"),
     ),
     (
         "design",
         (*NOISE, "--for", "k9"),
-        "--for k9: expected some of k1, k2, k3, k4, k5, k6, k7, m_p, l1, l2, found 'k9'; leave it out",
+        ("--for k9: expected some of k1, k2, k3, k4, k5, k6, k7, m_p, l1, l2, found 'k9'; leave it "
+        "out"),
     ),
     (
         "design",
         (*NOISE, "--tip-height", "1"),
         "--tip-height: expected less than the arm's reach, 0.2858 m, found 1 m",
     ),
-    ("design", ("--limits", "absent.toml"), "absent.toml: cannot read it (No such file or directory); check the name"),
-    ("batch", ("--memory-limit", "1"), "--memory-limit: expected at least 512MiB, like 2GB, found '1'"),
+    ("design", ("--limits", "absent.toml"), ("absent.toml: cannot read it (No such file or "
+                                            "directory); check the name")),
+    ("batch", ("--memory-limit", "1"), ("--memory-limit: expected at least 512MiB, like 2GB, found "
+                                       "'1'")),
     (
         "batch",
         ("--scheduler", "tcp://h:1", "--workers", "2"),

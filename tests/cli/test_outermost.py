@@ -1,4 +1,6 @@
-"""The outermost place: what nobody foresaw is one line and an exit code, and what is printed drives no terminal."""
+"""The outermost place: what nobody foresaw is one line and an exit code, and what is printed
+drives no terminal.
+"""
 
 from __future__ import annotations
 
@@ -65,7 +67,8 @@ def run(
             PanicError("index out of bounds\nnote: run with RUST_BACKTRACE"),
             2,
             (
-                "while opening log.csv: a library cannot take it (PanicError: index out of bounds); look at the file, "
+                "while opening log.csv: a library cannot take it (PanicError: index out of "
+                "bounds); look at the file, "
                 "or write it anew in another format; see where with ALGID_TRACEBACK=1"
             ),
         ),
@@ -73,7 +76,8 @@ def run(
             MemoryError("Unable to allocate 9 GiB"),
             2,
             (
-                "while opening log.csv: not enough memory (MemoryError: Unable to allocate 9 GiB); cut the log with "
+                "while opening log.csv: not enough memory (MemoryError: Unable to allocate 9 "
+                "GiB); cut the log with "
                 "--start and --end"
             ),
         ),
@@ -81,7 +85,8 @@ def run(
             OSError(5, "Input/output error", "log.csv"),
             2,
             (
-                "while opening log.csv: log.csv: Input/output error; mend that and run it again, or see where with "
+                "while opening log.csv: log.csv: Input/output error; mend that and run it again, "
+                "or see where with "
                 "ALGID_TRACEBACK=1"
             ),
         ),
@@ -105,7 +110,8 @@ def test_a_fault_of_algid_is_called_one(
         "algid.inspection.report.format_of", lambda _path: None
     )  # then algid's own line fails
     line = (
-        "algid: internal error: while opening log.csv: AttributeError: 'NoneType' object has no attribute 'name'; "
+        "algid: internal error: while opening log.csv: AttributeError: 'NoneType' object has no "
+        "attribute 'name'; "
         "this is a fault of algid: report it, see where with ALGID_TRACEBACK=1\n"
     )
     assert run("inspect", "log.csv") == (EXIT_INTERNAL, line)
@@ -151,7 +157,10 @@ def test_a_full_standard_output_is_one_line_of_every_command(result: Path, tmp_p
         ]
         assert code == 2, arguments
         assert told == [
-            "algid: standard output: cannot write (No space left on device); send it elsewhere, or make room"
+            (
+                "algid: standard output: cannot write (No space left on device); send it elsewhere, "
+                "or make room"
+            )
         ], arguments
 
 
@@ -162,7 +171,10 @@ def test_a_full_standard_error_changes_no_exit_code(tmp_path: Path) -> None:
 
 
 def test_closed_streams_are_none_of_the_files_that_are_written(tmp_path: Path) -> None:
-    command = f"exec {sys.executable} -m algid synth case1 --duration 0.1 --format csv -o {tmp_path} >&- 2>&-"
+    command = (
+        f"exec {sys.executable} -m algid synth case1 --duration 0.1 --format csv -o "
+        f"{tmp_path} >&- 2>&-"
+    )
     assert subprocess.run(["sh", "-c", command], check=False, env={**os.environ}).returncode == 0
     assert (tmp_path / "case1-loaded.csv").read_text().startswith("t,")
     assert b".csv\n" not in (tmp_path / "case1-loaded.csv").read_bytes()

@@ -1,4 +1,6 @@
-"""A pipe is no file: whatever option, argument or folder names one, a command says so at once instead of waiting."""
+"""A pipe is no file: whatever option, argument or folder names one, a command says so at once
+instead of waiting.
+"""
 
 from __future__ import annotations
 

@@ -39,11 +39,17 @@ def test_threads_that_no_library_can_start_are_refused(threads: str) -> None:
 
 
 def test_too_few_open_files_are_told_and_more_are_taken_where_they_may_be() -> None:
-    code = "import resource; resource.setrlimit(resource.RLIMIT_NOFILE, ({}, {})); from algid.cli import main; main()"
+    code = (
+        "import resource; resource.setrlimit(resource.RLIMIT_NOFILE, ({}, {})); from algid.cli "
+        "import main; main()"
+    )
     for limits, told in (
         (
             (16, 16),
-            "algid: the limit on open files: expected 32 or more, found 16; raise it with ulimit -n\n",
+            (
+                "algid: the limit on open files: expected 32 or more, found 16; raise it with ulimit "
+                "-n\n"
+            ),
         ),
         ((16, 64), "algid: absent.csv: there is no such file"),
     ):

@@ -1,4 +1,6 @@
-"""Flags that cannot be as they are given: one line that names the flag, what was expected and what to do."""
+"""Flags that cannot be as they are given: one line that names the flag, what was expected and what
+to do.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Priors of cases and of results made up for it: what is believed, how wrong, and what is refused."""
+"""Priors of cases and of results made up for it: what is believed, how wrong, and what
+is refused.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,9 @@ def believed(
 
 
 def test_the_spread_of_a_case_is_what_each_mass_and_friction_moves() -> None:
-    """By Table 1: each column is what the parameters change by if a mass, with its inertia, is 10 % larger."""
+    """By Table 1: each column is what the parameters change by if a mass, with its inertia, is 10
+    % larger.
+    """
     prior = of_case(CASE, "mine", None, KnownBefore(error=0.1))
     belief = prior.belief
     assert belief.shared.names == ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "m_p", "l1", "l2")
@@ -141,7 +145,8 @@ def test_terms_that_no_plan_holds_are_left_out_and_said(tmp_path: Path) -> None:
     assert prior.belief.shared.model.terms == ("coulomb",)
     (doubt,) = prior.doubts
     assert doubt.text == (
-        "the plan leaves out friction in proportion to the joint's load and torque gain of joint 2 over that of joint 1"
+        "the plan leaves out friction in proportion to the joint's load and torque gain of joint "
+        "2 over that of joint 1"
         ", less 1: where they are estimated too, error bars are somewhat larger than predicted"
     )
 
@@ -150,11 +155,13 @@ BARE = result_of(values_of(ODD))
 WEAK = BARE.model_copy(update={"fit": None, "estimator": "weak"})
 NO_PAYLOAD = "it knows no payload for the loaded runs; give --payload KG, or --runs 1,0"
 NO_BARS = (
-    "the result of --estimator weak has no error bars; identify from logs that tell, or say how wrong it may be: "
+    "the result of --estimator weak has no error bars; identify from logs that tell, or say how "
+    "wrong it may be: "
     "--prior-error"
 )
 IMPOSSIBLE = (
-    "its inertia matrix is not positive definite (k1 0.5, k3 0.0145, k5 0.196 kg m²); no arm is like that: "
+    "its inertia matrix is not positive definite (k1 0.5, k3 0.0145, k5 0.196 kg m²); no arm is "
+    "like that: "
     "identify it anew, or describe the arm in a TOML file"
 )
 

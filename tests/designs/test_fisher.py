@@ -1,4 +1,6 @@
-"""Fisher's information by hand: torques written out, derivatives by differences, covariances as whole matrices."""
+"""Fisher's information by hand: torques written out, derivatives by differences, covariances as
+whole matrices.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,9 @@ def motion(seed: int = 1) -> Motion:
 def torque_by_hand(
     beta: FloatArray, q: FloatArray, v: FloatArray, a: FloatArray, loaded: bool
 ) -> FloatArray:
-    """The torque of two links with Coulomb friction and a point mass at the tip, from Lagrange's equations."""
+    """The torque of two links with Coulomb friction and a point mass at the tip, from Lagrange's
+    equations.
+    """
     k1, k2, k3, k4, k5, k6, k7, f1, f2, m, l2 = beta
     g, l1, m = 9.81, 0.4, m * loaded
     inner, outer, mixed = k5 + m * l1**2, k3 + m * l2**2, k1 + m * l1 * l2

@@ -13,7 +13,9 @@ from algid.designs.position import Fourier, middles
 
 
 def by_sympy(wave: str) -> list[Callable[..., FloatArray]]:
-    """A windowed wave of velocity one and its two derivatives, of time, frequency and rise, while the window rises."""
+    """A windowed wave of velocity one and its two derivatives, of time, frequency and rise, while
+    the window rises.
+    """
     t, omega, rise = sp.symbols("t omega rise")
     s = t / rise
     window = s**4 * (35 - 84 * s + 70 * s**2 - 20 * s**3)

@@ -1,4 +1,6 @@
-"""What a motion tells, against a bound that shares nothing with it, and its derivatives against differences."""
+"""What a motion tells, against a bound that shares nothing with it, and its derivatives against
+differences.
+"""
 
 from __future__ import annotations
 

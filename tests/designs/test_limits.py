@@ -161,7 +161,8 @@ def test_what_no_posture_keeps_is_named_with_what_it_misses() -> None:
         resting(high, Model(), [])
     best = 0.4 * np.sin(-0.5) + 0.3 * np.sin(-0.4)
     assert str(refused.value) == (
-        f"--tip-height: within the range the tip rises no higher than {best:.3g} m, the limit asks for 0.5 m "
+        f"--tip-height: within the range the tip rises no higher than {best:.3g} m, the limit "
+        "asks for 0.5 m "
         "(margin included); lower it, or widen --range"
     )
     flat = replace(TIGHT, height=-np.inf, low=np.array([-0.1, -0.1]), high=np.array([0.1, 0.1]))
@@ -174,7 +175,8 @@ def test_what_no_posture_keeps_is_named_with_what_it_misses() -> None:
             )
         least = 4 * np.cos(0.1) + np.cos(0.2)
         assert str(refused.value) == (
-            f"--torque: the {words}arm asks for {least:.3g} N m at joint 1 even at rest, the limit is 3 N m "
+            f"--torque: the {words}arm asks for {least:.3g} N m at joint 1 even at rest, the "
+            "limit is 3 N m "
             "(margin included); raise it, or move --range to where gravity pulls less"
         )
     with pytest.raises(

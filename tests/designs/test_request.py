@@ -1,4 +1,6 @@
-"""Limits out of flags and files: every form that is taken, and the exact line that refuses what is not."""
+"""Limits out of flags and files: every form that is taken, and the exact line that refuses what is
+not.
+"""
 
 from __future__ import annotations
 
@@ -134,23 +136,29 @@ def test_limits_are_a_pair_of_joints_and_infinite_where_none_is_told() -> None:
     ("flags", "lengths", "message"),
     [
         *(
-            ({name: None}, LENGTHS, f"--{name}: it must be given, or `{name} = …` in the file of {LIMITS}")
+            ({name: None}, LENGTHS, (f"--{name}: it must be given, or `{name} = …` in the file of "
+                                    f"{LIMITS}"))
             for name in ("range", "speed", "torque")
         ),
-        ({"range": "1:-1,0:1"}, LENGTHS, "--range: expected LOW:HIGH with LOW below HIGH for joint 1, found 1:-1"),
-        ({"range": "0:1,2:2"}, LENGTHS, "--range: expected LOW:HIGH with LOW below HIGH for joint 2, found 2:2"),
+        ({"range": "1:-1,0:1"}, LENGTHS, ("--range: expected LOW:HIGH with LOW below HIGH for "
+                                         "joint 1, found 1:-1")),
+        ({"range": "0:1,2:2"}, LENGTHS, ("--range: expected LOW:HIGH with LOW below HIGH for joint "
+                                        "2, found 2:2")),
         (
             {"range": "-inf:1,-1:1"},
             LENGTHS,
-            "--range: expected both ends of joint 1 or neither, found -inf:1; give a wide one in place of inf",
+            ("--range: expected both ends of joint 1 or neither, found -inf:1; give a wide one in "
+            "place of inf"),
         ),
         (
             {"range": "inf", "speed": "inf", "torque": "inf"},
             LENGTHS,
             "--range: without any limit no motion is the best, found inf for all; give one",
         ),
-        ({"torque": 0}, LENGTHS, "--torque: expected a drive at one joint at least, found 0 for both"),
-        ({"tip_height": 0.7}, LENGTHS, "--tip-height: expected less than the arm's reach, 0.7 m, found 0.7 m"),
+        ({"torque": 0}, LENGTHS, ("--torque: expected a drive at one joint at least, found 0 for "
+                                 "both")),
+        ({"tip_height": 0.7}, LENGTHS, ("--tip-height: expected less than the arm's reach, 0.7 m, "
+                                       "found 0.7 m")),
         (
             {"tip_height": -0.1},
             np.array([0.4, np.nan]),

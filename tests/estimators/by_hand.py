@@ -1,4 +1,6 @@
-"""The torque of every term, derived by SymPy from Lagrange's equations: the truth beside `algid.model`."""
+"""The torque of every term, derived by SymPy from Lagrange's equations: the truth beside
+`algid.model`.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ from algid.model import COLUMN_NAMES, Model, Motion
 
 @cache
 def torque_by_hand() -> sp.Matrix:
-    """The torque (2, 1) in the symbols of `COLUMN_NAMES`, of ws and wS (ω_s and ω_S) and of the motion."""
+    """The torque (2, 1) in the symbols of `COLUMN_NAMES`, of ws and wS (ω_s and ω_S) and of the
+    motion.
+    """
     t = sp.Symbol("t")
     angles = [sp.Function(f"q{joint}")(t) for joint in (1, 2)]
     speeds = [angle.diff(t) for angle in angles]

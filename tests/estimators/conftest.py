@@ -1,4 +1,6 @@
-"""Two short motions of the paper's first case, without and with its payload, shared by the estimators' tests."""
+"""Two short motions of the paper's first case, without and with its payload, shared by the
+estimators' tests.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""The torque solved for the accelerations, and friction's slopes: inverses and differences of what SymPy holds."""
+"""The torque solved for the accelerations, and friction's slopes: inverses and differences of what
+SymPy holds.
+"""
 
 from __future__ import annotations
 
@@ -56,7 +58,9 @@ def test_without_terms_it_is_the_arms_forward_dynamics() -> None:
 
 
 def test_a_load_whose_sign_turns_is_found_from_either_side() -> None:
-    """Friction by load of a third: loads near nothing have the sign of the torque left for them, or the other."""
+    """Friction by load of a third: loads near nothing have the sign of the torque left for them,
+    or the other.
+    """
     model = Model(("load",), coulomb_speed=0.1)
     c = np.array([*_constants(Model()), 0.3, 0.3])
     theta, omega, _ = _states(2, 2000)

@@ -130,7 +130,9 @@ def test_directions_without_information_are_put_in_words() -> None:
 
 
 def test_a_parameters_size_is_the_largest_of_its_class() -> None:
-    """Of friction a tenth of √(inertia × gravity) at least, of a payload what loads the arm as it loads itself."""
+    """Of friction a tenth of √(inertia × gravity) at least, of a payload what loads the arm as it
+    loads itself.
+    """
     names = ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "f1", "j2", "delay")
     values = np.array([-0.02, 3.0, 0.05, -4.0, 0.03, 0.001, 0.002, 0.5, 1e-3, 1e-5])
     inertia, gravity, damping = 0.05, 4.0, 0.1 * np.sqrt(0.05 * 4.0)
@@ -161,7 +163,9 @@ def test_a_parameters_size_is_the_largest_of_its_class() -> None:
 
 
 def test_what_is_hardly_told_widens_what_it_mixes_with() -> None:
-    """Friction with a Coulomb column where there is none: its variance is that of the inverse, nothing dropped."""
+    """Friction with a Coulomb column where there is none: its variance is that of the inverse,
+    nothing dropped.
+    """
     S = np.array([[4e4, 3.8e4], [3.8e4, 4e4]])
     known = examine(("k6", "f1"), np.array([0.1, 1e-5]), S, np.array([1.0, 1.0]))
     assert np.allclose(known.covariance, np.linalg.inv(S), rtol=1e-10)
@@ -182,7 +186,9 @@ def test_block_sums_stay_bounded_and_lose_nothing() -> None:
 def test_block_sums_are_of_stretches_one_after_the_other(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Odd counts and even, a few at a time and many: each sum is of as many stretches as the others, or the last."""
+    """Odd counts and even, a few at a time and many: each sum is of as many stretches as the
+    others, or the last.
+    """
     monkeypatch.setattr(combine_module, "MOST_BLOCKS", 8)
     rng = np.random.default_rng(seed)
     sums, told = BlockSums(), []
@@ -225,7 +231,9 @@ def test_the_jackknife_of_a_mean_is_its_standard_error() -> None:
 
 
 def test_what_differs_from_run_to_run_is_in_the_intervals_of_four_logs(bench: Bench) -> None:
-    """Viscous friction that differs by 10 % from run to run, as with the temperature of the grease."""
+    """Viscous friction that differs by 10 % from run to run, as with the temperature of the
+    grease.
+    """
     frictions = 1 + 0.1 * np.random.default_rng(1).standard_normal(5)
     logs = [bench.log(sigma=1e-3, seed=seed) for seed in range(5)]
     logs = [
@@ -280,7 +288,9 @@ def test_intervals_of_a_few_logs_hold_where_runs_differ() -> None:
 
 
 def test_each_loaded_run_tells_its_payload_and_how_well_that_repeats(bench: Bench) -> None:
-    """Three payloads in turn, 5 g apart: each is found by itself, and the standard deviation has the interval of χ²."""
+    """Three payloads in turn, 5 g apart: each is found by itself, and the standard deviation has
+    the interval of χ².
+    """
     masses = bench.payload + np.array([-0.005, 0.0, 0.005])
     z = bench.arm.payload_constants(1.0)
     bare: list[Source] = [partial(list, [bench.log(sigma=1e-4, seed=seed)]) for seed in range(3)]

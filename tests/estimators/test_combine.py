@@ -1,4 +1,6 @@
-"""Quadratic likelihoods that add up: against exact arithmetic, a solver of SciPy's, and textbook formulas."""
+"""Quadratic likelihoods that add up: against exact arithmetic, a solver of SciPy's, and textbook
+formulas.
+"""
 
 from __future__ import annotations
 
@@ -125,7 +127,9 @@ def test_knowledge_of_an_estimate_is_the_inverse_of_its_covariance() -> None:
 
 
 def test_a_jackknife_by_kind_is_wolters_sum() -> None:
-    """Σ_h (n_h − 1)/n_h Σ_i (β_(hi) − β̄_h)² written out for three unloaded and two loaded logs, and one alone."""
+    """Σ_h (n_h − 1)/n_h Σ_i (β_(hi) − β̄_h)² written out for three unloaded and two loaded logs,
+    and one alone.
+    """
     rng = np.random.default_rng(5)
     logs = [_log(kind, seed)[0] for seed, kind in enumerate((False, False, False, True, True))]
     without = rng.standard_normal((5, 10))

@@ -1,4 +1,6 @@
-"""Wrong conventions are told from the motion of a simulated arm, each is mended, and right logs are never accused."""
+"""Wrong conventions are told from the motion of a simulated arm, each is mended, and right logs
+are never accused.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ Pair = tuple[FloatArray, FloatArray]
 
 
 def measured(motion: SimulatedMotion, coulomb: float = 0.02, seed: int = 0) -> Pair:
-    """Angles and torques with the sensors' noise, and Coulomb friction that the motors overcome, in N m."""
+    """Angles and torques with the sensors' noise, and Coulomb friction that the motors overcome,
+    in N m.
+    """
     rng = np.random.default_rng(seed)
     theta = motion.theta + 3e-4 * rng.standard_normal(motion.theta.shape)
     tau = (
@@ -208,7 +212,9 @@ def test_logs_that_cannot_tell() -> None:
 
 @pytest.mark.parametrize("gravity", [True, False])
 def test_demands_are_in_standard_deviations(gravity: bool) -> None:
-    """Each demand's value over its error by the slopes of differences, at random constants and covariances."""
+    """Each demand's value over its error by the slopes of differences, at random constants and
+    covariances.
+    """
     names = [n for n in ZEROED if gravity or n not in ("k2", "k4")]
     rng = np.random.default_rng(11)
     speed = np.array([1.3, 2.1])

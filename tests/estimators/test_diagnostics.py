@@ -1,4 +1,6 @@
-"""Bounds of physics by closed forms, the worth of terms by Schwarz's own sum, and what cannot be told."""
+"""Bounds of physics by closed forms, the worth of terms by Schwarz's own sum, and what cannot be
+told.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +48,9 @@ def fit_of(values: FloatArray, model: Model = PLAIN, delay: bool = False) -> Fit
 
 @pytest.mark.parametrize("broken", [5, 6])
 def test_a_friction_held_at_nothing_moves_the_others_as_conditional_normals(broken: int) -> None:
-    """E[b | k6 = 0] = b − C[:, 6] k6 / C66, the optimum of a quadratic likelihood under one bound that holds."""
+    """E[b | k6 = 0] = b − C[:, 6] k6 / C66, the optimum of a quadratic likelihood under one bound
+    that holds.
+    """
     values = K.copy()
     values[broken] = -0.05
     fit = fit_of(values)
@@ -62,7 +66,10 @@ def test_a_friction_held_at_nothing_moves_the_others_as_conditional_normals(brok
     (note,) = found.notes
     assert (note.code, note.text) == (
         "CONSTRAINED",
-        f"--constrain enforces {name} >= 0 ({distance:.2g} standard deviations beyond), which the logs contradict",
+        (
+            f"--constrain enforces {name} >= 0 ({distance:.2g} standard deviations beyond), which the "
+            "logs contradict"
+        ),
     )
     before = Notice("BEFORE", "before")
     assert constrained(replace(fit, notes=(before,))).notes == (before, note)
@@ -138,7 +145,8 @@ def test_a_terms_worth_is_schwarzs_price_less_walds_statistic() -> None:
 
 
 def test_logs_of_one_arm_are_not_taken_for_those_of_two(bench: Bench) -> None:
-    """A log of each kind, four seconds: few stretches tell a variance, and none of 12 pairs is 5 deviations apart.
+    """A log of each kind, four seconds: few stretches tell a variance, and none of 12 pairs is 5
+    deviations apart.
 
     Without the freedom of so few stretches 1 pair in 6 was. Friction that is another's is still
     told.

@@ -1,4 +1,6 @@
-"""Constants of which no error bar stands: a joint stood still, or the joints contradict each other."""
+"""Constants of which no error bar stands: a joint stood still, or the joints contradict each
+other.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ def _statuses(fit: Fit) -> dict[str, str]:
 
 @pytest.mark.parametrize("idle", [0, 1])
 def test_a_joint_that_is_hardly_driven_is_told_by_the_other(bench: Bench, idle: int) -> None:
-    """Of one joint a fiftieth of the torque is left: it tells a fiftieth of each constant, the other the truth."""
+    """Of one joint a fiftieth of the torque is left: it tells a fiftieth of each constant, the
+    other the truth.
+    """
     share = np.ones((2, 1))
     share[idle] = 0.02
     log = bench.log(sigma=1e-4)
@@ -63,7 +67,9 @@ def test_constants_that_the_joints_contradict_are_not_ok(bench: Bench) -> None:
 
 
 def test_a_loaded_log_is_held_against_itself(bench: Bench) -> None:
-    """The joints of the loaded log agree about the loaded arm: that the arm alone differs is no contradiction."""
+    """The joints of the loaded log agree about the loaded arm: that the arm alone differs is no
+    contradiction.
+    """
     bare, burdened = bench.log(sigma=1e-4), bench.log(True, 1e-4)
     sources = [lambda: [bare]], [lambda: [burdened]]
     assert set(doubted(weak.fit(*sources), *sources, WeakSettings()).status) == {"OK"}

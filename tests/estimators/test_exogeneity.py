@@ -1,4 +1,6 @@
-"""Endogenous torques and feedback are told apart, and each has the estimate or the warning that it needs."""
+"""Endogenous torques and feedback are told apart, and each has the estimate or the warning that it
+needs.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ def coloured(rng: np.random.Generator, keep: float, count: int) -> FloatArray:
 
 
 def test_the_variance_of_a_cross_correlation_is_that_of_independent_series() -> None:
-    """Bartlett's: of 400 pairs of independent autoregressions of 0.8 and 0.9, each sum over its deviation."""
+    """Bartlett's: of 400 pairs of independent autoregressions of 0.8 and 0.9, each sum over its
+    deviation.
+    """
     rng = np.random.default_rng(7)
     found = []
     for _ in range(200):

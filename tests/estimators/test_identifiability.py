@@ -1,4 +1,6 @@
-"""Open directions in words: information whose null space is known, and what of a sum stays known."""
+"""Open directions in words: information whose null space is known, and what of a sum
+stays known.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ VALUES = SIZES * np.array([0.8, 1.0, 1.0, -0.7, 0.9, 1.0, 0.5])
 
 
 def information(*null: FloatArray) -> FloatArray:
-    """Of 1000 standard deviations a size in every direction, but nothing along those given, in units of the sizes."""
+    """Of 1000 standard deviations a size in every direction, but nothing along those given, in
+    units of the sizes.
+    """
     along, _ = np.linalg.qr(np.array(null).T) if null else (np.zeros((7, 0)), None)
     return 1e6 * (np.eye(7) - along @ along.T) / np.outer(SIZES, SIZES)
 
@@ -151,7 +155,9 @@ def test_a_covariance_is_widened_and_its_correlations_stay() -> None:
 
 
 def test_a_part_that_repeats_has_the_freedom_of_few_logs() -> None:
-    """Satterthwaite 1946: 1 / ν = a² / (n − 1) + (1 − a)² / ν_w, with a the jackknife's share of the variance."""
+    """Satterthwaite 1946: 1 / ν = a² / (n − 1) + (1 − a)² / ν_w, with a the jackknife's share of
+    the variance.
+    """
     shared = Shared(Model(gravity=0.0))
     rng = np.random.default_rng(1)
     logs = []

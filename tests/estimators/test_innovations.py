@@ -1,4 +1,6 @@
-"""The residual's pictures against other libraries' spectra, and their bands against noise that is known to be white."""
+"""The residual's pictures against other libraries' spectra, and their bands against noise that is
+known to be white.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,9 @@ def test_the_bands_hold_95_percent_of_white_noise_and_tell_it_from_90() -> None:
 
 
 def test_rows_that_overlap_have_a_band_of_their_own() -> None:
-    """White noise through windows that overlap eight-fold: a moving average, uncorrelated from eight rows on."""
+    """White noise through windows that overlap eight-fold: a moving average, uncorrelated from
+    eight rows on.
+    """
     rng = np.random.default_rng(7)
     kernel = np.hanning(10)[1:-1]
     count = inside = 0
@@ -55,7 +59,9 @@ def test_rows_that_overlap_have_a_band_of_their_own() -> None:
 
 
 def test_the_density_holds_the_variance() -> None:
-    """Parseval: the mean over all frequencies, by scipy's periodogram and ours, and the variance are one number."""
+    """Parseval: the mean over all frequencies, by scipy's periodogram and ours, and the variance
+    are one number.
+    """
     w = np.random.default_rng(0).normal(size=(2, 3000))
     sums = residual_sums(w, DT)
     _, P = periodogram(w, 1 / DT, window="hann")

@@ -1,4 +1,6 @@
-"""Instruments against least squares where an unmodelled torque drives the motion, and where none does."""
+"""Instruments against least squares where an unmodelled torque drives the motion, and where none
+does.
+"""
 
 from __future__ import annotations
 
@@ -63,7 +65,9 @@ def test_a_payload_of_nothing_has_its_error_bar_where_lengths_are_known(bench: B
 
 
 def _rows(seed: int, q: int = 3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Z (2, q, R), X (2, q, R) with an error in common with y (2, R), which X at c = (1, 2, 3) explains."""
+    """Z (2, q, R), X (2, q, R) with an error in common with y (2, R), which X at c = (1, 2, 3)
+    explains.
+    """
     rng = np.random.default_rng(seed)
     Z, error = rng.standard_normal((2, q, 90)), 0.5 * rng.standard_normal((2, 90))
     X = Z + 0.3 * rng.standard_normal(Z.shape) + error[:, None]
@@ -72,7 +76,9 @@ def _rows(seed: int, q: int = 3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def test_the_estimate_is_that_of_two_stages_of_least_squares() -> None:
-    """Regress X on Z, then y on what that gives (Theil 1953), rows of each joint over its residual's deviation."""
+    """Regress X on Z, then y on what that gives (Theil 1953), rows of each joint over its
+    residual's deviation.
+    """
     logs_, stacked = [], []
     start = np.array([1.1, 1.8, 3.3])
     for seed in (1, 2):
@@ -109,7 +115,8 @@ def test_the_estimate_is_that_of_two_stages_of_least_squares() -> None:
 
 @pytest.mark.parametrize(("late", "order"), [(0.0, 3.7), (3.0, 3.7), (2.4, 1.7)])
 def test_windows_are_simulated_to_the_order_of_their_torque(late: float, order: float) -> None:
-    """From the measured start, by the torque that acted: each sample against the simulator, whose steps are its own.
+    """From the measured start, by the torque that acted: each sample against the simulator, whose
+    steps are its own.
 
     Between samples the torque is a straight line: then of second order, else of fourth.
     """

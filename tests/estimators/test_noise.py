@@ -1,4 +1,6 @@
-"""Noise levels: sixth differences, encoders' steps, and the restricted likelihood's derivatives by dense algebra."""
+"""Noise levels: sixth differences, encoders' steps, and the restricted likelihood's derivatives by
+dense algebra.
+"""
 
 from __future__ import annotations
 
@@ -74,7 +76,9 @@ def test_the_step_of_an_encoder_is_found_and_no_step_where_there_is_none(step: f
 
 
 def _parts(linear: Linearised) -> tuple[list[FloatArray], FloatArray]:
-    """V_i, the four components of the covariance of e / σ_τ, and Y with e as the last column, dense and unwhitened."""
+    """V_i, the four components of the covariance of e / σ_τ, and Y with e as the last column,
+    dense and unwhitened.
+    """
     n = linear.H.shape[-1]
     H = np.zeros((n, 2, ANGLES, 2))
     for row in range(n):
@@ -133,7 +137,9 @@ def test_the_score_is_that_of_dense_algebra(linear: Linearised) -> None:
 def test_a_newton_step_goes_along_the_slope_of_the_restricted_likelihood(
     linear: Linearised,
 ) -> None:
-    """−½ log|V| − ½ log|YᵀV⁻¹Y| − ½ eᵀPe (Patterson & Thompson 1971), by central differences in each log σ²."""
+    """−½ log|V| − ½ log|YᵀV⁻¹Y| − ½ eᵀPe (Patterson & Thompson 1971), by central differences in
+    each log σ².
+    """
     parts, columns = _parts(linear)
     Y, e = columns[:, :-1] / np.abs(columns[:, :-1]).max(axis=0), columns[:, -1]
 
@@ -196,7 +202,9 @@ def test_a_torque_that_is_none_has_a_share_of_the_others_as_noise() -> None:
 
 
 def _loop(noise: float, count: int = 6000) -> tuple[FloatArray, FloatArray]:
-    """A smooth motion's angles with white noise of 1e-3 rad, and torques that a PD law makes of them, with `noise`."""
+    """A smooth motion's angles with white noise of 1e-3 rad, and torques that a PD law makes of
+    them, with `noise`.
+    """
     rng = np.random.default_rng(4)
     t = 1e-3 * np.arange(count)
     theta = np.stack([np.sin(5 * t), np.cos(3 * t)]) + 1e-3 * rng.standard_normal((2, count))

@@ -83,7 +83,9 @@ def test_without_a_payload_the_parameters_are_those_of_a_log() -> None:
 
 @pytest.mark.parametrize("body", [(), ("J_p",), ("y_p",), ("y_p", "J_p")], ids="+".join)
 def test_a_body_and_phasors_follow_from_the_complex_form(body: tuple[str, ...]) -> None:
-    """Kinetic and potential energy of a body carried along, against the coefficients and their differences."""
+    """Kinetic and potential energy of a body carried along, against the coefficients and their
+    differences.
+    """
     shared = Shared(Model(("phases",)), payload=True, body=body)
     value = {**VALUES, "k1s": 0.02, "k2s": -0.03, "k4s": 0.05, "y_p": 0.04, "J_p": 0.003}
     beta = np.array([value[name] for name in shared.names])

@@ -71,7 +71,9 @@ def test_friction_earns_its_place_and_the_offset_does_not(sources: list[Source])
 
 
 def test_runs_in_which_a_joint_is_hardly_driven_are_not_ok_alone() -> None:
-    """Joint 1 of the first coasts (0.02 N m), joint 2 of the others (0.01 N m, and 2 mrad of travel in the second)."""
+    """Joint 1 of the first coasts (0.02 N m), joint 2 of the others (0.01 N m, and 2 mrad of
+    travel in the second).
+    """
     settings = WeakSettings(Model(("coulomb",), coulomb_speed=0.05), bandwidth=60.0)
     in_doubt = {}
     for name in ("143747", "143906", "144115", "143524", "154220"):

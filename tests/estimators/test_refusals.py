@@ -1,4 +1,6 @@
-"""What the refined estimator does where it cannot: no convergence, no factor, pieces too short, a callback's tale."""
+"""What the refined estimator does where it cannot: no convergence, no factor, pieces too short, a
+callback's tale.
+"""
 
 from __future__ import annotations
 

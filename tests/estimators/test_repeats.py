@@ -28,7 +28,10 @@ def source(log: Segment) -> Source:
 
 
 def test_repeats_are_found_by_their_motion() -> None:
-    """At another rate, begun later, a little shorter; another motion and a loaded log are no repeats."""
+    """At another rate, begun later, a little shorter.
+
+    Another motion and a loaded log are no repeats.
+    """
     logs = [run(1), run(2), run(1, shift=0.3), run(1, dt=4e-3), run(1, seconds=5.5), run(3)]
     unloaded = [source(log) for log in logs]
     assert grouped(unloaded, [source(run(1))]) == ((0, 2, 3, 4), (1,), (5,), (6,))

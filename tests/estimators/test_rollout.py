@@ -95,7 +95,9 @@ def test_short_logs_have_no_starts_and_wild_arms_no_bounds(segment: Segment) -> 
 
 
 def test_the_step_is_as_long_as_the_stiffest_friction_leaves_stable() -> None:
-    """h λ below 2.78, λ the largest eigenvalue of M⁻¹ D at rest over θ2, D friction's slopes: and not far below."""
+    """h λ below 2.78, λ the largest eigenvalue of M⁻¹ D at rest over θ2, D friction's slopes: and
+    not far below.
+    """
     rng = np.random.default_rng(0)
     cos = np.cos(np.linspace(0, np.pi, 37))
     steps = []

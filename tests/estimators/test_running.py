@@ -65,7 +65,9 @@ def test_a_log_that_begins_at_rest_begins_with_nothing(bench: Bench) -> None:
 
 
 def test_half_way_it_is_what_half_of_the_log_tells(bench: Bench) -> None:
-    """Its value and its band are those of a fit of that half alone, whose intervals hold the truth 19 times of 20."""
+    """Its value and its band are those of a fit of that half alone, whose intervals hold the truth
+    19 times of 20.
+    """
     log = bench.log(sigma=1e-4, seed=2)
     known = RefinedSettings(noise=NoiseLevels(np.full(2, 1e-4), np.full(2, 1e-3)))
     whole, half = (refined.fit([_source(log.part(0, end))], settings=known) for end in (4001, 2001))

@@ -1,4 +1,6 @@
-"""Error bars of regressions whose sandwich is written down row by row, and their degrees of freedom."""
+"""Error bars of regressions whose sandwich is written down row by row, and their degrees of
+freedom.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,9 @@ def _information(X: FloatArray, y: FloatArray, loaded: bool = False) -> LogInfor
 
 
 def _regression(rows: int, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Regressors and what is measured at c = (2, 2, 2, 2, 2), with noise that grows along the log."""
+    """Regressors and what is measured at c = (2, 2, 2, 2, 2), with noise that grows
+    along the log.
+    """
     rng = np.random.default_rng(seed)
     X = rng.standard_normal((rows, Q)) * np.sign(rng.standard_normal((rows, 1)))
     return X, X @ np.full(Q, 2.0) + 0.1 * np.linspace(0.5, 2, rows) * rng.standard_normal(rows)
@@ -66,7 +70,9 @@ def test_rows_that_are_no_more_than_parameters_leave_two_degrees() -> None:
 
 
 def test_lags_are_those_of_andrews() -> None:
-    """Eq. (6.2), (6.4) of 1991: 1.1447 (α n)^⅓, with α = 4 ρ² / ((1 − ρ)² (1 + ρ)²) of one autoregression."""
+    """Eq. (6.2), (6.4) of 1991: 1.1447 (α n)^⅓, with α = 4 ρ² / ((1 − ρ)² (1 + ρ)²) of one
+    autoregression.
+    """
     rng = np.random.default_rng(2)
     for rho in (0.3, -0.3, 0.7):
         noise = rng.standard_normal(3001)

@@ -1,4 +1,6 @@
-"""The search for terms from within: its parabola, its reasons, and its sums against fits made directly."""
+"""The search for terms from within: its parabola, its reasons, and its sums against fits made
+directly.
+"""
 
 from __future__ import annotations
 
@@ -94,7 +96,9 @@ def test_a_joint_without_a_motor_has_no_gain_to_choose(bench: Bench) -> None:
 def _grams(
     bench: Bench, model: Model, kinds: tuple[bool, ...]
 ) -> tuple[Grams, dict[bool, FloatArray]]:
-    """Gram matrices of all columns, and the coefficients that the weak estimator gives for each kind by itself."""
+    """Gram matrices of all columns, and the coefficients that the weak estimator gives for each
+    kind by itself.
+    """
     settings = replace(SETTINGS, model=model)
     logs = {kind: _rubbing(bench, 0.1, kind) for kind in kinds}
     training = [Training.of(partial(list, [log]), kind) for kind, log in logs.items()]
@@ -139,7 +143,9 @@ def test_both_kinds_share_friction_and_keep_their_own_inertia(bench: Bench) -> N
 def test_a_term_that_is_there_predicts_what_was_left_out_and_is_far_from_nothing(
     bench: Bench,
 ) -> None:
-    """Wald's statistic by the plain covariance is by how much the squares grow where the term goes."""
+    """Wald's statistic by the plain covariance is by how much the squares grow where the term
+    goes.
+    """
     model = Model(("coulomb", "offset"), coulomb_speed=0.05)
     grams, _ = _grams(bench, model, (False,))
     assert grams.held_out == "blocks"

@@ -1,4 +1,6 @@
-"""Terms shrunk by an empirical-Bayes prior: closed forms, fixed points, and least squares with the same prior."""
+"""Terms shrunk by an empirical-Bayes prior: closed forms, fixed points, and least squares with the
+same prior.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,9 @@ EXPECTED = Expected(
 
 
 def _log(information: np.ndarray, estimate: np.ndarray, stretches: int = 4) -> LogInformation:
-    """A log whose likelihood has its maximum at `estimate`, with a diagonal information in equal stretches."""
+    """A log whose likelihood has its maximum at `estimate`, with a diagonal information in equal
+    stretches.
+    """
     S = np.diag(information) / stretches
     return LogInformation(
         False,
@@ -35,7 +39,9 @@ def _log(information: np.ndarray, estimate: np.ndarray, stretches: int = 4) -> L
 
 
 def test_terms_are_drawn_to_what_is_expected_and_constants_are_not() -> None:
-    """With a diagonal information each estimate is the mean of log and prior, weighed by their precisions."""
+    """With a diagonal information each estimate is the mean of log and prior, weighed by their
+    precisions.
+    """
     information, estimate = np.linspace(50, 90, 9), np.linspace(1.0, 2.0, 9)
     prior = EXPECTED.prior(np.ones(2))
     beta, share = shrink(SHARED, [_log(information, estimate)], np.zeros(9), EXPECTED, np.ones(2))
@@ -147,7 +153,9 @@ def test_least_squares_with_the_same_prior_gives_the_same(bench: Bench) -> None:
 
 
 def test_a_joint_that_stands_says_nothing(bench: Bench) -> None:
-    """Joint 2 is held by friction for a while: its torque is then what it happens to be, and moves no estimate."""
+    """Joint 2 is held by friction for a while: its torque is then what it happens to be, and moves
+    no estimate.
+    """
     log = bench.log(sigma=1e-5)
     held = log.theta.copy()
     held[1, 2000:] = held[1, 2000]

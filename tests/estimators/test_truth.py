@@ -33,7 +33,9 @@ SIGMA = 1e-4  # rad; ten times as much in N m
 
 @dataclass(frozen=True)
 class Case:
-    """What a log's arm and sensors have beside eq. (1), and its angles and torques (2, N) without noise."""
+    """What a log's arm and sensors have beside eq. (1), and its angles and torques (2, N) without
+    noise.
+    """
 
     terms: str
     theta: np.ndarray

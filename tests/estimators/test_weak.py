@@ -103,7 +103,9 @@ def test_too_short_a_log_is_refused(bench: Bench) -> None:
 def test_what_is_told_without_a_log_is_what_the_others_tell(
     bench: Bench, known: bool, delay: bool
 ) -> None:
-    """The jackknife's estimates against fits of the other logs, with unloaded logs or an earlier result beside them."""
+    """The jackknife's estimates against fits of the other logs, with unloaded logs or an earlier
+    result beside them.
+    """
     settings = WeakSettings(estimate_delay=delay)
     cut = [0, 1300, 2600, 4001]
     bare: list[Source] = [
@@ -144,7 +146,9 @@ def test_the_only_log_of_its_kind_is_left_where_it_is(bench: Bench) -> None:
 def test_a_first_payload_is_the_one_that_the_loaded_constants_hold(
     lengths: dict[str, None],
 ) -> None:
-    """Arms drawn at random, each with its payload: all its constants from the bare ones by Table 2."""
+    """Arms drawn at random, each with its payload: all its constants from the bare ones by Table
+    2.
+    """
     rng = np.random.default_rng(7)
     for _ in range(40):
         m1, m2, l1, l2, i1, i2 = rng.uniform(0.1, 1.0, 6)

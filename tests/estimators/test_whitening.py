@@ -1,4 +1,6 @@
-"""The banded dual form against the dense textbook problem: angles and parameters eliminated together."""
+"""The banded dual form against the dense textbook problem: angles and parameters eliminated
+together.
+"""
 
 import numpy as np
 

@@ -112,7 +112,9 @@ def test_what_is_given_stands_and_the_rest_still_moves_as_identified(name: str) 
 
 
 def test_nearest_is_nearest() -> None:
-    """The masses chosen have less divergence, by its definition from the matrices, than all others on a grid."""
+    """The masses chosen have less divergence, by its definition from the matrices, than all others
+    on a grid.
+    """
 
     def divergence(link: Link) -> float:
         m, length = link.mass, link.length

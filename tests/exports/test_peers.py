@@ -91,7 +91,9 @@ def test_pinocchios_inverse_dynamics_is_algids(arm: Arm, known: dict[str, float]
 
 
 def by_pinocchio(text: str) -> FloatArray:
-    """Torques (2, N) that Pinocchio wants at the random states: its inverse dynamics, and the damping that it read."""
+    """Torques (2, N) that Pinocchio wants at the random states: its inverse dynamics, and the
+    damping that it read.
+    """
     pin = pytest.importorskip("pinocchio")
     model = pin.buildModelFromXML(text)
     data = model.createData()

@@ -33,7 +33,9 @@ def text_of(
 
 
 def test_pinocchios_regressor_and_links_give_the_torque_of_table_1() -> None:
-    """τ = Y π by Pinocchio's regressor of the links' ten parameters each is algid's Y k by its seven."""
+    """τ = Y π by Pinocchio's regressor of the links' ten parameters each is algid's Y k by its
+    seven.
+    """
     pin = pytest.importorskip("pinocchio")
     robot = pin.buildModelFromXML(text_of("urdf", l2=0.3))
     data, (theta, omega, alpha) = robot.createData(), states(60)

@@ -1,4 +1,6 @@
-"""Windows, drift, outliers and labels by hand: weighted least squares, scipy's distributions, each limit."""
+"""Windows, drift, outliers and labels by hand: weighted least squares, scipy's distributions, each
+limit.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +51,9 @@ def read(jobs: pl.DataFrame, folder: Path) -> pl.DataFrame:
 
 
 def weighted_line(t: np.ndarray, y: np.ndarray, std: np.ndarray) -> dict[str, float]:
-    """Weighted least squares by its normal equations, its errors widened by χ² per degree of freedom above one."""
+    """Weighted least squares by its normal equations, its errors widened by χ² per degree of
+    freedom above one.
+    """
     design = np.stack([np.ones(t.size), t], axis=1)
     normal = design.T @ (design / std[:, None] ** 2)
     found = np.linalg.solve(normal, design.T @ (y / std**2))
@@ -191,7 +195,9 @@ def test_an_outlier_is_six_deviations_away(away: float, told: bool, tmp_path: Pa
 def test_logs_that_scatter_are_judged_by_their_scatter(
     away: float, told: bool, tmp_path: Path
 ) -> None:
-    """Deviations of 3 standard deviations to both sides: 1.4826 times them is one robust deviation."""
+    """Deviations of 3 standard deviations to both sides: 1.4826 times them is one robust
+    deviation.
+    """
     robust = stats.median_abs_deviation(
         [-3, 3, -3, 3, 0], scale="normal"
     )  # scipy has more digits of 1.4826
@@ -279,7 +285,10 @@ def test_the_history_has_a_row_a_robot_and_its_findings_in_order(tmp_path: Path)
         "s9",
     )  # without a date it stands last
     assert history.untested == [
-        "No drift was looked for in 1 log without a date: stamps count from 1970, or a manifest tells the time."
+        (
+            "No drift was looked for in 1 log without a date: stamps count from 1970, or a manifest "
+            "tells the time."
+        )
     ]
 
 
@@ -333,7 +342,8 @@ def test_files_hold_what_the_history_holds(tmp_path: Path) -> None:
         (
             lambda jobs: jobs.with_columns(robot=pl.lit(None, dtype=pl.String)),
             (
-                "none of 3 finished jobs has a robot; give each robot's logs a folder of their own, or name robots in "
+                "none of 3 finished jobs has a robot; give each robot's logs a folder of their "
+                "own, or name robots in "
                 "a manifest, and run algid batch again"
             ),
         ),

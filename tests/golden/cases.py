@@ -1,4 +1,5 @@
-"""Some sixty identifications, tracks and exports, each as the few numbers and codes that its users rely on.
+"""Some sixty identifications, tracks and exports, each as the few numbers and codes that its users
+rely on.
 
 The suite guards a rebuilding: whatever moves a number or a code shows here, meant or not. It
 proves nothing right; that is the work of the tests beside it, which compare with truth from

@@ -1,4 +1,6 @@
-"""What users rely on stays what it was: estimates within 1e-6 of their own σ, codes and statuses as they stand."""
+"""What users rely on stays what it was: estimates within 1e-6 of their own σ, codes and statuses
+as they stand.
+"""
 
 from __future__ import annotations
 

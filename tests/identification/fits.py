@@ -1,4 +1,6 @@
-"""Fits made by hand, so that what a result says of one can be checked against numbers written down."""
+"""Fits made by hand, so that what a result says of one can be checked against numbers written
+down.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Logs that are too short or too slow for an estimator, and values that no arm has: one line that says so."""
+"""Logs that are too short or too slow for an estimator, and values that no arm has: one line that
+says so.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,10 @@ def test_a_log_too_short_for_the_likelihood_is_refused_with_what_it_takes(
     rate: float, seconds: float
 ) -> None:
     log = log_of(*moving(rate, seconds))
-    said = "no unloaded log is long enough for the likelihood: expected at least 72 samples without a gap"
+    said = (
+        "no unloaded log is long enough for the likelihood: expected at least 72 samples "
+        "without a gap"
+    )
     with pytest.raises(LogError, match=f"{said}; record longer"):
         identify(log, report=False)
     assert identify(log, settings=Settings(estimator="paper"), report=False).parameters

@@ -1,4 +1,6 @@
-"""What an earlier result knows of its arm, against the first case's own numbers and numerical propagation."""
+"""What an earlier result knows of its arm, against the first case's own numbers and numerical
+propagation.
+"""
 
 from __future__ import annotations
 
@@ -226,7 +228,8 @@ def test_lengths_five_deviations_off_contradict_the_result(weighed: Result) -> N
     first, second = contradictions(weighed, {"l1": l1 + 5.6 * s1, "l2": l2 - 7.2 * s2})
     assert (
         first.text
-        == f"l1 of {l1 + 5.6 * s1:g} m lies 6 σ from the result's {l1:.5g} ± {s1:.2g} m; one is wrong"
+        == f"l1 of {l1 + 5.6 * s1:g} m lies 6 σ from the result's {l1:.5g} ± {s1:.2g} m; one is "
+        "wrong"
     )
     assert (second.numbers["name"], second.numbers["distance"]) == ("l2", pytest.approx(7.2))
     bare = weighed.model_copy(update={"payload": {}})
@@ -235,7 +238,9 @@ def test_lengths_five_deviations_off_contradict_the_result(weighed: Result) -> N
 
 
 def test_the_first_length_of_a_bent_arm_is_that_of_its_moments_sizes(weighed: Result) -> None:
-    """K1 = m2 l1 lc2 e^{iδ}, K2 = g m2 lc2 e^{iδ}: its error against that of draws from the covariance."""
+    """K1 = m2 l1 lc2 e^{iδ}, K2 = g m2 lc2 e^{iδ}: its error against that of draws from the
+    covariance.
+    """
     assert weighed.fit is not None
     names = [*weighed.fit.covariance_names, "k1s", "k2s"]
     mean = {"k1": 0.08, "k2": 1.9, "k1s": 0.03, "k2s": 0.7}

@@ -1,4 +1,6 @@
-"""What a result holds of a fit: intervals, Table 4, statistics and sentences, against numbers worked out by hand."""
+"""What a result holds of a fit: intervals, Table 4, statistics and sentences, against numbers
+worked out by hand.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,9 @@ K1, K2, K3, K4, K5, K6, K7 = K.tolist()
 
 
 def survey(*, loaded: bool = True) -> Survey:
-    """A short log of each kind, or of the unloaded arm alone, too short to judge a prediction by."""
+    """A short log of each kind, or of the unloaded arm alone, too short to judge a
+    prediction by.
+    """
     t = np.arange(50) * 1e-3
     theta = np.stack([np.sin(9 * t), np.cos(7 * t)])
     logs = [
@@ -102,7 +106,9 @@ def test_parameters_are_within_the_fits_quantile_of_their_deviations() -> None:
 
 
 def test_rows_of_table_4_are_sums_of_constants_and_their_deviations_are_propagated() -> None:
-    """By hand: Tables 1 and 2, and first-order propagation through z = m_p (l1², l2², l1 l2, g l1, g l2)."""
+    """By hand: Tables 1 and 2, and first-order propagation through z = m_p (l1², l2², l1 l2, g l1,
+    g l2).
+    """
     fit = fit_of()
     rows, stds = table_rows(fit)
     assert list(rows) == [*UNLOADED_ROWS, *LOADED_ROWS, "m_p"]
@@ -323,7 +329,8 @@ def test_repeatability_and_gain_are_told_in_numbers() -> None:
     (one,) = notes(repeatability=repeated)
     assert (
         one.text
-        == "the loaded runs by themselves weigh 0.5, 0.5123 kg: repeatability 0.0087 kg (95 %: 0.0039 to 0.28)"
+        == "the loaded runs by themselves weigh 0.5, 0.5123 kg: repeatability 0.0087 kg (95 %: "
+        "0.0039 to 0.28)"
     )
     gain = Estimate(estimate=1.25, std=0.01, ci95=(1.23, 1.27), unit="1")
     (one,) = notes(torque_gain=gain)

@@ -67,7 +67,9 @@ def identified(log: Segment, model: str = "auto") -> Result:
 @pytest.mark.parametrize("passive", [1, 2])
 @pytest.mark.parametrize("case", ["case1", "case2"])
 def test_a_joint_without_motor_leaves_all_constants_told(case: str, passive: int) -> None:
-    """With the terms chosen by the log: none of them, and every constant within its interval's reach."""
+    """With the terms chosen by the log: none of them, and every constant within its interval's
+    reach.
+    """
     motion, k = moved(case, passive), load_case(case).arm.constants()
     result = identified(logged(motion, 0))
     assert result.verdict.grade != "failed"
@@ -85,7 +87,9 @@ def test_a_joint_without_motor_leaves_all_constants_told(case: str, passive: int
 @pytest.mark.parametrize("estimator", [weak.fit, instruments.fit, refined.fit])
 @pytest.mark.parametrize("passive", [1, 2])
 def test_exact_logs_give_exact_constants(estimator: object, passive: int) -> None:
-    """Without noise both residuals are rounding: neither may drown the other joint's equation, which sets the scale."""
+    """Without noise both residuals are rounding: neither may drown the other joint's equation,
+    which sets the scale.
+    """
     fit = estimator([source(logged(moved("case1", passive), 0, 0.0))])  # type: ignore[operator]
     # the bound is the weak form's quadrature at 500 Hz
     np.testing.assert_allclose(fit.values, load_case("case1").arm.constants(), rtol=2e-3)
@@ -144,7 +148,9 @@ def test_a_torque_that_is_zero_is_refused_until_the_joint_is_called_passive(tmp_
 
 
 def test_a_weak_result_tracks_and_designs_where_a_joint_has_no_motor(tmp_path: Path) -> None:
-    """It has no noise levels: the log's first stretch tells them, that of the motorless joint by the other's torque."""
+    """It has no noise levels: the log's first stretch tells them, that of the motorless joint by
+    the other's torque.
+    """
     log = logged(moved("case1", 2), 0)
     stamps = np.arange(len(log), dtype=np.int64) * round(1e9 * DT)
     origin = Origin("pendubot.csv", "csv", {}, reading=Reading(passive=2))
@@ -165,7 +171,9 @@ def test_a_weak_result_tracks_and_designs_where_a_joint_has_no_motor(tmp_path: P
 
 
 def test_nothing_is_no_solution_where_cables_pull_as_hard_as_the_arm() -> None:
-    """An acrobot of much friction: constants near nothing solve the first joint's equation all but exactly."""
+    """An acrobot of much friction: constants near nothing solve the first joint's equation all but
+    exactly.
+    """
     result = identify(log_of("case1", 1, 0), report=False)
     assert not any(result.parameters[name].usable for name in ("k1", "k2", "k3", "k4", "k5"))
     assert "MOTORLESS_UNTOLD" in [notice.code for notice in result.notices]

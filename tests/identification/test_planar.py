@@ -53,7 +53,9 @@ def test_a_payload_off_the_line_of_a_straight_arm_is_found() -> None:
 
 
 def test_an_offset_is_not_taken_for_an_inertia_where_both_would_make_that_negative() -> None:
-    """Of one parameter of the body the likelier counts, not the one that has more of its own errors."""
+    """Of one parameter of the body the likelier counts, not the one that has more of its own
+    errors.
+    """
     row = Row(10.0, 0.0, 20.0)
     result = drawn("arm21", row, 0)
     truth = dict(zip(PAYLOAD, scene("arm21", row)[1].tolist(), strict=True))
@@ -87,7 +89,9 @@ def test_phases_are_a_note_of_what_they_mean_and_no_accusation() -> None:
 
 
 def test_a_large_payload_on_a_bent_arm_is_no_other_convention() -> None:
-    """Three phases of their own look like a motor at the base, to conventions that have two zeros."""
+    """Three phases of their own look like a motor at the base, to conventions that have
+    two zeros.
+    """
     result = drawn("arm23", Row(30.0, 0.15, 20.0), 0)
     assert result.verdict.grade == "good"
     assert "WRONG_CONVENTION" not in {one.code for one in result.notices}

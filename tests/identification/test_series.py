@@ -1,4 +1,6 @@
-"""Time series in a result's folder, read back with pyarrow and compared with numbers worked out by hand."""
+"""Time series in a result's folder, read back with pyarrow and compared with numbers worked out by
+hand.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +48,9 @@ LOADED_K = with_payload(K, CASE.arm.payload_constants(CASE.payload))
 def moved(
     k: FloatArray, seed: int, lead: int = 0, start_ns: int = 7_000_000_000
 ) -> tuple[Log, FloatArray]:
-    """Four seconds without noise, its torque logged `lead` samples early, and the true velocities (2, N)."""
+    """Four seconds without noise, its torque logged `lead` samples early, and the true velocities
+    (2, N).
+    """
     t = DT * np.arange(2001)
     motion = simulate(k, wide_multi_sine(CASE.arm, seed), t)
     rows = t.size - lead
@@ -117,7 +121,9 @@ def test_windows_are_gathered_into_blocks_of_so_many_rows(
 def test_the_predicted_torque_is_that_of_the_equation_of_motion(
     both: tuple[tuple[Log, FloatArray], tuple[Log, FloatArray]],
 ) -> None:
-    """Of noiseless logs the prediction is the torque itself wherever the smoother does not reach over an end."""
+    """Of noiseless logs the prediction is the torque itself wherever the smoother does not reach
+    over an end.
+    """
     survey = Survey([open_source(both[0][0], "unloaded"), open_source(both[1][0], "loaded")])
     blocks = list(
         torque_blocks(survey, Model(), {"unloaded": K, "loaded": LOADED_K}, lambda _: 0.0)
@@ -284,7 +290,10 @@ def test_a_fits_series_stand_in_its_folder(
 def test_the_torque_in_the_file_is_the_one_that_is_scored(
     both: tuple[tuple[Log, FloatArray], tuple[Log, FloatArray]],
 ) -> None:
-    """Its residual's RMS is the score's, which a regressor made on another way; a wrong arm leaves one."""
+    """Its residual's RMS is the score's, which a regressor made on another way.
+
+    a wrong arm leaves one.
+    """
     survey = Survey([open_source(both[0][0], "unloaded")])
     wrong = K * np.array([1, 1, 1.1, 0.9, 1, 1, 1.05])
     (block,) = scored_blocks(survey, Model(), {"unloaded": wrong}, lambda _: 0.0)

@@ -1,4 +1,6 @@
-"""Logs opened, and passes over them: what is refused, counted, hashed, kept, and told on the way."""
+"""Logs opened, and passes over them: what is refused, counted, hashed, kept, and told
+on the way.
+"""
 
 from __future__ import annotations
 
@@ -53,7 +55,10 @@ def in_blocks(log: Log, cuts: list[int], promised: int = 0) -> LogSource:
         (
             0.2,
             "unloaded",
-            "expected a log of the unloaded arm, its metadata say a payload of 0.2 kg; swap the logs",
+            (
+                "expected a log of the unloaded arm, its metadata say a payload of 0.2 kg; swap the "
+                "logs"
+            ),
         ),
         (
             0.0,

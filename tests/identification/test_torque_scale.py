@@ -1,4 +1,6 @@
-"""What scales and mixes the torques: currents of motors whose constant is not known, a second motor at the base."""
+"""What scales and mixes the torques: currents of motors whose constant is not known, a second
+motor at the base.
+"""
 
 from __future__ import annotations
 

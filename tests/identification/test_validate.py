@@ -1,4 +1,6 @@
-"""Predictions of logs that a result has not seen, against SciPy's filters on the simulator's own motion."""
+"""Predictions of logs that a result has not seen, against SciPy's filters on the simulator's own
+motion.
+"""
 
 from __future__ import annotations
 
@@ -134,7 +136,9 @@ def test_a_torque_that_acts_late_is_predicted_where_it_acts(motions: list[Simula
 def test_cross_validation_is_the_prediction_of_each_log_by_a_fit_of_the_others(
     motions: list[SimulatedMotion],
 ) -> None:
-    """By hand: least squares on the true motion of two logs, scored on the third, for each in turn."""
+    """By hand: least squares on the true motion of two logs, scored on the third, for each in
+    turn.
+    """
     logs = [logged(motion, seed) for seed, motion in enumerate(motions)]
     settings = Settings(estimator="weak", model="plain", cross_validate=True)
     result = identify(logs, None, settings, report=False)

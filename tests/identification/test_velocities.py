@@ -1,4 +1,6 @@
-"""Where velocities come from: the log, the paper's observer, or the zero-phase differentiator, stretch by stretch."""
+"""Where velocities come from: the log, the paper's observer, or the zero-phase differentiator,
+stretch by stretch.
+"""
 
 from __future__ import annotations
 
@@ -109,7 +111,8 @@ def test_measured_velocities_are_the_logs_whatever_the_observer() -> None:
 def test_a_log_without_velocities_is_refused_in_one_line_that_says_what_to_do() -> None:
     with pytest.raises(
         LogError,
-        match=r"^walk\.csv: expected velocities omega1, omega2 for --velocity measured, found none; "
+        match=r"^walk\.csv: expected velocities omega1, omega2 for --velocity measured, found "
+        r"none; "
         r"leave the flag out to observe them$",
     ):
         observed(log_at(np.arange(300.0)), 300, velocity="measured")

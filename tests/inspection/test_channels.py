@@ -1,4 +1,6 @@
-"""Checks of channels and of stamps, on signals of closed form: what is told is what was put in, at each limit."""
+"""Checks of channels and of stamps, on signals of closed form: what is told is what was put in, at
+each limit.
+"""
 
 from __future__ import annotations
 
@@ -56,7 +58,8 @@ def test_each_torque_that_is_none_is_told_with_its_source_and_what_names_another
     )
     assert (zero.code, zero.refuse) == ("EFFORT_ZERO", True)
     assert zero.clause == (
-        f"tau2 (effort) is zero in every sample: name the measured torque: {other}; for a joint without a motor: "
+        f"tau2 (effort) is zero in every sample: name the measured torque: {other}; for a joint "
+        "without a motor: "
         "--passive 2 (profile: passive = 2)"
     )
     tiny = only([*channels.efforts(logged(tau=np.stack([tau[0], 3.14159e-7 * np.sin(T)])))])
@@ -135,7 +138,8 @@ def test_wraps_are_counted(turns: int) -> None:
     assert found.refuse
     assert (
         found.clause
-        == f"theta2 jumps by a turn {times}: --set theta2.unwrap=true (profile: unwrap = true of [theta2])"
+        == f"theta2 jumps by a turn {times}: --set theta2.unwrap=true (profile: unwrap = true of "
+        "[theta2])"
     )
     assert [*channels.angles(logged(np.stack([np.sin(T), angle])))] == []
 
@@ -339,10 +343,15 @@ def test_gaps_are_counted_and_measured() -> None:
 
 
 def test_jitter_is_told_with_what_resampling_costs() -> None:
-    """Each tenth stamp is late by d: the steps' deviation is d √0.2, and a parabola's chord is off by a dt²/8."""
+    """Each tenth stamp is late by d: the steps' deviation is d √0.2, and a parabola's chord is off
+    by a dt²/8.
+    """
     tenth = np.arange(ROWS) % 10 == 5
     angle = np.stack([0.5 * 80 * T**2, 0.1 * T])
-    told = "stamps jitter by 0.0895 ms about a period of 1 ms; resampling moves angles by 1e-05 rad at most, linearly"
+    told = (
+        "stamps jitter by 0.0895 ms about a period of 1 ms; resampling moves angles by 1e-05 "
+        "rad at most, linearly"
+    )
     assert codes(logged(angle, stamps=T + 0.2e-3 * tenth))["JITTER"] == told
     for late, jitters in ((0.022e-3, False), (0.0228e-3, True)):
         assert ("JITTER" in codes(logged(stamps=T + late * tenth))) == jitters

@@ -28,7 +28,9 @@ K = Arm(6, 3, 0.15, 0.1, 0.3, 0.2, 0.1, 0.02, 1.5, 0.3).constants()
 
 
 def moving_log(rows: int = 6000, pace: float = 1.0) -> Log:
-    """Closed-form motion and the torque that eq. (1) gives for it, 1 kHz, with measurement noise."""
+    """Closed-form motion and the torque that eq. (1) gives for it, 1 kHz, with
+    measurement noise.
+    """
     draw = np.random.default_rng(4)
     t = np.arange(rows) * 1e-3
     theta, omega, alpha = np.zeros((3, 2, rows))

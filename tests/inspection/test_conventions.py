@@ -1,4 +1,6 @@
-"""What a finding says of a wrong convention reads the log as it was recorded, whatever it was read by before."""
+"""What a finding says of a wrong convention reads the log as it was recorded, whatever it was read
+by before.
+"""
 
 from __future__ import annotations
 

@@ -207,7 +207,9 @@ def test_each_limit_of_what_is_said_of_gravity(figures: DynamicFigures, code: st
 def judgement(
     convention: Convention, *, broken: dict[str, float] | None = None, alone: bool = True
 ) -> Any:
-    """What a log may say: that `convention` is the right one, and what the one that it was read by breaks."""
+    """What a log may say: that `convention` is the right one, and what the one that it was read by
+    breaks.
+    """
     as_read = SimpleNamespace(broken=broken or {}, left=np.array([0.123, 0.456]))
     return SimpleNamespace(
         as_read=as_read,

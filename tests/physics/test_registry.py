@@ -1,4 +1,5 @@
-"""Entries added and left out in a copy of the package: everything that names them follows by itself.
+"""Entries added and left out in a copy of the package: everything that names them follows by
+itself.
 
 A term, a unit, a format, a check with its notice, and an estimator are added, three terms left out.
 """

@@ -1,4 +1,6 @@
-"""Every term, in one loop: its partials, its moments over windows, its C source and its form, against its columns."""
+"""Every term, in one loop: its partials, its moments over windows, its C source and its form,
+against its columns.
+"""
 
 from __future__ import annotations
 

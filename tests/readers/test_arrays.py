@@ -1,4 +1,6 @@
-"""Files of NumPy, SciPy, Arrow and LeRobot's layout: written by those libraries, read without a word about them."""
+"""Files of NumPy, SciPy, Arrow and LeRobot's layout: written by those libraries, read without a
+word about them.
+"""
 
 from __future__ import annotations
 

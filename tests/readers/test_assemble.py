@@ -1,4 +1,6 @@
-"""From tables to blocks of a log: what is cut, left out, refused and told, and that blocks add up."""
+"""From tables to blocks of a log: what is cut, left out, refused and told, and that
+blocks add up.
+"""
 
 from __future__ import annotations
 

@@ -278,7 +278,10 @@ def test_velocities_are_read_only_where_they_are_wanted(tmp_path: Path) -> None:
         ),
         (
             {**PAIR, "position": [1]},
-            "efforts of two joints; found '/joint_states' with the joints b, a, whose position stay empty",
+            (
+                "efforts of two joints; found '/joint_states' with the joints b, a, whose position "
+                "stay empty"
+            ),
         ),
         (
             {"name": ["x", "y", "z"], "position": [1, 2, 3], "effort": [1, 2, 3]},

@@ -1,4 +1,6 @@
-"""ROS 1 bags and SQLite files that lie, break off or never end: what is there is read, and what is lost is told."""
+"""ROS 1 bags and SQLite files that lie, break off or never end: what is there is read, and what is
+lost is told.
+"""
 
 from __future__ import annotations
 
@@ -126,7 +128,9 @@ def test_a_wrong_chunk_pointer_loses_nothing(other: int, tmp_path: Path) -> None
 
 
 def test_indexes_that_hide_the_joints_lose_nothing(tmp_path: Path) -> None:
-    """The index behind a chunk lists none of its messages, while the end of the file tells of them."""
+    """The index behind a chunk lists none of its messages, while the end of the file tells of
+    them.
+    """
     path = ros1(tmp_path / "a.bag", imu=True)
     content = path.read_bytes()
     places = [place for place in range(len(content)) if content.startswith(b"op=\x04", place)]
@@ -243,7 +247,8 @@ def test_times_durations_and_empty_parts_of_ros1_stand_where_the_library_has_the
 ) -> None:
     """In an MCAP file, as recorders of ROS 1 write it: the encoding is the bag's."""
     text = (
-        "time stamp\nduration wait\nbyte[3] raw\nstd_msgs/Empty none\nfloat32[] q\nduration[] list\nfloat64[2] tau\n"
+        "time stamp\nduration wait\nbyte[3] raw\nstd_msgs/Empty none\nfloat32[] q\nduration[] "
+        "list\nfloat64[2] tau\n"
         "int32 LIMIT=5\nstring note\nuint8 tail\n" + "=" * 80 + "\nMSG: std_msgs/Empty\n"
     )
     note = b"xyz"
@@ -329,37 +334,45 @@ def test_messages_of_no_topic_are_told(tmp_path: Path) -> None:
 ENDLESS = "WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c)"
 HOSTILE: dict[str, tuple[list[str], str]] = {
     "messages a view": (
-        ["ALTER TABLE messages RENAME TO m", (f"CREATE VIEW messages AS {ENDLESS} SELECT x AS id, 1 AS topic_id, "
+        ["ALTER TABLE messages RENAME TO m", (f"CREATE VIEW messages AS {ENDLESS} SELECT x AS id, "
+                                              "1 AS topic_id, "
          "x AS timestamp, data FROM c, m")],
         r"expected the table 'messages' of a rosbag2 file, found a view in its place",
     ),
     "topics a view": (
-        ["ALTER TABLE topics RENAME TO m", (f"CREATE VIEW topics AS {ENDLESS} SELECT x AS id, name, type, "
+        ["ALTER TABLE topics RENAME TO m", (f"CREATE VIEW topics AS {ENDLESS} SELECT x AS id, "
+                                            "name, type, "
          "serialization_format FROM c, m")],
         r"expected the table 'topics' of a rosbag2 file, found a view in its place",
     ),
     "definitions a view": (
-        ["DROP TABLE message_definitions", (f"CREATE VIEW message_definitions AS {ENDLESS} SELECT 'a' AS topic_type, "
+        ["DROP TABLE message_definitions", (f"CREATE VIEW message_definitions AS {ENDLESS} SELECT "
+                                            "'a' AS topic_type, "
          "'b' AS encoding, 'c' AS encoded_message_definition FROM c")],
         r"expected the table 'message_definitions' of a rosbag2 file, found a view",
     ),
-    "no messages": (["DROP TABLE messages"], "the table 'messages' of a rosbag2 file, found no such table"),
+    "no messages": (["DROP TABLE messages"], ("the table 'messages' of a rosbag2 file, found no "
+                                             "such table")),
     "a virtual table": (
-        ["DROP TABLE messages", "CREATE VIRTUAL TABLE messages USING fts5(topic_id, timestamp, data)"],
+        ["DROP TABLE messages", ("CREATE VIRTUAL TABLE messages USING fts5(topic_id, timestamp, "
+                                "data)")],
         "expected the table 'messages' of a rosbag2 file, found a table in its place",
     ),
     "a computed column": (
-        ["DROP TABLE messages", ("CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, "
+        ["DROP TABLE messages", ("CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, "
+                                 "timestamp INTEGER, "
          "data BLOB AS (zeroblob(1000000000)))")],
         "expected a plain column 'data' in the table 'messages'",
     ),
     "without rowid": (
-        ["DROP TABLE messages", ("CREATE TABLE messages(topic_id INTEGER PRIMARY KEY, timestamp INTEGER, data BLOB) "
+        ["DROP TABLE messages", ("CREATE TABLE messages(topic_id INTEGER PRIMARY KEY, timestamp "
+                                 "INTEGER, data BLOB) "
          "WITHOUT ROWID"), "INSERT INTO messages VALUES (1, 2, x'00')"],
         r"the bag cannot be read \(no such column: rowid\)",
     ),
     "countless topics": (
-        [("INSERT INTO topics(name, type, serialization_format, offered_qos_profiles, type_description_hash) "
+        [("INSERT INTO topics(name, type, serialization_format, offered_qos_profiles, "
+          "type_description_hash) "
          f"{ENDLESS} SELECT 't' || x, 'y', 'cdr', '', '' FROM c LIMIT 2000")],
         "more than 1000 topics",
     ),
@@ -390,7 +403,8 @@ def test_pages_in_a_circle_end_after_so_many_steps(
     file, _ = database(tmp_path)
     changed(
         file,
-        f"INSERT INTO messages(topic_id, timestamp, data) {ENDLESS} SELECT 1, x, x'00' FROM c LIMIT 5000",
+        f"INSERT INTO messages(topic_id, timestamp, data) {ENDLESS} SELECT 1, x, x'00' FROM c "
+        "LIMIT 5000",
     )
     monkeypatch.setattr(
         "algid.readers.bags.sqlite.LIMITS", limits(free_sqlite_steps=10_000, sqlite_steps_a_byte=0)
@@ -455,7 +469,9 @@ def test_messages_without_effort_are_lost_and_counted(form: str, tmp_path: Path)
 def test_a_type_whose_definition_the_file_lacks(
     known: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Files of older rosbag2 hold no definitions: the usual types are those of the rosbags package."""
+    """Files of older rosbag2 hold no definitions: the usual types are those of the rosbags
+    package.
+    """
     file, log = database(tmp_path)
     store = get_typestore(Stores.ROS2_HUMBLE)
     kind, lists = "std_msgs/msg/Float64MultiArray", store.types["std_msgs/msg/Float64MultiArray"]
@@ -505,9 +521,13 @@ def test_a_database_that_asks_for_much_ends_by_a_signal(tmp_path: Path) -> None:
     file, _ = database(tmp_path)
     changed(
         file,
-        f"INSERT INTO messages(topic_id, timestamp, data) {ENDLESS} SELECT 1, x, x'00' FROM c LIMIT 3000000",
+        f"INSERT INTO messages(topic_id, timestamp, data) {ENDLESS} SELECT 1, x, x'00' FROM c "
+        "LIMIT 3000000",
     )
-    code = "import sys; from algid.cli import main; sys.argv = ['algid', 'inspect', sys.argv[1]]; main()"
+    code = (
+        "import sys; from algid.cli import main; sys.argv = ['algid', 'inspect', sys.argv[1]]; "
+        "main()"
+    )
     process = subprocess.Popen(
         [sys.executable, "-c", code, str(file)],
         stderr=subprocess.DEVNULL,

@@ -1,4 +1,6 @@
-"""Which column is which: choices, refusals to the letter, and what is said of commands, currents, motors and units."""
+"""Which column is which: choices, refusals to the letter, and what is said of commands, currents,
+motors and units.
+"""
 
 from __future__ import annotations
 
@@ -28,8 +30,10 @@ def refusal(header: str, settings: dict[str, Any] | None = None, **stated: str) 
 
 def test_columns_that_are_missing_are_named_with_the_flags_that_name_them() -> None:
     assert refusal("q1 q2 tau1") == (
-        "no column for t, tau1, tau2; found 'q1', 'q2', 'tau1'; name them: --set time=NAME --set tau1.source=NAME "
-        '--set tau2.source=NAME (profile: time = "NAME", source = "NAME" of [tau1], source = "NAME" of [tau2]); '
+        "no column for t, tau1, tau2; found 'q1', 'q2', 'tau1'; name them: --set time=NAME --set "
+        "tau1.source=NAME "
+        '--set tau2.source=NAME (profile: time = "NAME", source = "NAME" of [tau1], source = '
+        '"NAME" of [tau2]); '
         "or give the samples a second of a log without a time: --rate HZ (profile: rate = HZ); "
         "a PD law makes them of q_des, kp and kd of [tau1] and [tau2] (algid guide logs)"
     )
@@ -38,7 +42,8 @@ def test_columns_that_are_missing_are_named_with_the_flags_that_name_them() -> N
     assert told.count("'c") == 16
     assert f"'c15{'x' * 37}' and 2 more; name them" in told
     assert refusal(PLAIN, {"theta2": {"source": "angle"}}) == (
-        f"theta2 is to be taken from 'angle', which is not there; found {', '.join(map(repr, PLAIN.split()))}; "
+        "theta2 is to be taken from 'angle', which is not there; found "
+        f"{', '.join(map(repr, PLAIN.split()))}; "
         'name another: --set theta2.source=NAME (profile: source = "NAME" of [theta2])'
     )
 
@@ -147,7 +152,10 @@ def test_the_file_and_the_user_differ_about_a_unit() -> None:
     assert said(assigned("t q1_deg q2 tau1 tau2", None, q1_deg="rad", q2="deg")) == [
         (
             "OTHER_UNIT",
-            "the file states the unit rad for theta1 ('q1_deg'), which is taken for deg, as its name says",
+            (
+                "the file states the unit rad for theta1 ('q1_deg'), which is taken for deg, as its "
+                "name says"
+            ),
         )
     ]
     assert said(assigned("time_ms q1 q2 tau1 tau2", {"time_unit": "s"})) == [
@@ -160,7 +168,8 @@ def test_the_file_and_the_user_differ_about_a_unit() -> None:
 
 def test_a_unit_of_no_joint_is_refused_where_it_counts() -> None:
     assert refusal("t q1_inch q2 tau1 tau2") == (
-        "the column 'q1_inch' for theta1 is in 'inch', which is no unit of a joint; say its unit if that is wrong: "
+        "the column 'q1_inch' for theta1 is in 'inch', which is no unit of a joint; say its unit "
+        "if that is wrong: "
         '--set theta1.unit=rad (profile: unit = "rad" of [theta1])'
     )
     assert '--set tau2.unit="N m"' in refusal(PLAIN, None, tau2="%")
@@ -176,8 +185,10 @@ def test_a_unit_of_no_joint_is_refused_where_it_counts() -> None:
 def test_motors_beside_joints_need_a_gear() -> None:
     told = refusal("t q1 q2 motor1_torque motor2_torque", {"tau2": {"gear_ratio": 1}})
     assert told == (
-        "tau1 (motor1_torque): signals of motors beside those of joints; tell the gear, turns of the motor in one of "
-        "the joint, 1 for a direct drive: --set tau1.gear_ratio=N (profile: gear_ratio = N of [tau1])"
+        "tau1 (motor1_torque): signals of motors beside those of joints; tell the gear, turns of "
+        "the motor in one of "
+        "the joint, 1 for a direct drive: --set tau1.gear_ratio=N (profile: gear_ratio = N of "
+        "[tau1])"
     )
     motors = assigned("t motor1_pos motor2_pos motor1_torque motor2_torque")
     assert [code for code, _ in said(motors)] == ["MOTOR_SIDE"]

@@ -1,4 +1,6 @@
-"""Units, gears, zeros and references: by the definitions of the units, by power, and against numpy's unwrap."""
+"""Units, gears, zeros and references: by the definitions of the units, by power, and against
+numpy's unwrap.
+"""
 
 from __future__ import annotations
 
@@ -151,7 +153,9 @@ def test_a_second_motor_at_the_base_does_the_same_work() -> None:
 
 
 def test_zero_and_reference_of_the_angles() -> None:
-    """The tip of an arm of two links of 1 m is where it was, whatever the angles are counted from."""
+    """The tip of an arm of two links of 1 m is where it was, whatever the angles are
+    counted from.
+    """
     hanging, absolute = converted(zero=-math.pi / 2).theta, converted(absolute=True)
     first, second = SIGNALS[:2]
     assert np.allclose(np.exp(1j * hanging[0]) * 1j, np.exp(1j * first), atol=1e-14)

@@ -1,4 +1,6 @@
-"""Feather files of every type and make: read, or refused in one line, and nothing unpacked that no log has."""
+"""Feather files of every type and make: read, or refused in one line, and nothing unpacked that no
+log has.
+"""
 
 from __future__ import annotations
 

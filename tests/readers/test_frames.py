@@ -1,4 +1,6 @@
-"""What flat tables of every format share: their clock, dates, types, rows with gaps, and the look at other joints."""
+"""What flat tables of every format share: their clock, dates, types, rows with gaps, and the look
+at other joints.
+"""
 
 from __future__ import annotations
 
@@ -176,12 +178,15 @@ OWN = {"q1": "theta1", "q2": "theta2"}
 
 @pytest.mark.parametrize(("slower", "told"), [(500, True), (200, False), (201, True)])
 def test_a_clock_too_slow_for_an_arm_is_told_once(slower: int, told: bool, tmp_path: Path) -> None:
-    """algid's own names mean seconds: below 5 Hz these are said to be doubtful, unless the user told them."""
+    """algid's own names mean seconds: below 5 Hz these are said to be doubtful, unless the user
+    told them.
+    """
     path = tmp_path / "log.csv"
     arm(30, 2).with_columns(t=pl.col("t") * slower).rename(OWN).write_csv(path)
     said = [notice for table in open_log(path).tables(10) for notice in table.notices]
     text = (
-        f"times in 't' are taken for s, which makes {1000 / slower:.3g} Hz, too slow for an arm in motion: "
+        f"times in 't' are taken for s, which makes {1000 / slower:.3g} Hz, too slow for an arm "
+        "in motion: "
         'if they are in ms: --set time_unit=ms (profile: time_unit = "ms")'
     )
     assert [(notice.code, notice.clause) for notice in said] == [("SLOW_CLOCK", text)] * told
@@ -237,7 +242,9 @@ def test_of_wide_lists_the_first_places_are_taken(tmp_path: Path) -> None:
 
 
 def test_a_look_at_other_joints_does_not_stand_for_the_check_of_all_pages(tmp_path: Path) -> None:
-    """A page of a joint that is read is checked to its last, though its first were looked at before."""
+    """A page of a joint that is read is checked to its last, though its first were looked at
+    before.
+    """
     path, frame = tmp_path / "log.parquet", arm()
     pq.write_table(
         frame.to_arrow(), path, compression="none", use_dictionary=False, write_page_checksum=True

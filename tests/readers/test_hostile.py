@@ -1,4 +1,6 @@
-"""Damaged and hostile files: an answer or one clear line, in bounded memory, and never a silent change."""
+"""Damaged and hostile files: an answer or one clear line, in bounded memory, and never a silent
+change.
+"""
 
 from __future__ import annotations
 
@@ -269,7 +271,9 @@ class Keys(encryption.KmsClient):  # type: ignore[misc]
 
 
 def read_alone(*paths: Path) -> list[str]:
-    """What a process of its own says of each file, which may end it: nothing, or the error's type and text."""
+    """What a process of its own says of each file, which may end it: nothing, or the error's type
+    and text.
+    """
     code = (
         "import sys; from algid.readers import read_log\n"
         "for path in sys.argv[1:]:\n"

@@ -139,7 +139,8 @@ def test_more_layouts_than_are_remembered(tmp_path: Path) -> None:
 
 def test_dynamic_joint_states(tmp_path: Path) -> None:
     definition = (
-        "std_msgs/Header header\nstring[] joint_names\ncontrol_msgs/InterfaceValue[] interface_values\n"
+        "std_msgs/Header header\nstring[] joint_names\ncontrol_msgs/InterfaceValue[] "
+        "interface_values\n"
         + "=" * 80
         + "\nMSG: control_msgs/InterfaceValue\nstring[] interface_names\nfloat64[] values\n"
         + HEADER
@@ -251,7 +252,8 @@ def test_splits_of_a_rosbag2_folder_are_one_log(tmp_path: Path) -> None:
         write_log(bag / f"bag_{number}.mcap", log.part(number * 90, min(1000, number * 90 + 90)))
     names = "".join(f"    - bag_{number}.mcap\n" for number in range(11))
     (bag / "metadata.yaml").write_text(
-        f"rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths:\n{names}  compression_mode: ''\n"
+        f"rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths:\n{names}  "
+        "compression_mode: ''\n"
     )
     assert same(read_log(bag), log.part(0, 990))
     (bag / "bag_3.mcap").unlink()
@@ -274,7 +276,8 @@ def test_bags_compressed_by_message_are_refused(tmp_path: Path) -> None:
     (tmp_path / "bag").mkdir()
     write_log(tmp_path / "bag" / "bag_0.mcap", noise_log(10))
     (tmp_path / "bag" / "metadata.yaml").write_text(
-        "  relative_file_paths:\n    - bag_0.mcap\n  compression_format: zstd\n  compression_mode: MESSAGE\n"
+        "  relative_file_paths:\n    - bag_0.mcap\n  compression_format: zstd\n  "
+        "compression_mode: MESSAGE\n"
     )
     with pytest.raises(LogError, match=r"compressed.*MESSAGE.*ros2 bag convert"):
         open_log(tmp_path / "bag")

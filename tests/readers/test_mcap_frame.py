@@ -1,4 +1,6 @@
-"""The frame of an MCAP file: a summary is believed only where it agrees with the file, a chunk where it is sound."""
+"""The frame of an MCAP file: a summary is believed only where it agrees with the file, a chunk
+where it is sound.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,9 @@ Records = list[McapRecord]
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """A log in several chunks with message indexes, statistics and a summary, as the `mcap` package writes it."""
+    """A log in several chunks with message indexes, statistics and a summary, as the `mcap`
+    package writes it.
+    """
     path = tmp_path_factory.mktemp("whole") / "log.mcap"
     write_mcap(path, messages_of(LOG), chunk_size=4096)
     assert len(chunks_of(path)) > 3
@@ -43,7 +47,9 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 def summarised(content: bytes, edit: Callable[[Records], Records], checksum: bool = True) -> bytes:
-    """The file with another summary, written by the `mcap` package, under a checksum that is right for it or none."""
+    """The file with another summary, written by the `mcap` package, under a checksum that is right
+    for it or none.
+    """
     start, _, _ = struct.unpack_from("<QQI", content, len(content) - 28)
     records = list(StreamReader(BytesIO(content[start:]), skip_magic=True).records)
     builder = RecordBuilder()
@@ -102,7 +108,9 @@ def shorter(records: Records) -> Records:
 
 
 def hidden_index(records: Records) -> Records:
-    """The second chunk lists none of its indexes, and the statistics do not count their messages."""
+    """The second chunk lists none of its indexes, and the statistics do not count their
+    messages.
+    """
     chunk = [one for one in records if isinstance(one, ChunkIndex)][1]
     (channel,) = chunk.message_index_offsets
     count = (chunk.message_index_length - 15) // 16
@@ -139,7 +147,8 @@ def redefined(kind: type, **change: Any) -> Callable[[Records], Records]:
 
 WRONG: dict[str, tuple[Callable[[Records], Records], str]] = {
     "a chunk of no length": (
-        changing(ChunkIndex, lambda one: setattr(one, "chunk_length", 9)), r"it claims a chunk at byte \d+"
+        changing(ChunkIndex, lambda one: setattr(one, "chunk_length", 9)), (r"it claims a chunk at "
+                                                                           r"byte \d+")
     ),
     "a chunk behind the end": (
         changing(ChunkIndex, lambda one: setattr(one, "message_index_length", 1 << 40)), r"it claims a chunk at byte"
@@ -153,16 +162,20 @@ WRONG: dict[str, tuple[Callable[[Records], Records], str]] = {
         changing(Statistics, lambda one: one.channel_message_counts.update({7: 1})),
         "its indexes and its statistics count different",
     ),
-    "an index beside its place": (changing(ChunkIndex, misplaced), r"it claims a message index at byte \d+"),
+    "an index beside its place": (changing(ChunkIndex, misplaced), (r"it claims a message index at "
+                                                                   r"byte \d+")),
     "chunks over one another": (overlapping, r"its chunks overlap at byte \d+"),
     "a chunk in no list": (hiding, r"it does not list what stands at byte \d+"),
     "an index in no list": (hidden_index, r"it does not list what stands at byte \d+"),
     "an index that ends before its end": (cut_index, r"a record at byte \d+ breaks off"),
     "a channel without definition": (
-        changing(Channel, lambda one: setattr(one, "id", 5)), "it lists messages of a channel 1 that it does not define"
+        changing(Channel, lambda one: setattr(one, "id", 5)), ("it lists messages of a channel 1 "
+                                                              "that it does not define")
     ),
-    "a schema twice": (redefined(Schema, data=b"int8 x"), "schema 1 is defined anew and differently"),
-    "a channel twice": (redefined(Channel, topic="/other"), "channel 1 is defined anew and differently"),
+    "a schema twice": (redefined(Schema, data=b"int8 x"), ("schema 1 is defined anew and "
+                                                          "differently")),
+    "a channel twice": (redefined(Channel, topic="/other"), ("channel 1 is defined anew and "
+                                                            "differently")),
 }  # fmt: skip
 
 
@@ -448,7 +461,9 @@ def test_the_truth_in_the_metadata_is_read_where_it_can_be(tmp_path: Path) -> No
 
 
 def hiding_one_of_two(path: Path, others: int) -> None:
-    """A file of small chunks, of which the summary hides the joints of one chunk that holds another channel too."""
+    """A file of small chunks, of which the summary hides the joints of one chunk that holds
+    another channel too.
+    """
     messages = messages_of(LOG)
     beside = [("/other", stamp, b"\0\1\0\0\7") for _, stamp, _ in messages[30 : 30 + others]]
     mixed = [*messages[:30], *beside, *messages[30:]]

@@ -30,8 +30,10 @@ FIELD = {
     ),
     "time,q[0],q[1],tau_J[0],tau_J[1]": "time q[0] q[1] tau_J[0] tau_J[1]",
     "T,THETA1,Theta2,Tau1,TAU2": "T THETA1 Theta2 Tau1 TAU2",
-    "Time [ms],Joint 1 Position [deg],Joint 2 Position [deg],Joint 1 Torque [Nm],Joint 2 Torque [Nm]": (
-        "Time [ms],Joint 1 Position [deg],Joint 2 Position [deg],Joint 1 Torque [Nm],Joint 2 Torque [Nm]"
+    "Time [ms],Joint 1 Position [deg],Joint 2 Position [deg],Joint 1 Torque [Nm],Joint 2 Torque "
+    "[Nm]": (
+        "Time [ms],Joint 1 Position [deg],Joint 2 Position [deg],Joint 1 Torque [Nm],Joint 2 "
+        "Torque [Nm]"
     ),
 }
 
@@ -110,11 +112,20 @@ def test_whole_nanoseconds_stay_exact() -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "# made by hand\n\n t ; q1 ; q2 ; tau1 ; tau2 \n0,0 ; 1,5 ;2,0;3,0;4,0\n0,5;1,5 ;2,0;3,0;4,0\n",
+        (
+            "# made by hand\n\n t ; q1 ; q2 ; tau1 ; tau2 \n0,0 ; 1,5 ;2,0;3,0;4,0\n0,5;1,5 "
+            ";2,0;3,0;4,0\n"
+        ),
         "t\tq1\tq2\ttau1\ttau2\n0.0\t1.5\t2.0\t3.0\t4.0\n0.5\t1.5\t2.0\t3.0\t4.0\n",
         "# t q1 q2 tau1 tau2\n 0.0  1.5  2.0  3.0 4.0\n 0.5  1.5  2.0  3.0 4.0\n\n",
-        'note,"t","q1","q2","tau1","tau2"\r\n"x, y",0.0,1.5,2.0,3.0,4.0\r\nz,0.5,1.5,2.0,3.0,4.0\r\n',
-        "\ufefft, q1, q2, tau1, tau2\n0.0, 1.5, 2.0, 3.0, 4.0\n0.5, 1.5, 2.0, 3.0, 4.0\n0.6, 1.5, 2",
+        (
+            'note,"t","q1","q2","tau1","tau2"\r\n"x, '
+            'y",0.0,1.5,2.0,3.0,4.0\r\nz,0.5,1.5,2.0,3.0,4.0\r\n'
+        ),
+        (
+            "\ufefft, q1, q2, tau1, tau2\n0.0, 1.5, 2.0, 3.0, 4.0\n0.5, 1.5, 2.0, 3.0, 4.0\n0.6, 1.5, "
+            "2"
+        ),
     ],
 )
 def test_dialects(text: str, tmp_path: Path) -> None:

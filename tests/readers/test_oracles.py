@@ -1,4 +1,6 @@
-"""Messages serialised by rosbags, read by algid, rosbags and mcap-ros2-support: the same to the last bit."""
+"""Messages serialised by rosbags, read by algid, rosbags and mcap-ros2-support: the same to the
+last bit.
+"""
 
 from __future__ import annotations
 
@@ -29,9 +31,11 @@ CHANNELS = ("theta1", "theta2", "tau1", "tau2")
 CUSTOM = {
     "control_msgs/msg/InterfaceValue": "string[] interface_names\nfloat64[] values\n",
     "control_msgs/msg/DynamicJointState": (
-        "std_msgs/Header header\nstring[] joint_names\ncontrol_msgs/InterfaceValue[] interface_values\n"
+        "std_msgs/Header header\nstring[] joint_names\ncontrol_msgs/InterfaceValue[] "
+        "interface_values\n"
     ),
-    "lab/msg/Joint": "bool[3] flags\nfloat32 temperature\nfloat64 angle\nchar mode\nfloat64[2] torques\n",
+    "lab/msg/Joint": "bool[3] flags\nfloat32 temperature\nfloat64 angle\nchar mode\nfloat64[2] "
+    "torques\n",
     "lab/msg/State": (
         "uint8 READY=1\nstring<=16 label\nuint16 errors\nlab/Joint[2] joints\nint8[] spare\n"
         "lab/Joint[<=3] more\nstring[] words\nbyte last\n"

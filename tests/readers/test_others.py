@@ -1,4 +1,6 @@
-"""Joints that a flat log has beside the two that are read: those that move are named with how far."""
+"""Joints that a flat log has beside the two that are read: those that move are named
+with how far.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Round trips through every format, other libraries as oracles, recorded logs, and what must be refused."""
+"""Round trips through every format, other libraries as oracles, recorded logs, and what must be
+refused.
+"""
 
 from __future__ import annotations
 

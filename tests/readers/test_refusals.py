@@ -1,4 +1,5 @@
-"""Every refusal that a flag overrides: what is refused, the flag that its message names, and the warning that stays.
+"""Every refusal that a flag overrides: what is refused, the flag that its message names, and the
+warning that stays.
 
 `REFUSALS` is the table of them. A refusal that is not in it cannot be overridden: the file is
 missing, damaged, cut off, of another format, or changed since algid wrote it.
@@ -41,7 +42,9 @@ ROWS = 40
 
 @dataclass(frozen=True)
 class Refusal:
-    """A log that is refused, words of the message, flags that it names, and the code of the warning that stays."""
+    """A log that is refused, words of the message, flags that it names, and the code of the
+    warning that stays.
+    """
 
     make: Callable[[Path], Path]
     words: str
@@ -138,7 +141,8 @@ REFUSALS = {
         table("t,q1,q2,current1,current2"), "unit", '--set tau1.unit="N m" --set tau2.unit="N m"', "CURRENT_AS_TORQUE"
     ),
     "counts": Refusal(
-        table("t,q1_counts,q2_counts,tau1,tau2"), "counts a turn", "--set theta1.counts=4096 --set theta2.counts=4096"
+        table("t,q1_counts,q2_counts,tau1,tau2"), "counts a turn", "--set theta1.counts=4096 "
+                                                                   "--set theta2.counts=4096"
     ),
     "inches": Refusal(
         table("t,q1 [inch],q2,tau1,tau2"), "'inch', which is no unit", '--set theta1.unit="rad"', "FOREIGN_UNIT"

@@ -57,7 +57,8 @@ module builtin_interfaces { module msg { /* seconds
 and the rest */ struct Time { int32 sec; uint32 nanosec; }; }; };
 """
 STATE_TEXT = (
-    f"{LINE}IDL: sensor_msgs/msg/JointState\n{JOINT_STATE}\n{LINE}IDL: std_msgs/msg/Header\n{HEADER}\n"
+    f"{LINE}IDL: sensor_msgs/msg/JointState\n{JOINT_STATE}\n{LINE}IDL: "
+    f"std_msgs/msg/Header\n{HEADER}\n"
     f"{LINE}IDL: builtin_interfaces/msg/Time\n{TIME}"
 )
 IDL_NAMES = {
@@ -86,7 +87,10 @@ def idl_of(name: str) -> str:
                 typedefs.append(f"typedef {kind} {alias}[{one.count}];")
                 kind = alias
             lines.append(f"{kind} {one.name};")
-        text = f"module {package} {{ module msg {{ {' '.join(typedefs)} struct {last} {{ {' '.join(lines)} }}; }}; }};"
+        text = (
+            f"module {package} {{ module msg {{ {' '.join(typedefs)} struct {last} {{ "
+            f"{' '.join(lines)} }}; }}; }};"
+        )
         sections.append(f"{LINE}IDL: {package}/msg/{last}\n{text}\n")
     return "".join(sections)
 

@@ -1,4 +1,6 @@
-"""Hostile schemas and messages: each is read, told or refused in one line, and none takes long or much."""
+"""Hostile schemas and messages: each is read, told or refused in one line, and none takes long or
+much.
+"""
 
 from __future__ import annotations
 
@@ -246,7 +248,9 @@ def test_a_structure_of_nothing_is_counted(tmp_path: Path) -> None:
 
 
 def descriptors(**types: list[tuple[str, str]]) -> bytes:
-    """A descriptor set: by type its fields, each with a name and the type of message it is, empty for a double."""
+    """A descriptor set: by type its fields, each with a name and the type of message it is, empty
+    for a double.
+    """
     file = descriptor_pb2.FileDescriptorProto(name="a.proto", package="a", syntax="proto3")
     for name, fields in types.items():
         message = file.message_type.add(name=name)
@@ -434,7 +438,9 @@ ARM = ("theta1", "theta2", "tau1", "tau2")
 
 
 def arm_file(presence: str) -> descriptor_pb2.FileDescriptorProto:
-    """Messages of four numbers that can be told to be unset in one of the ways of protobuf, or cannot (proto3)."""
+    """Messages of four numbers that can be told to be unset in one of the ways of protobuf, or
+    cannot (proto3).
+    """
     file = descriptor_pb2.FileDescriptorProto(name="p.proto", package="p")
     file.syntax = {"proto2": "proto2", "editions": "editions"}.get(presence, "proto3")
     if presence == "editions":
@@ -550,7 +556,9 @@ def single(value: float) -> bytes:
 @pytest.mark.parametrize("nested", [False, True])
 @pytest.mark.parametrize("kinds", ["pp", "ps", "sp", "spsp", "ppp"])
 def test_a_list_in_several_runs_is_one_list(kinds: str, *, nested: bool) -> None:
-    """Packed runs (p) and single numbers (s), one behind the other, as protobuf itself puts them together."""
+    """Packed runs (p) and single numbers (s), one behind the other, as protobuf itself puts them
+    together.
+    """
     file = runs_file()
     made = proto_class(file, "r.R")
     parts = []

@@ -1,4 +1,6 @@
-"""What a table loses is counted or refused: rows of commas, rows between quotes, times that wrap, a clock set back."""
+"""What a table loses is counted or refused: rows of commas, rows between quotes, times that wrap,
+a clock set back.
+"""
 
 from __future__ import annotations
 

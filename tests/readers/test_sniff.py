@@ -162,7 +162,8 @@ def test_text_of_other_encodings_is_refused() -> None:
 
 def test_the_dialect_of_a_table() -> None:
     dialect = found(
-        'made by hand\n\n"t" ; q1; "on, off" ;day\n1 ; 2,5;7;2024-01-02 03:04:05\n-2;.5;8;2024-01-02T03:04:06\n'
+        'made by hand\n\n"t" ; q1; "on, off" ;day\n1 ; 2,5;7;2024-01-02 '
+        "03:04:05\n-2;.5;8;2024-01-02T03:04:06\n"
     )
     assert dialect.columns == ("t", "q1", "on, off", "day")
     assert (dialect.separator, dialect.decimal_comma, dialect.skip, dialect.padded) == (

@@ -1,4 +1,6 @@
-"""Time order and alignment: against numpy's sort, closed forms of linear interpolation, and at their very limits."""
+"""Time order and alignment: against numpy's sort, closed forms of linear interpolation, and at
+their very limits.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,9 @@ def ordered(*tables: SampleTable) -> SampleTable:
 @settings(max_examples=30, deadline=None)
 @given(data=st.data())
 def test_late_and_repeated_samples_in_any_tables(data: st.DataObject) -> None:
-    """Neighbours swapped and stamps repeated at random: numpy's unique tells what must come out, and how many go."""
+    """Neighbours swapped and stamps repeated at random: numpy's unique tells what must come out,
+    and how many go.
+    """
     steps = data.draw(st.lists(st.integers(0, 3), min_size=40, max_size=80))
     stamps = np.cumsum([step or (place % 3 != 0) for place, step in enumerate(steps)])
     for place in data.draw(st.sets(st.integers(0, stamps.size // 8 - 1))):
@@ -131,7 +135,9 @@ def test_what_empty_tables_tell_is_kept() -> None:
 
 
 def test_memory_is_bounded_where_tables_overlap() -> None:
-    """Each table reaches a little into the one before, so that all are merged, and still none is held back for long."""
+    """Each table reaches a little into the one before, so that all are merged, and still none is
+    held back for long.
+    """
     stamps = np.arange(40_000)
     parts = np.split(stamps, range(4000, 40_000, 4000))
     for one, other in pairwise(parts):
@@ -148,7 +154,9 @@ def series(stamps: IntArray, **columns: FloatArray) -> Series:
 @pytest.mark.parametrize("start", [0, EPOCH_NS])
 @pytest.mark.parametrize("step", [MS, 3 * MS])
 def test_the_error_told_is_that_of_a_parabola(step: int, start: int) -> None:
-    """Between samples h apart a line misses a t² by a h²/4 at most, in the middle: what the notice says of it."""
+    """Between samples h apart a line misses a t² by a h²/4 at most, in the middle: what the notice
+    says of it.
+    """
     stamps = start + np.arange(200) * step
     seconds = (stamps - start) * 1e-9
     other = series(stamps, tau1=3 * seconds**2, tau2=-2 * seconds)

@@ -179,7 +179,9 @@ def test_hdf5_that_is_damaged_or_leads_elsewhere_is_refused(tmp_path: Path) -> N
 
 
 def test_hdf5_that_breaks_its_library_is_refused(tmp_path: Path) -> None:
-    """A chunk of three bytes, of which a checksum takes four, is a segmentation fault in libhdf5."""
+    """A chunk of three bytes, of which a checksum takes four, is a segmentation fault
+    in libhdf5.
+    """
     h5py = pytest.importorskip("h5py")
     path = tmp_path / "a.h5"
     with h5py.File(path, "w") as file:
@@ -242,7 +244,10 @@ def test_a_numpy_array_of_fewer_rows_than_its_file_holds_is_refused(tmp_path: Pa
 def test_a_matlab_file_whose_matrices_fit_nothing_says_what_it_holds(tmp_path: Path) -> None:
     path = tmp_path / "a.mat"
     scipy.io.savemat(path, {"A": np.eye(80), "q": np.ones((50, 2)), "t": np.arange(200.0)})
-    words = r"no column for theta1, .* the log also holds, of another length: A \(80 × 80\), q \(50 × 2\)"
+    words = (
+        r"no column for theta1, .* the log also holds, of another length: A \(80 × 80\), q "
+        r"\(50 × 2\)"
+    )
     with pytest.raises(LogError, match=words):
         read_log(path)
     found = inspect_log(path)

@@ -85,7 +85,8 @@ class Browser:
             failed=int(run("return document.documentElement.dataset.failed || 0")),
             panels=run(
                 "return document.querySelectorAll('.plot .main-svg').length && "
-                "[...document.querySelectorAll('.plot')].filter((p) => p.querySelector('.main-svg')).length"
+                "[...document.querySelectorAll('.plot')].filter((p) => "
+                "p.querySelector('.main-svg')).length"
             ),
             requests=self._requests(),
             console=[entry["message"] for entry in self._log("browser")],

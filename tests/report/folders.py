@@ -1,4 +1,6 @@
-"""Result folders to report on: a simulated arm, identified by plain least squares on its exact motion."""
+"""Result folders to report on: a simulated arm, identified by plain least squares on its exact
+motion.
+"""
 
 from __future__ import annotations
 
@@ -269,7 +271,9 @@ def _write_series(folder: Path, unloaded: Recording, loaded: Recording, k: Float
 
 
 def build_recorded(folder: Path, csv: Path) -> Result:
-    """A folder on a recorded run of a real arm: filtered least squares, whose residual is far from white."""
+    """A folder on a recorded run of a real arm: filtered least squares, whose residual is far from
+    white.
+    """
     run = pl.read_csv(csv)
     t = run["time"].to_numpy() - run["time"][0]
     dt = float(np.median(np.diff(t)))

@@ -112,8 +112,14 @@ def test_figures_follow_legend_theme_keys_and_paper(browser: Browser, folder: Pa
     run("document.querySelector('button[data-figure=torque][data-group=measured]').click()")
     assert run(shown) == [False, True, True]
 
-    press = "document.getElementById('torque-0').dispatchEvent(new KeyboardEvent('keydown', {key: arguments[0]}))"
-    ranges = "return ['torque-0', 'torque-1'].map((id) => [...document.getElementById(id)._fullLayout.xaxis.range])"
+    press = (
+        "document.getElementById('torque-0').dispatchEvent(new KeyboardEvent('keydown', {key: "
+        "arguments[0]}))"
+    )
+    ranges = (
+        "return ['torque-0', 'torque-1'].map((id) => "
+        "[...document.getElementById(id)._fullLayout.xaxis.range])"
+    )
     whole = run(ranges)[0]
     run(press, "+")
     browser.until(

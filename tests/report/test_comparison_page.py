@@ -1,4 +1,6 @@
-"""A comparison's page: what it draws is what the results hold, and its words count what it draws."""
+"""A comparison's page: what it draws is what the results hold, and its words count what
+it draws.
+"""
 
 from __future__ import annotations
 

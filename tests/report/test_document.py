@@ -1,4 +1,6 @@
-"""One document, three renderers: what each shows of it, in what order, and that nothing foreign gets through."""
+"""One document, three renderers: what each shows of it, in what order, and that nothing foreign
+gets through.
+"""
 
 from __future__ import annotations
 
@@ -181,7 +183,8 @@ def test_a_fold_is_open_or_closed() -> None:
                 2,
             ),
             (
-                '<dl><dt>r&lt;1&gt;</dt><dd><a href="./a%26b">a&amp;b</a>, <a href="./c">c</a> and 2 more</dd>'
+                '<dl><dt>r&lt;1&gt;</dt><dd><a href="./a%26b">a&amp;b</a>, <a href="./c">c</a> '
+                "and 2 more</dd>"
                 "<dt>r2</dt><dd>none</dd></dl>"
             ),
         ),

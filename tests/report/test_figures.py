@@ -1,4 +1,6 @@
-"""Figures against what they are drawn from: closed forms, NumPy's own linear algebra, files written by hand."""
+"""Figures against what they are drawn from: closed forms, NumPy's own linear algebra, files
+written by hand.
+"""
 
 from __future__ import annotations
 
@@ -435,7 +437,8 @@ def test_a_noisy_prediction_says_why() -> None:
         )
         note = torque(noisy, []).note
         assert note.startswith(
-            f"Residual of joint 1: 0.100 of 1.00 N m RMS; of joint 2: {residual:.3f} of 1.00 N m RMS."
+            f"Residual of joint 1: 0.100 of 1.00 N m RMS; of joint 2: {residual:.3f} of 1.00 N m "
+            "RMS."
         )
         assert ("differentiates angles twice" in note) is told
 

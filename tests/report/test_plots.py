@@ -1,4 +1,6 @@
-"""Figures for papers: every one of a page is saved, with the page's own values, words and ranges."""
+"""Figures for papers: every one of a page is saved, with the page's own values, words
+and ranges.
+"""
 
 from __future__ import annotations
 

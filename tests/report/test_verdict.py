@@ -126,7 +126,8 @@ def test_a_model_that_is_worse_than_a_constant_failed_and_one_that_explains_litt
     worse = TorquePrediction(rmse=(1, 1), nrmse=(1, 1), r2=(-0.14, 0.48), filter="none")
     found = with_fit(result, residual=worse).verdict
     assert found.sentence == (
-        "Failed: the model predicts the torque of joint 1 worse than its mean does; do not use these numbers."
+        "Failed: the model predicts the torque of joint 1 worse than its mean does; do not use "
+        "these numbers."
     )
     little = worse.model_copy(update={"r2": (0.14, 0.48)})
     found = with_fit(result, residual=little).verdict
@@ -181,7 +182,9 @@ def test_many_estimates_far_from_the_truth_are_one_reason(result: Result) -> Non
 
 
 def implausible(result: Result, **changes: object) -> Result:
-    """The result with no status OK left, as identification leaves it where physics or torque contradict a fit."""
+    """The result with no status OK left, as identification leaves it where physics or torque
+    contradict a fit.
+    """
     groups = {
         group: {
             name: e.model_copy(update={"status": Status.IMPLAUSIBLE})

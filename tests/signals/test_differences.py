@@ -29,7 +29,9 @@ def test_acceleration_converges_with_eighth_order() -> None:
 
 
 def test_a_held_torque_moves_an_inertia_like_the_smooth_one_to_fourth_order() -> None:
-    """θ̈ = u, u held: the samples in closed form, their second derivative half a sample after each stamp."""
+    """θ̈ = u, u held: the samples in closed form, their second derivative half a sample after each
+    stamp.
+    """
     errors = []
     for dt in (0.04, 0.02, 0.01):
         tau = np.sin(5 * dt * np.arange(round(2 / dt)))

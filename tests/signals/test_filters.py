@@ -108,7 +108,9 @@ def test_a_kernel_reaches_two_and_a_half_periods_of_its_bandwidth(
 
 
 def test_the_differentiators_response_is_that_of_a_derivative_and_falls_off() -> None:
-    """Against SciPy's frequency response: i ω up to half the bandwidth, next to nothing from twice of it."""
+    """Against SciPy's frequency response: i ω up to half the bandwidth, next to nothing from twice
+    of it.
+    """
     dt, bandwidth = 1e-3, 40.0
     kernel = differentiator(dt, bandwidth)
     np.testing.assert_allclose(kernel, -kernel[::-1], atol=1e-9 * np.abs(kernel).max())  # no phase

@@ -1,4 +1,6 @@
-"""The derivative observer against the transfer function of eq. (6) and a brute-force integration."""
+"""The derivative observer against the transfer function of eq. (6) and a brute-force
+integration.
+"""
 
 from __future__ import annotations
 

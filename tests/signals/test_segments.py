@@ -1,4 +1,6 @@
-"""Uniform segments: independent of blocks, exact where stamps are even, cubic where they are not."""
+"""Uniform segments: independent of blocks, exact where stamps are even, cubic where
+they are not.
+"""
 
 from __future__ import annotations
 

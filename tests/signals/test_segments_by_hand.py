@@ -1,4 +1,6 @@
-"""Segments of stamps small enough to check by eye: where a log is cut, what is dropped, what is put in between."""
+"""Segments of stamps small enough to check by eye: where a log is cut, what is dropped, what is
+put in between.
+"""
 
 from __future__ import annotations
 

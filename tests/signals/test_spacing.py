@@ -1,4 +1,6 @@
-"""Samples nearly on top of one another: late ones go back to their period, repeated ones count once."""
+"""Samples nearly on top of one another: late ones go back to their period, repeated ones count
+once.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ RANDOM = np.random.default_rng(8)
 
 
 def moving(t: FloatArray) -> FloatArray:
-    """Angles (2, N) in closed form: up to 6 rad/s, so that a sample one period late is 6e-3 rad off."""
+    """Angles (2, N) in closed form: up to 6 rad/s, so that a sample one period late is 6e-3 rad
+    off.
+    """
     return np.stack([2 * np.sin(3 * t), np.cos(2 * t)])
 
 

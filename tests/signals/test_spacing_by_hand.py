@@ -49,7 +49,9 @@ def test_a_sample_that_comes_with_its_successor_goes_back_to_its_own_period() ->
 
 
 def test_two_samples_of_one_instant_after_a_gap_are_one() -> None:
-    """As many periods lack samples as in the case above, but the angle did not move between the two."""
+    """As many periods lack samples as in the case above, but the angle did not move between the
+    two.
+    """
     found = settled(log_of([0, 1000, 2998, 3000, 4000], [0.0, 1.0, 2.98, 3.02, 4.0]))
     assert (found.stamp_ns // US).tolist() == [0, 1000, 2999, 4000]
     assert found.theta[0].tolist() == pytest.approx([0, 1, 3, 4], abs=1e-12)

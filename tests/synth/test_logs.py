@@ -65,7 +65,10 @@ def test_a_rehearsal_overwrites_no_log_either(tmp_path: Path) -> None:
     assert (tmp_path / "bare-unloaded.csv").read_bytes() != before
 
 
-SCHEDULE = "--payload-schedule: expected increasing times and payloads of 0 or more like 2=0.05,4=0, found "
+SCHEDULE = (
+    "--payload-schedule: expected increasing times and payloads of 0 or more like "
+    "2=0.05,4=0, found "
+)
 
 
 @pytest.mark.parametrize(
@@ -93,7 +96,10 @@ SCHEDULE = "--payload-schedule: expected increasing times and payloads of 0 or m
         ),
         (
             ["case1", "--motion", "x", "--initial", "0,0,0,0"],
-            "--initial 0,0,0,0: a motion starts where it was planned and carries one payload; leave it out",
+            (
+                "--initial 0,0,0,0: a motion starts where it was planned and carries one payload; "
+                "leave it out"
+            ),
         ),
         (["case1", "--motion", "x"], "x: not the trajectory of a design ("),
     ],

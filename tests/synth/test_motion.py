@@ -1,4 +1,6 @@
-"""The simulator against what mechanics keeps, decoupled arms in closed form, MuJoCo and Pinocchio."""
+"""The simulator against what mechanics keeps, decoupled arms in closed form, MuJoCo and
+Pinocchio.
+"""
 
 from __future__ import annotations
 
@@ -60,7 +62,9 @@ def test_an_arm_without_coupling_is_two_bodies_in_closed_form() -> None:
 
 
 def test_friction_alone_slows_exponentially() -> None:
-    """With k1 = 0, no weight, no torque and k7 = 0: k5 θ̈1 = −k6 θ̇1, while link 2 keeps its own turning in space."""
+    """With k1 = 0, no weight, no torque and k7 = 0: k5 θ̈1 = −k6 θ̇1, while link 2 keeps its own
+    turning in space.
+    """
     k = np.array([0.0, 0.0, 0.5, 0.0, 2.0, 0.8, 0.0])
     t = np.linspace(0, 4, 41)
     motion = simulate(k, no_torque, t, np.zeros(2), np.array([3.0, -1.0]))

@@ -1,4 +1,6 @@
-"""Logs of a case: schedules, rehearsals and controllers, against closed forms and the simulator by pieces."""
+"""Logs of a case: schedules, rehearsals and controllers, against closed forms and the simulator by
+pieces.
+"""
 
 from __future__ import annotations
 
@@ -190,13 +192,17 @@ def test_a_plan_is_read_with_or_without_the_loaded_torque(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("text", "found"),
     [
-        ("", f"expected {HEAD.replace(',', ', ')}, found no column t; give what algid design wrote"),
+        ("", (f"expected {HEAD.replace(',', ', ')}, found no column t; give what algid design "
+             "wrote")),
         (f"{HEAD[:-5]}\n0,1,2,3,4,5\n1,1,2,3,4,5\n", "found no column tau2"),
         (f"{HEAD}\n0,1,2,3,4,5,6\n", "found no motion"),
-        (f"{HEAD}\n0,1,2,3,4,5,6\n0,1,2,3,4,5,6\n", "finite numbers at increasing times; write the design anew"),
-        (f"{HEAD}\n0,1,2,3,4,5,nan\n1,1,2,3,4,5,6\n", "expected finite numbers at increasing times"),
+        (f"{HEAD}\n0,1,2,3,4,5,6\n0,1,2,3,4,5,6\n", ("finite numbers at increasing times; write "
+                                                    "the design anew")),
+        (f"{HEAD}\n0,1,2,3,4,5,nan\n1,1,2,3,4,5,6\n", ("expected finite numbers at increasing "
+                                                      "times")),
         (f"{HEAD}\n0,1,2,3,4,5\n1,1,2,3,4,5,6\n", "not the trajectory of a design ("),
-        (f"{HEAD}\n0,1,2,3,4,5,six\n", "not the trajectory of a design (could not convert string to float: 'six')"),
+        (f"{HEAD}\n0,1,2,3,4,5,six\n", ("not the trajectory of a design (could not convert string "
+                                       "to float: 'six')")),
     ],
 )  # fmt: skip
 def test_a_file_that_is_no_plan_is_refused(text: str, found: str, tmp_path: Path) -> None:
@@ -212,7 +218,9 @@ def test_a_file_that_is_no_plan_is_refused(text: str, found: str, tmp_path: Path
 
 @pytest.mark.slow
 def test_bent_links_and_a_body_at_the_tip_are_found_without_a_flag() -> None:
-    """Centres of mass 10° off both links, a payload of 5 cm radius of gyration: all within their intervals' reach."""
+    """Centres of mass 10° off both links, a payload of 5 cm radius of gyration: all within their
+    intervals' reach.
+    """
     arm = Arm(
         4.0, 2.5, 0.2, 0.15, 0.4, 0.35, 0.06, 0.03, 0.8, 0.5, 9.81, np.radians(10), np.radians(10)
     )

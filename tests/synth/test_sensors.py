@@ -1,4 +1,6 @@
-"""What sensors make of a motion: quantisation and noise against their statistics, with exact bounds."""
+"""What sensors make of a motion: quantisation and noise against their statistics, with exact
+bounds.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""The arm that a track weighs with: what it takes from a result, from the call, and from the log."""
+"""The arm that a track weighs with: what it takes from a result, from the call, and
+from the log.
+"""
 
 from __future__ import annotations
 

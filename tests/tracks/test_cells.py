@@ -261,7 +261,9 @@ def test_track_json_holds_what_was_found() -> None:
 
 
 def test_an_object_is_shaped_like_the_payload_that_was_identified() -> None:
-    """What a kilogram adds to the coefficients, with its offset and its inertia, in the complex form."""
+    """What a kilogram adds to the coefficients, with its offset and its inertia, in the complex
+    form.
+    """
     model = Model(("phases",))
     k = np.array(
         [0.1, 0.5, 0.2, 0.9, 0.4, 0.1, 0.1, 0.02, 0.1, 0.05]

@@ -1,4 +1,6 @@
-"""Where a payload changes: against exact dynamic programming, every placing tried, and variances in closed form."""
+"""Where a payload changes: against exact dynamic programming, every placing tried, and variances
+in closed form.
+"""
 
 from __future__ import annotations
 
@@ -149,7 +151,9 @@ def test_cells_without_information_do_not_stop_the_cut() -> None:
 
 @pytest.mark.parametrize("robust", [True, False])
 def test_white_rows_have_no_excess_and_slow_errors_have_theirs(robust: bool) -> None:
-    """Scores that are white but of nine times the variance have nine times the blocks' scatter, whatever the span."""
+    """Scores that are white but of nine times the variance have nine times the blocks' scatter,
+    whatever the span.
+    """
     rng = np.random.default_rng(0)
     A = rng.uniform(1, 3, 4000)
     B, whole = np.sqrt(A) * rng.standard_normal(4000), [(0, 4000)]
@@ -164,7 +168,9 @@ def test_white_rows_have_no_excess_and_slow_errors_have_theirs(robust: bool) -> 
 
 
 def test_errors_of_a_few_moments_are_in_the_mean_alone() -> None:
-    """As those of a friction's shape, which show where a joint turns back: one cell in 25 is five deviations off."""
+    """As those of a friction's shape, which show where a joint turns back: one cell in 25 is five
+    deviations off.
+    """
     rng = np.random.default_rng(3)
     A = np.ones(4000)
     B = rng.standard_normal(4000) + 5.0 * (np.arange(4000) % 25 == 0)

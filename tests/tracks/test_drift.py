@@ -16,7 +16,10 @@ MIDDLE = CELL * (np.arange(COUNT) + 0.5)
 
 
 def rows(change: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Y (C, ROWS, 3), columns of the payload and of two frictions, and e (C, ROWS); friction is up by `change` (C, 2)."""
+    """Y (C, ROWS, 3), columns of the payload and of two frictions, and e (C, ROWS).
+
+    Friction is up by `change` (C, 2).
+    """
     Y = rng.standard_normal((COUNT, ROWS, 3))
     truth = np.column_stack([MASSES, change])
     return Y, np.einsum("crq,cq->cr", Y, truth) + rng.standard_normal((COUNT, ROWS))

@@ -1,4 +1,6 @@
-"""A track's folder: the same digits everywhere, a page that opens offline, a log for other viewers."""
+"""A track's folder: the same digits everywhere, a page that opens offline, a log for other
+viewers.
+"""
 
 from __future__ import annotations
 

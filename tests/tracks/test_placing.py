@@ -44,7 +44,9 @@ def kept(log: Log, moments: tuple[float, ...], masses: tuple[float, ...]) -> lis
 
 
 def test_a_step_of_acceleration_is_seen_as_differences_see_it() -> None:
-    """Second differences of ½ (t − s)₊² itself, and of a motion whose acceleration has been there for long."""
+    """Second differences of ½ (t − s)₊² itself, and of a motion whose acceleration has been there
+    for long.
+    """
     dt, s = 2e-3, 0.0503
     t = dt * np.arange(60)
     seen = Stencil(dt).differences(np.tile(0.5 * np.maximum(t - s, 0.0) ** 2, (2, 1)))[2, 0]
@@ -106,7 +108,9 @@ def test_rows_do_not_depend_on_how_a_log_was_cut(picking: Log) -> None:
 
 
 def test_the_residual_of_the_arm_and_its_payload_is_white(picking: Log) -> None:
-    """Of variance one, on both sides of a change: its column explains what the payload adds, memory included."""
+    """Of variance one, on both sides of a change: its column explains what the payload adds,
+    memory included.
+    """
     log = noisy(picking, np.random.default_rng(4))
     (piece,) = (piece for _, piece in windows(segments([log]), [(0.5, 2.5)], 0.0))
     rows = rows_of(piece, ARM, None, [1.5], [0.0, 0.05])
@@ -137,7 +141,10 @@ def test_the_torques_of_a_cut_are_those_of_its_stretch(dt: float, shift: float) 
 
 @pytest.mark.parametrize("alike", [1, 200])
 def test_rows_that_err_alike_are_worth_as_much_less(alike: int) -> None:
-    """Errors that 200 rows share bring a score's variance to 200 times that of white rows; a change has to beat it."""
+    """Errors that 200 rows share bring a score's variance to 200 times that of white rows.
+
+    a change has to beat it.
+    """
     rng = np.random.default_rng(5)
     n = 3000
     t, g = 1e-3 * np.arange(n), np.ones((2, n))

@@ -56,7 +56,9 @@ def test_changes_of_50_g_are_found(picking: Log) -> None:
 
 @pytest.mark.slow
 def test_masses_lie_within_their_intervals() -> None:
-    """Those of stretches, and those of m_p(t) at two instants a stretch that have no cell in common."""
+    """Those of stretches, and those of m_p(t) at two instants a stretch that have no cell in
+    common.
+    """
     log = with_schedule(
         CASE,
         excitation(CASE, "wide"),
@@ -84,7 +86,8 @@ def test_masses_lie_within_their_intervals() -> None:
 def test_an_uncertain_arm_widens_the_intervals_by_what_moves_the_masses(
     picking: Log, drifts: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Constants and lengths off by a standard deviation in two directions: the masses' moves, squared and added.
+    """Constants and lengths off by a standard deviation in two directions: the masses' moves,
+    squared and added.
 
     Whether or not friction is free to follow.
     """

@@ -1,4 +1,6 @@
-"""MCAP files against the mcap library: its reader, with sums, and its own writer of the same messages."""
+"""MCAP files against the mcap library: its reader, with sums, and its own writer of the same
+messages.
+"""
 
 from __future__ import annotations
 
@@ -62,7 +64,9 @@ def facts(content: bytes) -> list[tuple[object, ...]]:
 
 
 def indexed(content: bytes) -> list[int]:
-    """The times of the messages that the chunks' indexes name, where a message stands at each place."""
+    """The times of the messages that the chunks' indexes name, where a message stands at each
+    place.
+    """
     summary = make_reader(io.BytesIO(content)).get_summary()
     assert summary is not None
     times = []

@@ -163,7 +163,13 @@ def nanoseconds(time: int) -> int:
 
 
 def _inside(content: bytes, place: int, end: int) -> Iterator[tuple[dict[str, bytes], int, int]]:
-    """Fields of each record within unpacked bytes, and where its data start and end; up to a record that breaks off."""
+    """Fields of each record within unpacked bytes, and where its data start and end.
+
+    Raises
+    ------
+    BrokenOffBagError
+        Where a record breaks off.
+    """
     while place < end:
         if place + 4 > end:
             raise BrokenOffBagError("a record breaks off")
@@ -288,6 +294,7 @@ def unpacked(packed: bytes, packing: str, size: int, *, torn: bool) -> bytes:
         raise BagError(f"a chunk cannot be unpacked ({error})") from error
     if len(found) != size and not torn:
         raise BagError(
-            f"a chunk of {counted(size, 'byte')} unpacks to {'more' if len(found) > size else len(found)}"
+            f"a chunk of {counted(size, 'byte')} unpacks to "
+            f"{'more' if len(found) > size else len(found)}"
         )
     return found

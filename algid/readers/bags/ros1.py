@@ -368,7 +368,10 @@ class Ros1Source(Source):
             messages = _of(found, channels)
             yield MessageBatch(messages, checked=True)
             if promised > len(messages):
-                reason = f"its index lists {counted(promised, 'message')} and it holds {len(messages)} {place}"
+                reason = (
+                    f"its index lists {counted(promised, 'message')} and it holds "
+                    f"{len(messages)} {place}"
+                )
                 yield MessageBatch(None, checked=True, reason=reason, lost=promised - len(messages))
 
     def _records(self, part: BagPart) -> tuple[ChunkMessages, Others]:

@@ -162,7 +162,10 @@ def _definitions(path: Path, base: sqlite3.Connection) -> dict[str, tuple[str, b
     _check_table(
         path, base, "message_definitions", {"topic_type", "encoding", "encoded_message_definition"}
     )
-    query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions NOT INDEXED"
+    query = (
+        "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions NOT "
+        "INDEXED"
+    )
     rows = itertools.islice(base.execute(query), LIMITS.bag_topics)
     return {str(kind): (str(encoding), str(text).encode()) for kind, encoding, text in rows if text}
 
@@ -216,9 +219,20 @@ class SqliteSource(Source):
         return self._left >= 0
 
     def batches(self, channels: frozenset[int]) -> Iterator[MessageBatch]:
-        """The messages of `channels` as they were recorded; at the end those rows that hold none, as one lost part."""
+        """The messages of `channels` as they were recorded.
+
+        At the end those rows that hold none, as one lost part.
+
+        Raises
+        ------
+        LogError
+            Where there are more messages than a file of this size can hold.
+        """
         numbers = ",".join(str(number) for number in sorted(channels))
-        query = f"SELECT timestamp, data FROM messages NOT INDEXED WHERE topic_id IN ({numbers}) ORDER BY rowid"
+        query = (
+            f"SELECT timestamp, data FROM messages NOT INDEXED WHERE topic_id IN ({numbers}) "
+            "ORDER BY rowid"
+        )
         stamps: list[int] = []
         payloads: list[bytes] = []
         size = odd = 0
@@ -234,7 +248,8 @@ class SqliteSource(Source):
             if size > _BATCH_BYTES or len(stamps) == _BATCH_ROWS:
                 if not self.works(len(stamps) // 2):
                     raise LogError(
-                        f"{self.path}: more messages than in any honest file of its size; copy it again"
+                        f"{self.path}: more messages than in any honest file of its size; copy it "
+                        "again"
                     )
                 yield MessageBatch(_gathered(stamps, payloads), checked=True)
                 stamps, payloads, size = [], [], 0

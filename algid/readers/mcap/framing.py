@@ -72,11 +72,18 @@ class File(OpenedFile):
         self._unpacked = self._work = 0
 
     def unpacks(self, size: int) -> None:
-        """Count bytes that a chunk claims to unpack to; `DamagedError` where no honest file of this size claims so."""
+        """Count bytes that a chunk claims to unpack to.
+
+        Raises
+        ------
+        DamagedError
+            Where no honest file of this size claims so much.
+        """
         self._unpacked += size
         if self._unpacked > LIMITS.free_unpacked_bytes + LIMITS.unpacked_a_byte * self.size:
             raise DamagedError(
-                f"the chunks of a file of {counted(self.size, 'byte')} claim {counted(self._unpacked, 'byte')} so far"
+                f"the chunks of a file of {counted(self.size, 'byte')} claim "
+                f"{counted(self._unpacked, 'byte')} so far"
             )
 
     def works(self, steps: int) -> bool:
@@ -311,12 +318,21 @@ def has_checksum(content: bytes) -> bool:
 
 
 def _decompressed(name: bytes, packed: memoryview, size: int, torn: bool) -> bytes:
-    """What is packed by the method `name`, in memory bounded by the `size` claimed; a torn one as far as it goes."""
+    """What is packed by the method `name`, in memory bounded by the `size` claimed.
+
+    A torn one is unpacked as far as it goes.
+
+    Raises
+    ------
+    DamagedError
+        Where the method is unknown or the bytes cannot be unpacked.
+    """
     if name == b"":
         return bytes(packed[:size] if torn else packed)
     if name not in (b"zstd", b"lz4"):
         raise DamagedError(
-            f"a chunk is packed with {name.decode(errors='replace')!r}; expected zstd, lz4 or nothing"
+            f"a chunk is packed with {name.decode(errors='replace')!r}; expected zstd, lz4 or "
+            "nothing"
         )
     import lz4.frame
     import zstandard

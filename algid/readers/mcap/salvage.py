@@ -68,7 +68,8 @@ def salvaged(file: File, start: int) -> Iterator[Record | Gap]:
                 others += record.code not in (framing.MESSAGE, framing.CHUNK, framing.MESSAGE_INDEX)
                 if others > LIMITS.file_records:
                     raise DamagedError(
-                        f"more than {LIMITS.file_records} records that are neither messages nor chunks"
+                        f"more than {LIMITS.file_records} records that are neither messages nor "
+                        "chunks"
                     )
                 yield record
                 if record.code == framing.FOOTER:

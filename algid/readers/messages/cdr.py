@@ -93,7 +93,8 @@ class _Walk:
         self.place += size
         if self.place > len(self.payload):
             raise MisfitError(
-                f"a message of {counted(len(self.payload), 'byte')} where its schema needs {self.place} at least"
+                f"a message of {counted(len(self.payload), 'byte')} where its schema needs "
+                f"{self.place} at least"
             )
 
     def possible(self, count: int, least: int) -> int:
@@ -117,7 +118,8 @@ def walk(payload: bytes, root: str, types: Types) -> Shape:
     representation = int.from_bytes(payload[:2], "big")
     if representation not in _ENDINGS:
         raise MisfitError(
-            f"the representation 0x{representation:04x}{' (XCDR2)' if 6 <= representation <= 11 else ''}; "
+            "the representation "
+            f"0x{representation:04x}{' (XCDR2)' if 6 <= representation <= 11 else ''}; "
             "expected plain CDR, 0x0000 or 0x0001"
         )
     shape = Shape()

@@ -93,7 +93,8 @@ def parse_msg(root: str, text: str, known: Types | None = None) -> Types:
 def _check_length(root: str, text: str) -> None:
     if len(text) > LIMITS.definition_letters:
         raise DefinitionError(
-            f"{root}: a definition of {counted(len(text), 'character')}; expected {LIMITS.definition_letters} at most"
+            f"{root}: a definition of {counted(len(text), 'character')}; expected "
+            f"{LIMITS.definition_letters} at most"
         )
 
 
@@ -136,7 +137,13 @@ def _resolved(field: Field, owner: str, types: Types) -> Field:
 
 
 def _check_depth(name: str, types: Types, known: dict[str, int], above: int = 0) -> int:
-    """Types below one another under `name`, each looked at once, however often it is used; too many are refused."""
+    """Types below one another under `name`, each looked at once, however often it is used.
+
+    Raises
+    ------
+    DefinitionError
+        Where types are nested too deep.
+    """
     if name not in known and above <= LIMITS.definition_depth:
         below = (
             _check_depth(field.type, types, known, above + 1)

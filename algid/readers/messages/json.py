@@ -41,7 +41,8 @@ def walk(payload: bytes) -> Shape:
 def _object(payload: bytes) -> dict[str, Any]:
     if len(payload) > LIMITS.json_bytes:
         raise MisfitError(
-            f"a JSON message of {counted(len(payload), 'byte')}; expected {LIMITS.json_bytes} at most"
+            f"a JSON message of {counted(len(payload), 'byte')}; expected {LIMITS.json_bytes} at "
+            "most"
         )
     try:
         found = json.loads(payload)

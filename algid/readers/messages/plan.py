@@ -224,7 +224,8 @@ def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
     each = Remedy({"tau1.topic": None, "tau1.source": None}, "or channel by channel")
     there = "; ".join([*dict.fromkeys(lacking)][:4]) or listed(source)
     raise NothingFoundError(
-        f"{source.path}: no topic holds {wanted}; found {there}; name topics and fields: {both}; {each}"
+        f"{source.path}: no topic holds {wanted}; found {there}; name topics and fields: {both}; "
+        f"{each}"
     )
 
 
@@ -269,7 +270,15 @@ def _fitting(topic: str, shape: Shape, joints: list[str], profile: Profile | Non
 
 
 def _candidates(source: Source, profile: Profile | None) -> list[tuple[str, str]]:
-    """Topics, each with a type of its messages, that may hold joint states; a profile's alone, where it names one."""
+    """Topics, each with a type of its messages, that may hold joint states.
+
+    A profile's alone, where it names one.
+
+    Raises
+    ------
+    LogError
+        Where several topics may hold them and no profile names one.
+    """
     places = kinds(source)
     if profile and profile.topic:
         return [place for place in places if place[0] == profile.topic]
@@ -355,5 +364,6 @@ def _shapes(source: Source, topic: str, type_name: str) -> Iterator[Shape]:
 def _work(source: Source, topic: str, steps: int) -> None:
     if not source.works(steps):
         raise LogError(
-            f"{source.path}: topic {topic!r}: messages or definitions of more parts than any recorder's"
+            f"{source.path}: topic {topic!r}: messages or definitions of more parts than any "
+            "recorder's"
         )

@@ -62,7 +62,8 @@ def parse(root: str, data: bytes) -> Types:
 
     if len(data) > LIMITS.definition_letters:
         raise DefinitionError(
-            f"{root}: a descriptor of {counted(len(data), 'byte')}; expected {LIMITS.definition_letters} at most"
+            f"{root}: a descriptor of {counted(len(data), 'byte')}; expected "
+            f"{LIMITS.definition_letters} at most"
         )
     try:
         found = {

@@ -156,7 +156,8 @@ class Topic:
                 ) from error
             if decoder.misfits > account.found / 2:
                 raise LogError(
-                    f"{path}: topic {self.name!r}: {decoder.misfit}; it cannot be read without guessing"
+                    f"{path}: topic {self.name!r}: {decoder.misfit}; it cannot be read without "
+                    "guessing"
                 )
             log_ns = batch.messages.log_ns
             parts.append(SampleTable(log_ns if held.all() else log_ns[held], columns))  # type: ignore[arg-type]
@@ -199,7 +200,8 @@ class Topic:
         if stamps is table.stamp_ns and len(table) and stamps.min() < 0:
             header_clock = Remedy({"clock": "header"}, "take the header's stamps")
             raise LogError(
-                f"{path}: topic {self.name!r}: a log time of 2^63 ns or more; expected ns since 1970; "
+                f"{path}: topic {self.name!r}: a log time of 2^63 ns or more; expected ns since "
+                "1970; "
                 f"{header_clock}"
             )
         floats = {name: np.asarray(values, np.float64) for name, values in columns.items()}
@@ -215,7 +217,8 @@ class Topic:
             if wrong.size:
                 log_clock = Remedy({"clock": "log"}, "take the recorder's times")
                 raise LogError(
-                    f"{path}: topic {self.name!r}: a header stamp with {values[wrong[0]]} for seconds "
+                    f"{path}: topic {self.name!r}: a header stamp with {values[wrong[0]]} for "
+                    "seconds "
                     f"or nanoseconds; expected whole numbers below 2^63 ns; {log_clock}"
                 )
         whole = np.floor(seconds)

@@ -26,7 +26,10 @@ def correlation(result: Result) -> Figure | Missing:
         )
     names = result.fit.covariance_names
     matrix = correlation_matrix(result.fit.covariance)
-    reading = "Read: a strong colour off the diagonal means two estimates err together: trust their combination first."
+    reading = (
+        "Read: a strong colour off the diagonal means two estimates err together: trust "
+        "their combination first."
+    )
     strong = np.argwhere(np.triu(np.abs(matrix) > STRONG, 1))
     pairs = [f"{names[i]} and {names[j]} ({matrix[i, j]:+.3f})" for i, j in strong]
     note = (

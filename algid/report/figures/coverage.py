@@ -29,7 +29,10 @@ def coverage(found: TorqueLog) -> Figure:
             " rad/s",
         ),
     )
-    reading = "Read: dots spread over both planes teach; a line or a spot leaves parameters tied to each other."
+    reading = (
+        "Read: dots spread over both planes teach; a line or a spot leaves parameters tied "
+        "to each other."
+    )
     note = f"θ1 {theta[0]}, θ2 {theta[1]}; speeds {omega[0]} and {omega[1]}."
     note += " Angles that turned round are shown within ±180°." if turned.any() else ""
     return Figure("coverage", "Coverage of the motion", panels, reading, note=note, columns=2)

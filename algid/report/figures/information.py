@@ -31,7 +31,10 @@ def information(path: Path, result: Result) -> Figure | Missing:
     x, gained, ranges = _summed(names, found)
     total = gained.sum(axis=1, keepdims=True)
     shares = 100 * np.divide(gained, total, out=np.zeros_like(gained), where=total > 0)
-    reading = "Read: strongly coloured seconds tell most; a row with colour in one place only rests on that moment."
+    reading = (
+        "Read: strongly coloured seconds tell most; a row with colour in one place only "
+        "rests on that moment."
+    )
     panel = information_panel(
         names, x, shares, SCALE, separators(ranges, offsets(ranges), result.logs)
     )
@@ -110,4 +113,7 @@ def _note(names: list[str], x: FloatArray, shares: FloatArray) -> str:
     if len(half) < 2 or x.size < 4:
         return ""
     poorest = min(half, key=lambda name: half[name])
-    return f"Half of what is known of {poorest} comes from {significant(100 * half[poorest], 2)} % of the time."
+    return (
+        f"Half of what is known of {poorest} comes from {significant(100 * half[poorest], 2)} "
+        "% of the time."
+    )

@@ -34,11 +34,13 @@ FAINT = 0.02  # a correlation below which the estimator's test takes colour not 
 HEIGHT = 260
 MILLI = 0.5  # s: lags that end before are shown in milliseconds
 WHITE_READING = (
-    "Read: white noise leaves 19 of 20 points and bars inside the blue band; a hump in the spectrum is motion that the "
+    "Read: white noise leaves 19 of 20 points and bars inside the blue band; a hump in the "
+    "spectrum is motion that the "
     "model misses, bars that start high and fall are an error slower than the sampling."
 )
 RAW_READING = (
-    "Read: a flat orange line far below grey is noise and a hump is motion that the model misses; bars inside the blue "
+    "Read: a flat orange line far below grey is noise and a hump is motion that the model misses; "
+    "bars inside the blue "
     "band, one window apart, are white."
 )
 RESIDUAL = Legend("residual", "the estimator's residual", "@orange")

@@ -32,7 +32,8 @@ HALF = "_half"
 HEIGHT = 210
 SETTLED = 4.0  # final half widths that the first view shows at least, either way
 READING = (
-    "Read: the band must shrink and the line stay inside what the band was before; a line that leaves it late tells "
+    "Read: the band must shrink and the line stay inside what the band was before; a line that "
+    "leaves it late tells "
     "of a part of the logs that contradicts the rest."
 )
 LEGEND = (

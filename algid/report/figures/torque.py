@@ -24,7 +24,10 @@ RAW = "as recorded"
 READING = (
     "Read: blue should cover grey, and orange should look like noise without a trace of the motion."
 )
-DIFFERENTIATED = "The prediction differentiates angles twice, and with them their noise: see Torque prediction above."
+DIFFERENTIATED = (
+    "The prediction differentiates angles twice, and with them their noise: see "
+    "Torque prediction above."
+)
 MEASURED, PREDICTED = (
     Legend("measured", "measured", "@measured"),
     Legend("predicted", "predicted by the model", "@blue"),
@@ -85,7 +88,8 @@ def _scored(found: TorqueLog, logs: list[LogSummary], scored: Scored) -> Figure:
         panels.append(_torque_panel(found, logs, joint, lines, says))
     whole = _shares(found)
     note = (
-        f"Residual{band}, which the table of predictions scores: joint 1 {shares[0]}; joint 2 {shares[1]}. "
+        f"Residual{band}, which the table of predictions scores: joint 1 {shares[0]}; joint 2 "
+        f"{shares[1]}. "
         f"As recorded: joint 1 {whole[0]}; joint 2 {whole[1]}."
     )
     if any(2 * left > rms for left, rms in zip(found.residual_rms, found.rms, strict=True)):
@@ -148,13 +152,24 @@ def closeup(path: Path, found: TorqueLog, logs: list[LogSummary]) -> Figure | Mi
     )
     if not panels:
         return Missing("closeup", CLOSEUP, "no torque is predicted")
-    reading = "Read: a residual that stands out once is an event, such as a knock; one like the rest is the model's limit."
+    reading = (
+        "Read: a residual that stands out once is an event, such as a knock; one like the "
+        "rest is the model's limit."
+    )
     legend = (MEASURED, PREDICTED, Legend("residual", "residual", "@orange"))
     return Figure("closeup", CLOSEUP, panels, reading, legend, columns=2)
 
 
 def _closeup_panel(path: Path, found: TorqueLog, joint: int, logs: list[LogSummary]) -> Panel:
-    """The stretch around the worst moment of a joint; only the file's row groups around it are read."""
+    """The stretch around the worst moment of a joint.
+
+    Only the file's row groups around it are read.
+
+    Raises
+    ------
+    ResultError
+        Where the file cannot be read.
+    """
     import polars as pl
 
     log, moment = found.worst[joint]
@@ -209,7 +224,10 @@ def signals(found: TorqueLog, logs: list[LogSummary]) -> Figure:
         lows, highs = zip(*(found.extremes[f"{name}{joint}"] for joint in (1, 2)), strict=True)
         says = f"{words} of both joints, {min(lows):.4g} to {max(highs):.4g} {unit}"
         panels.append(Panel(traces, layout, says, words, 200, "torque"))
-    reading = "Read: look for jumps, flat stretches and clipped tops; what is odd here is odd in every number above."
+    reading = (
+        "Read: look for jumps, flat stretches and clipped tops; what is odd here is odd in "
+        "every number above."
+    )
     legend = tuple(
         Legend(f"joint{joint}", f"joint {joint}", colour)
         for joint, colour in enumerate(COLOURS, start=1)

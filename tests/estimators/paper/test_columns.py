@@ -1,4 +1,6 @@
-"""The paper's integrals in closed form, its rows, and what windows and logs make of its estimates."""
+"""The paper's integrals in closed form, its rows, and what windows and logs make of its
+estimates.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ from algid.synth.cases import load_case
 def _by_sympy(
     t: FloatArray, q1: sp.Expr, q2: sp.Expr, torques: tuple[sp.Expr, sp.Expr]
 ) -> dict[str, FloatArray]:
-    """∫∫ t² of what stands beside each unknown of eq. (1), twice from nought, with no integration by parts."""
+    """∫∫ t² of what stands beside each unknown of eq. (1), twice from nought, with no integration
+    by parts.
+    """
     s = sp.Symbol("s")
     v1, v2 = sp.diff(q1, s), sp.diff(q2, s)
     signals = {
