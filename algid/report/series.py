@@ -1,6 +1,6 @@
-"""What the figures need of a convergence series, gathered in one pass of bounded memory.
+"""What the figures need of a convergence series and of `torque.parquet`.
 
-What the figures need of `torque.parquet`, gathered in one pass of bounded memory.
+Each is gathered in one pass of bounded memory.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.errors import ResultError
 from algid.methods import settles
 from algid.progress import Progress
 from algid.report.reduce import (
@@ -171,6 +172,7 @@ COLUMNS = (
     "tau1_predicted",
     "tau2_predicted",
 )
+MOTION = COLUMNS[2:6]
 SERIES = (*COLUMNS[2:], "residual1", "residual2")
 SCORED = ("tau1", "tau2", "tau1_predicted", "tau2_predicted")
 SCORED_POINTS = 1_200  # of a curve without anything fast in it
@@ -220,7 +222,10 @@ class TorqueLog:
 def read_torque(path: Path, progress: Progress | None = None) -> TorqueLog:
     """Read `path`, telling how far.
 
-    Raises `ResultError` where it cannot be read or lacks a column.
+    Raises
+    ------
+    ResultError
+        Where it cannot be read, lacks a column, or a column of the motion holds no number.
     """
     total = row_count(path)
     gathering = _Gathering(total)
@@ -228,6 +233,9 @@ def read_torque(path: Path, progress: Progress | None = None) -> TorqueLog:
         gathering.take(log, block)
         if progress is not None:
             progress("report", sum(span.samples for span in gathering.ranges.values()), total)
+    for name in MOTION:
+        if np.isnan(gathering.extremes.get(name, (0.0, 0.0))[0]):
+            raise ResultError(f"{path}: the column {name!r} holds no number; identify again")
     return gathering.result()
 
 
@@ -252,9 +260,7 @@ class _Gathering:
         reducers = self.reducers.setdefault(log, {name: MinMax(self.size) for name in SERIES})
         for name, reducer in reducers.items():
             reducer.feed(block["t"], block[name])
-        self.motion.feed(
-            np.stack([block[name] for name in ("theta1", "theta2", "omega1", "omega2")])
-        )
+        self.motion.feed(np.stack([block[name] for name in MOTION]))
         for name in SERIES:
             low, high = float(np.fmin.reduce(block[name])), float(np.fmax.reduce(block[name]))
             old = self.extremes.get(name, (low, high))

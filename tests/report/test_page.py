@@ -3,6 +3,7 @@ from __future__ import annotations
 import base64
 import gzip
 import hashlib
+import html
 import json
 import re
 import shutil
@@ -207,6 +208,15 @@ def test_a_log_without_prediction_has_its_torque_alone(folder: Path) -> None:
     text = write_report(folder).read_text(encoding="utf-8")
     assert "8,000 samples have no predicted torque" in text
     assert "Not shown: no torque is predicted" in text
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_motion_without_numbers_is_not_drawn(folder: Path) -> None:
+    path = folder / "torque.parquet"
+    lost = pl.lit(None, pl.Float64).alias("theta1")
+    pl.read_parquet(path).with_columns(lost).write_parquet(path)
+    text = write_report(folder).read_text(encoding="utf-8")
+    assert "the column 'theta1' holds no number" in html.unescape(text)
 
 
 def _ids(text: str) -> Iterator[str]:

@@ -15,7 +15,7 @@ TURN = 540.0  # degrees: an angle that spans more has turned round, and is shown
 def coverage(found: TorqueLog) -> Figure:
     """Samples of the motion, evenly spaced in time."""
     degrees = np.degrees(found.motion[:2])
-    turned = np.nanmax(degrees, axis=1) - np.nanmin(degrees, axis=1) > TURN
+    turned = np.fmax.reduce(degrees, axis=1) - np.fmin.reduce(degrees, axis=1) > TURN
     degrees = np.where(turned[:, None], (degrees + 180) % 360 - 180, degrees)
     theta = [_range(found, f"theta{joint}", np.degrees(1.0), "°") for joint in (1, 2)]
     omega = [_range(found, f"omega{joint}", 1.0, " rad/s") for joint in (1, 2)]
