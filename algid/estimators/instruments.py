@@ -248,7 +248,7 @@ _Piece = tuple[int, Segment, Windows]
 def _batches(
     sources: Sequence[Source], settings: WeakSettings, most: int | None
 ) -> Iterator[list[_Piece]]:
-    """Pieces with whole windows, those together that have the same windows and not too many samples."""
+    """Pieces with whole windows, those together that are alike and have not too many samples."""
     batch: list[_Piece] = []
     samples = 0
     for number, source in enumerate(sources):
@@ -265,32 +265,36 @@ def _batches(
 
 
 def _alike(one: Windows, other: Windows) -> bool:
-    return (one.dt, one.length, one.shift, one.bandwidth) == (
-        other.dt, other.length, other.shift, other.bandwidth,
-    )  # fmt: skip
+    """Whether windows have the same samples and steps, however long a sample is: no clock is another's."""
+    return (one.step, _stride(one.dt)) == (other.step, _stride(other.dt))
+
+
+def _stride(dt: float) -> int:
+    """Samples that a step of the simulation spans: every window is a multiple of it."""
+    return int(np.clip(2 ** np.floor(np.log2(max(_STEP / dt, 1.0))), 2, OVERLAP))
 
 
 def _side_by_side(
     batch: Sequence[_Piece], settings: WeakSettings, c: FloatArray
 ) -> Iterator[tuple[FloatArray, NDArray[np.bool_], bool]]:
     """Of each piece instruments and columns (2, 2 q + 1, R), good windows (R,), and whether `c` moves the arm."""
-    windows = batch[0][2]
-    linear = c[: len(settings.model.names)]
-    columns = [
-        windows.equations(settings.model, piece, settings.estimate_delay, linear)[:, :, ::_STRIDE]
-        for _, piece, _ in batch
-    ]
-    cut = [_cut(piece, windows) for _, piece, _ in batch]
+    model = settings.model
+    linear = c[: len(model.names)]
+    cut = [_cut(piece, windows) for _, piece, windows in batch]
+    counts = [angles.shape[1] for angles, *_ in cut]
+    dt = np.repeat([windows.dt for _, _, windows in batch], counts)
     together = (np.concatenate(part, axis=1) for part in zip(*cut, strict=True))
-    motion, good, moves = _simulated(settings.model, linear, windows, *together)
-    plain = Windows(windows.dt, windows.length, 0.0, None)
-    Z = plain.equations(settings.model, motion, settings.estimate_delay, linear)[:, :-1, ::OVERLAP]
+    moved = _simulated(model, linear, dt, *together)
     last = 0
-    for X, (_, piece, _) in zip(columns, batch, strict=True):
-        own = slice(last, last := last + X.shape[2])
-        both = np.concatenate([Z[:, :, own], X], axis=1)
+    for (_, piece, windows), count in zip(batch, counts, strict=True):
+        own = slice(last, last := last + count)
+        columns = windows.equations(model, piece, settings.estimate_delay, linear)
+        plain = Windows(windows.dt, windows.length, 0.0, None)
+        motion = moved.end_to_end(own, windows.dt)
+        Z = plain.equations(model, motion, settings.estimate_delay, linear)[:, :-1, ::OVERLAP]
+        both = np.concatenate([Z, columns[:, :, ::_STRIDE]], axis=1)
         both = np.where(_moving(windows, piece, settings)[:, None], both, 0.0)
-        yield both, good[own], bool(np.all(moves[own]))
+        yield both, moved.good[own], bool(np.all(moved.moves[own]))
 
 
 def _moving(windows: Windows, piece: Segment, settings: WeakSettings) -> NDArray[np.bool_]:
@@ -316,26 +320,48 @@ def _cut(piece: Segment, windows: Windows) -> tuple[FloatArray, FloatArray, Floa
     return *_started(piece, windows, starts), tau, piece.theta[:, instants[:, :-1]]
 
 
+@dataclass(frozen=True, eq=False)
+class _Simulated:
+    """The motion that R windows of L samples would have had.
+
+    Parameters
+    ----------
+    theta, omega, tau : (2, R, L)
+    good : (R,), windows that have not run away
+    moves : (R,), windows on which the mass matrix is positive definite
+    """
+
+    theta: FloatArray
+    omega: FloatArray
+    tau: FloatArray
+    good: NDArray[np.bool_]
+    moves: NDArray[np.bool_]
+
+    def end_to_end(self, own: slice, dt: float) -> Segment:
+        """Some of the windows, of samples `dt` s apart, one after another."""
+        theta, tau, omega = (
+            signal[:, own].reshape(2, -1) for signal in (self.theta, self.tau, self.omega)
+        )
+        return Segment(0.0, dt, theta, tau, omega)
+
+
 def _simulated(
     model: Model,
     c: FloatArray,
-    windows: Windows,
+    dt: FloatArray,
     theta: FloatArray,
     omega: FloatArray,
     tau: FloatArray,
     measured: FloatArray,
-) -> tuple[Segment, NDArray[np.bool_], NDArray[np.bool_]]:
-    """The motion that windows cut from logs would have had, end to end.
-
-    Also which windows (R,) have not run away, and on which the mass matrix is positive definite.
+) -> _Simulated:
+    """The motion that windows cut from logs would have had, of samples `dt` (R,) s apart.
 
     Runge-Kutta's fourth order in steps of some `_STEP` s, all windows side by side, from the
     measured start. (To start earlier, so that what the unmodelled torque did before has faded,
     made the instruments too weak.)
     """
-    # Samples that a step spans: every window is a multiple of it.
-    stride = int(np.clip(2 ** np.floor(np.log2(max(_STEP / windows.dt, 1.0))), 2, OVERLAP))
-    h = stride * windows.dt
+    stride = _stride(float(dt[0]))
+    h = stride * dt
     inside = np.arange(stride) / stride
     acts = np.ascontiguousarray(
         np.moveaxis(tau[:, :, :: stride // 2], 2, 0)
@@ -360,10 +386,7 @@ def _simulated(
     moves = _inert(model, c, thetas[:, :, ::stride])
     # A window that ran away is left out; products of its velocities would overflow.
     thetas[:, ~good], omegas[:, ~good] = 0.0, 0.0
-    angles, torques, velocities = (
-        signal.reshape(2, -1) for signal in (thetas, tau[:, :, :-1], omegas)
-    )
-    return Segment(0.0, windows.dt, angles, torques, velocities), good, moves
+    return _Simulated(thetas, omegas, tau[:, :, :-1], good, moves)
 
 
 def _cubic(

@@ -136,8 +136,9 @@ def test_windows_are_simulated_to_the_order_of_their_torque(late: float, order: 
         piece = Segment(0.0, dt, motion.theta, tau, motion.omega)
         windows = Windows(dt, 0.32, shift, None)
         cut = instruments._cut(piece, windows)
-        simulated, good, _ = instruments._simulated(Model(), k, windows, *cut)
-        assert (simulated.start, simulated.dt) == (0.0, dt)
+        every = np.full(cut[0].shape[1], dt)
+        moved = instruments._simulated(Model(), k, every, *cut)
+        simulated, good = moved.end_to_end(slice(None), dt), moved.good
         length, first = 8 * windows.step, windows.margin
         starts = first + 2 * windows.step * np.arange(good.size)
         at = (starts[:, None] + np.arange(length)).ravel()
@@ -161,11 +162,12 @@ def test_coefficients_that_move_no_arm_and_windows_that_run_away_are_told(bench:
     k, log = bench.arm.constants(), bench.log()
     windows = Windows(log.dt, 0.2, 0.0, None)
     cut = instruments._cut(log, windows)
-    assert not instruments._simulated(Model(), -k, windows, *cut)[2].any()
+    every = np.full(cut[0].shape[1], log.dt)
+    assert not instruments._simulated(Model(), -k, every, *cut).moves.any()
     wild = k * np.array([1, 1, 1, 1, 1, -500, -500])
-    _, good, moves = instruments._simulated(Model(), wild, windows, *cut)
-    assert not good.any()
-    assert moves.all()
+    ran = instruments._simulated(Model(), wild, every, *cut)
+    assert not ran.good.any()
+    assert ran.moves.all()
     assert instruments.moments([lambda: [log]], WeakSettings(), -k) == [None]
     (found,) = instruments.moments([lambda: [log]], WeakSettings(), wild)
     assert found is not None
@@ -224,12 +226,15 @@ def test_of_a_long_log_the_first_pieces_are_looked_at(
 
 
 def test_logs_side_by_side_have_the_sums_that_each_has_alone(bench: Bench) -> None:
-    """Also where rates differ, so that their windows cannot be simulated together."""
+    """Also where rates differ, so that their windows cannot be simulated together, or clocks a little."""
     k, log = bench.arm.constants(), bench.log()
+    drifting = replace(log, dt=1.001 * log.dt)
     slower = Segment(0.0, 2 * log.dt, log.theta[:, ::2], log.tau[:, ::2])
     short = Segment(0.0, log.dt, log.theta[:, :3000], log.tau[:, :3000])
     none = Segment(0.0, log.dt, log.theta[:, :50], log.tau[:, :50])
-    sources: list[Source] = [partial(list, [one]) for one in (log, short, slower, none, log)]
+    sources: list[Source] = [
+        partial(list, [one]) for one in (log, drifting, short, slower, none, log)
+    ]
     together = instruments.moments(sources, WeakSettings(), k)
     for source, found in zip(sources, together, strict=True):
         (alone,) = instruments.moments([source], WeakSettings(), k)
