@@ -8,6 +8,7 @@ is the state kept here.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
@@ -117,6 +118,12 @@ class LogEvidence:
     def refuted(self) -> bool:
         """Whether the torque's error is no white noise: far above what neighbouring samples differ by."""
         return bool(np.any(self.noise.tau > np.maximum(_EXCESS * self._sensor, self._least)))
+
+    def untrained(self) -> LogEvidence:
+        """The log as it is now, whose training changes nothing of this one."""
+        own = copy(self)
+        own._trajectories = list(self._trajectories)
+        return own
 
     def train(self, c: FloatArray) -> Outcome:
         """Linearise the training set at the coefficients `c`; keeps the trajectories found."""

@@ -39,6 +39,8 @@ _SETTLED = 0.02  # change of every parameter in its standard deviations
 _NOISE_SETTLED = 0.2  # change of every log variance in its standard deviations
 _FAR = 3.0  # standard deviations of the training set beyond which the last step is repeated
 _PASSES = 4
+_MANY = 4  # logs of which one is tried alone before all of them are
+_GROWING = 1.5  # factor of a torque's error in a step: a step makes at most e of it
 _ANCHOR = 1e-3  # of a parameter's size: how firmly a direction without information is held
 
 
@@ -131,11 +133,15 @@ def fit(
                 f"no {which} log is long enough for the likelihood: expected at least {SHORTEST} "
                 "samples without a gap"
             )
+    refuted = start.noted(Notice("REFUTED", numbers={"kept": start.estimator}))
     try:
+        if len(logs) >= _MANY and (
+            steps := _refuted_alone(shared, logs[0], start.values, settings)
+        ):
+            return replace(refuted, iterations=steps)
         beta, outcomes, iterations, end = _train(shared, logs, start.values, settings, progress)
         if end == "refuted":
-            refuted = Notice("REFUTED", numbers={"kept": start.estimator})
-            return replace(start.noted(refuted), iterations=iterations)
+            return replace(refuted, iterations=iterations)
         settled = end == "settled" and bool(np.all(np.isfinite(beta)))
         if settled and not all(log.whole for log in logs):
             beta, outcomes = _finish(shared, logs, beta, settings)
@@ -234,6 +240,26 @@ def _train(
         if iteration > 1 and moved < _SETTLED and improved < _NOISE_SETTLED:
             return beta, outcomes, iteration, "settled"
     return beta, outcomes, _STEPS, "unsettled"
+
+
+def _refuted_alone(
+    shared: Shared, log: LogEvidence, beta: FloatArray, settings: RefinedSettings
+) -> int:
+    """Steps after which a log by itself refutes the likelihood; 0 where it does not.
+
+    With parameters of its own it is explained better than with those of all logs: what it refutes
+    alone, it refutes among others. It is given up once its torque's error stops growing.
+    """
+    log = log.untrained()
+    for step in range(1, _NOISE_STEPS + 1):
+        outcome, before = log.train(shared.coefficients(beta, log.loaded)), log.noise.tau
+        beta, _, _ = combine(shared, [outcome.information], beta, settings.prior)
+        log.improve_noise(outcome)
+        if log.refuted:
+            return step
+        if float(np.max(log.noise.tau / before)) < _GROWING:
+            return 0
+    return 0
 
 
 def _finish(
