@@ -11,7 +11,7 @@ since a real one falls with speed at first (Stribeck).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice, product
@@ -46,6 +46,9 @@ _EACH = 10.0  # s of each of several logs, at least
 _SHORTEST = 6 * WINDOW  # of motion
 _QUARTERS = (0.0, 0.5 * pi, pi, -0.5 * pi)
 _SHIFTED = 3  # conventions, of the best, whose zeros are set free
+_REACH, _SETTLED = 0.2, 1e-5  # rad, of the grid on which free zeros are sought
+_MOST_GRIDS = 100
+_GRID = np.array(list(product((0.0, -0.5, 0.5, -1.0, 1.0), repeat=2)))  # its middle first
 _SCALES = (0.1, 400.0)  # from turns (0.16) to the motors behind large gears
 _WIDEST = 40.0  # rad: no scale is tried under which a joint would move further
 _EXACT = (180 / pi, 1 / (2 * pi), *range(2, 401))
@@ -242,6 +245,24 @@ class _Windowed:
         return joint, base
 
 
+def _least(scores: Callable[[FloatArray], FloatArray], start: FloatArray) -> FloatArray:
+    """Where a function of two angles (Z, 2) is least near `start` (2,), in rad.
+
+    On a grid around the best point so far, which shrinks where none of its points is better. (A
+    minimiser of scipy's does the same; to import it takes longer than the whole search.)
+    """
+    reach, best = _REACH, start
+    for _ in range(_MOST_GRIDS):
+        points = best + reach * _GRID
+        least = points[int(np.argmin(scores(points)))]
+        if np.all(np.abs(least - best) < 0.75 * reach):
+            reach *= 0.5
+        best = least
+        if reach < _SETTLED:
+            break
+    return best
+
+
 class _Trials:
     """Logs, mapped and fitted under any convention."""
 
@@ -325,19 +346,11 @@ class _Trials:
         c = self._free @ solved(sums, [family], self._free[None])[0][0]
         start = np.array([np.arctan2(c[6], c[5]), np.arctan2(c[1], c[0])])
 
-        def score(zero: FloatArray) -> float:
-            return float(
-                _sizes(solved(sums, [family], self._place((zero[0], zero[1]))[None])[1][0])
-            )
+        def scores(zeros: FloatArray) -> FloatArray:
+            T = np.stack([self._place((one, two)) for one, two in zeros.tolist()])
+            return _sizes(solved(sums, [family], T)[1])
 
-        from scipy.optimize import minimize
-
-        best = minimize(
-            score,
-            start,
-            method="Nelder-Mead",
-            options={"xatol": 1e-4, "fatol": 1e-3, "maxiter": 200},
-        ).x
+        best = _least(scores, start)
         return remainder(float(best[0]), 2 * pi), remainder(float(best[1]), 2 * pi)
 
     def _scaled(self, joints: tuple[int, int]) -> Convention | None:

@@ -15,6 +15,7 @@ from algid.estimators.convention_search import (
     Judgement,
     Recorded,
     _demands,
+    _least,
     judge,
     judge_together,
 )
@@ -251,3 +252,17 @@ def test_demands_are_in_standard_deviations(gravity: bool) -> None:
             expected["k1 k2 > 0"] = np.sign(k1 * k2) * min(abs(k1), abs(k2))
         found = _demands(dict(zip(names, c.tolist(), strict=True)), covariance, speed)
         assert found == pytest.approx(expected, rel=1e-5)
+
+
+@pytest.mark.parametrize("start", [(0.0, 0.0), (1.0, -1.0)])
+def test_two_angles_are_found_where_a_function_of_both_is_least(
+    start: tuple[float, float],
+) -> None:
+    """A narrow valley across both axes, whose lowest point is known."""
+
+    def valley(at: FloatArray) -> FloatArray:
+        along, across = at[:, 0] + at[:, 1] - 0.3, at[:, 0] - at[:, 1] + 0.7
+        return 0.01 * np.square(along) + np.square(across)
+
+    found = _least(valley, np.array(start))
+    np.testing.assert_allclose(found, [-0.2, 0.5], atol=1e-4)

@@ -162,7 +162,9 @@ def test_one_log_of_many_refutes_the_likelihood_of_all(bench: Bench, place: int)
 def test_to_try_one_log_of_many_changes_nothing(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    logs = [partial(list, [bench.log(sigma=1e-4, seed=seed)]) for seed in range(4)]
+    logs: list[weak.Source] = [
+        partial(list, [bench.log(sigma=1e-4, seed=seed)]) for seed in range(4)
+    ]
     tried = refined.fit(logs)
     monkeypatch.setattr(refined, "_MANY", 5)
     together = refined.fit(logs)
