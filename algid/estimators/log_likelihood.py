@@ -8,7 +8,6 @@ is the state kept here.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from copy import copy
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
@@ -119,11 +118,14 @@ class LogEvidence:
         """Whether the torque's error is no white noise: far above what neighbouring samples differ by."""
         return bool(np.any(self.noise.tau > np.maximum(_EXCESS * self._sensor, self._least)))
 
-    def untrained(self) -> LogEvidence:
-        """The log as it is now, whose training changes nothing of this one."""
-        own = copy(self)
-        own._trajectories = list(self._trajectories)
-        return own
+    @property
+    def state(self) -> tuple[NoiseLevels, list[FloatArray]]:
+        """Noise levels and trajectories: what training changes."""
+        return self.noise, list(self._trajectories)
+
+    def restore(self, state: tuple[NoiseLevels, list[FloatArray]]) -> None:
+        """Forget what was trained since the log had this `state`."""
+        self.noise, self._trajectories = state[0], list(state[1])
 
     def train(self, c: FloatArray) -> Outcome:
         """Linearise the training set at the coefficients `c`; keeps the trajectories found."""

@@ -250,15 +250,20 @@ def _refuted_alone(
     With parameters of its own it is explained better than with those of all logs: what it refutes
     alone, it refutes among others. It is given up once its torque's error stops growing.
     """
-    log = log.untrained()
-    for step in range(1, _NOISE_STEPS + 1):
-        outcome, before = log.train(shared.coefficients(beta, log.loaded)), log.noise.tau
-        beta, _, _ = combine(shared, [outcome.information], beta, settings.prior)
-        log.improve_noise(outcome)
-        if log.refuted:
-            return step
-        if float(np.max(log.noise.tau / before)) < _GROWING:
-            return 0
+    untrained = log.state
+    try:
+        for step in range(1, _NOISE_STEPS + 1):
+            outcome, before = log.train(shared.coefficients(beta, log.loaded)), log.noise.tau
+            beta, _, _ = combine(shared, [outcome.information], beta, settings.prior)
+            log.improve_noise(outcome)
+            if log.refuted:
+                return step
+            if float(np.max(log.noise.tau / before)) < _GROWING:
+                break
+    except np.linalg.LinAlgError:  # it leaves open what others may tell
+        return 0
+    finally:
+        log.restore(untrained)
     return 0
 
 
